@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+/// @file accumulator.h
+/// The only thing that runs per sample: the shift-structured Gram matrix of lagged samples.
+///
+/// For a run of consecutive samples the sums S_b = sum_n v_n v_(n-b)^T, b = 0..p, and the p samples at each end of the run
+/// determine the whole Gram matrix of [v_n; v_(n-1); ..; v_(n-p)] (paper eq. 36-38 without the zeros of eq. 38, which
+/// would be wrong for a structure that already moves). Cost: 2 m^2 (p+1) flop a sample, whatever q is.
+///
+/// Samples stand in *slots*: a slot is an unbroken piece of the record (at most `block` samples where a window or
+/// forgetting is asked for). A gap closes a slot. Closed slots either stay in a ring (window, `slots` > 0) and fall out
+/// of it whole, or are folded into the base sums, which need the edge Gram of q^2/2 numbers (`edges` = 1).
+/// Samples wait in a small buffer until the kernel can take many at once, so that the result does not depend, to the
+/// last bit, on how a record was cut into calls, double samples included.
+///
+/// Codes (int16) are summed exactly: any split of a record into calls gives bit-equal results. The bound: a product of
+/// two 16-bit codes is at most 2^30; the kernel sums up to 2^22 of them in double (2^52 < 2^53, exact) before adding
+/// them to int64, which holds 2^32 rows (2^62 < 2^63); OKID_ERR_RANGE stands before that could fail.
+#ifndef OKID_ACCUMULATOR_H
+#define OKID_ACCUMULATOR_H
+
+#include <okid/types.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// What the samples are.
+typedef enum okid_sample_t {
+    OKID_SAMPLE_DOUBLE = 0, ///< double samples, double sums
+    OKID_SAMPLE_INT16 = 1   ///< int16 ADC codes, exact integer sums
+} okid_sample_t;
+
+/// One recursive accumulator. Private; lives inside the block given to okid_accumulator_create(). It holds offsets, no
+/// pointers: a memcpy of the block is a snapshot.
+typedef struct okid_accumulator okid_accumulator_t;
+
+typedef struct okid_accumulator_config_t {
+    int32_t n_u;          ///< inputs, >= 0
+    int32_t n_y;          ///< outputs, >= 1; n_u + n_y <= 256
+    int32_t lags;         ///< p, 1..4096
+    okid_sample_t sample; ///< what add() takes
+    int32_t block;        ///< rows after which a slot closes; 0 = only at gaps
+    int32_t slots;        ///< sliding window of slots * block sample periods (closed slots); 0 = growing. Needs block
+    double forgetting;    ///< lambda in (0, 1] per sample, applied between blocks; 1 = infinite memory. Needs block, edges
+    int32_t edges;        ///< 1 = room for the edge Gram: gaps, several records, merge, forgetting; 0 = one unbroken run
+    int32_t spare_slots;  ///< window only: further slots, because each gap closes one early; full = the window shortens
+} okid_accumulator_config_t;
+
+/// Counts since create or reset.
+typedef struct okid_accumulator_stats_t {
+    int64_t samples;   ///< samples absorbed, missing ones not counted
+    int64_t missing;   ///< samples missing (NaN, infinite, or told by okid_accumulator_gap)
+    int64_t gaps;      ///< runs of missing samples that broke a run
+    int64_t saturated; ///< codes at full scale
+    int64_t rows;      ///< regression rows now in the sums (window: of the window); each run gives its samples less p
+    int64_t dropped;   ///< rows lost because edges = 0 and a second run began (the older run was dropped)
+} okid_accumulator_stats_t;
+
+/// Bytes okid_accumulator_create() needs (alignment slack included); 0 when the configuration is invalid.
+OKID_API size_t okid_accumulator_memsize(const okid_accumulator_config_t* config);
+
+/// Lay an accumulator out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_create(okid_accumulator_t** self,
+                                                              const okid_accumulator_config_t* config, void* block,
+                                                              size_t bytes);
+
+/// Forget everything; the units stay.
+OKID_API void okid_accumulator_reset(okid_accumulator_t* self);
+
+/// Engineering units of each channel, applied when the Gram matrix is made: value = scale * code + offset.
+/// @param scale, offset  m numbers each; offset may be NULL (all 0)
+OKID_API void okid_accumulator_set_units(okid_accumulator_t* self, const double* scale, const double* offset);
+
+/// Absorb a block of samples. O(m^2 (p+1)) per sample, no heap, no system call. On error the state is unchanged.
+/// A sample with a NaN or infinite channel is missing as a whole: counted, the run ends, the next run re-arms.
+/// @param samples  in, column-major m x count; row order: inputs, then outputs
+/// @return OKID_OK, OKID_WARN_MISSING, OKID_ERR_NULL, OKID_ERR_MISMATCH (created for codes)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add(okid_accumulator_t* self, const double* samples, size_t count);
+
+/// The same for 16-bit codes, summed exactly. @return also OKID_WARN_SATURATED, OKID_ERR_RANGE
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i16(okid_accumulator_t* self, const int16_t* codes,
+                                                               size_t count);
+
+/// Mark `count` missing samples: the run ends here. A gap of 0 samples separates two records.
+OKID_API void okid_accumulator_gap(okid_accumulator_t* self, int64_t count);
+
+/// Add all of `other` to `self` as further records (exact for codes). Both need edges = 1, slots = 0, the same n_u, n_y,
+/// lags and sample type. The open run of `self` ends; `other` keeps its content. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_RANGE
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_t* other);
+
+OKID_API void okid_accumulator_stats(const okid_accumulator_t* self, okid_accumulator_stats_t* out);
+OKID_API void okid_accumulator_config(const okid_accumulator_t* self, okid_accumulator_config_t* out);
+
+/// Regression rows now in the sums (stats.rows, cheaper).
+OKID_API int64_t okid_accumulator_rows(const okid_accumulator_t* self);
+
+/// The Gram matrix of the lagged samples w_n = [v_n; v_(n-1); ..; v_(n-p)] over all rows, in engineering units.
+/// @param detrend  OKID_DETREND_MEAN centres every lag row by its own mean
+/// @param gram     out, column-major, m(p+1) x m(p+1), symmetric, both triangles filled
+/// @param mean     out, m means of the lag-0 rows in engineering units, may be NULL
+/// Cost O((m p)^2 (1 + slots)). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_TOO_SHORT (no rows)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t detrend,
+                                                            double* gram, double* mean);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+/// @file okid.h
+/// All of the library.
+#ifndef OKID_H
+#define OKID_H
+#include <okid/accumulator.h>
+#include <okid/era.h>
+#include <okid/identify.h>
+#include <okid/markov.h>
+#include <okid/modal.h>
+#include <okid/model.h>
+#include <okid/observer.h>
+#include <okid/types.h>
+#endif

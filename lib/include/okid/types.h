@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+/// @file types.h
+/// Status codes, export macros and the conventions every okid header follows.
+///
+/// Matrices are column-major everywhere. Sizes: n_u inputs, n_y outputs, n_x degrees of freedom, n_z states,
+/// m = n_u + n_y channels, p lags of the observer (ARX order), q = n_u + p m regressors.
+/// A sample v_n = [u_n; y_n] is m numbers, inputs first (paper eq. 23).
+/// Memory is the caller's: X_memsize() says how much, X_create() lays an object out in it, nothing is ever freed.
+#ifndef OKID_TYPES_H
+#define OKID_TYPES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(_WIN32)
+#define OKID_API
+#else
+#define OKID_API __attribute__((visibility("default")))
+#endif
+#define OKID_NODISCARD __attribute__((warn_unused_result))
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// 0 ok; < 0 error and nothing changed; > 0 warning with a valid result.
+typedef enum okid_status_t {
+    OKID_OK = 0,
+    OKID_WARN_MISSING = 1,    ///< some samples were missing (NaN): counted, the lag window re-arms after them
+    OKID_WARN_SATURATED = 2,  ///< some codes stood at full scale: absorbed and counted
+    OKID_WARN_MODEL = 3,      ///< a model was identified, with remarks: see okid_identified_t::warnings
+    OKID_ERR_NULL = -1,       ///< a required pointer is NULL
+    OKID_ERR_DIM = -2,        ///< a size is outside its documented range
+    OKID_ERR_MEMORY = -3,     ///< the caller's block is smaller than X_memsize()
+    OKID_ERR_MISMATCH = -4,   ///< two objects, or an object and a call, do not fit each other
+    OKID_ERR_RANGE = -5,      ///< an exact sum would leave its proven range
+    OKID_ERR_TOO_SHORT = -6,  ///< fewer usable rows than unknowns
+    OKID_ERR_INPUT = -7,      ///< an input is constant: it excites nothing
+    OKID_ERR_OUTPUT = -8,     ///< an output is constant: it measures nothing
+    OKID_ERR_EXCITATION = -9, ///< the inputs together do not excite enough to separate the unknowns
+    OKID_ERR_NUMERIC = -10,   ///< a factorisation did not converge
+    OKID_ERR_UNSTABLE = -11,  ///< no ridge on the grid gives a stable ARX model
+    OKID_ERR_NO_MODES = -12   ///< the model has no underdamped mode below Nyquist
+} okid_status_t;
+
+/// One line of English for a status; never NULL.
+OKID_API const char* okid_status_text(okid_status_t status);
+
+/// Library version, "major.minor.patch".
+OKID_API const char* okid_version(void);
+
+/// Which linear algebra stands behind the library: "lapacke" or "eigen".
+OKID_API const char* okid_backend(void);
+
+/// What is removed from the record before identification.
+typedef enum okid_detrend_t {
+    OKID_DETREND_NONE = 0,
+    OKID_DETREND_MEAN = 1 ///< each lag row is centred by its own mean (numerics: offsets without a second pass)
+} okid_detrend_t;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

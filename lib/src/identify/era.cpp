@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    eigensystem realization from system Markov parameters
+// METHOD     SVD of H(0); R^T H(1) S once for every order that will be asked for; observer gain by least squares through
+//            the identified observability matrix
+// REFERENCE  paper eq. (43)-(54); Juang and Pappa (1985); EMAC: Pappa, Elliott, Schenk (1993)
+// NUMERICS   the columns of H hold Y_k only: with Y0_k the truncation mixes noise modes in (trap 1)
+// WORKSPACE  2 H-sized matrices, the factors and LAPACK's; an SVD of (r n_y) x (c n_u) and 2 r n_y c n_u k flop
+#include <okid/era.h>
+
+#include "linalg/arena.hpp"
+#include "linalg/linalg.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+using std::size_t;
+
+struct okid_era {
+    okid_era_config_t config;
+    int height, breadth, rank; // of H: r n_y, c n_u, min of both
+    double *hankel, *left, *values, *right, *work, *product, *core, *rotated;
+};
+
+namespace {
+
+size_t lay_out(okid_era& e, okid::arena& memory) {
+    const auto height = static_cast<size_t>(e.height), breadth = static_cast<size_t>(e.breadth), rank = static_cast<size_t>(e.rank);
+    e.hankel = memory.take<double>(height * breadth);
+    e.left = memory.take<double>(height * rank);
+    e.values = memory.take<double>(rank);
+    e.right = memory.take<double>(rank * breadth);
+    e.work = memory.take<double>(okid::linalg::svd_work(e.height, e.breadth));
+    e.product = memory.take<double>(height * std::max(rank, static_cast<size_t>(e.config.n_y)));
+    e.core = memory.take<double>(rank * rank);
+    e.rotated = memory.take<double>(rank * static_cast<size_t>(e.config.n_y));
+    return memory.bytes();
+}
+
+bool valid(const okid_era_config_t& c) { return c.n_u >= 1 && c.n_y >= 1 && c.rows >= 1 && c.cols >= 1; }
+
+okid_era plan(const okid_era_config_t& c) {
+    okid_era e{};
+    e.config = c;
+    e.height = c.rows * c.n_y;
+    e.breadth = c.cols * c.n_u;
+    e.rank = std::min(e.height, e.breadth);
+    return e;
+}
+
+/// H(shift): block (i, j) = Y_(i + j + 1 + shift).
+void fill_hankel(okid_era& e, const double* markov, int shift) {
+    const int ny = e.config.n_y, nu = e.config.n_u;
+    for (int j = 0; j < e.config.cols; ++j)
+        for (int c = 0; c < nu; ++c) {
+            double* column = e.hankel + static_cast<size_t>(j * nu + c) * static_cast<size_t>(e.height);
+            for (int i = 0; i < e.config.rows; ++i) {
+                const double* y = markov + (static_cast<size_t>(i + j + 1 + shift) * static_cast<size_t>(nu) + static_cast<size_t>(c)) * static_cast<size_t>(ny);
+                std::copy(y, y + ny, column + static_cast<size_t>(i * ny));
+            }
+        }
+}
+
+} // namespace
+
+size_t okid_era_memsize(const okid_era_config_t* config) {
+    if (config == nullptr || !valid(*config)) return 0;
+    okid_era e = plan(*config);
+    okid::arena memory;
+    memory.take<okid_era>(1);
+    return lay_out(e, memory);
+}
+
+int32_t okid_era_max_order(const okid_era_config_t* config) {
+    return config == nullptr ? 0 : std::min(config->rows * config->n_y, config->cols * config->n_u);
+}
+
+okid_status_t okid_era_create(okid_era_t** self, const okid_era_config_t* config, void* block, size_t bytes) {
+    if (self == nullptr || config == nullptr || block == nullptr) return OKID_ERR_NULL;
+    if (!valid(*config)) return OKID_ERR_DIM;
+    if (bytes < okid_era_memsize(config)) return OKID_ERR_MEMORY;
+    okid::linalg::warm_up();
+    okid::arena memory(block);
+    auto* e = memory.take<okid_era>(1);
+    *e = plan(*config);
+    lay_out(*e, memory);
+    *self = e;
+    return OKID_OK;
+}
+
+okid_status_t okid_era_decompose(okid_era_t* self, const double* markov) {
+    if (self == nullptr || markov == nullptr) return OKID_ERR_NULL;
+    okid_era& e = *self;
+    fill_hankel(e, markov, 0);
+    if (okid::linalg::svd(e.height, e.breadth, e.hankel, e.left, e.values, e.right, e.work) != 0) return OKID_ERR_NUMERIC;
+    fill_hankel(e, markov, 1);
+    okid::linalg::multiply(false, true, e.height, e.rank, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0, e.product, e.height);
+    okid::linalg::multiply(true, false, e.rank, e.rank, e.height, 1, e.left, e.height, e.product, e.height, 0, e.core, e.rank);
+    return OKID_OK;
+}
+
+const double* okid_era_singular_values(const okid_era_t* self, int32_t* count) {
+    if (count != nullptr) *count = self->rank;
+    return self->values;
+}
+
+okid_status_t okid_era_realize(okid_era_t* self, int32_t order, double* A, double* B, double* C,
+                               const double* gain_markov, double* K) {
+    if (self == nullptr || A == nullptr || B == nullptr || C == nullptr) return OKID_ERR_NULL;
+    okid_era& e = *self;
+    if (order < 1 || order > e.rank || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
+    const int ny = e.config.n_y, nu = e.config.n_u;
+    for (int j = 0; j < order; ++j)
+        for (int i = 0; i < order; ++i) A[j * order + i] = e.core[j * e.rank + i] / std::sqrt(e.values[i] * e.values[j]);
+    for (int c = 0; c < nu; ++c)
+        for (int i = 0; i < order; ++i) B[c * order + i] = std::sqrt(e.values[i]) * e.right[c * e.rank + i];
+    for (int j = 0; j < order; ++j)
+        for (int o = 0; o < ny; ++o) C[j * ny + o] = e.left[static_cast<size_t>(j) * static_cast<size_t>(e.height) + static_cast<size_t>(o)] * std::sqrt(e.values[j]);
+    if (gain_markov == nullptr || K == nullptr) return OKID_OK;
+    // L = P^+ [Y0_1; ..; Y0_r], P = R Sigma^(1/2); K = -L. The stack is made in `product`, which is free by now.
+    for (int c = 0; c < ny; ++c)
+        for (int i = 0; i < e.config.rows; ++i) {
+            const double* y0 = gain_markov + (static_cast<size_t>(i * ny) + static_cast<size_t>(c)) * static_cast<size_t>(ny);
+            std::copy(y0, y0 + ny, e.product + static_cast<size_t>(c) * static_cast<size_t>(e.height) + static_cast<size_t>(i * ny));
+        }
+    okid::linalg::multiply(true, false, order, ny, e.height, 1, e.left, e.height, e.product, e.height, 0, e.rotated, e.rank);
+    for (int c = 0; c < ny; ++c)
+        for (int i = 0; i < order; ++i) K[c * order + i] = -e.rotated[c * e.rank + i] / std::sqrt(e.values[i]);
+    return OKID_OK;
+}
+
+okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count, const double* lambda_re,
+                            const double* lambda_im, const double* psi_re, const double* psi_im, double* emac) {
+    if (self == nullptr || emac == nullptr) return OKID_ERR_NULL;
+    const okid_era& e = *self;
+    if (order < 1 || order > e.rank) return OKID_ERR_DIM;
+    const int ny = e.config.n_y, last = (e.config.rows - 1) * ny;
+    constexpr double quarter_pi = 0.78539816339744831;
+    for (int k = 0; k < count; ++k) {
+        const double* re = psi_re + static_cast<size_t>(k) * static_cast<size_t>(order);
+        const double* im = psi_im + static_cast<size_t>(k) * static_cast<size_t>(order);
+        const double steps = e.config.rows - 1, radius = std::pow(std::hypot(lambda_re[k], lambda_im[k]), steps);
+        const double angle = steps * std::atan2(lambda_im[k], lambda_re[k]);
+        double weighted = 0, total = 0;
+        for (int o = 0; o < ny; ++o) {
+            double first_re = 0, first_im = 0, end_re = 0, end_im = 0;
+            for (int i = 0; i < order; ++i) {
+                const double* column = e.left + static_cast<size_t>(i) * static_cast<size_t>(e.height);
+                const double root = std::sqrt(e.values[i]);
+                first_re += root * column[o] * re[i];
+                first_im += root * column[o] * im[i];
+                end_re += root * column[last + o] * re[i];
+                end_im += root * column[last + o] * im[i];
+            }
+            const double expected_re = radius * (first_re * std::cos(angle) - first_im * std::sin(angle));
+            const double expected_im = radius * (first_re * std::sin(angle) + first_im * std::cos(angle));
+            const double a = std::hypot(expected_re, expected_im), b = std::hypot(end_re, end_im);
+            const double weight = first_re * first_re + first_im * first_im;
+            total += weight;
+            if (!(a > 0) || !(b > 0)) continue;
+            const double turn = std::abs(std::atan2(end_im * expected_re - end_re * expected_im, end_re * expected_re + end_im * expected_im));
+            weighted += weight * std::min(a, b) / std::max(a, b) * std::max(0.0, 1 - turn / quarter_pi);
+        }
+        emac[k] = total > 0 ? weighted / total : 0;
+    }
+    return OKID_OK;
+}

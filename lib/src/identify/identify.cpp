@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    one call from an accumulator to a model with its modes
+// METHOD     Gram matrix -> observer -> Markov parameters -> ERA -> order -> modes; see the modules
+// REFERENCE  paper eq. (36)-(54)
+// NUMERICS   see observer.cpp; the choice of the order: order.hpp
+// WORKSPACE  (m(p+1))^2 for the Gram matrix, the modules' own, all in the caller's block; no heap
+#include <okid/era.h>
+#include <okid/identify.h>
+#include <okid/markov.h>
+#include <okid/modal.h>
+
+#include "identify/order.hpp"
+#include "linalg/arena.hpp"
+#include "linalg/linalg.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+using std::size_t;
+
+struct okid_identify {
+    okid_identify_config_t config;
+    okid_era_config_t era_config;
+    okid_observer_config_t observer_config;
+    int n_u, n_y, m, n, q, max_order, markov_last;
+    size_t observer_bytes, modal_bytes;
+    double *gram, *theta, *innovation, *mean, *markov, *gain;
+    double *A, *B, *C, *D, *K, *closed_loop, *eigen_re, *eigen_im, *eigen_work;
+    double *frequency, *damping, *mpc, *emac, *shape_re, *shape_im, *mu_re, *mu_im, *psi_re, *psi_im;
+    void *observer_work, *modal_work, *era_block;
+    okid_era_t* era;
+};
+
+namespace {
+
+bool valid(const okid_identify_config_t& c) {
+    return c.n_u >= 1 && c.n_y >= 1 && c.n_u + c.n_y <= 256 && c.p >= 1 && c.p <= 4096 && c.rows >= 0 && c.rows <= 8192 &&
+           c.order >= 0 && c.max_order >= 0 && c.fs_hz > 0 && std::isfinite(c.fs_hz) && c.method == OKID_METHOD_OKID_ERA &&
+           (c.detrend == OKID_DETREND_NONE || c.detrend == OKID_DETREND_MEAN);
+}
+
+okid_identify plan(const okid_identify_config_t& c) {
+    okid_identify s{};
+    s.config = c;
+    s.n_u = c.n_u;
+    s.n_y = c.n_y;
+    s.m = c.n_u + c.n_y;
+    s.n = s.m * (c.p + 1);
+    s.q = s.n - c.n_y;
+    const int rows = c.rows > 0 ? c.rows : 2 * c.p;
+    s.config.rows = rows;
+    s.era_config = okid_era_config_t{c.n_u, c.n_y, rows, rows};
+    s.observer_config = okid_observer_config_t{c.n_u, c.n_y, c.p, 0, 0};
+    s.max_order = std::min({c.max_order > 0 ? c.max_order : 128, okid_era_max_order(&s.era_config), c.p * c.n_y});
+    if (c.order > 0) s.max_order = std::max(s.max_order, std::min(c.order, okid_era_max_order(&s.era_config)));
+    s.markov_last = 2 * rows;
+    return s;
+}
+
+size_t lay_out(okid_identify& s, okid::arena& memory) {
+    const auto n = static_cast<size_t>(s.n), ny = static_cast<size_t>(s.n_y), nu = static_cast<size_t>(s.n_u), m = nu + ny;
+    const auto z = static_cast<size_t>(s.max_order), last = static_cast<size_t>(s.markov_last), rows = static_cast<size_t>(s.config.rows);
+    auto doubles = [&](size_t count) { return memory.take<double>(count); };
+    s.gram = doubles(n * n);
+    s.theta = doubles(ny * static_cast<size_t>(s.q));
+    s.innovation = doubles(ny * ny);
+    s.mean = doubles(m);
+    s.markov = doubles((last + 1) * ny * nu);
+    s.gain = doubles(std::max(last, rows) * ny * ny);
+    s.A = doubles(z * z);
+    s.B = doubles(z * nu);
+    s.C = doubles(ny * z);
+    s.D = doubles(ny * nu);
+    s.K = doubles(z * ny);
+    s.closed_loop = doubles(z * z);
+    s.eigen_re = doubles(z);
+    s.eigen_im = doubles(z);
+    s.eigen_work = doubles(okid::linalg::eigen_work(s.max_order));
+    const size_t modes = z / 2 + 1;
+    for (double** each : {&s.frequency, &s.damping, &s.mpc, &s.emac, &s.mu_re, &s.mu_im}) *each = doubles(modes);
+    for (double** each : {&s.shape_re, &s.shape_im}) *each = doubles(modes * ny);
+    for (double** each : {&s.psi_re, &s.psi_im}) *each = doubles(modes * z);
+    s.observer_bytes = okid_observer_memsize(&s.observer_config);
+    s.observer_work = memory.take<char>(s.observer_bytes);
+    s.modal_bytes = okid_modal_memsize(s.n_y, s.max_order);
+    s.modal_work = memory.take<char>(s.modal_bytes);
+    s.era_block = memory.take<char>(okid_era_memsize(&s.era_config));
+    return memory.bytes();
+}
+
+/// A constant channel, judged by its variance about its own mean; -1 when there is none.
+int constant_channel(const okid_identify& s, double rows) {
+    for (int c = 0; c < s.m; ++c) {
+        const double square = s.gram[static_cast<size_t>(c) * static_cast<size_t>(s.n + 1)], bias = rows * s.mean[c] * s.mean[c];
+        const double variance = s.config.detrend == OKID_DETREND_MEAN ? square : square - bias;
+        if (!(variance > 1e-13 * (std::abs(variance) + bias))) return c;
+    }
+    return -1;
+}
+
+/// Poles of the predictor A - K C.
+double predictor_radius(okid_identify& s, int order) {
+    std::copy(s.A, s.A + order * order, s.closed_loop);
+    okid::linalg::multiply(false, false, order, order, s.n_y, -1, s.K, order, s.C, s.n_y, 1, s.closed_loop, order);
+    if (okid::linalg::eigen(order, s.closed_loop, s.eigen_re, s.eigen_im, nullptr, s.eigen_work) != 0) return HUGE_VAL;
+    double radius = 0;
+    for (int i = 0; i < order; ++i) radius = std::max(radius, std::hypot(s.eigen_re[i], s.eigen_im[i]));
+    return radius;
+}
+
+void point_to(const okid_identify& s, okid_identified_t* out) {
+    out->A = s.A;
+    out->B = s.B;
+    out->C = s.C;
+    out->D = s.D;
+    out->K = s.K;
+    out->markov = s.markov;
+    out->markov_count = s.markov_last + 1;
+    out->observer = s.theta;
+    out->innovation = s.innovation;
+    out->mean = s.mean;
+    out->frequency_hz = s.frequency;
+    out->damping_ratio = s.damping;
+    out->mpc = s.mpc;
+    out->emac = s.emac;
+    out->shape_re = s.shape_re;
+    out->shape_im = s.shape_im;
+    out->singular_values = okid_era_singular_values(s.era, &out->singular_count);
+}
+
+void begin(const okid_identify& s, okid_identified_t* out, int64_t rows) {
+    *out = okid_identified_t{};
+    out->n_u = s.n_u;
+    out->n_y = s.n_y;
+    out->p = s.config.p;
+    out->rows = s.config.rows;
+    out->dt = 1 / s.config.fs_hz;
+    out->regression_rows = rows;
+    out->observer_info.channel = -1;
+}
+
+void observer_notes(okid_identified_t* out, int q) {
+    const okid_observer_info_t& info = out->observer_info;
+    if (info.radius_plain >= 1) out->warnings |= OKID_NOTE_ARX_STABILISED;
+    if (info.condition > 1e10) out->warnings |= OKID_NOTE_ILL_CONDITIONED;
+    if (out->regression_rows < 10LL * q) out->warnings |= OKID_NOTE_FEW_ROWS;
+    if (info.input_excitation < 1e-8) out->warnings |= OKID_NOTE_WEAK_EXCITATION;
+}
+
+} // namespace
+
+int32_t okid_identify_usable_p(int32_t n_u, int32_t n_y, int32_t p, int64_t samples) {
+    const int64_t m = n_u + n_y;
+    if (m < 1) return p;
+    const int64_t largest = (samples / 10 - n_u) / m; // 10 (n_u + p m) <= samples
+    return static_cast<int32_t>(std::max<int64_t>(1, std::min<int64_t>(p, largest)));
+}
+
+size_t okid_identify_memsize(const okid_identify_config_t* config) {
+    if (config == nullptr || !valid(*config)) return 0;
+    okid_identify s = plan(*config);
+    okid::arena memory;
+    memory.take<okid_identify>(1);
+    return lay_out(s, memory);
+}
+
+okid_status_t okid_identify_create(okid_identify_t** self, const okid_identify_config_t* config, void* block, size_t bytes) {
+    if (self == nullptr || config == nullptr || block == nullptr) return OKID_ERR_NULL;
+    if (!valid(*config)) return OKID_ERR_DIM;
+    if (bytes < okid_identify_memsize(config)) return OKID_ERR_MEMORY;
+    okid::linalg::warm_up();
+    okid::arena memory(block);
+    auto* s = memory.take<okid_identify>(1);
+    *s = plan(*config);
+    lay_out(*s, memory);
+    const okid_status_t status = okid_era_create(&s->era, &s->era_config, s->era_block, okid_era_memsize(&s->era_config));
+    *self = s;
+    return status;
+}
+
+okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_identified_t* out) {
+    if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
+    okid_identify& s = *self;
+    if (order < 1 || order > s.max_order) return OKID_ERR_DIM;
+    okid_status_t status = okid_era_realize(s.era, order, s.A, s.B, s.C, s.gain, s.K);
+    if (status != OKID_OK) return status;
+    out->n_z = order;
+    out->warnings &= ~static_cast<uint32_t>(OKID_NOTE_MODEL_UNSTABLE | OKID_NOTE_PREDICTOR_UNSTABLE);
+    status = okid_modal_analyse(s.n_y, order, out->dt, s.A, s.C, &out->mode_count, s.frequency, s.damping, s.mpc, s.shape_re,
+                                s.shape_im, s.mu_re, s.mu_im, s.psi_re, s.psi_im, &out->model_radius, s.modal_work, s.modal_bytes);
+    if (status != OKID_OK) return status;
+    status = okid_era_emac(s.era, order, out->mode_count, s.mu_re, s.mu_im, s.psi_re, s.psi_im, s.emac);
+    if (status != OKID_OK) return status;
+    if (!(out->model_radius < 1)) out->warnings |= OKID_NOTE_MODEL_UNSTABLE;
+    if (!(predictor_radius(s, order) < 1)) out->warnings |= OKID_NOTE_PREDICTOR_UNSTABLE;
+    if (out->mode_count == 0) return OKID_ERR_NO_MODES;
+    return out->warnings != 0 ? OKID_WARN_MODEL : OKID_OK;
+}
+
+okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator, okid_identified_t* out) {
+    if (self == nullptr || accumulator == nullptr || out == nullptr) return OKID_ERR_NULL;
+    okid_identify& s = *self;
+    okid_accumulator_config_t held;
+    okid_accumulator_config(accumulator, &held);
+    const int64_t rows = okid_accumulator_rows(accumulator);
+    begin(s, out, rows);
+    if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.config.p) return OKID_ERR_MISMATCH;
+    if (rows < s.q) return OKID_ERR_TOO_SHORT;
+    okid_status_t status = okid_accumulator_gram(accumulator, s.config.detrend, s.gram, s.mean);
+    if (status != OKID_OK) return status;
+    out->observer_info.channel = constant_channel(s, static_cast<double>(rows));
+    if (out->observer_info.channel >= 0) return out->observer_info.channel < s.n_u ? OKID_ERR_INPUT : OKID_ERR_OUTPUT;
+    status = okid_observer_solve(&s.observer_config, s.gram, rows, s.theta, s.innovation, &out->observer_info,
+                                 s.observer_work, s.observer_bytes);
+    if (status != OKID_OK) return status;
+    observer_notes(out, s.q);
+    status = okid_markov_recursion(s.n_u, s.n_y, s.config.p, s.theta, s.markov_last, s.markov, s.gain);
+    if (status != OKID_OK) return status;
+    status = okid_era_decompose(s.era, s.markov);
+    if (status != OKID_OK) return status;
+    std::copy(s.markov, s.markov + s.n_y * s.n_u, s.D);
+    if (s.config.detrend == OKID_DETREND_NONE) std::fill(s.mean, s.mean + s.m, 0.0);
+    point_to(s, out);
+    int order = s.config.order;
+    if (order > s.max_order) {
+        order = s.max_order;
+        out->warnings |= OKID_NOTE_ORDER_REDUCED;
+    }
+    if (order == 0) {
+        bool clear = true;
+        order = okid::choose_order(out->singular_values, out->singular_count, s.max_order, clear);
+        if (!clear) out->warnings |= OKID_NOTE_ORDER_UNCLEAR;
+    }
+    return okid_identify_order(self, order, out);
+}

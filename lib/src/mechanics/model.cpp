@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    simulate and predict with a discrete state-space model; least-squares initial state
+// METHOD     plain recursions; x0 from the normal equations of y - y_forced = C A^n x0 over the record
+// REFERENCE  paper eq. (13), (15), (16), (20) with L = -K
+// NUMERICS   the normal equations of x0 are scaled to unit diagonal with a ridge of 1e-12: poles that died out early
+//            carry little and are left near zero instead of blowing up
+// WORKSPACE  okid_model_workspace() doubles
+#include <okid/model.h>
+
+#include "linalg/linalg.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+using std::size_t;
+
+namespace {
+
+/// y = M x + y, M rows x cols column-major.
+void add_product(int rows, int cols, const double* M, const double* x, double* y) {
+    for (int j = 0; j < cols; ++j) {
+        const double v = x[j];
+        const double* column = M + static_cast<size_t>(j) * static_cast<size_t>(rows);
+        for (int i = 0; i < rows; ++i) y[i] += column[i] * v;
+    }
+}
+
+struct stepper {
+    const okid_model_t& model;
+    double *x, *next;
+    size_t z() const { return static_cast<size_t>(model.n_z); }
+
+    stepper(const okid_model_t& m, const double* x0, double* work) : model(m), x(work), next(work + m.n_z) {
+        if (x0 != nullptr) std::copy(x0, x0 + z(), x);
+        else std::fill(x, x + z(), 0.0);
+    }
+    void output(const double* u, double* y) const {
+        std::fill(y, y + model.n_y, 0.0);
+        add_product(model.n_y, model.n_z, model.C, x, y);
+        add_product(model.n_y, model.n_u, model.D, u, y);
+    }
+    void step(const double* u, const double* correction) {
+        std::fill(next, next + z(), 0.0);
+        add_product(model.n_z, model.n_z, model.A, x, next);
+        add_product(model.n_z, model.n_u, model.B, u, next);
+        if (correction != nullptr) add_product(model.n_z, model.n_y, model.K, correction, next);
+        std::swap(x, next);
+    }
+};
+
+bool finite(const double* v, int count) {
+    return std::all_of(v, v + count, [](double x) { return std::isfinite(x); });
+}
+
+/// A sample with a missing input counts as no force.
+const double* usable_input(const double* u, int count, double* spare) {
+    if (finite(u, count)) return u;
+    std::transform(u, u + count, spare, [](double x) { return std::isfinite(x) ? x : 0.0; });
+    return spare;
+}
+
+} // namespace
+
+size_t okid_model_workspace(const okid_model_t* model) {
+    const auto z = static_cast<size_t>(model->n_z), y = static_cast<size_t>(model->n_y), u = static_cast<size_t>(model->n_u);
+    return 2 * z + u + 2 * y + 2 * y * z + z * z + z;
+}
+
+okid_status_t okid_model_simulate(const okid_model_t* model, const double* u, size_t count, const double* x0, double* y,
+                                  double* work) {
+    if (model == nullptr || u == nullptr || y == nullptr || work == nullptr) return OKID_ERR_NULL;
+    stepper s(*model, x0, work);
+    double* spare = work + 2 * model->n_z;
+    for (size_t n = 0; n < count; ++n) {
+        const double* input = usable_input(u + n * static_cast<size_t>(model->n_u), model->n_u, spare);
+        s.output(input, y + n * static_cast<size_t>(model->n_y));
+        s.step(input, nullptr);
+    }
+    return OKID_OK;
+}
+
+okid_status_t okid_model_predict(const okid_model_t* model, const double* u, const double* y, size_t count,
+                                 const double* x0, double* yhat, double* work) {
+    if (model == nullptr || model->K == nullptr || u == nullptr || y == nullptr || yhat == nullptr || work == nullptr)
+        return OKID_ERR_NULL;
+    stepper s(*model, x0, work);
+    double *spare = work + 2 * model->n_z, *innovation = spare + model->n_u;
+    const auto ny = static_cast<size_t>(model->n_y);
+    for (size_t n = 0; n < count; ++n) {
+        const double* input = usable_input(u + n * static_cast<size_t>(model->n_u), model->n_u, spare);
+        double* out = yhat + n * ny;
+        s.output(input, out);
+        const double* measured = y + n * ny;
+        for (size_t o = 0; o < ny; ++o) innovation[o] = measured[o] - out[o];
+        s.step(input, finite(innovation, model->n_y) ? innovation : nullptr);
+    }
+    return OKID_OK;
+}
+
+okid_status_t okid_model_initial_state(const okid_model_t* model, const double* u, const double* y, size_t count,
+                                       double* x0, double* work) {
+    if (model == nullptr || u == nullptr || y == nullptr || x0 == nullptr || work == nullptr) return OKID_ERR_NULL;
+    const auto z = static_cast<size_t>(model->n_z), ny = static_cast<size_t>(model->n_y), nu = static_cast<size_t>(model->n_u);
+    stepper s(*model, nullptr, work);
+    double* spare = work + 2 * z;
+    double *out = spare + nu, *residual = out + ny, *observe = residual + ny, *moved = observe + ny * z;
+    double *normal = moved + ny * z, *scale = normal + z * z;
+    std::copy(model->C, model->C + ny * z, observe); // C A^n
+    std::fill(normal, normal + z * z, 0.0);
+    std::fill(x0, x0 + z, 0.0);
+    double first = 0;
+    for (size_t n = 0; n < count; ++n) {
+        const double* input = usable_input(u + n * nu, model->n_u, spare);
+        s.output(input, out);
+        for (size_t o = 0; o < ny; ++o) residual[o] = y[n * ny + o] - out[o];
+        if (finite(residual, model->n_y)) {
+            okid::linalg::multiply(true, false, model->n_z, model->n_z, model->n_y, 1, observe, model->n_y, observe, model->n_y, 1, normal, model->n_z);
+            okid::linalg::multiply(true, false, model->n_z, 1, model->n_y, 1, observe, model->n_y, residual, model->n_y, 1, x0, model->n_z);
+        }
+        s.step(input, nullptr);
+        okid::linalg::multiply(false, false, model->n_y, model->n_z, model->n_z, 1, observe, model->n_y, model->A, model->n_z, 0, moved, model->n_y);
+        std::swap(observe, moved);
+        double size = 0;
+        for (size_t i = 0; i < ny * z; ++i) size = std::max(size, std::abs(observe[i]));
+        if (n == 0) first = size;
+        if (!(size > 1e-9 * first) || !std::isfinite(size)) break; // the rest of the record no longer sees x0
+    }
+    for (size_t i = 0; i < z; ++i) scale[i] = normal[i * z + i] > 0 ? 1 / std::sqrt(normal[i * z + i]) : 0;
+    for (size_t j = 0; j < z; ++j) {
+        for (size_t i = 0; i < z; ++i) normal[j * z + i] *= scale[i] * scale[j];
+        normal[j * z + j] = scale[j] > 0 ? 1 + 1e-12 : 1;
+        x0[j] *= scale[j];
+    }
+    if (okid::linalg::cholesky(model->n_z, normal, model->n_z) != 0) return OKID_ERR_NUMERIC;
+    okid::linalg::cholesky_solve(model->n_z, normal, model->n_z, x0, model->n_z, 1);
+    for (size_t i = 0; i < z; ++i) x0[i] *= scale[i];
+    return OKID_OK;
+}

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    version and status texts
+#include <okid/identify.h>
+
+const char* okid_version(void) { return OKID_VERSION; }
+
+const char* okid_status_text(okid_status_t status) {
+    switch (status) {
+    case OKID_OK: return "ok";
+    case OKID_WARN_MISSING: return "some samples were missing";
+    case OKID_WARN_SATURATED: return "some codes stood at full scale";
+    case OKID_WARN_MODEL: return "a model was identified, with remarks";
+    case OKID_ERR_NULL: return "a required pointer is NULL";
+    case OKID_ERR_DIM: return "a size is outside its range";
+    case OKID_ERR_MEMORY: return "the memory block is too small";
+    case OKID_ERR_MISMATCH: return "the objects do not fit each other";
+    case OKID_ERR_RANGE: return "an exact sum would leave its range";
+    case OKID_ERR_TOO_SHORT: return "fewer usable samples than unknowns";
+    case OKID_ERR_INPUT: return "an input is constant";
+    case OKID_ERR_OUTPUT: return "an output is constant";
+    case OKID_ERR_EXCITATION: return "the inputs do not excite enough";
+    case OKID_ERR_NUMERIC: return "a factorisation did not converge";
+    case OKID_ERR_UNSTABLE: return "no regularisation gives a stable model";
+    case OKID_ERR_NO_MODES: return "the model has no underdamped mode";
+    }
+    return "unknown status";
+}
+
+const char* okid_warning_code(uint32_t bit) {
+    switch (bit) {
+    case OKID_NOTE_ARX_STABILISED: return "arx_stabilised";
+    case OKID_NOTE_ILL_CONDITIONED: return "ill_conditioned";
+    case OKID_NOTE_FEW_ROWS: return "few_rows";
+    case OKID_NOTE_MODEL_UNSTABLE: return "model_unstable";
+    case OKID_NOTE_PREDICTOR_UNSTABLE: return "predictor_unstable";
+    case OKID_NOTE_ORDER_REDUCED: return "order_reduced";
+    case OKID_NOTE_ORDER_UNCLEAR: return "order_unclear";
+    case OKID_NOTE_WEAK_EXCITATION: return "weak_excitation";
+    default: return NULL;
+    }
+}

@@ -1,0 +1,77 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Installs what okid needs: Debian packages from tools/packages/*.txt and Python packages into .venv.
+# usage: tools/setup.sh [build|test|dev]   (each includes the one before)
+# Idempotent; silent when nothing is missing. Needs root or sudo only when a Debian package is missing.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+tier=${1:-build}
+
+lists=(tools/packages/debian.txt)
+[ "$tier" = build ] || lists+=(tools/packages/debian-test.txt)
+
+installed() { [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null)" = installed ]; }
+
+command -v dpkg-query >/dev/null || {
+  echo "setup: this is not a Debian-like system (no dpkg-query). Install the equivalents of ${lists[*]} by hand," \
+       "then run make with OKID_SKIP_APT=1." >&2
+  [ "${OKID_SKIP_APT:-}" = 1 ] || exit 4
+}
+
+if [ "${OKID_SKIP_APT:-}" != 1 ]; then
+  missing=()
+  while read -r name _; do
+    case $name in ''|'#'*) continue ;; esac
+    found=
+    for one in ${name//|/ }; do installed "$one" && found=1 && break; done
+    [ -n "$found" ] || missing+=("$name")
+  done < <(cat "${lists[@]}")
+
+  if [ ${#missing[@]} -gt 0 ]; then
+    sudo=
+    if [ "$(id -u)" -ne 0 ]; then
+      if command -v sudo >/dev/null && { sudo -n true 2>/dev/null || [ -t 0 ]; }; then
+        sudo=sudo
+      else
+        echo "setup: missing Debian packages, and neither root nor sudo is at hand. Ask an administrator to run:" >&2
+        echo "  apt-get install --no-install-recommends ${missing[*]%%|*}" >&2
+        exit 4
+      fi
+    fi
+    echo "setup: installing ${#missing[@]} Debian packages: ${missing[*]}"
+    log=$(mktemp)
+    apt() { $sudo env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" >"$log" 2>&1 </dev/null; }
+    apt update || { echo "setup: apt-get update failed; going on with the lists at hand:" >&2; tail -n 3 "$log" >&2; }
+    want=()
+    for name in "${missing[@]}"; do
+      pick=${name%%|*}
+      for one in ${name//|/ }; do
+        [ -n "$(apt-cache policy "$one" 2>/dev/null | sed -n 's/ *Candidate: //p' | grep -v none)" ] && pick=$one && break
+      done
+      want+=("$pick")
+    done
+    apt install -y --no-install-recommends "${want[@]}" || {
+      echo "setup: apt-get install ${want[*]} failed:" >&2; tail -n 20 "$log" >&2; rm -f "$log"; exit 4; }
+    rm -f "$log"
+  fi
+fi
+
+# Python: one .venv, refreshed only when the list of requirements changed.
+extra=$tier
+stamp=.venv/.okid-$extra
+if [ ! -f "$stamp" ] || ! cmp -s tools/pyproject.toml "$stamp"; then
+  [ -x .venv/bin/python ] || python3 -m venv .venv || {
+    echo "setup: python3 -m venv failed. Install python3-venv, or remove a half-made .venv, and try again." >&2; exit 4; }
+  echo "setup: installing Python packages ($extra) into .venv"
+  list=$(mktemp)
+  .venv/bin/python tools/requirements.py "$extra" >"$list"
+  .venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$list" || {
+    echo "setup: pip could not install tools/pyproject.toml [$extra]; see the lines above." >&2; rm -f "$list"; exit 4; }
+  rm -f "$list"
+  .venv/bin/python - <<'PY'
+import pathlib, sysconfig
+# `import okid` from the source tree: the binding finds build/libokid.so beside it.
+pathlib.Path(sysconfig.get_paths()["purelib"], "okid-source.pth").write_text(str(pathlib.Path("tools").resolve()) + "\n")
+PY
+  cp tools/pyproject.toml "$stamp"
+fi
