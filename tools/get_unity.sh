@@ -5,7 +5,7 @@
 set -euo pipefail
 tag=$1 dir=$2
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/okid/unity
-if [ -f "$cache/unity.c" ]; then echo "$cache"; exit 0; fi
+if [ -f "$cache/src/unity.c" ]; then echo "$cache/src"; exit 0; fi
 rm -rf "$dir"; mkdir -p "$dir" "$cache"
 
 if GIT_TERMINAL_PROMPT=0 timeout 30 git clone -q --depth 1 -b "$tag" \
@@ -33,7 +33,8 @@ else
   found=$(echo "$dir"/cjson-*/tests/unity/src)
 fi
 [ -f "$found/unity.c" ] || { echo "get_unity: no unity.c in $found" >&2; exit 1; }
-mkdir -p "$cache.part.$$"
-cp "$found"/unity*.[ch] "$cache.part.$$"
+mkdir -p "$cache.part.$$/src" "$cache.part.$$/examples"
+cp "$found"/unity*.[ch] "$cache.part.$$/src/"
+[ ! -f "$found/../examples/unity_config.h" ] || cp "$found/../examples/unity_config.h" "$cache.part.$$/examples/"
 rm -rf "$cache"; mv "$cache.part.$$" "$cache"
-echo "$cache"
+echo "$cache/src"

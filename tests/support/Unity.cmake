@@ -19,5 +19,7 @@ else()
   endif()
   add_library(unity STATIC ${OKID_UNITY_SOURCES}/unity.c)
   target_include_directories(unity SYSTEM PUBLIC ${OKID_UNITY_SOURCES})
-  target_compile_definitions(unity PUBLIC UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64)
+  if(NOT EXISTS ${OKID_UNITY_SOURCES}/../examples/unity_config.h) # Debian's copy brings these settings with it
+    target_compile_definitions(unity PUBLIC UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64)
+  endif()
 endif()

@@ -9,8 +9,8 @@
 /// Samples stand in *slots*: a slot is an unbroken piece of the record (at most `block` samples where a window or
 /// forgetting is asked for). A gap closes a slot. Closed slots either stay in a ring (window, `slots` > 0) and fall out
 /// of it whole, or are folded into the base sums, which need the edge Gram of q^2/2 numbers (`edges` = 1).
-/// Samples wait in a small buffer until the kernel can take many at once, so that the result does not depend, to the
-/// last bit, on how a record was cut into calls, double samples included.
+/// Samples wait in a small buffer until the kernel can take many at once: how a record is cut into calls changes
+/// nothing, not even the last bit of double sums (as long as the Gram matrix is looked at after the same samples).
 ///
 /// Codes (int16) are summed exactly: any split of a record into calls gives bit-equal results. The bound: a product of
 /// two 16-bit codes is at most 2^30; the kernel sums up to 2^22 of them in double (2^52 < 2^53, exact) before adding

@@ -23,7 +23,7 @@ enum {
     OKID_NOTE_MODEL_UNSTABLE = 1 << 3,      ///< the realised A has a pole on or outside the unit circle
     OKID_NOTE_PREDICTOR_UNSTABLE = 1 << 4,  ///< A - K C is unstable: no prediction from this gain
     OKID_NOTE_ORDER_REDUCED = 1 << 5,       ///< the order asked for exceeds what the Hankel matrix can carry
-    OKID_NOTE_ORDER_UNCLEAR = 1 << 6,       ///< no clear gap in the singular values: order chosen by the noise threshold
+    OKID_NOTE_ORDER_UNCLEAR = 1 << 6,       ///< no clear gap in the singular values: smallest order that keeps the consistent modes
     OKID_NOTE_WEAK_EXCITATION = 1 << 7      ///< the inputs excite some directions only weakly
 };
 /// Name of a single bit as in okid.result/1 ("arx_stabilised", ...), NULL for an unknown one.

@@ -26,6 +26,7 @@ struct okid_identify {
     size_t observer_bytes, modal_bytes;
     double *gram, *theta, *innovation, *mean, *markov, *gain;
     double *A, *B, *C, *D, *K, *closed_loop, *eigen_re, *eigen_im, *eigen_work;
+    double *scores; ///< of the order scan
     double *frequency, *damping, *mpc, *emac, *shape_re, *shape_im, *mu_re, *mu_im, *psi_re, *psi_im;
     void *observer_work, *modal_work, *era_block;
     okid_era_t* era;
@@ -77,6 +78,7 @@ size_t lay_out(okid_identify& s, okid::arena& memory) {
     s.eigen_im = doubles(z);
     s.eigen_work = doubles(okid::linalg::eigen_work(s.max_order));
     const size_t modes = z / 2 + 1;
+    s.scores = doubles(modes);
     for (double** each : {&s.frequency, &s.damping, &s.mpc, &s.emac, &s.mu_re, &s.mu_im}) *each = doubles(modes);
     for (double** each : {&s.shape_re, &s.shape_im}) *each = doubles(modes * ny);
     for (double** each : {&s.psi_re, &s.psi_im}) *each = doubles(modes * z);
@@ -145,6 +147,29 @@ void observer_notes(okid_identified_t* out, int q) {
     if (info.condition > 1e10) out->warnings |= OKID_NOTE_ILL_CONDITIONED;
     if (out->regression_rows < 10LL * q) out->warnings |= OKID_NOTE_FEW_ROWS;
     if (info.input_excitation < 1e-8) out->warnings |= OKID_NOTE_WEAK_EXCITATION;
+}
+
+/// Realise every even order and score it; 0 when no stable model has a consistent mode.
+int scan_orders(okid_identify& s, okid_identified_t* out) {
+    const int count = s.max_order / 2;
+    for (int k = 0; k < count; ++k) {
+        const okid_status_t status = okid_identify_order(&s, 2 * (k + 1), out);
+        const bool usable = status >= 0 && out->model_radius < 1;
+        s.scores[k] = usable ? okid::consistency_score(s.emac, out->mode_count) : 0;
+    }
+    return count > 0 ? okid::order_by_score(s.scores, count) : 0;
+}
+
+/// A clear gap in the singular values decides, if its model is stable and no ridge has bent the values; else the scan.
+okid_status_t automatic_order(okid_identify& s, okid_identified_t* out) {
+    const okid::gap_choice gap = okid::order_by_gap(out->singular_values, out->singular_count, s.max_order);
+    if (gap.ratio >= okid::clear_gap && out->observer_info.radius_plain < 1) {
+        const okid_status_t status = okid_identify_order(&s, gap.order, out);
+        if (status >= 0 && out->model_radius < 1) return status;
+    }
+    const int order = scan_orders(s, out);
+    out->warnings |= OKID_NOTE_ORDER_UNCLEAR;
+    return okid_identify_order(&s, order > 0 ? order : gap.order, out);
 }
 
 } // namespace
@@ -221,15 +246,9 @@ okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accum
     std::copy(s.markov, s.markov + s.n_y * s.n_u, s.D);
     if (s.config.detrend == OKID_DETREND_NONE) std::fill(s.mean, s.mean + s.m, 0.0);
     point_to(s, out);
-    int order = s.config.order;
-    if (order > s.max_order) {
-        order = s.max_order;
-        out->warnings |= OKID_NOTE_ORDER_REDUCED;
+    if (s.config.order > 0) {
+        if (s.config.order > s.max_order) out->warnings |= OKID_NOTE_ORDER_REDUCED;
+        return okid_identify_order(self, std::min(s.config.order, s.max_order), out);
     }
-    if (order == 0) {
-        bool clear = true;
-        order = okid::choose_order(out->singular_values, out->singular_count, s.max_order, clear);
-        if (!clear) out->warnings |= OKID_NOTE_ORDER_UNCLEAR;
-    }
-    return okid_identify_order(self, order, out);
+    return automatic_order(s, out);
 }

@@ -195,7 +195,8 @@ okid_status_t okid_observer_solve(const okid_observer_config_t* config, const do
     s.equilibrate();
     if (s.input_rank() <= std::min(4, s.p) * s.n_u) return OKID_ERR_EXCITATION;
     const double ridge_min = config->ridge_min > 0 ? config->ridge_min : 1e-12;
-    if (!s.solve(ridge_min, true, theta) && !s.solve(ridge_min * 1e2, true, theta)) return OKID_ERR_NUMERIC;
+    const bool numerical = ridge_min <= 1e-10; // a floor only: the refinement step takes it out again
+    if (!s.solve(ridge_min, numerical, theta) && !s.solve(ridge_min * 1e2, numerical, theta)) return OKID_ERR_NUMERIC;
     info->radius = info->radius_plain = okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.companion);
     if (!(info->radius < 1) && config->unstable == 0) {
         const okid_status_t status = okid::stabilise(s, ridge_min, theta);

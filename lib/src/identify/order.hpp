@@ -1,10 +1,22 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    model order from the singular values of the Hankel matrix
+// PURPOSE    model order from the singular values of the Hankel matrix, or from how modes hold over the orders
 #pragma once
 
 namespace okid {
 
-/// Even order in 2..largest. `clear` tells whether a gap decided (true) or the noise floor (false).
-int choose_order(const double* values, int count, int largest, bool& clear);
+struct gap_choice {
+    int order;    ///< even
+    double ratio; ///< sigma_order / sigma_(order+1)
+};
+constexpr double clear_gap = 5.0; ///< a ratio that decides by itself
+
+/// The largest gap over even orders up to `largest`.
+gap_choice order_by_gap(const double* values, int count, int largest);
+
+/// What a set of modes is worth: the sum of those EMACs that are above one half.
+double consistency_score(const double* emac, int count);
+
+/// scores[k] belongs to order 2 (k + 1), unstable models 0. The smallest order near the best score; 0 when none scores.
+int order_by_score(const double* scores, int count);
 
 } // namespace okid

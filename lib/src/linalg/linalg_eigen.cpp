@@ -7,6 +7,8 @@
 // WORKSPACE  as linalg.hpp states; products are lazy (coefficient-based), so that Eigen asks for no temporaries
 #include "linalg.hpp"
 
+#include <okid/types.h>
+
 #include <Eigen/Core>
 #include <Eigen/Jacobi>
 #include <algorithm>
@@ -427,3 +429,5 @@ int eigen(int n, double* a, double* re, double* im, double* vectors, double* wor
 }
 
 } // namespace okid::linalg
+
+extern "C" const char* okid_backend(void) { return okid::linalg::name(); }

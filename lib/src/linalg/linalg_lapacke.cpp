@@ -3,6 +3,8 @@
 // NUMERICS   LAPACK's; workspace sizes are asked from LAPACK itself
 #include "linalg.hpp"
 
+#include <okid/types.h>
+
 #include <algorithm>
 #include <cblas.h>
 #include <cstring>
@@ -79,3 +81,5 @@ int eigen(int n, double* a, double* re, double* im, double* vectors, double* wor
 }
 
 } // namespace okid::linalg
+
+extern "C" const char* okid_backend(void) { return okid::linalg::name(); }

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// After create nothing touches the heap: the per-sample path and the whole identification, on every backend. The
+// allocator of the process is interposed and counted.
+#include "modal_rig.h"
+
+#include <okid/okid.h>
+#include <unity.h>
+
+extern void* __libc_malloc(size_t size);
+extern void* __libc_calloc(size_t count, size_t size);
+extern void* __libc_realloc(void* block, size_t size);
+extern void __libc_free(void* block);
+extern void* __libc_memalign(size_t alignment, size_t size);
+
+static volatile long calls;
+
+void* malloc(size_t size) {
+    ++calls;
+    return __libc_malloc(size);
+}
+void* calloc(size_t count, size_t size) {
+    ++calls;
+    return __libc_calloc(count, size);
+}
+void* realloc(void* block, size_t size) {
+    ++calls;
+    return __libc_realloc(block, size);
+}
+void free(void* block) {
+    ++calls;
+    __libc_free(block);
+}
+int posix_memalign(void** block, size_t alignment, size_t size) {
+    ++calls;
+    *block = __libc_memalign(alignment, size);
+    return *block ? 0 : 12;
+}
+void* aligned_alloc(size_t alignment, size_t size) {
+    ++calls;
+    return __libc_memalign(alignment, size);
+}
+void* memalign(size_t alignment, size_t size) {
+    ++calls;
+    return __libc_memalign(alignment, size);
+}
+
+enum { P = 40, N = 5000 };
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static void the_interposer_counts(void) {
+    const long before = calls;
+    void* volatile block = malloc(10);
+    free(block);
+    TEST_ASSERT_EQUAL(before + 2, calls);
+}
+
+static void nothing_after_create(void) {
+    rig_t rig;
+    rig_make(&rig);
+    double* v = rig_record(&rig, N, 0.02, NULL, 3);
+    int16_t* codes = malloc(sizeof *codes * N * RIG_M);
+    for (int i = 0; i < N * RIG_M; ++i) codes[i] = (int16_t)lrint(v[i] * 500);
+    v[2000 * RIG_M] = NAN; // a gap on the way
+    const okid_accumulator_config_t configs[] = {
+        {RIG_NU, RIG_NY, P, OKID_SAMPLE_DOUBLE, 0, 0, 1.0, 1, 0},
+        {RIG_NU, RIG_NY, P, OKID_SAMPLE_DOUBLE, 500, 6, 1.0, 0, 6},
+        {RIG_NU, RIG_NY, P, OKID_SAMPLE_INT16, 0, 0, 1.0, 1, 0},
+        {RIG_NU, RIG_NY, P, OKID_SAMPLE_INT16, 500, 0, 0.9999, 1, 0},
+    };
+    const okid_identify_config_t ident = {RIG_NU, RIG_NY, P, 0, 0, 40, RIG_FS, OKID_METHOD_OKID_ERA, OKID_DETREND_MEAN};
+    for (size_t k = 0; k < sizeof configs / sizeof *configs; ++k) {
+        const size_t bytes = okid_accumulator_memsize(&configs[k]), more = okid_identify_memsize(&ident);
+        void *b1 = malloc(bytes), *b2 = malloc(more);
+        okid_accumulator_t* a;
+        okid_identify_t* s;
+        okid_identified_t out;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &configs[k], b1, bytes));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&s, &ident, b2, more));
+        const long before = calls;
+        okid_status_t added = OKID_OK, found = OKID_OK, scanned = OKID_OK;
+        for (int n = 0; n < N; n += 100) {
+            const int integer = configs[k].sample == OKID_SAMPLE_INT16;
+            added = integer ? okid_accumulator_add_i16(a, codes + n * RIG_M, 100) : okid_accumulator_add(a, v + n * RIG_M, 100);
+            if (n % 1000 == 900) found = okid_identify_run(s, a, &out);
+        }
+        for (int order = 2; order <= 40; order += 2) scanned = okid_identify_order(s, order, &out);
+        const long after = calls;
+        TEST_ASSERT_GREATER_OR_EQUAL(0, added);
+        TEST_ASSERT_GREATER_OR_EQUAL(0, found);
+        TEST_ASSERT_GREATER_OR_EQUAL(0, scanned);
+        TEST_ASSERT_EQUAL_MESSAGE(0, after - before, okid_backend());
+        free(b1);
+        free(b2);
+    }
+    free(v);
+    free(codes);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(the_interposer_counts);
+    RUN_TEST(nothing_after_create);
+    return UNITY_END();
+}
