@@ -41,9 +41,9 @@ typedef struct okid_accumulator_config_t {
     okid_sample_t sample; ///< what add() takes
     int32_t block;        ///< rows after which a slot closes; 0 = only at gaps
     int32_t slots;        ///< sliding window of slots * block sample periods (closed slots); 0 = growing. Needs block
-    double forgetting;    ///< lambda in (0, 1] per sample, applied between blocks; 1 = infinite memory. Needs block, edges
-    int32_t edges;        ///< 1 = room for the edge Gram: gaps, several records, merge, forgetting; 0 = one unbroken run
-    int32_t spare_slots;  ///< window only: further slots, because each gap closes one early; full = the window shortens
+    double forgetting; ///< lambda in (0, 1] per sample, applied between blocks; 1 = infinite memory. Needs block, edges
+    int32_t edges;     ///< 1 = room for the edge Gram: gaps, several records, merge, forgetting; 0 = one unbroken run
+    int32_t spare_slots; ///< window only: further slots, because each gap closes one early; full = the window shortens
 } okid_accumulator_config_t;
 
 /// Counts since create or reset.
@@ -75,7 +75,8 @@ OKID_API void okid_accumulator_set_units(okid_accumulator_t* self, const double*
 /// A sample with a NaN or infinite channel is missing as a whole: counted, the run ends, the next run re-arms.
 /// @param samples  in, column-major m x count; row order: inputs, then outputs
 /// @return OKID_OK, OKID_WARN_MISSING, OKID_ERR_NULL, OKID_ERR_MISMATCH (created for codes)
-OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add(okid_accumulator_t* self, const double* samples, size_t count);
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add(okid_accumulator_t* self, const double* samples,
+                                                           size_t count);
 
 /// The same for 16-bit codes, summed exactly. @return also OKID_WARN_SATURATED, OKID_ERR_RANGE
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i16(okid_accumulator_t* self, const int16_t* codes,

@@ -17,25 +17,26 @@ typedef enum okid_method_t {
 
 /// Remarks on a valid result, as bits of okid_identified_t::warnings; okid_warning_code() and _text() name them.
 enum {
-    OKID_NOTE_ARX_STABILISED = 1 << 0,      ///< plain least squares was unstable; a ridge cured it (ridge, radius_plain)
-    OKID_NOTE_ILL_CONDITIONED = 1 << 1,     ///< condition above 1e10: near noise-free or redundant channels
-    OKID_NOTE_FEW_ROWS = 1 << 2,            ///< fewer than 10 q regression rows: variances are large
-    OKID_NOTE_MODEL_UNSTABLE = 1 << 3,      ///< the realised A has a pole on or outside the unit circle
-    OKID_NOTE_PREDICTOR_UNSTABLE = 1 << 4,  ///< A - K C is unstable: no prediction from this gain
-    OKID_NOTE_ORDER_REDUCED = 1 << 5,       ///< the order asked for exceeds what the Hankel matrix can carry
-    OKID_NOTE_ORDER_UNCLEAR = 1 << 6,       ///< no clear gap in the singular values: smallest order that keeps the consistent modes
-    OKID_NOTE_WEAK_EXCITATION = 1 << 7      ///< the inputs excite some directions only weakly
+    OKID_NOTE_ARX_STABILISED = 1 << 0,     ///< plain least squares was unstable; a ridge cured it (ridge, radius_plain)
+    OKID_NOTE_ILL_CONDITIONED = 1 << 1,    ///< condition above 1e10: near noise-free or redundant channels
+    OKID_NOTE_FEW_ROWS = 1 << 2,           ///< fewer than 10 q regression rows: variances are large
+    OKID_NOTE_MODEL_UNSTABLE = 1 << 3,     ///< the realised A has a pole on or outside the unit circle
+    OKID_NOTE_PREDICTOR_UNSTABLE = 1 << 4, ///< A - K C is unstable: no prediction from this gain
+    OKID_NOTE_ORDER_REDUCED = 1 << 5,      ///< the order asked for exceeds what the Hankel matrix can carry
+    OKID_NOTE_ORDER_UNCLEAR =
+        1 << 6, ///< no clear gap in the singular values: smallest order that keeps the consistent modes
+    OKID_NOTE_WEAK_EXCITATION = 1 << 7 ///< the inputs excite some directions only weakly
 };
 /// Name of a single bit as in okid.result/1 ("arx_stabilised", ...), NULL for an unknown one.
 OKID_API const char* okid_warning_code(uint32_t bit);
 
 typedef struct okid_identify_config_t {
     int32_t n_u, n_y;
-    int32_t p;          ///< observer (ARX) order
-    int32_t rows;       ///< block rows and block columns of the Hankel matrices; 0 = 2 p
-    int32_t order;      ///< n_z; 0 = automatic
-    int32_t max_order;  ///< bound of the automatic order and of the memory; 0 = min(128, what the Hankel matrix carries)
-    double fs_hz;       ///< sample rate
+    int32_t p;         ///< observer (ARX) order
+    int32_t rows;      ///< block rows and block columns of the Hankel matrices; 0 = 2 p
+    int32_t order;     ///< n_z; 0 = automatic
+    int32_t max_order; ///< bound of the automatic order and of the memory; 0 = min(128, what the Hankel matrix carries)
+    double fs_hz;      ///< sample rate
     okid_method_t method;
     okid_detrend_t detrend;
 } okid_identify_config_t;
@@ -46,16 +47,16 @@ typedef struct okid_identified_t {
     int32_t n_u, n_y, n_z, p, rows;
     int32_t singular_count, markov_count, mode_count; ///< numbers in the arrays below
     int64_t regression_rows;
-    double dt;                     ///< s
+    double dt;                       ///< s
     const double *A, *B, *C, *D, *K; ///< column-major; K Kalman gain n_z x n_y
-    const double* singular_values; ///< of H(0), descending
-    const double* markov;          ///< Y_0 .. Y_(markov_count-1), n_y x n_u blocks
-    const double* observer;        ///< theta, n_y x q
-    const double* innovation;      ///< n_y x n_y
-    const double* mean;            ///< m channel means that were removed (zeros for detrend none)
+    const double* singular_values;   ///< of H(0), descending
+    const double* markov;            ///< Y_0 .. Y_(markov_count-1), n_y x n_u blocks
+    const double* observer;          ///< theta, n_y x q
+    const double* innovation;        ///< n_y x n_y
+    const double* mean;              ///< m channel means that were removed (zeros for detrend none)
     const double *frequency_hz, *damping_ratio, *mpc, *emac; ///< mode_count each
     const double *shape_re, *shape_im;                       ///< n_y x mode_count
-    double model_radius;             ///< spectral radius of A
+    double model_radius;                                     ///< spectral radius of A
     okid_observer_info_t observer_info;
 } okid_identified_t;
 

@@ -15,7 +15,8 @@ typedef struct okid_observer_config_t {
     int32_t n_y;      ///< outputs, >= 1
     int32_t p;        ///< lags
     double ridge_min; ///< ridge on the unit-diagonal Gram, >= 0; 0 = 1e-12
-    int32_t unstable; ///< 0 = search the smallest ridge on a half-decade grid that makes the ARX model stable; 1 = leave it
+    int32_t
+        unstable; ///< 0 = search the smallest ridge on a half-decade grid that makes the ARX model stable; 1 = leave it
 } okid_observer_config_t;
 
 /// What the solve found, beside the parameters.

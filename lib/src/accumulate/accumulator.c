@@ -139,8 +139,10 @@ static void fold_slot_into_base(okid_accumulator_t* a, double weight) {
     if (weight != 1)
         for (size_t i = 0; i < sums + m + pm + pm * (pm + 1) / 2; ++i) base[i] *= weight;
     for (size_t i = 0; i < sums; ++i) {
-        if (integer_base) ((int64_t*)base)[i] += ((const int64_t*)data)[i];
-        else base[i] += integer_slot ? (double)((const int64_t*)data)[i] : data[i];
+        if (integer_base)
+            ((int64_t*)base)[i] += ((const int64_t*)data)[i];
+        else
+            base[i] += integer_slot ? (double)((const int64_t*)data)[i] : data[i];
     }
     double *mean = base + sums, *edge_mean = mean + m, *edge = edge_mean + pm;
     for (int32_t r = 0; r < m; ++r) mean[r] += data[sums + (size_t)r];
@@ -149,8 +151,10 @@ static void fold_slot_into_base(okid_accumulator_t* a, double weight) {
         edge_mean[j] += hj - tj;
         for (size_t i = 0; i <= j; ++i) {
             const double e = acc_lag(head, i, m, p) * hj - acc_lag(tail, i, m, p) * tj;
-            if (integer_base) ((int64_t*)edge)[j * (j + 1) / 2 + i] += (int64_t)e;
-            else edge[j * (j + 1) / 2 + i] += e;
+            if (integer_base)
+                ((int64_t*)edge)[j * (j + 1) / 2 + i] += (int64_t)e;
+            else
+                edge[j * (j + 1) / 2 + i] += e;
         }
     }
     a->base_weight = a->base_weight * weight + (double)acc_slot(a, a->open)->rows;
@@ -235,7 +239,8 @@ static size_t feed(okid_accumulator_t* a, const double* samples, const int16_t* 
     }
     if (count > room) count = room;
     const size_t numbers = count * (size_t)m;
-    if (samples) memcpy(to, samples, numbers * sizeof *to);
+    if (samples)
+        memcpy(to, samples, numbers * sizeof *to);
     else
         for (size_t i = 0; i < numbers; ++i) to[i] = codes[i];
     a->clock += (int64_t)count;
@@ -248,8 +253,10 @@ static size_t feed(okid_accumulator_t* a, const double* samples, const int16_t* 
     }
     a->pending += (int32_t)count;
     a->stats.rows += (int64_t)count;
-    if (a->config.block > 0 && acc_slot(a, a->open)->rows + a->pending == a->config.block) close_slot(a, 1);
-    else if (a->pending == CHUNK) flush(a);
+    if (a->config.block > 0 && acc_slot(a, a->open)->rows + a->pending == a->config.block)
+        close_slot(a, 1);
+    else if (a->pending == CHUNK)
+        flush(a);
     return count;
 }
 
@@ -258,8 +265,10 @@ static void feed_run(okid_accumulator_t* a, const double* samples, const int16_t
     a->stats.samples += (int64_t)count;
     while (count > 0) {
         const size_t taken = feed(a, samples, codes, count), numbers = taken * (size_t)a->m;
-        if (samples) samples += numbers;
-        else codes += numbers;
+        if (samples)
+            samples += numbers;
+        else
+            codes += numbers;
         count -= taken;
     }
 }
@@ -293,8 +302,7 @@ okid_status_t okid_accumulator_add(okid_accumulator_t* self, const double* sampl
 okid_status_t okid_accumulator_add_i16(okid_accumulator_t* self, const int16_t* codes, size_t count) {
     if (!self || (!codes && count > 0)) return OKID_ERR_NULL;
     if (self->config.sample != OKID_SAMPLE_INT16) return OKID_ERR_MISMATCH;
-    if (self->config.slots == 0 && self->config.forgetting >= 1 &&
-        self->stats.rows + (int64_t)count > MAX_ROWS_I16)
+    if (self->config.slots == 0 && self->config.forgetting >= 1 && self->stats.rows + (int64_t)count > MAX_ROWS_I16)
         return OKID_ERR_RANGE;
     int64_t saturated = 0;
     const size_t numbers = count * (size_t)self->m;
@@ -330,8 +338,10 @@ okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_
     const int integer = acc_base_is_integer(self);
     for (size_t i = 0; i < end; ++i) {
         const int is_mean = i >= mean && i < edge;
-        if (integer && !is_mean) ((int64_t*)to)[i] += ((const int64_t*)from)[i];
-        else to[i] += from[i];
+        if (integer && !is_mean)
+            ((int64_t*)to)[i] += ((const int64_t*)from)[i];
+        else
+            to[i] += from[i];
     }
     self->base_weight += other->base_weight;
     adopt_open_slot(self, other);

@@ -22,17 +22,19 @@ struct okid_accumulator {
     okid_accumulator_stats_t stats;
     okid_kernel_fn* kernel;
     size_t scale_at, x_at, sums_at, partial_at, slots_at, base_at, slot_bytes; ///< byte offsets from this struct
-    size_t slot_head, slot_tail;                                      ///< in numbers from the slot's data
-    int64_t clock;                                                    ///< samples seen, missing ones included
-    double base_weight;                                               ///< rows in the base, forgotten ones fading
-    int32_t m, width;                                                 ///< channels, m (p+1)
-    int32_t slot_count, open, closed;                                 ///< ring; closed slots stand before `open`
-    int32_t have, pending;  ///< samples of the lag window at hand; samples waiting behind it for the kernel
-    int32_t partial_rows;   ///< codes: rows in the double sums not yet folded
-    int32_t in_gap;         ///< the run has ended; the next sample begins another
+    size_t slot_head, slot_tail;                                               ///< in numbers from the slot's data
+    int64_t clock;                                                             ///< samples seen, missing ones included
+    double base_weight;               ///< rows in the base, forgotten ones fading
+    int32_t m, width;                 ///< channels, m (p+1)
+    int32_t slot_count, open, closed; ///< ring; closed slots stand before `open`
+    int32_t have, pending;            ///< samples of the lag window at hand; samples waiting behind it for the kernel
+    int32_t partial_rows;             ///< codes: rows in the double sums not yet folded
+    int32_t in_gap;                   ///< the run has ended; the next sample begins another
 };
 
-static inline double* acc_at(const okid_accumulator_t* a, size_t offset) { return (double*)((char*)(size_t)a + offset); }
+static inline double* acc_at(const okid_accumulator_t* a, size_t offset) {
+    return (double*)((char*)(size_t)a + offset);
+}
 static inline double* acc_scale(const okid_accumulator_t* a) { return acc_at(a, a->scale_at); }
 static inline double* acc_x(const okid_accumulator_t* a) { return acc_at(a, a->x_at); }
 static inline double* acc_sums(const okid_accumulator_t* a) { return acc_at(a, a->sums_at); }

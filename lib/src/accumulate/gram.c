@@ -55,7 +55,8 @@ static double lag_sum(const okid_accumulator_t* a, size_t i, double before) {
         const slot_info_t* slot = acc_slot(a, index);
         if (slot->rows == 0) continue;
         const double* data = acc_slot_data(a, index);
-        if (i < m) sum += data[m * n + i];
+        if (i < m)
+            sum += data[m * n + i];
         else {
             if (!(k > 0 && slot->joined)) sum += acc_lag(data + a->slot_head, i - m, a->m, p);
             if (!acc_is_continued(a, k)) sum -= acc_lag(acc_tail(a, index), i - m, a->m, p);
@@ -98,9 +99,12 @@ okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t det
     if (!(rows > 0)) return OKID_ERR_TOO_SHORT;
     const size_t m = (size_t)self->m, n = (size_t)self->width;
     const int integer = acc_base_is_integer(self);
-    if (integer) gram_of_int64(self, (int64_t*)gram);
-    else if (self->config.sample == OKID_SAMPLE_INT16) gram_of_mixed(self, gram);
-    else gram_of_double(self, gram);
+    if (integer)
+        gram_of_int64(self, (int64_t*)gram);
+    else if (self->config.sample == OKID_SAMPLE_INT16)
+        gram_of_mixed(self, gram);
+    else
+        gram_of_double(self, gram);
     double* sums = acc_sums(self);
     for (size_t i = 0; i < n; ++i) sums[i] = lag_sum(self, i, i < m ? 0 : sums[i - m]);
     if (mean)
@@ -113,7 +117,8 @@ okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t det
                 memcpy(&e, &gram[j * n + i], sizeof e);
                 raw = (double)e;
                 centred = centred_int64(e, sums[i], sums[j], rows);
-            } else centred = raw - sums[i] * sums[j] / rows;
+            } else
+                centred = raw - sums[i] * sums[j] / rows;
             gram[j * n + i] = entry_in_units(self, raw, centred, i, j, sums, rows, detrend);
         }
     for (size_t j = 0; j < n; ++j)

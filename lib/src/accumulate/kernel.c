@@ -57,7 +57,8 @@ static inline __attribute__((always_inline)) void tile(double* S, int ld, const 
     }
 }
 
-static void tiles(double* S, int ld, const double* current, const double* window, int m, int count, int rows, int skip) {
+static void tiles(double* S, int ld, const double* current, const double* window, int m, int count, int rows,
+                  int skip) {
     switch (rows) {
     case 1: tile(S, ld, current, window, m, count, 1, skip); break;
     case 2: tile(S, ld, current, window, m, count, 2, skip); break;

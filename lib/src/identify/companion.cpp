@@ -76,8 +76,10 @@ int arnoldi(const companion& c, companion_work& w, double* beyond) {
             }
         const double length = norm(next, c.size);
         if (length < 1e-13) return j + 1; // invariant subspace
-        if (j + 1 < k) w.hessenberg[j * k + j + 1] = length;
-        else *beyond = length;
+        if (j + 1 < k)
+            w.hessenberg[j * k + j + 1] = length;
+        else
+            *beyond = length;
         scale(next, c.size, 1 / length);
     }
     return k;
@@ -104,7 +106,9 @@ double dense_radius(const companion& c, companion_work& w) {
     const auto n = static_cast<size_t>(c.size);
     std::fill(w.hessenberg, w.hessenberg + n * n, 0.0);
     for (size_t j = 0; j < n; ++j) {
-        for (int i = 0; i < c.n_y; ++i) w.hessenberg[j * n + static_cast<size_t>(i)] = c.feedback[j * static_cast<size_t>(c.n_y) + static_cast<size_t>(i)];
+        for (int i = 0; i < c.n_y; ++i)
+            w.hessenberg[j * n + static_cast<size_t>(i)] =
+                c.feedback[j * static_cast<size_t>(c.n_y) + static_cast<size_t>(i)];
         if (j + static_cast<size_t>(c.n_y) < n) w.hessenberg[j * n + j + static_cast<size_t>(c.n_y)] = 1;
     }
     if (linalg::eigen(c.size, w.hessenberg, w.re, w.im, nullptr, w.eigen) != 0) return HUGE_VAL;

@@ -24,7 +24,8 @@ struct okid_era {
 namespace {
 
 size_t lay_out(okid_era& e, okid::arena& memory) {
-    const auto height = static_cast<size_t>(e.height), breadth = static_cast<size_t>(e.breadth), rank = static_cast<size_t>(e.rank);
+    const auto height = static_cast<size_t>(e.height), breadth = static_cast<size_t>(e.breadth),
+               rank = static_cast<size_t>(e.rank);
     e.hankel = memory.take<double>(height * breadth);
     e.left = memory.take<double>(height * rank);
     e.values = memory.take<double>(rank);
@@ -54,7 +55,9 @@ void fill_hankel(okid_era& e, const double* markov, int shift) {
         for (int c = 0; c < nu; ++c) {
             double* column = e.hankel + static_cast<size_t>(j * nu + c) * static_cast<size_t>(e.height);
             for (int i = 0; i < e.config.rows; ++i) {
-                const double* y = markov + (static_cast<size_t>(i + j + 1 + shift) * static_cast<size_t>(nu) + static_cast<size_t>(c)) * static_cast<size_t>(ny);
+                const double* y = markov + (static_cast<size_t>(i + j + 1 + shift) * static_cast<size_t>(nu) +
+                                            static_cast<size_t>(c)) *
+                                               static_cast<size_t>(ny);
                 std::copy(y, y + ny, column + static_cast<size_t>(i * ny));
             }
         }
@@ -91,10 +94,13 @@ okid_status_t okid_era_decompose(okid_era_t* self, const double* markov) {
     if (self == nullptr || markov == nullptr) return OKID_ERR_NULL;
     okid_era& e = *self;
     fill_hankel(e, markov, 0);
-    if (okid::linalg::svd(e.height, e.breadth, e.hankel, e.left, e.values, e.right, e.work) != 0) return OKID_ERR_NUMERIC;
+    if (okid::linalg::svd(e.height, e.breadth, e.hankel, e.left, e.values, e.right, e.work) != 0)
+        return OKID_ERR_NUMERIC;
     fill_hankel(e, markov, 1);
-    okid::linalg::multiply(false, true, e.height, e.rank, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0, e.product, e.height);
-    okid::linalg::multiply(true, false, e.rank, e.rank, e.height, 1, e.left, e.height, e.product, e.height, 0, e.core, e.rank);
+    okid::linalg::multiply(false, true, e.height, e.rank, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0,
+                           e.product, e.height);
+    okid::linalg::multiply(true, false, e.rank, e.rank, e.height, 1, e.left, e.height, e.product, e.height, 0, e.core,
+                           e.rank);
     return OKID_OK;
 }
 
@@ -110,19 +116,25 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, double* A, doubl
     if (order < 1 || order > e.rank || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
     const int ny = e.config.n_y, nu = e.config.n_u;
     for (int j = 0; j < order; ++j)
-        for (int i = 0; i < order; ++i) A[j * order + i] = e.core[j * e.rank + i] / std::sqrt(e.values[i] * e.values[j]);
+        for (int i = 0; i < order; ++i)
+            A[j * order + i] = e.core[j * e.rank + i] / std::sqrt(e.values[i] * e.values[j]);
     for (int c = 0; c < nu; ++c)
         for (int i = 0; i < order; ++i) B[c * order + i] = std::sqrt(e.values[i]) * e.right[c * e.rank + i];
     for (int j = 0; j < order; ++j)
-        for (int o = 0; o < ny; ++o) C[j * ny + o] = e.left[static_cast<size_t>(j) * static_cast<size_t>(e.height) + static_cast<size_t>(o)] * std::sqrt(e.values[j]);
+        for (int o = 0; o < ny; ++o)
+            C[j * ny + o] = e.left[static_cast<size_t>(j) * static_cast<size_t>(e.height) + static_cast<size_t>(o)] *
+                            std::sqrt(e.values[j]);
     if (gain_markov == nullptr || K == nullptr) return OKID_OK;
     // L = P^+ [Y0_1; ..; Y0_r], P = R Sigma^(1/2); K = -L. The stack is made in `product`, which is free by now.
     for (int c = 0; c < ny; ++c)
         for (int i = 0; i < e.config.rows; ++i) {
-            const double* y0 = gain_markov + (static_cast<size_t>(i * ny) + static_cast<size_t>(c)) * static_cast<size_t>(ny);
-            std::copy(y0, y0 + ny, e.product + static_cast<size_t>(c) * static_cast<size_t>(e.height) + static_cast<size_t>(i * ny));
+            const double* y0 =
+                gain_markov + (static_cast<size_t>(i * ny) + static_cast<size_t>(c)) * static_cast<size_t>(ny);
+            std::copy(y0, y0 + ny,
+                      e.product + static_cast<size_t>(c) * static_cast<size_t>(e.height) + static_cast<size_t>(i * ny));
         }
-    okid::linalg::multiply(true, false, order, ny, e.height, 1, e.left, e.height, e.product, e.height, 0, e.rotated, e.rank);
+    okid::linalg::multiply(true, false, order, ny, e.height, 1, e.left, e.height, e.product, e.height, 0, e.rotated,
+                           e.rank);
     for (int c = 0; c < ny; ++c)
         for (int i = 0; i < order; ++i) K[c * order + i] = -e.rotated[c * e.rank + i] / std::sqrt(e.values[i]);
     return OKID_OK;
@@ -157,7 +169,8 @@ okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count, cons
             const double weight = first_re * first_re + first_im * first_im;
             total += weight;
             if (!(a > 0) || !(b > 0)) continue;
-            const double turn = std::abs(std::atan2(end_im * expected_re - end_re * expected_im, end_re * expected_re + end_im * expected_im));
+            const double turn = std::abs(
+                std::atan2(end_im * expected_re - end_re * expected_im, end_re * expected_re + end_im * expected_im));
             weighted += weight * std::min(a, b) / std::max(a, b) * std::max(0.0, 1 - turn / quarter_pi);
         }
         emac[k] = total > 0 ? weighted / total : 0;

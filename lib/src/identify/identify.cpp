@@ -26,7 +26,7 @@ struct okid_identify {
     size_t observer_bytes, modal_bytes;
     double *gram, *theta, *innovation, *mean, *markov, *gain;
     double *A, *B, *C, *D, *K, *closed_loop, *eigen_re, *eigen_im, *eigen_work;
-    double *scores; ///< of the order scan
+    double* scores; ///< of the order scan
     double *frequency, *damping, *mpc, *emac, *shape_re, *shape_im, *mu_re, *mu_im, *psi_re, *psi_im;
     void *observer_work, *modal_work, *era_block;
     okid_era_t* era;
@@ -35,9 +35,9 @@ struct okid_identify {
 namespace {
 
 bool valid(const okid_identify_config_t& c) {
-    return c.n_u >= 1 && c.n_y >= 1 && c.n_u + c.n_y <= 256 && c.p >= 1 && c.p <= 4096 && c.rows >= 0 && c.rows <= 8192 &&
-           c.order >= 0 && c.max_order >= 0 && c.fs_hz > 0 && std::isfinite(c.fs_hz) && c.method == OKID_METHOD_OKID_ERA &&
-           (c.detrend == OKID_DETREND_NONE || c.detrend == OKID_DETREND_MEAN);
+    return c.n_u >= 1 && c.n_y >= 1 && c.n_u + c.n_y <= 256 && c.p >= 1 && c.p <= 4096 && c.rows >= 0 &&
+           c.rows <= 8192 && c.order >= 0 && c.max_order >= 0 && c.fs_hz > 0 && std::isfinite(c.fs_hz) &&
+           c.method == OKID_METHOD_OKID_ERA && (c.detrend == OKID_DETREND_NONE || c.detrend == OKID_DETREND_MEAN);
 }
 
 okid_identify plan(const okid_identify_config_t& c) {
@@ -59,8 +59,10 @@ okid_identify plan(const okid_identify_config_t& c) {
 }
 
 size_t lay_out(okid_identify& s, okid::arena& memory) {
-    const auto n = static_cast<size_t>(s.n), ny = static_cast<size_t>(s.n_y), nu = static_cast<size_t>(s.n_u), m = nu + ny;
-    const auto z = static_cast<size_t>(s.max_order), last = static_cast<size_t>(s.markov_last), rows = static_cast<size_t>(s.config.rows);
+    const auto n = static_cast<size_t>(s.n), ny = static_cast<size_t>(s.n_y), nu = static_cast<size_t>(s.n_u),
+               m = nu + ny;
+    const auto z = static_cast<size_t>(s.max_order), last = static_cast<size_t>(s.markov_last),
+               rows = static_cast<size_t>(s.config.rows);
     auto doubles = [&](size_t count) { return memory.take<double>(count); };
     s.gram = doubles(n * n);
     s.theta = doubles(ny * static_cast<size_t>(s.q));
@@ -93,7 +95,8 @@ size_t lay_out(okid_identify& s, okid::arena& memory) {
 /// A constant channel, judged by its variance about its own mean; -1 when there is none.
 int constant_channel(const okid_identify& s, double rows) {
     for (int c = 0; c < s.m; ++c) {
-        const double square = s.gram[static_cast<size_t>(c) * static_cast<size_t>(s.n + 1)], bias = rows * s.mean[c] * s.mean[c];
+        const double square = s.gram[static_cast<size_t>(c) * static_cast<size_t>(s.n + 1)],
+                     bias = rows * s.mean[c] * s.mean[c];
         const double variance = s.config.detrend == OKID_DETREND_MEAN ? square : square - bias;
         if (!(variance > 1e-13 * (std::abs(variance) + bias))) return c;
     }
@@ -189,7 +192,8 @@ size_t okid_identify_memsize(const okid_identify_config_t* config) {
     return lay_out(s, memory);
 }
 
-okid_status_t okid_identify_create(okid_identify_t** self, const okid_identify_config_t* config, void* block, size_t bytes) {
+okid_status_t okid_identify_create(okid_identify_t** self, const okid_identify_config_t* config, void* block,
+                                   size_t bytes) {
     if (self == nullptr || config == nullptr || block == nullptr) return OKID_ERR_NULL;
     if (!valid(*config)) return OKID_ERR_DIM;
     if (bytes < okid_identify_memsize(config)) return OKID_ERR_MEMORY;
@@ -198,7 +202,8 @@ okid_status_t okid_identify_create(okid_identify_t** self, const okid_identify_c
     auto* s = memory.take<okid_identify>(1);
     *s = plan(*config);
     lay_out(*s, memory);
-    const okid_status_t status = okid_era_create(&s->era, &s->era_config, s->era_block, okid_era_memsize(&s->era_config));
+    const okid_status_t status =
+        okid_era_create(&s->era, &s->era_config, s->era_block, okid_era_memsize(&s->era_config));
     *self = s;
     return status;
 }
@@ -211,8 +216,9 @@ okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_ide
     if (status != OKID_OK) return status;
     out->n_z = order;
     out->warnings &= ~static_cast<uint32_t>(OKID_NOTE_MODEL_UNSTABLE | OKID_NOTE_PREDICTOR_UNSTABLE);
-    status = okid_modal_analyse(s.n_y, order, out->dt, s.A, s.C, &out->mode_count, s.frequency, s.damping, s.mpc, s.shape_re,
-                                s.shape_im, s.mu_re, s.mu_im, s.psi_re, s.psi_im, &out->model_radius, s.modal_work, s.modal_bytes);
+    status = okid_modal_analyse(s.n_y, order, out->dt, s.A, s.C, &out->mode_count, s.frequency, s.damping, s.mpc,
+                                s.shape_re, s.shape_im, s.mu_re, s.mu_im, s.psi_re, s.psi_im, &out->model_radius,
+                                s.modal_work, s.modal_bytes);
     if (status != OKID_OK) return status;
     status = okid_era_emac(s.era, order, out->mode_count, s.mu_re, s.mu_im, s.psi_re, s.psi_im, s.emac);
     if (status != OKID_OK) return status;

@@ -16,7 +16,8 @@ using std::size_t;
 
 /// target(n) = own(n) + sum_h theta^y_h target(n-h), blocks of n_y x width; block 0 of `target` has index `first`.
 void add_feedback(int n_u, int n_y, int p, const double* theta, double* target, int width, int n, int first) {
-    const size_t m = static_cast<size_t>(n_u) + static_cast<size_t>(n_y), size = static_cast<size_t>(n_y) * static_cast<size_t>(width);
+    const size_t m = static_cast<size_t>(n_u) + static_cast<size_t>(n_y),
+                 size = static_cast<size_t>(n_y) * static_cast<size_t>(width);
     double* out = target + static_cast<size_t>(n - first) * size;
     for (int h = 1; h <= std::min(n - first, p); ++h) {
         const size_t column = static_cast<size_t>(n_u) + static_cast<size_t>(h - 1) * m + static_cast<size_t>(n_u);
@@ -36,13 +37,17 @@ okid_status_t okid_markov_recursion(int32_t n_u, int32_t n_y, int32_t p, const d
     for (int n = 1; n <= count; ++n) {
         const double* own = theta + (nu + static_cast<size_t>(n - 1) * m) * ny; // [Ybar^I_n, -Ybar^II_n]
         double* y = system + static_cast<size_t>(n) * ny * nu;
-        if (n <= p) std::copy(own, own + ny * nu, y);
-        else std::fill(y, y + ny * nu, 0.0);
+        if (n <= p)
+            std::copy(own, own + ny * nu, y);
+        else
+            std::fill(y, y + ny * nu, 0.0);
         add_feedback(n_u, n_y, p, theta, system, n_u, n, 0);
         if (gain == nullptr) continue;
         double* y0 = gain + static_cast<size_t>(n - 1) * ny * ny;
-        if (n <= p) std::transform(own + ny * nu, own + ny * m, y0, [](double x) { return -x; });
-        else std::fill(y0, y0 + ny * ny, 0.0);
+        if (n <= p)
+            std::transform(own + ny * nu, own + ny * m, y0, [](double x) { return -x; });
+        else
+            std::fill(y0, y0 + ny * ny, 0.0);
         add_feedback(n_u, n_y, p, theta, gain, n_y, n, 1);
     }
     return OKID_OK;

@@ -18,7 +18,7 @@ namespace okid {
 namespace {
 
 using std::size_t;
-constexpr int grid_size = 23;          // 1e-12, 3e-12, … 1e-1
+constexpr int grid_size = 23;            // 1e-12, 3e-12, … 1e-1
 constexpr double rank_tolerance = 1e-10; // of the unit-diagonal Gram of the input lags
 
 struct observer_work {
@@ -27,7 +27,8 @@ struct observer_work {
 };
 
 size_t lay_out(const okid_observer_config_t& c, arena& memory, observer_work* work) {
-    const auto m = static_cast<size_t>(c.n_u + c.n_y), n = m * static_cast<size_t>(c.p + 1), ny = static_cast<size_t>(c.n_y);
+    const auto m = static_cast<size_t>(c.n_u + c.n_y), n = m * static_cast<size_t>(c.p + 1),
+               ny = static_cast<size_t>(c.n_y);
     const size_t q = n - ny;
     observer_work w;
     w.factor = memory.take<double>(q * q);
@@ -121,13 +122,16 @@ struct solver {
     void residual(double ridge) {
         std::fill(w.t, w.t + n * n_y, 0.0);
         for (int o = 0; o < n_y; ++o)
-            for (int k = 0; k < q; ++k) w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + index(k)] = w.x[o * q + k] * w.scale[index(k)];
+            for (int k = 0; k < q; ++k)
+                w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + index(k)] = w.x[o * q + k] * w.scale[index(k)];
         linalg::multiply(false, false, n, n_y, n, 1, gram, n, w.t, n, 0, w.out, n);
         for (int o = 0; o < n_y; ++o)
             for (int k = 0; k < q; ++k) {
                 const size_t i = index(k);
                 const double rhs = gram[static_cast<size_t>(n_u + o) * static_cast<size_t>(n) + i];
-                w.estimate[o * q + k] = w.scale[i] * (rhs - w.out[static_cast<size_t>(o) * static_cast<size_t>(n) + i]) - ridge * w.x[o * q + k];
+                w.estimate[o * q + k] =
+                    w.scale[i] * (rhs - w.out[static_cast<size_t>(o) * static_cast<size_t>(n) + i]) -
+                    ridge * w.x[o * q + k];
             }
     }
 
@@ -140,11 +144,13 @@ struct solver {
     void innovation(const double* theta, double* cov) {
         std::fill(w.t, w.t + n * n_y, 0.0);
         for (int o = 0; o < n_y; ++o) {
-            for (int k = 0; k < q; ++k) w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + index(k)] = -theta[k * n_y + o];
+            for (int k = 0; k < q; ++k)
+                w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + index(k)] = -theta[k * n_y + o];
             w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + static_cast<size_t>(n_u + o)] = 1;
         }
         linalg::multiply(false, false, n, n_y, n, 1, gram, n, w.t, n, 0, w.out, n);
-        linalg::multiply(true, false, n_y, n_y, n, 1 / static_cast<double>(std::max(rows - q, 1LL)), w.t, n, w.out, n, 0, cov, n_y);
+        linalg::multiply(true, false, n_y, n_y, n, 1 / static_cast<double>(std::max(rows - q, 1LL)), w.t, n, w.out, n,
+                         0, cov, n_y);
     }
 };
 
@@ -176,7 +182,8 @@ size_t okid_observer_memsize(const okid_observer_config_t* config) {
 
 okid_status_t okid_observer_solve(const okid_observer_config_t* config, const double* gram, int64_t rows, double* theta,
                                   double* innovation, okid_observer_info_t* info, void* work, size_t bytes) {
-    if (config == nullptr || gram == nullptr || theta == nullptr || info == nullptr || work == nullptr) return OKID_ERR_NULL;
+    if (config == nullptr || gram == nullptr || theta == nullptr || info == nullptr || work == nullptr)
+        return OKID_ERR_NULL;
     const size_t needed = okid_observer_memsize(config);
     if (needed == 0) return OKID_ERR_DIM;
     if (bytes < needed) return OKID_ERR_MEMORY;

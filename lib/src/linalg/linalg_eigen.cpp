@@ -32,7 +32,8 @@ template <class Target, class Panel> void subtract_outer(Target c, const Panel& 
     const int n = static_cast<int>(c.rows());
     for (int j = 0; j < n; j += block) {
         const int width = std::min(block, n - j);
-        c.block(j, j, n - j, width).noalias() -= panel.bottomRows(n - j).lazyProduct(panel.middleRows(j, width).transpose());
+        c.block(j, j, n - j, width).noalias() -=
+            panel.bottomRows(n - j).lazyProduct(panel.middleRows(j, width).transpose());
     }
 }
 
@@ -67,10 +68,12 @@ void reflect_right(double* a, int lda, int rows, int cols, const double* tail, d
     if (tau == 0) return;
     for (int i = 0; i < rows; ++i) {
         double w = a[i];
-        for (int j = 1; j < cols; ++j) w += a[static_cast<size_t>(j) * static_cast<size_t>(lda) + static_cast<size_t>(i)] * tail[j - 1];
+        for (int j = 1; j < cols; ++j)
+            w += a[static_cast<size_t>(j) * static_cast<size_t>(lda) + static_cast<size_t>(i)] * tail[j - 1];
         w *= tau;
         a[i] -= w;
-        for (int j = 1; j < cols; ++j) a[static_cast<size_t>(j) * static_cast<size_t>(lda) + static_cast<size_t>(i)] -= w * tail[j - 1];
+        for (int j = 1; j < cols; ++j)
+            a[static_cast<size_t>(j) * static_cast<size_t>(lda) + static_cast<size_t>(i)] -= w * tail[j - 1];
     }
 }
 
@@ -89,8 +92,9 @@ int cholesky(int n, double* a, int lda) {
             d.col(j).tail(width + below - j) /= std::sqrt(d(j, j));
         }
         if (below > 0)
-            subtract_outer(view(a + static_cast<size_t>(k + width) * static_cast<size_t>(lda) + k + width, below, below, lda),
-                           d.bottomRows(below));
+            subtract_outer(
+                view(a + static_cast<size_t>(k + width) * static_cast<size_t>(lda) + k + width, below, below, lda),
+                d.bottomRows(below));
     }
     return 0;
 }
@@ -132,8 +136,10 @@ double cholesky_condition(int n, const double* l, int ldl, double norm1, double*
 void multiply(bool transpose_a, bool transpose_b, int rows, int cols, int inner, double alpha, const double* a, int lda,
               const double* b, int ldb, double beta, double* c, int ldc) {
     matrix C = view(c, rows, cols, ldc);
-    if (beta == 0) C.setZero();
-    else if (beta != 1) C *= beta;
+    if (beta == 0)
+        C.setZero();
+    else if (beta != 1)
+        C *= beta;
     const const_matrix A = view(a, transpose_a ? inner : rows, transpose_a ? rows : inner, lda);
     const const_matrix B = view(b, transpose_b ? cols : inner, transpose_b ? inner : cols, ldb);
     for (int k = 0; k < inner; k += 256) { // strips keep the operands in cache; no packing, hence no temporaries
@@ -203,10 +209,13 @@ void sort_columns(matrix g, matrix v, double* s) {
 int svd(int rows, int cols, double* a, double* u, double* s, double* vt, double* work) {
     const bool wide = cols > rows;
     const int tall = std::max(rows, cols), k = std::min(rows, cols);
-    double *q = work, *g = q + static_cast<size_t>(tall) * static_cast<size_t>(k), *v = g + static_cast<size_t>(k) * static_cast<size_t>(k);
-    double *tau = v + static_cast<size_t>(k) * static_cast<size_t>(k);
-    if (wide) view(q, tall, k, tall) = view(a, rows, cols, rows).transpose();
-    else view(q, tall, k, tall) = view(a, rows, cols, rows);
+    double *q = work, *g = q + static_cast<size_t>(tall) * static_cast<size_t>(k),
+           *v = g + static_cast<size_t>(k) * static_cast<size_t>(k);
+    double* tau = v + static_cast<size_t>(k) * static_cast<size_t>(k);
+    if (wide)
+        view(q, tall, k, tall) = view(a, rows, cols, rows).transpose();
+    else
+        view(q, tall, k, tall) = view(a, rows, cols, rows);
     for (int j = 0; j < k; ++j) {
         double* x = q + static_cast<size_t>(j) * static_cast<size_t>(tall) + j;
         double beta = 0;
@@ -227,11 +236,13 @@ int svd(int rows, int cols, double* a, double* u, double* s, double* vt, double*
     tall_factor.setZero();
     tall_factor.topRows(k) = V;
     for (int j = k - 1; j >= 0; --j)
-        reflect_left(out + j, tall, tall - j, k, q + static_cast<size_t>(j) * static_cast<size_t>(tall) + j + 1, tau[j]);
+        reflect_left(out + j, tall, tall - j, k, q + static_cast<size_t>(j) * static_cast<size_t>(tall) + j + 1,
+                     tau[j]);
     if (wide) {
         view(vt, k, cols, k) = tall_factor.transpose();
         view(u, rows, k, rows) = G;
-    } else view(vt, k, cols, k) = G.transpose();
+    } else
+        view(vt, k, cols, k) = G.transpose();
     return 0;
 }
 
@@ -247,7 +258,9 @@ namespace {
 struct schur {
     int n;
     double *t, *z; // quasi-triangular form and (or nullptr) the accumulated rotations
-    double& T(int i, int j) const { return t[static_cast<size_t>(j) * static_cast<size_t>(n) + static_cast<size_t>(i)]; }
+    double& T(int i, int j) const {
+        return t[static_cast<size_t>(j) * static_cast<size_t>(n) + static_cast<size_t>(i)];
+    }
 
     void to_hessenberg(double* spare) const {
         for (int k = 0; k + 2 < n; ++k) {
@@ -258,7 +271,8 @@ struct schur {
             std::copy(x + 1, x + length, spare);
             reflect_left(&T(k + 1, k + 1), n, length, n - k - 1, spare, tau);
             reflect_right(&T(0, k + 1), n, n, length, spare, tau);
-            if (z != nullptr) reflect_right(z + static_cast<size_t>(k + 1) * static_cast<size_t>(n), n, n, length, spare, tau);
+            if (z != nullptr)
+                reflect_right(z + static_cast<size_t>(k + 1) * static_cast<size_t>(n), n, n, length, spare, tau);
             *x = beta;
             std::fill(x + 1, x + length, 0.0);
         }
@@ -281,7 +295,8 @@ struct schur {
             const int from = std::max(k - 1, 0);
             reflect_left(&T(k, from), n, length, n - from, v + 1, tau);
             reflect_right(&T(0, k), n, std::min(k + 4, high + 1), length, v + 1, tau);
-            if (z != nullptr) reflect_right(z + static_cast<size_t>(k) * static_cast<size_t>(n), n, n, length, v + 1, tau);
+            if (z != nullptr)
+                reflect_right(z + static_cast<size_t>(k) * static_cast<size_t>(n), n, n, length, v + 1, tau);
             if (k > low) {
                 T(k + 1, k - 1) = 0;
                 if (length == 3) T(k + 2, k - 1) = 0;
@@ -360,7 +375,8 @@ void back_substitute(const schur& s, int k, double re, double im, double* x, dou
     if (im > 0) { // (T_kk - mu) x_k + T_k,k+1 x_(k+1) = 0
         x[k + 1] = 1;
         divide(-s.T(k, k + 1), 0, s.T(k, k) - re, -im, &x[k], &y[k]);
-    } else x[k] = 1;
+    } else
+        x[k] = 1;
     auto right = [&](int row, int from, double* a, double* b) {
         *a = *b = 0;
         for (int j = from; j <= top; ++j) {
@@ -394,7 +410,8 @@ void back_substitute(const schur& s, int k, double re, double im, double* x, dou
 } // namespace
 
 int eigen(int n, double* a, double* re, double* im, double* vectors, double* work) {
-    double *z = vectors != nullptr ? work : nullptr, *x = work + static_cast<size_t>(n) * static_cast<size_t>(n), *y = x + n;
+    double *z = vectors != nullptr ? work : nullptr, *x = work + static_cast<size_t>(n) * static_cast<size_t>(n),
+           *y = x + n;
     if (z != nullptr) view(z, n, n, n).setIdentity();
     const schur s{n, a, z};
     s.to_hessenberg(x);
@@ -418,7 +435,8 @@ int eigen(int n, double* a, double* re, double* im, double* vectors, double* wor
         double* column = vectors + static_cast<size_t>(k) * static_cast<size_t>(n);
         multiply(false, false, n, 1, n, 1, z, n, x, n, 0, column, n);
         if (pair) multiply(false, false, n, 1, n, 1, z, n, y, n, 0, column + n, n);
-        const double size = std::sqrt(vector(column, n).squaredNorm() + (pair ? vector(column + n, n).squaredNorm() : 0));
+        const double size =
+            std::sqrt(vector(column, n).squaredNorm() + (pair ? vector(column + n, n).squaredNorm() : 0));
         if (size > 0) {
             vector(column, n) /= size;
             if (pair) vector(column + n, n) /= size;

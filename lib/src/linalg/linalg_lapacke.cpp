@@ -52,7 +52,8 @@ static lapack_int svd_query(int rows, int cols) {
     double wanted = 0, none = 0;
     lapack_int integer = 0;
     const int k = std::min(rows, cols);
-    LAPACKE_dgesdd_work(LAPACK_COL_MAJOR, 'S', rows, cols, &none, rows, &none, &none, rows, &none, k, &wanted, -1, &integer);
+    LAPACKE_dgesdd_work(LAPACK_COL_MAJOR, 'S', rows, cols, &none, rows, &none, &none, rows, &none, k, &wanted, -1,
+                        &integer);
     return static_cast<lapack_int>(wanted);
 }
 

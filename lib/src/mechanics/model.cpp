@@ -31,8 +31,10 @@ struct stepper {
     size_t z() const { return static_cast<size_t>(model.n_z); }
 
     stepper(const okid_model_t& m, const double* x0, double* work) : model(m), x(work), next(work + m.n_z) {
-        if (x0 != nullptr) std::copy(x0, x0 + z(), x);
-        else std::fill(x, x + z(), 0.0);
+        if (x0 != nullptr)
+            std::copy(x0, x0 + z(), x);
+        else
+            std::fill(x, x + z(), 0.0);
     }
     void output(const double* u, double* y) const {
         std::fill(y, y + model.n_y, 0.0);
@@ -62,7 +64,8 @@ const double* usable_input(const double* u, int count, double* spare) {
 } // namespace
 
 size_t okid_model_workspace(const okid_model_t* model) {
-    const auto z = static_cast<size_t>(model->n_z), y = static_cast<size_t>(model->n_y), u = static_cast<size_t>(model->n_u);
+    const auto z = static_cast<size_t>(model->n_z), y = static_cast<size_t>(model->n_y),
+               u = static_cast<size_t>(model->n_u);
     return 2 * z + u + 2 * y + 2 * y * z + z * z + z;
 }
 
@@ -100,7 +103,8 @@ okid_status_t okid_model_predict(const okid_model_t* model, const double* u, con
 okid_status_t okid_model_initial_state(const okid_model_t* model, const double* u, const double* y, size_t count,
                                        double* x0, double* work) {
     if (model == nullptr || u == nullptr || y == nullptr || x0 == nullptr || work == nullptr) return OKID_ERR_NULL;
-    const auto z = static_cast<size_t>(model->n_z), ny = static_cast<size_t>(model->n_y), nu = static_cast<size_t>(model->n_u);
+    const auto z = static_cast<size_t>(model->n_z), ny = static_cast<size_t>(model->n_y),
+               nu = static_cast<size_t>(model->n_u);
     stepper s(*model, nullptr, work);
     double* spare = work + 2 * z;
     double *out = spare + nu, *residual = out + ny, *observe = residual + ny, *moved = observe + ny * z;
@@ -114,11 +118,14 @@ okid_status_t okid_model_initial_state(const okid_model_t* model, const double* 
         s.output(input, out);
         for (size_t o = 0; o < ny; ++o) residual[o] = y[n * ny + o] - out[o];
         if (finite(residual, model->n_y)) {
-            okid::linalg::multiply(true, false, model->n_z, model->n_z, model->n_y, 1, observe, model->n_y, observe, model->n_y, 1, normal, model->n_z);
-            okid::linalg::multiply(true, false, model->n_z, 1, model->n_y, 1, observe, model->n_y, residual, model->n_y, 1, x0, model->n_z);
+            okid::linalg::multiply(true, false, model->n_z, model->n_z, model->n_y, 1, observe, model->n_y, observe,
+                                   model->n_y, 1, normal, model->n_z);
+            okid::linalg::multiply(true, false, model->n_z, 1, model->n_y, 1, observe, model->n_y, residual, model->n_y,
+                                   1, x0, model->n_z);
         }
         s.step(input, nullptr);
-        okid::linalg::multiply(false, false, model->n_y, model->n_z, model->n_z, 1, observe, model->n_y, model->A, model->n_z, 0, moved, model->n_y);
+        okid::linalg::multiply(false, false, model->n_y, model->n_z, model->n_z, 1, observe, model->n_y, model->A,
+                               model->n_z, 0, moved, model->n_y);
         std::swap(observe, moved);
         double size = 0;
         for (size_t i = 0; i < ny * z; ++i) size = std::max(size, std::abs(observe[i]));

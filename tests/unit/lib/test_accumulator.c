@@ -92,8 +92,10 @@ static void any_split_gives_the_same_bits(void) {
         }
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, OKID_DETREND_NONE, whole, NULL));
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(b, OKID_DETREND_NONE, parts, NULL));
-        if (kind) TEST_ASSERT_EQUAL_MEMORY(whole, parts, sizeof whole);
-        else same(whole, parts, 1e-13);
+        if (kind)
+            TEST_ASSERT_EQUAL_MEMORY(whole, parts, sizeof whole);
+        else
+            same(whole, parts, 1e-13);
         free(b1);
         free(b2);
     }
@@ -177,7 +179,9 @@ static void window_forgets_completely(void) {
     config.slots = 4;
     config.edges = 0;
     okid_accumulator_t* a = make(config, &block);
-    for (int n = 0; n < 450 + P; n += 10) TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(a, samples + n * RIG_M, n + 10 > 450 + P ? (size_t)(450 + P - n) : 10));
+    for (int n = 0; n < 450 + P; n += 10)
+        TEST_ASSERT_EQUAL(OKID_OK,
+                          okid_accumulator_add(a, samples + n * RIG_M, n + 10 > 450 + P ? (size_t)(450 + P - n) : 10));
     TEST_ASSERT_EQUAL_INT64(200, okid_accumulator_rows(a));
     reference(samples, 450 + P - 200, 450 + P, expected);
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, OKID_DETREND_NONE, actual, NULL));

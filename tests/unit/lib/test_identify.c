@@ -40,7 +40,8 @@ static void expect_modes(double frequency_error, double damping_error) {
         TEST_ASSERT_TRUE(model.emac[k] > 0.95 && model.emac[k] <= 1 + 1e-12);
         TEST_ASSERT_TRUE(model.mpc[k] >= 0 && model.mpc[k] <= 1 + 1e-12);
         double largest = 0;
-        for (int o = 0; o < RIG_NY; ++o) largest = fmax(largest, hypot(model.shape_re[k * RIG_NY + o], model.shape_im[k * RIG_NY + o]));
+        for (int o = 0; o < RIG_NY; ++o)
+            largest = fmax(largest, hypot(model.shape_re[k * RIG_NY + o], model.shape_im[k * RIG_NY + o]));
         TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, largest);
     }
 }
@@ -139,7 +140,8 @@ static double misfit(const double* a, const double* b, int count) {
 // Trap 3: L of the paper is -K. With K the predictor follows the record to the noise; with L it runs away.
 static void trap_03_kalman_gain_is_minus_L(void) {
     double* v = rig_record(&rig, N, 0.05, NULL, 15);
-    double *u = malloc(sizeof *u * N), *y = malloc(sizeof *y * N * RIG_NY), *yhat = malloc(sizeof *y * N * RIG_NY), K[RIG_NZ * RIG_NY];
+    double *u = malloc(sizeof *u * N), *y = malloc(sizeof *y * N * RIG_NY), *yhat = malloc(sizeof *y * N * RIG_NY),
+           K[RIG_NZ * RIG_NY];
     prepare(v, N, RIG_NZ, OKID_DETREND_NONE);
     TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
     TEST_ASSERT_FALSE(model.warnings & OKID_NOTE_PREDICTOR_UNSTABLE);
@@ -196,12 +198,14 @@ static void poles_that_are_no_modes_are_left_out(void) {
     int32_t count = -1;
     const size_t bytes = okid_modal_memsize(1, NZ);
     void* work = malloc(bytes);
-    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(1, NZ, 0.01, A, C, &count, f, z, mpc, re, im, NULL, NULL, NULL, NULL, &radius, work, bytes));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(1, NZ, 0.01, A, C, &count, f, z, mpc, re, im, NULL, NULL, NULL, NULL,
+                                                  &radius, work, bytes));
     TEST_ASSERT_EQUAL(1, count);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 100 * hypot(log(0.98), 0.7) / 6.283185307179586, f[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, -log(0.98) / hypot(log(0.98), 0.7), z[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.01, radius);
-    TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_modal_analyse(1, NZ, 0.01, A, C, &count, f, z, mpc, re, im, NULL, NULL, NULL, NULL, NULL, work, 8));
+    TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_modal_analyse(1, NZ, 0.01, A, C, &count, f, z, mpc, re, im, NULL, NULL,
+                                                          NULL, NULL, NULL, work, 8));
     const double a[2] = {1, 1}, b[2] = {1, -1}, zero[2] = {0, 0};
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1, okid_modal_mac(2, a, zero, zero, a));
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, okid_modal_mac(2, a, zero, b, zero));
@@ -226,7 +230,8 @@ static void wrong_use_is_refused(void) {
     TEST_ASSERT_TRUE(model.warnings & OKID_NOTE_ORDER_REDUCED);
     TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_identify_order(identifier, 0, &model));
     free(v);
-    for (int status = -12; status <= 3; ++status) TEST_ASSERT_NOT_EQUAL(0, strcmp("unknown status", okid_status_text((okid_status_t)status)));
+    for (int status = -12; status <= 3; ++status)
+        TEST_ASSERT_NOT_EQUAL(0, strcmp("unknown status", okid_status_text((okid_status_t)status)));
     TEST_ASSERT_EQUAL_STRING("unknown status", okid_status_text((okid_status_t)-99));
     for (int bit = 0; bit < 8; ++bit) TEST_ASSERT_NOT_NULL(okid_warning_code(1u << bit));
     TEST_ASSERT_NULL(okid_warning_code(1u << 30));

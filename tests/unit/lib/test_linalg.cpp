@@ -50,7 +50,8 @@ void test_multiply() {
     for (int mode = 0; mode < 4; ++mode) {
         const bool ta = (mode & 1) != 0, tb = (mode & 2) != 0;
         vec c(static_cast<size_t>(n * m), 1.0);
-        la::multiply(ta, tb, n, m, k, 2, ta ? at_.data() : a.data(), ta ? k : n, tb ? bt.data() : b.data(), tb ? m : k, 3, c.data(), n);
+        la::multiply(ta, tb, n, m, k, 2, ta ? at_.data() : a.data(), ta ? k : n, tb ? bt.data() : b.data(), tb ? m : k,
+                     3, c.data(), n);
         for (size_t i = 0; i < c.size(); ++i) TEST_ASSERT_DOUBLE_WITHIN(1e-11, 2 * expected[i] + 3, c[i]);
     }
 }
@@ -85,7 +86,8 @@ void test_svd() {
     for (auto [rows, cols] : {std::pair{40, 12}, {12, 40}, {9, 9}, {1, 5}, {30, 1}}) {
         const int k = std::min(rows, cols);
         const vec original = random_matrix(rows, cols, 5);
-        vec a = original, u(static_cast<size_t>(rows * k)), s(static_cast<size_t>(k)), vt(static_cast<size_t>(k * cols)), work(la::svd_work(rows, cols));
+        vec a = original, u(static_cast<size_t>(rows * k)), s(static_cast<size_t>(k)),
+            vt(static_cast<size_t>(k * cols)), work(la::svd_work(rows, cols));
         TEST_ASSERT_EQUAL(0, la::svd(rows, cols, a.data(), u.data(), s.data(), vt.data(), work.data()));
         for (int i = 1; i < k; ++i) TEST_ASSERT_TRUE(s[static_cast<size_t>(i)] <= s[static_cast<size_t>(i - 1)]);
         for (int j = 0; j < cols; ++j)
@@ -106,7 +108,8 @@ void test_svd() {
 }
 
 void check_eigen(int n, const vec& original) {
-    vec a = original, re(static_cast<size_t>(n)), im(static_cast<size_t>(n)), v(static_cast<size_t>(n * n)), work(la::eigen_work(n));
+    vec a = original, re(static_cast<size_t>(n)), im(static_cast<size_t>(n)), v(static_cast<size_t>(n * n)),
+        work(la::eigen_work(n));
     TEST_ASSERT_EQUAL(0, la::eigen(n, a.data(), re.data(), im.data(), v.data(), work.data()));
     double scale = 1e-300;
     for (double x : original) scale = std::max(scale, std::abs(x));
@@ -116,7 +119,8 @@ void check_eigen(int n, const vec& original) {
         double size = 0;
         for (int i = 0; i < n; ++i) {
             std::complex<double> sum = 0, x(at(v, n, i, k), pair ? at(v, n, i, k + 1) : 0);
-            for (int j = 0; j < n; ++j) sum += at(original, n, i, j) * std::complex<double>(at(v, n, j, k), pair ? at(v, n, j, k + 1) : 0);
+            for (int j = 0; j < n; ++j)
+                sum += at(original, n, i, j) * std::complex<double>(at(v, n, j, k), pair ? at(v, n, j, k + 1) : 0);
             TEST_ASSERT_DOUBLE_WITHIN(1e-11 * scale * n, 0, std::abs(sum - mu * x));
             size += std::norm(x);
         }
@@ -129,8 +133,8 @@ void test_eigen() {
     for (int n : {1, 2, 3, 6, 25, 60}) check_eigen(n, random_matrix(n, n, static_cast<std::uint64_t>(n)));
     check_eigen(4, {0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 0, 0, 0}); // a cyclic permutation
     check_eigen(3, {1, 0, 0, 0, 1, 0, 0, 0, 1});
-    check_eigen(3, {2, 0, 0, 5, 2.5, 0, 1, -1, 3});                   // triangular
-    vec shift(36, 0.0);                                                // badly scaled
+    check_eigen(3, {2, 0, 0, 5, 2.5, 0, 1, -1, 3}); // triangular
+    vec shift(36, 0.0);                             // badly scaled
     for (int i = 0; i < 36; ++i) shift[static_cast<size_t>(i)] = std::pow(10.0, (i % 7) - 3) * (i % 5 - 2);
     check_eigen(6, shift);
 }

@@ -82,7 +82,8 @@ static void nothing_after_create(void) {
         okid_status_t added = OKID_OK, found = OKID_OK, scanned = OKID_OK;
         for (int n = 0; n < N; n += 100) {
             const int integer = configs[k].sample == OKID_SAMPLE_INT16;
-            added = integer ? okid_accumulator_add_i16(a, codes + n * RIG_M, 100) : okid_accumulator_add(a, v + n * RIG_M, 100);
+            added = integer ? okid_accumulator_add_i16(a, codes + n * RIG_M, 100)
+                            : okid_accumulator_add(a, v + n * RIG_M, 100);
             if (n % 1000 == 900) found = okid_identify_run(s, a, &out);
         }
         for (int order = 2; order <= 40; order += 2) scanned = okid_identify_order(s, order, &out);

@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Format, static analysis and the rules of the house that a grep can check. Exits non-zero on the first kind of trouble.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+bad=0
+bin=.venv/bin
+c_files=$(git ls-files '*.c' '*.h' '*.cpp' '*.hpp')
+
+$bin/clang-format --dry-run -Werror $c_files || { echo "lint: run make format"; bad=1; }
+$bin/ruff check --config tools/pyproject.toml tools tests || bad=1
+$bin/ruff format --check --config tools/pyproject.toml -q tools tests || { echo "lint: run make format"; bad=1; }
+(cd tools && ../$bin/mypy --config-file pyproject.toml) || bad=1
+
+cmake --preset release -DOKID_BUILD_TESTS=ON --log-level=WARNING >/dev/null &&
+  git ls-files 'lib/src/*.c' 'lib/src/*.cpp' 'drivers/src/*.c' 'firmware_host/*.cpp' 'firmware_host/**/*.cpp' | sort -u |
+  xargs -P 2 -n 4 $bin/clang-tidy --quiet -p build 2>/dev/null || { echo "lint: clang-tidy found something"; bad=1; }
+
+# The storeys: lib and drivers do not know each other.
+grep -rnE '#include [<"](drv|nlohmann|CLI|toml)' lib && { echo "lint: lib includes what it must not know"; bad=1; }
+grep -rnE '#include [<"]okid/' drivers && { echo "lint: drivers include lib"; bad=1; }
+for file in $c_files $(git ls-files '*.py' '*.sh' '*.cmake' '*CMakeLists.txt'); do
+  grep -q 'SPDX-License-Identifier: MIT' "$file" || { echo "lint: $file has no SPDX line"; bad=1; }
+done
+for file in $(git ls-files 'lib/*' 'drivers/*' 'firmware_host/*' 'tools/okid/*'); do
+  [ "$(wc -l <"$file")" -le 500 ] || { echo "lint: $file is longer than 500 lines"; bad=1; }
+done
+exit $bad
