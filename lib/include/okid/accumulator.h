@@ -12,9 +12,14 @@
 /// Samples wait in a small buffer until the kernel can take many at once: how a record is cut into calls changes
 /// nothing, not even the last bit of double sums (as long as the Gram matrix is looked at after the same samples).
 ///
-/// Codes (int16) are summed exactly: any split of a record into calls gives bit-equal results. The bound: a product of
-/// two 16-bit codes is at most 2^30; the kernel sums up to 2^22 of them in double (2^52 < 2^53, exact) before adding
-/// them to int64, which holds 2^32 rows (2^62 < 2^63); OKID_ERR_RANGE stands before that could fail.
+/// Codes are summed exactly: any split of a record into calls, any order of merging gives bit-equal results. The bounds,
+/// with b bits a code and products of at most 2^(2b-2) in magnitude:
+///   int16: the kernel sums at most 2^22 rows in double (2^30 2^22 = 2^52 < 2^53, exact);
+///   int24: at most 2^7 rows (2^46 2^7 = 2^53, exact);
+///   int32: codes are split into high 16 and low 16 bits; three double sums of at most 2^20 rows (2^33 2^20 = 2^53);
+/// then the doubles are added to pairs of 64-bit integers, value = high 2^48 + low with 0 <= low < 2^48, whose range of
+/// 2^111 holds full-scale 32-bit products (2^62) for 2^49 rows. Sums of the codes themselves are 64-bit integers:
+/// 2^31 2^32 = 2^63; OKID_ERR_RANGE stands before 2^32 rows of int32 codes (2^40 of int24, 2^48 of int16) are reached.
 #ifndef OKID_ACCUMULATOR_H
 #define OKID_ACCUMULATOR_H
 
@@ -27,7 +32,9 @@ extern "C" {
 /// What the samples are.
 typedef enum okid_sample_t {
     OKID_SAMPLE_DOUBLE = 0, ///< double samples, double sums
-    OKID_SAMPLE_INT16 = 1   ///< int16 ADC codes, exact integer sums
+    OKID_SAMPLE_INT16 = 1,  ///< int16 ADC codes, exact integer sums
+    OKID_SAMPLE_INT24 = 2,  ///< int32 words that hold 24-bit codes, exact integer sums
+    OKID_SAMPLE_INT32 = 3   ///< int32 ADC codes, exact integer sums
 } okid_sample_t;
 
 /// One recursive accumulator. Private; lives inside the block given to okid_accumulator_create(). It holds offsets, no
@@ -80,6 +87,11 @@ OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add(okid_accumulator_t* s
 
 /// The same for 16-bit codes, summed exactly. @return also OKID_WARN_SATURATED, OKID_ERR_RANGE
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i16(okid_accumulator_t* self, const int16_t* codes,
+                                                               size_t count);
+
+/// The same for 24-bit or 32-bit codes in int32 words, as the accumulator was created for.
+/// @return also OKID_ERR_RANGE when a word is no 24-bit code (nothing is absorbed then)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i32(okid_accumulator_t* self, const int32_t* codes,
                                                                size_t count);
 
 /// Mark `count` missing samples: the run ends here. A gap of 0 samples separates two records.

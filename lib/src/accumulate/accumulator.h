@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    memory map of an accumulator, shared by the per-sample part (accumulator.c) and the Gram matrix (gram.c)
+// PURPOSE    memory map of an accumulator, shared by the per-sample part (accumulator.c), what happens when a run ends
+//            (slots.c) and the Gram matrix (gram.c)
 #ifndef OKID_ACCUMULATOR_PRIVATE_H
 #define OKID_ACCUMULATOR_PRIVATE_H
 
@@ -7,8 +8,9 @@
 
 #include "kernel.h"
 
-/// An unbroken piece of the record. Behind it in memory: S (m x m(p+1) row-major, double or int64), the sum of v_n over
-/// its rows (m), head (the p samples before its first row) and tail (the last p samples), both in time order.
+/// An unbroken piece of the record. Behind it in memory: S (m x m(p+1) row-major; codes: plane of low words, then plane of
+/// high words), the sum of v_n over its rows (m; codes: int64), head (the p samples before its first row) and tail (the
+/// last p samples), both in time order, as doubles (exact for every code).
 typedef struct slot_info_t {
     int64_t rows;
     int64_t start;  ///< sample clock at its first row
@@ -16,20 +18,21 @@ typedef struct slot_info_t {
 } slot_info_t;
 
 /// Base sums, where the configuration has them: S, sum (m), edge sums (p m: heads less tails by lag), edge Gram (packed
-/// upper triangle, p m (p m + 1)/2). S and edge Gram are int64 for codes without forgetting, else double.
+/// upper triangle, p m (p m + 1)/2). Codes without forgetting: S and edge Gram as planes, the sums int64; else doubles.
 struct okid_accumulator {
     okid_accumulator_config_t config;
     okid_accumulator_stats_t stats;
     okid_kernel_fn* kernel;
-    size_t scale_at, x_at, sums_at, partial_at, slots_at, base_at, slot_bytes; ///< byte offsets from this struct
-    size_t slot_head, slot_tail;                                               ///< in numbers from the slot's data
-    int64_t clock;                                                             ///< samples seen, missing ones included
-    double base_weight;               ///< rows in the base, forgotten ones fading
-    int32_t m, width;                 ///< channels, m (p+1)
-    int32_t slot_count, open, closed; ///< ring; closed slots stand before `open`
-    int32_t have, pending;            ///< samples of the lag window at hand; samples waiting behind it for the kernel
-    int32_t partial_rows;             ///< codes: rows in the double sums not yet folded
-    int32_t in_gap;                   ///< the run has ended; the next sample begins another
+    size_t scale_at, x_at, scratch_at, partial_at, split_at, slots_at, base_at, slot_bytes; ///< bytes from this struct
+    size_t slot_mean, slot_head, slot_tail;      ///< in numbers from the slot's data
+    size_t base_mean, base_edge_mean, base_edge; ///< in numbers from the base
+    int64_t clock;                               ///< samples seen, missing ones included
+    double base_weight;                          ///< rows in the base, forgotten ones fading
+    int32_t m, width;                            ///< channels, m (p+1)
+    int32_t slot_count, open, closed;            ///< ring; closed slots stand before `open`
+    int32_t have, pending;                       ///< samples of the lag window at hand; samples waiting behind it
+    int32_t partial_rows;                        ///< codes: rows in the double sums not yet folded
+    int32_t in_gap;                              ///< the run has ended; the next sample begins another
 };
 
 static inline double* acc_at(const okid_accumulator_t* a, size_t offset) {
@@ -37,8 +40,7 @@ static inline double* acc_at(const okid_accumulator_t* a, size_t offset) {
 }
 static inline double* acc_scale(const okid_accumulator_t* a) { return acc_at(a, a->scale_at); }
 static inline double* acc_x(const okid_accumulator_t* a) { return acc_at(a, a->x_at); }
-static inline double* acc_sums(const okid_accumulator_t* a) { return acc_at(a, a->sums_at); }
-static inline double* acc_partial(const okid_accumulator_t* a) { return acc_at(a, a->partial_at); }
+static inline double* acc_scratch(const okid_accumulator_t* a) { return acc_at(a, a->scratch_at); } ///< 2 m (p+1)
 static inline double* acc_base(const okid_accumulator_t* a) { return acc_at(a, a->base_at); }
 static inline slot_info_t* acc_slot(const okid_accumulator_t* a, int32_t index) {
     return (slot_info_t*)acc_at(a, a->slots_at + a->slot_bytes * (size_t)index);
@@ -49,16 +51,23 @@ static inline double* acc_slot_data(const okid_accumulator_t* a, int32_t index) 
 static inline int32_t acc_oldest(const okid_accumulator_t* a) {
     return (a->open - a->closed + a->slot_count) % a->slot_count;
 }
-static inline int acc_base_is_integer(const okid_accumulator_t* a) {
-    return a->config.sample == OKID_SAMPLE_INT16 && a->config.forgetting >= 1;
+static inline int acc_has_codes(const okid_accumulator_t* a) { return a->config.sample != OKID_SAMPLE_DOUBLE; }
+static inline int acc_base_is_exact(const okid_accumulator_t* a) {
+    return acc_has_codes(a) && a->config.forgetting >= 1;
 }
-/// Entry i = lag*m + channel of the lag vector [v_(n-1); ..; v_(n-p)] whose samples stand in time order in `ends`.
-static inline double acc_lag(const double* ends, size_t i, int32_t m, int32_t p) {
-    const size_t lag = i / (size_t)m, channel = i % (size_t)m;
-    return ends[((size_t)p - 1 - lag) * (size_t)m + channel];
-}
+static inline size_t acc_sum_count(const okid_accumulator_t* a) { return (size_t)a->m * (size_t)a->width; }
+static inline size_t acc_lag_count(const okid_accumulator_t* a) { return (size_t)a->m * (size_t)a->config.lags; }
+
+/// Reorder the p samples of `ends` (time order) into the lag vector [v_(n-1); ..; v_(n-p)].
+void okid_accumulator_lag_vector(const okid_accumulator_t* a, const double* ends, double* out);
 
 /// Bring everything that waits into the sums of the open slot.
 void okid_accumulator_settle(okid_accumulator_t* self);
+
+/// End the open slot. `joined`: the next one continues the same run.
+void okid_accumulator_close_slot(okid_accumulator_t* self, int joined);
+
+/// Empty the slot; it begins at the sample clock.
+void okid_accumulator_clear_slot(okid_accumulator_t* self, int32_t index, int joined);
 
 #endif

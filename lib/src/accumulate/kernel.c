@@ -68,14 +68,14 @@ static void tiles(double* S, int ld, const double* current, const double* window
     }
 }
 
-void OKID_KERNEL(double* S, const double* x, int m, int p, int count);
-void OKID_KERNEL(double* S, const double* x, int m, int p, int count) {
+okid_kernel_fn OKID_KERNEL;
+void OKID_KERNEL(double* S, const double* current, const double* window, int m, int p, int count) {
     const int width = m * (p + 1);
-    const double* current = x + (size_t)p * (size_t)m;
+    current += (size_t)p * (size_t)m;
     if (width < TILE) { // a handful of numbers: no tile fits
         for (int n = 0; n < count; ++n)
             for (int r = 0; r < m; ++r)
-                for (int c = 0; c < width; ++c) S[r * width + c] += current[n * m + r] * x[n * m + c];
+                for (int c = 0; c < width; ++c) S[r * width + c] += current[n * m + r] * window[n * m + c];
         return;
     }
     const int groups = (m + MAX_ROWS - 1) / MAX_ROWS;
@@ -83,7 +83,7 @@ void OKID_KERNEL(double* S, const double* x, int m, int p, int count) {
         const int start = c + TILE <= width ? c : width - TILE;
         for (int g = 0, r = 0; g < groups; ++g) {
             const int rows = (m - r + groups - g - 1) / (groups - g);
-            tiles(S + r * width + start, width, current + r, x + start, m, count, rows, c - start);
+            tiles(S + r * width + start, width, current + r, window + start, m, count, rows, c - start);
             r += rows;
         }
     }

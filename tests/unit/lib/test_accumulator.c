@@ -117,6 +117,69 @@ static void codes_are_summed_exactly(void) {
     free(block);
 }
 
+/// Full-scale 24-bit and 32-bit codes: exact against 128-bit sums, whatever the split; merged and windowed too.
+static void long_codes_are_summed_exactly(void) {
+    static int32_t longs[N * RIG_M];
+    static double whole[W * W], parts[W * W];
+    for (int kind = OKID_SAMPLE_INT24; kind <= OKID_SAMPLE_INT32; ++kind) {
+        const double top = kind == OKID_SAMPLE_INT24 ? 8388607 : 2147483647;
+        uint64_t state = 5;
+        for (int i = 0; i < N * RIG_M; ++i) longs[i] = (int32_t)(top * (2 * rig_uniform(&state) - 1));
+        for (int i = 200 * RIG_M; i < 260 * RIG_M; ++i) longs[i] = (int32_t)(i % 3 ? top : -top - 1); // the extremes
+        void *b1, *b2, *b3;
+        okid_accumulator_t *a = make(config_of((okid_sample_t)kind), &b1),
+                           *b = make(config_of((okid_sample_t)kind), &b2),
+                           *c = make(config_of((okid_sample_t)kind), &b3);
+        TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, okid_accumulator_add_i32(a, longs, N));
+        for (int n = 0; n < N; n += 37)
+            TEST_ASSERT_GREATER_OR_EQUAL(
+                0, okid_accumulator_add_i32(b, longs + n * RIG_M, n + 37 < N ? 37 : (size_t)(N - n)));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, OKID_DETREND_NONE, whole, NULL));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(b, OKID_DETREND_NONE, parts, NULL));
+        TEST_ASSERT_EQUAL_MEMORY(whole, parts, sizeof whole);
+        for (int j = 0; j < W; ++j)
+            for (int i = 0; i < W; ++i) {
+                __int128 sum = 0;
+                for (int n = P; n < N; ++n)
+                    sum += (__int128)longs[(n - i / RIG_M) * RIG_M + i % RIG_M] *
+                           longs[(n - j / RIG_M) * RIG_M + j % RIG_M];
+                TEST_ASSERT_EQUAL_DOUBLE((double)sum, whole[j * W + i]);
+            }
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_merge(c, a));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_merge(c, b));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(c, OKID_DETREND_NONE, parts, NULL));
+        for (int i = 0; i < W * W; ++i) TEST_ASSERT_EQUAL_DOUBLE(2 * whole[i], parts[i]);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, OKID_DETREND_MEAN, whole, NULL));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(c, OKID_DETREND_MEAN, parts, NULL));
+        for (int i = 0; i < W * W; ++i) TEST_ASSERT_DOUBLE_WITHIN(1e-12 * fabs(whole[0]), 2 * whole[i], parts[i]);
+        longs[3] = INT32_MAX;
+        TEST_ASSERT_EQUAL(kind == OKID_SAMPLE_INT24 ? OKID_ERR_RANGE : OKID_WARN_SATURATED,
+                          okid_accumulator_add_i32(a, longs, 5));
+        free(b1);
+        free(b2);
+        free(b3);
+    }
+}
+
+/// A small signal on a large offset: what is left after centring has every digit of the codes.
+static void offsets_of_codes_cost_no_digits(void) {
+    void *b1, *b2;
+    static double plain[W * W], shifted[W * W];
+    okid_accumulator_t *a = make(config_of(OKID_SAMPLE_INT32), &b1), *b = make(config_of(OKID_SAMPLE_INT32), &b2);
+    static int32_t small[N * RIG_M], large[N * RIG_M];
+    for (int i = 0; i < N * RIG_M; ++i) {
+        small[i] = codes[i] / 1000;
+        large[i] = small[i] + 2000000000;
+    }
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add_i32(a, small, N));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add_i32(b, large, N));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, OKID_DETREND_MEAN, plain, NULL));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(b, OKID_DETREND_MEAN, shifted, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(plain, shifted, sizeof plain);
+    free(b1);
+    free(b2);
+}
+
 static void missing_samples_drop_exactly_the_rows_they_touch(void) {
     void* block;
     double expected[W * W], actual[W * W];
@@ -365,6 +428,8 @@ int main(void) {
     RUN_TEST(gram_equals_explicit_sum);
     RUN_TEST(any_split_gives_the_same_bits);
     RUN_TEST(codes_are_summed_exactly);
+    RUN_TEST(long_codes_are_summed_exactly);
+    RUN_TEST(offsets_of_codes_cost_no_digits);
     RUN_TEST(missing_samples_drop_exactly_the_rows_they_touch);
     RUN_TEST(offsets_leave_without_a_second_pass);
     RUN_TEST(units_scale_codes);
