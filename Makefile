@@ -34,7 +34,7 @@ test-slow: ## the long tiers: more seeds, more frames
 	@OKID_SLOW=1 tests/run
 
 bench: build ## speed of the kernels as ratios within one run
-	@$(PYTHON) tests/bench/bench.py --json build/bench.json
+	@OPENBLAS_NUM_THREADS=1 build/okid bench --save build/bench.json
 
 sanitize: ## unit tests under AddressSanitizer and UndefinedBehaviourSanitizer
 	@tools/setup.sh test

@@ -56,22 +56,27 @@ if [ "${OKID_SKIP_APT:-}" != 1 ]; then
   fi
 fi
 
-# Python: one .venv, refreshed only when the list of requirements changed.
-extra=$tier
-stamp=.venv/.okid-$extra
-if [ ! -f "$stamp" ] || ! cmp -s tools/pyproject.toml "$stamp"; then
-  [ -x .venv/bin/python ] || python3 -m venv .venv || {
-    echo "setup: python3 -m venv failed. Install python3-venv, or remove a half-made .venv, and try again." >&2; exit 4; }
-  echo "setup: installing Python packages ($extra) into .venv"
-  list=$(mktemp)
-  .venv/bin/python tools/requirements.py "$extra" >"$list"
-  .venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$list" || {
-    echo "setup: pip could not install tools/pyproject.toml [$extra]; see the lines above." >&2; rm -f "$list"; exit 4; }
-  rm -f "$list"
-  .venv/bin/python - <<'PY'
+# Python: one .venv, refreshed only when the list of requirements changed. A tier includes the ones before it.
+case $tier in
+  build) covers="build test dev" ;;
+  test) covers="test dev" ;;
+  dev) covers="dev" ;;
+  *) echo "setup: no tier '$tier' (build, test, dev)" >&2; exit 2 ;;
+esac
+for one in $covers; do
+  if cmp -s tools/pyproject.toml ".venv/.okid-$one"; then exit 0; fi
+done
+[ -x .venv/bin/python ] || python3 -m venv .venv || {
+  echo "setup: python3 -m venv failed. Install python3-venv, or remove a half-made .venv, and try again." >&2; exit 4; }
+echo "setup: installing Python packages ($tier) into .venv"
+list=$(mktemp)
+.venv/bin/python tools/requirements.py "$tier" >"$list"
+.venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$list" || {
+  echo "setup: pip could not install tools/pyproject.toml [$tier]; see the lines above." >&2; rm -f "$list"; exit 4; }
+rm -f "$list"
+.venv/bin/python - <<'PY'
 import pathlib, sysconfig
 # `import okid` from the source tree: the binding finds build/libokid.so beside it.
 pathlib.Path(sysconfig.get_paths()["purelib"], "okid-source.pth").write_text(str(pathlib.Path("tools").resolve()) + "\n")
 PY
-  cp tools/pyproject.toml "$stamp"
-fi
+cp tools/pyproject.toml ".venv/.okid-$tier"

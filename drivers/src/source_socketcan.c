@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  frames off a CAN interface, every loss counted and placed
+// METHOD   recvmmsg of 64 frames a call; the kernel's drop counter rides on each frame (SO_RXQ_OVFL), the lost tail is
+//          read from SO_MEMINFO at stats and close; an interface that vanished is bound again when it is back
+#include <drv/source.h>
+
+#include <errno.h>
+#include <time.h>
+
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <linux/can/raw.h>
+#include <linux/errqueue.h>
+#include <linux/net_tstamp.h>
+#include <linux/sock_diag.h>
+#include <net/if.h>
+#include <net/if_arp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+enum { BATCH = 64, CONTROL_BYTES = 256, DEFAULT_BUFFER = 8 << 20 };
+
+typedef struct socketcan_t {
+    int fd;
+    int gone;         ///< the interface vanished: bind anew when it is back
+    uint32_t counted; ///< the kernel's drop counter of this socket, as far as it stands in the counts
+    uint32_t placed;  ///< the same as of the frame delivered last
+    uint8_t loss;     ///< DRV_LOSS_… of the next frame
+    char interface[DRV_NAME_BYTES];
+    struct can_filter filters[DRV_MAX_FILTERS];
+    int filter_count;
+    int buffer_bytes;
+    struct mmsghdr messages[BATCH];
+    struct iovec pieces[BATCH];
+    struct canfd_frame frames[BATCH];
+    _Alignas(8) uint8_t control[BATCH][CONTROL_BYTES];
+} socketcan_t;
+
+static int explain(drv_source_t* self, int code, const char* interface, const char* text) {
+    snprintf(self->error, sizeof self->error, "interface %s: %s", interface, text);
+    return -code;
+}
+
+static void ask_for_buffer(drv_source_t* self, int fd, int bytes) {
+    if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) != 0)
+        (void)setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+    int granted = 0;
+    socklen_t length = sizeof granted;
+    if (getsockopt(fd, SOL_SOCKET, SO_RCVBUF, &granted, &length) == 0)
+        self->counts.buffer_bytes = granted / 2; // the kernel doubles what was asked for, for its own overhead
+}
+
+static void ask_for_stamps(drv_source_t* self, int fd) {
+    int on = 1;
+    int kinds = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE | SOF_TIMESTAMPING_RX_HARDWARE |
+                SOF_TIMESTAMPING_RAW_HARDWARE;
+    if (setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPING, &kinds, sizeof kinds) == 0)
+        self->counts.stamp = DRV_STAMP_NS;
+    else if (setsockopt(fd, SOL_SOCKET, SO_TIMESTAMP, &on, sizeof on) == 0)
+        self->counts.stamp = DRV_STAMP_US;
+    else
+        self->counts.stamp = DRV_STAMP_NONE;
+}
+
+/// Options of a fresh socket; the old kernel that lacks one of them still delivers frames.
+static void set_options(drv_source_t* self, const socketcan_t* state, int fd) {
+    int on = 1;
+    can_err_mask_t errors = CAN_ERR_MASK;
+    (void)setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
+    (void)setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors);
+    (void)setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
+    if (state->filter_count > 0)
+        (void)setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, state->filters,
+                         (socklen_t)((size_t)state->filter_count * sizeof state->filters[0]));
+    ask_for_buffer(self, fd, state->buffer_bytes);
+    ask_for_stamps(self, fd);
+}
+
+/// A bound socket, or -errno with the reason.
+static int make_socket(drv_source_t* self, const socketcan_t* state, int* up) {
+    int fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
+    if (fd < 0) {
+        int code = errno;
+        if (code == EAFNOSUPPORT || code == EPROTONOSUPPORT)
+            return explain(self, EAFNOSUPPORT, state->interface, "this kernel has no CAN (no AF_CAN or no can-raw)");
+        return explain(self, code, state->interface, strerror(code));
+    }
+    struct ifreq request;
+    memset(&request, 0, sizeof request);
+    memcpy(request.ifr_name, state->interface, sizeof state->interface);
+    int code = 0;
+    const char* why = "there is no such interface";
+    if (ioctl(fd, SIOCGIFHWADDR, &request) != 0) code = errno;
+    else if (request.ifr_hwaddr.sa_family != ARPHRD_CAN) code = ENODEV, why = "is not a CAN interface";
+    else if (ioctl(fd, SIOCGIFFLAGS, &request) != 0) code = errno;
+    if (code == 0) {
+        *up = (request.ifr_flags & IFF_UP) != 0;
+        set_options(self, state, fd);
+        struct sockaddr_can address;
+        memset(&address, 0, sizeof address);
+        address.can_family = AF_CAN;
+        address.can_ifindex = (int)if_nametoindex(state->interface);
+        if (address.can_ifindex == 0 || bind(fd, (struct sockaddr*)&address, sizeof address) != 0)
+            code = address.can_ifindex == 0 ? ENODEV : errno;
+    }
+    if (code == 0) return fd;
+    close(fd);
+    return explain(self, code, state->interface, code == ENODEV ? why : strerror(code));
+}
+
+static void lay_out_batch(socketcan_t* state) {
+    for (int i = 0; i < BATCH; ++i) {
+        state->pieces[i].iov_base = &state->frames[i];
+        state->pieces[i].iov_len = sizeof state->frames[i];
+        state->messages[i].msg_hdr.msg_iov = &state->pieces[i];
+        state->messages[i].msg_hdr.msg_iovlen = 1;
+        state->messages[i].msg_hdr.msg_control = state->control[i];
+    }
+}
+
+static int socketcan_open(drv_source_t* self, const drv_source_config_t* config) {
+    memset(&self->counts, 0, sizeof self->counts);
+    self->error[0] = '\0';
+    self->state = NULL;
+    const char* name = config->interface_count > 0 ? config->interfaces[0] : "";
+    if (name[0] == '\0' || strlen(name) >= DRV_NAME_BYTES)
+        return explain(self, EINVAL, name, "an interface name has 1 to 15 characters");
+    if (config->filter_count > DRV_MAX_FILTERS)
+        return explain(self, EINVAL, name, "at most 512 identifiers can be asked for");
+    socketcan_t* state = calloc(1, sizeof *state);
+    if (!state) return explain(self, ENOMEM, name, "out of memory");
+    memcpy(state->interface, name, strlen(name));
+    state->buffer_bytes = config->buffer_bytes > 0 ? config->buffer_bytes : DEFAULT_BUFFER;
+    state->filter_count = config->filters ? config->filter_count : 0;
+    for (int i = 0; i < state->filter_count; ++i) {
+        int extended = config->filters[i].extended;
+        state->filters[i].can_id = config->filters[i].id | (extended ? CAN_EFF_FLAG : 0);
+        state->filters[i].can_mask = (extended ? CAN_EFF_MASK : CAN_SFF_MASK) | CAN_EFF_FLAG | CAN_RTR_FLAG;
+    }
+    lay_out_batch(state);
+    int up = 0;
+    state->fd = make_socket(self, state, &up);
+    int code = state->fd < 0 ? state->fd : 0;
+    if (code == 0 && !up) {
+        close(state->fd);
+        code = explain(self, ENETDOWN, name, "is down");
+    }
+    if (code) {
+        free(state);
+        return code;
+    }
+    self->state = state;
+    return 0;
+}
+
+static int socketcan_fd(const drv_source_t* self) {
+    const socketcan_t* state = self->state;
+    return state && !state->gone ? state->fd : -1;
+}
+
+/// Take in the kernel's drop counter (it wraps). @return frames dropped since last time
+static uint32_t account_drops(drv_source_t* self, socketcan_t* state, uint32_t now) {
+    uint32_t more = now - state->counted;
+    if (more > UINT32_MAX / 2) return 0; // an older value: the socket's own counter was read in between
+    self->counts.lost_overflow += more;
+    state->counted = now;
+    return more;
+}
+
+/// The counter of the socket itself, frames that were dropped after the last one delivered included.
+static void read_drop_counter(drv_source_t* self, socketcan_t* state) {
+    uint32_t info[SK_MEMINFO_VARS] = {0};
+    socklen_t length = sizeof info;
+    if (getsockopt(state->fd, SOL_SOCKET, SO_MEMINFO, info, &length) != 0) return;
+    if (length > SK_MEMINFO_DROPS * sizeof info[0]) (void)account_drops(self, state, info[SK_MEMINFO_DROPS]);
+}
+
+/// The counter as it stood when this frame was queued: drops stand before it.
+static void place_drops(drv_source_t* self, socketcan_t* state, uint32_t now) {
+    (void)account_drops(self, state, now);
+    if (now != state->placed) state->loss |= DRV_LOSS_OVERFLOW;
+    state->placed = now;
+}
+
+static void link_lost(drv_source_t* self, socketcan_t* state, int gone) {
+    if (!self->counts.link_is_down) ++self->counts.link_down;
+    self->counts.link_is_down = 1;
+    state->loss |= DRV_LOSS_LINK;
+    if (gone && !state->gone) {
+        read_drop_counter(self, state);
+        state->gone = 1;
+    }
+}
+
+/// Bind anew when the interface is there again. @return 1 when it is
+static int try_again(drv_source_t* self, socketcan_t* state) {
+    int up = 0;
+    if (if_nametoindex(state->interface) == 0) return 0;
+    int fd = make_socket(self, state, &up);
+    if (fd < 0) return 0;
+    close(state->fd);
+    state->fd = fd;
+    state->gone = 0;
+    state->counted = state->placed = 0;
+    ++self->counts.reopened;
+    self->error[0] = '\0';
+    return 1;
+}
+
+static void take_stamp(drv_frame_t* frame, const struct cmsghdr* part) {
+    if (part->cmsg_type == SCM_TIMESTAMPING) {
+        struct scm_timestamping stamps;
+        memcpy(&stamps, CMSG_DATA(part), sizeof stamps);
+        frame->time_ns = (int64_t)stamps.ts[0].tv_sec * 1000000000 + stamps.ts[0].tv_nsec;
+        frame->hw_time_ns = (int64_t)stamps.ts[2].tv_sec * 1000000000 + stamps.ts[2].tv_nsec;
+    } else if (part->cmsg_type == SCM_TIMESTAMP) {
+        struct timeval stamp;
+        memcpy(&stamp, CMSG_DATA(part), sizeof stamp);
+        frame->time_ns = ((int64_t)stamp.tv_sec * 1000000 + stamp.tv_usec) * 1000;
+    }
+}
+
+static void take_control(drv_source_t* self, socketcan_t* state, struct msghdr* header, drv_frame_t* frame) {
+    for (struct cmsghdr* part = CMSG_FIRSTHDR(header); part; part = CMSG_NXTHDR(header, part)) {
+        if (part->cmsg_level != SOL_SOCKET) continue;
+        if (part->cmsg_type == SO_RXQ_OVFL) {
+            uint32_t dropped;
+            memcpy(&dropped, CMSG_DATA(part), sizeof dropped);
+            place_drops(self, state, dropped);
+        } else {
+            take_stamp(frame, part);
+        }
+    }
+    if (frame->hw_time_ns) self->counts.stamp = DRV_STAMP_HARDWARE;
+    if (frame->time_ns == 0) {
+        struct timespec now;
+        clock_gettime(CLOCK_REALTIME, &now);
+        frame->time_ns = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+    }
+}
+
+static void count_error_frame(drv_source_t* self, socketcan_t* state, const struct canfd_frame* raw) {
+    ++self->counts.error_frames;
+    if (raw->can_id & CAN_ERR_BUSOFF) ++self->counts.bus_off;
+    if (raw->can_id & CAN_ERR_RESTARTED) ++self->counts.restarts;
+    if ((raw->can_id & CAN_ERR_CRTL) && (raw->data[1] & CAN_ERR_CRTL_RX_OVERFLOW)) {
+        ++self->counts.lost_driver;
+        state->loss |= DRV_LOSS_DRIVER;
+    }
+}
+
+/// One received message to a frame. @return 1, or 0 when it is no data
+static int take_message(drv_source_t* self, socketcan_t* state, int index, drv_frame_t* frame) {
+    const struct canfd_frame* raw = &state->frames[index];
+    struct mmsghdr* message = &state->messages[index];
+    int fd_frame = message->msg_len == CANFD_MTU;
+    if (!fd_frame && message->msg_len != CAN_MTU) return 0;
+    memset(frame, 0, offsetof(drv_frame_t, data));
+    take_control(self, state, &message->msg_hdr, frame);
+    if (raw->can_id & CAN_ERR_FLAG) {
+        count_error_frame(self, state, raw);
+        return 0;
+    }
+    if (raw->can_id & CAN_RTR_FLAG) {
+        ++self->counts.remote;
+        return 0;
+    }
+    int extended = (raw->can_id & CAN_EFF_FLAG) != 0;
+    frame->id = raw->can_id & (extended ? CAN_EFF_MASK : CAN_SFF_MASK);
+    frame->flags = (uint8_t)((extended ? DRV_FRAME_EXTENDED : 0) | (fd_frame ? DRV_FRAME_FD : 0));
+    if (fd_frame && raw->flags & CANFD_BRS) frame->flags |= DRV_FRAME_BRS;
+    if (fd_frame && raw->flags & CANFD_ESI) frame->flags |= DRV_FRAME_ESI;
+    unsigned most = fd_frame ? 64 : 8;
+    frame->len = (uint8_t)(raw->len < most ? raw->len : most);
+    memcpy(frame->data, raw->data, fd_frame ? 64 : 8);
+    frame->loss = state->loss;
+    state->loss = 0;
+    self->counts.link_is_down = 0;
+    ++self->counts.received;
+    return 1;
+}
+
+static int socketcan_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
+    socketcan_t* state = self->state;
+    if (!state) return -EBADF;
+    if (state->gone && !try_again(self, state)) return 0;
+    int batch = capacity < BATCH ? capacity : BATCH;
+    for (int i = 0; i < batch; ++i) {
+        state->messages[i].msg_hdr.msg_controllen = CONTROL_BYTES;
+        state->messages[i].msg_hdr.msg_flags = 0;
+    }
+    int got = recvmmsg(state->fd, state->messages, (unsigned)batch, MSG_DONTWAIT, NULL);
+    if (got < 0) {
+        int code = errno;
+        if (code == EAGAIN || code == EWOULDBLOCK || code == EINTR) return 0;
+        if (code == ENETDOWN || code == ENODEV || code == ENXIO) {
+            link_lost(self, state, code != ENETDOWN);
+            return 0;
+        }
+        ++self->counts.read_errors;
+        return explain(self, code, state->interface, strerror(code));
+    }
+    int count = 0;
+    for (int i = 0; i < got; ++i) count += take_message(self, state, i, &frames[count]);
+    return count;
+}
+
+static void socketcan_stats(drv_source_t* self, drv_stats_t* out) {
+    socketcan_t* state = self->state;
+    if (state) read_drop_counter(self, state);
+    *out = self->counts;
+}
+
+static void socketcan_close(drv_source_t* self) {
+    socketcan_t* state = self->state;
+    if (!state) return;
+    read_drop_counter(self, state);
+    close(state->fd);
+    free(state);
+    self->state = NULL;
+}
+
+const drv_source_ops_t drv_source_socketcan = {socketcan_open, socketcan_fd, socketcan_read, socketcan_stats,
+                                               socketcan_close};

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// One function a sub-command: adds itself to the command line and leaves what to do in its callback.
+#pragma once
+#include <CLI/CLI.hpp>
+
+namespace okid_host {
+
+void add_identify(CLI::App& app);
+void add_simulate(CLI::App& app);
+void add_run(CLI::App& app);
+void add_replay(CLI::App& app);
+void add_convert(CLI::App& app);
+void add_check(CLI::App& app);
+void add_doctor(CLI::App& app);
+void add_bench(CLI::App& app);
+
+} // namespace okid_host

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// okid doctor: what a live measurement needs of this machine, what is missing, and the command that mends it.
+#include "../config.hpp"
+#include "../error.hpp"
+#include "../live/reader.hpp"
+#include "../nearest_name.hpp"
+#include "commands.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <memory>
+#include <net/if.h>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace okid_host {
+namespace {
+
+constexpr long long wanted_buffer = 8 << 20;
+constexpr int cap_net_admin = 12;
+
+/// The findings, one line each; a finding that is missing comes with its remedy.
+class findings {
+  public:
+    void well(const std::string& what, const std::string& found) { fmt::print("ok       {:<22} {}\n", what, found); }
+    void note(const std::string& what, const std::string& found) { fmt::print("note     {:<22} {}\n", what, found); }
+    void missing(const std::string& what, const std::string& found, const std::string& remedy) {
+        fmt::print("missing  {:<22} {}\n         {:<22} -> {}\n", what, found, "", remedy);
+        ++count_;
+    }
+    int count() const { return count_; }
+
+  private:
+    int count_ = 0;
+};
+
+std::string first_line(const std::string& path) {
+    std::ifstream input(path);
+    std::string line;
+    std::getline(input, line);
+    return line;
+}
+
+bool in_path(const std::string& program) {
+    const char* path = std::getenv("PATH");
+    std::stringstream folders(path ? path : "");
+    std::string folder;
+    while (std::getline(folders, folder, ':'))
+        if (access((folder + "/" + program).c_str(), X_OK) == 0) return true;
+    return false;
+}
+
+bool has_net_admin() {
+    std::ifstream input("/proc/self/status");
+    std::string line;
+    while (std::getline(input, line))
+        if (line.rfind("CapEff:", 0) == 0) return (std::strtoull(line.c_str() + 7, nullptr, 16) >> cap_net_admin & 1) != 0;
+    return false;
+}
+
+bool check_kernel(findings& out) {
+    const int fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, 1);
+    if (fd >= 0) {
+        close(fd);
+        out.well("CAN in the kernel", "AF_CAN and can-raw answer");
+        return true;
+    }
+    if (errno == EPERM || errno == EACCES) {
+        out.missing("CAN in the kernel", std::strerror(errno), "run with sudo, or with CAP_NET_RAW");
+        return false;
+    }
+    out.missing("CAN in the kernel", fmt::format("no CAN sockets ({})", std::strerror(errno)),
+                "sudo modprobe can can-raw vcan (Debian: they are in linux-image; Ubuntu: apt-get install linux-modules-extra-$(uname -r)); "
+                "without CAN: okid replay LOG -c CONFIG.toml");
+    return false;
+}
+
+/// What iproute2 tells of a link, an empty object when it does not.
+nlohmann::json link_details(const std::string& interface) {
+    if (!in_path("ip") || interface.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-.") != std::string::npos) return nlohmann::json::object();
+    FILE* pipe = popen(("ip -json -details link show dev " + interface + " 2>/dev/null").c_str(), "re");
+    if (!pipe) return nlohmann::json::object();
+    std::string text;
+    char piece[4096];
+    for (std::size_t got; (got = std::fread(piece, 1, sizeof piece, pipe)) > 0;) text.append(piece, got);
+    pclose(pipe);
+    const auto parsed = nlohmann::json::parse(text, nullptr, false);
+    return parsed.is_array() && !parsed.empty() && parsed[0].is_object() ? parsed[0] : nlohmann::json::object();
+}
+
+void check_interface(findings& out, const bus_config& bus) {
+    const std::string what = fmt::format("bus {} ({})", bus.name, bus.interface);
+    const std::vector<std::string> there = can_interfaces();
+    if (std::find(there.begin(), there.end(), bus.interface) == there.end()) {
+        const bool other = if_nametoindex(bus.interface.c_str()) != 0;
+        out.missing(what, other ? "exists, but is no CAN interface" : "no such interface; CAN interfaces: " + (there.empty() ? "none" : list_names(there)),
+                    fmt::format("plug the adapter in, or sudo ip link add {0} type vcan && sudo ip link set {0} up", bus.interface));
+        return;
+    }
+    const std::string folder = "/sys/class/net/" + bus.interface;
+    const nlohmann::json details = link_details(bus.interface);
+    const auto data = details.value("/linkinfo/info_data"_json_pointer, nlohmann::json::object());
+    const auto bitrate = data.value("/bittiming/bitrate"_json_pointer, 0LL);
+    const std::string rate = bitrate ? fmt::format(", {} bit/s", bitrate) : "";
+    if (!(std::strtoul(first_line(folder + "/flags").c_str(), nullptr, 16) & IFF_UP)) {
+        const bool real = details.value("/linkinfo/info_kind"_json_pointer, std::string()) == "can";
+        out.missing(what, "is down" + rate, fmt::format("sudo ip link set {} up{}", bus.interface, real ? " type can bitrate 1000000 restart-ms 100" : ""));
+        return;
+    }
+    if (bus.fd && std::atoi(first_line(folder + "/mtu").c_str()) < 72)
+        out.missing(what, "up, but its mtu carries no FD frames", fmt::format("sudo ip link set {0} down && sudo ip link set {0} mtu 72 up", bus.interface));
+    else if (bitrate && bus.bitrate && static_cast<double>(bitrate) != *bus.bitrate)
+        out.missing(what, fmt::format("up{}, expected {:.0f} bit/s", rate, *bus.bitrate),
+                    fmt::format("sudo ip link set {0} down && sudo ip link set {0} up type can bitrate {1:.0f} restart-ms 100", bus.interface, *bus.bitrate));
+    else
+        out.well(what, "up" + rate);
+    if (bitrate && data.value("restart_ms", 0) == 0)
+        out.note(what, "restart-ms is 0: the bus stays off after bus-off; sudo ip link set " + bus.interface + " type can restart-ms 100 (while down)");
+}
+
+void check_buses(findings& out, const std::optional<live_config>& config, bool kernel_has_can) {
+    if (!config) {
+        const std::vector<std::string> there = can_interfaces();
+        if (!there.empty()) out.well("CAN interfaces", list_names(there));
+        else if (kernel_has_can)
+            out.missing("CAN interfaces", "none", "plug an adapter in, or sudo ip link add vcan0 type vcan && sudo ip link set vcan0 up");
+        return;
+    }
+    for (const bus_config& bus : config->buses) {
+        if (bus.type == "socketcan" && kernel_has_can) check_interface(out, bus);
+        if (bus.type != "replay") continue;
+        const std::string what = fmt::format("bus {} (replay)", bus.name);
+        if (access(bus.file.c_str(), R_OK) == 0) out.well(what, bus.file);
+        else out.missing(what, fmt::format("{}: {}", bus.file, std::strerror(errno)), "put the log there, or correct file in the [[bus]]");
+    }
+}
+
+void check_limits(findings& out) {
+    const bool admin = has_net_admin();
+    const long long limit = std::atoll(first_line("/proc/sys/net/core/rmem_max").c_str());
+    if (limit >= wanted_buffer) out.well("receive buffer", fmt::format("net.core.rmem_max is {} bytes", limit));
+    else if (admin) out.well("receive buffer", fmt::format("rmem_max is {} bytes, but CAP_NET_ADMIN lets okid take {}", limit, wanted_buffer));
+    else
+        out.missing("receive buffer", fmt::format("net.core.rmem_max is {} bytes, expected {}: bursts may be lost", limit, wanted_buffer),
+                    fmt::format("sudo sysctl -w net.core.rmem_max={0} (keep it: echo net.core.rmem_max={0} | sudo tee /etc/sysctl.d/60-okid.conf)", wanted_buffer));
+    const std::string clock = first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource");
+    const bool slow = clock == "hpet" || clock == "acpi_pm" || clock == "jiffies";
+    if (clock.empty()) out.note("clock", "the kernel does not tell its clock source");
+    else if (slow) out.note("clock", clock + " is slow to read; time stamps of the kernel are coarser than with tsc");
+    else out.well("clock", clock);
+    if (in_path("candump") && in_path("canplayer")) out.well("can-utils", "candump and canplayer are there");
+    else out.missing("can-utils", "candump and canplayer were not found (recording and playing logs)", "sudo apt-get install can-utils");
+}
+
+} // namespace
+
+void add_doctor(CLI::App& app) {
+    auto path = std::make_shared<std::string>();
+    CLI::App* command = app.add_subcommand("doctor", "Look at what this machine lacks for a live measurement, and say how to mend it");
+    command->add_option("config", *path, "also look at the buses of this file")->type_name("CONFIG.toml");
+    command->footer("Exit 0: all well. 2: the config is wrong. 4: something is missing.\n\nExample:\n  okid doctor frame.toml");
+    command->callback([path] {
+        std::optional<live_config> config;
+        if (!path->empty()) config = load_config(*path);
+        findings out;
+        const bool kernel_has_can = check_kernel(out);
+        check_buses(out, config, kernel_has_can);
+        check_limits(out);
+        if (out.count() > 0) throw failure(exit_device, fmt::format("{} thing{} missing, see above", out.count(), out.count() == 1 ? "" : "s"));
+    });
+}
+
+} // namespace okid_host

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: MIT
+// okid identify: measured records in, modes and a state-space model out.
+#include "commands.hpp"
+
+#include "../csv_header.hpp"
+#include "../error.hpp"
+#include "../mat_file.hpp"
+#include "../nearest_name.hpp"
+#include "../progress.hpp"
+#include "../record.hpp"
+#include "../whole_file.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+/// The command line as it was typed.
+struct identify_arguments {
+    std::vector<std::string> records;
+    std::string inputs, outputs, method = "okid-era", order = "auto", hold = "zoh", detrend = "mean";
+    std::string sensing = "acceleration", input_dofs, output_dofs, range, json, model;
+    std::string fs, p = "40", rows;
+    bool refine = false, quiet = false;
+};
+
+[[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
+
+void one_of(const std::string& option, const std::string& value, const std::vector<std::string>& choices) {
+    if (std::find(choices.begin(), choices.end(), value) != choices.end()) return;
+    usage(fmt::format("{}: found \"{}\"{}, expected one of: {}", option, printable(value), did_you_mean(value, choices),
+                      list_names(choices)));
+}
+
+long long whole_number(const std::string& option, const std::string& text, long long low, long long high) {
+    long long value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || value < low || value > high)
+        usage(
+            fmt::format("{}: found \"{}\", expected a whole number from {} to {}", option, printable(text), low, high));
+    return value;
+}
+
+void check_method(const std::string& method) {
+    one_of("--method", method, {"okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"});
+    if (method != "okid-era") usage(fmt::format("--method {} is not available in this version; okid-era is", method));
+}
+
+void check_not_available(const identify_arguments& given) {
+    if (given.refine) usage("--refine (maximum likelihood) is not available in this version");
+    if (!given.input_dofs.empty() || !given.output_dofs.empty())
+        usage(
+            "--input-dofs and --output-dofs (mass, stiffness and damping matrices) are not available in this version");
+}
+
+/// The inputs and outputs, checked; names the columns there are when none were chosen.
+void choose_channels(const identify_arguments& given, record_options& options) {
+    const auto columns = [&] { return list_names(read_csv_columns(given.records.front())); };
+    if (given.outputs.empty())
+        usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}",
+                          given.records.front(), columns()));
+    if (given.inputs.empty())
+        usage(fmt::format(
+            "--inputs is missing, and identification without a measured force (ambient) is not available in this "
+            "version; {} has: {}",
+            given.records.front(), columns()));
+    options.inputs = split_names("--inputs", given.inputs);
+    options.outputs = split_names("--outputs", given.outputs);
+    for (const std::string& name : options.outputs)
+        if (std::find(options.inputs.begin(), options.inputs.end(), name) != options.inputs.end())
+            usage(fmt::format("\"{}\" stands in --inputs and in --outputs, expected a column to be one of them",
+                              printable(name)));
+    if (options.inputs.size() + options.outputs.size() > 256)
+        usage(fmt::format("{} channels were chosen, at most 256 can be identified together",
+                          options.inputs.size() + options.outputs.size()));
+}
+
+void check_sensing(const std::string& sensing, std::size_t outputs) {
+    std::vector<std::string> kinds;
+    for (std::size_t at = 0; at <= sensing.size();) {
+        const std::size_t comma = std::min(sensing.find(',', at), sensing.size());
+        kinds.push_back(sensing.substr(at, comma - at));
+        at = comma + 1;
+    }
+    for (const std::string& kind : kinds) one_of("--sensing", kind, {"acceleration", "velocity", "displacement"});
+    if (kinds.size() != 1 && kinds.size() != outputs)
+        usage(fmt::format("--sensing: found {} kinds for {} outputs, expected one for all or one for each",
+                          kinds.size(), outputs));
+}
+
+record_options check_options(const identify_arguments& given) {
+    record_options options;
+    check_method(given.method);
+    check_not_available(given);
+    one_of("--hold", given.hold, {"zoh", "foh"});
+    one_of("--detrend", given.detrend, {"none", "mean", "linear"});
+    options.p = static_cast<int>(whole_number("--p", given.p, 1, 4096));
+    if (!given.rows.empty()) options.rows = static_cast<int>(whole_number("--rows", given.rows, 2, 100000));
+    if (given.order != "auto") {
+        if (given.order.empty() || given.order[0] < '0' || given.order[0] > '9')
+            usage(fmt::format("--order: found \"{}\", expected a whole number or auto", printable(given.order)));
+        options.order = static_cast<int>(whole_number("--order", given.order, 1, 10000));
+    }
+    options.method = given.method;
+    options.hold = given.hold;
+    options.detrend = given.detrend;
+    choose_channels(given, options);
+    check_sensing(given.sensing, options.outputs.size());
+    return options;
+}
+
+std::optional<double> check_rate(const std::string& text) {
+    if (text.empty()) return std::nullopt;
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !(value > 0) || !std::isfinite(value))
+        usage(fmt::format("--fs: found \"{}\", expected a sample rate in Hz above 0", printable(text)));
+    return value;
+}
+
+/// First and one past the last sample of `--range a:b`; either may be left out.
+std::pair<std::size_t, std::size_t> check_range(const std::string& range, const csv_record& record) {
+    if (range.empty()) return {0, record.count};
+    const std::size_t colon = range.find(':');
+    if (colon == std::string::npos)
+        usage(fmt::format("--range: found \"{}\", expected a:b, samples a up to but not including b, counted from 0",
+                          printable(range)));
+    const auto count = static_cast<long long>(record.count);
+    const std::string from = range.substr(0, colon), to = range.substr(colon + 1);
+    const long long first = from.empty() ? 0 : whole_number("--range", from, 0, 1LL << 60);
+    const long long last = to.empty() ? count : whole_number("--range", to, 0, 1LL << 60);
+    if (last > count || first >= last)
+        usage(fmt::format("--range {}: {} has samples 0 to {}, expected a below b and b at most {}", range, record.path,
+                          count - 1, count));
+    return {static_cast<std::size_t>(first), static_cast<std::size_t>(last)};
+}
+
+/// A result must not be written over a measurement, nor over the other result.
+void check_targets(const identify_arguments& given) {
+    for (const std::string& target : {given.json, given.model}) {
+        if (target.empty()) continue;
+        check_writable(target);
+        for (const std::string& record : given.records) {
+            std::error_code ignored;
+            if (std::filesystem::equivalent(target, record, ignored))
+                usage(fmt::format("{}: is a record to be read, a result is not written over it", target));
+        }
+    }
+    if (!given.json.empty() && given.json == given.model)
+        usage(fmt::format("--json and --model both name {}, expected two files", given.json));
+}
+
+std::vector<record_data> read_records(const identify_arguments& given, record_options& options, progress& display) {
+    csv_request request;
+    request.columns = options.inputs;
+    request.columns.insert(request.columns.end(), options.outputs.begin(), options.outputs.end());
+    request.fs_hz = check_rate(given.fs);
+    std::vector<record_data> records;
+    for (const std::string& path : given.records) {
+        request.progress = [&](double megabytes) {
+            display.stage(fmt::format("reading {}, {:.0f} MB", path, megabytes));
+        };
+        const csv_record record = read_csv(path, request);
+        if (records.empty()) options.fs_hz = record.fs_hz;
+        if (std::abs(record.fs_hz - options.fs_hz) > 1e-6 * options.fs_hz)
+            usage(fmt::format(
+                "{}: found a sample rate of {} Hz, expected {} Hz as in {}: only records of one rate can be merged",
+                path, record.fs_hz, options.fs_hz, given.records.front()));
+        const auto [first, last] = check_range(given.range, record);
+        records.push_back(split_record(record, options.inputs.size(), first, last));
+    }
+    return records;
+}
+
+/// One key a line, so that a person can look into it; matrices stay compact.
+std::string result_text(const nlohmann::ordered_json& result) {
+    std::string out = "{\n";
+    std::size_t left = result.size();
+    for (const auto& [key, value] : result.items())
+        out += fmt::format("\"{}\":{}{}\n", key,
+                           value.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace),
+                           --left ? "," : "");
+    return out + "}\n";
+}
+
+void identify(const identify_arguments& given) {
+    record_options options = check_options(given);
+    check_targets(given);
+    record_result result;
+    {
+        progress display(!given.quiet);
+        options.stage = [&](const char* stage) { display.stage(stage); };
+        result = identify_records(read_records(given, options, display), options);
+    }
+    if (!given.model.empty()) write_whole_file(given.model, mat_file(result.model));
+    if (!given.json.empty()) write_whole_file(given.json, result_text(result_json(result.model, result.context)));
+    if (given.json != "-" && given.model != "-" && !given.quiet)
+        write_whole_file("-", result_table(result.model, result.context));
+}
+
+} // namespace
+
+void add_identify(CLI::App& app) {
+    auto given = std::make_shared<identify_arguments>();
+    CLI::App* command = app.add_subcommand("identify", "Identify modes and a model from measured CSV records");
+    command->add_option("records", given->records, "CSV records of one structure, merged exactly")
+        ->required()
+        ->type_name("RECORD.csv");
+    command->add_option("--inputs", given->inputs, "force columns, with commas between")->type_name("NAMES");
+    command->add_option("--outputs", given->outputs, "response columns, with commas between")->type_name("NAMES");
+    command->add_option("--fs", given->fs, "sample rate; default: what the file says")->type_name("HZ");
+    command->add_option("--method", given->method, "okid-era (default)")->type_name("NAME");
+    command->add_option("--p", given->p, "observer order in samples (default 40)")->type_name("N");
+    command->add_option("--rows", given->rows, "block rows of the Hankel matrix (default 2 p)")->type_name("N");
+    command->add_option("--order", given->order, "number of states, or auto (default)")->type_name("N");
+    command->add_option("--hold", given->hold, "force between samples: zoh (default) or foh")->type_name("KIND");
+    command->add_option("--detrend", given->detrend, "none, mean (default) or linear")->type_name("KIND");
+    command
+        ->add_option("--sensing", given->sensing,
+                     "acceleration (default), velocity, displacement; one, or one per output")
+        ->type_name("KIND");
+    command->add_option("--input-dofs", given->input_dofs, "not available in this version")->type_name("LIST");
+    command->add_option("--output-dofs", given->output_dofs, "not available in this version")->type_name("LIST");
+    command->add_flag("--refine", given->refine, "not available in this version");
+    command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")
+        ->type_name("A:B");
+    command->add_option("--json", given->json, "write okid.result/1 to FILE, - is stdout")->type_name("FILE");
+    command->add_option("--model", given->model, "write A, B, C, D, K, dt as a MAT file for scipy")
+        ->type_name("FILE.mat");
+    command->add_flag("--quiet", given->quiet, "no table, no progress");
+    command->footer("Example:\n  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --json result.json\n"
+                    "A CSV has a line of column names, numbers below, and \"# fs_hz: 1024\" above (or use --fs).");
+    command->callback([given] { identify(*given); });
+}
+
+} // namespace okid_host

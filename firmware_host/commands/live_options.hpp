@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// Options that run and replay have in common.
+#pragma once
+#include "../live/session.hpp"
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+namespace okid_host {
+
+struct live_arguments {
+    std::string config, events, json, duration, speed;
+};
+
+void add_output_options(CLI::App& command, live_arguments& given);
+
+/// A number of seconds above 0; throws `failure` (exit 2).
+std::optional<double> parse_seconds(const char* option, const std::string& text);
+/// "max" or a factor above 0; nothing = as fast as possible.
+std::optional<double> parse_speed(const std::string& text);
+
+/// Everything checked before any device is opened; the remarks of the config go to stderr.
+session_options check_live(const live_arguments& given, const live_config& config);
+
+} // namespace okid_host

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// okid simulate: a virtual rig with known M, K, R writes the log, record and truth a real one would give.
+#include "commands.hpp"
+
+#include "../error.hpp"
+#include "../progress.hpp"
+#include "../result.hpp"
+#include "../rig_files.hpp"
+#include "../rig_frames.hpp"
+#include "../rig_play.hpp"
+#include "../whole_file.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct simulate_arguments {
+    std::string rig, log, truth, csv, dbc, config, to;
+    bool quiet = false;
+};
+
+/// Where the DBC goes: as asked, else beside the configuration, else nowhere.
+std::string dbc_path(const simulate_arguments& given) {
+    if (!given.dbc.empty() || given.config.empty()) return given.dbc;
+    if (given.config == "-")
+        throw failure(exit_usage, "--config - needs --dbc FILE: the configuration names that file");
+    return fs::path(given.config).replace_extension(".dbc").string();
+}
+
+/// The DBC as the configuration names it, relative to its own folder.
+std::string dbc_from_config(const std::string& dbc, const std::string& config) {
+    if (config == "-") return fs::absolute(dbc).lexically_normal().string();
+    return fs::absolute(dbc)
+        .lexically_normal()
+        .lexically_proximate(fs::absolute(config).lexically_normal().parent_path())
+        .string();
+}
+
+void check_targets(const simulate_arguments& given, const std::string& dbc) {
+    const std::vector<std::string> targets{given.log, given.truth, given.csv, dbc, given.config};
+    bool any = !given.to.empty();
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+        if (targets[i].empty()) continue;
+        any = true;
+        check_writable(targets[i]);
+        std::error_code ignored;
+        if (fs::equivalent(targets[i], given.rig, ignored))
+            throw failure(exit_usage, fmt::format("{}: is the rig itself, it is not written over", targets[i]));
+        for (std::size_t j = 0; j < i; ++j)
+            if (targets[i] == targets[j] && targets[i] != "/dev/null")
+                throw failure(exit_usage,
+                              fmt::format("{} was given for two outputs, expected a file for each", targets[i]));
+    }
+    if (!any)
+        throw failure(exit_usage,
+                      "nothing to write: give at least one of --log, --truth, --csv, --dbc, --config, --to");
+}
+
+void warn(const simulate_arguments& given, const std::string& text) {
+    if (!given.quiet) std::fprintf(stderr, "okid: %s: %s\n", given.rig.c_str(), text.c_str());
+}
+
+void check_bus(const simulate_arguments& given, const rig_run& run) {
+    const std::size_t messages = rig_messages(run).size();
+    const double needed = static_cast<double>(messages) * 130e-6 * run.rate_hz;
+    if (needed > 0.95 && !(given.log.empty() && given.to.empty()))
+        warn(
+            given,
+            fmt::format(
+                "{} frames a sample at {:g} Hz would load a 1 Mbit/s bus by {:.0f} %: the log is valid, but no classic "
+                "CAN bus could carry it",
+                messages, run.rate_hz, 100 * needed));
+}
+
+std::string summary(const rig& rig, const rig_run& run) {
+    std::string out = fmt::format("{} samples at {:g} Hz, forces {}, sensors {}, frames {}\n", run.count, run.rate_hz,
+                                  run.forces, run.channels.size() - run.forces, run.count * rig_messages(run).size());
+    const rig_modes modes = structure_modes(rig.body);
+    out += "   #       f [Hz]     ζ [%]\n";
+    for (std::size_t k = 0; k < modes.frequency_hz.size(); ++k)
+        out += fmt::format("{:>4} {:>12.5f} {:>9.4f}\n", k + 1, modes.frequency_hz[k], 100 * modes.damping_ratio[k]);
+    return out;
+}
+
+void simulate(const simulate_arguments& given) {
+    const rig rig = load_rig(given.rig);
+    const std::string dbc = dbc_path(given);
+    check_targets(given, dbc);
+    for (const std::string& text : rig.warnings) warn(given, text);
+    rig_run run;
+    {
+        progress display(!given.quiet);
+        display.stage("simulating");
+        run = simulate_rig(rig);
+        check_bus(given, run);
+        display.stage("writing");
+        if (!given.log.empty()) write_whole_file(given.log, rig_log(run));
+        if (!given.truth.empty()) write_whole_file(given.truth, rig_truth(rig));
+        if (!given.csv.empty()) write_whole_file(given.csv, rig_csv(run));
+        if (!dbc.empty()) write_whole_file(dbc, rig_dbc(run));
+        if (!given.config.empty())
+            write_whole_file(given.config, rig_config(rig, run, dbc_from_config(dbc, given.config)));
+    }
+    const bool to_stdout =
+        given.log == "-" || given.truth == "-" || given.csv == "-" || given.dbc == "-" || given.config == "-";
+    if (!given.quiet && !to_stdout) write_whole_file("-", summary(rig, run));
+    if (!given.to.empty()) play_rig(run, given.to);
+}
+
+} // namespace
+
+void add_simulate(CLI::App& app) {
+    auto given = std::make_shared<simulate_arguments>();
+    CLI::App* command = app.add_subcommand("simulate", "Play a virtual rig with known mass, stiffness and damping");
+    command->add_option("rig", given->rig, "the rig")->required()->type_name("RIG.toml");
+    command->add_option("--log", given->log, "CAN frames in the format of candump -L")->type_name("FILE");
+    command->add_option("--truth", given->truth, "true modes and matrices, okid.truth/1")->type_name("FILE.json");
+    command->add_option("--csv", given->csv, "the same samples in engineering units")->type_name("FILE");
+    command->add_option("--dbc", given->dbc, "description of the frames")->type_name("FILE");
+    command
+        ->add_option("--config", given->config, "CONFIG.toml for okid run and okid replay (writes the DBC beside it)")
+        ->type_name("FILE");
+    command->add_option("--to", given->to, "send the frames on a CAN interface, in real time")->type_name("IFACE");
+    command->add_flag("--quiet", given->quiet, "no summary, no warnings");
+    command->footer("Example:\n  okid simulate rig.toml --log rig.log --truth truth.json --config rig-config.toml\n"
+                    "  okid replay rig.log -c rig-config.toml\n"
+                    "The same seed gives the same bytes. `-` is stdout.");
+    command->callback([given] { simulate(*given); });
+}
+
+} // namespace okid_host

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: MIT
+#include "config.hpp"
+
+#include "config_channel.hpp"
+#include "config_schema.hpp"
+#include "error.hpp"
+#include "nearest_name.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+namespace okid_host {
+namespace {
+
+[[noreturn]] void refuse_file(const std::string& path, const std::string& text) {
+    throw failure(exit_usage, fmt::format("{}: {}", path, text));
+}
+
+[[noreturn]] void refuse_entry(const config_place& place, const toml::table& table, const std::string& text) {
+    refuse_file(place.path, fmt::format("line {}, {}: {}", table.source().begin.line, place.section, text));
+}
+
+toml::table parse(const std::string& path) {
+    std::error_code ignored;
+    std::ifstream input(path, std::ios::binary);
+    if (!input || std::filesystem::is_directory(path, ignored))
+        refuse_file(path, input ? "cannot be read: it is a folder, expected a CONFIG.toml" : "cannot be read: no such file or no permission");
+    std::stringstream text;
+    text << input.rdbuf();
+    try {
+        return toml::parse(text.str(), path);
+    } catch (const toml::parse_error& error) {
+        refuse_file(path, fmt::format("line {}, column {}: {}", error.source().begin.line, error.source().begin.column,
+                                      error.description()));
+    }
+}
+
+std::string beside(const std::string& config, const std::string& file) {
+    const std::filesystem::path path(file);
+    return path.is_absolute() ? file : (std::filesystem::path(config).parent_path() / path).string();
+}
+
+void require_key(const config_place& place, const toml::table& table, const char* key, const char* why) {
+    if (!table.contains(key)) refuse_entry(place, table, fmt::format("\"{}\" is missing: {}", key, why));
+}
+
+bus_config read_bus(const config_place& place, const toml::table& table) {
+    bus_config bus;
+    require_key(place, table, "name", "every bus has a name");
+    bus.name = *table["name"].value<std::string>();
+    bus.type = table["type"].value_or(bus.type);
+    bus.interface = table["interface"].value_or(std::string());
+    bus.device = table["device"].value_or(std::string());
+    bus.fd = table["fd"].value_or(false);
+    bus.bitrate = table["bitrate"].value<double>();
+    bus.dbitrate = table["dbitrate"].value<double>();
+    if (const auto dbc = table["dbc"].value<std::string>()) bus.dbc = beside(place.path, *dbc);
+    if (const auto file = table["file"].value<std::string>()) bus.file = beside(place.path, *file);
+    if (bus.type == "slcan" || bus.type == "serial")
+        refuse_key(place, *table.get("type"), "type",
+                   fmt::format("\"{}\" is not available in this version; socketcan and replay are", bus.type));
+    if (bus.type == "socketcan") require_key(place, table, "interface", "a socketcan bus needs one, such as interface = \"can0\"");
+    if (bus.type == "replay") require_key(place, table, "file", "a replay bus needs a candump -L log");
+    if (bus.interface.size() >= DRV_NAME_BYTES)
+        refuse_key(place, *table.get("interface"), "interface", "an interface name has at most 15 characters");
+    return bus;
+}
+
+void read_acquisition(const std::string& path, const toml::table& file, live_config& config) {
+    const toml::table* table = file["acquisition"].as_table();
+    if (!table || !table->contains("rate_hz"))
+        refuse_file(path, "\"rate_hz\" is missing in [acquisition], expected the sample rate, such as rate_hz = 1000.0");
+    config.rate_hz = *(*table)["rate_hz"].value<double>();
+    for (const auto& [key, node] : *table)
+        if (node.is_string()) config.notes.emplace_back(key.str(), *node.value<std::string>());
+}
+
+void read_buses(const std::string& path, const toml::table& file, live_config& config) {
+    const toml::array* entries = file["bus"].as_array();
+    if (!entries || entries->empty()) refuse_file(path, "no [[bus]], expected at least one");
+    if (entries->size() > DRV_MAX_BUSES) refuse_file(path, fmt::format("{} buses, at most {} are possible", entries->size(), int{DRV_MAX_BUSES}));
+    for (std::size_t i = 0; i < entries->size(); ++i) {
+        const toml::table& table = *entries->get_as<toml::table>(i);
+        const config_place place{path, entry_name("bus", table, i)};
+        bus_config bus = read_bus(place, table);
+        for (const bus_config& other : config.buses) {
+            if (other.name == bus.name) refuse_key(place, *table.get("name"), "name", "another [[bus]] has this name");
+            if (!bus.interface.empty() && other.interface == bus.interface)
+                refuse_key(place, *table.get("interface"), "interface", fmt::format("bus \"{}\" uses it already", other.name));
+        }
+        config.buses.push_back(std::move(bus));
+    }
+}
+
+channel_role role_of(const std::string& text) {
+    if (text == "force") return channel_role::force;
+    if (text == "acceleration") return channel_role::acceleration;
+    if (text == "velocity") return channel_role::velocity;
+    return text == "displacement" ? channel_role::displacement : channel_role::aux;
+}
+
+std::size_t bus_of(const config_place& place, const toml::table& table, const live_config& config) {
+    std::vector<std::string> names;
+    for (const bus_config& bus : config.buses) names.push_back(bus.name);
+    const toml::node* node = table.get("bus");
+    if (!node) {
+        if (names.size() == 1) return 0;
+        refuse_entry(place, table, fmt::format("\"bus\" is missing, expected one of: {}", list_names(names)));
+    }
+    const std::string name = *node->value<std::string>();
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+        refuse_key(place, *node, "bus", fmt::format("found \"{}\"{}, expected one of: {}", printable(name), did_you_mean(name, names),
+                                                    list_names(names)));
+    return static_cast<std::size_t>(found - names.begin());
+}
+
+bool same_bits(const std::optional<drv_signal_t>& a, const std::optional<drv_signal_t>& b) {
+    return a && b && a->start_bit == b->start_bit && a->length == b->length && a->big_endian == b->big_endian;
+}
+
+/// One message has one counter; a channel that names none takes that of its neighbours in the message.
+void share_sequence(const config_place& place, const toml::table& table, live_config& config, channel_config& channel) {
+    for (channel_config& other : config.channels) {
+        if (other.name == channel.name) refuse_key(place, *table.get("name"), "name", "another [[channel]] has this name");
+        if (other.bus != channel.bus || other.frame.id != channel.frame.id || other.frame.extended != channel.frame.extended) continue;
+        if (channel.sequence && other.sequence && !same_bits(channel.sequence, other.sequence))
+            refuse_key(place, *table.get("sequence"), "sequence",
+                       fmt::format("channel \"{}\" of the same message names another counter", other.name));
+        if (!channel.sequence) channel.sequence = other.sequence;
+        if (!other.sequence) other.sequence = channel.sequence;
+    }
+}
+
+void read_channels(const std::string& path, const toml::table& file, live_config& config) {
+    const toml::array* entries = file["channel"].as_array();
+    if (!entries || entries->empty()) refuse_file(path, "no [[channel]], expected at least one");
+    std::map<std::string, dbc_file> dbcs;
+    for (const bus_config& bus : config.buses)
+        if (!bus.dbc.empty() && !dbcs.count(bus.dbc)) dbcs.emplace(bus.dbc, read_dbc(bus.dbc));
+    for (std::size_t i = 0; i < entries->size(); ++i) {
+        const toml::table& table = *entries->get_as<toml::table>(i);
+        const config_place place{path, entry_name("channel", table, i)};
+        require_key(place, table, "name", "every channel has a name");
+        require_key(place, table, "role", "force, acceleration, velocity, displacement or aux");
+        channel_config channel;
+        channel.name = *table["name"].value<std::string>();
+        channel.role = role_of(*table["role"].value<std::string>());
+        channel.dof = static_cast<int>(table["dof"].value_or(std::int64_t{0}));
+        channel.unit = table["unit"].value_or(std::string());
+        channel.bus = bus_of(place, table, config);
+        const bus_config& bus = config.buses[channel.bus];
+        const auto dbc = dbcs.find(bus.dbc);
+        resolve_channel(place, table, bus, dbc == dbcs.end() ? nullptr : &dbc->second, channel);
+        share_sequence(place, table, config, channel);
+        config.channels.push_back(std::move(channel));
+    }
+    const auto rank = [](const channel_config& c) { return c.role == channel_role::force ? 0 : c.role == channel_role::aux ? 2 : 1; };
+    std::stable_sort(config.channels.begin(), config.channels.end(),
+                     [&](const channel_config& a, const channel_config& b) { return rank(a) < rank(b); });
+    for (const channel_config& channel : config.channels) {
+        config.n_u += rank(channel) == 0;
+        config.n_y += rank(channel) == 1;
+    }
+    if (config.n_u + config.n_y > 256)
+        refuse_file(path, fmt::format("{} force and response channels, at most 256 can be identified together", config.n_u + config.n_y));
+}
+
+void read_identification(const std::string& path, const toml::table& file, live_config& config) {
+    identification_config& out = config.identification;
+    const toml::table* table = file["identification"].as_table();
+    if (!table) return;
+    const config_place place{path, "[identification]"};
+    const toml::table& t = *table;
+    out.method = t["method"].value_or(out.method);
+    if (out.method != "okid-era")
+        refuse_key(place, *t.get("method"), "method", fmt::format("\"{}\" is not available in this version; okid-era is", out.method));
+    out.hold = t["hold"].value_or(out.hold);
+    out.detrend = t["detrend"].value_or(out.detrend);
+    if (out.detrend == "linear")
+        refuse_key(place, *t.get("detrend"), "detrend", "\"linear\" needs the whole record: none and mean are possible while a stream runs");
+    out.p = static_cast<int>(t["p"].value_or(std::int64_t{out.p}));
+    out.rows = static_cast<int>(t["rows"].value_or(std::int64_t{0}));
+    out.order = static_cast<int>(t["order"].value_or(std::int64_t{0}));
+    out.window_s = t["window_s"].value<double>();
+    out.forgetting = t["forgetting"].value<double>();
+    out.update_s = t["update_s"].value_or(out.update_s);
+    if (out.window_s && out.forgetting)
+        refuse_key(place, *t.get("forgetting"), "forgetting", "window_s is given too; a window and forgetting together are not available, choose one");
+    if (out.window_s && *out.window_s * config.rate_hz < 2.0 * out.p)
+        refuse_key(place, *t.get("window_s"), "window_s", fmt::format("{:g} s are {:.0f} samples at {:g} Hz, expected more than 2 p = {}",
+                                                                     *out.window_s, *out.window_s * config.rate_hz, config.rate_hz, 2 * out.p));
+    if (out.update_s * config.rate_hz < 1)
+        refuse_key(place, *t.get("update_s"), "update_s", fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
+    if (t["mkr"].value_or(false))
+        config.warnings.emplace_back("[identification] mkr: mass, stiffness and damping matrices are not available in this version");
+}
+
+/// Sections of later versions: checked, then said to do nothing.
+void note_ignored(const toml::table& file, live_config& config) {
+    for (const char* section : {"alarm", "trigger", "record", "publish", "geometry"})
+        if (file.contains(section))
+            config.warnings.push_back(fmt::format("[{}] is accepted, but does nothing in this version", section));
+}
+
+} // namespace
+
+live_config load_config(const std::string& path) {
+    const toml::table file = parse(path);
+    check_schema(path, file);
+    live_config config;
+    config.path = path;
+    read_acquisition(path, file, config);
+    read_buses(path, file, config);
+    read_channels(path, file, config);
+    read_identification(path, file, config);
+    note_ignored(file, config);
+    return config;
+}
+
+void require_identifiable(const live_config& config) {
+    if (config.n_y == 0)
+        refuse_file(config.path, "no [[channel]] has the role acceleration, velocity or displacement, expected at least one response");
+    if (config.n_u == 0)
+        refuse_file(config.path, "no [[channel]] has the role force: identification without a measured force (ambient) is not "
+                                 "available in this version");
+}
+
+std::vector<drv_filter_t> wanted_frames(const live_config& config, std::size_t bus) {
+    std::vector<drv_filter_t> out;
+    for (const channel_config& channel : config.channels) {
+        if (channel.bus != bus) continue;
+        const bool known = std::any_of(out.begin(), out.end(), [&](const drv_filter_t& f) {
+            return f.id == channel.frame.id && f.extended == channel.frame.extended;
+        });
+        if (!known) out.push_back(channel.frame);
+    }
+    return out;
+}
+
+} // namespace okid_host

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// One CSV record in memory: the columns asked for, NaN where a sample is missing.
+#pragma once
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+struct csv_request {
+    std::vector<std::string> columns;               ///< names, in the order wanted
+    std::optional<double> fs_hz;                    ///< overrides what the file says
+    std::function<void(double megabytes)> progress; ///< called now and then while reading; may be empty
+};
+
+struct csv_record {
+    std::string path;
+    std::vector<std::string> columns, units; ///< as asked for; unit "" when the header names none
+    double fs_hz = 0;
+    std::size_t count = 0;       ///< samples
+    std::vector<double> samples; ///< columns x count, column-major: one sample after the other
+    std::size_t first_line = 0;  ///< line number of the first sample
+};
+
+/// Read a record. Throws `failure` (exit 2) naming file, line, column, what was found and what was expected.
+/// Columns that were not asked for are skipped unread.
+csv_record read_csv(const std::string& path, const csv_request& request);
+
+/// Only the column names, for messages.
+std::vector<std::string> read_csv_columns(const std::string& path);
+
+} // namespace okid_host

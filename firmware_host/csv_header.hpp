@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// The head of a CSV record: comment lines, separator, column names with their units, the stated sample rate.
+#pragma once
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace okid_host {
+
+struct csv_header {
+    std::size_t line = 0;            ///< line number of the names, from 1
+    char separator = ',';            ///< ',' ';' or tab
+    std::vector<std::string> names;  ///< as written, quotes removed
+    std::optional<double> fs_hz;     ///< from `# fs_hz: …` or `# sample_rate_hz = …`
+    std::string fs_remark;           ///< a rate line that holds no number, for the message
+    bool looks_like_numbers = false; ///< the line holds numbers: the file has no header
+};
+
+/// Take in one `#` line. Throws when two lines state different rates or a rate is not positive.
+void read_csv_comment(const std::string& path, std::size_t number, std::string_view line, csv_header& header);
+
+/// Take in the line of names. Throws on duplicate names, an open quote or bytes that are not text.
+void read_csv_names(const std::string& path, std::size_t number, std::string_view line, csv_header& header);
+
+/// Index of a column by its name, or by its name without the unit (`acc1` for `acc1 [g]`); throws with the nearest name.
+std::size_t find_csv_column(const std::string& path, const csv_header& header, const std::string& name);
+
+/// "g" of `acc1 [g]`, `acc1 (g)` and `acc1_g`; "" when the name carries no known unit.
+std::string unit_of_name(const std::string& name);
+
+/// The names of an option, `a,b,"c,d"`; throws on an empty or repeated one.
+std::vector<std::string> split_names(const std::string& option, const std::string& list);
+
+} // namespace okid_host

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// Why no model could be identified, and what to do about it.
+#include "error.hpp"
+#include "result.hpp"
+
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+/// Name of channel number `channel` (inputs first), with its kind.
+std::string channel_name(int channel, const result_context& context) {
+    const auto at = static_cast<std::size_t>(channel);
+    if (channel < 0) return "a channel";
+    if (at < context.inputs.size()) return fmt::format("input \"{}\"", context.inputs[at]);
+    if (at - context.inputs.size() < context.outputs.size())
+        return fmt::format("output \"{}\"", context.outputs[at - context.inputs.size()]);
+    return fmt::format("channel {}", channel + 1);
+}
+
+std::string reason(okid_status_t status, const okid_identified_t& model, const okid_identify_config_t& config,
+                   const result_context& context) {
+    const okid_observer_info_t& info = model.observer_info;
+    const long long q = config.n_u + static_cast<long long>(config.p) * (config.n_u + config.n_y);
+    switch (status) {
+    case OKID_ERR_TOO_SHORT:
+        return fmt::format(
+            "too few samples: {} usable rows, but p {} has {} unknowns per output and needs more than {} rows in "
+            "unbroken stretches (10 times as many are advised). Record longer, lower --p, or mend the gaps",
+            model.regression_rows, config.p, q, q + config.n_y);
+    case OKID_ERR_INPUT:
+        return fmt::format(
+            "{} is constant: it excites nothing. Leave it out of --inputs, or check the force sensor and its wiring",
+            channel_name(info.channel, context));
+    case OKID_ERR_OUTPUT:
+        return fmt::format(
+            "{} is constant: it measures nothing. Leave it out of --outputs, or check the sensor and its wiring",
+            channel_name(info.channel, context));
+    case OKID_ERR_EXCITATION:
+        return fmt::format(
+            "not enough excitation{}: the inputs cannot be told apart over {} lags (smallest over largest {:.1e}). "
+            "Use independent broad-band forces, lower --p, or leave out an input that repeats another",
+            info.channel >= 0 ? " by " + channel_name(info.channel, context) : "", config.p, info.input_excitation);
+    case OKID_ERR_UNSTABLE:
+        return fmt::format(
+            "no stable observer: plain least squares has spectral radius {:.6g}, and no ridge of the grid cures it. "
+            "Try --detrend linear, a smaller --p, or a record without drift",
+            info.radius_plain);
+    case OKID_ERR_NO_MODES:
+        return fmt::format(
+            "the model of order {} has no underdamped mode below {:g} Hz: the record holds no vibration that answers "
+            "the inputs. Try a higher --order or --p, and check that inputs and outputs are not exchanged",
+            model.n_z, context.fs_hz / 2);
+    case OKID_ERR_NUMERIC:
+        return "a factorisation did not converge. Check the record for extreme values; try a smaller --p";
+    default: return okid_status_text(status);
+    }
+}
+
+} // namespace
+
+void throw_identify_failure(okid_status_t status, const okid_identified_t& model, const okid_identify_config_t& config,
+                            const result_context& context) {
+    throw failure(exit_no_model, "no model: " + reason(status, model, config, context));
+}
+
+} // namespace okid_host

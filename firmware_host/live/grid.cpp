@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: MIT
+// Places frames on the grid and lets samples out; where a lane stands is decided in grid_lane.cpp.
+#include "grid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace okid_host {
+namespace {
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+std::uint32_t lane_key(std::size_t bus, std::uint32_t id, bool extended) {
+    return static_cast<std::uint32_t>(bus) << 30 ^ static_cast<std::uint32_t>(bus >> 2) << 11 ^ id ^ (extended ? 1u << 29 : 0u);
+}
+
+std::size_t hash_of(std::uint32_t key, std::size_t size) { return (key * 2654435761u >> 7) & (size - 1); }
+
+std::int64_t power_of_two(std::int64_t least) {
+    std::int64_t value = 1;
+    while (value < least) value *= 2;
+    return value;
+}
+
+} // namespace
+
+const char* gap_cause_name(gap_cause cause) {
+    static const char* const names[] = {"socket_overflow", "driver", "sequence", "crc", "link_down", "stall"};
+    return names[static_cast<std::size_t>(cause)];
+}
+
+grid::grid(const live_config& config, grid_sink& sink)
+    : sink_(sink), rate_hz_(config.rate_hz), period_ns_(1e9 / config.rate_hz), channels_(config.channels),
+      width_(config.channels.size()), buses_(config.buses.size()) {
+    build_lanes(config);
+    window_ = std::clamp<std::int64_t>(std::llround(rate_hz_ / 4), 4 * reorder_, 4096);
+    mask_ = power_of_two(2 * window_) - 1;
+    const auto rows = static_cast<std::size_t>(mask_ + 1);
+    values_.assign(rows * width_, missing);
+    present_.assign(rows * lanes_.size(), 0);
+    slots_.assign(rows, 0);
+    held_.reserve(lanes_.size() * 64 + 256);
+}
+
+void grid::build_lanes(const live_config& config) {
+    for (std::size_t c = 0; c < config.channels.size(); ++c) {
+        const channel_config& channel = config.channels[c];
+        const std::uint32_t key = lane_key(channel.bus, channel.frame.id, channel.frame.extended != 0);
+        lane* found = nullptr;
+        for (lane& each : lanes_)
+            if (each.bus == channel.bus && each.key == key && each.selector.has_value() == channel.selector.has_value() &&
+                (!channel.selector || each.selector_value == channel.selector_value))
+                found = &each;
+        if (!found) {
+            lane fresh;
+            fresh.key = key;
+            fresh.bus = channel.bus;
+            fresh.sequence = channel.sequence;
+            fresh.selector = channel.selector;
+            fresh.selector_value = channel.selector_value;
+            lanes_.push_back(std::move(fresh));
+            found = &lanes_.back();
+        }
+        found->channels.push_back(c);
+    }
+    std::size_t most = 0;
+    for (const lane& each : lanes_) most = std::max(most, each.channels.size());
+    decoded_.resize(most);
+    table_.assign(static_cast<std::size_t>(power_of_two(static_cast<std::int64_t>(4 * lanes_.size()))), -1);
+    for (std::size_t i = 0; i < lanes_.size(); ++i) {
+        std::size_t at = hash_of(lanes_[i].key, table_.size());
+        while (table_[at] >= 0 && lanes_[static_cast<std::size_t>(table_[at])].key != lanes_[i].key) at = (at + 1) & (table_.size() - 1);
+        lanes_[i].next = table_[at];
+        table_[at] = static_cast<int>(i);
+    }
+}
+
+/// The lane a frame belongs to: by identifier, then by multiplexor.
+grid::lane* grid::find_lane(const drv_frame_t& frame) {
+    const std::uint32_t key = lane_key(frame.bus, frame.id, (frame.flags & DRV_FRAME_EXTENDED) != 0);
+    std::size_t at = hash_of(key, table_.size());
+    while (table_[at] >= 0 && lanes_[static_cast<std::size_t>(table_[at])].key != key) at = (at + 1) & (table_.size() - 1);
+    for (int i = table_[at]; i >= 0; i = lanes_[static_cast<std::size_t>(i)].next) {
+        lane& each = lanes_[static_cast<std::size_t>(i)];
+        if (each.bus != frame.bus) continue;
+        if (!each.selector) return &each;
+        std::int64_t page = 0;
+        if (drv_signal_raw(&*each.selector, frame.data, frame.len, &page) && static_cast<std::uint64_t>(page) == each.selector_value)
+            return &each;
+    }
+    return nullptr;
+}
+
+bool grid::decode(lane& l, const drv_frame_t& frame) {
+    std::int64_t raw = 0;
+    for (std::size_t i = 0; i < l.channels.size(); ++i) {
+        const drv_signal_t& layout = channels_[l.channels[i]].layout;
+        if (!drv_signal_raw(&layout, frame.data, frame.len, &raw)) return false;
+        decoded_[i] = drv_signal_number(&layout, raw);
+        if (!std::isfinite(decoded_[i])) return false;
+    }
+    return !l.sequence || drv_signal_bytes(&*l.sequence) <= frame.len;
+}
+
+void grid::push(const drv_frame_t& frame) {
+    if (frame.bus >= buses_.size()) return;
+    if (frame.loss)
+        for (lane& each : lanes_)
+            if (each.bus == frame.bus) each.loss |= frame.loss;
+    lane* l = find_lane(frame);
+    if (!l) return;
+    grid_bus_counts& counts = buses_[frame.bus];
+    ++counts.received;
+    if (!decode(*l, frame)) {
+        ++counts.decode_errors;
+        return;
+    }
+    if (!anchored_) hold_until_anchored(*l, frame);
+    else place(*l, frame);
+}
+
+/// Lay rows out in the ring up to and including `upto`; makes room by letting the oldest go.
+void grid::open_rows(std::int64_t upto) {
+    if (upto - next_ > mask_) {
+        while (next_ < opened_ && upto - next_ > window_) emit_front();
+        if (next_ == opened_ && upto - next_ > window_) skip_to(upto - window_ / 2);
+    }
+    for (; opened_ <= upto; ++opened_) {
+        std::fill_n(row(opened_), width_, missing);
+        std::fill_n(present(opened_), lanes_.size(), std::uint8_t{0});
+        slot(opened_) = 0;
+    }
+}
+
+/// The frame's numbers (in decoded_) into their row.
+void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
+    grid_bus_counts& counts = buses_[frame.bus];
+    const auto which = static_cast<std::size_t>(&l - lanes_.data());
+    const bool late = index < l.last;
+    l.last = std::max(l.last, index);
+    if (index < next_) {
+        if (index < 0) return; // before the grid begins
+        const bool remembered = opened_ - index <= mask_;
+        if (remembered && present(index)[which]) ++counts.duplicate;
+        else ++counts.out_of_order; // too late: the sample has gone out without it
+        return;
+    }
+    open_rows(index);
+    if (present(index)[which]) {
+        ++counts.duplicate;
+        return;
+    }
+    if (late) ++counts.out_of_order;
+    present(index)[which] = 1;
+    ++slot(index);
+    double* to = row(index);
+    for (std::size_t i = 0; i < l.channels.size(); ++i) to[l.channels[i]] = decoded_[i];
+    drain(false);
+}
+
+void grid::drain(bool all) {
+    const auto lanes = static_cast<std::int64_t>(lanes_.size());
+    while (next_ < opened_ && next_ < limit_) {
+        if (slot(next_) < lanes && !all && opened_ - next_ <= window_) {
+            if (opened_ - next_ <= reorder_) return;
+            const std::uint8_t* have = present(next_);
+            for (std::size_t i = 0; i < lanes_.size(); ++i)
+                if (!have[i] && (!lanes_[i].heard || lanes_[i].last < next_ + reorder_)) return;
+        }
+        emit_front();
+    }
+}
+
+void grid::emit_front() {
+    const std::uint8_t* have = present(next_);
+    for (std::size_t i = 0; i < lanes_.size(); ++i) {
+        lane& l = lanes_[i];
+        if (have[i]) {
+            if (l.gap_count) close_gap(l, true);
+            ++l.expected;
+            ++l.received;
+        } else {
+            extend_gap(l, next_, 1);
+        }
+    }
+    const std::int64_t index = next_++;
+    sink_.on_sample(index, row(index));
+}
+
+/// Nothing at all arrived between next_ and index.
+void grid::skip_to(std::int64_t index) {
+    const std::int64_t count = index - next_;
+    if (count <= 0) return;
+    for (lane& l : lanes_) extend_gap(l, next_, count);
+    const std::int64_t first = next_;
+    next_ = opened_ = index;
+    for (std::int64_t i = std::max(first, index - mask_); i < index; ++i) std::fill_n(present(i), lanes_.size(), std::uint8_t{0});
+    sink_.on_missing(first, count);
+}
+
+void grid::extend_gap(lane& l, std::int64_t first, std::int64_t count) {
+    if (l.gap_count == 0) l.gap_first = first;
+    l.gap_count += count;
+    l.expected += count;
+}
+
+/// The cause is what was known when the lane jumped over the gap.
+void grid::close_gap(lane& l, bool resumed) {
+    grid_gap gap;
+    gap.first = l.gap_first;
+    gap.count = l.gap_count;
+    gap.last = gap.first + gap.count - 1;
+    gap.cause = resumed || gap.count <= reorder_ ? gap_cause::sequence : gap_cause::stall;
+    for (const cause_mark& mark : l.marks)
+        if (mark.first <= gap.last && mark.last >= gap.first) gap.cause = mark.cause;
+    if (!resumed && (l.loss & DRV_LOSS_LINK)) gap.cause = gap_cause::link_down;
+    buses_[l.bus].lost[static_cast<std::size_t>(gap.cause)] += static_cast<std::uint64_t>(gap.count);
+    l.gap_count = 0;
+    for (const std::size_t channel : l.channels) {
+        gap.channel = channel;
+        sink_.on_gap(gap);
+    }
+}
+
+void grid::finish() {
+    if (!anchored_ && heard_ > 0) anchor();
+    for (lane& l : lanes_) {
+        buses_[l.bus].decode_errors += l.suspected;
+        l.suspected = false;
+    }
+    const auto lanes = static_cast<std::int64_t>(lanes_.size());
+    if (opened_ > next_ && slot(opened_ - 1) < lanes) --opened_;
+    drain(true);
+    for (lane& l : lanes_)
+        if (l.gap_count) close_gap(l, false);
+}
+
+grid_channel_counts grid::channel(std::size_t index) const {
+    for (const lane& l : lanes_)
+        if (std::find(l.channels.begin(), l.channels.end(), index) != l.channels.end()) return {l.expected, l.received};
+    return {};
+}
+
+std::vector<std::size_t> grid::silent_channels() const {
+    std::vector<std::size_t> out;
+    for (const lane& l : lanes_)
+        if (!l.heard) out.insert(out.end(), l.channels.begin(), l.channels.end());
+    return out;
+}
+
+} // namespace okid_host

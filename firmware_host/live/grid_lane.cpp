@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: MIT
+// Where a lane stands on the grid: the first alignment, counters unwrapped, jumps believed or not, cadence.
+#include "grid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace okid_host {
+namespace {
+
+/// Difference of two counters of `bits` bits, the short way round.
+std::int64_t wrapped_step(std::uint64_t from, std::uint64_t to, unsigned bits) {
+    const std::uint64_t range = std::uint64_t{1} << bits, step = (to - from) & (range - 1);
+    return step < range / 2 ? static_cast<std::int64_t>(step) : static_cast<std::int64_t>(step) - static_cast<std::int64_t>(range);
+}
+
+/// Two counters this close at the start count the same samples.
+std::int64_t kinship(unsigned bits) { return bits >= 9 ? 64 : std::max<std::int64_t>(1, std::int64_t{1} << bits >> 3); }
+
+constexpr double longest_pause_s = 5;           // beyond it the clock says how often a counter went round
+constexpr double longest_beat_s = 1;            // a lane without a counter that pauses longer has stalled
+constexpr double longest_silence_ns = 400 * 86400e9; // a stamp further ahead is no time but an error
+
+} // namespace
+
+bool grid::read_counter(const lane& l, const drv_frame_t& frame, std::uint64_t& counter) const {
+    std::int64_t raw = 0;
+    if (!l.sequence || !drv_signal_raw(&*l.sequence, frame.data, frame.len, &raw)) return false;
+    counter = static_cast<std::uint64_t>(raw);
+    return true;
+}
+
+/// Before the grid begins frames wait until every lane was heard, or until no more can wait.
+void grid::hold_until_anchored(lane& l, const drv_frame_t& frame) {
+    heard_ += !l.waiting;
+    l.waiting = true;
+    held_.emplace_back(static_cast<int>(&l - lanes_.data()), frame);
+    if (heard_ == lanes_.size() || held_.size() == held_.capacity()) anchor();
+}
+
+/// The place of a counter beside the lanes whose counters count the same samples.
+bool grid::place_by_kin(const lane& l, std::uint64_t counter, std::int64_t& index) const {
+    for (const lane& other : lanes_) {
+        if (!other.heard || &other == &l || !other.sequence) continue;
+        const unsigned bits = std::min(l.sequence->length, other.sequence->length);
+        const std::int64_t apart = wrapped_step(other.counter, counter, bits);
+        if (std::abs(apart) > kinship(bits)) continue;
+        index = other.last + apart;
+        return true;
+    }
+    return false;
+}
+
+/// Give a lane its place from its first frame; lanes heard before are the reference.
+void grid::hear_first(lane& l, const drv_frame_t& frame) {
+    l.time_ns = frame.time_ns;
+    l.phase_ns = static_cast<double>(frame.time_ns);
+    l.loss = 0;
+    l.last = 0;
+    const bool counted = read_counter(l, frame, l.counter);
+    if (!counted || !place_by_kin(l, l.counter, l.last))
+        for (const lane& other : lanes_) {
+            if (!other.heard) continue;
+            l.last = other.last + std::llround(static_cast<double>(frame.time_ns - other.time_ns) / period_ns_);
+            break;
+        }
+    l.heard = true;
+}
+
+/// All lanes were heard (or waiting has no end): sample 0 is the first one that every lane can have.
+void grid::anchor() {
+    anchored_ = true;
+    std::vector<std::pair<std::int64_t, const drv_frame_t*>> first(lanes_.size(), {0, nullptr});
+    std::int64_t begin = std::numeric_limits<std::int64_t>::min();
+    for (const auto& [which, frame] : held_) { // first pass: where each lane's first frame stands
+        lane& l = lanes_[static_cast<std::size_t>(which)];
+        if (!l.heard) {
+            hear_first(l, frame);
+            first[static_cast<std::size_t>(which)] = {l.last, &frame};
+            begin = std::max(begin, l.last);
+            continue;
+        }
+        std::uint64_t counter = 0; // the reference of the lanes to come moves on
+        const std::int64_t step = read_counter(l, frame, counter)
+                                      ? wrapped_step(l.counter, counter, l.sequence->length)
+                                      : std::llround(static_cast<double>(frame.time_ns - l.time_ns) / period_ns_);
+        if (step <= 0 || step > window_) continue;
+        l.counter = counter;
+        l.last += step;
+        l.time_ns = frame.time_ns;
+    }
+    for (std::size_t i = 0; i < lanes_.size(); ++i) { // every lane back to just its first frame
+        lane& l = lanes_[i];
+        if (!l.heard) continue;
+        l.last = first[i].first - begin;
+        l.time_ns = first[i].second->time_ns;
+        read_counter(l, *first[i].second, l.counter);
+    }
+    for (const auto& [which, frame] : held_) { // second pass: for good
+        lane& l = lanes_[static_cast<std::size_t>(which)];
+        decode(l, frame);
+        if (first[static_cast<std::size_t>(which)].second == &frame) insert(l, l.last, frame);
+        else place(l, frame);
+    }
+    held_.clear();
+}
+
+void grid::place(lane& l, const drv_frame_t& frame) {
+    if (!l.heard) {
+        hear_first(l, frame);
+        insert(l, l.last, frame);
+        return;
+    }
+    std::uint64_t counter = 0;
+    if (read_counter(l, frame, counter)) {
+        place_by_counter(l, frame, counter);
+        return;
+    }
+    const bool pause = static_cast<double>(frame.time_ns - l.time_ns) > 1e9 * longest_beat_s;
+    const std::int64_t step = cadence_step(l, frame);
+    move_on(l, frame, l.last + step, pause);
+}
+
+/// The lane's newest frame is now at `index`; what it jumped over is lost unless it still comes.
+void grid::move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool pause) {
+    if (index > l.last + 1) note_loss(l, l.last + 1, index - 1, pause);
+    l.loss = 0;
+    l.time_ns = frame.time_ns;
+    insert(l, index, frame);
+}
+
+void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
+    const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+    if (step <= 0 && step >= -reorder_) { // again, or late
+        insert(l, l.last + step, frame);
+        return;
+    }
+    std::int64_t far = step;
+    const bool timed = count_rounds(l, frame, far);
+    if (!timed && (step < 0 || step > window_)) {
+        judge_jump(l, frame, counter);
+        return;
+    }
+    l.suspected = false;
+    l.counter = counter;
+    move_on(l, frame, l.last + far, false);
+}
+
+/// After a known loss or a long silence the clock tells how often the counter went round. @return it does, and agrees
+bool grid::count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& step) const {
+    const double pause_ns = static_cast<double>(frame.time_ns - l.time_ns);
+    if (step == 1 || (!l.loss && pause_ns < 1e9 * longest_pause_s) || pause_ns <= 0 || pause_ns > longest_silence_ns) return false;
+    const double range = std::ldexp(1.0, l.sequence->length), guess = pause_ns / period_ns_;
+    const double rounds = std::max(0.0, std::round((guess - static_cast<double>(step)) / range));
+    const double found = static_cast<double>(step) + rounds * range;
+    if (found < 1 || std::abs(found - guess) > std::max(static_cast<double>(window_), 0.2 * guess)) return false;
+    step = static_cast<std::int64_t>(found);
+    return true;
+}
+
+/// A counter far off: one damaged frame, or did the sender jump or start anew? Two frames that agree decide.
+void grid::judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
+    std::uint64_t before = 0;
+    if (l.suspected) {
+        read_counter(l, l.suspect, before);
+        const std::int64_t apart = wrapped_step(before, counter, l.sequence->length);
+        if (apart >= 1 && apart <= reorder_) {
+            const drv_frame_t earlier = l.suspect;
+            l.suspected = false;
+            const std::int64_t step = wrapped_step(l.counter, before, l.sequence->length);
+            const std::int64_t index = step > 0 ? l.last + step : place_restart(l, earlier, before);
+            l.counter = before;
+            decode(l, earlier);
+            move_on(l, earlier, index, false);
+            decode(l, frame);
+            place_by_counter(l, frame, counter);
+            return;
+        }
+        ++buses_[l.bus].decode_errors; // nothing followed the one before
+    }
+    l.suspected = true;
+    l.suspect = frame;
+}
+
+/// The sender's counter began anew: beside lanes that did so already, else by time, at least one sample apart.
+std::int64_t grid::place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const {
+    std::int64_t index = 0;
+    if (place_by_kin(l, counter, index) && index > l.last + 1) return index;
+    const double pause = static_cast<double>(frame.time_ns - l.time_ns) / period_ns_;
+    return l.last + (pause > 2 && pause < longest_silence_ns / period_ns_ ? std::llround(pause) : 2);
+}
+
+/// Samples since the frame before, 1 when nothing was lost. The expected time follows slowly; how far frames scatter
+/// around it decides how late a frame must be to mean a loss, so that bursts of a slow reader are no losses.
+std::int64_t grid::cadence_step(lane& l, const drv_frame_t& frame) {
+    const double now = static_cast<double>(frame.time_ns), ahead = now - l.phase_ns;
+    if (ahead < -1e9 || ahead > longest_silence_ns) { // the clock was set
+        l.phase_ns = now;
+        l.lateness = 0;
+        return 1;
+    }
+    const double late = ahead / period_ns_ - 1;
+    std::int64_t step = late > 0.5 + l.jitter ? 1 + std::llround(late) : 1;
+    l.phase_ns += static_cast<double>(step) * period_ns_;
+    double error = (now - l.phase_ns) / period_ns_;
+    l.jitter = std::max(std::abs(error), 0.998 * l.jitter);
+    l.lateness += (error - l.lateness) / 32;
+    if (l.lateness > 0.75 && error > 0.5) { // late for good: one was lost unseen among the scatter
+        ++step;
+        l.phase_ns += period_ns_;
+        l.lateness -= 1;
+        error -= 1;
+    }
+    l.phase_ns += 0.002 * error * period_ns_;
+    return step;
+}
+
+void grid::note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause) {
+    cause_mark& mark = l.marks[l.mark_count++ % l.marks.size()];
+    mark.first = from;
+    mark.last = to;
+    mark.cause = l.loss & DRV_LOSS_LINK       ? gap_cause::link_down
+                 : l.loss & DRV_LOSS_OVERFLOW ? gap_cause::socket_overflow
+                 : l.loss & DRV_LOSS_DRIVER   ? gap_cause::driver
+                 : pause                      ? gap_cause::stall
+                                              : gap_cause::sequence;
+}
+
+} // namespace okid_host

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+#include "identifier.hpp"
+
+#include "../error.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <new>
+
+namespace okid_host {
+namespace {
+
+constexpr std::size_t chunk = 256; // samples handed over at a time
+
+/// Do the raw numbers of every channel fit int16 as they are?
+bool fits_codes(const live_config& config) {
+    return std::all_of(config.channels.begin(), config.channels.begin() + static_cast<std::ptrdiff_t>(config.n_u + config.n_y),
+                       [](const channel_config& channel) {
+                           const drv_signal_t& layout = channel.layout;
+                           return layout.value == DRV_VALUE_INTEGER && layout.length <= (layout.is_signed ? 16 : 15);
+                       });
+}
+
+std::unique_ptr<std::byte[]> allocate(const live_config& config, std::size_t bytes, const char* what) {
+    if (bytes == 0)
+        throw failure(exit_usage, fmt::format("{}: [identification]: p, rows, order or window_s do not go together with {} channels ({})",
+                                              config.path, config.n_u + config.n_y, what));
+    std::unique_ptr<std::byte[]> block(new (std::nothrow) std::byte[bytes]);
+    if (!block)
+        throw failure(exit_usage, fmt::format("{}: [identification]: {} needs {:.1f} GB; lower p, rows or window_s", config.path, what,
+                                              static_cast<double>(bytes) / 1e9));
+    return block;
+}
+
+} // namespace
+
+identifier::identifier(const live_config& config) : m_(config.n_u + config.n_y), exact_(fits_codes(config)) {
+    for (std::size_t i = 0; i < m_; ++i) {
+        scale_.push_back(config.channels[i].layout.scale * config.channels[i].si_factor());
+        offset_.push_back(config.channels[i].layout.offset * config.channels[i].si_factor());
+    }
+    if (exact_) codes_.resize(chunk * m_);
+    else doubles_.resize(chunk * m_);
+    create_accumulator(config);
+    create_identifier(config);
+}
+
+/// The window moves in whole blocks: about a twentieth of it, or one update where that is finer.
+void identifier::create_accumulator(const live_config& config) {
+    const identification_config& wanted = config.identification;
+    const std::int64_t update = std::max<std::int64_t>(1, std::llround(wanted.update_s * config.rate_hz));
+    okid_accumulator_config_t a{};
+    a.n_u = static_cast<std::int32_t>(config.n_u);
+    a.n_y = static_cast<std::int32_t>(config.n_y);
+    a.lags = wanted.p;
+    a.sample = exact_ ? OKID_SAMPLE_INT16 : OKID_SAMPLE_DOUBLE;
+    a.forgetting = wanted.forgetting.value_or(1.0);
+    a.edges = 1;
+    if (wanted.window_s) {
+        const std::int64_t window = std::max<std::int64_t>(1, std::llround(*wanted.window_s * config.rate_hz));
+        const std::int64_t block = std::clamp(update, std::max<std::int64_t>(1, window / 64), std::max<std::int64_t>(1, window / 20));
+        a.block = static_cast<std::int32_t>(std::min<std::int64_t>(block, INT32_MAX));
+        a.slots = static_cast<std::int32_t>(std::max<std::int64_t>(1, std::llround(static_cast<double>(window) / static_cast<double>(a.block))));
+        a.spare_slots = a.slots / 2 + 8;
+        memory_samples_ = std::int64_t{a.slots} * a.block;
+    } else if (a.forgetting < 1) {
+        const double memory = 1 / (1 - a.forgetting);
+        a.block = static_cast<std::int32_t>(std::clamp<std::int64_t>(std::llround(memory / 20), 1, std::min<std::int64_t>(update, 1 << 20)));
+        memory_samples_ = std::llround(std::min(memory, 1e15));
+    }
+    const std::size_t bytes = okid_accumulator_memsize(&a);
+    accumulator_block_ = allocate(config, bytes, "the accumulator");
+    if (okid_accumulator_create(&accumulator_, &a, accumulator_block_.get(), bytes) != OKID_OK)
+        throw failure(exit_usage, fmt::format("{}: [identification]: the accumulator cannot be made", config.path));
+    okid_accumulator_set_units(accumulator_, scale_.data(), offset_.data());
+}
+
+void identifier::create_identifier(const live_config& config) {
+    const identification_config& wanted = config.identification;
+    okid_identify_config_t& c = identify_config_;
+    c.n_u = static_cast<std::int32_t>(config.n_u);
+    c.n_y = static_cast<std::int32_t>(config.n_y);
+    c.p = wanted.p;
+    c.rows = wanted.rows;
+    c.order = wanted.order;
+    c.fs_hz = config.rate_hz;
+    c.method = OKID_METHOD_OKID_ERA;
+    c.detrend = wanted.detrend == "none" ? OKID_DETREND_NONE : OKID_DETREND_MEAN;
+    q_ = c.n_u + std::int64_t{c.p} * (c.n_u + c.n_y);
+    const std::size_t bytes = okid_identify_memsize(&c);
+    identify_block_ = allocate(config, bytes, "the identification");
+    if (okid_identify_create(&identify_, &c, identify_block_.get(), bytes) != OKID_OK)
+        throw failure(exit_usage, fmt::format("{}: [identification]: the identification cannot be made", config.path));
+}
+
+void identifier::flush() {
+    if (pending_ == 0) return;
+    const okid_status_t status = exact_ ? okid_accumulator_add_i16(accumulator_, codes_.data(), pending_)
+                                        : okid_accumulator_add(accumulator_, doubles_.data(), pending_);
+    pending_ = 0;
+    if (status < 0) throw failure(exit_no_model, fmt::format("the samples cannot be summed any further: {}", okid_status_text(status)));
+}
+
+void identifier::add(const double* row) {
+    double check = 0;
+    for (std::size_t i = 0; i < m_; ++i) check += row[i] * 0.0;
+    if (check != 0) { // NaN
+        add_missing(1);
+        return;
+    }
+    if (exact_) {
+        std::int16_t* to = codes_.data() + pending_ * m_;
+        for (std::size_t i = 0; i < m_; ++i) to[i] = static_cast<std::int16_t>(row[i]);
+    } else {
+        double* to = doubles_.data() + pending_ * m_;
+        std::copy_n(row, m_, to);
+    }
+    if (++pending_ == chunk) flush();
+}
+
+void identifier::add_missing(std::int64_t count) {
+    flush();
+    okid_accumulator_gap(accumulator_, count);
+}
+
+okid_status_t identifier::run() {
+    flush();
+    return okid_identify_run(identify_, accumulator_, &model_);
+}
+
+std::int64_t identifier::rows() {
+    flush();
+    return okid_accumulator_rows(accumulator_);
+}
+
+okid_accumulator_stats_t identifier::stats() {
+    flush();
+    okid_accumulator_stats_t out{};
+    okid_accumulator_stats(accumulator_, &out);
+    return out;
+}
+
+std::int64_t identifier::basis() {
+    const std::int64_t all = stats().samples;
+    return memory_samples_ > 0 ? std::min(all, memory_samples_) : all;
+}
+
+} // namespace okid_host

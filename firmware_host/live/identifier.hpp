@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// Samples of the grid into the accumulator, and a model out of it whenever it is asked for. All memory at the start.
+#pragma once
+#include "../config.hpp"
+
+#include <okid/accumulator.h>
+#include <okid/identify.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace okid_host {
+
+class identifier {
+  public:
+    /// Throws `failure` (exit 2) when p, rows or the window ask for more than the library or the memory can give.
+    explicit identifier(const live_config& config);
+
+    /// One row of raw numbers of the grid (inputs, outputs, then whatever); a NaN among the first two makes it missing.
+    void add(const double* row);
+    void add_missing(std::int64_t count);
+
+    /// Identify from what is there. @return status of okid_identify_run(); the model stays valid until the next call
+    okid_status_t run();
+    const okid_identified_t& model() const { return model_; }
+    const okid_identify_config_t& config() const { return identify_config_; }
+
+    bool exact() const { return exact_; }          ///< 16-bit codes, summed exactly
+    std::int64_t unknowns() const { return q_; }   ///< regressors q = n_u + p m
+    std::int64_t rows();                           ///< regression rows now in the sums
+    std::int64_t basis();                          ///< samples the model rests on
+    okid_accumulator_stats_t stats();
+
+  private:
+    void flush();
+    void create_accumulator(const live_config& config);
+    void create_identifier(const live_config& config);
+
+    std::size_t m_;
+    bool exact_;
+    std::int64_t q_ = 0, memory_samples_ = 0; ///< 0 = everything is kept
+    std::vector<double> scale_, offset_, doubles_;
+    std::vector<std::int16_t> codes_;
+    std::size_t pending_ = 0;
+    std::unique_ptr<std::byte[]> accumulator_block_, identify_block_;
+    okid_accumulator_t* accumulator_ = nullptr;
+    okid_identify_t* identify_ = nullptr;
+    okid_identify_config_t identify_config_{};
+    okid_identified_t model_{};
+};
+
+} // namespace okid_host

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+#include "reader.hpp"
+
+#include "../error.hpp"
+#include "../nearest_name.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <net/if_arp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+namespace okid_host {
+namespace {
+
+constexpr std::size_t ring_frames = 1 << 17; // 6 s of a saturated FD bus, 15 s of a classic one
+constexpr int look_ms = 100;                 // how often counters and a vanished interface are looked at
+constexpr int batches_between_looks = 64;
+
+} // namespace
+
+bus_reader::bus_reader(const std::string& interface, std::size_t bus, const std::vector<drv_filter_t>& frames, int wake_fd)
+    : interface_(interface), bus_(static_cast<std::uint8_t>(bus)), wake_fd_(wake_fd), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      block_(new std::byte[drv_ring_memsize(ring_frames)]), batch_(64) {
+    ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));
+    source_.ops = &drv_source_socketcan;
+    drv_source_config_t config{};
+    config.interfaces[0] = interface_.c_str();
+    config.interface_count = 1;
+    if (frames.size() <= DRV_MAX_FILTERS) {
+        config.filters = frames.data();
+        config.filter_count = static_cast<std::int32_t>(frames.size());
+    }
+    const int code = source_.ops->open(&source_, &config);
+    if (code != 0) {
+        close(stop_fd_);
+        throw_interface_failure(-code, interface_, source_.error);
+    }
+    publish_stats();
+}
+
+bus_reader::~bus_reader() {
+    stop();
+    source_.ops->close(&source_);
+    close(stop_fd_);
+}
+
+void bus_reader::start() {
+    sigset_t all, before; // signals are the main thread's
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    thread_ = std::thread([this] { run(); });
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+void bus_reader::stop() {
+    if (!thread_.joinable()) return;
+    stopping_ = true;
+    const std::uint64_t one = 1;
+    (void)!write(stop_fd_, &one, sizeof one);
+    thread_.join();
+}
+
+/// One read of the source. @return frames moved
+int bus_reader::drain_once() {
+    const int count = source_.ops->read(&source_, batch_.data(), static_cast<int>(batch_.size()));
+    if (count <= 0) return 0;
+    for (int i = 0; i < count; ++i) batch_[static_cast<std::size_t>(i)].bus = bus_;
+    drv_ring_push(ring_, batch_.data(), static_cast<std::size_t>(count));
+    const std::uint64_t one = 1;
+    (void)!write(wake_fd_, &one, sizeof one);
+    return count;
+}
+
+void bus_reader::publish_stats() {
+    drv_stats_t now{};
+    source_.ops->stats(&source_, &now);
+    const std::lock_guard<std::mutex> hold(mutex_);
+    seen_ = now;
+}
+
+drv_stats_t bus_reader::stats() const {
+    const std::lock_guard<std::mutex> hold(mutex_);
+    return seen_;
+}
+
+void bus_reader::run() {
+    while (!stopping_) {
+        pollfd waits[2] = {{stop_fd_, POLLIN, 0}, {source_.ops->fd(&source_), POLLIN, 0}};
+        (void)poll(waits, 2, look_ms); // a negative fd is left out: then only the time runs
+        for (int i = 0; i < batches_between_looks && !stopping_; ++i)
+            if (drain_once() == 0) break;
+        publish_stats();
+    }
+    for (int i = 0; i < 1 << 14 && drain_once() > 0; ++i) {} // what had arrived before the end
+    publish_stats();
+}
+
+std::vector<std::string> can_interfaces() {
+    std::vector<std::string> out;
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator("/sys/class/net", ignored)) {
+        int type = 0;
+        std::ifstream(entry.path() / "type") >> type;
+        if (type == ARPHRD_CAN) out.push_back(entry.path().filename().string());
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+}
+
+void throw_interface_failure(int code, const std::string& interface, const std::string& reason) {
+    const std::string text = printable(reason, 300);
+    if (code == EAFNOSUPPORT)
+        throw failure(exit_device, text + ". Load the modules: sudo modprobe can can-raw vcan; without them use `okid replay LOG -c CONFIG.toml`");
+    if (code == ENETDOWN) throw failure(exit_device, fmt::format("{}. Bring it up: sudo ip link set {} up (a real bus also needs type can bitrate 1000000)", text, interface));
+    if (code == EPERM || code == EACCES) throw failure(exit_device, text + ". Run it with sudo, or with CAP_NET_RAW");
+    const std::vector<std::string> there = can_interfaces();
+    const std::string found = there.empty() ? "this machine has no CAN interface" : "CAN interfaces found: " + list_names(there) + did_you_mean(interface, there);
+    throw failure(exit_device, fmt::format("{}; {}. Plug the adapter in, or make a virtual one: sudo ip link add {} type vcan && sudo ip link set {} up",
+                                           text, found, interface, interface));
+}
+
+} // namespace okid_host

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// One thread a bus that does nothing but empty the socket into a ring, so that no identification can make it overflow.
+#pragma once
+#include <drv/ring.h>
+#include <drv/source.h>
+
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace okid_host {
+
+class bus_reader {
+  public:
+    /// Opens the interface. Throws `failure` (exit 4) that says what is there and what to do.
+    /// @param bus  number given to every frame; @param wake_fd  an eventfd written when frames wait
+    bus_reader(const std::string& interface, std::size_t bus, const std::vector<drv_filter_t>& frames, int wake_fd);
+    ~bus_reader();
+    bus_reader(const bus_reader&) = delete;
+    bus_reader& operator=(const bus_reader&) = delete;
+
+    void start();
+    /// End the thread; frames still in the socket and in the ring can be taken afterwards.
+    void stop();
+    std::size_t take(drv_frame_t* frames, std::size_t capacity) { return drv_ring_pop(ring_, frames, capacity); }
+
+    /// Counts of the source and of the ring, as of the last time the thread looked (at most 0.1 s ago).
+    drv_stats_t stats() const;
+    std::uint64_t ring_overrun() const { return drv_ring_overrun(ring_); }
+    const std::string& interface() const { return interface_; }
+
+  private:
+    void run();
+    int drain_once();
+    void publish_stats();
+
+    std::string interface_;
+    std::uint8_t bus_;
+    int wake_fd_, stop_fd_;
+    drv_source_t source_{};
+    std::unique_ptr<std::byte[]> block_;
+    drv_ring_t* ring_ = nullptr;
+    std::vector<drv_frame_t> batch_;
+    std::thread thread_;
+    std::atomic<bool> stopping_{false};
+    mutable std::mutex mutex_;
+    drv_stats_t seen_{};
+};
+
+/// The text and exit code for an interface that cannot be opened: what was found on this machine and what to do.
+[[noreturn]] void throw_interface_failure(int code, const std::string& interface, const std::string& reason);
+
+/// Names of the CAN interfaces of this machine.
+std::vector<std::string> can_interfaces();
+
+} // namespace okid_host

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: MIT
+#include "session.hpp"
+
+#include "../error.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double stats_every_s = 5;
+
+/// UTC at microseconds: 2026-11-21T12:00:00.000000Z
+std::string wall_time(std::int64_t time_ns) {
+    const std::time_t seconds = time_ns / 1000000000;
+    std::tm utc{};
+    gmtime_r(&seconds, &utc);
+    return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday, utc.tm_hour,
+                       utc.tm_min, utc.tm_sec, time_ns / 1000 % 1000000);
+}
+
+std::int64_t samples_of(double seconds, double rate_hz) { return std::max<std::int64_t>(1, std::llround(seconds * rate_hz)); }
+
+} // namespace
+
+session::session(const live_config& config, const session_options& options)
+    : config_(config), options_(options), events_(options.events), view_(options.events != "-" && options.json != "-"), grid_(config, *this),
+      identifier_(config), losses_(config.buses.size()),
+      update_samples_(samples_of(config.identification.update_s, config.rate_hz)) {
+    stats_samples_ = update_samples_ * std::max<std::int64_t>(1, std::llround(stats_every_s / config.identification.update_s));
+    if (options.duration_s) {
+        limit_ = samples_of(*options.duration_s, config.rate_hz);
+        grid_.set_limit(limit_);
+    }
+}
+
+void session::start(std::int64_t time_ns) {
+    if (started_) return;
+    started_ = true;
+    ordered_json event{{"type", "start"}, {"t", 0.0}, {"config", config_.path}, {"wall_time", wall_time(time_ns)}};
+    for (const auto& [key, text] : config_.notes) event["notes"][key] = text;
+    events_.write(event);
+}
+
+/// Time is taken at microseconds, as a log keeps it: live and replayed streams decide alike.
+void session::frame(const drv_frame_t& frame) {
+    if (done()) return;
+    drv_frame_t stamped = frame;
+    stamped.time_ns = frame.time_ns / 1000 * 1000;
+    start(stamped.time_ns);
+    grid_.push(stamped);
+}
+
+void session::on_sample(std::int64_t index, const double* row) {
+    if (limit_ > 0 && index >= limit_) return;
+    now_ = index + 1;
+    identifier_.add(row);
+    if (now_ % update_samples_ == 0) update(now_);
+}
+
+void session::on_missing(std::int64_t index, std::int64_t count) {
+    if (limit_ > 0) count = std::min(count, limit_ - index);
+    if (count <= 0) return;
+    now_ = index + count;
+    identifier_.add_missing(count);
+    if (now_ / update_samples_ > index / update_samples_) update(now_);
+}
+
+void session::on_gap(const grid_gap& gap) {
+    ++gaps_;
+    events_.write({{"type", "gap"}, {"t", seconds(std::max(now_, gap.last + 1))}, {"channel", config_.channels[gap.channel].name},
+                   {"first", gap.first}, {"last", gap.last}, {"count", gap.count}, {"cause", gap_cause_name(gap.cause)}});
+}
+
+/// Modes are shown once there are twice as many equations as unknowns: below that they only repeat the noise.
+void session::update(std::int64_t samples) {
+    live_status status;
+    status.t = seconds(samples);
+    const okid_accumulator_stats_t stats = identifier_.stats();
+    status.samples = stats.samples;
+    status.missing = stats.missing;
+    status.gaps = stats.gaps;
+    const std::int64_t rows = identifier_.rows(), need = 2 * identifier_.unknowns();
+    okid_status_t outcome = OKID_ERR_TOO_SHORT;
+    if (rows >= need) outcome = identifier_.run();
+    if (outcome >= 0) {
+        status.model = &identifier_.model();
+        status.settled = settling_.add(identifier_.model());
+        const std::int64_t basis = identifier_.basis();
+        events_.write({{"type", "modes"}, {"t", status.t}, {"modes", modes_json(identifier_.model())}, {"window_s", seconds(basis)},
+                       {"samples", basis}, {"settled", status.settled}});
+    } else {
+        settling_.reset();
+        status.waiting = rows < need ? fmt::format("waiting for samples, {} of {}", rows, need)
+                                     : fmt::format("no model yet: {}", okid_status_text(outcome));
+    }
+    view_.show(status);
+    if (samples % stats_samples_ == 0) write_stats();
+}
+
+/// Frames missing on the grid are booked under what the devices counted first; the rest was lost before it reached us.
+ordered_json session::bus_stats(std::size_t bus) const {
+    const grid_bus_counts& counts = grid_.bus(bus);
+    const auto lost = [&](gap_cause cause) { return counts.lost[static_cast<std::size_t>(cause)]; };
+    const auto beyond = [](std::uint64_t seen, std::uint64_t booked) { return seen > booked ? seen - booked : 0; };
+    const std::uint64_t overflow = losses_[bus].socket_overflow, driver = losses_[bus].driver;
+    const std::uint64_t sequence = lost(gap_cause::sequence) + beyond(lost(gap_cause::socket_overflow), overflow) +
+                                   beyond(lost(gap_cause::driver), driver);
+    const std::uint64_t link = lost(gap_cause::link_down), stall = lost(gap_cause::stall);
+    ordered_json out;
+    out["received"] = counts.received;
+    out["lost"] = overflow + driver + sequence + link + stall;
+    out["lost_by"] = {{"socket_overflow", overflow}, {"driver", driver}, {"sequence", sequence}, {"link_down", link}, {"stall", stall}};
+    out["out_of_order"] = counts.out_of_order;
+    out["duplicate"] = counts.duplicate;
+    out["decode_errors"] = counts.decode_errors;
+    out["load_percent"] = nullptr;
+    return out;
+}
+
+void session::write_stats() {
+    ordered_json event{{"type", "stats"}, {"t", seconds(now_)}, {"bus", ordered_json::object()}, {"channel", ordered_json::object()}};
+    for (std::size_t i = 0; i < config_.buses.size(); ++i) event["bus"][config_.buses[i].name] = bus_stats(i);
+    for (std::size_t i = 0; i < config_.channels.size(); ++i) {
+        const grid_channel_counts counts = grid_.channel(i);
+        const double percent = counts.expected ? 100.0 * static_cast<double>(counts.received) / static_cast<double>(counts.expected) : 0.0;
+        event["channel"][config_.channels[i].name] = {{"expected", counts.expected}, {"received", counts.received},
+                                                      {"missing", counts.expected - counts.received}, {"completeness_percent", percent}};
+    }
+    events_.write(event);
+}
+
+/// A channel that never spoke is the likeliest reason for no model: say so before the algebra does.
+void session::check_heard() const {
+    for (const std::size_t index : grid_.silent_channels()) {
+        const channel_config& channel = config_.channels[index];
+        if (channel.role == channel_role::aux) continue;
+        throw failure(exit_no_model,
+                      fmt::format("no usable frame of channel \"{}\" was received ({}identifier {:#x}{}, bus \"{}\"): is the sensor on, and are "
+                                  "identifier and bus right in {}?", channel.name,
+                                  channel.message.empty() ? "" : "message " + channel.message + ", ", channel.frame.id,
+                                  channel.frame.extended ? " extended" : "", config_.buses[channel.bus].name, config_.path));
+    }
+}
+
+result_context session::context() {
+    result_context out;
+    out.method = config_.identification.method;
+    out.fs_hz = config_.rate_hz;
+    out.samples = identifier_.basis();
+    out.gaps = identifier_.stats().gaps;
+    out.hold = config_.identification.hold;
+    out.detrend = config_.identification.detrend;
+    for (std::size_t i = 0; i < config_.n_u + config_.n_y; ++i)
+        (i < config_.n_u ? out.inputs : out.outputs).push_back(config_.channels[i].name);
+    return out;
+}
+
+void session::finish() {
+    grid_.finish();
+    start(std::int64_t{std::time(nullptr)} * 1000000000); // nothing was heard at all
+    const okid_status_t status = identifier_.run();
+    write_stats();
+    view_.end();
+    check_heard();
+    const result_context about = context();
+    if (status < 0) throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
+    const ordered_json result = result_json(identifier_.model(), about);
+    events_.write({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
+    if (!options_.json.empty())
+        write_whole_file(options_.json, result.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n");
+    if (!events_.on_stdout() && options_.json != "-") write_whole_file("-", result_table(identifier_.model(), about));
+}
+
+} // namespace okid_host

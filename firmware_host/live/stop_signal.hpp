@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+// SIGINT and SIGTERM ask a session to end; it then finishes in order.
+#pragma once
+
+namespace okid_host {
+
+/// From now on the two signals set a flag instead of ending the process; a second one ends it at once.
+void catch_stop_signals();
+bool stop_requested();
+/// Becomes readable when a stop is asked for; for poll().
+int stop_fd();
+
+} // namespace okid_host

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: MIT
+#include "record.hpp"
+
+#include "error.hpp"
+#include "record_check.hpp"
+#include "record_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fmt/format.h>
+#include <new>
+#include <unistd.h>
+
+namespace okid_host {
+namespace {
+
+void detrend_linear(std::vector<record_data>& records, const record_options& options) {
+    for (record_data& record : records) {
+        const record_data before = record;
+        remove_lines(record.u.data(), options.inputs.size(), record.count);
+        remove_lines(record.y.data(), options.outputs.size(), record.count);
+        check_not_a_line(record, before, options);
+    }
+}
+
+/// Several records: each is centred by its own mean first, so that an offset that moved between them does no harm.
+void remove_means(double* samples, std::size_t channels, std::size_t count) {
+    for (std::size_t k = 0; k < channels; ++k) {
+        double sum = 0;
+        std::size_t present = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const double x = samples[i * channels + k];
+            if (std::isnan(x)) continue;
+            sum += x;
+            ++present;
+        }
+        for (std::size_t i = 0; present && i < count; ++i)
+            samples[i * channels + k] -= sum / static_cast<double>(present);
+    }
+}
+
+void centre_each(std::vector<record_data>& records, const record_options& options) {
+    for (record_data& record : records) {
+        remove_means(record.u.data(), options.inputs.size(), record.count);
+        remove_means(record.y.data(), options.outputs.size(), record.count);
+    }
+}
+
+/// p for the samples there are, with the remark when it is smaller than asked for.
+int choose_p(const record_options& options, long long samples, result_context& context) {
+    const int n_u = static_cast<int>(options.inputs.size()), n_y = static_cast<int>(options.outputs.size());
+    const int least_p = n_y >= 2 ? 1 : 2; // p n_y states: two make the first mode
+    const long long least = 10LL * (n_u + least_p * (n_u + n_y));
+    if (samples < least)
+        throw failure(exit_no_model,
+                      fmt::format("no model: too few samples: {} complete samples, but even the smallest model of {} "
+                                  "inputs and {} outputs needs {} (10 for each unknown). Record longer or use fewer "
+                                  "channels",
+                                  samples, n_u, n_y, least));
+    const int p = okid_identify_usable_p(n_u, n_y, options.p, samples);
+    if (p < options.p)
+        context.warnings.emplace_back("p_reduced",
+                                      fmt::format("p is {} instead of {}: {} samples bear no more unknowns (10 samples "
+                                                  "for each). Record longer for sharper damping",
+                                                  p, options.p, samples));
+    return p;
+}
+
+/// Bytes for one object of the library; refuses before the machine runs out.
+std::unique_ptr<std::byte[]> library_memory(std::size_t bytes, int p) {
+    if (bytes == 0)
+        throw failure(exit_usage, fmt::format("--p {} with these channels, --rows and --order is outside what the "
+                                              "library takes",
+                                              p));
+    const double machine = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+    std::unique_ptr<std::byte[]> block(static_cast<double>(bytes) < 0.8 * machine ? new (std::nothrow) std::byte[bytes]
+                                                                                  : nullptr);
+    if (!block)
+        throw failure(
+            exit_usage,
+            fmt::format("--p {} with these channels and --rows needs {:.1f} GB of memory, this machine has {:.1f} "
+                        "GB: lower --p or --rows, or use fewer channels",
+                        p, static_cast<double>(bytes) / 1e9, machine / 1e9));
+    return block;
+}
+
+void check_status(okid_status_t status, const char* what) {
+    if (status < 0) throw failure(exit_no_model, fmt::format("no model: {}: {}", what, okid_status_text(status)));
+}
+
+/// All records into one accumulator, a gap between each two.
+std::unique_ptr<std::byte[]> accumulate(const std::vector<record_data>& records, const okid_identify_config_t& config,
+                                        okid_accumulator_t*& accumulator) {
+    okid_accumulator_config_t shape{};
+    shape.n_u = config.n_u;
+    shape.n_y = config.n_y;
+    shape.lags = config.p;
+    shape.sample = OKID_SAMPLE_DOUBLE;
+    shape.forgetting = 1;
+    shape.edges = 1;
+    const std::size_t bytes = okid_accumulator_memsize(&shape);
+    auto block = library_memory(bytes, config.p);
+    check_status(okid_accumulator_create(&accumulator, &shape, block.get(), bytes), "accumulator");
+    const auto n_u = static_cast<std::size_t>(config.n_u), n_y = static_cast<std::size_t>(config.n_y);
+    constexpr std::size_t piece = 4096;
+    std::vector<double> v(piece * (n_u + n_y));
+    for (const record_data& record : records) {
+        okid_accumulator_gap(accumulator, 0);
+        for (std::size_t first = 0; first < record.count; first += piece) {
+            const std::size_t n = std::min(piece, record.count - first);
+            for (std::size_t i = 0; i < n; ++i) {
+                std::copy_n(&record.u[(first + i) * n_u], n_u, &v[i * (n_u + n_y)]);
+                std::copy_n(&record.y[(first + i) * n_y], n_y, &v[i * (n_u + n_y) + n_u]);
+            }
+            check_status(okid_accumulator_add(accumulator, v.data(), n), record.path.c_str());
+        }
+    }
+    return block;
+}
+
+/// Into the model's own terms: means off, missing inputs 0 (outputs stay NaN and carry no weight).
+void centre(std::vector<record_data>& records, const okid_identified_t& model) {
+    const auto n_u = static_cast<std::size_t>(model.n_u), n_y = static_cast<std::size_t>(model.n_y);
+    for (record_data& record : records) {
+        for (std::size_t i = 0; i < record.u.size(); ++i) {
+            record.u[i] -= model.mean[i % n_u];
+            if (std::isnan(record.u[i])) record.u[i] = 0;
+        }
+        for (std::size_t i = 0; i < record.y.size(); ++i) record.y[i] -= model.mean[n_u + i % n_y];
+    }
+}
+
+result_context describe(const std::vector<record_data>& records, const record_options& options,
+                        const missing_count& missing, long long total) {
+    result_context context;
+    context.method = options.method;
+    context.fs_hz = options.fs_hz;
+    context.samples = total;
+    context.records = static_cast<int>(records.size());
+    context.gaps = missing.gaps;
+    context.inputs = options.inputs;
+    context.outputs = options.outputs;
+    context.hold = options.hold;
+    context.detrend = options.detrend;
+    if (missing.samples)
+        context.warnings.emplace_back("missing_samples",
+                                      fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was "
+                                                  "interpolated; the lags start anew after each gap",
+                                                  missing.samples, total, missing.gaps, missing.gaps == 1 ? "" : "s"));
+    return context;
+}
+
+void tell(const record_options& options, const char* stage) {
+    if (options.stage) options.stage(stage);
+}
+
+} // namespace
+
+record_data split_record(const csv_record& record, std::size_t n_u, std::size_t first, std::size_t last) {
+    const std::size_t m = record.columns.size(), n_y = m - n_u;
+    record_data out;
+    out.path = record.path;
+    out.count = last - first;
+    out.u.resize(out.count * n_u);
+    out.y.resize(out.count * n_y);
+    for (std::size_t n = 0; n < out.count; ++n) {
+        const double* sample = &record.samples[(first + n) * m];
+        std::copy_n(sample, n_u, &out.u[n * n_u]);
+        std::copy_n(sample + n_u, n_y, &out.y[n * n_y]);
+    }
+    return out;
+}
+
+void remove_lines(double* samples, std::size_t channels, std::size_t count) {
+    const double middle = (static_cast<double>(count) - 1) / 2;
+    for (std::size_t k = 0; k < channels; ++k) {
+        double n = 0, st = 0, stt = 0, sx = 0, stx = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const double x = samples[i * channels + k], t = static_cast<double>(i) - middle;
+            if (std::isnan(x)) continue;
+            n += 1, st += t, stt += t * t, sx += x, stx += t * x;
+        }
+        if (n == 0) continue;
+        const double spread = stt - st * st / n;
+        const double slope = spread > 0 ? (stx - st * sx / n) / spread : 0;
+        const double level = (sx - slope * st) / n;
+        for (std::size_t i = 0; i < count; ++i)
+            samples[i * channels + k] -= level + slope * (static_cast<double>(i) - middle);
+    }
+}
+
+record_result identify_records(std::vector<record_data> records, const record_options& options) {
+    long long total = 0;
+    for (const record_data& record : records) total += static_cast<long long>(record.count);
+    const missing_count missing = count_missing(records, options.inputs.size(), options.outputs.size());
+    record_result result;
+    result.context = describe(records, options, missing, total);
+    check_moving(records, options);
+    check_different_inputs(records, options);
+    if (options.detrend == "linear") detrend_linear(records, options);
+    if (options.detrend == "mean" && records.size() > 1) centre_each(records, options);
+
+    okid_identify_config_t config{};
+    config.n_u = static_cast<std::int32_t>(options.inputs.size());
+    config.n_y = static_cast<std::int32_t>(options.outputs.size());
+    config.p = choose_p(options, total - missing.samples, result.context);
+    config.rows = options.rows;
+    config.order = options.order;
+    config.fs_hz = options.fs_hz;
+    config.method = OKID_METHOD_OKID_ERA;
+    config.detrend = options.detrend == "mean" ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
+
+    tell(options, "summing lagged products");
+    okid_accumulator_t* accumulator = nullptr;
+    const auto sums = accumulate(records, config, accumulator);
+    tell(options, "identifying");
+    const std::size_t bytes = okid_identify_memsize(&config);
+    result.memory = library_memory(bytes, config.p);
+    okid_identify_t* identifier = nullptr;
+    check_status(okid_identify_create(&identifier, &config, result.memory.get(), bytes), "identifier");
+    const okid_status_t status = okid_identify_run(identifier, accumulator, &result.model);
+    if (status < 0) throw_identify_failure(status, result.model, config, result.context);
+    tell(options, "simulating the model");
+    centre(records, result.model);
+    fit_records(records, result);
+    return result;
+}
+
+} // namespace okid_host

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// Records no honest model can come from are refused before anything is computed, with the channel named (exit 3).
+#pragma once
+#include "record.hpp"
+
+namespace okid_host {
+
+struct missing_count {
+    long long samples = 0, gaps = 0; ///< samples with any channel missing, and the runs they form
+};
+missing_count count_missing(const std::vector<record_data>& records, std::size_t n_u, std::size_t n_y);
+
+/// A channel that never moves makes any model a guess.
+void check_moving(const std::vector<record_data>& records, const record_options& options);
+
+/// Inputs that repeat each other share their effect in any proportion.
+void check_different_inputs(const std::vector<record_data>& records, const record_options& options);
+
+/// A straight line is removed by --detrend linear and leaves rounding noise only; that is no excitation either.
+void check_not_a_line(const record_data& record, const record_data& before, const record_options& options);
+
+} // namespace okid_host

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+#include "record_fit.hpp"
+
+#include "error.hpp"
+
+#include <okid/model.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace okid_host {
+namespace {
+
+/// Sums over all records of one output: residual, and what is needed for the spread about the mean.
+struct output_sums {
+    double residual = 0, sum = 0, square = 0;
+    std::size_t count = 0;
+};
+
+/// Samples after which the initial state has died away to rounding; the rest of the record cannot inform it.
+std::size_t initial_state_samples(double radius, std::size_t count) {
+    if (!(radius > 0 && radius < 1)) return count;
+    const double needed = std::log(1e-16) / std::log(radius);
+    return needed < static_cast<double>(count) ? std::max<std::size_t>(static_cast<std::size_t>(needed), 1) : count;
+}
+
+void pool(const std::vector<double>& y, const std::vector<double>& estimate, std::size_t n_y,
+          std::vector<output_sums>& sums) {
+    for (std::size_t i = 0; i < y.size(); ++i) {
+        if (std::isnan(y[i])) continue;
+        output_sums& s = sums[i % n_y];
+        const double error = y[i] - estimate[i];
+        s.residual += error * error;
+        s.sum += y[i];
+        s.square += y[i] * y[i];
+        ++s.count;
+    }
+}
+
+/// 100 (1 - |y - yhat| / |y - mean(y)|), NaN when it has no meaning.
+std::vector<double> percent(const std::vector<output_sums>& sums) {
+    std::vector<double> out;
+    for (const output_sums& s : sums) {
+        const double spread = s.square - s.sum * s.sum / static_cast<double>(std::max<std::size_t>(s.count, 1));
+        const double value = 100 * (1 - std::sqrt(s.residual / spread));
+        out.push_back(spread > 0 && std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN());
+    }
+    return out;
+}
+
+} // namespace
+
+void fit_records(const std::vector<record_data>& records, record_result& result) {
+    const okid_identified_t& found = result.model;
+    const okid_model_t model{found.n_u, found.n_y, found.n_z, found.A, found.B, found.C, found.D, found.K};
+    const auto n_y = static_cast<std::size_t>(found.n_y);
+    const bool predict = found.K && !(found.warnings & OKID_NOTE_PREDICTOR_UNSTABLE);
+    std::vector<double> work(okid_model_workspace(&model));
+    std::vector<output_sums> simulated(n_y), predicted(n_y);
+    std::vector<std::vector<double>> states;
+    for (const record_data& record : records) {
+        std::vector<double> x0(static_cast<std::size_t>(found.n_z)), estimate(record.y.size());
+        const std::size_t used = initial_state_samples(found.model_radius, record.count);
+        if (okid_model_initial_state(&model, record.u.data(), record.y.data(), used, x0.data(), work.data()) < 0)
+            std::fill(x0.begin(), x0.end(), 0.0);
+        if (okid_model_simulate(&model, record.u.data(), record.count, x0.data(), estimate.data(), work.data()) < 0)
+            throw failure(exit_no_model,
+                          fmt::format("{}: the model cannot be simulated over this record", record.path));
+        pool(record.y, estimate, n_y, simulated);
+        if (predict) {
+            if (okid_model_predict(&model, record.u.data(), record.y.data(), record.count, x0.data(), estimate.data(),
+                                   work.data()) < 0)
+                std::fill(estimate.begin(), estimate.end(), std::numeric_limits<double>::quiet_NaN());
+            pool(record.y, estimate, n_y, predicted);
+        }
+        states.push_back(std::move(x0));
+    }
+    result.context.x0 = std::move(states);
+    result.context.simulation_percent = percent(simulated);
+    result.context.prediction_percent =
+        predict ? percent(predicted) : std::vector<double>(n_y, std::numeric_limits<double>::quiet_NaN());
+}
+
+} // namespace okid_host

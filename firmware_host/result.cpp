@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: MIT
+#include "result.hpp"
+
+#include "error.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+
+ordered_json vector_json(const double* values, int count) {
+    ordered_json out = ordered_json::array();
+    for (int i = 0; i < count; ++i) out.push_back(number(values[i]));
+    return out;
+}
+
+/// Column-major in, rows of rows out.
+ordered_json matrix_json(const double* values, int rows, int columns) {
+    if (!values) return nullptr;
+    ordered_json out = ordered_json::array();
+    for (int i = 0; i < rows; ++i) {
+        ordered_json row = ordered_json::array();
+        for (int j = 0; j < columns; ++j) row.push_back(number(values[i + static_cast<std::ptrdiff_t>(j) * rows]));
+        out.push_back(std::move(row));
+    }
+    return out;
+}
+
+ordered_json model_json(const okid_identified_t& model, const result_context& context) {
+    const int n_u = model.n_u, n_y = model.n_y, n_z = model.n_z;
+    ordered_json out;
+    out["dt"] = number(model.dt);
+    out["A"] = matrix_json(model.A, n_z, n_z);
+    out["B"] = matrix_json(model.B, n_z, n_u);
+    out["C"] = matrix_json(model.C, n_y, n_z);
+    out["D"] = matrix_json(model.D, n_y, n_u);
+    out["K"] = matrix_json(model.K, n_z, n_y);
+    out["x0"] = nullptr;
+    if (!context.x0) return out;
+    out["x0"] = ordered_json::array();
+    for (const auto& state : *context.x0)
+        out["x0"].push_back(vector_json(state.data(), static_cast<int>(state.size())));
+    return out;
+}
+
+ordered_json percent_json(const std::optional<std::vector<double>>& percent, const std::vector<std::string>& outputs) {
+    if (!percent) return nullptr;
+    ordered_json out = ordered_json::object();
+    for (std::size_t i = 0; i < outputs.size() && i < percent->size(); ++i) out[outputs[i]] = number((*percent)[i]);
+    return out;
+}
+
+std::string counted(long long count, const char* noun) {
+    return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+std::string note_text(const okid_identified_t& model, std::uint32_t bit) {
+    const okid_observer_info_t& info = model.observer_info;
+    const long long q = model.n_u + static_cast<long long>(model.p) * (model.n_u + model.n_y);
+    switch (bit) {
+    case OKID_NOTE_ARX_STABILISED:
+        return fmt::format(
+            "plain least squares gave an unstable observer (spectral radius {:.6g}); a ridge of {:.1e} brought "
+            "it to {:.6g}. Damping may be slightly high: a longer record or another --p needs no ridge",
+            info.radius_plain, info.ridge, info.radius);
+    case OKID_NOTE_ILL_CONDITIONED:
+        return fmt::format(
+            "the regression is ill-conditioned ({:.1e}): nearly noise-free data or channels that repeat each "
+            "other. Frequencies stay good; check damping with a smaller --p or without the redundant channel",
+            info.condition);
+    case OKID_NOTE_FEW_ROWS:
+        return fmt::format(
+            "{} usable samples for {} unknowns per output, 10 for each are advised: scatter is large. Record "
+            "longer or lower --p",
+            model.regression_rows, q);
+    case OKID_NOTE_MODEL_UNSTABLE:
+        return fmt::format(
+            "the model has a pole on or outside the unit circle (spectral radius {:.6g}): no simulation can be "
+            "trusted. Try a lower --order or --detrend mean",
+            model.model_radius);
+    case OKID_NOTE_PREDICTOR_UNSTABLE:
+        return "the predictor A - K C is unstable: no prediction fit is given. Try another --p, --rows or --order";
+    case OKID_NOTE_ORDER_REDUCED:
+        return fmt::format(
+            "the order asked for is more than the data can carry; {} is used. A larger --p and --rows carry "
+            "more",
+            model.n_z);
+    case OKID_NOTE_ORDER_UNCLEAR:
+        return fmt::format(
+            "no clear gap in the singular values: order {} was taken by a noise threshold and may hold noise "
+            "modes. Compare a few orders with --order N",
+            model.n_z);
+    case OKID_NOTE_WEAK_EXCITATION:
+        return fmt::format("the inputs hardly excite some directions (smallest over largest {:.1e}): modes there are "
+                           "uncertain. Use a broader-band force",
+                           info.input_excitation);
+    default: return "";
+    }
+}
+
+std::string fit_text(const result_context& context) {
+    if (!context.simulation_percent && !context.prediction_percent) return "";
+    std::size_t width = 6;
+    for (const auto& name : context.outputs) width = std::max(width, name.size());
+    std::string out = fmt::format("\n{:<{}}  simulated [%]  predicted [%]\n", "output", width);
+    const auto cell = [](const std::optional<std::vector<double>>& values, std::size_t i) {
+        return values && i < values->size() && std::isfinite((*values)[i]) ? fmt::format("{:.2f}", (*values)[i])
+                                                                           : std::string("-");
+    };
+    for (std::size_t i = 0; i < context.outputs.size(); ++i)
+        out += fmt::format("{:<{}}  {:>13}  {:>13}\n", context.outputs[i], width, cell(context.simulation_percent, i),
+                           cell(context.prediction_percent, i));
+    return out;
+}
+
+constexpr double doubtful_emac = 0.5; // below this a mode seldom belongs to the structure
+constexpr int most_shape_columns = 6; // more would not stand side by side on a screen
+
+std::string mode_rows(const okid_identified_t& model, const result_context& context) {
+    const bool shapes = model.n_y > 1 && model.n_y <= most_shape_columns;
+    bool any_doubtful = false;
+    std::vector<std::size_t> width;
+    std::string out = "   #       f [Hz]     ζ [%]     MPC    EMAC";
+    for (int i = 0; shapes && i < model.n_y; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        const std::string name = at < context.outputs.size() ? context.outputs[at] : fmt::format("y{}", i + 1);
+        width.push_back(std::max<std::size_t>(6, name.size()));
+        out += fmt::format("  {:>{}}", name, width.back());
+    }
+    out += "\n";
+    for (int k = 0; k < model.mode_count; ++k) {
+        const bool doubtful = !(model.emac[k] >= doubtful_emac);
+        any_doubtful = any_doubtful || doubtful;
+        out += fmt::format("{:>4}{}{:>12.5f} {:>9.4f} {:>7.4f} {:>7.4f}", k + 1, doubtful ? '?' : ' ',
+                           model.frequency_hz[k], 100 * model.damping_ratio[k], model.mpc[k], model.emac[k]);
+        for (int i = 0; shapes && i < model.n_y; ++i)
+            out += fmt::format("  {:>{}.3f}", model.shape_re[i + static_cast<std::ptrdiff_t>(k) * model.n_y],
+                               width[static_cast<std::size_t>(i)]);
+        out += "\n";
+    }
+    if (any_doubtful)
+        out += fmt::format("   ? EMAC below {:g}: probably noise, not a mode of the structure\n", doubtful_emac);
+    return out;
+}
+
+} // namespace
+
+nlohmann::ordered_json modes_json(const okid_identified_t& model) {
+    ordered_json out = ordered_json::array();
+    for (int k = 0; k < model.mode_count; ++k) {
+        const auto at = static_cast<std::ptrdiff_t>(k) * model.n_y;
+        ordered_json mode;
+        mode["frequency_hz"] = number(model.frequency_hz[k]);
+        mode["damping_ratio"] = number(model.damping_ratio[k]);
+        mode["shape_re"] = vector_json(model.shape_re + at, model.n_y);
+        mode["shape_im"] = vector_json(model.shape_im + at, model.n_y);
+        mode["mpc"] = number(model.mpc[k]);
+        mode["emac"] = number(model.emac[k]);
+        out.push_back(std::move(mode));
+    }
+    return out;
+}
+
+nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context) {
+    ordered_json out;
+    out["schema"] = "okid.result/1";
+    out["version"] = okid_version();
+    out["method"] = context.method;
+    out["fs_hz"] = number(context.fs_hz);
+    out["samples"] = context.samples;
+    out["records"] = context.records;
+    out["gaps"] = context.gaps;
+    out["inputs"] = context.inputs;
+    out["outputs"] = context.outputs;
+    out["p"] = model.p;
+    out["rows"] = model.rows;
+    out["order"] = model.n_z;
+    out["hold"] = context.hold;
+    out["detrend"] = context.detrend;
+    out["singular_values"] = vector_json(model.singular_values, model.singular_count);
+    out["model"] = model_json(model, context);
+    ordered_json blocks = ordered_json::array();
+    const std::ptrdiff_t block = static_cast<std::ptrdiff_t>(model.n_y) * model.n_u;
+    for (int k = 0; k < model.markov_count; ++k)
+        blocks.push_back(matrix_json(model.markov + k * block, model.n_y, model.n_u));
+    out["markov"]["Y"] = std::move(blocks);
+    out["modes"] = modes_json(model);
+    out["fit"]["simulation_percent"] = percent_json(context.simulation_percent, context.outputs);
+    out["fit"]["prediction_percent"] = percent_json(context.prediction_percent, context.outputs);
+    out["warnings"] = ordered_json::array();
+    for (const auto& [code, text] : result_warnings(model, context))
+        out["warnings"].push_back(ordered_json{{"code", code}, {"text", text}});
+    return out;
+}
+
+std::string result_table(const okid_identified_t& model, const result_context& context) {
+    std::string out =
+        fmt::format("{}: {} to {}, {} at {:g} Hz ({:.4g} s), {}", context.method, counted(model.n_u, "input"),
+                    counted(model.n_y, "output"), counted(context.samples, "sample"), context.fs_hz,
+                    static_cast<double>(context.samples) / context.fs_hz, counted(context.records, "record"));
+    if (context.gaps) out += ", " + counted(context.gaps, "gap");
+    out +=
+        fmt::format("\np {}, {} block rows, order {}, detrend {}\n\n", model.p, model.rows, model.n_z, context.detrend);
+    out += mode_rows(model, context) + fit_text(context);
+    const auto warnings = result_warnings(model, context);
+    if (!warnings.empty()) out += "\n";
+    for (const auto& [code, text] : warnings) out += fmt::format("remark {}: {}\n", code, text);
+    return out;
+}
+
+std::vector<std::pair<std::string, std::string>> result_warnings(const okid_identified_t& model,
+                                                                 const result_context& context) {
+    std::vector<std::pair<std::string, std::string>> out;
+    for (std::uint32_t bit = 1; bit; bit <<= 1) {
+        const char* code = (model.warnings & bit) ? okid_warning_code(bit) : nullptr;
+        if (code) out.emplace_back(code, note_text(model, bit));
+    }
+    out.insert(out.end(), context.warnings.begin(), context.warnings.end());
+    return out;
+}
+
+} // namespace okid_host

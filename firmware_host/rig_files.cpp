@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#include "rig_files.hpp"
+
+#include "rig_frames.hpp"
+
+#include <charconv>
+#include <fmt/format.h>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+namespace okid_host {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json matrix_json(const Eigen::MatrixXd& matrix) {
+    ordered_json out = ordered_json::array();
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+        ordered_json row = ordered_json::array();
+        for (Eigen::Index j = 0; j < matrix.cols(); ++j) row.push_back(matrix(i, j));
+        out.push_back(std::move(row));
+    }
+    return out;
+}
+
+void describe(const structure& body, ordered_json& out) {
+    const rig_modes modes = structure_modes(body);
+    out["frequency_hz"] = modes.frequency_hz;
+    out["damping_ratio"] = modes.damping_ratio;
+    out["M"] = matrix_json(body.M);
+    out["K"] = matrix_json(body.K);
+    out["R"] = matrix_json(body.R);
+}
+
+void put_number(std::string& out, double value) {
+    char text[32];
+    const auto [end, error] = std::to_chars(text, text + sizeof text, value);
+    out.append(text, error == std::errc{} ? end : text);
+}
+
+/// A TOML basic string.
+std::string quoted(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) {
+        if (c == '"' || c == '\\') out += '\\';
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+            out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+        else
+            out += c;
+    }
+    return out + "\"";
+}
+
+} // namespace
+
+std::string rig_truth(const rig& rig) {
+    ordered_json out;
+    out["schema"] = "okid.truth/1";
+    describe(rig.body, out);
+    out["alpha"] = rig.alpha ? ordered_json(*rig.alpha) : ordered_json(nullptr);
+    out["beta"] = rig.beta ? ordered_json(*rig.beta) : ordered_json(nullptr);
+    out["fs_hz"] = rig.rate_hz;
+    for (const rig_change& change : rig.changes) {
+        ordered_json after;
+        after["at_s"] = change.at_s;
+        describe(change.after, after);
+        out["changes"].push_back(std::move(after));
+    }
+    std::string text = "{\n";
+    std::size_t left = out.size();
+    for (const auto& [key, value] : out.items())
+        text += fmt::format("\"{}\": {}{}\n", key, value.dump(), --left ? "," : "");
+    return text + "}\n";
+}
+
+std::string rig_csv(const rig_run& run) {
+    std::string out = fmt::format("# fs_hz: {}\n# units:", run.rate_hz);
+    for (const rig_channel& channel : run.channels) out += fmt::format(" {} {},", channel.name, channel.unit);
+    out.back() = '\n';
+    for (std::size_t k = 0; k < run.channels.size(); ++k) out += (k ? "," : "") + run.channels[k].name;
+    out += '\n';
+    out.reserve(out.size() + run.count * run.channels.size() * 12);
+    for (std::size_t n = 0; n < run.count; ++n) {
+        for (std::size_t k = 0; k < run.channels.size(); ++k) {
+            if (k) out += ',';
+            put_number(out, run.channels[k].value(n));
+        }
+        out += '\n';
+    }
+    return out;
+}
+
+std::string rig_config(const rig& rig, const rig_run& run, const std::string& dbc) {
+    std::string out = "# written by okid simulate\n";
+    auto text = std::back_inserter(out);
+    fmt::format_to(text, "[acquisition]\nrate_hz = {:#}\ntitle = \"virtual rig\"\n\n", run.rate_hz);
+    fmt::format_to(text,
+                   "[[bus]]\nname = \"can0\"\ntype = \"socketcan\"\ninterface = \"{}\"\nbitrate = 1000000\ndbc = {}\n",
+                   rig_interface, quoted(dbc));
+    for (const rig_message& message : rig_messages(run)) {
+        for (std::size_t k = 0; k < message.count; ++k) {
+            const rig_channel& channel = run.channels[message.first + k];
+            fmt::format_to(text,
+                           "\n[[channel]]\nname = \"{}\"\nrole = \"{}\"\ndof = {}\nunit = \"{}\"\nbus = "
+                           "\"can0\"\nmessage = \"{}\"\n"
+                           "signal = \"{}\"\nsequence = \"Counter\"\n",
+                           channel.name, channel.role, channel.dof, channel.unit, message.name, channel.signal);
+        }
+    }
+    fmt::format_to(text,
+                   "\n[identification]\nmethod = \"okid-era\"\np = 40\nrows = 80\norder = \"auto\"\nhold = "
+                   "\"{}\"\ndetrend = \"mean\"\n"
+                   "update_s = 1.0\n",
+                   rig.hold);
+    return out;
+}
+
+} // namespace okid_host

@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: MIT
+"""okid on a real CAN interface (vcan0): can-utils on one side, okid on the other. Run by tests/vcan/run."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+OKID = os.environ.get("OKID_PROGRAM", str(Path(__file__).parents[2] / "build" / "okid"))
+RIG = """
+rate_hz = 500.0
+duration_s = {duration}
+seed = 3
+masses = [1.0, 0.8]
+springs = [3e4, 2e4]
+zeta = [0.02, 0.02]
+force_dofs = [1]
+sense_dofs = [1, 2]
+sensing = "acceleration"
+excitation = "white"
+noise_percent = 1.0
+bits = 16
+"""
+
+
+def sh(*args: str, check: bool = True, seconds: float = 60) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(args, capture_output=True, text=True, timeout=seconds, check=False)
+    if check:
+        assert done.returncode == 0, f"{args}: {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done
+
+
+def make_record(folder: Path, duration: float) -> Path:
+    (folder / "rig.toml").write_text(RIG.format(duration=duration))
+    sh(OKID, "simulate", str(folder / "rig.toml"), "--log", str(folder / "a.log"), "--truth", str(folder / "t.json"),
+       "--dbc", str(folder / "a.dbc"), "--config", str(folder / "a.toml"))
+    text = (folder / "a.toml").read_text()
+    text = re.sub(r"(?m)^(p|rows) = .*\n", "", text).replace("[identification]", "[identification]\np = 20\nrows = 40")
+    (folder / "a.toml").write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_record(tmp_path_factory.mktemp("short"), 6.0)
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_record(tmp_path_factory.mktemp("long"), 60.0)
+
+
+@pytest.fixture(autouse=True)
+def interface() -> None:
+    """Every test begins with vcan0 up and able to carry FD."""
+    sh("ip", "link", "add", "vcan0", "type", "vcan", check=False)
+    sh("ip", "link", "set", "vcan0", "mtu", "72", check=False)
+    sh("ip", "link", "set", "vcan0", "up")
+
+
+class Run:
+    """`okid run` in the background, ready when its socket listens."""
+
+    def __init__(self, folder: Path, *options: str, config: str = "a.toml") -> None:
+        self.folder = folder
+        self.stderr = (folder / "stderr").open("w+")
+        for name in ("ev", "r.json"):
+            (folder / name).unlink(missing_ok=True)
+        self.process = subprocess.Popen(
+            [OKID, "run", str(folder / config), "--events", str(folder / "ev"), "--json", str(folder / "r.json"), *options],
+            stdout=subprocess.DEVNULL, stderr=self.stderr)
+        for _ in range(400):
+            if self.listening():
+                return
+            assert self.process.poll() is None, self.messages()
+            time.sleep(0.02)
+        raise AssertionError("okid run never listened")
+
+    @staticmethod
+    def listening() -> bool:
+        lists = ("/proc/net/can/rcvlist_sff", "/proc/net/can/rcvlist_eff", "/proc/net/can/rcvlist_fil", "/proc/net/can/rcvlist_all")
+        return any(re.search(r"vcan0\s+[0-9a-f]+\s+[0-9a-f]+\s", Path(each).read_text()) for each in lists)
+
+    def messages(self) -> str:
+        self.stderr.seek(0)
+        return self.stderr.read()
+
+    def stop(self, how: signal.Signals = signal.SIGINT, status: int = 0) -> list[dict]:
+        time.sleep(0.3)  # what was sent is already in the socket: the end of the run empties it
+        self.process.send_signal(how)
+        assert self.process.wait(30) == status, self.messages()
+        return self.events()
+
+    def events(self) -> list[dict]:
+        return [json.loads(line) for line in (self.folder / "ev").read_text().splitlines()]
+
+
+def bus(events: list[dict]) -> dict:
+    last = [event for event in events if event["type"] == "stats"][-1]
+    return last["bus"]["can0"]
+
+
+def play(log: Path, *options: str) -> None:
+    sh("canplayer", "-I", str(log), *options)
+
+
+def replayed(folder: Path, log: str = "a.log") -> bytes:
+    sh(OKID, "replay", str(folder / log), "-c", str(folder / "a.toml"), "--speed", "max", "--json", str(folder / "replay.json"))
+    return (folder / "replay.json").read_bytes()
+
+
+def part(folder: Path, name: str, first: int, last: int) -> Path:
+    lines = (folder / "a.log").read_text().splitlines(keepends=True)
+    (folder / name).write_text("".join(lines[first:last]))
+    return folder / name
+
+
+def test_canplayer_in_real_time_equals_replay(short: Path) -> None:
+    live = Run(short)
+    play(short / "a.log")
+    events = live.stop()
+    assert [e["type"] for e in events][0] == "start"
+    assert [e["type"] for e in events][-2:] == ["stats", "result"]
+    assert bus(events)["received"] == 6000
+    assert bus(events)["lost"] == 0
+    assert all(c["missing"] == 0 for c in events[-2]["channel"].values())
+    assert not [e for e in events if e["type"] == "gap"]
+    assert (short / "r.json").read_bytes() == replayed(short)
+    assert events[-1]["result"] == json.loads((short / "r.json").read_text())
+
+
+def test_duration_ends_at_the_exact_sample(short: Path) -> None:
+    live = Run(short, "--duration", "4")
+    play(short / "a.log", "-t")
+    assert live.process.wait(30) == 0
+    events = live.events()
+    assert events[-1]["t"] == 4.0
+    assert events[-1]["result"]["samples"] == 2000
+
+
+def test_burst_of_20000_frames_into_a_stopped_reader(long: Path) -> None:
+    live = Run(long)
+    log = part(long, "burst.log", 0, 20000)
+    live.process.send_signal(signal.SIGSTOP)
+    play(log, "-t")
+    live.process.send_signal(signal.SIGCONT)
+    events = live.stop()
+    assert bus(events)["received"] == 20000
+    assert bus(events)["lost"] == 0
+    assert (long / "r.json").read_bytes() == replayed(long, "burst.log")
+
+
+def test_flat_out_60000_frames(long: Path) -> None:
+    live = Run(long)
+    play(long / "a.log", "-t")
+    events = live.stop(signal.SIGTERM)
+    assert bus(events)["received"] == 60000
+    assert bus(events)["lost"] == 0
+    assert (long / "r.json").read_bytes() == replayed(long)
+
+
+def test_overflow_is_counted_placed_and_named(long: Path) -> None:
+    """More than the buffer holds while nobody reads: every lost frame counted once, the tail included."""
+    live = Run(long)
+    play(part(long, "head.log", 0, 4000), "-t")
+    time.sleep(0.5)
+    live.process.send_signal(signal.SIGSTOP)
+    play(part(long, "middle.log", 4000, 56000), "-t")
+    live.process.send_signal(signal.SIGCONT)
+    time.sleep(1.0)
+    play(part(long, "tail.log", 56000, 60000), "-t")
+    events = live.stop()
+    counts = bus(events)
+    assert counts["lost_by"]["socket_overflow"] > 1000
+    assert counts["received"] + counts["lost"] == 60000
+    assert counts["lost"] == counts["lost_by"]["socket_overflow"]
+    gaps = [e for e in events if e["type"] == "gap"]
+    assert {e["cause"] for e in gaps} == {"socket_overflow"}
+    for name, channel in events[-2]["channel"].items():
+        assert channel["missing"] == sum(g["count"] for g in gaps if g["channel"] == name)
+
+
+def test_dropped_frames_are_gaps(short: Path) -> None:
+    lines = (short / "a.log").read_text().splitlines(keepends=True)
+    lost = [line for i, line in enumerate(lines) if 2000 <= i < 2040 and " 101#" in line]
+    (short / "holes.log").write_text("".join(line for line in lines if line not in lost))
+    live = Run(short)
+    play(short / "holes.log", "-t")
+    events = live.stop()
+    gaps = [e for e in events if e["type"] == "gap"]
+    assert {(g["channel"], g["first"], g["last"], g["count"], g["cause"]) for g in gaps} == {
+        (name, 1000, 1019, 20, "sequence") for name in ("acc1", "acc2")}
+    assert bus(events)["lost_by"]["sequence"] == 20
+
+
+def test_link_down_and_up(short: Path) -> None:
+    live = Run(short)
+    play(part(short, "one.log", 0, 2400), "-t")
+    time.sleep(0.3)
+    sh("ip", "link", "set", "vcan0", "down")
+    time.sleep(0.3)
+    sh("ip", "link", "set", "vcan0", "up")
+    time.sleep(0.3)
+    play(part(short, "two.log", 2600, 6000), "-t")
+    events = live.stop()
+    gaps = [e for e in events if e["type"] == "gap"]
+    assert {(g["first"], g["last"], g["cause"]) for g in gaps} == {(1200, 1299, "link_down")}
+    assert events[-1]["result"]["samples"] == 2900
+    assert "went down" in live.messages()
+
+
+def test_interface_deleted_and_made_anew(short: Path) -> None:
+    live = Run(short)
+    play(part(short, "one.log", 0, 2400), "-t")
+    time.sleep(0.3)
+    sh("ip", "link", "delete", "vcan0")
+    time.sleep(0.3)
+    sh("ip", "link", "add", "vcan0", "type", "vcan")
+    sh("ip", "link", "set", "vcan0", "up")
+    time.sleep(0.5)
+    play(part(short, "two.log", 2600, 6000), "-t")
+    events = live.stop()
+    gaps = [e for e in events if e["type"] == "gap"]
+    assert {(g["first"], g["last"], g["cause"]) for g in gaps} == {(1200, 1299, "link_down")}
+    assert events[-1]["result"]["samples"] == 2900
+
+
+def test_joined_in_the_middle(short: Path) -> None:
+    live = Run(short)
+    play(part(short, "middle.log", 1001, 6000), "-t")  # begins with the second frame of a sample
+    events = live.stop()
+    assert bus(events)["lost"] == 0
+    assert events[-1]["result"]["samples"] == 2499
+
+
+def test_unknown_frames_and_error_frames_are_no_data(short: Path) -> None:
+    live = Run(short)
+    sh("cansend", "vcan0", "7FF#00")
+    sh("cansend", "vcan0", "20000040#0000000000000000")  # bus-off
+    sh("cansend", "vcan0", "100#R")
+    play(short / "a.log", "-t")
+    sh("cansend", "vcan0", "101#00")  # too short
+    events = live.stop()
+    assert bus(events)["received"] == 6001
+    assert bus(events)["decode_errors"] == 1
+    assert bus(events)["lost"] == 0
+
+
+def test_replay_onto_the_bus(short: Path) -> None:
+    live = Run(short)
+    sh(OKID, "replay", str(short / "a.log"), "--to", "vcan0", "--speed", "4")
+    events = live.stop()
+    assert bus(events)["lost"] == 0
+    assert (short / "r.json").read_bytes() == replayed(short)
+
+
+def test_no_frames_no_result(short: Path) -> None:
+    live = Run(short, "--duration", "1")
+    assert live.process.wait(30) == 3
+    assert "no usable frame of channel" in live.messages()
+    assert [e["type"] for e in live.events()] == ["start", "stats"]
+    assert not (short / "r.json").exists()
+
+
+def test_wrong_interfaces(short: Path) -> None:
+    text = (short / "a.toml").read_text()
+    (short / "b.toml").write_text(text.replace('"vcan0"', '"vcan7"'))
+    absent = sh(OKID, "run", str(short / "b.toml"), check=False)
+    assert absent.returncode == 4
+    assert "vcan7: there is no such interface" in absent.stderr and "CAN interfaces found: vcan0" in absent.stderr
+    (short / "b.toml").write_text(text.replace('"vcan0"', '"lo"'))
+    other = sh(OKID, "run", str(short / "b.toml"), check=False)
+    assert other.returncode == 4 and "is not a CAN interface" in other.stderr
+    sh("ip", "link", "set", "vcan0", "down")
+    down = sh(OKID, "run", str(short / "a.toml"), check=False)
+    assert down.returncode == 4 and "ip link set vcan0 up" in down.stderr
+    doctor = sh(OKID, "doctor", str(short / "a.toml"), check=False)
+    assert doctor.returncode == 4 and "is down" in doctor.stdout
+
+
+def test_doctor_is_content(short: Path) -> None:
+    assert "AF_CAN and can-raw answer" in sh(OKID, "doctor", str(short / "a.toml")).stdout
+
+
+def test_fd_frames(tmp_path: Path) -> None:
+    """A 16-byte FD frame with a big-endian counter."""
+    (tmp_path / "a.toml").write_text("""
+[acquisition]
+rate_hz = 100.0
+[[bus]]
+name = "can0"
+interface = "vcan0"
+fd = true
+""" + "".join(f"""
+[[channel]]
+name = "{name}"
+role = "{role}"
+can_id = 0x18F02D00
+start_bit = {7 + 16 * i}
+length = 16
+byte_order = "big"
+signed = true
+scale = 0.01
+sequence = {{ start_bit = 7, length = 16, byte_order = "big" }}
+""" for i, (name, role) in enumerate([("f", "force"), ("a", "acceleration")], start=3)))
+    rows = ["f,a"] + [f"{((n * 7919) % 211 - 105) / 10},{((n * 104729) % 223 - 111) / 10}" for n in range(300)]
+    (tmp_path / "in.csv").write_text("# fs_hz: 100\n" + "\n".join(rows) + "\n")
+    sh(OKID, "convert", str(tmp_path / "in.csv"), str(tmp_path / "fd.log"), "-c", str(tmp_path / "a.toml"))
+    assert "##0" in (tmp_path / "fd.log").read_text()
+    live = Run(tmp_path)
+    sh(OKID, "replay", str(tmp_path / "fd.log"), "--to", "vcan0", "--speed", "max")
+    time.sleep(0.3)
+    live.process.send_signal(signal.SIGINT)
+    assert live.process.wait(30) in (0, 3)  # noise: whether it makes a model does not matter here
+    counts = bus(live.events())
+    assert (counts["received"], counts["lost"], counts["decode_errors"]) == (300, 0, 0)

@@ -1,0 +1,37 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# PID 1 inside User-Mode Linux; the root is the host's own, so nothing is touched before /dev is private.
+# Run by run_uml; $OKID_ROOM (from the kernel's command line) holds the command, its folder and its environment.
+PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
+power_off() {
+  sync
+  echo o >/proc/sysrq-trigger
+  while :; do sleep 1; done
+}
+mount -t proc proc /proc || exit 1
+grep -q '^[^ ]* /dev devtmpfs ' /proc/mounts || mount -t devtmpfs dev /dev || power_off # never the host's /dev
+mount -t sysfs sys /sys
+mkdir -p /dev/pts /dev/shm
+mount -t devpts pts /dev/pts
+mount -t tmpfs shm /dev/shm
+mount -t tmpfs run /run
+mount -t configfs config /sys/kernel/config 2>/dev/null
+ln -sf /proc/self/fd /dev/fd
+ip link set lo up
+
+modules=/usr/lib/uml/modules/$(uname -r)/kernel
+for module in net/can/can net/can/can-raw net/can/can-bcm net/can/can-gw drivers/net/can/dev/can-dev drivers/net/can/vcan \
+  drivers/net/can/vxcan drivers/net/can/slcan/slcan; do
+  [ -f "$modules/$module.ko" ] && insmod "$modules/$module.ko" 2>/dev/null
+done
+ip link add vcan0 type vcan && ip link set vcan0 mtu 72 && ip link set vcan0 up || power_off
+
+room=$OKID_ROOM
+(
+  . "$room/environment"
+  cd "$(cat "$room/folder")" || exit 90
+  eval "$(cat "$room/command")"
+) </dev/null >"$room/out" 2>"$room/err"
+echo $? >"$room/rc.part"
+mv "$room/rc.part" "$room/rc"
+power_off

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""okid: from measured forces and vibrations to modes and a state-space model.
+
+okid.identify(u, y, fs=...) does a whole record; okid.Accumulator and okid.Identifier do it while samples arrive.
+"""
+
+from okid import capture, frf, modal
+from okid._errors import Error, IdentificationError, InputError
+from okid.accumulator import Accumulator, Stats
+from okid.demo import demo
+from okid.identifier import Identified, Identifier, usable_p
+from okid.identify import identify
+from okid.model import Model
+from okid.records import read_csv
+from okid.result import Fit, Mode, Result
+from okid.stabilization import OrderPoles
+
+__all__ = [
+    "Accumulator",
+    "Error",
+    "Fit",
+    "IdentificationError",
+    "Identified",
+    "Identifier",
+    "InputError",
+    "Mode",
+    "Model",
+    "OrderPoles",
+    "Result",
+    "Stats",
+    "capture",
+    "demo",
+    "frf",
+    "identify",
+    "library_version",
+    "modal",
+    "read_csv",
+    "usable_p",
+]
+
+
+def library_version() -> str:
+    """Version and linear-algebra backend of the loaded C library."""
+    from okid._abi import library
+
+    return f"{library().okid_version().decode()} ({library().okid_backend().decode()})"

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: MIT
+"""The C ABI of libokid as ctypes: structures, constants and signatures exactly as in lib/include/okid/*.h.
+
+tests/abi/test_struct_layout.py compiles the headers and compares every size, offset, constant and argument.
+The library is looked for in $OKID_LIBRARY, beside this file, and in <repository>/build.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_int16, c_int32, c_int64, c_size_t, c_uint32
+from ctypes import c_void_p as opaque
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from okid._errors import Error, IdentificationError, InputError
+
+OK, WARN_MISSING, WARN_SATURATED, WARN_MODEL = 0, 1, 2, 3
+ERR_NULL, ERR_DIM, ERR_MEMORY, ERR_MISMATCH, ERR_RANGE = -1, -2, -3, -4, -5
+ERR_TOO_SHORT, ERR_INPUT, ERR_OUTPUT, ERR_EXCITATION = -6, -7, -8, -9
+ERR_NUMERIC, ERR_UNSTABLE, ERR_NO_MODES = -10, -11, -12
+SAMPLE_DOUBLE, SAMPLE_INT16, SAMPLE_INT24, SAMPLE_INT32 = 0, 1, 2, 3
+DETREND_NONE, DETREND_MEAN = 0, 1
+METHOD_OKID_ERA = 0
+NOTE_ARX_STABILISED = 1 << 0
+NOTE_ILL_CONDITIONED = 1 << 1
+NOTE_FEW_ROWS = 1 << 2
+NOTE_MODEL_UNSTABLE = 1 << 3
+NOTE_PREDICTOR_UNSTABLE = 1 << 4
+NOTE_ORDER_REDUCED = 1 << 5
+NOTE_ORDER_UNCLEAR = 1 << 6
+NOTE_WEAK_EXCITATION = 1 << 7
+
+doubles = POINTER(c_double)
+int32s = POINTER(c_int32)
+int16s = POINTER(c_int16)
+
+
+class AccumulatorConfig(Structure):
+    """okid_accumulator_config_t."""
+
+    _fields_ = [
+        ("n_u", c_int32),
+        ("n_y", c_int32),
+        ("lags", c_int32),
+        ("sample", c_int),
+        ("block", c_int32),
+        ("slots", c_int32),
+        ("forgetting", c_double),
+        ("edges", c_int32),
+        ("spare_slots", c_int32),
+    ]
+
+
+class AccumulatorStats(Structure):
+    """okid_accumulator_stats_t."""
+
+    _fields_ = [(name, c_int64) for name in ("samples", "missing", "gaps", "saturated", "rows", "dropped")]
+
+
+class EraConfig(Structure):
+    """okid_era_config_t."""
+
+    _fields_ = [(name, c_int32) for name in ("n_u", "n_y", "rows", "cols")]
+
+
+class IdentifyConfig(Structure):
+    """okid_identify_config_t."""
+
+    _fields_ = [
+        ("n_u", c_int32),
+        ("n_y", c_int32),
+        ("p", c_int32),
+        ("rows", c_int32),
+        ("order", c_int32),
+        ("max_order", c_int32),
+        ("fs_hz", c_double),
+        ("method", c_int),
+        ("detrend", c_int),
+    ]
+
+
+class ModelView(Structure):
+    """okid_model_t."""
+
+    _fields_ = [(name, c_int32) for name in ("n_u", "n_y", "n_z")] + [(name, doubles) for name in "ABCDK"]
+
+
+class ObserverConfig(Structure):
+    """okid_observer_config_t."""
+
+    _fields_ = [("n_u", c_int32), ("n_y", c_int32), ("p", c_int32), ("ridge_min", c_double), ("unstable", c_int32)]
+
+
+class ObserverInfo(Structure):
+    """okid_observer_info_t."""
+
+    _fields_ = [(name, c_double) for name in ("ridge", "radius", "radius_plain", "condition", "input_excitation")] + [
+        ("channel", c_int32)
+    ]
+
+
+class Identified(Structure):
+    """okid_identified_t."""
+
+    _fields_: ClassVar[Any] = [
+        ("warnings", c_uint32),
+        *((name, c_int32) for name in ("n_u", "n_y", "n_z", "p", "rows")),
+        *((name, c_int32) for name in ("singular_count", "markov_count", "mode_count")),
+        ("regression_rows", c_int64),
+        ("dt", c_double),
+        *((name, doubles) for name in "ABCDK"),
+        *((name, doubles) for name in ("singular_values", "markov", "observer", "innovation", "mean")),
+        *((name, doubles) for name in ("frequency_hz", "damping_ratio", "mpc", "emac", "shape_re", "shape_im")),
+        ("model_radius", c_double),
+        ("observer_info", ObserverInfo),
+    ]
+
+
+_model = POINTER(ModelView)
+
+STRUCTS: dict[str, type[Structure]] = {
+    "okid_accumulator_config_t": AccumulatorConfig,
+    "okid_accumulator_stats_t": AccumulatorStats,
+    "okid_era_config_t": EraConfig,
+    "okid_identify_config_t": IdentifyConfig,
+    "okid_identified_t": Identified,
+    "okid_model_t": ModelView,
+    "okid_observer_config_t": ObserverConfig,
+    "okid_observer_info_t": ObserverInfo,
+}
+
+# name -> (result, arguments); a status is c_int
+SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
+    "okid_status_text": (c_char_p, [c_int]),
+    "okid_version": (c_char_p, []),
+    "okid_backend": (c_char_p, []),
+    "okid_accumulator_memsize": (c_size_t, [POINTER(AccumulatorConfig)]),
+    "okid_accumulator_create": (c_int, [POINTER(opaque), POINTER(AccumulatorConfig), opaque, c_size_t]),
+    "okid_accumulator_reset": (None, [opaque]),
+    "okid_accumulator_set_units": (None, [opaque, doubles, doubles]),
+    "okid_accumulator_add": (c_int, [opaque, doubles, c_size_t]),
+    "okid_accumulator_add_i16": (c_int, [opaque, int16s, c_size_t]),
+    "okid_accumulator_add_i32": (c_int, [opaque, int32s, c_size_t]),
+    "okid_accumulator_gap": (None, [opaque, c_int64]),
+    "okid_accumulator_merge": (c_int, [opaque, opaque]),
+    "okid_accumulator_stats": (None, [opaque, POINTER(AccumulatorStats)]),
+    "okid_accumulator_config": (None, [opaque, POINTER(AccumulatorConfig)]),
+    "okid_accumulator_rows": (c_int64, [opaque]),
+    "okid_accumulator_gram": (c_int, [opaque, c_int, doubles, doubles]),
+    "okid_observer_memsize": (c_size_t, [POINTER(ObserverConfig)]),
+    "okid_observer_solve": (
+        c_int,
+        [POINTER(ObserverConfig), doubles, c_int64, doubles, doubles, POINTER(ObserverInfo), opaque, c_size_t],
+    ),
+    "okid_markov_recursion": (c_int, [c_int32, c_int32, c_int32, doubles, c_int32, doubles, doubles]),
+    "okid_era_memsize": (c_size_t, [POINTER(EraConfig)]),
+    "okid_era_create": (c_int, [POINTER(opaque), POINTER(EraConfig), opaque, c_size_t]),
+    "okid_era_decompose": (c_int, [opaque, doubles]),
+    "okid_era_singular_values": (doubles, [opaque, int32s]),
+    "okid_era_max_order": (c_int32, [POINTER(EraConfig)]),
+    "okid_era_realize": (c_int, [opaque, c_int32, doubles, doubles, doubles, doubles, doubles]),
+    "okid_era_emac": (c_int, [opaque, c_int32, c_int32, doubles, doubles, doubles, doubles, doubles]),
+    "okid_modal_memsize": (c_size_t, [c_int32, c_int32]),
+    "okid_modal_analyse": (
+        c_int,
+        [c_int32, c_int32, c_double, doubles, doubles, int32s] + [doubles] * 10 + [opaque, c_size_t],
+    ),
+    "okid_modal_mac": (c_double, [c_int32, doubles, doubles, doubles, doubles]),
+    "okid_model_workspace": (c_size_t, [_model]),
+    "okid_model_simulate": (c_int, [_model, doubles, c_size_t, doubles, doubles, doubles]),
+    "okid_model_predict": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles, doubles]),
+    "okid_model_initial_state": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles]),
+    "okid_warning_code": (c_char_p, [c_uint32]),
+    "okid_identify_usable_p": (c_int32, [c_int32, c_int32, c_int32, c_int64]),
+    "okid_identify_memsize": (c_size_t, [POINTER(IdentifyConfig)]),
+    "okid_identify_create": (c_int, [POINTER(opaque), POINTER(IdentifyConfig), opaque, c_size_t]),
+    "okid_identify_run": (c_int, [opaque, opaque, POINTER(Identified)]),
+    "okid_identify_order": (c_int, [opaque, c_int32, POINTER(Identified)]),
+}
+
+
+def candidates() -> list[Path]:
+    """Where the shared object may be, in the order of trust."""
+    given = os.environ.get("OKID_LIBRARY")
+    if given:
+        return [Path(given)]
+    here = Path(__file__).resolve().parent
+    return [here / "libokid.so", here.parents[1] / "build" / "libokid.so"]
+
+
+@lru_cache(maxsize=1)
+def library() -> Any:
+    """The loaded shared object with typed functions. OSError names every place that was tried."""
+    tried = candidates()
+    for path in tried:
+        if path.is_file():
+            loaded = ctypes.CDLL(str(path))
+            break
+    else:
+        places = ", ".join(str(path) for path in tried)
+        raise OSError(f"libokid.so not found in {places}: run `make build`, or set OKID_LIBRARY to the file")
+    for name, (result, arguments) in SIGNATURES.items():
+        function = getattr(loaded, name)
+        function.restype = result
+        function.argtypes = arguments
+    return loaded
+
+
+def pointer(array: NDArray[np.float64] | None) -> Any:
+    """double* of a float64 array (None stays NULL). The caller keeps the array alive."""
+    return None if array is None else array.ctypes.data_as(doubles)
+
+
+def block(size: int) -> NDArray[np.uint8]:
+    """Zeroed memory of `size` bytes that begins on a 64-byte boundary, so that a copy of it is laid out alike."""
+    raw = np.zeros(size + 64, dtype=np.uint8)
+    skip = -raw.ctypes.data % 64
+    return raw[skip : skip + size]
+
+
+def status_text(status: int) -> str:
+    """One line of English for a status."""
+    text: bytes = library().okid_status_text(status)
+    return text.decode()
+
+
+def check(status: int, what: str) -> int:
+    """Raise the exception that belongs to an error status; warnings (> 0) pass."""
+    if status >= 0:
+        return status
+    kind: type[Error] = Error
+    if status in (ERR_DIM, ERR_MISMATCH, ERR_RANGE):
+        kind = InputError
+    elif status <= ERR_TOO_SHORT:
+        kind = IdentificationError
+    raise kind(f"{what}: {status_text(status)}", status)

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""The library's one-call identification over an Accumulator: for records, and again and again while a stream runs."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from okid import _abi
+from okid._errors import IdentificationError, InputError
+from okid.accumulator import Accumulator
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Observer(NamedTuple):
+    """What the least-squares step found; see okid_observer_info_t."""
+
+    ridge: float
+    radius: float
+    radius_plain: float
+    condition: float
+    input_excitation: float
+
+
+class Identified(NamedTuple):
+    """A copy of okid_identified_t: nothing points into the identifier any more.
+
+    A (n_z, n_z) .. K (n_z, n_y); singular_values (s,); markov (count, n_y, n_u); theta (n_y, q); innovation
+    (n_y, n_y); mean (m,) channel means that were removed; modes (k,) with shapes (k, n_y), largest entry 1.
+    """
+
+    notes: int
+    p: int
+    rows: int
+    order: int
+    regression_rows: int
+    dt: float
+    A: Real
+    B: Real
+    C: Real
+    D: Real
+    K: Real
+    singular_values: Real
+    markov: Real
+    theta: Real
+    innovation: Real
+    mean: Real
+    frequency_hz: Real
+    damping_ratio: Real
+    mpc: Real
+    emac: Real
+    shapes: Complex
+    model_radius: float
+    observer: Observer
+
+
+def usable_p(n_u: int, n_y: int, p: int, samples: int) -> int:
+    """p, or the largest p with 10 (n_u + p (n_u + n_y)) <= samples when that is smaller; at least 1."""
+    return int(_abi.library().okid_identify_usable_p(n_u, n_y, p, samples))
+
+
+def _matrix(address: Any, rows: int, columns: int) -> Real:
+    """A C-order copy of a column-major matrix of the library."""
+    if rows * columns == 0 or not address:
+        return np.zeros((rows, columns))
+    flat = np.ctypeslib.as_array(address, shape=(rows * columns,))
+    return np.array(flat.reshape(columns, rows).T, dtype=np.float64, order="C")
+
+
+def _copy(raw: _abi.Identified) -> Identified:
+    n_u, n_y, n_z, p = int(raw.n_u), int(raw.n_y), int(raw.n_z), int(raw.p)
+    modes, blocks = int(raw.mode_count), int(raw.markov_count)
+    markov = _matrix(raw.markov, n_y, n_u * blocks).reshape(n_y, blocks, n_u).transpose(1, 0, 2)
+    shapes = _matrix(raw.shape_re, n_y, modes).T + 1j * _matrix(raw.shape_im, n_y, modes).T
+    info = raw.observer_info
+    return Identified(
+        notes=int(raw.warnings),
+        p=p,
+        rows=int(raw.rows),
+        order=n_z,
+        regression_rows=int(raw.regression_rows),
+        dt=float(raw.dt),
+        A=_matrix(raw.A, n_z, n_z),
+        B=_matrix(raw.B, n_z, n_u),
+        C=_matrix(raw.C, n_y, n_z),
+        D=_matrix(raw.D, n_y, n_u),
+        K=_matrix(raw.K, n_z, n_y),
+        singular_values=_matrix(raw.singular_values, int(raw.singular_count), 1)[:, 0],
+        markov=np.ascontiguousarray(markov),
+        theta=_matrix(raw.observer, n_y, n_u + p * (n_u + n_y)),
+        innovation=_matrix(raw.innovation, n_y, n_y),
+        mean=_matrix(raw.mean, n_u + n_y, 1)[:, 0],
+        frequency_hz=_matrix(raw.frequency_hz, modes, 1)[:, 0],
+        damping_ratio=_matrix(raw.damping_ratio, modes, 1)[:, 0],
+        mpc=_matrix(raw.mpc, modes, 1)[:, 0],
+        emac=_matrix(raw.emac, modes, 1)[:, 0],
+        shapes=shapes,
+        model_radius=float(raw.model_radius),
+        observer=Observer(*(float(getattr(info, name)) for name in Observer._fields)),
+    )
+
+
+class Identifier:
+    """Workspace for models of one shape; run() may be called as often as results are wanted.
+
+    `order` 0 = automatic, bounded by `max_order` (0 = the library's own bound); `rows` 0 = 2 p.
+    Raises InputError for sizes outside the documented range. Source: lib/include/okid/identify.h, paper eq. 36-54.
+    """
+
+    def __init__(
+        self,
+        n_u: int,
+        n_y: int,
+        *,
+        fs: float,
+        p: int = 40,
+        rows: int = 0,
+        order: int = 0,
+        max_order: int = 0,
+        detrend: str = "mean",
+    ) -> None:
+        mode = _abi.DETREND_MEAN if detrend == "mean" else _abi.DETREND_NONE
+        self.config = _abi.IdentifyConfig(n_u, n_y, p, rows, order, max_order, fs, _abi.METHOD_OKID_ERA, mode)
+        size = int(_abi.library().okid_identify_memsize(ctypes.byref(self.config)))
+        if size == 0:
+            raise InputError(
+                f"n_u={n_u}, n_y={n_y}, fs={fs}, p={p}, rows={rows}, order={order}, max_order={max_order}: "
+                "outside what the library takes, see okid/identify.h",
+                _abi.ERR_DIM,
+            )
+        self._block = _abi.block(size)
+        self._handle = ctypes.c_void_p()
+        status = _abi.library().okid_identify_create(
+            ctypes.byref(self._handle), ctypes.byref(self.config), self._block.ctypes.data, self._block.size
+        )
+        _abi.check(status, "identifier")
+        self._raw = _abi.Identified()
+
+    def run(self, accumulator: Accumulator) -> Identified:
+        """Identify from what the accumulator holds now; it is not changed.
+
+        Raises IdentificationError with `status` and, where one is at fault, `channel` as an attribute.
+        """
+        status = int(_abi.library().okid_identify_run(self._handle, accumulator.handle, ctypes.byref(self._raw)))
+        if status < 0:
+            channel = int(self._raw.observer_info.channel)
+            who = "" if channel < 0 else f" (channel {channel}, counted from 0: inputs, then outputs)"
+            fault = IdentificationError(f"no model: {_abi.status_text(status)}{who}", status)
+            fault.channel = channel  # type: ignore[attr-defined]
+            raise fault
+        return _copy(self._raw)
+
+    def realise(self, order: int) -> Identified:
+        """Another order from the Markov parameters of the last run(), for stabilization diagrams."""
+        status = int(_abi.library().okid_identify_order(self._handle, order, ctypes.byref(self._raw)))
+        _abi.check(status, f"order {order}")
+        return _copy(self._raw)
+
+    def largest_order(self) -> int:
+        """The largest order realise() can be asked for."""
+        rows = int(self.config.rows) or 2 * int(self.config.p)
+        era = _abi.EraConfig(self.config.n_u, self.config.n_y, rows, rows)
+        hankel = int(_abi.library().okid_era_max_order(ctypes.byref(era)))
+        bound = min(int(self.config.max_order) or 128, hankel, int(self.config.p * self.config.n_y))
+        return max(bound, min(int(self.config.order), hankel))

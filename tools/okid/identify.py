@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: MIT
+"""okid.identify: measured inputs and outputs in, a model with its modes out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from okid import _abi
+from okid._errors import IdentificationError, InputError
+from okid.accumulator import Accumulator
+from okid.identifier import Identified, Identifier, usable_p
+from okid.model import Model
+from okid.records import paired
+from okid.result import Fit, Remark, Result, modes_of
+
+Real = NDArray[np.float64]
+
+
+def _choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
+    if value not in allowed:
+        raise InputError(f"{name} is {value!r}, expected one of {', '.join(map(repr, allowed))}")
+
+
+def _whole(name: str, value: object, smallest: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or int(value) < smallest:
+        raise InputError(f"{name} is {value!r}, expected a whole number >= {smallest}")
+    return int(value)
+
+
+def _names(given: Sequence[str] | None, letter: str, count: int) -> list[str]:
+    names = [f"{letter}{k + 1}" for k in range(count)] if given is None else [str(name) for name in given]
+    if len(names) != count or len(set(names)) != count:
+        raise InputError(f"{count} different names are needed for the channels of {letter}, got {names}")
+    return names
+
+
+def _check_moving(records: list[Real], names: list[str], n_u: int) -> None:
+    for k, name in enumerate(names):
+        kind = "input" if k < n_u else "output"
+        present = np.concatenate([record[np.isfinite(record[:, k]), k] for record in records])
+        if len(present) == 0:
+            raise InputError(f"{kind} {name!r} has no sample at all: every value is missing")
+        if np.ptp(present) == 0.0:
+            reason = "excites nothing" if k < n_u else "measures nothing"
+            status = _abi.ERR_INPUT if k < n_u else _abi.ERR_OUTPUT
+            raise IdentificationError(f"no model: {kind} {name!r} is constant ({present[0]:g}): it {reason}", status)
+
+
+def _detrended(record: Real, kind: str) -> Real:
+    """The record without its mean or its straight line, channel by channel over the samples that are there."""
+    out = record.copy()
+    time = np.arange(len(record)) - (len(record) - 1) / 2.0
+    for k in range(record.shape[1]):
+        there = np.isfinite(record[:, k])
+        if not there.any():
+            continue
+        level, slope = float(np.mean(record[there, k])), 0.0
+        if kind == "linear":
+            middle = float(np.mean(time[there]))
+            spread = float(np.sum((time[there] - middle) ** 2))
+            if spread > 0.0:
+                slope = float(np.sum((time[there] - middle) * record[there, k]) / spread)
+            level -= slope * middle
+        out[:, k] -= level + slope * time
+    return out
+
+
+def _gap_count(records: list[Real]) -> tuple[int, int]:
+    """Missing samples and the runs they form."""
+    missing = gaps = 0
+    for record in records:
+        broken = ~np.all(np.isfinite(record), axis=1)
+        missing += int(np.sum(broken))
+        gaps += int(np.sum(broken[1:] & ~broken[:-1])) + int(broken[0]) if len(broken) else 0
+    return missing, gaps
+
+
+def _silent_start(records: list[Real], n_u: int, p: int) -> bool:
+    """True when most of the input energy lies in the first p samples of every record: a hit just after the trigger."""
+    early = total = 0.0
+    for record in records:
+        power = np.nansum((record[:, :n_u] - np.nanmedian(record[:, :n_u], axis=0)) ** 2, axis=1)
+        early += float(np.sum(power[:p]))
+        total += float(np.sum(power))
+    return total > 0.0 and early > 0.5 * total
+
+
+def _accumulate(records: list[Real], n_u: int, p: int, rest: bool) -> Accumulator:
+    m = records[0].shape[1]
+    total = Accumulator(n_u, m - n_u, p)
+    for record in records:
+        total.gap(0)
+        if rest:
+            total.add(np.zeros((p, m)))
+        total.add(record)
+    return total
+
+
+def _note_text(found: Identified, code: str) -> str:
+    o = found.observer
+    texts = {
+        "arx_stabilised": f"plain least squares gave an unstable observer (radius {o.radius_plain:.6g}); a ridge of "
+        f"{o.ridge:.1e} brought it to {o.radius:.6g}. Damping may come out slightly high",
+        "ill_conditioned": f"the regression is ill-conditioned ({o.condition:.1e}): nearly noise-free data, or "
+        "channels that repeat each other",
+        "few_rows": f"{found.regression_rows} usable rows for {found.theta.shape[1]} unknowns an output: much scatter",
+        "model_unstable": f"the model has a pole outside the unit circle (radius {found.model_radius:.6g})",
+        "predictor_unstable": "the predictor A - K C is unstable: no prediction fit is given",
+        "order_reduced": f"the order asked for is more than the data can carry; {found.order} is used",
+        "order_unclear": f"no clear gap in the singular values: order {found.order} keeps the consistent modes. "
+        "Compare a few orders, see stabilization()",
+        "weak_excitation": f"the inputs hardly excite some directions (smallest over largest {o.input_excitation:.1e})",
+    }
+    return texts.get(code, code)
+
+
+def _remarks(found: Identified) -> list[Remark]:
+    out = []
+    for bit in range(32):
+        if found.notes >> bit & 1:
+            name = _abi.library().okid_warning_code(1 << bit)
+            code = name.decode() if name else f"note_{bit}"
+            out.append(Remark(code, _note_text(found, code)))
+    return out
+
+
+def _percent(pairs: list[tuple[Real, Real]], names: list[str]) -> dict[str, float | None]:
+    out: dict[str, float | None] = {}
+    for k, name in enumerate(names):
+        y = np.concatenate([measured[:, k] for measured, _ in pairs])
+        yhat = np.concatenate([estimate[:, k] for _, estimate in pairs])
+        there = np.isfinite(y)
+        spread = float(np.linalg.norm(y[there] - np.mean(y[there])))
+        with np.errstate(over="ignore", invalid="ignore"):
+            value = 100.0 * (1.0 - float(np.linalg.norm(y[there] - yhat[there])) / spread) if spread > 0.0 else math.nan
+        out[name] = value if math.isfinite(value) else None
+    return out
+
+
+def _fit(model: Model, found: Identified, records: list[Real], outputs: list[str]) -> Fit:
+    """Initial state of each record into model.x0, then both fits over all records."""
+    n_u, states = model.B.shape[1], []
+    simulated, predicted = [], []
+    unstable_predictor = bool(found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
+    for record in records:
+        centred = record - found.mean
+        u, y = np.nan_to_num(centred[:, :n_u]), centred[:, n_u:]
+        used = len(u)
+        if 0.0 < found.model_radius < 1.0:
+            used = max(1, min(used, int(math.log(1e-16) / math.log(found.model_radius))))
+        try:
+            x0 = model.initial_state(u[:used], y[:used])
+        except IdentificationError:
+            x0 = np.zeros(model.order)
+        states.append(x0)
+        simulated.append((y, model.simulate(u, x0)))
+        if not unstable_predictor:
+            predicted.append((y, model.predict(u, y, x0)))
+    model.x0 = np.array(states)
+    none: dict[str, float | None] = {name: None for name in outputs}
+    return Fit(_percent(simulated, outputs), _percent(predicted, outputs) if predicted else none)
+
+
+def _usable(p: int, n_u: int, n_y: int, samples: int) -> tuple[int, list[Remark]]:
+    least = 10 * (n_u + (1 if n_y >= 2 else 2) * (n_u + n_y))
+    if samples < least:
+        raise IdentificationError(
+            f"no model: too few samples: {samples} complete ones, even the smallest model of {n_u} inputs and {n_y} "
+            f"outputs needs {least} (10 for each unknown)",
+            _abi.ERR_TOO_SHORT,
+        )
+    used = usable_p(n_u, n_y, p, samples)
+    if used == p:
+        return p, []
+    return used, [Remark("p_reduced", f"p is {used} instead of {p}: {samples} samples bear no more unknowns")]
+
+
+def identify(
+    u: ArrayLike | Sequence[ArrayLike],
+    y: ArrayLike | Sequence[ArrayLike],
+    *,
+    fs: float,
+    method: str = "okid-era",
+    p: int = 40,
+    rows: int | None = None,
+    order: int | str = "auto",
+    max_order: int | None = None,
+    detrend: str = "mean",
+    hold: str = "zoh",
+    start: str = "moving",
+    input_names: Sequence[str] | None = None,
+    output_names: Sequence[str] | None = None,
+) -> Result:
+    """Identify a structure from measured inputs and outputs.
+
+    u (N, n_u) or (N,), y (N, n_y) or (N,) at `fs` Hz, or lists of such arrays: several records, merged exactly, each
+    centred by itself. NaN = missing sample: the regression leaves it out and re-arms, nothing is interpolated. The
+    arrays are never modified. `p` ARX horizon, reduced with a warning when the record is shorter than 10 unknowns;
+    `rows` block rows of the Hankel matrices (default 2 p); `order` a number or "auto" (up to `max_order`);
+    `detrend` "none", "mean" or "linear"; `hold` "zoh" or "foh": how the force behaved between samples.
+    `start` "rest" says that every record begins just before the structure is struck: the silent past is then used
+    (paper eq. 38), without it the hit itself would be lost with the first p samples. "moving" assumes nothing.
+
+    Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
+    """
+    _choice("method", method, ("okid-era",))
+    _choice("detrend", detrend, ("none", "mean", "linear"))
+    _choice("hold", hold, ("zoh", "foh"))
+    _choice("start", start, ("moving", "rest"))
+    if not (isinstance(fs, int | float | np.number) and math.isfinite(float(fs)) and float(fs) > 0.0):
+        raise InputError(f"fs is {fs!r}, expected a sample rate in Hz > 0")
+    horizon = _whole("p", p, 1)
+    wanted = 0 if order == "auto" else _whole("order", order, 1)
+    inputs, outputs = paired(u, y)
+    n_u, n_y = inputs[0].shape[1], outputs[0].shape[1]
+    in_names, out_names = _names(input_names, "u", n_u), _names(output_names, "y", n_y)
+    records = [np.hstack(pair) for pair in zip(inputs, outputs, strict=True)]
+    _check_moving(records, in_names + out_names, n_u)
+    missing, gaps = _gap_count(records)
+    samples = sum(len(record) for record in records)
+    horizon, remarks = _usable(horizon, n_u, n_y, samples - missing)
+    if missing:
+        text = f"{missing} of {samples} samples are missing in {gaps} gap(s): left out, nothing was interpolated"
+        remarks.append(Remark("missing_samples", text))
+    if start == "moving" and _silent_start(records, n_u, horizon):
+        text = f"most of the input energy lies in the first {horizon} samples, which serve as history only: the hit is "
+        remarks.append(Remark("hit_at_start", text + "lost. If the structure was at rest before, use start='rest'"))
+    own_centre = detrend == "linear" or (detrend == "mean" and (start == "rest" or len(records) > 1))
+    if own_centre:
+        records = [_detrended(record, detrend) for record in records]
+    centre = "mean" if detrend == "mean" and start == "moving" else "none"
+    identifier = Identifier(
+        n_u, n_y, fs=float(fs), p=horizon, rows=0 if rows is None else _whole("rows", rows, 1), order=wanted,
+        max_order=0 if max_order is None else _whole("max_order", max_order, 1), detrend=centre,
+    )  # fmt: skip
+    with _accumulate(records, n_u, horizon, start == "rest") as sums:
+        found = identifier.run(sums)
+    model = Model(found.A, found.B, found.C, found.D, found.K, found.dt)
+    fit = _fit(model, found, records, out_names)
+    return Result(
+        method, float(fs), samples, len(records), gaps, in_names, out_names, found.p, found.rows, found.order, hold,
+        detrend, start, found.singular_values, model, found.markov, modes_of(found), fit, _remarks(found) + remarks,
+        found.observer, identifier,
+    )  # fmt: skip

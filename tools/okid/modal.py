@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""Mode shapes and poles: modal assurance, phase collinearity, poles of a discrete model."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from okid._errors import InputError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def mac_matrix(a: ArrayLike, b: ArrayLike | None = None) -> Real:
+    """Modal assurance criterion of every shape in `a` (modes, n_y) with every shape in `b` (default: a itself).
+
+    |a^H b|^2 / (a^H a)(b^H b), 0..1; a zero shape gives 0. Raises InputError when the lengths differ.
+    """
+    first = np.atleast_2d(np.asarray(a, dtype=np.complex128))
+    second = first if b is None else np.atleast_2d(np.asarray(b, dtype=np.complex128))
+    if first.shape[1] != second.shape[1]:
+        raise InputError(f"shapes have {first.shape[1]} and {second.shape[1]} entries: they cannot be compared")
+    cross = np.abs(first.conj() @ second.T) ** 2
+    power = np.outer(np.sum(np.abs(first) ** 2, axis=1), np.sum(np.abs(second) ** 2, axis=1))
+    return np.asarray(np.divide(cross, power, out=np.zeros_like(cross), where=power > 0.0), dtype=np.float64)
+
+
+def mac(a: ArrayLike, b: ArrayLike) -> float:
+    """Modal assurance criterion of two shapes of n_y entries."""
+    return float(mac_matrix(a, b)[0, 0])
+
+
+def mpc(shape: ArrayLike) -> float:
+    """Modal phase collinearity 0..1 of one complex shape: 1 = all entries on one line through the origin.
+
+    ((Sxx - Syy)^2 + 4 Sxy^2) / (Sxx + Syy)^2 with the sums of real and imaginary parts about zero.
+    """
+    x = np.asarray(shape, dtype=np.complex128)
+    sxx, syy, sxy = float(x.real @ x.real), float(x.imag @ x.imag), float(x.real @ x.imag)
+    total = sxx + syy
+    return ((sxx - syy) ** 2 + 4.0 * sxy**2) / total**2 if total > 0.0 else 0.0
+
+
+def normalised(shape: ArrayLike) -> Complex:
+    """The shape scaled so that its largest entry is 1 (a zero shape stays)."""
+    x = np.asarray(shape, dtype=np.complex128)
+    largest = x[np.argmax(np.abs(x))]
+    return x / largest if largest != 0.0 else x
+
+
+class Poles(NamedTuple):
+    """Underdamped pairs, ascending in frequency: (modes,), (modes,), (modes, n_y)."""
+
+    frequency_hz: Real
+    damping_ratio: Real
+    shapes: Complex
+
+
+def poles(A: ArrayLike, C: ArrayLike, dt: float) -> Poles:
+    """Frequencies, damping ratios and shapes of the pairs 0 < zeta < 1 of x+ = A x, y = C x below 99 % of Nyquist.
+
+    lambda = log(mu)/dt, f = |lambda|/(2 pi), zeta = -Re lambda/|lambda| (paper eq. 104 onwards).
+    """
+    mu, psi = np.linalg.eig(np.asarray(A, dtype=np.float64))
+    upper = mu.imag > 0.0
+    lam = np.log(mu[upper].astype(np.complex128)) / dt
+    size = np.abs(lam)
+    zeta = -lam.real / size
+    shapes = (np.asarray(C, dtype=np.float64) @ psi[:, upper]).T
+    good = (zeta > 0.0) & (zeta < 1.0) & (np.abs(lam.imag) < 0.99 * np.pi / dt)
+    rank = np.argsort(size[good])
+    scaled = np.array([normalised(s) for s in shapes[good][rank]], dtype=np.complex128)
+    return Poles(size[good][rank] / (2.0 * np.pi), zeta[good][rank], scaled.reshape(-1, shapes.shape[1]))

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: MIT
+"""An identified model as people and programs see it: modes, fit, table, okid.result/1."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from okid import _abi
+from okid._errors import Error
+from okid.model import Model
+from okid.stabilization import OrderPoles, compare
+
+if TYPE_CHECKING:
+    from okid.identifier import Identified, Identifier, Observer
+
+Real = NDArray[np.float64]
+
+
+class Mode(NamedTuple):
+    """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1."""
+
+    frequency_hz: float
+    damping_ratio: float
+    shape: NDArray[np.complex128]
+    mpc: float
+    emac: float
+
+
+class Fit(NamedTuple):
+    """100 (1 - |y - yhat| / |y - mean|) for each output by name; None = not available."""
+
+    simulation_percent: dict[str, float | None]
+    prediction_percent: dict[str, float | None]
+
+
+class Remark(NamedTuple):
+    """A remark on a valid result."""
+
+    code: str
+    text: str
+
+
+def modes_of(found: Identified) -> list[Mode]:
+    """The modes of an Identified as a list, ascending in frequency."""
+    return [
+        Mode(float(f), float(z), shape, float(mpc), float(emac))
+        for f, z, shape, mpc, emac in zip(
+            found.frequency_hz, found.damping_ratio, found.shapes, found.mpc, found.emac, strict=True
+        )
+    ]
+
+
+def _number(value: float | None) -> float | None:
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _nested(array: Real) -> Any:
+    if array.ndim == 1:
+        return [_number(x) for x in array.tolist()]
+    return [_nested(row) for row in array]
+
+
+@dataclass
+class Result:
+    """What identify() returns. singular_values (s,) of H(0); markov (count, n_y, n_u) Y_0 .. by eq. 40."""
+
+    method: str
+    fs_hz: float
+    samples: int
+    records: int
+    gaps: int
+    inputs: list[str]
+    outputs: list[str]
+    p: int
+    rows: int
+    order: int
+    hold: str
+    detrend: str
+    start: str
+    singular_values: Real
+    model: Model
+    markov: Real
+    modes: list[Mode]
+    fit: Fit
+    warnings: list[Remark]
+    observer: Observer
+    identifier: Identifier | None = field(default=None, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "identifier": None}  # holds memory of the C library: cannot be pickled
+
+    def to_dict(self) -> dict[str, Any]:
+        """okid.result/1 (docs/result-json): plain lists and numbers, None for a missing number."""
+        m = self.model
+        return {
+            "schema": "okid.result/1",
+            "version": _abi.library().okid_version().decode(),
+            "method": self.method,
+            "fs_hz": self.fs_hz,
+            "samples": self.samples,
+            "records": self.records,
+            "gaps": self.gaps,
+            "inputs": list(self.inputs),
+            "outputs": list(self.outputs),
+            "p": self.p,
+            "rows": self.rows,
+            "order": self.order,
+            "hold": self.hold,
+            "detrend": self.detrend,
+            "start": self.start,
+            "singular_values": _nested(self.singular_values),
+            "model": {
+                "dt": m.dt,
+                **{name: _nested(getattr(m, name)) for name in "ABCDK"},
+                "x0": None if m.x0 is None else _nested(m.x0),
+            },
+            "markov": {"Y": _nested(self.markov)},
+            "modes": [
+                {
+                    "frequency_hz": mode.frequency_hz,
+                    "damping_ratio": mode.damping_ratio,
+                    "shape_re": _nested(mode.shape.real),
+                    "shape_im": _nested(mode.shape.imag),
+                    "mpc": _number(mode.mpc),
+                    "emac": _number(mode.emac),
+                }
+                for mode in self.modes
+            ],
+            "fit": {
+                "simulation_percent": dict(self.fit.simulation_percent),
+                "prediction_percent": dict(self.fit.prediction_percent),
+            },
+            "warnings": [{"code": w.code, "text": w.text} for w in self.warnings],
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write okid.result/1 as JSON, whole or not at all (temporary file, then rename)."""
+        target = Path(path)
+        part = target.with_name(target.name + ".part")
+        part.write_text(json.dumps(self.to_dict(), allow_nan=False) + "\n", encoding="utf-8")
+        part.replace(target)
+
+    def to_scipy(self) -> Any:
+        """scipy.signal.StateSpace with dt."""
+        return self.model.to_scipy()
+
+    def to_control(self) -> Any:
+        """control.StateSpace with dt; ImportError says how to install python-control."""
+        return self.model.to_control()
+
+    def table(self) -> str:
+        """The modal table, fits and remarks as text for a person."""
+        lines = [
+            f"{self.method}: {self.samples} samples at {self.fs_hz:g} Hz, {self.records} record(s), {self.gaps} gap(s)",
+            f"p {self.p}, {self.rows} block rows, order {self.order}, detrend {self.detrend}, start {self.start}",
+            "",
+            "   #       f [Hz]     ζ [%]     MPC    EMAC",
+        ]
+        lines += [
+            f"{k:4d} {mode.frequency_hz:12.5f} {100 * mode.damping_ratio:9.4f} {mode.mpc:7.4f} {mode.emac:7.4f}"
+            for k, mode in enumerate(self.modes, 1)
+        ]
+        width = max([6, *(len(name) for name in self.outputs)])
+        lines += ["", f"{'output':<{width}}  simulated [%]  predicted [%]"]
+        for name in self.outputs:
+            pair = (self.fit.simulation_percent.get(name), self.fit.prediction_percent.get(name))
+            cells = ["-" if value is None else f"{value:.2f}" for value in pair]
+            lines.append(f"{name:<{width}}  {cells[0]:>13}  {cells[1]:>13}")
+        lines += [f"warning {w.code}: {w.text}" for w in self.warnings]
+        return "\n".join(lines)
+
+    def stabilization(self, orders: Iterable[int] | None = None) -> list[OrderPoles]:
+        """Poles of other orders from the same Markov parameters, each compared with the order before.
+
+        Default: every even order up to the largest. Orders the data cannot carry are left out. Raises Error on a
+        result that was unpickled: it has no Markov decomposition any more.
+        """
+        if self.identifier is None:
+            raise Error("this result no longer holds its decomposition: identify again for a stabilization diagram")
+        largest = self.identifier.largest_order()
+        wanted: Sequence[int] = sorted({n for n in (orders or range(2, largest + 1, 2)) if 1 <= n <= largest})
+        runs = []
+        for n in wanted:
+            try:
+                found = self.identifier.realise(n)
+            except Error as fault:
+                if fault.status not in (_abi.ERR_NO_MODES, _abi.ERR_NUMERIC):
+                    raise
+                continue  # no pole to draw at this order
+            runs.append((n, found.frequency_hz, found.damping_ratio, found.shapes))
+        return compare(runs)
+
+    def plot_stabilization(self, ax: Any = None, orders: Iterable[int] | None = None) -> Any:
+        """Draw the stabilization diagram into `ax` (default: a new matplotlib figure); returns the axes."""
+        from okid.figures import draw_stabilization
+
+        if ax is None:
+            from matplotlib.figure import Figure
+
+            ax = Figure(figsize=(9.0, 4.5), layout="constrained").add_subplot()
+        draw_stabilization(ax, self.stabilization(orders), self.fs_hz / 2.0, [mode.frequency_hz for mode in self.modes])
+        return ax
