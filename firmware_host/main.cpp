@@ -2,12 +2,27 @@
 // okid: one binary, sub-commands. Parses the command line, runs one command, turns a failure into a message.
 #include "commands/commands.hpp"
 #include "error.hpp"
+#include "whole_file.hpp"
 
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <okid/types.h>
+#include <unistd.h>
+
+namespace {
+
+/// A batch command that is interrupted leaves nothing half-written; run and replay put their own handler in place.
+void on_interrupt(int) {
+    okid_host::remove_unfinished_file();
+    _exit(okid_host::exit_interrupted);
+}
+
+} // namespace
 
 int main(int argc, char** argv) {
+    std::signal(SIGINT, on_interrupt);
+    std::signal(SIGTERM, on_interrupt);
     CLI::App app{"okid: from a cable of sensor frames to natural frequencies, damping ratios and mode shapes", "okid"};
     app.set_version_flag("--version", std::string("okid ") + okid_version() + " (" + okid_backend() + ")");
     app.require_subcommand(1);

@@ -93,8 +93,8 @@ std::string note_text(const okid_identified_t& model, std::uint32_t bit) {
             model.n_z);
     case OKID_NOTE_ORDER_UNCLEAR:
         return fmt::format(
-            "no clear gap in the singular values: order {} was taken by a noise threshold and may hold noise "
-            "modes. Compare a few orders with --order N",
+            "no clear gap in the singular values: {} is the smallest order that keeps every mode that holds over the "
+            "orders; it holds noise modes too (EMAC below 0.5). Compare a few orders with --order N",
             model.n_z);
     case OKID_NOTE_WEAK_EXCITATION:
         return fmt::format("the inputs hardly excite some directions (smallest over largest {:.1e}): modes there are "

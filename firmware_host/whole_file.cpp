@@ -6,6 +6,7 @@
 #include "result.hpp"
 
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -16,6 +17,10 @@
 
 namespace okid_host {
 namespace {
+
+// Name of the temporary being written, for a signal handler; empty when there is none.
+char unfinished[4096];
+volatile std::sig_atomic_t writing = 0;
 
 [[noreturn]] void cannot_write(const std::string& path, int reason) {
     throw failure(exit_usage, fmt::format("{}: cannot be written: {}", path, std::strerror(reason)));
@@ -50,6 +55,10 @@ std::string resolved(const std::string& path) {
 
 } // namespace
 
+void remove_unfinished_file() {
+    if (writing) unlink(unfinished);
+}
+
 void check_writable(const std::string& path) {
     if (path == "-") return;
     struct stat status{};
@@ -80,6 +89,10 @@ void write_whole_file(const std::string& path, const std::string& text) {
     std::string temporary = target + ".XXXXXX";
     const int fd = mkostemp(temporary.data(), O_CLOEXEC);
     if (fd < 0) cannot_write(path, errno);
+    if (temporary.size() < sizeof unfinished) {
+        std::memcpy(unfinished, temporary.c_str(), temporary.size() + 1);
+        writing = 1;
+    }
     const mode_t mask = umask(0);
     umask(mask);
     int reason = fchmod(fd, exists ? status.st_mode & 07777 : 0666 & ~mask) == 0 ? 0 : errno;
@@ -87,6 +100,7 @@ void write_whole_file(const std::string& path, const std::string& text) {
     if (!reason && fsync(fd) != 0 && errno != EINVAL) reason = errno;
     if (close(fd) != 0 && !reason) reason = errno;
     if (!reason && std::rename(temporary.c_str(), target.c_str()) != 0) reason = errno;
+    writing = 0;
     if (!reason) return;
     unlink(temporary.c_str());
     cannot_write(path, reason);

@@ -139,6 +139,8 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
     const auto which = static_cast<std::size_t>(&l - lanes_.data());
     const bool late = index < l.last;
     l.last = std::max(l.last, index);
+    l.recent[l.recent_at++ % l.recent.size()] = index;
+    if (l.recent_at >= l.recent.size()) l.passed = *std::min_element(l.recent.begin(), l.recent.end());
     if (index < next_) {
         if (index < 0) return; // before the grid begins
         const bool remembered = opened_ - index <= mask_;
@@ -163,10 +165,10 @@ void grid::drain(bool all) {
     const auto lanes = static_cast<std::int64_t>(lanes_.size());
     while (next_ < opened_ && next_ < limit_) {
         if (slot(next_) < lanes && !all && opened_ - next_ <= window_) {
-            if (opened_ - next_ <= reorder_) return;
+            if (opened_ - next_ <= 1) return;
             const std::uint8_t* have = present(next_);
             for (std::size_t i = 0; i < lanes_.size(); ++i)
-                if (!have[i] && (!lanes_[i].heard || lanes_[i].last < next_ + reorder_)) return;
+                if (!have[i] && (!lanes_[i].heard || lanes_[i].passed <= next_)) return;
         }
         emit_front();
     }
@@ -226,6 +228,7 @@ void grid::close_gap(lane& l, bool resumed) {
 void grid::finish() {
     if (!anchored_ && heard_ > 0) anchor();
     for (lane& l : lanes_) {
+        release_late(l);
         buses_[l.bus].decode_errors += l.suspected;
         l.suspected = false;
     }

@@ -5,7 +5,7 @@
 // Frames of one message (and multiplexor value) are a lane. Counters of all lanes count the same samples when they stand
 // close together at the start; a lane whose counter is unrelated is placed by time once, then counts on. The grid begins
 // with the first sample for which every lane has been heard, so a stream may be joined in the middle. A sample goes out
-// when it is complete, or when every lane that lacks it has moved on by more than `reorder` samples, or when any lane is
+// when it is complete, or when the newest eight frames of every lane that lacks it lie beyond it, or when any lane is
 // `window` samples ahead.
 #pragma once
 #include "../config.hpp"
@@ -92,8 +92,14 @@ class grid {
         // A counter far off is believed when a second frame agrees.
         bool suspected = false;
         drv_frame_t suspect{};
-        // Cadence.
-        double phase_ns = 0, jitter = 0, lateness = 0;
+        // Cadence: when a frame is late, the next ones tell whether it was lost company or a burst.
+        double phase_ns = 0, least_late = 0;
+        std::array<drv_frame_t, 16> late{};
+        std::size_t late_count = 0;
+        // The newest frames: what lies before all of them does not come any more.
+        std::array<std::int64_t, 8> recent{};
+        std::size_t recent_at = 0;
+        std::int64_t passed = std::numeric_limits<std::int64_t>::min();
         // The gap that is open.
         std::int64_t gap_first = -1, gap_count = 0;
         std::int64_t expected = 0, received = 0;
@@ -115,7 +121,10 @@ class grid {
     bool count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& step) const;
     void judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter);
     std::int64_t place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const;
-    std::int64_t cadence_step(lane& l, const drv_frame_t& frame);
+    void place_by_cadence(lane& l, const drv_frame_t& frame);
+    void release_late(lane& l);
+    void beat(lane& l, const drv_frame_t& frame, std::int64_t step);
+    bool awaited(const lane& l, std::int64_t index) const;
     void note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause);
     void insert(lane& l, std::int64_t index, const drv_frame_t& frame);
 
@@ -126,6 +135,7 @@ class grid {
     void close_gap(lane& l, bool resumed);
 
     double* row(std::int64_t index) { return values_.data() + static_cast<std::size_t>(index & mask_) * width_; }
+    const std::uint8_t* present(std::int64_t index) const { return present_.data() + static_cast<std::size_t>(index & mask_) * lanes_.size(); }
     std::uint8_t* present(std::int64_t index) { return present_.data() + static_cast<std::size_t>(index & mask_) * lanes_.size(); }
     std::int64_t& slot(std::int64_t index) { return slots_[static_cast<std::size_t>(index & mask_)]; }
     void open_rows(std::int64_t upto);

@@ -117,9 +117,7 @@ void grid::place(lane& l, const drv_frame_t& frame) {
         place_by_counter(l, frame, counter);
         return;
     }
-    const bool pause = static_cast<double>(frame.time_ns - l.time_ns) > 1e9 * longest_beat_s;
-    const std::int64_t step = cadence_step(l, frame);
-    move_on(l, frame, l.last + step, pause);
+    place_by_cadence(l, frame);
 }
 
 /// The lane's newest frame is now at `index`; what it jumped over is lost unless it still comes.
@@ -132,7 +130,7 @@ void grid::move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool p
 
 void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
     const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
-    if (step <= 0 && step >= -reorder_) { // again, or late
+    if (step <= 0 && (step >= -reorder_ || awaited(l, l.last + step))) { // again, or late
         insert(l, l.last + step, frame);
         return;
     }
@@ -142,6 +140,7 @@ void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t cou
         judge_jump(l, frame, counter);
         return;
     }
+    buses_[l.bus].decode_errors += l.suspected; // one damaged frame
     l.suspected = false;
     l.counter = counter;
     move_on(l, frame, l.last + far, false);
@@ -191,29 +190,66 @@ std::int64_t grid::place_restart(const lane& l, const drv_frame_t& frame, std::u
     return l.last + (pause > 2 && pause < longest_silence_ns / period_ns_ ? std::llround(pause) : 2);
 }
 
-/// Samples since the frame before, 1 when nothing was lost. The expected time follows slowly; how far frames scatter
-/// around it decides how late a frame must be to mean a loss, so that bursts of a slow reader are no losses.
-std::int64_t grid::cadence_step(lane& l, const drv_frame_t& frame) {
-    const double now = static_cast<double>(frame.time_ns), ahead = now - l.phase_ns;
+/// Is the sample still waiting for this lane, or does it hold just these numbers (a frame that came twice)?
+bool grid::awaited(const lane& l, std::int64_t index) const {
+    if (index < 0 || index >= opened_ || index < opened_ - mask_) return false;
+    if (!present(index)[&l - lanes_.data()]) return index >= next_;
+    const double* numbers = values_.data() + static_cast<std::size_t>(index & mask_) * width_;
+    for (std::size_t i = 0; i < l.channels.size(); ++i)
+        if (numbers[l.channels[i]] != decoded_[i]) return false;
+    return true;
+}
+
+/// A frame at its time is the next sample. A late one waits for those behind it: after a loss all of them stay late,
+/// after a pause of the reader they catch up.
+void grid::place_by_cadence(lane& l, const drv_frame_t& frame) {
+    const double ahead = static_cast<double>(frame.time_ns) - l.phase_ns;
     if (ahead < -1e9 || ahead > longest_silence_ns) { // the clock was set
-        l.phase_ns = now;
-        l.lateness = 0;
-        return 1;
+        release_late(l);
+        l.phase_ns = static_cast<double>(frame.time_ns) - period_ns_;
+        decode(l, frame);
+        beat(l, frame, 1);
+        return;
     }
-    const double late = ahead / period_ns_ - 1;
-    std::int64_t step = late > 0.5 + l.jitter ? 1 + std::llround(late) : 1;
+    const double late = ahead / period_ns_ - 1 - static_cast<double>(l.late_count);
+    if (l.late_count == 0 && late <= 0.5) {
+        beat(l, frame, 1);
+        return;
+    }
+    l.least_late = l.late_count == 0 ? late : std::min(l.least_late, late);
+    l.late[l.late_count++] = frame;
+    if (late <= 0.5 || l.late_count == l.late.size()) release_late(l);
+}
+
+/// Those that waited are placed; what all of them lacked is lost.
+void grid::release_late(lane& l) {
+    const std::size_t count = l.late_count;
+    if (count == 0) return;
+    const std::array<drv_frame_t, 16> frames = l.late;
+    const std::int64_t lost = std::max<std::int64_t>(0, static_cast<std::int64_t>(std::ceil(l.least_late - 0.5)));
+    l.late_count = 0;
+    if (lost == 0) { // they caught up: no loss among them
+        for (std::size_t i = 0; i < count; ++i) {
+            decode(l, frames[i]);
+            beat(l, frames[i], 1);
+        }
+        return;
+    }
+    decode(l, frames[0]);
+    beat(l, frames[0], 1 + lost);
+    for (std::size_t i = 1; i < count; ++i) { // more may be lost among these
+        decode(l, frames[i]);
+        place_by_cadence(l, frames[i]);
+    }
+}
+
+/// The expected time follows early frames quickly and late ones slowly: it keeps to those that were not held up.
+void grid::beat(lane& l, const drv_frame_t& frame, std::int64_t step) {
+    const bool pause = static_cast<double>(frame.time_ns - l.time_ns) > 1e9 * longest_beat_s;
     l.phase_ns += static_cast<double>(step) * period_ns_;
-    double error = (now - l.phase_ns) / period_ns_;
-    l.jitter = std::max(std::abs(error), 0.998 * l.jitter);
-    l.lateness += (error - l.lateness) / 32;
-    if (l.lateness > 0.75 && error > 0.5) { // late for good: one was lost unseen among the scatter
-        ++step;
-        l.phase_ns += period_ns_;
-        l.lateness -= 1;
-        error -= 1;
-    }
-    l.phase_ns += 0.002 * error * period_ns_;
-    return step;
+    const double error_ns = static_cast<double>(frame.time_ns) - l.phase_ns;
+    l.phase_ns += (error_ns < 0 ? 0.1 : 0.002) * error_ns;
+    move_on(l, frame, l.last + step, pause);
 }
 
 void grid::note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause) {

@@ -26,11 +26,21 @@ std::string wall_time(std::int64_t time_ns) {
 
 std::int64_t samples_of(double seconds, double rate_hz) { return std::max<std::int64_t>(1, std::llround(seconds * rate_hz)); }
 
+/// Longest time a frame can take on the wire (all stuff bits, gap included), s; 0 when the bit rate is not known.
+double wire_s(const drv_frame_t& frame, const bus_config& bus) {
+    if (!bus.bitrate) return 0;
+    const bool extended = (frame.flags & DRV_FRAME_EXTENDED) != 0;
+    if (!(frame.flags & DRV_FRAME_FD)) return ((extended ? 80 : 55) + 10.0 * frame.len) / *bus.bitrate;
+    const double fast = (frame.flags & DRV_FRAME_BRS) && bus.dbitrate ? *bus.dbitrate : *bus.bitrate;
+    const double slow_bits = extended ? 65 : 43, check_bits = frame.len > 16 ? 32 : 27; // check field with its fixed stuff bits
+    return slow_bits / *bus.bitrate + (1.25 * (8.0 * frame.len + 6) + check_bits) / fast;
+}
+
 } // namespace
 
 session::session(const live_config& config, const session_options& options)
     : config_(config), options_(options), events_(options.events), view_(options.events != "-" && options.json != "-"), grid_(config, *this),
-      identifier_(config), losses_(config.buses.size()),
+      identifier_(config), losses_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)) {
     stats_samples_ = update_samples_ * std::max<std::int64_t>(1, std::llround(stats_every_s / config.identification.update_s));
     if (options.duration_s) {
@@ -53,6 +63,7 @@ void session::frame(const drv_frame_t& frame) {
     drv_frame_t stamped = frame;
     stamped.time_ns = frame.time_ns / 1000 * 1000;
     start(stamped.time_ns);
+    if (frame.bus < busy_s_.size()) busy_s_[frame.bus] += wire_s(frame, config_.buses[frame.bus]);
     grid_.push(stamped);
 }
 
@@ -119,7 +130,8 @@ ordered_json session::bus_stats(std::size_t bus) const {
     out["out_of_order"] = counts.out_of_order;
     out["duplicate"] = counts.duplicate;
     out["decode_errors"] = counts.decode_errors;
-    out["load_percent"] = nullptr;
+    const bool known = config_.buses[bus].bitrate && now_ > 0;
+    out["load_percent"] = known ? ordered_json(std::round(1e4 * busy_s_[bus] / seconds(now_)) / 100) : ordered_json(nullptr);
     return out;
 }
 

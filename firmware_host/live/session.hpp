@@ -60,6 +60,7 @@ class session : private grid_sink {
     identifier identifier_;
     settling settling_;
     std::vector<device_losses> losses_;
+    std::vector<double> busy_s_; ///< time on the wire of each bus, 0 without a bitrate
     std::int64_t update_samples_, stats_samples_, limit_ = 0, now_ = 0;
     std::int64_t gaps_ = 0;
     bool started_ = false;

@@ -87,7 +87,11 @@ class Observer:
 
 
 def observer(
-    records: Sequence[NDArray[np.floating]], n_u: int, p: int, mean: bool = True, ridge: float = 0.0,
+    records: Sequence[NDArray[np.floating]],
+    n_u: int,
+    p: int,
+    mean: bool = True,
+    ridge: float = 0.0,
     weights: Array | None = None,
 ) -> Observer:
     """Least squares by np.linalg.lstsq on the explicit matrix, columns scaled to unit norm (eq. 36-39)."""

@@ -112,9 +112,7 @@ def simulate(model: tuple[Array, Array, Array, Array], u: Array, x0: Array | Non
     return y
 
 
-def record(
-    s: Structure, samples: int, noise_percent: float, seed: int, x0: Array | None = None
-) -> tuple[Array, Array]:
+def record(s: Structure, samples: int, noise_percent: float, seed: int, x0: Array | None = None) -> tuple[Array, Array]:
     """White unit force and measured accelerations: u (N, n_u), y (N, n_y)."""
     rng = np.random.default_rng(seed)
     u = rng.standard_normal((samples, len(s.force_dofs)))

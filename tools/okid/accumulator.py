@@ -33,10 +33,10 @@ class Accumulator:
 
     A sample with a NaN or infinite channel counts as missing: it ends the run, the next run re-arms by itself.
 
-    Parameters: `n_u` inputs, `n_y` outputs, `lags` p; `codes` 16, 24 or 32 takes ADC codes of so many
-    bits (int16, or int32 words) and sums them exactly, 0 takes real numbers;
-    `block` and `slots` make a sliding window of slots * block sample periods (`spare_slots` more where gaps close slots
-    early); `forgetting` lambda per sample (needs `block`); `edges` False saves memory for one unbroken run. Raises InputError for sizes outside the
+    Parameters: `n_u` inputs, `n_y` outputs, `lags` p; `codes` 16, 24 or 32 takes ADC codes of so many bits (int16, or
+    int32 words) and sums them exactly, 0 takes real numbers; `block` and `slots` make a sliding window of
+    slots * block sample periods (`spare_slots` more where gaps close slots early); `forgetting` lambda per sample
+    (needs `block`); `edges` False saves memory for one unbroken run. Raises InputError for sizes outside the
     documented range. Source: lib/include/okid/accumulator.h, paper eq. 36-38.
     """
 
@@ -54,7 +54,9 @@ class Accumulator:
         spare_slots: int = 0,
     ) -> None:
         if codes not in _SAMPLE:
-            raise InputError(f"codes is {codes!r}, expected the bits of an ADC code: 16, 24 or 32, or 0 for real numbers")
+            raise InputError(
+                f"codes is {codes!r}, expected the bits of an ADC code: 16, 24 or 32, or 0 for real numbers"
+            )
         self._config = _abi.AccumulatorConfig(
             n_u, n_y, lags, _SAMPLE[codes], block, slots, forgetting, int(edges), spare_slots
         )

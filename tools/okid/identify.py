@@ -179,6 +179,25 @@ def _usable(p: int, n_u: int, n_y: int, samples: int) -> tuple[int, list[Remark]
     return used, [Remark("p_reduced", f"p is {used} instead of {p}: {samples} samples bear no more unknowns")]
 
 
+def _record_remarks(records: list[Real], n_u: int, p: int, start: str, counts: tuple[int, int, int]) -> list[Remark]:
+    missing, gaps, samples = counts
+    out = []
+    if missing:
+        text = f"{missing} of {samples} samples are missing in {gaps} gap(s): left out, nothing was interpolated"
+        out.append(Remark("missing_samples", text))
+    if start == "moving" and _silent_start(records, n_u, p):
+        text = f"most of the input energy lies in the first {p} samples, which serve as history only: the hit is lost. "
+        out.append(Remark("hit_at_start", text + "If the structure was at rest before, use start='rest'"))
+    return out
+
+
+def _centred(records: list[Real], detrend: str, start: str) -> tuple[list[Real], str]:
+    """The records as they go into the sums, and what the sums still have to remove themselves."""
+    if detrend == "linear" or (detrend == "mean" and (start == "rest" or len(records) > 1)):
+        records = [_detrended(record, detrend) for record in records]
+    return records, "mean" if detrend == "mean" and start == "moving" else "none"
+
+
 def identify(
     u: ArrayLike | Sequence[ArrayLike],
     y: ArrayLike | Sequence[ArrayLike],
@@ -223,16 +242,8 @@ def identify(
     missing, gaps = _gap_count(records)
     samples = sum(len(record) for record in records)
     horizon, remarks = _usable(horizon, n_u, n_y, samples - missing)
-    if missing:
-        text = f"{missing} of {samples} samples are missing in {gaps} gap(s): left out, nothing was interpolated"
-        remarks.append(Remark("missing_samples", text))
-    if start == "moving" and _silent_start(records, n_u, horizon):
-        text = f"most of the input energy lies in the first {horizon} samples, which serve as history only: the hit is "
-        remarks.append(Remark("hit_at_start", text + "lost. If the structure was at rest before, use start='rest'"))
-    own_centre = detrend == "linear" or (detrend == "mean" and (start == "rest" or len(records) > 1))
-    if own_centre:
-        records = [_detrended(record, detrend) for record in records]
-    centre = "mean" if detrend == "mean" and start == "moving" else "none"
+    remarks += _record_remarks(records, n_u, horizon, start, (missing, gaps, samples))
+    records, centre = _centred(records, detrend, start)
     identifier = Identifier(
         n_u, n_y, fs=float(fs), p=horizon, rows=0 if rows is None else _whole("rows", rows, 1), order=wanted,
         max_order=0 if max_order is None else _whole("max_order", max_order, 1), detrend=centre,

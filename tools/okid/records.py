@@ -145,6 +145,8 @@ def read_csv(path: str | Path) -> CsvRecord:
     if twice or "" in names:
         raise InputError(f"{source}:{start + 1}: duplicate or empty column name {twice or ['']}")
     body = lines[start + 1 :]
+    if not any(line.strip() for line in body):
+        raise InputError(f"{source}: no samples after the header")
     try:
         if separator == ";":
             raise ValueError("decimal commas need the slow way")

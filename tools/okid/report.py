@@ -171,7 +171,12 @@ def _stabilization(result: Loaded, measured: Measured | None) -> str:
     drawing = figures.figure(9.6, 4.8)
     behind = (measured.frf.frequency_hz[1:], cmif(measured.frf.response[1:]))
     figures.draw_stabilization(
-        drawing.add_subplot(), measured.rows, result.shown_hz, result.frequency_hz.tolist(), behind, int(result.raw["order"])
+        drawing.add_subplot(),
+        measured.rows,
+        result.shown_hz,
+        result.frequency_hz.tolist(),
+        behind,
+        int(result.raw["order"]),
     )
     return _page.section(title, _page.picture(drawing, "poles over frequency and model order"), _page.note(
         "A pole holds when the next lower order has one within 1 % in frequency, 5 % in damping and MAC ≥ 0.98. Green "
@@ -283,9 +288,7 @@ def _fit(result: Loaded) -> str:
         return _page.section("Fit", _page.absent("The result holds no fit (a live result keeps no record)."))
     drawing = figures.figure(max(4.0, min(9.6, 2.0 + 0.6 * len(names))), 3.0)
     figures.draw_fit(drawing.add_subplot(), names, parts[0], parts[1])
-    words = (
-        "100 (1 − ‖y − ŷ‖ / ‖y − mean‖). Simulation: from input and initial state; prediction: one step ahead."
-    )
+    words = "100 (1 − ‖y − ŷ‖ / ‖y − mean‖). Simulation: from input and initial state; prediction: one step ahead."
     return _page.section("Fit", _page.picture(drawing, "fit percentage of each output"), _page.note(words))
 
 

@@ -152,9 +152,15 @@ void observer_notes(okid_identified_t* out, int q) {
     if (info.input_excitation < 1e-8) out->warnings |= OKID_NOTE_WEAK_EXCITATION;
 }
 
+/// The Hankel matrix of an ARX(p) model has rank p n_y at most, and near that rank every pole, noise too, looks consistent:
+/// automatic orders stay below half of it.
+int automatic_limit(const okid_identify& s) {
+    return std::max(2, std::min(s.max_order, s.config.p * s.n_y / 2) / 2 * 2);
+}
+
 /// Realise every even order and score it; 0 when no stable model has a consistent mode.
 int scan_orders(okid_identify& s, okid_identified_t* out) {
-    const int count = s.max_order / 2;
+    const int count = automatic_limit(s) / 2;
     for (int k = 0; k < count; ++k) {
         const okid_status_t status = okid_identify_order(&s, 2 * (k + 1), out);
         const bool usable = status >= 0 && out->model_radius < 1;
@@ -165,7 +171,7 @@ int scan_orders(okid_identify& s, okid_identified_t* out) {
 
 /// A clear gap in the singular values decides, if its model is stable and no ridge has bent the values; else the scan.
 okid_status_t automatic_order(okid_identify& s, okid_identified_t* out) {
-    const okid::gap_choice gap = okid::order_by_gap(out->singular_values, out->singular_count, s.max_order);
+    const okid::gap_choice gap = okid::order_by_gap(out->singular_values, out->singular_count, automatic_limit(s));
     if (gap.ratio >= okid::clear_gap && out->observer_info.radius_plain < 1) {
         const okid_status_t status = okid_identify_order(&s, gap.order, out);
         if (status >= 0 && out->model_radius < 1) return status;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    observer Markov parameters from the Gram matrix (OKID least squares), made stable where needed
 // METHOD     unit-diagonal scaling, ridge, Cholesky, one refinement step; spectral radius of the ARX companion matrix by
-//            Arnoldi; when it reaches 1, the smallest stabilising ridge by bisection over a half-decade grid
+//            Arnoldi; when it reaches 1, the smallest ridge of a half-decade grid above which all are stable
 // REFERENCE  paper eq. (36)-(39); Phan, Horta, Juang, Longman (1992); docs/numerics.md trap 22 for the ridge
 // NUMERICS   squares cond(V): fine to 1e7 with exact sums; the refinement step takes the ridge of 1e-12 out again
 // WORKSPACE  q^2 + 3 m (p+1) n_y doubles and the Arnoldi basis; q^3/3 + 2 q^2 n_y flop a ridge
@@ -154,7 +154,9 @@ struct solver {
     }
 };
 
-/// Find the smallest ridge of the grid with a stable companion matrix; theta is left at it.
+/// Go down the grid from its largest ridge while the companion matrix stays stable; theta is left at the smallest such
+/// ridge. From above, because stability is not monotone in the ridge: below the last unstable value lie islands where the
+/// radius is below 1 by chance and the model is poor.
 okid_status_t stabilise(solver& s, double ridge_min, double* theta) {
     auto ridge_of = [&](int k) { return ridge_min * std::pow(10.0, 0.5 * k); };
     auto stable = [&](int k) {
@@ -162,13 +164,10 @@ okid_status_t stabilise(solver& s, double ridge_min, double* theta) {
         s.info->radius = companion_radius(s.n_u, s.n_y, s.p, theta, s.w.companion);
         return s.info->radius < 1;
     };
-    int low = 0, high = grid_size - 1; // low is known to be unstable
-    if (!stable(high)) return OKID_ERR_UNSTABLE;
-    while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        (stable(middle) ? high : low) = middle;
-    }
-    return stable(high) ? OKID_OK : OKID_ERR_UNSTABLE;
+    int k = grid_size - 1;
+    while (k > 0 && stable(k)) --k;
+    if (k == grid_size - 1) return OKID_ERR_UNSTABLE;
+    return stable(k + 1) ? OKID_OK : OKID_ERR_UNSTABLE;
 }
 
 } // namespace

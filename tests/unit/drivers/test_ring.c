@@ -28,9 +28,9 @@ static drv_frame_t numbered(uint32_t id) {
 }
 
 static void test_sizes(void) {
-    TEST_ASSERT_EQUAL_size_t(0, drv_ring_memsize(0));
-    TEST_ASSERT_EQUAL_size_t(0, drv_ring_memsize(1));
-    TEST_ASSERT_EQUAL_size_t(0, drv_ring_memsize(48));
+    TEST_ASSERT_EQUAL_UINT64(0, drv_ring_memsize(0));
+    TEST_ASSERT_EQUAL_UINT64(0, drv_ring_memsize(1));
+    TEST_ASSERT_EQUAL_UINT64(0, drv_ring_memsize(48));
     size_t bytes = drv_ring_memsize(64);
     block = malloc(bytes);
     TEST_ASSERT_NULL(drv_ring_create(64, block, bytes - 1));
@@ -42,21 +42,21 @@ static void test_overrun_is_counted_and_placed(void) {
     make(4);
     drv_frame_t in[6], out[8];
     for (uint32_t i = 0; i < 6; ++i) in[i] = numbered(i);
-    TEST_ASSERT_EQUAL_size_t(4, drv_ring_push(ring, in, 6));
+    TEST_ASSERT_EQUAL_UINT64(4, drv_ring_push(ring, in, 6));
     TEST_ASSERT_EQUAL_UINT64(2, drv_ring_overrun(ring));
-    TEST_ASSERT_EQUAL_size_t(4, drv_ring_used(ring));
-    TEST_ASSERT_EQUAL_size_t(0, drv_ring_push(ring, in, 1));
-    TEST_ASSERT_EQUAL_size_t(4, drv_ring_pop(ring, out, 8));
+    TEST_ASSERT_EQUAL_UINT64(4, drv_ring_used(ring));
+    TEST_ASSERT_EQUAL_UINT64(0, drv_ring_push(ring, in, 1));
+    TEST_ASSERT_EQUAL_UINT64(4, drv_ring_pop(ring, out, 8));
     for (uint32_t i = 0; i < 4; ++i) {
         TEST_ASSERT_EQUAL_UINT32(i, out[i].id);
         TEST_ASSERT_EQUAL_INT(0, out[i].loss);
     }
-    TEST_ASSERT_EQUAL_size_t(2, drv_ring_push(ring, in, 2));
-    TEST_ASSERT_EQUAL_size_t(2, drv_ring_pop(ring, out, 8));
+    TEST_ASSERT_EQUAL_UINT64(2, drv_ring_push(ring, in, 2));
+    TEST_ASSERT_EQUAL_UINT64(2, drv_ring_pop(ring, out, 8));
     TEST_ASSERT_EQUAL_INT(DRV_LOSS_DRIVER, out[0].loss);
     TEST_ASSERT_EQUAL_INT(0, out[1].loss);
     TEST_ASSERT_EQUAL_UINT64(3, drv_ring_overrun(ring));
-    TEST_ASSERT_EQUAL_size_t(0, drv_ring_pop(ring, out, 8));
+    TEST_ASSERT_EQUAL_UINT64(0, drv_ring_pop(ring, out, 8));
 }
 
 enum { FRAMES = 200000 };

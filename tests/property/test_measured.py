@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""Measured records (read from $OKID_DATA, else ../shared/data): the modes their references list are found."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import okid
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FRAME_HZ = [62, 119, 155, 193, 215, 230, 239, 287, 321, 334, 352, 398, 417, 468]
+PLANE_HZ = [18.84, 40.18, 97.53, 105.19, 143.37, 166.27]
+PLANE_ALL_HZ = [*PLANE_HZ, 87.74, 89.63, 117.91, 125.2, 125.69, 129.74, 135.12]
+
+
+def data_file(name: str) -> Path:
+    folder = Path(os.environ.get("OKID_DATA") or ROOT.parent / "shared" / "data")
+    path = folder / name
+    if not path.is_file():
+        message = f"reference data not found: {path}; set OKID_DATA to the folder that holds it"
+        if os.environ.get("CI") == "true":
+            pytest.fail(message)
+        pytest.skip(message)
+    return path
+
+
+def found(result: okid.Result, wanted: Sequence[float], within_hz: float) -> list[float]:
+    """The listed frequencies that the result has a mode near."""
+    have = np.array([mode.frequency_hz for mode in result.modes])
+    return [f for f in wanted if len(have) and np.min(np.abs(have - f)) <= within_hz]
+
+
+@pytest.fixture(scope="module")
+def frame() -> okid.records.CsvRecord:
+    return okid.read_csv(data_file("daisy_flexible_structure/daisy_flexible_structure.csv"))
+
+
+@pytest.fixture(scope="module")
+def plane() -> list[np.ndarray]:
+    return [okid.read_csv(data_file(f"uliege_plane_hammer/lab1_0000{k}.csv")).samples for k in (1, 2, 3, 4)]
+
+
+@pytest.mark.parametrize("options", [{}, {"p": 8, "rows": 30}, {"p": 15, "rows": 60}, {"order": 40}])
+def test_steel_frame_with_28_redundant_accelerometers(frame: okid.records.CsvRecord, options: dict[str, int]) -> None:
+    assert frame.fs_hz == 1024.0
+    assert frame.samples.shape == (8523, 30)
+    result = okid.identify(frame.samples[:, :2], frame.samples[:, 2:], fs=frame.fs_hz, **options)
+    assert len(found(result, FRAME_HZ, 1.0)) >= 13, result.table()
+    assert result.model.radius() < 1.0
+    codes = [w.code for w in result.warnings]
+    assert result.observer.radius_plain >= 1.0  # plain least squares explodes on these data (trap 22)
+    assert result.observer.radius < 1.0
+    assert "arx_stabilised" in codes
+    assert len(result.modes) <= 2 * len(FRAME_HZ)
+    assert np.median([v for v in result.fit.prediction_percent.values() if v is not None]) > 90.0
+
+
+@pytest.mark.parametrize("chosen", [(0,), (1,), (0, 1)], ids=["record 1", "record 2", "1 and 2 merged"])
+def test_struck_plane_from_rest(plane: list[np.ndarray], chosen: tuple[int, ...]) -> None:
+    forces, answers = [plane[k][:, :1] for k in chosen], [plane[k][:, 1:] for k in chosen]
+    result = okid.identify(forces, answers, fs=512.0, start="rest", hold="foh")
+    assert found(result, PLANE_HZ, 0.5) == PLANE_HZ, result.table()
+    assert len(found(result, PLANE_ALL_HZ, 0.5)) >= 11
+    assert result.model.radius() < 1.0
+    assert result.records == len(chosen)
+
+
+def test_a_hit_lost_in_the_first_samples_is_said(plane: list[np.ndarray]) -> None:
+    result = okid.identify(plane[0][:, :1], plane[0][:, 1:], fs=512.0)
+    assert "hit_at_start" in [w.code for w in result.warnings]

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""okid-report: one file, nothing from outside, the right pictures, clear refusals."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import okid
+import pytest
+import systems
+from okid import report
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("report")
+    s = systems.w2()
+    u, y = systems.record(s, 8000, 1.0, 1)
+    names = ["shaker A", "shaker <B>"] + [f"a{k}" for k in range(1, 7)]
+    result = okid.identify(u, y, fs=s.fs, p=20, input_names=names[:2], output_names=names[2:])
+    result.save(folder / "r.json")
+    rows = "\n".join(",".join(f"{x:.9g}" for x in row) for row in np.hstack([u, y]))
+    (folder / "r.csv").write_text(f"# fs_hz = {s.fs}\n{','.join(names)}\n{rows}\n", encoding="utf-8")
+    return folder / "r.json", folder / "r.csv"
+
+
+def pictures(html: str) -> dict[str, str]:
+    """Alternative text -> SVG of every picture; each must be whole XML."""
+    found = re.findall(r'<img alt="([^"]+)" src="data:image/svg\+xml;base64,([^"]+)">', html)
+    out = {alt: base64.b64decode(code).decode() for alt, code in found}
+    for svg in out.values():
+        ElementTree.fromstring(svg)
+    return out
+
+
+def test_report_with_record(made: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    target = made[0].with_name("full.html")
+    assert report.main([str(made[0]), "--record", str(made[1]), "--out", str(target), "--title", "A & B"]) == 0
+    assert str(target) in capsys.readouterr().out
+    html = target.read_text(encoding="utf-8")
+    shown = pictures(html)
+    for words in ("singular", "poles", "of the record", "mode shapes", "complex plane", "assurance", "fit", "Markov"):
+        assert any(words in alt for alt in shown), words
+    assert "<title>A &amp; B</title>" in html
+    assert "shaker &lt;B&gt;" in html
+    assert "<B>" not in html
+    outside = re.sub(r"base64,[^\"]+", "", html)
+    assert not re.findall(r"(?:https?:)?//\w|@import|<script|<link|url\(", outside)
+    result = json.loads(made[0].read_text(encoding="utf-8"))
+    for mode in result["modes"]:
+        assert f"<td>{mode['frequency_hz']:.4f}</td>" in html
+    assert "± σ" not in html
+    assert html.count("<h2>") == 10
+
+
+def test_report_without_record_says_what_is_missing(made: tuple[Path, Path]) -> None:
+    html = report.build(report.load_result(made[0]))
+    assert html.count("--record") == 2
+    assert len(pictures(html)) == 7
+
+
+def test_the_same_result_gives_the_same_bytes(made: tuple[Path, Path]) -> None:
+    first = report.build(report.load_result(made[0]), made[1])
+    assert report.build(report.load_result(made[0]), made[1]) == first
+
+
+def test_uncertainties_fill_their_columns(made: tuple[Path, Path], tmp_path: Path) -> None:
+    data = json.loads(made[0].read_text(encoding="utf-8"))
+    for mode in data["modes"]:
+        mode.update(frequency_std_hz=0.00123, damping_ratio_std=None)
+    data["modes"][0]["damping_ratio_std"] = 0.000456
+    path = tmp_path / "sigma.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    html = report.build(report.load_result(path))
+    assert "± σ [Hz]" in html
+    assert "<td>0.0012</td>" in html
+    assert "<td>0.046</td>" in html
+    assert "<td>–</td>" in html
+
+
+def test_live_results_without_fit_and_modes(made: tuple[Path, Path], tmp_path: Path) -> None:
+    data = json.loads(made[0].read_text(encoding="utf-8"))
+    data["model"]["x0"] = None
+    data["fit"] = {"simulation_percent": None, "prediction_percent": None}
+    data["modes"] = []
+    path = tmp_path / "live.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    html = report.build(report.load_result(path))
+    assert "no underdamped mode" in html
+    assert "holds no fit" in html
+
+
+def test_many_outputs_show_the_best_pairs() -> None:
+    rng = np.random.default_rng(1)
+    response = rng.standard_normal((50, 28, 2)) + 1j * rng.standard_normal((50, 28, 2))
+    coherence = np.full((50, 28), 0.5)
+    coherence[:, 20] = 1.0
+    pairs = report.choose_pairs(response, coherence)
+    assert len(pairs) == 4
+    assert {into for _, into in pairs} == {0, 1}
+    assert 20 in {out for out, _ in pairs}
+    assert len({out for out, _ in pairs}) == 4
+    assert report.choose_pairs(response[:, :1, :1], None) == [(0, 0)]
+    assert report.choose_pairs(response[:, :1, :], None) == [(0, 0), (0, 1)]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "No such file"),
+        ("{", "r.json:1:2: not JSON"),
+        ("[]", "schema is None"),
+        ('{"schema": "okid.result/2"}', "okid.result/2"),
+        ('{"schema": "okid.result/1"}', "'fs_hz' is missing"),
+    ],
+)
+def test_unreadable_results(
+    tmp_path: Path, content: str | None, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "r.json"
+    if content is not None:
+        path.write_text(content, encoding="utf-8")
+    assert report.main([str(path)]) == 2
+    message = capsys.readouterr().err
+    assert words in message
+    assert message.startswith("okid-report: ")
+    assert not list(tmp_path.glob("*.html"))
+
+
+def test_broken_matrices_and_foreign_records(
+    made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = json.loads(made[0].read_text(encoding="utf-8"))
+    data["model"]["B"] = data["model"]["B"][:-1]
+    broken = tmp_path / "broken.json"
+    broken.write_text(json.dumps(data), encoding="utf-8")
+    assert report.main([str(broken)]) == 2
+    assert "model.B" in capsys.readouterr().err
+    other = tmp_path / "other.csv"
+    other.write_text("# fs_hz = 10\nx,y\n1,2\n", encoding="utf-8")
+    assert report.main([str(made[0]), "--record", str(other), "--out", str(tmp_path / "o.html")]) == 2
+    assert "no column 'shaker A'" in capsys.readouterr().err
+    assert report.main([str(made[0]), "--out", str(tmp_path / "no" / "folder.html")]) == 2
+    assert not list(tmp_path.glob("*.html"))
+
+
+def test_help_as_a_module() -> None:
+    done = subprocess.run([sys.executable, "-m", "okid.report", "--help"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0
+    assert "example:" in done.stdout
+    done = subprocess.run([sys.executable, "-m", "okid.report"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2

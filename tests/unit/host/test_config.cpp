@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+// Every wrong CONFIG.toml ends with exit 2 and a message that names line, key, what was found and what was expected.
+#include "config.hpp"
+#include "error.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <unity.h>
+
+using namespace okid_host;
+
+namespace {
+
+std::filesystem::path room;
+
+const std::string good = R"([acquisition]
+rate_hz = 1000
+title = "test"
+[[bus]]
+name = "can0"
+interface = "vcan0"
+dbc = "okid.dbc"
+[[channel]]
+name = "a1"
+role = "acceleration"
+message = "OKID_Accel1"
+signal = "Accel1"
+[[channel]]
+name = "f1"
+role = "force"
+message = "OKID_Force"
+signal = "Force1"
+sequence = "Counter"
+[[channel]]
+name = "raw"
+role = "aux"
+can_id = 0x18FF0001
+start_bit = 7
+length = 12
+byte_order = "big"
+signed = true
+scale = 0.5
+offset = -1
+sequence = { start_bit = 16, length = 8 }
+[identification]
+p = 20
+order = "auto"
+window_s = 10
+)";
+
+live_config load(const std::string& text) {
+    const std::string path = (room / "c.toml").string();
+    std::ofstream(path, std::ios::binary) << text;
+    return load_config(path);
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    TEST_ASSERT_TRUE_MESSAGE(at != std::string::npos, from.c_str());
+    return text.replace(at, from.size(), to);
+}
+
+/// The config must be refused with exit 2 and all these words.
+void refuse(const std::string& text, std::initializer_list<const char*> words) {
+    try {
+        const live_config config = load(text);
+        require_identifiable(config);
+    } catch (const failure& error) {
+        TEST_ASSERT_EQUAL_INT_MESSAGE(exit_usage, error.code, error.what());
+        for (const char* word : words) {
+            const std::string message = std::string("\"") + word + "\" is not in: " + error.what();
+            TEST_ASSERT_TRUE_MESSAGE(std::string(error.what()).find(word) != std::string::npos, message.c_str());
+        }
+        return;
+    }
+    TEST_FAIL_MESSAGE(text.c_str());
+}
+
+void refuse_change(const char* from, const char* to, std::initializer_list<const char*> words) { refuse(replaced(good, from, to), words); }
+
+} // namespace
+
+void setUp(void) {
+    char pattern[] = "/tmp/okid-config-XXXXXX";
+    room = mkdtemp(pattern);
+    std::filesystem::copy_file(OKID_SOURCE_DIR "/drivers/proto/okid.dbc", room / "okid.dbc");
+}
+void tearDown(void) { std::filesystem::remove_all(room); }
+
+static void test_good() {
+    const live_config config = load(good);
+    TEST_ASSERT_EQUAL_INT(3, config.channels.size());
+    TEST_ASSERT_EQUAL_STRING("f1", config.channels[0].name.c_str()); // inputs, outputs, aux
+    TEST_ASSERT_EQUAL_STRING("a1", config.channels[1].name.c_str());
+    TEST_ASSERT_EQUAL_INT(1, config.n_u);
+    TEST_ASSERT_EQUAL_INT(1, config.n_y);
+    TEST_ASSERT_EQUAL_HEX32(0x100, config.channels[0].frame.id);
+    TEST_ASSERT_EQUAL_DOUBLE(0.01, config.channels[0].layout.scale);
+    TEST_ASSERT_EQUAL_STRING("N", config.channels[0].unit.c_str());
+    TEST_ASSERT_TRUE(config.channels[0].sequence.has_value());
+    TEST_ASSERT_FALSE(config.channels[1].sequence.has_value());
+    const channel_config& raw = config.channels[2];
+    TEST_ASSERT_EQUAL_INT(1, raw.frame.extended);
+    TEST_ASSERT_EQUAL_INT(1, raw.layout.big_endian);
+    TEST_ASSERT_EQUAL_DOUBLE(-1, raw.layout.offset);
+    TEST_ASSERT_EQUAL_INT(8, raw.sequence->length);
+    TEST_ASSERT_EQUAL_DOUBLE(10, *config.identification.window_s);
+    TEST_ASSERT_EQUAL_INT(3, wanted_frames(config, 0).size());
+}
+
+static void test_byte_order_mark_and_line_ends() {
+    std::string text = "\xEF\xBB\xBF";
+    for (const char c : good) text += c == '\n' ? std::string("\r\n") : std::string(1, c);
+    TEST_ASSERT_EQUAL_INT(3, load(text).channels.size());
+}
+
+static void test_unknown_keys() {
+    refuse_change("rate_hz", "rate_hzz", {"line 2", "[acquisition]", "\"rate_hzz\": unknown key", "did you mean \"rate_hz\"?"});
+    refuse_change("[identification]", "[identifcation]", {"unknown section", "did you mean \"identification\"?"});
+    refuse_change("title =", "windows_s =", {"line 3", "windows_s", "known here: rate_hz"});
+    refuse_change("interface =", "interfase =", {"line 6", "[[bus]] \"can0\"", "did you mean \"interface\"?"});
+    refuse_change("role = \"aux\"", "role = \"aux\"\nsgined = true", {"[[channel]] \"raw\"", "did you mean \"signed\"?"});
+    refuse("rate = 3\n" + good, {"line 1", "top level", "unknown key"});
+    refuse_change("length = 8 }", "length = 8, lenght = 2 }", {"unknown \"lenght\"", "start_bit, length, byte_order"});
+}
+
+static void test_wrong_types_and_ranges() {
+    refuse_change("rate_hz = 1000", "rate_hz = \"1000\"", {"line 2", "found \"1000\", expected a number above 0"});
+    refuse_change("rate_hz = 1000", "rate_hz = 0", {"found 0"});
+    refuse_change("rate_hz = 1000", "rate_hz = nan", {"line 2", "rate_hz"});
+    refuse_change("rate_hz = 1000", "", {"\"rate_hz\" is missing"});
+    refuse_change("p = 20", "p = 2.5", {"found 2.5, expected a whole number from 1 to 4096"});
+    refuse_change("p = 20", "p = 0", {"found 0"});
+    refuse_change("order = \"auto\"", "order = \"best\"", {"found \"best\"", "\"auto\""});
+    refuse_change("order = \"auto\"", "order = -2", {"found -2"});
+    refuse_change("signed = true", "signed = 1", {"found 1, expected true or false"});
+    refuse_change("length = 12", "length = 65", {"found 65", "from 1 to 64"});
+    refuse_change("role = \"force\"", "role = \"forse\"", {"found \"forse\"", "did you mean \"force\"?"});
+    refuse_change("window_s = 10", "window_s = 0.01", {"window_s", "2 p = 40"});
+    refuse_change("window_s = 10", "update_s = 0.0001", {"update_s", "at least one sample"});
+    refuse_change("[[bus]]", "[bus]", {"expected sections [[bus]]"});
+    refuse_change("[identification]", "[[identification]]", {"expected a section [identification]"});
+}
+
+static void test_not_available() {
+    refuse_change("p = 20", "method = \"n4sid-cva\"", {"method", "not available in this version"});
+    refuse_change("p = 20", "forgetting = 0.999", {"forgetting", "window_s", "choose one"});
+    refuse_change("p = 20", "detrend = \"linear\"", {"detrend", "linear"});
+    refuse_change("interface = \"vcan0\"", "type = \"serial\"\ndevice = \"/dev/ttyUSB0\"", {"type", "not available in this version"});
+    refuse_change("interface = \"vcan0\"", "type = \"usb\"", {"type", "expected one of: socketcan, slcan, serial, replay"});
+}
+
+static void test_channels() {
+    refuse_change("\"OKID_Force\"", "\"OKID_Forse\"", {"line 16", "[[channel]] \"f1\"", "did you mean \"OKID_Force\"?"});
+    refuse_change("\"Force1\"", "\"Force9\"", {"line 17", "found \"Force9\"", "OKID_Force"});
+    refuse_change("\"Counter\"", "\"Count\"", {"sequence", "did you mean \"Counter\"?"});
+    refuse_change("\"Counter\"", "\"Force2\"", {"sequence", "unsigned"});
+    refuse_change("name = \"f1\"", "name = \"a1\"", {"another [[channel]] has this name"});
+    refuse_change("signal = \"Force1\"", "", {"[[channel]] \"f1\"", "\"signal\" is missing"});
+    refuse_change("signal = \"Force1\"", "signal = \"Force1\"\nlength = 3", {"length", "not both"});
+    refuse_change("length = 12", "", {"\"length\" is missing"});
+    refuse_change("start_bit = 7", "start_bit = 510", {"start_bit", "byte 64"});
+    refuse_change("scale = 0.5", "scale = 0", {"scale", "found 0"});
+    refuse_change("role = \"force\"", "role = \"force\"\nbus = \"can1\"", {"bus", "found \"can1\"", "can0"});
+    refuse_change("role = \"force\"", "role = \"aux\"", {"role force", "ambient"});
+    refuse_change("role = \"acceleration\"", "role = \"aux\"", {"at least one response"});
+    refuse_change("dbc = \"okid.dbc\"", "", {"message", "has no dbc"});
+    refuse_change("dbc = \"okid.dbc\"", "dbc = \"none.dbc\"", {"none.dbc", "cannot be read"});
+}
+
+static void test_syntax_and_files() {
+    refuse_change("rate_hz = 1000", "rate_hz = = 1000", {"c.toml", "line 2, column"});
+    refuse("", {"c.toml"});
+    refuse(std::string("\x00\x01\xff", 3), {"c.toml"});
+    try {
+        load_config("/nonexistent.toml");
+        TEST_FAIL();
+    } catch (const failure& error) {
+        TEST_ASSERT_EQUAL_INT(exit_usage, error.code);
+    }
+}
+
+static void test_later_sections_are_checked_and_said_to_sleep() {
+    const live_config config = load(good + "[alarm]\nenabled = true\n[publish]\nudp = \"127.0.0.1:9870\"\n");
+    TEST_ASSERT_EQUAL_INT(2, config.warnings.size());
+    refuse(good + "[alarm]\nk_sigma = -1\n", {"[alarm]", "found -1"});
+    refuse(good + "[publish]\nudb = \"x\"\n", {"did you mean \"udp\"?"});
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_good);
+    RUN_TEST(test_byte_order_mark_and_line_ends);
+    RUN_TEST(test_unknown_keys);
+    RUN_TEST(test_wrong_types_and_ranges);
+    RUN_TEST(test_not_available);
+    RUN_TEST(test_channels);
+    RUN_TEST(test_syntax_and_files);
+    RUN_TEST(test_later_sections_are_checked_and_said_to_sleep);
+    return UNITY_END();
+}
