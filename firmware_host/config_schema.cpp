@@ -115,15 +115,25 @@ void check_value(const config_place& place, const toml::node& node, const key_ru
     }
 }
 
+using entry = std::pair<std::string_view, const toml::node*>;
+
+/// The entries of a table in the order of the file, so that the first fault is the one told.
+std::vector<entry> in_order(const toml::table& table) {
+    std::vector<entry> out;
+    for (const auto& [key, node] : table) out.emplace_back(key.str(), &node);
+    std::stable_sort(out.begin(), out.end(), [](const entry& a, const entry& b) { return a.second->source().begin < b.second->source().begin; });
+    return out;
+}
+
 void check_table(const config_place& place, const toml::table& table, const section_rule& rule) {
     std::vector<std::string> known;
     for (const key_rule& key : rule.keys) known.emplace_back(key.key);
-    for (const auto& [key, node] : table) {
-        const auto found = std::find_if(rule.keys.begin(), rule.keys.end(), [&](const key_rule& k) { return key.str() == k.key; });
+    for (const auto& [key, node] : in_order(table)) {
+        const std::string name(key);
+        const auto found = std::find_if(rule.keys.begin(), rule.keys.end(), [&](const key_rule& k) { return name == k.key; });
         if (found == rule.keys.end())
-            refuse_key(place, node, key.str(), fmt::format("unknown key{}; known here: {}", did_you_mean(std::string(key.str()), known),
-                                                           list_names(known)));
-        check_value(place, node, *found);
+            refuse_key(place, *node, key, fmt::format("unknown key{}; known here: {}", did_you_mean(name, known), list_names(known)));
+        check_value(place, *node, *found);
     }
 }
 
@@ -171,7 +181,7 @@ std::string entry_name(const char* section, const toml::table& entry, std::size_
 }
 
 void check_schema(const std::string& path, const toml::table& file) {
-    for (const auto& [key, node] : file) check_section(path, key.str(), node);
+    for (const auto& [key, node] : in_order(file)) check_section(path, key, *node);
 }
 
 } // namespace okid_host

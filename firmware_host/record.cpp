@@ -89,9 +89,9 @@ void check_status(okid_status_t status, const char* what) {
     if (status < 0) throw failure(exit_no_model, fmt::format("no model: {}: {}", what, okid_status_text(status)));
 }
 
-/// All records into one accumulator, a gap between each two.
+/// All records into one accumulator, a gap between each two. At rest: p samples of silence before each.
 std::unique_ptr<std::byte[]> accumulate(const std::vector<record_data>& records, const okid_identify_config_t& config,
-                                        okid_accumulator_t*& accumulator) {
+                                        bool at_rest, okid_accumulator_t*& accumulator) {
     okid_accumulator_config_t shape{};
     shape.n_u = config.n_u;
     shape.n_y = config.n_y;
@@ -105,8 +105,12 @@ std::unique_ptr<std::byte[]> accumulate(const std::vector<record_data>& records,
     const auto n_u = static_cast<std::size_t>(config.n_u), n_y = static_cast<std::size_t>(config.n_y);
     constexpr std::size_t piece = 4096;
     std::vector<double> v(piece * (n_u + n_y));
+    const std::vector<double> silence(at_rest ? static_cast<std::size_t>(config.p) * (n_u + n_y) : 0);
     for (const record_data& record : records) {
         okid_accumulator_gap(accumulator, 0);
+        if (at_rest)
+            check_status(okid_accumulator_add(accumulator, silence.data(), static_cast<std::size_t>(config.p)),
+                         record.path.c_str());
         for (std::size_t first = 0; first < record.count; first += piece) {
             const std::size_t n = std::min(piece, record.count - first);
             for (std::size_t i = 0; i < n; ++i) {
@@ -143,6 +147,7 @@ result_context describe(const std::vector<record_data>& records, const record_op
     context.outputs = options.outputs;
     context.hold = options.hold;
     context.detrend = options.detrend;
+    context.start = options.start;
     if (missing.samples)
         context.warnings.emplace_back("missing_samples",
                                       fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was "
@@ -199,7 +204,8 @@ record_result identify_records(std::vector<record_data> records, const record_op
     check_moving(records, options);
     check_different_inputs(records, options);
     if (options.detrend == "linear") detrend_linear(records, options);
-    if (options.detrend == "mean" && records.size() > 1) centre_each(records, options);
+    const bool at_rest = options.start == "rest";
+    if (options.detrend == "mean" && (records.size() > 1 || at_rest)) centre_each(records, options);
 
     okid_identify_config_t config{};
     config.n_u = static_cast<std::int32_t>(options.inputs.size());
@@ -209,11 +215,12 @@ record_result identify_records(std::vector<record_data> records, const record_op
     config.order = options.order;
     config.fs_hz = options.fs_hz;
     config.method = OKID_METHOD_OKID_ERA;
-    config.detrend = options.detrend == "mean" ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
+    config.detrend = options.detrend == "mean" && !at_rest ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
+    if (!at_rest) remark_early_hit(records, config.n_u, config.p, result.context);
 
     tell(options, "summing lagged products");
     okid_accumulator_t* accumulator = nullptr;
-    const auto sums = accumulate(records, config, accumulator);
+    const auto sums = accumulate(records, config, at_rest, accumulator);
     tell(options, "identifying");
     const std::size_t bytes = okid_identify_memsize(&config);
     result.memory = library_memory(bytes, config.p);

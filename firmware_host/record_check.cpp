@@ -119,4 +119,31 @@ void check_different_inputs(const std::vector<record_data>& records, const recor
     }
 }
 
+void remark_early_hit(const std::vector<record_data>& records, int n_u, int p, result_context& context) {
+    const auto inputs = static_cast<std::size_t>(n_u);
+    double early = 0, total = 0;
+    for (const record_data& record : records)
+        for (std::size_t k = 0; k < inputs; ++k) {
+            std::vector<double> values;
+            for (std::size_t i = k; i < record.u.size(); i += inputs)
+                if (!std::isnan(record.u[i])) values.push_back(record.u[i]);
+            if (values.empty()) continue;
+            const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+            std::nth_element(values.begin(), middle, values.end());
+            const double quiet = *middle;
+            for (std::size_t i = 0; i < record.count; ++i) {
+                const double x = record.u[i * inputs + k] - quiet;
+                if (std::isnan(x)) continue;
+                total += x * x;
+                if (i < static_cast<std::size_t>(p)) early += x * x;
+            }
+        }
+    if (!(early > 0.5 * total) || !(total > 0)) return;
+    context.warnings.emplace_back(
+        "hit_at_start",
+        fmt::format("most of the input energy lies in the first {} samples, which serve as history only: "
+                    "the hit is lost. If the structure was at rest before, use --start rest",
+                    p));
+}
+
 } // namespace okid_host

@@ -183,6 +183,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["order"] = model.n_z;
     out["hold"] = context.hold;
     out["detrend"] = context.detrend;
+    out["start"] = context.start;
     out["singular_values"] = vector_json(model.singular_values, model.singular_count);
     out["model"] = model_json(model, context);
     ordered_json blocks = ordered_json::array();

@@ -22,7 +22,7 @@ namespace {
 /// The command line as it was typed.
 struct identify_arguments {
     std::vector<std::string> records;
-    std::string inputs, outputs, method = "okid-era", order = "auto", hold = "zoh", detrend = "mean";
+    std::string inputs, outputs, method = "okid-era", order = "auto", hold = "zoh", detrend = "mean", start = "moving";
     std::string sensing = "acceleration", input_dofs, output_dofs, range, json, model;
     std::string fs, p = "40", rows;
     bool refine = false, quiet = false;
@@ -98,6 +98,7 @@ record_options check_options(const identify_arguments& given) {
     check_not_available(given);
     one_of("--hold", given.hold, {"zoh", "foh"});
     one_of("--detrend", given.detrend, {"none", "mean", "linear"});
+    one_of("--start", given.start, {"moving", "rest"});
     options.p = static_cast<int>(whole_number("--p", given.p, 1, 4096));
     if (!given.rows.empty()) options.rows = static_cast<int>(whole_number("--rows", given.rows, 2, 100000));
     if (given.order != "auto") {
@@ -108,6 +109,7 @@ record_options check_options(const identify_arguments& given) {
     options.method = given.method;
     options.hold = given.hold;
     options.detrend = given.detrend;
+    options.start = given.start;
     choose_channels(given, options);
     check_sensing(given.sensing, options.outputs.size());
     return options;
@@ -219,6 +221,12 @@ void add_identify(CLI::App& app) {
     command->add_option("--order", given->order, "number of states, or auto (default)")->type_name("N");
     command->add_option("--hold", given->hold, "force between samples: zoh (default) or foh")->type_name("KIND");
     command->add_option("--detrend", given->detrend, "none, mean (default) or linear")->type_name("KIND");
+    command
+        ->add_option(
+            "--start", given->start,
+            "moving (default): nothing is known before the record; rest: every record begins with the structure "
+            "at rest, as a hammer test with a short pre-trigger does")
+        ->type_name("STATE");
     command
         ->add_option("--sensing", given->sensing,
                      "acceleration (default), velocity, displacement; one, or one per output")

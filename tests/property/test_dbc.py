@@ -85,11 +85,12 @@ def test_decodes_as_cantools(tmp_path: Path, layout: dict, data: st.DataObject) 
     frames = [bytearray(data.draw(st.binary(min_size=layout["size"], max_size=layout["size"]))) for _ in range(6)]
     identifier = f"{layout['id']:08X}" if layout["extended"] else f"{layout['id']:03X}"
     mark_fd = "##0" if layout["size"] > 8 else "#"
+    pages = len({s["page"] for s in layout["signals"]})
     lines = []
     for n, frame in enumerate(frames):
         if layout["multiplexed"]:
-            frame[0] = n % 2
-        lines.append(f"({n // (2 if layout['multiplexed'] else 1) / RATE:.6f}) can0 {identifier}{mark_fd}{frame.hex().upper()}\n")
+            frame[0] = n % pages
+        lines.append(f"({n // pages / RATE:.6f}) can0 {identifier}{mark_fd}{frame.hex().upper()}\n")
     (tmp_path / "a.log").write_text("".join(lines))
     expected: dict[str, list[float]] = {s["name"]: [] for s in layout["signals"]}
     for frame in frames:

@@ -36,14 +36,15 @@ def okid(*arguments: object) -> None:
 def through_the_front_end(
     tmp_path: pathlib.Path, record: measured_can.Record, inputs: int, rate_hz: float, settings: str
 ) -> tuple[dict, list[dict]]:
-    """Encode, replay at two speeds' worth of code paths, return (result, events)."""
+    """Encode as CAN frames, replay, check that nothing was lost; returns (result, events)."""
     config = tmp_path / "rig.toml"
     measured_can.write_config(config, record, inputs, rate_hz, settings)
     measured_can.write_csv(tmp_path / "rig.csv", record, rate_hz)
     okid("convert", tmp_path / "rig.csv", tmp_path / "rig.log", "-c", config)
     frames = sum(1 for _ in (tmp_path / "rig.log").open())
     assert frames == len(record.values) * -(-len(record.names) // 3)
-    okid("replay", tmp_path / "rig.log", "-c", config, "--events", tmp_path / "events.jsonl", "--json", tmp_path / "r.json")
+    out = ["--events", tmp_path / "events.jsonl", "--json", tmp_path / "r.json"]
+    okid("replay", tmp_path / "rig.log", "-c", config, *out)
     events = [json.loads(line) for line in (tmp_path / "events.jsonl").open()]
     assert events[0]["type"] == "start"
     assert events[-1]["type"] == "result"
@@ -94,3 +95,19 @@ def test_hammer(tmp_path: pathlib.Path) -> None:
     check_model(result, record)
     assert found(result, HAMMER_POLES, 0.5) == HAMMER_POLES
     assert [event for event in events if event["type"] == "modes"]
+
+
+def test_hammer_from_rest(tmp_path: pathlib.Path) -> None:
+    """The hit comes five samples after the start: without the silent past it is lost as input, and that is said."""
+    path = data_file("uliege_plane_hammer", "lab1_00001.csv")
+    channels = ["--inputs", "force_N", "--outputs", "acc1_g,acc2_g,acc3_g", "--hold", "foh"]
+    results = {}
+    for start in ("moving", "rest"):
+        okid("identify", path, *channels, "--start", start, "--quiet", "--json", tmp_path / f"{start}.json")
+        results[start] = json.loads((tmp_path / f"{start}.json").read_text())
+        assert found(results[start], HAMMER_POLES, 0.5) == HAMMER_POLES
+    codes = {start: {w["code"] for w in result["warnings"]} for start, result in results.items()}
+    assert "hit_at_start" in codes["moving"]
+    assert "hit_at_start" not in codes["rest"]
+    for channel, better in results["rest"]["fit"]["simulation_percent"].items():
+        assert better > results["moving"]["fit"]["simulation_percent"][channel] + 10

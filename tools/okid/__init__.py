@@ -4,7 +4,10 @@
 okid.identify(u, y, fs=...) does a whole record; okid.Accumulator and okid.Identifier do it while samples arrive.
 """
 
-from okid import capture, frf, modal
+from importlib import import_module
+from typing import Any
+
+from okid import frf, modal
 from okid._errors import Error, IdentificationError, InputError
 from okid.accumulator import Accumulator, Stats
 from okid.demo import demo
@@ -28,7 +31,6 @@ __all__ = [
     "OrderPoles",
     "Result",
     "Stats",
-    "capture",
     "demo",
     "frf",
     "identify",
@@ -37,6 +39,13 @@ __all__ = [
     "read_csv",
     "usable_p",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """okid.capture and okid.report load when they are first used: they bring python-can and matplotlib with them."""
+    if name in ("capture", "report"):
+        return import_module(f"okid.{name}")
+    raise AttributeError(f"module 'okid' has no attribute {name!r}")
 
 
 def library_version() -> str:

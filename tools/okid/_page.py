@@ -39,6 +39,10 @@ footer { color: #7a8590; font-size: 13px; margin-top: 20px; }
 
 def picture(drawing: Figure, text: str) -> str:
     """The figure as an <img> that carries its SVG; the same numbers always give the same bytes."""
+    drawing.draw_without_rendering()
+    drawing.set_layout_engine("none")
+    for axes in drawing.axes:  # the layout solver is not repeatable in its last digits
+        axes.set_position(tuple(round(x, 4) for x in axes.get_position(original=True).bounds))
     buffer = io.BytesIO()
     drawing.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     code = base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -216,9 +216,10 @@ def _frf(result: Loaded, measured: Measured | None) -> tuple[str, list[tuple[int
     columns = len(pairs) if len(pairs) <= 3 else 2
     bands = -(-len(pairs) // columns)
     drawing = figures.figure(9.6, 3.7 * bands)
-    parts = np.atleast_2d(drawing.subfigures(bands, columns, squeeze=False))
-    for part, (out, into) in zip(parts.ravel(), pairs, strict=False):
-        axes = part.subplots(len(heights), 1, sharex=True, gridspec_kw={"height_ratios": heights})
+    grid = drawing.add_gridspec(bands, columns)
+    for place, (out, into) in enumerate(pairs):
+        cells = grid[divmod(place, columns)].subgridspec(len(heights), 1, height_ratios=heights)
+        axes: list[Any] = list(np.asarray(cells.subplots(sharex=True), dtype=object))
         figures.draw_frf(axes, data, line, model, (out, into))
         axes[0].set_title(f"{raw['outputs'][out]} / {raw['inputs'][into]}")
         axes[0].set_ylabel("magnitude")
