@@ -29,7 +29,8 @@ toml::table parse(const std::string& path) {
     std::error_code ignored;
     std::ifstream input(path, std::ios::binary);
     if (!input || std::filesystem::is_directory(path, ignored))
-        refuse_file(path, input ? "cannot be read: it is a folder, expected a CONFIG.toml" : "cannot be read: no such file or no permission");
+        refuse_file(path, input ? "cannot be read: it is a folder, expected a CONFIG.toml"
+                                : "cannot be read: no such file or no permission");
     std::stringstream text;
     text << input.rdbuf();
     try {
@@ -64,7 +65,8 @@ bus_config read_bus(const config_place& place, const toml::table& table) {
     if (bus.type == "slcan" || bus.type == "serial")
         refuse_key(place, *table.get("type"), "type",
                    fmt::format("\"{}\" is not available in this version; socketcan and replay are", bus.type));
-    if (bus.type == "socketcan") require_key(place, table, "interface", "a socketcan bus needs one, such as interface = \"can0\"");
+    if (bus.type == "socketcan")
+        require_key(place, table, "interface", "a socketcan bus needs one, such as interface = \"can0\"");
     if (bus.type == "replay") require_key(place, table, "file", "a replay bus needs a candump -L log");
     if (bus.interface.size() >= DRV_NAME_BYTES)
         refuse_key(place, *table.get("interface"), "interface", "an interface name has at most 15 characters");
@@ -74,7 +76,8 @@ bus_config read_bus(const config_place& place, const toml::table& table) {
 void read_acquisition(const std::string& path, const toml::table& file, live_config& config) {
     const toml::table* table = file["acquisition"].as_table();
     if (!table || !table->contains("rate_hz"))
-        refuse_file(path, "\"rate_hz\" is missing in [acquisition], expected the sample rate, such as rate_hz = 1000.0");
+        refuse_file(path,
+                    "\"rate_hz\" is missing in [acquisition], expected the sample rate, such as rate_hz = 1000.0");
     config.rate_hz = *(*table)["rate_hz"].value<double>();
     for (const auto& [key, node] : *table)
         if (node.is_string()) config.notes.emplace_back(key.str(), *node.value<std::string>());
@@ -83,7 +86,8 @@ void read_acquisition(const std::string& path, const toml::table& file, live_con
 void read_buses(const std::string& path, const toml::table& file, live_config& config) {
     const toml::array* entries = file["bus"].as_array();
     if (!entries || entries->empty()) refuse_file(path, "no [[bus]], expected at least one");
-    if (entries->size() > DRV_MAX_BUSES) refuse_file(path, fmt::format("{} buses, at most {} are possible", entries->size(), int{DRV_MAX_BUSES}));
+    if (entries->size() > DRV_MAX_BUSES)
+        refuse_file(path, fmt::format("{} buses, at most {} are possible", entries->size(), int{DRV_MAX_BUSES}));
     for (std::size_t i = 0; i < entries->size(); ++i) {
         const toml::table& table = *entries->get_as<toml::table>(i);
         const config_place place{path, entry_name("bus", table, i)};
@@ -91,7 +95,8 @@ void read_buses(const std::string& path, const toml::table& file, live_config& c
         for (const bus_config& other : config.buses) {
             if (other.name == bus.name) refuse_key(place, *table.get("name"), "name", "another [[bus]] has this name");
             if (!bus.interface.empty() && other.interface == bus.interface)
-                refuse_key(place, *table.get("interface"), "interface", fmt::format("bus \"{}\" uses it already", other.name));
+                refuse_key(place, *table.get("interface"), "interface",
+                           fmt::format("bus \"{}\" uses it already", other.name));
         }
         config.buses.push_back(std::move(bus));
     }
@@ -115,8 +120,9 @@ std::size_t bus_of(const config_place& place, const toml::table& table, const li
     const std::string name = *node->value<std::string>();
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-        refuse_key(place, *node, "bus", fmt::format("found \"{}\"{}, expected one of: {}", printable(name), did_you_mean(name, names),
-                                                    list_names(names)));
+        refuse_key(place, *node, "bus",
+                   fmt::format("found \"{}\"{}, expected one of: {}", printable(name), did_you_mean(name, names),
+                               list_names(names)));
     return static_cast<std::size_t>(found - names.begin());
 }
 
@@ -127,8 +133,11 @@ bool same_bits(const std::optional<drv_signal_t>& a, const std::optional<drv_sig
 /// One message has one counter; a channel that names none takes that of its neighbours in the message.
 void share_sequence(const config_place& place, const toml::table& table, live_config& config, channel_config& channel) {
     for (channel_config& other : config.channels) {
-        if (other.name == channel.name) refuse_key(place, *table.get("name"), "name", "another [[channel]] has this name");
-        if (other.bus != channel.bus || other.frame.id != channel.frame.id || other.frame.extended != channel.frame.extended) continue;
+        if (other.name == channel.name)
+            refuse_key(place, *table.get("name"), "name", "another [[channel]] has this name");
+        if (other.bus != channel.bus || other.frame.id != channel.frame.id ||
+            other.frame.extended != channel.frame.extended)
+            continue;
         if (channel.sequence && other.sequence && !same_bits(channel.sequence, other.sequence))
             refuse_key(place, *table.get("sequence"), "sequence",
                        fmt::format("channel \"{}\" of the same message names another counter", other.name));
@@ -160,7 +169,9 @@ void read_channels(const std::string& path, const toml::table& file, live_config
         share_sequence(place, table, config, channel);
         config.channels.push_back(std::move(channel));
     }
-    const auto rank = [](const channel_config& c) { return c.role == channel_role::force ? 0 : c.role == channel_role::aux ? 2 : 1; };
+    const auto rank = [](const channel_config& c) {
+        return c.role == channel_role::force ? 0 : c.role == channel_role::aux ? 2 : 1;
+    };
     std::stable_sort(config.channels.begin(), config.channels.end(),
                      [&](const channel_config& a, const channel_config& b) { return rank(a) < rank(b); });
     for (const channel_config& channel : config.channels) {
@@ -168,7 +179,8 @@ void read_channels(const std::string& path, const toml::table& file, live_config
         config.n_y += rank(channel) == 1;
     }
     if (config.n_u + config.n_y > 256)
-        refuse_file(path, fmt::format("{} force and response channels, at most 256 can be identified together", config.n_u + config.n_y));
+        refuse_file(path, fmt::format("{} force and response channels, at most 256 can be identified together",
+                                      config.n_u + config.n_y));
 }
 
 void read_identification(const std::string& path, const toml::table& file, live_config& config) {
@@ -179,11 +191,13 @@ void read_identification(const std::string& path, const toml::table& file, live_
     const toml::table& t = *table;
     out.method = t["method"].value_or(out.method);
     if (out.method != "okid-era")
-        refuse_key(place, *t.get("method"), "method", fmt::format("\"{}\" is not available in this version; okid-era is", out.method));
+        refuse_key(place, *t.get("method"), "method",
+                   fmt::format("\"{}\" is not available in this version; okid-era is", out.method));
     out.hold = t["hold"].value_or(out.hold);
     out.detrend = t["detrend"].value_or(out.detrend);
     if (out.detrend == "linear")
-        refuse_key(place, *t.get("detrend"), "detrend", "\"linear\" needs the whole record: none and mean are possible while a stream runs");
+        refuse_key(place, *t.get("detrend"), "detrend",
+                   "\"linear\" needs the whole record: none and mean are possible while a stream runs");
     out.p = static_cast<int>(t["p"].value_or(std::int64_t{out.p}));
     out.rows = static_cast<int>(t["rows"].value_or(std::int64_t{0}));
     out.order = static_cast<int>(t["order"].value_or(std::int64_t{0}));
@@ -191,14 +205,19 @@ void read_identification(const std::string& path, const toml::table& file, live_
     out.forgetting = t["forgetting"].value<double>();
     out.update_s = t["update_s"].value_or(out.update_s);
     if (out.window_s && out.forgetting)
-        refuse_key(place, *t.get("forgetting"), "forgetting", "window_s is given too; a window and forgetting together are not available, choose one");
+        refuse_key(place, *t.get("forgetting"), "forgetting",
+                   "window_s is given too; a window and forgetting together are not available, choose one");
     if (out.window_s && *out.window_s * config.rate_hz < 2.0 * out.p)
-        refuse_key(place, *t.get("window_s"), "window_s", fmt::format("{:g} s are {:.0f} samples at {:g} Hz, expected more than 2 p = {}",
-                                                                     *out.window_s, *out.window_s * config.rate_hz, config.rate_hz, 2 * out.p));
+        refuse_key(place, *t.get("window_s"), "window_s",
+                   fmt::format("{:g} s are {:.0f} samples at {:g} Hz, expected more than 2 p = {}", *out.window_s,
+                               *out.window_s * config.rate_hz, config.rate_hz, 2 * out.p));
     if (out.update_s * config.rate_hz < 1)
-        refuse_key(place, *t.get("update_s"), "update_s", fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
+        refuse_key(
+            place, *t.get("update_s"), "update_s",
+            fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
     if (t["mkr"].value_or(false))
-        config.warnings.emplace_back("[identification] mkr: mass, stiffness and damping matrices are not available in this version");
+        config.warnings.emplace_back(
+            "[identification] mkr: mass, stiffness and damping matrices are not available in this version");
 }
 
 /// Sections of later versions: checked, then said to do nothing.
@@ -225,10 +244,13 @@ live_config load_config(const std::string& path) {
 
 void require_identifiable(const live_config& config) {
     if (config.n_y == 0)
-        refuse_file(config.path, "no [[channel]] has the role acceleration, velocity or displacement, expected at least one response");
+        refuse_file(
+            config.path,
+            "no [[channel]] has the role acceleration, velocity or displacement, expected at least one response");
     if (config.n_u == 0)
-        refuse_file(config.path, "no [[channel]] has the role force: identification without a measured force (ambient) is not "
-                                 "available in this version");
+        refuse_file(config.path,
+                    "no [[channel]] has the role force: identification without a measured force (ambient) is not "
+                    "available in this version");
 }
 
 std::vector<drv_filter_t> wanted_frames(const live_config& config, std::size_t bus) {

@@ -13,7 +13,8 @@
 namespace okid_host {
 
 struct bus_config {
-    std::string name, type = "socketcan", interface, device, file, dbc; ///< paths already relative to the config's folder
+    std::string name, type = "socketcan", interface, device, file,
+                      dbc; ///< paths already relative to the config's folder
     bool fd = false;
     std::optional<double> bitrate, dbitrate;
 };
@@ -24,16 +25,16 @@ enum class channel_role { force, acceleration, velocity, displacement, aux };
 struct channel_config {
     std::string name;
     channel_role role = channel_role::aux;
-    int dof = 0; ///< 0 = not given
+    int dof = 0;      ///< 0 = not given
     std::string unit; ///< as measured
     std::size_t bus = 0;
-    std::string message, signal;             ///< names out of the DBC, "" without one
-    drv_filter_t frame{};                    ///< identifier
-    unsigned length = 0;                     ///< bytes of the message by the DBC, 0 = unknown
-    drv_signal_t layout{};                   ///< prepared
-    std::optional<drv_signal_t> selector;    ///< multiplexor of the signal …
-    std::uint64_t selector_value = 0;        ///< … and what it must hold
-    std::optional<drv_signal_t> sequence;    ///< counts samples
+    std::string message, signal;          ///< names out of the DBC, "" without one
+    drv_filter_t frame{};                 ///< identifier
+    unsigned length = 0;                  ///< bytes of the message by the DBC, 0 = unknown
+    drv_signal_t layout{};                ///< prepared
+    std::optional<drv_signal_t> selector; ///< multiplexor of the signal …
+    std::uint64_t selector_value = 0;     ///< … and what it must hold
+    std::optional<drv_signal_t> sequence; ///< counts samples
     /// 9.80665 for channels in g, else 1.
     double si_factor() const { return unit == "g" ? 9.80665 : 1.0; }
     /// Unit of the decoded channel once si_factor() is applied.

@@ -12,17 +12,20 @@ namespace okid_host {
 namespace {
 
 [[noreturn]] void refuse_table(const config_place& place, const toml::table& table, const std::string& text) {
-    throw failure(exit_usage, fmt::format("{}: line {}, {}: {}", place.path, table.source().begin.line, place.section, text));
+    throw failure(exit_usage,
+                  fmt::format("{}: line {}, {}: {}", place.path, table.source().begin.line, place.section, text));
 }
 
-const dbc_message& find_message(const config_place& place, const toml::node& node, const dbc_file& dbc, const std::string& name) {
+const dbc_message& find_message(const config_place& place, const toml::node& node, const dbc_file& dbc,
+                                const std::string& name) {
     std::vector<std::string> names;
     for (const dbc_message& message : dbc.messages) {
         if (message.name == name) return message;
         names.push_back(message.name);
     }
-    refuse_key(place, node, "message", fmt::format("found \"{}\"{}, expected a message of {}: {}", printable(name),
-                                                   did_you_mean(name, names), dbc.path, list_names(names, 16)));
+    refuse_key(place, node, "message",
+               fmt::format("found \"{}\"{}, expected a message of {}: {}", printable(name), did_you_mean(name, names),
+                           dbc.path, list_names(names, 16)));
 }
 
 const dbc_signal& find_signal(const config_place& place, const toml::node& node, const char* key, const dbc_file& dbc,
@@ -35,11 +38,13 @@ const dbc_signal& find_signal(const config_place& place, const toml::node& node,
         const char* wrong = drv_signal_prepare(&layout);
         if (!wrong && drv_signal_bytes(&layout) > message.length) wrong = "the signal ends beyond the message";
         if (!wrong && layout.scale == 0) wrong = "the factor of the signal is 0";
-        if (wrong) refuse_key(place, node, key, fmt::format("{}: line {}, signal {}: {}", dbc.path, signal.line, name, wrong));
+        if (wrong)
+            refuse_key(place, node, key, fmt::format("{}: line {}, signal {}: {}", dbc.path, signal.line, name, wrong));
         return signal;
     }
-    refuse_key(place, node, key, fmt::format("found \"{}\"{}, expected a signal of message {}: {}", printable(name),
-                                             did_you_mean(name, names), message.name, list_names(names, 16)));
+    refuse_key(place, node, key,
+               fmt::format("found \"{}\"{}, expected a signal of message {}: {}", printable(name),
+                           did_you_mean(name, names), message.name, list_names(names, 16)));
 }
 
 void check_sequence(const config_place& place, const toml::node& node, const drv_signal_t& signal) {
@@ -56,28 +61,32 @@ drv_signal_t sequence_of_table(const config_place& place, const toml::table& tab
         if (!node) refuse_key(place, table, "sequence", fmt::format("\"{}\" is missing in it", key));
         const auto value = node->value_exact<std::int64_t>();
         if (!value || *value < low || *value > high)
-            refuse_key(place, *node, "sequence", fmt::format("{}: found {}, expected a whole number from {} to {}", key,
-                                                             found_value(*node), low, high));
+            refuse_key(
+                place, *node, "sequence",
+                fmt::format("{}: found {}, expected a whole number from {} to {}", key, found_value(*node), low, high));
         return static_cast<std::uint16_t>(*value);
     };
     for (const auto& [key, node] : table)
         if (key.str() != "start_bit" && key.str() != "length" && key.str() != "byte_order")
             refuse_key(place, node, "sequence",
-                       fmt::format("unknown \"{}\" in it; known: start_bit, length, byte_order", printable(std::string(key.str()))));
+                       fmt::format("unknown \"{}\" in it; known: start_bit, length, byte_order",
+                                   printable(std::string(key.str()))));
     signal.start_bit = whole("start_bit", 0, 511);
     signal.length = whole("length", 2, 63);
     const std::string order = table["byte_order"].value_or(std::string("little"));
     if (order != "little" && order != "big" && order != "intel" && order != "motorola")
-        refuse_key(place, table, "sequence", fmt::format("byte_order: found \"{}\", expected little or big", printable(order)));
+        refuse_key(place, table, "sequence",
+                   fmt::format("byte_order: found \"{}\", expected little or big", printable(order)));
     signal.big_endian = order == "big" || order == "motorola";
     const char* wrong = drv_signal_prepare(&signal);
-    if (!wrong && message_bytes && drv_signal_bytes(&signal) > message_bytes) wrong = "the counter ends beyond the message";
+    if (!wrong && message_bytes && drv_signal_bytes(&signal) > message_bytes)
+        wrong = "the counter ends beyond the message";
     if (wrong) refuse_key(place, table, "sequence", wrong);
     return signal;
 }
 
-void resolve_sequence(const config_place& place, const toml::table& table, const dbc_file* dbc, const dbc_message* message,
-                      channel_config& channel) {
+void resolve_sequence(const config_place& place, const toml::table& table, const dbc_file* dbc,
+                      const dbc_message* message, channel_config& channel) {
     const toml::node* node = table.get("sequence");
     if (!node) return;
     if (const toml::table* bits = node->as_table()) {
@@ -86,7 +95,8 @@ void resolve_sequence(const config_place& place, const toml::table& table, const
     }
     if (!message)
         refuse_key(place, *node, "sequence",
-                   "the name of a signal needs a channel with message and signal of a dbc; expected { start_bit = 0, length = 16 }");
+                   "the name of a signal needs a channel with message and signal of a dbc; expected { start_bit = 0, "
+                   "length = 16 }");
     const dbc_signal& signal = find_signal(place, *node, "sequence", *dbc, *message, *node->value<std::string>());
     channel.sequence = signal.layout;
     check_sequence(place, *node, *channel.sequence);
@@ -96,14 +106,16 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
                      channel_config& channel) {
     for (const char* key : {"can_id", "extended", "start_bit", "length", "byte_order", "signed", "value", "field"})
         if (const toml::node* node = table.get(key))
-            refuse_key(place, *node, key, "a channel has either message and signal of a dbc, or can_id and start_bit, not both");
+            refuse_key(place, *node, key,
+                       "a channel has either message and signal of a dbc, or can_id and start_bit, not both");
     const toml::node *message_node = table.get("message"), *signal_node = table.get("signal");
     if (!message_node || !signal_node)
-        refuse_table(place, table, fmt::format("\"{}\" is missing beside \"{}\"", message_node ? "signal" : "message",
-                                               message_node ? "message" : "signal"));
+        refuse_table(place, table,
+                     fmt::format("\"{}\" is missing beside \"{}\"", message_node ? "signal" : "message",
+                                 message_node ? "message" : "signal"));
     if (!dbc)
-        refuse_key(place, *message_node, "message", fmt::format("bus \"{}\" has no dbc, expected dbc = \"FILE.dbc\" in its [[bus]]",
-                                                                bus.name));
+        refuse_key(place, *message_node, "message",
+                   fmt::format("bus \"{}\" has no dbc, expected dbc = \"FILE.dbc\" in its [[bus]]", bus.name));
     channel.message = *message_node->value<std::string>();
     channel.signal = *signal_node->value<std::string>();
     const dbc_message& message = find_message(place, *message_node, *dbc, channel.message);
@@ -116,8 +128,10 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
         const auto selector = std::find_if(message.signals.begin(), message.signals.end(),
                                            [](const dbc_signal& each) { return each.multiplexor && !each.mux_value; });
         if (selector == message.signals.end())
-            refuse_key(place, *signal_node, "signal", fmt::format("{}: line {}: the signal is multiplexed, but message {} has no "
-                                                                  "multiplexor (M)", dbc->path, signal.line, message.name));
+            refuse_key(place, *signal_node, "signal",
+                       fmt::format("{}: line {}: the signal is multiplexed, but message {} has no "
+                                   "multiplexor (M)",
+                                   dbc->path, signal.line, message.name));
         channel.selector = find_signal(place, *signal_node, "signal", *dbc, message, selector->name).layout;
         channel.selector_value = *signal.mux_value;
     }
@@ -127,12 +141,15 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
 void resolve_by_bits(const config_place& place, const toml::table& table, channel_config& channel) {
     for (const char* key : {"can_id", "start_bit", "length"})
         if (!table.get(key))
-            refuse_table(place, table, fmt::format("\"{}\" is missing: a channel needs message and signal (with a dbc on its bus), "
-                                                   "or can_id, start_bit and length", key));
+            refuse_table(place, table,
+                         fmt::format("\"{}\" is missing: a channel needs message and signal (with a dbc on its bus), "
+                                     "or can_id, start_bit and length",
+                                     key));
     const auto id = *table["can_id"].value<std::int64_t>();
     const bool extended = table["extended"].value_or(id > 0x7FF);
     if (!extended && id > 0x7FF)
-        refuse_key(place, *table.get("can_id"), "can_id", fmt::format("found {}, expected at most 2047 with extended = false", id));
+        refuse_key(place, *table.get("can_id"), "can_id",
+                   fmt::format("found {}, expected at most 2047 with extended = false", id));
     channel.frame = {static_cast<std::uint32_t>(id), static_cast<std::uint8_t>(extended)};
     channel.layout.start_bit = static_cast<std::uint16_t>(*table["start_bit"].value<std::int64_t>());
     channel.layout.length = static_cast<std::uint16_t>(*table["length"].value<std::int64_t>());
@@ -140,9 +157,12 @@ void resolve_by_bits(const config_place& place, const toml::table& table, channe
     channel.layout.big_endian = order == "big" || order == "motorola";
     channel.layout.is_signed = table["signed"].value_or(false);
     const std::string value = table["value"].value_or(std::string("integer"));
-    channel.layout.value = value == "float32" ? DRV_VALUE_FLOAT32 : value == "float64" ? DRV_VALUE_FLOAT64 : DRV_VALUE_INTEGER;
+    channel.layout.value = value == "float32"   ? DRV_VALUE_FLOAT32
+                           : value == "float64" ? DRV_VALUE_FLOAT64
+                                                : DRV_VALUE_INTEGER;
     channel.layout.scale = 1;
-    if (const char* wrong = drv_signal_prepare(&channel.layout)) refuse_key(place, *table.get("start_bit"), "start_bit", wrong);
+    if (const char* wrong = drv_signal_prepare(&channel.layout))
+        refuse_key(place, *table.get("start_bit"), "start_bit", wrong);
     resolve_sequence(place, table, nullptr, nullptr, channel);
 }
 
@@ -152,8 +172,10 @@ void resolve_channel(const config_place& place, const toml::table& table, const 
                      channel_config& channel) {
     if (const toml::node* node = table.get("field"))
         refuse_key(place, *node, "field", "serial fields are not available in this version");
-    if (table.contains("message") || table.contains("signal")) resolve_by_name(place, table, bus, dbc, channel);
-    else resolve_by_bits(place, table, channel);
+    if (table.contains("message") || table.contains("signal"))
+        resolve_by_name(place, table, bus, dbc, channel);
+    else
+        resolve_by_bits(place, table, channel);
     if (const toml::node* node = table.get("scale")) { // by hand, or to correct what the dbc says
         channel.layout.scale = *node->value<double>();
         if (channel.layout.scale == 0) refuse_key(place, *node, "scale", "found 0, expected another number");

@@ -30,45 +30,81 @@ struct section_rule {
     std::vector<key_rule> keys;
 };
 
-const std::vector<section_rule>& schema() {
-    static const std::vector<section_rule> rules = {
-        {"acquisition", false,
-         {{"rate_hz", kind::positive, 0, 1e6}, {"title", kind::text}, {"operator", kind::text}, {"structure", kind::text},
-          {"specimen", kind::text}, {"location", kind::text}, {"notes", kind::text}}},
-        {"bus", true,
-         {{"name", kind::text}, {"type", kind::choice, 0, 0, {"socketcan", "slcan", "serial", "replay"}},
-          {"interface", kind::text}, {"device", kind::text}, {"baud", kind::whole, 50, 2e7},
-          {"framing", kind::choice, 0, 0, {"cobs", "ascii", "witmotion"}}, {"file", kind::text}, {"fd", kind::flag},
-          {"bitrate", kind::whole, 1000, 2e7}, {"dbitrate", kind::whole, 1000, 2e7}, {"dbc", kind::text}}},
-        {"channel", true,
-         {{"name", kind::text},
-          {"role", kind::choice, 0, 0, {"force", "acceleration", "velocity", "displacement", "aux"}},
-          {"dof", kind::whole, 1, 100000}, {"unit", kind::text}, {"bus", kind::text}, {"message", kind::text},
-          {"signal", kind::text}, {"can_id", kind::whole, 0, 0x1FFFFFFF}, {"extended", kind::flag},
-          {"start_bit", kind::whole, 0, 511}, {"length", kind::whole, 1, 64},
-          {"byte_order", kind::choice, 0, 0, {"little", "big", "intel", "motorola"}}, {"signed", kind::flag},
-          {"value", kind::choice, 0, 0, {"integer", "float32", "float64"}}, {"scale", kind::number},
-          {"offset", kind::number}, {"field", kind::whole, 0, 1023}, {"sequence", kind::start_bits}}},
-        {"identification", false,
-         {{"method", kind::choice, 0, 0, {"okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"}},
-          {"p", kind::whole, 1, 4096}, {"rows", kind::whole, 2, 100000}, {"order", kind::order, 1, 10000},
-          {"hold", kind::choice, 0, 0, {"zoh", "foh"}}, {"detrend", kind::choice, 0, 0, {"none", "mean", "linear"}},
-          {"window_s", kind::positive, 0, 1e6}, {"forgetting", kind::positive, 0, 1}, {"update_s", kind::positive, 0, 1e5},
-          {"mkr", kind::flag}}},
-        {"alarm", false,
-         {{"enabled", kind::flag}, {"k_sigma", kind::positive, 0, 1e6}, {"baseline_updates", kind::whole, 1, 1000000}}},
-        {"trigger", false,
-         {{"source", kind::choice, 0, 0, {"immediate", "level", "gpio"}}, {"channel", kind::text}, {"level", kind::number},
-          {"pretrigger_s", kind::number, 0, 1e5}, {"chip", kind::text}, {"line", kind::whole, 0, 1023},
-          {"edge", kind::choice, 0, 0, {"rising", "falling", "both"}}}},
-        {"record", false,
-         {{"directory", kind::text}, {"segment_mb", kind::positive, 0, 1e6}, {"max_mb", kind::positive, 0, 1e9},
-          {"pretrigger_s", kind::number, 0, 1e5}}},
-        {"publish", false,
-         {{"socket", kind::text}, {"udp", kind::text}, {"prometheus", kind::text}, {"mqtt", kind::text}}},
-        {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
-    return rules;
-}
+const std::vector<section_rule> schema = {
+    {"acquisition",
+     false,
+     {{"rate_hz", kind::positive, 0, 1e6},
+      {"title", kind::text},
+      {"operator", kind::text},
+      {"structure", kind::text},
+      {"specimen", kind::text},
+      {"location", kind::text},
+      {"notes", kind::text}}},
+    {"bus",
+     true,
+     {{"name", kind::text},
+      {"type", kind::choice, 0, 0, {"socketcan", "slcan", "serial", "replay"}},
+      {"interface", kind::text},
+      {"device", kind::text},
+      {"baud", kind::whole, 50, 2e7},
+      {"framing", kind::choice, 0, 0, {"cobs", "ascii", "witmotion"}},
+      {"file", kind::text},
+      {"fd", kind::flag},
+      {"bitrate", kind::whole, 1000, 2e7},
+      {"dbitrate", kind::whole, 1000, 2e7},
+      {"dbc", kind::text}}},
+    {"channel",
+     true,
+     {{"name", kind::text},
+      {"role", kind::choice, 0, 0, {"force", "acceleration", "velocity", "displacement", "aux"}},
+      {"dof", kind::whole, 1, 100000},
+      {"unit", kind::text},
+      {"bus", kind::text},
+      {"message", kind::text},
+      {"signal", kind::text},
+      {"can_id", kind::whole, 0, 0x1FFFFFFF},
+      {"extended", kind::flag},
+      {"start_bit", kind::whole, 0, 511},
+      {"length", kind::whole, 1, 64},
+      {"byte_order", kind::choice, 0, 0, {"little", "big", "intel", "motorola"}},
+      {"signed", kind::flag},
+      {"value", kind::choice, 0, 0, {"integer", "float32", "float64"}},
+      {"scale", kind::number},
+      {"offset", kind::number},
+      {"field", kind::whole, 0, 1023},
+      {"sequence", kind::start_bits}}},
+    {"identification",
+     false,
+     {{"method", kind::choice, 0, 0, {"okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"}},
+      {"p", kind::whole, 1, 4096},
+      {"rows", kind::whole, 2, 100000},
+      {"order", kind::order, 1, 10000},
+      {"hold", kind::choice, 0, 0, {"zoh", "foh"}},
+      {"detrend", kind::choice, 0, 0, {"none", "mean", "linear"}},
+      {"window_s", kind::positive, 0, 1e6},
+      {"forgetting", kind::positive, 0, 1},
+      {"update_s", kind::positive, 0, 1e5},
+      {"mkr", kind::flag}}},
+    {"alarm",
+     false,
+     {{"enabled", kind::flag}, {"k_sigma", kind::positive, 0, 1e6}, {"baseline_updates", kind::whole, 1, 1000000}}},
+    {"trigger",
+     false,
+     {{"source", kind::choice, 0, 0, {"immediate", "level", "gpio"}},
+      {"channel", kind::text},
+      {"level", kind::number},
+      {"pretrigger_s", kind::number, 0, 1e5},
+      {"chip", kind::text},
+      {"line", kind::whole, 0, 1023},
+      {"edge", kind::choice, 0, 0, {"rising", "falling", "both"}}}},
+    {"record",
+     false,
+     {{"directory", kind::text},
+      {"segment_mb", kind::positive, 0, 1e6},
+      {"max_mb", kind::positive, 0, 1e9},
+      {"pretrigger_s", kind::number, 0, 1e5}}},
+    {"publish", false, {{"socket", kind::text}, {"udp", kind::text}, {"prometheus", kind::text}, {"mqtt", kind::text}}},
+    {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
 
 void check_number(const config_place& place, const toml::node& node, const key_rule& rule) {
     const bool whole = rule.what == kind::whole;
@@ -78,8 +114,10 @@ void check_number(const config_place& place, const toml::node& node, const key_r
         (rule.what != kind::positive || *value > rule.low))
         return;
     std::string expected = whole ? "a whole number" : "a number";
-    if (rule.what == kind::positive) expected += fmt::format(" above {:.10g}", rule.low);
-    else if (std::isfinite(rule.low)) expected += fmt::format(" from {:.10g}", rule.low);
+    if (rule.what == kind::positive)
+        expected += fmt::format(" above {:.10g}", rule.low);
+    else if (std::isfinite(rule.low))
+        expected += fmt::format(" from {:.10g}", rule.low);
     if (std::isfinite(rule.high)) expected += fmt::format(" to {:.10g}", rule.high);
     refuse_key(place, node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
 }
@@ -94,7 +132,8 @@ void check_choice(const config_place& place, const toml::node& node, const key_r
 
 void check_value(const config_place& place, const toml::node& node, const key_rule& rule) {
     const auto expect = [&](bool holds, const char* expected) {
-        if (!holds) refuse_key(place, node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
+        if (!holds)
+            refuse_key(place, node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
     };
     switch (rule.what) {
     case kind::text: expect(node.is_string() && !node.value<std::string>()->empty(), "text in quotes"); break;
@@ -121,7 +160,9 @@ using entry = std::pair<std::string_view, const toml::node*>;
 std::vector<entry> in_order(const toml::table& table) {
     std::vector<entry> out;
     for (const auto& [key, node] : table) out.emplace_back(key.str(), &node);
-    std::stable_sort(out.begin(), out.end(), [](const entry& a, const entry& b) { return a.second->source().begin < b.second->source().begin; });
+    std::stable_sort(out.begin(), out.end(), [](const entry& a, const entry& b) {
+        return a.second->source().begin < b.second->source().begin;
+    });
     return out;
 }
 
@@ -130,40 +171,46 @@ void check_table(const config_place& place, const toml::table& table, const sect
     for (const key_rule& key : rule.keys) known.emplace_back(key.key);
     for (const auto& [key, node] : in_order(table)) {
         const std::string name(key);
-        const auto found = std::find_if(rule.keys.begin(), rule.keys.end(), [&](const key_rule& k) { return name == k.key; });
+        const auto found =
+            std::find_if(rule.keys.begin(), rule.keys.end(), [&](const key_rule& k) { return name == k.key; });
         if (found == rule.keys.end())
-            refuse_key(place, *node, key, fmt::format("unknown key{}; known here: {}", did_you_mean(name, known), list_names(known)));
+            refuse_key(place, *node, key,
+                       fmt::format("unknown key{}; known here: {}", did_you_mean(name, known), list_names(known)));
         check_value(place, *node, *found);
     }
 }
 
 void check_section(const std::string& path, std::string_view key, const toml::node& node) {
-    const auto& rules = schema();
+    const auto& rules = schema;
     const auto rule = std::find_if(rules.begin(), rules.end(), [&](const section_rule& r) { return key == r.name; });
     const config_place top{path, "top level"};
     if (rule == rules.end()) {
         std::vector<std::string> known;
         for (const section_rule& each : rules) known.emplace_back(each.name);
-        refuse_key(top, node, key, fmt::format("unknown {}{}; known: {}", node.is_table() || node.is_array() ? "section" : "key",
-                                               did_you_mean(std::string(key), known), list_names(known)));
+        refuse_key(top, node, key,
+                   fmt::format("unknown {}{}; known: {}", node.is_table() || node.is_array() ? "section" : "key",
+                               did_you_mean(std::string(key), known), list_names(known)));
     }
     if (!rule->many) {
-        if (!node.is_table()) refuse_key(top, node, key, fmt::format("found {}, expected a section [{}]", found_value(node), key));
+        if (!node.is_table())
+            refuse_key(top, node, key, fmt::format("found {}, expected a section [{}]", found_value(node), key));
         check_table({path, fmt::format("[{}]", key)}, *node.as_table(), *rule);
         return;
     }
     const toml::array* entries = node.as_array();
     if (!entries || !entries->is_homogeneous(toml::node_type::table))
-        refuse_key(top, node, key, fmt::format("found {}, expected sections [[{}]] with two brackets", found_value(node), key));
+        refuse_key(top, node, key,
+                   fmt::format("found {}, expected sections [[{}]] with two brackets", found_value(node), key));
     for (std::size_t i = 0; i < entries->size(); ++i)
-        check_table({path, entry_name(rule->name, *entries->get_as<toml::table>(i), i)}, *entries->get_as<toml::table>(i), *rule);
+        check_table({path, entry_name(rule->name, *entries->get_as<toml::table>(i), i)},
+                    *entries->get_as<toml::table>(i), *rule);
 }
 
 } // namespace
 
 void refuse_key(const config_place& place, const toml::node& node, std::string_view key, const std::string& text) {
-    throw failure(exit_usage, fmt::format("{}: line {}, {}, key \"{}\": {}", place.path, node.source().begin.line, place.section,
-                                          printable(std::string(key)), text));
+    throw failure(exit_usage, fmt::format("{}: line {}, {}, key \"{}\": {}", place.path, node.source().begin.line,
+                                          place.section, printable(std::string(key)), text));
 }
 
 std::string found_value(const toml::node& node) {
@@ -177,7 +224,8 @@ std::string found_value(const toml::node& node) {
 
 std::string entry_name(const char* section, const toml::table& entry, std::size_t index) {
     const auto name = entry["name"].value<std::string>();
-    return name ? fmt::format("[[{}]] \"{}\"", section, printable(*name)) : fmt::format("[[{}]] number {}", section, index + 1);
+    return name ? fmt::format("[[{}]] \"{}\"", section, printable(*name))
+                : fmt::format("[[{}]] number {}", section, index + 1);
 }
 
 void check_schema(const std::string& path, const toml::table& file) {

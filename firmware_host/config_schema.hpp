@@ -14,7 +14,8 @@ struct config_place {
 };
 
 /// "path: line 12, [[channel]] "a1", key "unit": <text>" with exit 2.
-[[noreturn]] void refuse_key(const config_place& place, const toml::node& node, std::string_view key, const std::string& text);
+[[noreturn]] void refuse_key(const config_place& place, const toml::node& node, std::string_view key,
+                             const std::string& text);
 
 /// Value of a node for a message: `"abc"`, `12`, `true`, `a table`.
 std::string found_value(const toml::node& node);

@@ -6,9 +6,9 @@
 #include "error.hpp"
 #include "nearest_name.hpp"
 
+#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
@@ -24,12 +24,14 @@ constexpr std::uint32_t no_message_id = 0xC0000000u; // VECTOR__INDEPENDENT_SIG_
 /// One line under inspection; every refusal names file, line and column.
 class dbc_line {
   public:
-    dbc_line(const std::string& path, std::size_t number, std::string_view text) : path_(path), number_(number), text_(text) {}
+    dbc_line(const std::string& path, std::size_t number, std::string_view text)
+        : path_(path), number_(number), text_(text) {}
 
     [[noreturn]] void refuse(const std::string& expected) const {
-        const std::string found = at_ < text_.size() ? '"' + printable(std::string(text_.substr(at_)), 24) + '"' : "end of line";
-        throw failure(exit_usage, fmt::format("{}: line {}, column {}: found {}, expected {}", path_, number_, at_ + 1, found,
-                                              expected));
+        const std::string found =
+            at_ < text_.size() ? '"' + printable(std::string(text_.substr(at_)), 24) + '"' : "end of line";
+        throw failure(exit_usage, fmt::format("{}: line {}, column {}: found {}, expected {}", path_, number_, at_ + 1,
+                                              found, expected));
     }
     void blanks() {
         while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t')) ++at_;
@@ -92,7 +94,12 @@ class dbc_line {
 bool is_utf8(const std::string& text) {
     for (std::size_t i = 0; i < text.size();) {
         const auto byte = static_cast<unsigned char>(text[i]);
-        const std::size_t more = byte < 0x80 ? 0 : byte < 0xC2 ? 9 : byte < 0xE0 ? 1 : byte < 0xF0 ? 2 : byte < 0xF5 ? 3 : 9;
+        const std::size_t more = byte < 0x80   ? 0
+                                 : byte < 0xC2 ? 9
+                                 : byte < 0xE0 ? 1
+                                 : byte < 0xF0 ? 2
+                                 : byte < 0xF5 ? 3
+                                               : 9;
         if (more > 3 || i + more >= text.size()) return false;
         for (std::size_t k = 1; k <= more; ++k)
             if ((static_cast<unsigned char>(text[i + k]) & 0xC0) != 0x80) return false;
@@ -107,8 +114,10 @@ std::string to_utf8(const std::string& text) {
     std::string out;
     for (const char c : text) {
         const auto byte = static_cast<unsigned char>(c);
-        if (byte < 0x80) out += c;
-        else out += {static_cast<char>(0xC0 | byte >> 6), static_cast<char>(0x80 | (byte & 0x3F))};
+        if (byte < 0x80)
+            out += c;
+        else
+            out += {static_cast<char>(0xC0 | byte >> 6), static_cast<char>(0x80 | (byte & 0x3F))};
     }
     return out;
 }
@@ -143,7 +152,8 @@ void read_multiplexing(dbc_line& line, dbc_signal& signal) {
     const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value);
     const std::string_view rest(end, static_cast<std::size_t>(text.data() + text.size() - end));
     if (text[0] != 'm' || error != std::errc{} || (!rest.empty() && rest != "M"))
-        line.refuse(fmt::format("M, m<number> or ':' after the name of the signal, found \"{}\"", printable(std::string(text))));
+        line.refuse(fmt::format("M, m<number> or ':' after the name of the signal, found \"{}\"",
+                                printable(std::string(text))));
     signal.mux_value = value;
 }
 
@@ -158,10 +168,14 @@ dbc_signal read_signal(dbc_line& line) {
     line.need('|', "after the start bit");
     signal.layout.length = static_cast<std::uint16_t>(line.whole("the length in bits", 65535));
     line.need('@', "after the length");
-    if (line.take('0')) signal.layout.big_endian = 1;
-    else line.need('1', "or '0' (byte order) after '@'");
-    if (line.take('-')) signal.layout.is_signed = 1;
-    else line.need('+', "or '-' (sign) after the byte order");
+    if (line.take('0'))
+        signal.layout.big_endian = 1;
+    else
+        line.need('1', "or '0' (byte order) after '@'");
+    if (line.take('-'))
+        signal.layout.is_signed = 1;
+    else
+        line.need('+', "or '-' (sign) after the byte order");
     line.need('(', "before the factor");
     signal.layout.scale = line.number("the factor, a number");
     line.need(',', "between factor and offset");
@@ -210,7 +224,8 @@ dbc_file read_dbc(const std::string& path) {
     std::ifstream input(path, std::ios::binary);
     std::error_code ignored;
     if (!input || std::filesystem::is_directory(path, ignored))
-        throw failure(exit_usage, fmt::format("{}: cannot be read: {}", path, input ? "it is a folder" : std::strerror(errno)));
+        throw failure(exit_usage,
+                      fmt::format("{}: cannot be read: {}", path, input ? "it is a folder" : std::strerror(errno)));
     std::string whole_line;
     bool in_string = false, in_message = false, message_kept = false;
     for (std::size_t number = 1; std::getline(input, whole_line); ++number) {
@@ -236,7 +251,8 @@ dbc_file read_dbc(const std::string& path) {
         }
     }
     if (file.messages.empty())
-        throw failure(exit_usage, fmt::format("{}: found no message, expected a DBC file with lines that begin with BO_", path));
+        throw failure(exit_usage,
+                      fmt::format("{}: found no message, expected a DBC file with lines that begin with BO_", path));
     return file;
 }
 

@@ -12,8 +12,8 @@ namespace okid_host {
 
 struct dbc_signal {
     std::string name, unit;
-    drv_signal_t layout{};                 ///< prepared
-    bool multiplexor = false;              ///< selects which of the others are present
+    drv_signal_t layout{};                  ///< prepared
+    bool multiplexor = false;               ///< selects which of the others are present
     std::optional<std::uint64_t> mux_value; ///< present only when the multiplexor holds this
     std::size_t line = 0;
 };

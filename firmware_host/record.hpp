@@ -24,7 +24,8 @@ struct record_options {
     double fs_hz = 0;
     int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, order 0 = automatic
     std::string method = "okid-era", hold = "zoh", detrend = "mean";
-    std::string start = "moving"; ///< "rest": each record begins before the structure was struck, its silent past is used
+    std::string start =
+        "moving"; ///< "rest": each record begins before the structure was struck, its silent past is used
     std::function<void(const char* stage)> stage; ///< told what begins; may be empty
 };
 

@@ -19,9 +19,9 @@ struct result_context {
     long long gaps = 0;
     std::vector<std::string> inputs, outputs;
     std::string hold = "zoh", detrend = "mean", start = "moving";
-    std::optional<std::vector<std::vector<double>>> x0;       ///< one initial state per record; absent live (null)
-    std::optional<std::vector<double>> simulation_percent;    ///< per output; absent live (null)
-    std::optional<std::vector<double>> prediction_percent;    ///< per output; absent = null
+    std::optional<std::vector<std::vector<double>>> x0;        ///< one initial state per record; absent live (null)
+    std::optional<std::vector<double>> simulation_percent;     ///< per output; absent live (null)
+    std::optional<std::vector<double>> prediction_percent;     ///< per output; absent = null
     std::vector<std::pair<std::string, std::string>> warnings; ///< further (code, text)
 };
 

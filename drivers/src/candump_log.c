@@ -32,9 +32,7 @@ static int refuse(const cursor_t* self, const char* expected) {
     return -1;
 }
 
-static int peek(const cursor_t* self) {
-    return self->at < self->length ? (unsigned char)self->line[self->at] : -1;
-}
+static int peek(const cursor_t* self) { return self->at < self->length ? (unsigned char)self->line[self->at] : -1; }
 
 static int hex_digit(int c) {
     if (c >= '0' && c <= '9') return c - '0';

@@ -23,9 +23,7 @@ const char* drv_signal_prepare(drv_signal_t* self) {
     return NULL;
 }
 
-size_t drv_signal_bytes(const drv_signal_t* self) {
-    return (size_t)self->first + self->bytes;
-}
+size_t drv_signal_bytes(const drv_signal_t* self) { return (size_t)self->first + self->bytes; }
 
 /// Up to eight bytes as one number, the first byte least (little) or most (big) significant.
 static uint64_t load(const uint8_t* bytes, unsigned count, int big_endian) {

@@ -9,7 +9,7 @@
 struct drv_ring_t {
     size_t mask;
     drv_frame_t* slots;
-    int overran; ///< writer only: the next frame is the first after a loss
+    int overran;                     ///< writer only: the next frame is the first after a loss
     _Alignas(64) atomic_size_t head; ///< frames written
     _Alignas(64) atomic_size_t tail; ///< frames read
     _Alignas(64) atomic_uint_fast64_t overrun;

@@ -28,7 +28,8 @@ int drv_sink_open(drv_sink_t* self, const char* interface) {
     if (self->fd < 0 && (errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT))
         return explain(self, EAFNOSUPPORT, interface, "this kernel has no CAN (no AF_CAN or no can-raw)");
     if (self->fd < 0) return explain(self, errno, interface, strerror(errno));
-    if (strlen(interface) >= DRV_NAME_BYTES) return explain(self, EINVAL, interface, "an interface name has at most 15 characters");
+    if (strlen(interface) >= DRV_NAME_BYTES)
+        return explain(self, EINVAL, interface, "an interface name has at most 15 characters");
     int on = 1;
     (void)setsockopt(self->fd, SOL_CAN_RAW, CAN_RAW_FILTER, NULL, 0);
     (void)setsockopt(self->fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
@@ -66,8 +67,9 @@ int drv_sink_write(drv_sink_t* self, const drv_frame_t* frame, int patience_ms) 
         int code = errno;
         if (code == EINTR) continue;
         if ((code != ENOBUFS && code != EAGAIN) || waited_ms >= patience_ms) {
-            snprintf(self->error, sizeof self->error, "frame %llu cannot be sent: %s%s", (unsigned long long)self->sent + 1,
-                     strerror(code), code == EINVAL && bytes == CANFD_MTU ? " (an FD frame on an interface with mtu 16?)" : "");
+            snprintf(self->error, sizeof self->error, "frame %llu cannot be sent: %s%s",
+                     (unsigned long long)self->sent + 1, strerror(code),
+                     code == EINVAL && bytes == CANFD_MTU ? " (an FD frame on an interface with mtu 16?)" : "");
             return -code;
         }
         ++self->waits;

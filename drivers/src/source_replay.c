@@ -148,9 +148,7 @@ static int replay_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
     return count;
 }
 
-static void replay_stats(drv_source_t* self, drv_stats_t* out) {
-    *out = self->counts;
-}
+static void replay_stats(drv_source_t* self, drv_stats_t* out) { *out = self->counts; }
 
 static void replay_close(drv_source_t* self) {
     replay_t* state = self->state;

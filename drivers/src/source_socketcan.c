@@ -95,9 +95,12 @@ static int make_socket(drv_source_t* self, const socketcan_t* state, int* up) {
     memcpy(request.ifr_name, state->interface, sizeof state->interface);
     int code = 0;
     const char* why = "there is no such interface";
-    if (ioctl(fd, SIOCGIFHWADDR, &request) != 0) code = errno;
-    else if (request.ifr_hwaddr.sa_family != ARPHRD_CAN) code = ENODEV, why = "is not a CAN interface";
-    else if (ioctl(fd, SIOCGIFFLAGS, &request) != 0) code = errno;
+    if (ioctl(fd, SIOCGIFHWADDR, &request) != 0)
+        code = errno;
+    else if (request.ifr_hwaddr.sa_family != ARPHRD_CAN)
+        code = ENODEV, why = "is not a CAN interface";
+    else if (ioctl(fd, SIOCGIFFLAGS, &request) != 0)
+        code = errno;
     if (code == 0) {
         *up = (request.ifr_flags & IFF_UP) != 0;
         set_options(self, state, fd);

@@ -21,12 +21,18 @@ const char* role_name(channel_role role) {
 
 ordered_json bits_json(const drv_signal_t& signal) {
     static const char* const values[] = {"integer", "float32", "float64"};
-    return {{"start_bit", signal.start_bit}, {"length", signal.length}, {"byte_order", signal.big_endian ? "big" : "little"},
-            {"signed", signal.is_signed != 0}, {"value", values[signal.value]}, {"scale", signal.scale}, {"offset", signal.offset}};
+    return {{"start_bit", signal.start_bit},
+            {"length", signal.length},
+            {"byte_order", signal.big_endian ? "big" : "little"},
+            {"signed", signal.is_signed != 0},
+            {"value", values[signal.value]},
+            {"scale", signal.scale},
+            {"offset", signal.offset}};
 }
 
 ordered_json channel_json(const live_config& config, const channel_config& channel) {
-    ordered_json out{{"name", channel.name}, {"role", role_name(channel.role)}, {"unit", channel.unit}, {"bus", config.buses[channel.bus].name},
+    ordered_json out{{"name", channel.name},       {"role", role_name(channel.role)},
+                     {"unit", channel.unit},       {"bus", config.buses[channel.bus].name},
                      {"can_id", channel.frame.id}, {"extended", channel.frame.extended != 0}};
     out.update(bits_json(channel.layout));
     out["multiplexor"] = channel.selector ? bits_json(*channel.selector) : ordered_json(nullptr);
@@ -36,8 +42,9 @@ ordered_json channel_json(const live_config& config, const channel_config& chann
 }
 
 ordered_json config_json(const live_config& config) {
-    ordered_json out{{"schema", "okid.check/1"}, {"config", config.path}, {"rate_hz", config.rate_hz}, {"inputs", config.n_u},
-                     {"outputs", config.n_y}, {"channels", ordered_json::array()}, {"warnings", config.warnings}};
+    ordered_json out{{"schema", "okid.check/1"},   {"config", config.path}, {"rate_hz", config.rate_hz},
+                     {"inputs", config.n_u},       {"outputs", config.n_y}, {"channels", ordered_json::array()},
+                     {"warnings", config.warnings}};
     for (const channel_config& channel : config.channels) out["channels"].push_back(channel_json(config, channel));
     return out;
 }
@@ -51,21 +58,22 @@ std::string memory_text(const live_config& config) {
 
 std::string summary(const live_config& config, bool exact) {
     const identification_config& id = config.identification;
-    std::string out = fmt::format("{}: well\n\n{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", config.path, "channel", "role", "unit", "bus",
-                                  "identifier", "bits", "samples counted by");
+    std::string out = fmt::format("{}: well\n\n{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", config.path, "channel",
+                                  "role", "unit", "bus", "identifier", "bits", "samples counted by");
     for (const channel_config& channel : config.channels) {
         const drv_signal_t& layout = channel.layout;
         const char* kind = layout.value == DRV_VALUE_INTEGER ? (layout.is_signed ? "int" : "uint") : "float";
-        out += fmt::format("{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", channel.name, role_name(channel.role),
-                           channel.unit.empty() ? "-" : channel.unit, config.buses[channel.bus].name,
-                           fmt::format("{:#x}{}", channel.frame.id, channel.frame.extended ? " ext" : ""),
-                           fmt::format("{}{} at {} {}", kind, layout.length, layout.start_bit, layout.big_endian ? "big" : "little"),
-                           channel.sequence ? fmt::format("{}-bit counter", channel.sequence->length) : "time stamps");
+        out += fmt::format(
+            "{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", channel.name, role_name(channel.role),
+            channel.unit.empty() ? "-" : channel.unit, config.buses[channel.bus].name,
+            fmt::format("{:#x}{}", channel.frame.id, channel.frame.extended ? " ext" : ""),
+            fmt::format("{}{} at {} {}", kind, layout.length, layout.start_bit, layout.big_endian ? "big" : "little"),
+            channel.sequence ? fmt::format("{}-bit counter", channel.sequence->length) : "time stamps");
     }
-    out += fmt::format("\n{:g} Hz, {} force and {} response channel{}{}\n", config.rate_hz, config.n_u, config.n_y, config.n_y == 1 ? "" : "s",
-                       exact ? ", 16-bit codes summed exactly" : "");
-    out += fmt::format("{}, p {}, {} block rows, an update each {:g} s, memory: {}\n", id.method, id.p, id.rows ? id.rows : 2 * id.p, id.update_s,
-                       memory_text(config));
+    out += fmt::format("\n{:g} Hz, {} force and {} response channel{}{}\n", config.rate_hz, config.n_u, config.n_y,
+                       config.n_y == 1 ? "" : "s", exact ? ", 16-bit codes summed exactly" : "");
+    out += fmt::format("{}, p {}, {} block rows, an update each {:g} s, memory: {}\n", id.method, id.p,
+                       id.rows ? id.rows : 2 * id.p, id.update_s, memory_text(config));
     for (const std::string& text : config.warnings) out += fmt::format("remark: {}\n", text);
     return out;
 }
@@ -86,8 +94,9 @@ void add_check(CLI::App& app) {
         const live_config config = load_config(given->config);
         require_identifiable(config);
         const bool exact = identifier(config).exact(); // its memory is proved here, not in the lab
-        write_whole_file("-", given->json ? config_json(config).dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n"
-                                          : summary(config, exact));
+        write_whole_file(
+            "-", given->json ? config_json(config).dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n"
+                             : summary(config, exact));
     });
 }
 

@@ -62,7 +62,8 @@ bool has_net_admin() {
     std::ifstream input("/proc/self/status");
     std::string line;
     while (std::getline(input, line))
-        if (line.rfind("CapEff:", 0) == 0) return (std::strtoull(line.c_str() + 7, nullptr, 16) >> cap_net_admin & 1) != 0;
+        if (line.rfind("CapEff:", 0) == 0)
+            return (std::strtoull(line.c_str() + 7, nullptr, 16) >> cap_net_admin & 1) != 0;
     return false;
 }
 
@@ -78,14 +79,17 @@ bool check_kernel(findings& out) {
         return false;
     }
     out.missing("CAN in the kernel", fmt::format("no CAN sockets ({})", std::strerror(errno)),
-                "sudo modprobe can can-raw vcan (Debian: they are in linux-image; Ubuntu: apt-get install linux-modules-extra-$(uname -r)); "
+                "sudo modprobe can can-raw vcan (Debian: they are in linux-image; Ubuntu: apt-get install "
+                "linux-modules-extra-$(uname -r)); "
                 "without CAN: okid replay LOG -c CONFIG.toml");
     return false;
 }
 
 /// What iproute2 tells of a link, an empty object when it does not.
 nlohmann::json link_details(const std::string& interface) {
-    if (!in_path("ip") || interface.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-.") != std::string::npos) return nlohmann::json::object();
+    if (!in_path("ip") || interface.find_first_not_of(
+                              "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-.") != std::string::npos)
+        return nlohmann::json::object();
     FILE* pipe = popen(("ip -json -details link show dev " + interface + " 2>/dev/null").c_str(), "re");
     if (!pipe) return nlohmann::json::object();
     std::string text;
@@ -101,8 +105,11 @@ void check_interface(findings& out, const bus_config& bus) {
     const std::vector<std::string> there = can_interfaces();
     if (std::find(there.begin(), there.end(), bus.interface) == there.end()) {
         const bool other = if_nametoindex(bus.interface.c_str()) != 0;
-        out.missing(what, other ? "exists, but is no CAN interface" : "no such interface; CAN interfaces: " + (there.empty() ? "none" : list_names(there)),
-                    fmt::format("plug the adapter in, or sudo ip link add {0} type vcan && sudo ip link set {0} up", bus.interface));
+        out.missing(what,
+                    other ? "exists, but is no CAN interface"
+                          : "no such interface; CAN interfaces: " + (there.empty() ? "none" : list_names(there)),
+                    fmt::format("plug the adapter in, or sudo ip link add {0} type vcan && sudo ip link set {0} up",
+                                bus.interface));
         return;
     }
     const std::string folder = "/sys/class/net/" + bus.interface;
@@ -112,61 +119,86 @@ void check_interface(findings& out, const bus_config& bus) {
     const std::string rate = bitrate ? fmt::format(", {} bit/s", bitrate) : "";
     if (!(std::strtoul(first_line(folder + "/flags").c_str(), nullptr, 16) & IFF_UP)) {
         const bool real = details.value("/linkinfo/info_kind"_json_pointer, std::string()) == "can";
-        out.missing(what, "is down" + rate, fmt::format("sudo ip link set {} up{}", bus.interface, real ? " type can bitrate 1000000 restart-ms 100" : ""));
+        out.missing(what, "is down" + rate,
+                    fmt::format("sudo ip link set {} up{}", bus.interface,
+                                real ? " type can bitrate 1000000 restart-ms 100" : ""));
         return;
     }
     if (bus.fd && std::atoi(first_line(folder + "/mtu").c_str()) < 72)
-        out.missing(what, "up, but its mtu carries no FD frames", fmt::format("sudo ip link set {0} down && sudo ip link set {0} mtu 72 up", bus.interface));
+        out.missing(what, "up, but its mtu carries no FD frames",
+                    fmt::format("sudo ip link set {0} down && sudo ip link set {0} mtu 72 up", bus.interface));
     else if (bitrate && bus.bitrate && static_cast<double>(bitrate) != *bus.bitrate)
-        out.missing(what, fmt::format("up{}, expected {:.0f} bit/s", rate, *bus.bitrate),
-                    fmt::format("sudo ip link set {0} down && sudo ip link set {0} up type can bitrate {1:.0f} restart-ms 100", bus.interface, *bus.bitrate));
+        out.missing(
+            what, fmt::format("up{}, expected {:.0f} bit/s", rate, *bus.bitrate),
+            fmt::format("sudo ip link set {0} down && sudo ip link set {0} up type can bitrate {1:.0f} restart-ms 100",
+                        bus.interface, *bus.bitrate));
     else
         out.well(what, "up" + rate);
     if (bitrate && data.value("restart_ms", 0) == 0)
-        out.note(what, "restart-ms is 0: the bus stays off after bus-off; sudo ip link set " + bus.interface + " type can restart-ms 100 (while down)");
+        out.note(what, "restart-ms is 0: the bus stays off after bus-off; sudo ip link set " + bus.interface +
+                           " type can restart-ms 100 (while down)");
 }
 
 void check_buses(findings& out, const std::optional<live_config>& config, bool kernel_has_can) {
     if (!config) {
         const std::vector<std::string> there = can_interfaces();
-        if (!there.empty()) out.well("CAN interfaces", list_names(there));
+        if (!there.empty())
+            out.well("CAN interfaces", list_names(there));
         else if (kernel_has_can)
-            out.missing("CAN interfaces", "none", "plug an adapter in, or sudo ip link add vcan0 type vcan && sudo ip link set vcan0 up");
+            out.missing("CAN interfaces", "none",
+                        "plug an adapter in, or sudo ip link add vcan0 type vcan && sudo ip link set vcan0 up");
         return;
     }
     for (const bus_config& bus : config->buses) {
         if (bus.type == "socketcan" && kernel_has_can) check_interface(out, bus);
         if (bus.type != "replay") continue;
         const std::string what = fmt::format("bus {} (replay)", bus.name);
-        if (access(bus.file.c_str(), R_OK) == 0) out.well(what, bus.file);
-        else out.missing(what, fmt::format("{}: {}", bus.file, std::strerror(errno)), "put the log there, or correct file in the [[bus]]");
+        if (access(bus.file.c_str(), R_OK) == 0)
+            out.well(what, bus.file);
+        else
+            out.missing(what, fmt::format("{}: {}", bus.file, std::strerror(errno)),
+                        "put the log there, or correct file in the [[bus]]");
     }
 }
 
 void check_limits(findings& out) {
     const bool admin = has_net_admin();
     const long long limit = std::atoll(first_line("/proc/sys/net/core/rmem_max").c_str());
-    if (limit >= wanted_buffer) out.well("receive buffer", fmt::format("net.core.rmem_max is {} bytes", limit));
-    else if (admin) out.well("receive buffer", fmt::format("rmem_max is {} bytes, but CAP_NET_ADMIN lets okid take {}", limit, wanted_buffer));
+    if (limit >= wanted_buffer)
+        out.well("receive buffer", fmt::format("net.core.rmem_max is {} bytes", limit));
+    else if (admin)
+        out.well("receive buffer",
+                 fmt::format("rmem_max is {} bytes, but CAP_NET_ADMIN lets okid take {}", limit, wanted_buffer));
     else
-        out.missing("receive buffer", fmt::format("net.core.rmem_max is {} bytes, expected {}: bursts may be lost", limit, wanted_buffer),
-                    fmt::format("sudo sysctl -w net.core.rmem_max={0} (keep it: echo net.core.rmem_max={0} | sudo tee /etc/sysctl.d/60-okid.conf)", wanted_buffer));
+        out.missing("receive buffer",
+                    fmt::format("net.core.rmem_max is {} bytes, expected {}: bursts may be lost", limit, wanted_buffer),
+                    fmt::format("sudo sysctl -w net.core.rmem_max={0} (keep it: echo net.core.rmem_max={0} | sudo tee "
+                                "/etc/sysctl.d/60-okid.conf)",
+                                wanted_buffer));
     const std::string clock = first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource");
     const bool slow = clock == "hpet" || clock == "acpi_pm" || clock == "jiffies";
-    if (clock.empty()) out.note("clock", "the kernel does not tell its clock source");
-    else if (slow) out.note("clock", clock + " is slow to read; time stamps of the kernel are coarser than with tsc");
-    else out.well("clock", clock);
-    if (in_path("candump") && in_path("canplayer")) out.well("can-utils", "candump and canplayer are there");
-    else out.missing("can-utils", "candump and canplayer were not found (recording and playing logs)", "sudo apt-get install can-utils");
+    if (clock.empty())
+        out.note("clock", "the kernel does not tell its clock source");
+    else if (slow)
+        out.note("clock", clock + " is slow to read; time stamps of the kernel are coarser than with tsc");
+    else
+        out.well("clock", clock);
+    if (in_path("candump") && in_path("canplayer"))
+        out.well("can-utils", "candump and canplayer are there");
+    else
+        out.missing("can-utils", "candump and canplayer were not found (recording and playing logs)",
+                    "sudo apt-get install can-utils");
 }
 
 } // namespace
 
 void add_doctor(CLI::App& app) {
     auto path = std::make_shared<std::string>();
-    CLI::App* command = app.add_subcommand("doctor", "Look at what this machine lacks for a live measurement, and say how to mend it");
+    CLI::App* command =
+        app.add_subcommand("doctor", "Look at what this machine lacks for a live measurement, and say how to mend it");
     command->add_option("config", *path, "also look at the buses of this file")->type_name("CONFIG.toml");
-    command->footer("Exit 0: all well. 2: the config is wrong. 4: something is missing.\n\nExample:\n  okid doctor frame.toml");
+    command->footer(
+        "Exit 0: all well. 2: the config is wrong. 4: something is missing.\n\nExample:\n  okid doctor frame.toml");
     command->callback([path] {
         std::optional<live_config> config;
         if (!path->empty()) config = load_config(*path);
@@ -174,7 +206,9 @@ void add_doctor(CLI::App& app) {
         const bool kernel_has_can = check_kernel(out);
         check_buses(out, config, kernel_has_can);
         check_limits(out);
-        if (out.count() > 0) throw failure(exit_device, fmt::format("{} thing{} missing, see above", out.count(), out.count() == 1 ? "" : "s"));
+        if (out.count() > 0)
+            throw failure(exit_device,
+                          fmt::format("{} thing{} missing, see above", out.count(), out.count() == 1 ? "" : "s"));
     });
 }
 

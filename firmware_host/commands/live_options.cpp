@@ -16,7 +16,8 @@ namespace {
 std::optional<double> positive(const std::string& text) {
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || !(value > 0) || !std::isfinite(value)) return std::nullopt;
+    if (error != std::errc{} || end != text.data() + text.size() || !(value > 0) || !std::isfinite(value))
+        return std::nullopt;
     return value;
 }
 
@@ -24,21 +25,25 @@ std::optional<double> positive(const std::string& text) {
 
 void add_output_options(CLI::App& command, live_arguments& given) {
     command.add_option("--duration", given.duration, "end after this much stream time")->type_name("SECONDS");
-    command.add_option("--events", given.events, "write events as JSON lines to FILE, - is stdout (then no table)")->type_name("FILE");
+    command.add_option("--events", given.events, "write events as JSON lines to FILE, - is stdout (then no table)")
+        ->type_name("FILE");
     command.add_option("--json", given.json, "write the final okid.result/1 to FILE, - is stdout")->type_name("FILE");
 }
 
 std::optional<double> parse_seconds(const char* option, const std::string& text) {
     if (text.empty()) return std::nullopt;
     const auto value = positive(text);
-    if (!value || *value > 1e9) throw failure(exit_usage, fmt::format("{}: found \"{}\", expected seconds above 0", option, printable(text)));
+    if (!value || *value > 1e9)
+        throw failure(exit_usage, fmt::format("{}: found \"{}\", expected seconds above 0", option, printable(text)));
     return value;
 }
 
 std::optional<double> parse_speed(const std::string& text) {
     if (text.empty() || text == "max") return std::nullopt;
     const auto value = positive(text);
-    if (!value) throw failure(exit_usage, fmt::format("--speed: found \"{}\", expected max or a factor above 0 (1 = as it was)", printable(text)));
+    if (!value)
+        throw failure(exit_usage, fmt::format("--speed: found \"{}\", expected max or a factor above 0 (1 = as it was)",
+                                              printable(text)));
     return value;
 }
 
@@ -48,12 +53,14 @@ session_options check_live(const live_arguments& given, const live_config& confi
     options.duration_s = parse_seconds("--duration", given.duration);
     options.events = given.events;
     options.json = given.json;
-    if (given.events == "-" && given.json == "-") throw failure(exit_usage, "--events - and --json - both want stdout, expected a file for one of them");
+    if (given.events == "-" && given.json == "-")
+        throw failure(exit_usage, "--events - and --json - both want stdout, expected a file for one of them");
     if (!given.events.empty() && given.events == given.json && given.json != "-")
         throw failure(exit_usage, fmt::format("--events and --json name the same file \"{}\"", printable(given.json)));
     for (const std::string& target : {given.events, given.json})
         if (!target.empty() && target != "-") check_writable(target);
-    for (const std::string& text : config.warnings) std::fprintf(stderr, "okid: %s: %s\n", config.path.c_str(), text.c_str());
+    for (const std::string& text : config.warnings)
+        std::fprintf(stderr, "okid: %s: %s\n", config.path.c_str(), text.c_str());
     return options;
 }
 

@@ -16,15 +16,19 @@ struct replay_arguments : live_arguments {
 
 void replay(const replay_arguments& given) {
     if (given.log.size() > 4 && given.log.substr(given.log.size() - 4) == ".okj")
-        throw failure(exit_usage, given.log + ": journals are not available in this version; a candump -L log (.log) is");
+        throw failure(exit_usage,
+                      given.log + ": journals are not available in this version; a candump -L log (.log) is");
     const std::optional<double> speed = parse_speed(given.speed);
     if (!given.to.empty()) {
         if (!given.config.empty() || !given.events.empty() || !given.json.empty() || !given.duration.empty())
-            throw failure(exit_usage, "--to plays the log onto a bus and identifies nothing: leave -c, --events, --json and --duration out");
+            throw failure(
+                exit_usage,
+                "--to plays the log onto a bus and identifies nothing: leave -c, --events, --json and --duration out");
         play_onto_bus(given.log, given.to, given.speed.empty() ? std::optional<double>(1.0) : speed);
         return;
     }
-    if (given.config.empty()) throw failure(exit_usage, "-c CONFIG.toml is missing (or --to INTERFACE, to play the log onto a bus)");
+    if (given.config.empty())
+        throw failure(exit_usage, "-c CONFIG.toml is missing (or --to INTERFACE, to play the log onto a bus)");
     const live_config config = load_config(given.config);
     const session_options options = check_live(given, config);
     play_through_session(given.log, config, options, speed);
@@ -34,14 +38,20 @@ void replay(const replay_arguments& given) {
 
 void add_replay(CLI::App& app) {
     auto given = std::make_shared<replay_arguments>();
-    CLI::App* command = app.add_subcommand("replay", "Play a recorded candump -L log through the live path, or onto a bus");
+    CLI::App* command =
+        app.add_subcommand("replay", "Play a recorded candump -L log through the live path, or onto a bus");
     command->add_option("log", given->log, "a log of candump -L")->required()->type_name("LOG");
-    command->add_option("-c,--config", given->config, "what the frames mean and how to identify")->type_name("CONFIG.toml");
-    command->add_option("--speed", given->speed, "max (default), or a multiple of the log's own time (default with --to: 1)")->type_name("N");
+    command->add_option("-c,--config", given->config, "what the frames mean and how to identify")
+        ->type_name("CONFIG.toml");
+    command
+        ->add_option("--speed", given->speed,
+                     "max (default), or a multiple of the log's own time (default with --to: 1)")
+        ->type_name("N");
     command->add_option("--to", given->to, "play onto this interface instead")->type_name("INTERFACE");
     add_output_options(*command, *given);
     command->footer("The result is the same at every speed.\n\n"
-                    "Examples:\n  okid replay frame.log -c frame.toml --json result.json\n  okid replay frame.log --to vcan0 --speed 2");
+                    "Examples:\n  okid replay frame.log -c frame.toml --json result.json\n  okid replay frame.log --to "
+                    "vcan0 --speed 2");
     command->callback([given] { replay(*given); });
 }
 

@@ -16,13 +16,15 @@ namespace {
 void run(const live_arguments& given) {
     const live_config config = load_config(given.config);
     const session_options options = check_live(given, config);
-    const auto replays = std::count_if(config.buses.begin(), config.buses.end(), [](const bus_config& bus) { return bus.type == "replay"; });
+    const auto replays = std::count_if(config.buses.begin(), config.buses.end(),
+                                       [](const bus_config& bus) { return bus.type == "replay"; });
     if (replays == 0) {
         capture(config, options);
         return;
     }
     if (config.buses.size() != 1)
-        throw failure(exit_usage, fmt::format("{}: a bus of type replay stands beside another bus, expected it alone", config.path));
+        throw failure(exit_usage, fmt::format("{}: a bus of type replay stands beside another bus, expected it alone",
+                                              config.path));
     play_through_session(config.buses.front().file, config, options, std::nullopt);
 }
 
@@ -31,7 +33,9 @@ void run(const live_arguments& given) {
 void add_run(CLI::App& app) {
     auto given = std::make_shared<live_arguments>();
     CLI::App* command = app.add_subcommand("run", "Acquire from the buses of a CONFIG.toml and identify while it runs");
-    command->add_option("config", given->config, "what to acquire and how to identify")->required()->type_name("CONFIG.toml");
+    command->add_option("config", given->config, "what to acquire and how to identify")
+        ->required()
+        ->type_name("CONFIG.toml");
     add_output_options(*command, *given);
     command->footer("Ends in order, with the result, on Ctrl-C, SIGTERM or after --duration.\n\n"
                     "Example:\n  okid run frame.toml --duration 60 --events events.jsonl --json result.json");

@@ -17,7 +17,9 @@ namespace {
 
 using clock_type = std::chrono::steady_clock;
 
-double seconds_since(clock_type::time_point then) { return std::chrono::duration<double>(clock_type::now() - then).count(); }
+double seconds_since(clock_type::time_point then) {
+    return std::chrono::duration<double>(clock_type::now() - then).count();
+}
 
 /// Owns the eventfd the readers write to.
 struct wake_event {
@@ -35,7 +37,8 @@ class pump {
   public:
     pump(const live_config& config, session& target) : session_(target), frames_(256) {
         for (std::size_t i = 0; i < config.buses.size(); ++i)
-            readers_.push_back(std::make_unique<bus_reader>(config.buses[i].interface, i, wanted_frames(config, i), wake_.fd));
+            readers_.push_back(
+                std::make_unique<bus_reader>(config.buses[i].interface, i, wanted_frames(config, i), wake_.fd));
         down_.assign(readers_.size(), 0);
     }
 
@@ -56,7 +59,8 @@ class pump {
             if (duration_s && seconds_since(heard) > 2 && seconds_since(begin) > *duration_s + 2) break;
         }
         for (auto& reader : readers_) reader->stop();
-        while (!session_.done() && move_frames(false)) {}
+        while (!session_.done() && move_frames(false)) {
+        }
         tell_losses();
     }
 
@@ -64,7 +68,9 @@ class pump {
     bool move_frames(bool bounded) {
         bool any = false;
         for (auto& reader : readers_)
-            for (std::size_t count; !session_.done() && !(bounded && stop_requested()) && (count = reader->take(frames_.data(), frames_.size())) > 0; any = true) {
+            for (std::size_t count; !session_.done() && !(bounded && stop_requested()) &&
+                                    (count = reader->take(frames_.data(), frames_.size())) > 0;
+                 any = true) {
                 tell_losses();
                 for (std::size_t i = 0; i < count; ++i) session_.frame(frames_[i]);
             }
@@ -81,7 +87,8 @@ class pump {
             const drv_stats_t stats = readers_[i]->stats();
             if (stats.link_down == down_[i]) continue;
             down_[i] = stats.link_down;
-            std::fprintf(stderr, "okid: interface %s went down or away; waiting for it\n", readers_[i]->interface().c_str());
+            std::fprintf(stderr, "okid: interface %s went down or away; waiting for it\n",
+                         readers_[i]->interface().c_str());
         }
     }
 

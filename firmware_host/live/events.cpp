@@ -15,13 +15,12 @@ namespace {
 
 constexpr double redraw_s = 0.1; // a replay at full speed updates faster than an eye
 
-double now_s() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 std::string state_text(const live_status& status) {
     std::string text = status.model ? (status.settled ? "settled" : "settling") : status.waiting;
-    if (status.gaps) text += fmt::format(", {} missing in {} gap{}", status.missing, status.gaps, status.gaps == 1 ? "" : "s");
+    if (status.gaps)
+        text += fmt::format(", {} missing in {} gap{}", status.missing, status.gaps, status.gaps == 1 ? "" : "s");
     return text;
 }
 
@@ -30,7 +29,8 @@ std::string state_text(const live_status& status) {
 event_stream::event_stream(const std::string& path) : path_(path) {
     if (path.empty()) return;
     file_ = path == "-" ? stdout : std::fopen(path.c_str(), "we");
-    if (!file_) throw failure(exit_usage, fmt::format("--events {}: cannot be written: {}", path, std::strerror(errno)));
+    if (!file_)
+        throw failure(exit_usage, fmt::format("--events {}: cannot be written: {}", path, std::strerror(errno)));
 }
 
 event_stream::~event_stream() {
@@ -58,7 +58,8 @@ void live_view::show(const live_status& status) {
     }
     std::string line = fmt::format("t {:.3f} s", status.t);
     for (int k = 0; status.model && k < status.model->mode_count; ++k)
-        line += fmt::format("{} {:.4f} Hz {:.3f} %", k ? "," : ":", status.model->frequency_hz[k], 100 * status.model->damping_ratio[k]);
+        line += fmt::format("{} {:.4f} Hz {:.3f} %", k ? "," : ":", status.model->frequency_hz[k],
+                            100 * status.model->damping_ratio[k]);
     fmt::print("{}; {}\n", line, state_text(status));
     std::fflush(stdout);
 }

@@ -19,7 +19,8 @@ unsigned sendable(unsigned bytes) {
 }
 
 bool same_message(const channel_config& a, const channel_config& b) {
-    return a.bus == b.bus && a.frame.id == b.frame.id && a.frame.extended == b.frame.extended && a.selector_value == b.selector_value;
+    return a.bus == b.bus && a.frame.id == b.frame.id && a.frame.extended == b.frame.extended &&
+           a.selector_value == b.selector_value;
 }
 
 } // namespace
@@ -27,8 +28,9 @@ bool same_message(const channel_config& a, const channel_config& b) {
 frame_maker::frame_maker(const live_config& config) : config_(config), period_ns_(1e9 / config.rate_hz) {
     for (std::size_t i = 0; i < config.channels.size(); ++i) {
         const channel_config& channel = config.channels[i];
-        auto found = std::find_if(messages_.begin(), messages_.end(),
-                                  [&](const message& each) { return same_message(config.channels[each.channels.front()], channel); });
+        auto found = std::find_if(messages_.begin(), messages_.end(), [&](const message& each) {
+            return same_message(config.channels[each.channels.front()], channel);
+        });
         if (found == messages_.end()) {
             messages_.emplace_back();
             found = messages_.end() - 1;
@@ -38,7 +40,8 @@ frame_maker::frame_maker(const live_config& config) : config_(config), period_ns
             found->frame.flags = channel.frame.extended ? DRV_FRAME_EXTENDED : 0;
         }
         found->channels.push_back(i);
-        std::size_t bytes = std::max<std::size_t>({found->frame.len, channel.length, drv_signal_bytes(&channel.layout)});
+        std::size_t bytes =
+            std::max<std::size_t>({found->frame.len, channel.length, drv_signal_bytes(&channel.layout)});
         if (channel.sequence) bytes = std::max(bytes, drv_signal_bytes(&*channel.sequence));
         found->frame.len = static_cast<std::uint8_t>(sendable(static_cast<unsigned>(std::min<std::size_t>(bytes, 64))));
         if (found->frame.len > 8) found->frame.flags |= DRV_FRAME_FD;
@@ -52,7 +55,9 @@ bool frame_maker::fill(const message& from, std::int64_t index, const double* ro
         if (!std::isfinite(row[i])) return false;
         const int verdict = drv_signal_encode(&channel.layout, frame.data, frame.len, row[i] / channel.si_factor());
         saturated_ += verdict == 2;
-        if (channel.selector) drv_signal_put(&*channel.selector, frame.data, frame.len, static_cast<std::int64_t>(channel.selector_value));
+        if (channel.selector)
+            drv_signal_put(&*channel.selector, frame.data, frame.len,
+                           static_cast<std::int64_t>(channel.selector_value));
         if (channel.sequence) drv_signal_put(&*channel.sequence, frame.data, frame.len, index);
     }
     return true;
@@ -63,7 +68,8 @@ void frame_maker::append_sample(std::int64_t index, const double* row, std::stri
     for (std::size_t k = 0; k < messages_.size(); ++k) {
         drv_frame_t frame = messages_[k].frame;
         if (!fill(messages_[k], index, row, frame)) continue;
-        frame.time_ns = begin_ns + std::llround(static_cast<double>(index) * period_ns_ + static_cast<double>(k) * between_ns_);
+        frame.time_ns =
+            begin_ns + std::llround(static_cast<double>(index) * period_ns_ + static_cast<double>(k) * between_ns_);
         const int count = drv_candump_format(line, sizeof line, messages_[k].interface.c_str(), &frame);
         if (count <= 0) continue;
         text.append(line, static_cast<std::size_t>(count));

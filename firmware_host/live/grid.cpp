@@ -12,7 +12,8 @@ namespace {
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 std::uint32_t lane_key(std::size_t bus, std::uint32_t id, bool extended) {
-    return static_cast<std::uint32_t>(bus) << 30 ^ static_cast<std::uint32_t>(bus >> 2) << 11 ^ id ^ (extended ? 1u << 29 : 0u);
+    return static_cast<std::uint32_t>(bus) << 30 ^ static_cast<std::uint32_t>(bus >> 2) << 11 ^ id ^
+           (extended ? 1u << 29 : 0u);
 }
 
 std::size_t hash_of(std::uint32_t key, std::size_t size) { return (key * 2654435761u >> 7) & (size - 1); }
@@ -49,7 +50,8 @@ void grid::build_lanes(const live_config& config) {
         const std::uint32_t key = lane_key(channel.bus, channel.frame.id, channel.frame.extended != 0);
         lane* found = nullptr;
         for (lane& each : lanes_)
-            if (each.bus == channel.bus && each.key == key && each.selector.has_value() == channel.selector.has_value() &&
+            if (each.bus == channel.bus && each.key == key &&
+                each.selector.has_value() == channel.selector.has_value() &&
                 (!channel.selector || each.selector_value == channel.selector_value))
                 found = &each;
         if (!found) {
@@ -70,7 +72,8 @@ void grid::build_lanes(const live_config& config) {
     table_.assign(static_cast<std::size_t>(power_of_two(static_cast<std::int64_t>(4 * lanes_.size()))), -1);
     for (std::size_t i = 0; i < lanes_.size(); ++i) {
         std::size_t at = hash_of(lanes_[i].key, table_.size());
-        while (table_[at] >= 0 && lanes_[static_cast<std::size_t>(table_[at])].key != lanes_[i].key) at = (at + 1) & (table_.size() - 1);
+        while (table_[at] >= 0 && lanes_[static_cast<std::size_t>(table_[at])].key != lanes_[i].key)
+            at = (at + 1) & (table_.size() - 1);
         lanes_[i].next = table_[at];
         table_[at] = static_cast<int>(i);
     }
@@ -80,13 +83,15 @@ void grid::build_lanes(const live_config& config) {
 grid::lane* grid::find_lane(const drv_frame_t& frame) {
     const std::uint32_t key = lane_key(frame.bus, frame.id, (frame.flags & DRV_FRAME_EXTENDED) != 0);
     std::size_t at = hash_of(key, table_.size());
-    while (table_[at] >= 0 && lanes_[static_cast<std::size_t>(table_[at])].key != key) at = (at + 1) & (table_.size() - 1);
+    while (table_[at] >= 0 && lanes_[static_cast<std::size_t>(table_[at])].key != key)
+        at = (at + 1) & (table_.size() - 1);
     for (int i = table_[at]; i >= 0; i = lanes_[static_cast<std::size_t>(i)].next) {
         lane& each = lanes_[static_cast<std::size_t>(i)];
         if (each.bus != frame.bus) continue;
         if (!each.selector) return &each;
         std::int64_t page = 0;
-        if (drv_signal_raw(&*each.selector, frame.data, frame.len, &page) && static_cast<std::uint64_t>(page) == each.selector_value)
+        if (drv_signal_raw(&*each.selector, frame.data, frame.len, &page) &&
+            static_cast<std::uint64_t>(page) == each.selector_value)
             return &each;
     }
     return nullptr;
@@ -116,8 +121,10 @@ void grid::push(const drv_frame_t& frame) {
         ++counts.decode_errors;
         return;
     }
-    if (!anchored_) hold_until_anchored(*l, frame);
-    else place(*l, frame);
+    if (!anchored_)
+        hold_until_anchored(*l, frame);
+    else
+        place(*l, frame);
 }
 
 /// Lay rows out in the ring up to and including `upto`; makes room by letting the oldest go.
@@ -144,8 +151,10 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
     if (index < next_) {
         if (index < 0) return; // before the grid begins
         const bool remembered = opened_ - index <= mask_;
-        if (remembered && present(index)[which]) ++counts.duplicate;
-        else ++counts.out_of_order; // too late: the sample has gone out without it
+        if (remembered && present(index)[which])
+            ++counts.duplicate;
+        else
+            ++counts.out_of_order; // too late: the sample has gone out without it
         return;
     }
     open_rows(index);
@@ -197,7 +206,8 @@ void grid::skip_to(std::int64_t index) {
     for (lane& l : lanes_) extend_gap(l, next_, count);
     const std::int64_t first = next_;
     next_ = opened_ = index;
-    for (std::int64_t i = std::max(first, index - mask_); i < index; ++i) std::fill_n(present(i), lanes_.size(), std::uint8_t{0});
+    for (std::int64_t i = std::max(first, index - mask_); i < index; ++i)
+        std::fill_n(present(i), lanes_.size(), std::uint8_t{0});
     sink_.on_missing(first, count);
 }
 

@@ -85,10 +85,10 @@ class grid {
         std::uint64_t selector_value = 0;
         // Where the lane stands on the grid.
         bool waiting = false, heard = false;
-        std::uint64_t counter = 0;  ///< as last received
-        std::int64_t last = 0;      ///< unwrapped place of the newest frame
-        std::int64_t time_ns = 0;   ///< its stamp
-        std::uint8_t loss = 0;      ///< DRV_LOSS_… told by the bus since
+        std::uint64_t counter = 0; ///< as last received
+        std::int64_t last = 0;     ///< unwrapped place of the newest frame
+        std::int64_t time_ns = 0;  ///< its stamp
+        std::uint8_t loss = 0;     ///< DRV_LOSS_… told by the bus since
         // A counter far off is believed when a second frame agrees.
         bool suspected = false;
         drv_frame_t suspect{};
@@ -135,8 +135,12 @@ class grid {
     void close_gap(lane& l, bool resumed);
 
     double* row(std::int64_t index) { return values_.data() + static_cast<std::size_t>(index & mask_) * width_; }
-    const std::uint8_t* present(std::int64_t index) const { return present_.data() + static_cast<std::size_t>(index & mask_) * lanes_.size(); }
-    std::uint8_t* present(std::int64_t index) { return present_.data() + static_cast<std::size_t>(index & mask_) * lanes_.size(); }
+    const std::uint8_t* present(std::int64_t index) const {
+        return present_.data() + static_cast<std::size_t>(index & mask_) * lanes_.size();
+    }
+    std::uint8_t* present(std::int64_t index) {
+        return present_.data() + static_cast<std::size_t>(index & mask_) * lanes_.size();
+    }
     std::int64_t& slot(std::int64_t index) { return slots_[static_cast<std::size_t>(index & mask_)]; }
     void open_rows(std::int64_t upto);
 

@@ -12,14 +12,15 @@ namespace {
 /// Difference of two counters of `bits` bits, the short way round.
 std::int64_t wrapped_step(std::uint64_t from, std::uint64_t to, unsigned bits) {
     const std::uint64_t range = std::uint64_t{1} << bits, step = (to - from) & (range - 1);
-    return step < range / 2 ? static_cast<std::int64_t>(step) : static_cast<std::int64_t>(step) - static_cast<std::int64_t>(range);
+    return step < range / 2 ? static_cast<std::int64_t>(step)
+                            : static_cast<std::int64_t>(step) - static_cast<std::int64_t>(range);
 }
 
 /// Two counters this close at the start count the same samples.
 std::int64_t kinship(unsigned bits) { return bits >= 9 ? 64 : std::max<std::int64_t>(1, std::int64_t{1} << bits >> 3); }
 
-constexpr double longest_pause_s = 5;           // beyond it the clock says how often a counter went round
-constexpr double longest_beat_s = 1;            // a lane without a counter that pauses longer has stalled
+constexpr double longest_pause_s = 5;                // beyond it the clock says how often a counter went round
+constexpr double longest_beat_s = 1;                 // a lane without a counter that pauses longer has stalled
 constexpr double longest_silence_ns = 400 * 86400e9; // a stamp further ahead is no time but an error
 
 } // namespace
@@ -100,8 +101,10 @@ void grid::anchor() {
     for (const auto& [which, frame] : held_) { // second pass: for good
         lane& l = lanes_[static_cast<std::size_t>(which)];
         decode(l, frame);
-        if (first[static_cast<std::size_t>(which)].second == &frame) insert(l, l.last, frame);
-        else place(l, frame);
+        if (first[static_cast<std::size_t>(which)].second == &frame)
+            insert(l, l.last, frame);
+        else
+            place(l, frame);
     }
     held_.clear();
 }
@@ -149,7 +152,8 @@ void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t cou
 /// After a known loss or a long silence the clock tells how often the counter went round. @return it does, and agrees
 bool grid::count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& step) const {
     const double pause_ns = static_cast<double>(frame.time_ns - l.time_ns);
-    if (step == 1 || (!l.loss && pause_ns < 1e9 * longest_pause_s) || pause_ns <= 0 || pause_ns > longest_silence_ns) return false;
+    if (step == 1 || (!l.loss && pause_ns < 1e9 * longest_pause_s) || pause_ns <= 0 || pause_ns > longest_silence_ns)
+        return false;
     const double range = std::ldexp(1.0, l.sequence->length), guess = pause_ns / period_ns_;
     const double rounds = std::max(0.0, std::round((guess - static_cast<double>(step)) / range));
     const double found = static_cast<double>(step) + rounds * range;

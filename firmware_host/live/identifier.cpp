@@ -15,7 +15,8 @@ constexpr std::size_t chunk = 256; // samples handed over at a time
 
 /// Do the raw numbers of every channel fit int16 as they are?
 bool fits_codes(const live_config& config) {
-    return std::all_of(config.channels.begin(), config.channels.begin() + static_cast<std::ptrdiff_t>(config.n_u + config.n_y),
+    return std::all_of(config.channels.begin(),
+                       config.channels.begin() + static_cast<std::ptrdiff_t>(config.n_u + config.n_y),
                        [](const channel_config& channel) {
                            const drv_signal_t& layout = channel.layout;
                            return layout.value == DRV_VALUE_INTEGER && layout.length <= (layout.is_signed ? 16 : 15);
@@ -24,12 +25,14 @@ bool fits_codes(const live_config& config) {
 
 std::unique_ptr<std::byte[]> allocate(const live_config& config, std::size_t bytes, const char* what) {
     if (bytes == 0)
-        throw failure(exit_usage, fmt::format("{}: [identification]: p, rows, order or window_s do not go together with {} channels ({})",
-                                              config.path, config.n_u + config.n_y, what));
+        throw failure(
+            exit_usage,
+            fmt::format("{}: [identification]: p, rows, order or window_s do not go together with {} channels ({})",
+                        config.path, config.n_u + config.n_y, what));
     std::unique_ptr<std::byte[]> block(new (std::nothrow) std::byte[bytes]);
     if (!block)
-        throw failure(exit_usage, fmt::format("{}: [identification]: {} needs {:.1f} GB; lower p, rows or window_s", config.path, what,
-                                              static_cast<double>(bytes) / 1e9));
+        throw failure(exit_usage, fmt::format("{}: [identification]: {} needs {:.1f} GB; lower p, rows or window_s",
+                                              config.path, what, static_cast<double>(bytes) / 1e9));
     return block;
 }
 
@@ -40,8 +43,10 @@ identifier::identifier(const live_config& config) : m_(config.n_u + config.n_y),
         scale_.push_back(config.channels[i].layout.scale * config.channels[i].si_factor());
         offset_.push_back(config.channels[i].layout.offset * config.channels[i].si_factor());
     }
-    if (exact_) codes_.resize(chunk * m_);
-    else doubles_.resize(chunk * m_);
+    if (exact_)
+        codes_.resize(chunk * m_);
+    else
+        doubles_.resize(chunk * m_);
     create_accumulator(config);
     create_identifier(config);
 }
@@ -59,14 +64,17 @@ void identifier::create_accumulator(const live_config& config) {
     a.edges = 1;
     if (wanted.window_s) {
         const std::int64_t window = std::max<std::int64_t>(1, std::llround(*wanted.window_s * config.rate_hz));
-        const std::int64_t block = std::clamp(update, std::max<std::int64_t>(1, window / 64), std::max<std::int64_t>(1, window / 20));
+        const std::int64_t block =
+            std::clamp(update, std::max<std::int64_t>(1, window / 64), std::max<std::int64_t>(1, window / 20));
         a.block = static_cast<std::int32_t>(std::min<std::int64_t>(block, INT32_MAX));
-        a.slots = static_cast<std::int32_t>(std::max<std::int64_t>(1, std::llround(static_cast<double>(window) / static_cast<double>(a.block))));
+        a.slots = static_cast<std::int32_t>(
+            std::max<std::int64_t>(1, std::llround(static_cast<double>(window) / static_cast<double>(a.block))));
         a.spare_slots = a.slots / 2 + 8;
         memory_samples_ = std::int64_t{a.slots} * a.block;
     } else if (a.forgetting < 1) {
         const double memory = 1 / (1 - a.forgetting);
-        a.block = static_cast<std::int32_t>(std::clamp<std::int64_t>(std::llround(memory / 20), 1, std::min<std::int64_t>(update, 1 << 20)));
+        a.block = static_cast<std::int32_t>(
+            std::clamp<std::int64_t>(std::llround(memory / 20), 1, std::min<std::int64_t>(update, 1 << 20)));
         memory_samples_ = std::llround(std::min(memory, 1e15));
     }
     const std::size_t bytes = okid_accumulator_memsize(&a);
@@ -99,7 +107,9 @@ void identifier::flush() {
     const okid_status_t status = exact_ ? okid_accumulator_add_i16(accumulator_, codes_.data(), pending_)
                                         : okid_accumulator_add(accumulator_, doubles_.data(), pending_);
     pending_ = 0;
-    if (status < 0) throw failure(exit_no_model, fmt::format("the samples cannot be summed any further: {}", okid_status_text(status)));
+    if (status < 0)
+        throw failure(exit_no_model,
+                      fmt::format("the samples cannot be summed any further: {}", okid_status_text(status)));
 }
 
 void identifier::add(const double* row) {

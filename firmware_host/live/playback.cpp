@@ -34,10 +34,12 @@ std::vector<std::string> interfaces_of(const std::string& log) {
     std::ifstream input(log);
     std::string line;
     while (std::getline(input, line)) {
-        const std::size_t close = line.find(')'), begin = line.find_first_not_of(" \t", close == std::string::npos ? close : close + 1);
+        const std::size_t close = line.find(')'),
+                          begin = line.find_first_not_of(" \t", close == std::string::npos ? close : close + 1);
         if (close == std::string::npos || begin == std::string::npos) continue;
         const std::string name = line.substr(begin, line.find_first_of(" \t", begin) - begin);
-        if (name.size() < DRV_NAME_BYTES && (out.empty() || out.back() != name) && std::find(out.begin(), out.end(), name) == out.end())
+        if (name.size() < DRV_NAME_BYTES && (out.empty() || out.back() != name) &&
+            std::find(out.begin(), out.end(), name) == out.end())
             out.push_back(name);
     }
     return out;
@@ -65,20 +67,22 @@ bool pacer::wait_for(std::int64_t time_ns) {
 std::vector<std::string> map_interfaces(const std::string& log, const live_config& config) {
     std::vector<std::string> wanted;
     for (const bus_config& bus : config.buses) wanted.push_back(bus.interface);
-    const std::vector<std::string> there = interfaces_of(log);
-    const bool any = std::any_of(wanted.begin(), wanted.end(),
-                                 [&](const std::string& name) { return std::find(there.begin(), there.end(), name) != there.end(); });
+    std::vector<std::string> there = interfaces_of(log);
+    const bool any = std::any_of(wanted.begin(), wanted.end(), [&](const std::string& name) {
+        return std::find(there.begin(), there.end(), name) != there.end();
+    });
     if (any || there.empty()) return wanted; // an empty or malformed log names its own fault
     if (wanted.size() == 1 && there.size() == 1) return there;
-    throw failure(exit_usage, fmt::format("{}: found frames of {}, expected an interface of {}: {}", log, list_names(there), config.path,
-                                          list_names(wanted)));
+    throw failure(exit_usage, fmt::format("{}: found frames of {}, expected an interface of {}: {}", log,
+                                          list_names(there), config.path, list_names(wanted)));
 }
 
 log_frames::log_frames(const std::string& path, const std::vector<std::string>& interfaces) : batch_(512) {
     source_.ops = &drv_source_replay;
     drv_source_config_t config{};
     config.path = path.c_str();
-    for (std::size_t i = 0; i < interfaces.size() && i < DRV_MAX_BUSES; ++i) config.interfaces[i] = interfaces[i].c_str();
+    for (std::size_t i = 0; i < interfaces.size() && i < DRV_MAX_BUSES; ++i)
+        config.interfaces[i] = interfaces[i].c_str();
     config.interface_count = static_cast<std::int32_t>(std::min<std::size_t>(interfaces.size(), DRV_MAX_BUSES));
     if (source_.ops->open(&source_, &config) != 0) throw failure(exit_usage, source_.error);
 }
@@ -98,7 +102,8 @@ const drv_frame_t* log_frames::next() {
     return &batch_[static_cast<std::size_t>(at_++)];
 }
 
-void play_through_session(const std::string& log, const live_config& config, const session_options& options, std::optional<double> speed) {
+void play_through_session(const std::string& log, const live_config& config, const session_options& options,
+                          std::optional<double> speed) {
     log_frames frames(log, map_interfaces(log, config));
     catch_stop_signals();
     session played(config, options);

@@ -41,7 +41,8 @@ class log_frames {
 };
 
 /// Play a log through a session and finish it. Throws `failure`.
-void play_through_session(const std::string& log, const live_config& config, const session_options& options, std::optional<double> speed);
+void play_through_session(const std::string& log, const live_config& config, const session_options& options,
+                          std::optional<double> speed);
 
 /// Play every frame of a log onto an interface. Throws `failure`: exit 2 for the log, exit 4 for the interface.
 void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed);

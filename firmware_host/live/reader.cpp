@@ -24,9 +24,11 @@ constexpr int batches_between_looks = 64;
 
 } // namespace
 
-bus_reader::bus_reader(const std::string& interface, std::size_t bus, const std::vector<drv_filter_t>& frames, int wake_fd)
-    : interface_(interface), bus_(static_cast<std::uint8_t>(bus)), wake_fd_(wake_fd), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
-      block_(new std::byte[drv_ring_memsize(ring_frames)]), batch_(64) {
+bus_reader::bus_reader(const std::string& interface, std::size_t bus, const std::vector<drv_filter_t>& frames,
+                       int wake_fd)
+    : interface_(interface), bus_(static_cast<std::uint8_t>(bus)), wake_fd_(wake_fd),
+      stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), block_(new std::byte[drv_ring_memsize(ring_frames)]),
+      batch_(64) {
     ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));
     source_.ops = &drv_source_socketcan;
     drv_source_config_t config{};
@@ -97,7 +99,8 @@ void bus_reader::run() {
             if (drain_once() == 0) break;
         publish_stats();
     }
-    for (int i = 0; i < 1 << 14 && drain_once() > 0; ++i) {} // what had arrived before the end
+    for (int i = 0; i < 1 << 14 && drain_once() > 0; ++i) {
+    } // what had arrived before the end
     publish_stats();
 }
 
@@ -116,12 +119,20 @@ std::vector<std::string> can_interfaces() {
 void throw_interface_failure(int code, const std::string& interface, const std::string& reason) {
     const std::string text = printable(reason, 300);
     if (code == EAFNOSUPPORT)
-        throw failure(exit_device, text + ". Load the modules: sudo modprobe can can-raw vcan; without them use `okid replay LOG -c CONFIG.toml`");
-    if (code == ENETDOWN) throw failure(exit_device, fmt::format("{}. Bring it up: sudo ip link set {} up (a real bus also needs type can bitrate 1000000)", text, interface));
+        throw failure(exit_device, text + ". Load the modules: sudo modprobe can can-raw vcan; without them use `okid "
+                                          "replay LOG -c CONFIG.toml`");
+    if (code == ENETDOWN)
+        throw failure(
+            exit_device,
+            fmt::format("{}. Bring it up: sudo ip link set {} up (a real bus also needs type can bitrate 1000000)",
+                        text, interface));
     if (code == EPERM || code == EACCES) throw failure(exit_device, text + ". Run it with sudo, or with CAP_NET_RAW");
     const std::vector<std::string> there = can_interfaces();
-    const std::string found = there.empty() ? "this machine has no CAN interface" : "CAN interfaces found: " + list_names(there) + did_you_mean(interface, there);
-    throw failure(exit_device, fmt::format("{}; {}. Plug the adapter in, or make a virtual one: sudo ip link add {} type vcan && sudo ip link set {} up",
+    const std::string found = there.empty()
+                                  ? "this machine has no CAN interface"
+                                  : "CAN interfaces found: " + list_names(there) + did_you_mean(interface, there);
+    throw failure(exit_device, fmt::format("{}; {}. Plug the adapter in, or make a virtual one: sudo ip link add {} "
+                                           "type vcan && sudo ip link set {} up",
                                            text, found, interface, interface));
 }
 

@@ -20,11 +20,13 @@ std::string wall_time(std::int64_t time_ns) {
     const std::time_t seconds = time_ns / 1000000000;
     std::tm utc{};
     gmtime_r(&seconds, &utc);
-    return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday, utc.tm_hour,
-                       utc.tm_min, utc.tm_sec, time_ns / 1000 % 1000000);
+    return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday,
+                       utc.tm_hour, utc.tm_min, utc.tm_sec, time_ns / 1000 % 1000000);
 }
 
-std::int64_t samples_of(double seconds, double rate_hz) { return std::max<std::int64_t>(1, std::llround(seconds * rate_hz)); }
+std::int64_t samples_of(double seconds, double rate_hz) {
+    return std::max<std::int64_t>(1, std::llround(seconds * rate_hz));
+}
 
 /// Longest time a frame can take on the wire (all stuff bits, gap included), s; 0 when the bit rate is not known.
 double wire_s(const drv_frame_t& frame, const bus_config& bus) {
@@ -32,17 +34,19 @@ double wire_s(const drv_frame_t& frame, const bus_config& bus) {
     const bool extended = (frame.flags & DRV_FRAME_EXTENDED) != 0;
     if (!(frame.flags & DRV_FRAME_FD)) return ((extended ? 80 : 55) + 10.0 * frame.len) / *bus.bitrate;
     const double fast = (frame.flags & DRV_FRAME_BRS) && bus.dbitrate ? *bus.dbitrate : *bus.bitrate;
-    const double slow_bits = extended ? 65 : 43, check_bits = frame.len > 16 ? 32 : 27; // check field with its fixed stuff bits
+    const double slow_bits = extended ? 65 : 43,
+                 check_bits = frame.len > 16 ? 32 : 27; // check field with its fixed stuff bits
     return slow_bits / *bus.bitrate + (1.25 * (8.0 * frame.len + 6) + check_bits) / fast;
 }
 
 } // namespace
 
 session::session(const live_config& config, const session_options& options)
-    : config_(config), options_(options), events_(options.events), view_(options.events != "-" && options.json != "-"), grid_(config, *this),
-      identifier_(config), losses_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
+    : config_(config), options_(options), events_(options.events), view_(options.events != "-" && options.json != "-"),
+      grid_(config, *this), identifier_(config), losses_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)) {
-    stats_samples_ = update_samples_ * std::max<std::int64_t>(1, std::llround(stats_every_s / config.identification.update_s));
+    stats_samples_ =
+        update_samples_ * std::max<std::int64_t>(1, std::llround(stats_every_s / config.identification.update_s));
     if (options.duration_s) {
         limit_ = samples_of(*options.duration_s, config.rate_hz);
         grid_.set_limit(limit_);
@@ -84,8 +88,13 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
 
 void session::on_gap(const grid_gap& gap) {
     ++gaps_;
-    events_.write({{"type", "gap"}, {"t", seconds(std::max(now_, gap.last + 1))}, {"channel", config_.channels[gap.channel].name},
-                   {"first", gap.first}, {"last", gap.last}, {"count", gap.count}, {"cause", gap_cause_name(gap.cause)}});
+    events_.write({{"type", "gap"},
+                   {"t", seconds(std::max(now_, gap.last + 1))},
+                   {"channel", config_.channels[gap.channel].name},
+                   {"first", gap.first},
+                   {"last", gap.last},
+                   {"count", gap.count},
+                   {"cause", gap_cause_name(gap.cause)}});
 }
 
 /// Modes are shown once there are twice as many equations as unknowns: below that they only repeat the noise.
@@ -103,8 +112,12 @@ void session::update(std::int64_t samples) {
         status.model = &identifier_.model();
         status.settled = settling_.add(identifier_.model());
         const std::int64_t basis = identifier_.basis();
-        events_.write({{"type", "modes"}, {"t", status.t}, {"modes", modes_json(identifier_.model())}, {"window_s", seconds(basis)},
-                       {"samples", basis}, {"settled", status.settled}});
+        events_.write({{"type", "modes"},
+                       {"t", status.t},
+                       {"modes", modes_json(identifier_.model())},
+                       {"window_s", seconds(basis)},
+                       {"samples", basis},
+                       {"settled", status.settled}});
     } else {
         settling_.reset();
         status.waiting = rows < need ? fmt::format("waiting for samples, {} of {}", rows, need)
@@ -126,23 +139,32 @@ ordered_json session::bus_stats(std::size_t bus) const {
     ordered_json out;
     out["received"] = counts.received;
     out["lost"] = overflow + driver + sequence + link + stall;
-    out["lost_by"] = {{"socket_overflow", overflow}, {"driver", driver}, {"sequence", sequence}, {"link_down", link}, {"stall", stall}};
+    out["lost_by"] = {{"socket_overflow", overflow},
+                      {"driver", driver},
+                      {"sequence", sequence},
+                      {"link_down", link},
+                      {"stall", stall}};
     out["out_of_order"] = counts.out_of_order;
     out["duplicate"] = counts.duplicate;
     out["decode_errors"] = counts.decode_errors;
     const bool known = config_.buses[bus].bitrate && now_ > 0;
-    out["load_percent"] = known ? ordered_json(std::round(1e4 * busy_s_[bus] / seconds(now_)) / 100) : ordered_json(nullptr);
+    out["load_percent"] =
+        known ? ordered_json(std::round(1e4 * busy_s_[bus] / seconds(now_)) / 100) : ordered_json(nullptr);
     return out;
 }
 
 void session::write_stats() {
-    ordered_json event{{"type", "stats"}, {"t", seconds(now_)}, {"bus", ordered_json::object()}, {"channel", ordered_json::object()}};
+    ordered_json event{
+        {"type", "stats"}, {"t", seconds(now_)}, {"bus", ordered_json::object()}, {"channel", ordered_json::object()}};
     for (std::size_t i = 0; i < config_.buses.size(); ++i) event["bus"][config_.buses[i].name] = bus_stats(i);
     for (std::size_t i = 0; i < config_.channels.size(); ++i) {
         const grid_channel_counts counts = grid_.channel(i);
-        const double percent = counts.expected ? 100.0 * static_cast<double>(counts.received) / static_cast<double>(counts.expected) : 0.0;
-        event["channel"][config_.channels[i].name] = {{"expected", counts.expected}, {"received", counts.received},
-                                                      {"missing", counts.expected - counts.received}, {"completeness_percent", percent}};
+        const double percent =
+            counts.expected ? 100.0 * static_cast<double>(counts.received) / static_cast<double>(counts.expected) : 0.0;
+        event["channel"][config_.channels[i].name] = {{"expected", counts.expected},
+                                                      {"received", counts.received},
+                                                      {"missing", counts.expected - counts.received},
+                                                      {"completeness_percent", percent}};
     }
     events_.write(event);
 }
@@ -153,10 +175,12 @@ void session::check_heard() const {
         const channel_config& channel = config_.channels[index];
         if (channel.role == channel_role::aux) continue;
         throw failure(exit_no_model,
-                      fmt::format("no usable frame of channel \"{}\" was received ({}identifier {:#x}{}, bus \"{}\"): is the sensor on, and are "
-                                  "identifier and bus right in {}?", channel.name,
-                                  channel.message.empty() ? "" : "message " + channel.message + ", ", channel.frame.id,
-                                  channel.frame.extended ? " extended" : "", config_.buses[channel.bus].name, config_.path));
+                      fmt::format("no usable frame of channel \"{}\" was received ({}identifier {:#x}{}, bus \"{}\"): "
+                                  "is the sensor on, and are "
+                                  "identifier and bus right in {}?",
+                                  channel.name, channel.message.empty() ? "" : "message " + channel.message + ", ",
+                                  channel.frame.id, channel.frame.extended ? " extended" : "",
+                                  config_.buses[channel.bus].name, config_.path));
     }
 }
 

@@ -74,12 +74,7 @@ def text_of(
     join: str = ",",
     end: str = "\n",
 ) -> str:
-    return (
-        head
-        + names
-        + end
-        + "".join(join.join(f"{x:.9g}" for x in row) + end for row in data)
-    )
+    return head + names + end + "".join(join.join(f"{x:.9g}" for x in row) + end for row in data)
 
 
 @pytest.fixture
@@ -89,9 +84,7 @@ def record(tmp_path: Path) -> Path:
     return path
 
 
-def identify(
-    path: Path, *more: object, channels: list[str] | None = None
-) -> subprocess.CompletedProcess[str]:
+def identify(path: Path, *more: object, channels: list[str] | None = None) -> subprocess.CompletedProcess[str]:
     return okid(
         "identify",
         path,
@@ -104,9 +97,7 @@ def identify(
 
 def result_of(done: subprocess.CompletedProcess[str]) -> dict:
     assert done.returncode == 0, done.stderr
-    return json.loads(
-        done.stdout, parse_constant=lambda name: pytest.fail(f"{name} in the result")
-    )
+    return json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} in the result"))
 
 
 def shape(matrix: list) -> tuple[int, int]:
@@ -149,9 +140,7 @@ def test_result_has_the_fixed_keys_in_order(record: Path) -> None:
     assert all(shape(block) == (2, 1) for block in result["markov"]["Y"])
     assert result["markov"]["Y"][0] == model["D"]
     assert result["singular_values"] == sorted(result["singular_values"], reverse=True)
-    assert [list(mode) for mode in result["modes"]] == [MODE_KEYS] * len(
-        result["modes"]
-    )
+    assert [list(mode) for mode in result["modes"]] == [MODE_KEYS] * len(result["modes"])
     assert list(result["fit"]["simulation_percent"]) == ["y1", "y2"]
     assert all(set(w) == {"code", "text"} and w["text"] for w in result["warnings"])
 
@@ -160,14 +149,11 @@ def test_modes_of_a_known_system(record: Path) -> None:
     modes = result_of(identify(record, "--order", 4, "--json", "-"))["modes"]
     for mode, (radius, angle) in zip(modes, [(0.99, 0.3), (0.985, 1.1)], strict=True):
         pole = complex(math.log(radius), angle) * 100
-        assert mode["frequency_hz"] == pytest.approx(
-            abs(pole) / (2 * math.pi), rel=1e-3
-        )
+        assert mode["frequency_hz"] == pytest.approx(abs(pole) / (2 * math.pi), rel=1e-3)
         assert mode["damping_ratio"] == pytest.approx(-pole.real / abs(pole), rel=3e-2)
-        assert max(
-            math.hypot(a, b)
-            for a, b in zip(mode["shape_re"], mode["shape_im"], strict=True)
-        ) == pytest.approx(1)
+        assert max(math.hypot(a, b) for a, b in zip(mode["shape_re"], mode["shape_im"], strict=True)) == pytest.approx(
+            1
+        )
 
 
 def test_table_goes_to_stdout(record: Path) -> None:
@@ -186,9 +172,7 @@ def test_quiet_writes_only_the_file(record: Path, tmp_path: Path) -> None:
 
 
 def test_same_record_same_bytes(record: Path) -> None:
-    assert (
-        identify(record, "--json", "-").stdout == identify(record, "--json", "-").stdout
-    )
+    assert identify(record, "--json", "-").stdout == identify(record, "--json", "-").stdout
 
 
 @pytest.mark.parametrize(
@@ -217,17 +201,13 @@ def test_dialects_give_the_same_result(
         text = head + names + body.replace(".", ",")
     other = tmp_path / "other.csv"
     other.write_bytes((b"\xef\xbb\xbf" if bom else b"") + text.encode())
-    assert (
-        identify(other, "--json", "-").stdout == identify(record, "--json", "-").stdout
-    )
+    assert identify(other, "--json", "-").stdout == identify(record, "--json", "-").stdout
 
 
 def test_last_line_without_its_end(record: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.csv"
     other.write_text(record.read_text().rstrip("\n"))
-    assert (
-        identify(other, "--json", "-").stdout == identify(record, "--json", "-").stdout
-    )
+    assert identify(other, "--json", "-").stdout == identify(record, "--json", "-").stdout
 
 
 @pytest.mark.parametrize(
@@ -286,13 +266,9 @@ def test_two_records_are_merged(tmp_path: Path) -> None:
     paths = []
     for seed in (1, 2):
         paths.append(tmp_path / f"r{seed}.csv")
-        shifted = [
-            [u, y1 + 50 * seed, y2] for u, y1, y2 in rows(seed=seed)
-        ]  # the offset moved between the records
+        shifted = [[u, y1 + 50 * seed, y2] for u, y1, y2 in rows(seed=seed)]  # the offset moved between the records
         paths[-1].write_text(text_of(shifted))
-    result = result_of(
-        okid("identify", *paths, *CHANNELS, "--p", 10, "--order", 4, "--json", "-")
-    )
+    result = result_of(okid("identify", *paths, *CHANNELS, "--p", 10, "--order", 4, "--json", "-"))
     assert (result["records"], result["samples"], result["gaps"]) == (2, 1200, 0)
     assert shape(result["model"]["x0"]) == (2, 4)
     assert result["modes"][0]["frequency_hz"] == pytest.approx(4.780, abs=0.005)
@@ -301,23 +277,14 @@ def test_two_records_are_merged(tmp_path: Path) -> None:
 
 def test_linear_detrend_removes_drift(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
-    path.write_text(
-        text_of([[u, y1 + 3 * n, y2 - 7] for n, (u, y1, y2) in enumerate(rows())])
-    )
-    result = result_of(
-        identify(path, "--detrend", "linear", "--order", 4, "--json", "-")
-    )
+    path.write_text(text_of([[u, y1 + 3 * n, y2 - 7] for n, (u, y1, y2) in enumerate(rows())]))
+    result = result_of(identify(path, "--detrend", "linear", "--order", 4, "--json", "-"))
     assert result["fit"]["simulation_percent"]["y1"] > 95
 
 
 def test_range_selects_samples(record: Path) -> None:
-    assert (
-        result_of(identify(record, "--range", "100:500", "--json", "-"))["samples"]
-        == 400
-    )
-    assert (
-        result_of(identify(record, "--range", ":500", "--json", "-"))["samples"] == 500
-    )
+    assert result_of(identify(record, "--range", "100:500", "--json", "-"))["samples"] == 400
+    assert result_of(identify(record, "--range", ":500", "--json", "-"))["samples"] == 500
 
 
 def test_short_record_reduces_p(tmp_path: Path) -> None:
@@ -376,9 +343,7 @@ def test_folder(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_files_that_are_no_record(
-    tmp_path: Path, content: bytes, parts: tuple[str, ...]
-) -> None:
+def test_files_that_are_no_record(tmp_path: Path, content: bytes, parts: tuple[str, ...]) -> None:
     path = tmp_path / "bad.csv"
     path.write_bytes(content)
     refused(identify(path), 2, "bad.csv", *parts)
@@ -402,13 +367,9 @@ def test_duplicate_names(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    "cell", ["abc", "1.5 V", "1,5", "0x10", "--1", "1e", "#", "1.2.3"]
-)
+@pytest.mark.parametrize("cell", ["abc", "1.5 V", "1,5", "0x10", "--1", "1e", "#", "1.2.3"])
 def test_text_in_a_cell(tmp_path: Path, cell: str) -> None:
-    lines = text_of(
-        rows(), names="u1;y1;y2" if "," in cell else "u1,y1,y2"
-    ).splitlines()
+    lines = text_of(rows(), names="u1;y1;y2" if "," in cell else "u1,y1,y2").splitlines()
     quoted = f'"{cell}"' if "," in cell else cell
     lines[50] = lines[50].split(",")[0] + f",{quoted}," + "1"
     path = tmp_path / "r.csv"
@@ -425,9 +386,7 @@ def test_infinite_cell(tmp_path: Path, cell: str) -> None:
     refused(identify(path), 2, "line 10", "column 3", "y2", cell, "finite")
 
 
-@pytest.mark.parametrize(
-    ("line", "count"), [("1,2", "2 cells"), ("1,2,3,4", "4 cells"), ("7", "1 cell,")]
-)
+@pytest.mark.parametrize(("line", "count"), [("1,2", "2 cells"), ("1,2,3,4", "4 cells"), ("7", "1 cell,")])
 def test_ragged_row(tmp_path: Path, line: str, count: str) -> None:
     lines = text_of(rows()).splitlines()
     lines[19] = line
@@ -481,9 +440,7 @@ def test_constant_output(tmp_path: Path) -> None:
 
 def test_straight_line_is_no_excitation(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
-    path.write_text(
-        text_of([[0.5 * n, y1, y2] for n, (_, y1, y2) in enumerate(rows())])
-    )
+    path.write_text(text_of([[0.5 * n, y1, y2] for n, (_, y1, y2) in enumerate(rows())]))
     refused(identify(path, "--detrend", "linear"), 3, '"u1"', "straight line")
 
 
@@ -503,12 +460,8 @@ def test_one_sample(tmp_path: Path) -> None:
 
 def test_repeated_input_is_not_enough_excitation(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
-    path.write_text(
-        text_of([[u, y1, y2, u] for u, y1, y2 in rows()], names="u1,y1,y2,u2")
-    )
-    refused(
-        identify(path, channels=["--inputs", "u1,u2", "--outputs", "y1,y2"]), 3, "excit"
-    )
+    path.write_text(text_of([[u, y1, y2, u] for u, y1, y2 in rows()], names="u1,y1,y2,u2"))
+    refused(identify(path, channels=["--inputs", "u1,u2", "--outputs", "y1,y2"]), 3, "excit")
 
 
 # ------------------------------------------------------------------ wrong usage
@@ -547,9 +500,7 @@ def test_repeated_input_is_not_enough_excitation(tmp_path: Path) -> None:
         (["--json", "/"], ("/", "cannot be written")),
     ],
 )
-def test_wrong_options(
-    record: Path, options: list[str], parts: tuple[str, ...]
-) -> None:
+def test_wrong_options(record: Path, options: list[str], parts: tuple[str, ...]) -> None:
     given = {"--inputs": "u1", "--outputs": "y1,y2", "--p": "10"}
     flags = [options[0]] if len(options) == 1 else []
     given |= {options[0]: options[1]} if len(options) == 2 else {}
@@ -588,18 +539,13 @@ def test_unknown_option_and_help(record: Path) -> None:
 def rig_text(**changes: object) -> str:
     text = DEMO_RIG.read_text()
     for key, value in changes.items():
-        text = "\n".join(
-            f"{key} = {value}" if line.startswith(f"{key} ") else line
-            for line in text.split("\n")
-        )
+        text = "\n".join(f"{key} = {value}" if line.startswith(f"{key} ") else line for line in text.split("\n"))
     return text
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6])
 def test_simulated_rig_is_identified(tmp_path: Path, seed: int) -> None:
-    rig, csv, truth_file = (
-        tmp_path / name for name in ("rig.toml", "rig.csv", "truth.json")
-    )
+    rig, csv, truth_file = (tmp_path / name for name in ("rig.toml", "rig.csv", "truth.json"))
     rig.write_text(rig_text(seed=seed))
     assert okid("simulate", rig, "--csv", csv, "--truth", truth_file).returncode == 0
     truth = json.loads(truth_file.read_text())
@@ -616,9 +562,7 @@ def test_simulated_rig_is_identified(tmp_path: Path, seed: int) -> None:
         )
     )
     assert len(result["modes"]) == 3
-    for mode, frequency, damping in zip(
-        result["modes"], truth["frequency_hz"], truth["damping_ratio"], strict=True
-    ):
+    for mode, frequency, damping in zip(result["modes"], truth["frequency_hz"], truth["damping_ratio"], strict=True):
         assert mode["frequency_hz"] == pytest.approx(frequency, rel=5e-4)
         assert mode["damping_ratio"] == pytest.approx(damping, rel=0.05)
 
@@ -639,13 +583,9 @@ def test_truth_file(tmp_path: Path) -> None:
         "fs_hz",
     ]
     assert list(truth) == keys and truth["schema"] == "okid.truth/1"
-    assert truth["damping_ratio"][0] == pytest.approx(0.01) and truth["damping_ratio"][
-        -1
-    ] == pytest.approx(0.01)
+    assert truth["damping_ratio"][0] == pytest.approx(0.01) and truth["damping_ratio"][-1] == pytest.approx(0.01)
     for m, k, r in zip(truth["M"], truth["K"], truth["R"], strict=True):
-        assert r == pytest.approx(
-            [truth["alpha"] * a + truth["beta"] * b for a, b in zip(m, k, strict=True)]
-        )
+        assert r == pytest.approx([truth["alpha"] * a + truth["beta"] * b for a, b in zip(m, k, strict=True)])
 
 
 def test_same_seed_same_bytes(tmp_path: Path) -> None:
@@ -666,9 +606,7 @@ def test_same_seed_same_bytes(tmp_path: Path) -> None:
             names[3],
         )
         assert done.returncode == 0, done.stderr
-        files[run] = {
-            p.name: p.read_bytes() for p in sorted((tmp_path / run).iterdir())
-        }
+        files[run] = {p.name: p.read_bytes() for p in sorted((tmp_path / run).iterdir())}
     assert files["a"] == files["b"] and "c.dbc" in files["a"]
 
 
@@ -678,9 +616,7 @@ def test_log_and_csv_hold_the_same_values(tmp_path: Path, bits: int) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text(rig_text(bits=bits, duration_s="0.4", sense_dofs="[3, 1, 2]"))
     log, csv, dbc = (tmp_path / name for name in ("r.log", "r.csv", "r.dbc"))
-    assert (
-        okid("simulate", rig, "--log", log, "--csv", csv, "--dbc", dbc).returncode == 0
-    )
+    assert okid("simulate", rig, "--log", log, "--csv", csv, "--dbc", dbc).returncode == 0
     database = cantools.database.load_file(str(dbc))
     decoded: dict[int, dict[str, float]] = {}
     for line in log.read_text().splitlines():
@@ -691,15 +627,10 @@ def test_log_and_csv_hold_the_same_values(tmp_path: Path, bits: int) -> None:
         decoded.setdefault(int(values.pop("Counter")), {}).update(values)
     lines = csv.read_text().splitlines()
     names = lines[2].split(",")
-    assert (
-        names == ["force1", "acc3", "acc1", "acc2"]
-        and len(lines) - 3 == len(decoded) == 100
-    )
+    assert names == ["force1", "acc3", "acc1", "acc2"] and len(lines) - 3 == len(decoded) == 100
     signals = [name.replace("force", "Force").replace("acc", "Accel") for name in names]
     for n, line in enumerate(lines[3:]):
-        assert [decoded[n][s] for s in signals] == pytest.approx(
-            [float(x) for x in line.split(",")], rel=1e-12
-        )
+        assert [decoded[n][s] for s in signals] == pytest.approx([float(x) for x in line.split(",")], rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -724,14 +655,10 @@ def test_log_and_csv_hold_the_same_values(tmp_path: Path, bits: int) -> None:
         ({"seed": "= 1"}, ("line 5",)),
     ],
 )
-def test_bad_rig(
-    tmp_path: Path, change: dict[str, str], parts: tuple[str, ...]
-) -> None:
+def test_bad_rig(tmp_path: Path, change: dict[str, str], parts: tuple[str, ...]) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text(rig_text(**change))
-    refused(
-        okid("simulate", rig, "--truth", tmp_path / "t.json"), 2, "rig.toml", *parts
-    )
+    refused(okid("simulate", rig, "--truth", tmp_path / "t.json"), 2, "rig.toml", *parts)
     assert not (tmp_path / "t.json").exists()
 
 
@@ -752,22 +679,15 @@ def test_simulate_usage(tmp_path: Path) -> None:
 
 def test_changed_rig(tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
-    rig.write_text(
-        rig_text() + "\n[[change]]\nat_s = 10.0\nsprings = [3e4, 1.8e4, 2.5e4]\n"
-    )
+    rig.write_text(rig_text() + "\n[[change]]\nat_s = 10.0\nsprings = [3e4, 1.8e4, 2.5e4]\n")
     truth = json.loads(okid("simulate", rig, "--truth", "-").stdout)
-    assert (
-        truth["changes"][0]["at_s"] == 10
-        and truth["changes"][0]["frequency_hz"][0] < truth["frequency_hz"][0]
-    )
+    assert truth["changes"][0]["at_s"] == 10 and truth["changes"][0]["frequency_hz"][0] < truth["frequency_hz"][0]
     csv = tmp_path / "r.csv"
     assert okid("simulate", rig, "--csv", csv, "--quiet").returncode == 0
     channels = ["--inputs", "force1", "--outputs", "acc1,acc2,acc3", "--json", "-"]
     for part, true in ((":2500", truth), ("2500:", truth["changes"][0])):
         modes = result_of(okid("identify", csv, *channels, "--range", part))["modes"]
-        assert [m["frequency_hz"] for m in modes] == pytest.approx(
-            true["frequency_hz"], rel=1e-3
-        )
+        assert [m["frequency_hz"] for m in modes] == pytest.approx(true["frequency_hz"], rel=1e-3)
 
 
 def test_alias_warning(tmp_path: Path) -> None:

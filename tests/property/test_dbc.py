@@ -41,12 +41,28 @@ def layouts(draw: st.DrawFn) -> dict:
         big = draw(st.booleans())
         start = first * 8 + 7 - offset_in_byte if big else first * 8 + offset_in_byte
         scale = draw(st.sampled_from([1, 0.5, 0.01, -2, 1e-6, 9.80665]))
-        signals.append({"name": f"S{index}", "start": start, "length": length, "big": big, "signed": draw(st.booleans()), "kind": kind,
-                        "scale": scale, "offset": draw(st.sampled_from([0, -320, 0.25])), "page": index % 2 if multiplexed else None})
+        signals.append(
+            {
+                "name": f"S{index}",
+                "start": start,
+                "length": length,
+                "big": big,
+                "signed": draw(st.booleans()),
+                "kind": kind,
+                "scale": scale,
+                "offset": draw(st.sampled_from([0, -320, 0.25])),
+                "page": index % 2 if multiplexed else None,
+            }
+        )
         first += size
     size = next(n for n in (8, 12, 16, 20, 24, 32, 48, 64) if n >= first)
-    return {"id": draw(st.integers(0, 0x1FFFFFFF if extended else 0x7FF)), "extended": extended, "size": size, "signals": signals,
-            "multiplexed": multiplexed}
+    return {
+        "id": draw(st.integers(0, 0x1FFFFFFF if extended else 0x7FF)),
+        "extended": extended,
+        "size": size,
+        "signals": signals,
+        "multiplexed": multiplexed,
+    }
 
 
 def dbc_text(layout: dict) -> str:
@@ -56,9 +72,11 @@ def dbc_text(layout: dict) -> str:
     for s in layout["signals"]:
         page = f"m{s['page']} " if s["page"] is not None else ""
         sign = "-" if s["signed"] or s["kind"] != "integer" else "+"
-        lines.append(f' SG_ {s["name"]} {page}: {s["start"]}|{s["length"]}@{0 if s["big"] else 1}{sign} '
-                     f'({s["scale"]},{s["offset"]}) [0|0] "m/s^2" X')
-    lines += ["", 'CM_ BO_ %d "a comment over' % number, ' SG_ two lines";', 'BA_DEF_ BO_ "Cycle" INT 0 1;']
+        lines.append(
+            f' SG_ {s["name"]} {page}: {s["start"]}|{s["length"]}@{0 if s["big"] else 1}{sign} '
+            f'({s["scale"]},{s["offset"]}) [0|0] "m/s^2" X'
+        )
+    lines += ["", f'CM_ BO_ {number} "a comment over', ' SG_ two lines";', 'BA_DEF_ BO_ "Cycle" INT 0 1;']
     for s in layout["signals"]:
         if s["kind"] != "integer":
             lines.append(f'SIG_VALTYPE_ {number} {s["name"]} : {1 if s["kind"] == "float32" else 2};')
@@ -119,28 +137,42 @@ def test_okid_dbc_is_read_whole(tmp_path: Path) -> None:
             if signal.name == "Counter":
                 continue
             role = "force" if "Force" in signal.name else "acceleration" if "Accel" in signal.name else "aux"
-            text += f'[[channel]]\nname = "{signal.name}"\nrole = "{role}"\nmessage = "{message.name}"\nsignal = "{signal.name}"\n'
+            text += f'[[channel]]\nname = "{signal.name}"\nrole = "{role}"\n'
+            text += f'message = "{message.name}"\nsignal = "{signal.name}"\n'
             text += 'sequence = "Counter"\n'
-            wanted[signal.name] = (message.frame_id, signal.start, signal.length, signal.is_signed, float(signal.scale), float(signal.offset))
+            wanted[signal.name] = (
+                message.frame_id,
+                signal.start,
+                signal.length,
+                signal.is_signed,
+                float(signal.scale),
+                float(signal.offset),
+            )
     (tmp_path / "all.toml").write_text(text + "[identification]\np = 4\n")
     found = json.loads(okid("check", str(tmp_path / "all.toml"), "--json").stdout)
-    assert {c["name"]: (c["can_id"], c["start_bit"], c["length"], c["signed"], c["scale"], c["offset"]) for c in found["channels"]} == wanted
+    assert {
+        c["name"]: (c["can_id"], c["start_bit"], c["length"], c["signed"], c["scale"], c["offset"])
+        for c in found["channels"]
+    } == wanted
     assert all(c["sequence"] == found["channels"][0]["sequence"] for c in found["channels"])
 
 
-@pytest.mark.parametrize(("line", "column", "expected"), [
-    ('BO_ x Message: 8 X', 5, "the identifier of the message"),
-    ('BO_ 1 : 8 X', 7, "the name of the message"),
-    ('BO_ 1 Message 8 X', 15, "':' after the name of the message"),
-    ('BO_ 4096 Message: 8 X', 20, "fits 11 bits"),
-    ('BO_ 1 M: 8 X\n SG_ S : 0-8@1+ (1,0) [0|0] "" X', 11, "'|' after the start bit"),
-    ('BO_ 1 M: 8 X\n SG_ S : 0|8@2+ (1,0) [0|0] "" X', 14, "(byte order)"),
-    ('BO_ 1 M: 8 X\n SG_ S : 0|8@1 (1,0) [0|0] "" X', 16, "(sign)"),
-    ('BO_ 1 M: 8 X\n SG_ S : 0|8@1+ (x,0) [0|0] "" X', 18, "the factor, a number"),
-    ('BO_ 1 M: 8 X\n SG_ S : 0|8@1+ (1,0) [0|0] "', 30, "'\"' after the unit"),
-    ('BO_ 1 M: 8 X\n SG_ S mx : 0|8@1+ (1,0) [0|0] "" X', 10, "M, m<number>"),
-    (' SG_ S : 0|8@1+ (1,0) [0|0] "" X', 5, "a message (BO_) before its first signal"),
-])
+@pytest.mark.parametrize(
+    ("line", "column", "expected"),
+    [
+        ("BO_ x Message: 8 X", 5, "the identifier of the message"),
+        ("BO_ 1 : 8 X", 7, "the name of the message"),
+        ("BO_ 1 Message 8 X", 15, "':' after the name of the message"),
+        ("BO_ 4096 Message: 8 X", 20, "fits 11 bits"),
+        ('BO_ 1 M: 8 X\n SG_ S : 0-8@1+ (1,0) [0|0] "" X', 11, "'|' after the start bit"),
+        ('BO_ 1 M: 8 X\n SG_ S : 0|8@2+ (1,0) [0|0] "" X', 14, "(byte order)"),
+        ('BO_ 1 M: 8 X\n SG_ S : 0|8@1 (1,0) [0|0] "" X', 16, "(sign)"),
+        ('BO_ 1 M: 8 X\n SG_ S : 0|8@1+ (x,0) [0|0] "" X', 18, "the factor, a number"),
+        ('BO_ 1 M: 8 X\n SG_ S : 0|8@1+ (1,0) [0|0] "', 30, "'\"' after the unit"),
+        ('BO_ 1 M: 8 X\n SG_ S mx : 0|8@1+ (1,0) [0|0] "" X', 10, "M, m<number>"),
+        (' SG_ S : 0|8@1+ (1,0) [0|0] "" X', 5, "a message (BO_) before its first signal"),
+    ],
+)
 def test_damaged_lines_are_named(tmp_path: Path, line: str, column: int, expected: str) -> None:
     (tmp_path / "a.dbc").write_text('VERSION ""\n' + line + "\n")
     (tmp_path / "a.toml").write_text(config_text({"signals": [{"name": "S"}]}))

@@ -39,8 +39,19 @@ def sh(*args: str, check: bool = True, seconds: float = 60) -> subprocess.Comple
 
 def make_record(folder: Path, duration: float) -> Path:
     (folder / "rig.toml").write_text(RIG.format(duration=duration))
-    sh(OKID, "simulate", str(folder / "rig.toml"), "--log", str(folder / "a.log"), "--truth", str(folder / "t.json"),
-       "--dbc", str(folder / "a.dbc"), "--config", str(folder / "a.toml"))
+    sh(
+        OKID,
+        "simulate",
+        str(folder / "rig.toml"),
+        "--log",
+        str(folder / "a.log"),
+        "--truth",
+        str(folder / "t.json"),
+        "--dbc",
+        str(folder / "a.dbc"),
+        "--config",
+        str(folder / "a.toml"),
+    )
     text = (folder / "a.toml").read_text()
     text = re.sub(r"(?m)^(p|rows) = .*\n", "", text).replace("[identification]", "[identification]\np = 20\nrows = 40")
     (folder / "a.toml").write_text(text)
@@ -74,8 +85,19 @@ class Run:
         for name in ("ev", "r.json"):
             (folder / name).unlink(missing_ok=True)
         self.process = subprocess.Popen(
-            [OKID, "run", str(folder / config), "--events", str(folder / "ev"), "--json", str(folder / "r.json"), *options],
-            stdout=subprocess.DEVNULL, stderr=self.stderr)
+            [
+                OKID,
+                "run",
+                str(folder / config),
+                "--events",
+                str(folder / "ev"),
+                "--json",
+                str(folder / "r.json"),
+                *options,
+            ],
+            stdout=subprocess.DEVNULL,
+            stderr=self.stderr,
+        )
         for _ in range(400):
             if self.listening():
                 return
@@ -85,7 +107,12 @@ class Run:
 
     @staticmethod
     def listening() -> bool:
-        lists = ("/proc/net/can/rcvlist_sff", "/proc/net/can/rcvlist_eff", "/proc/net/can/rcvlist_fil", "/proc/net/can/rcvlist_all")
+        lists = (
+            "/proc/net/can/rcvlist_sff",
+            "/proc/net/can/rcvlist_eff",
+            "/proc/net/can/rcvlist_fil",
+            "/proc/net/can/rcvlist_all",
+        )
         return any(re.search(r"vcan0\s+[0-9a-f]+\s+[0-9a-f]+\s", Path(each).read_text()) for each in lists)
 
     def messages(self) -> str:
@@ -112,7 +139,17 @@ def play(log: Path, *options: str) -> None:
 
 
 def replayed(folder: Path, log: str = "a.log") -> bytes:
-    sh(OKID, "replay", str(folder / log), "-c", str(folder / "a.toml"), "--speed", "max", "--json", str(folder / "replay.json"))
+    sh(
+        OKID,
+        "replay",
+        str(folder / log),
+        "-c",
+        str(folder / "a.toml"),
+        "--speed",
+        "max",
+        "--json",
+        str(folder / "replay.json"),
+    )
     return (folder / "replay.json").read_bytes()
 
 
@@ -196,7 +233,8 @@ def test_dropped_frames_are_gaps(short: Path) -> None:
     events = live.stop()
     gaps = [e for e in events if e["type"] == "gap"]
     assert {(g["channel"], g["first"], g["last"], g["count"], g["cause"]) for g in gaps} == {
-        (name, 1000, 1019, 20, "sequence") for name in ("acc1", "acc2")}
+        (name, 1000, 1019, 20, "sequence") for name in ("acc1", "acc2")
+    }
     assert bus(events)["lost_by"]["sequence"] == 20
 
 
@@ -291,14 +329,17 @@ def test_doctor_is_content(short: Path) -> None:
 
 def test_fd_frames(tmp_path: Path) -> None:
     """A 16-byte FD frame with a big-endian counter."""
-    (tmp_path / "a.toml").write_text("""
+    (tmp_path / "a.toml").write_text(
+        """
 [acquisition]
 rate_hz = 100.0
 [[bus]]
 name = "can0"
 interface = "vcan0"
 fd = true
-""" + "".join(f"""
+"""
+        + "".join(
+            f"""
 [[channel]]
 name = "{name}"
 role = "{role}"
@@ -309,7 +350,10 @@ byte_order = "big"
 signed = true
 scale = 0.01
 sequence = {{ start_bit = 7, length = 16, byte_order = "big" }}
-""" for i, (name, role) in enumerate([("f", "force"), ("a", "acceleration")], start=3)))
+"""
+            for i, (name, role) in enumerate([("f", "force"), ("a", "acceleration")], start=3)
+        )
+    )
     rows = ["f,a"] + [f"{((n * 7919) % 211 - 105) / 10},{((n * 104729) % 223 - 111) / 10}" for n in range(300)]
     (tmp_path / "in.csv").write_text("# fs_hz: 100\n" + "\n".join(rows) + "\n")
     sh(OKID, "convert", str(tmp_path / "in.csv"), str(tmp_path / "fd.log"), "-c", str(tmp_path / "a.toml"))

@@ -22,12 +22,12 @@ typedef struct drv_signal_t {
     uint8_t big_endian; ///< 1 = Motorola
     uint8_t is_signed;
     drv_value_t value;
-    double scale;  ///< physical = raw * scale + offset
+    double scale; ///< physical = raw * scale + offset
     double offset;
     // Filled by drv_signal_prepare():
-    uint8_t first;   ///< first byte touched
-    uint8_t bytes;   ///< bytes touched, 1..9
-    uint8_t shift;   ///< bits below the signal in those bytes
+    uint8_t first; ///< first byte touched
+    uint8_t bytes; ///< bytes touched, 1..9
+    uint8_t shift; ///< bits below the signal in those bytes
     uint64_t mask;
 } drv_signal_t;
 

@@ -25,10 +25,11 @@ typedef struct drv_filter_t {
 } drv_filter_t;
 
 typedef struct drv_source_config_t {
-    const char* interfaces[DRV_MAX_BUSES]; ///< socket: the first one; log: those to deliver, frame.bus is the index here
-    int32_t interface_count;               ///< log: 0 = deliver every interface as bus 0
-    const char* path;                      ///< log only
-    const drv_filter_t* filters;           ///< socket only; NULL = everything
+    const char*
+        interfaces[DRV_MAX_BUSES]; ///< socket: the first one; log: those to deliver, frame.bus is the index here
+    int32_t interface_count;       ///< log: 0 = deliver every interface as bus 0
+    const char* path;              ///< log only
+    const drv_filter_t* filters;   ///< socket only; NULL = everything
     int32_t filter_count;
     int32_t buffer_bytes; ///< receive buffer asked for, 0 = 8 MiB
 } drv_source_config_t;
@@ -44,24 +45,24 @@ typedef struct drv_stats_t {
     uint64_t error_frames;  ///< error messages of the controller, the next two among them
     uint64_t bus_off;
     uint64_t restarts;
-    uint64_t remote;       ///< remote requests, not delivered
-    uint64_t foreign;      ///< log: frames of other interfaces, not delivered
-    uint64_t link_down;    ///< times the interface went down or away
-    uint64_t reopened;     ///< times the socket was made anew after the interface had gone
-    uint64_t read_errors;  ///< other errors of the socket
-    int32_t buffer_bytes;  ///< receive buffer granted
-    int32_t link_is_down;  ///< 1 = down or away now
+    uint64_t remote;      ///< remote requests, not delivered
+    uint64_t foreign;     ///< log: frames of other interfaces, not delivered
+    uint64_t link_down;   ///< times the interface went down or away
+    uint64_t reopened;    ///< times the socket was made anew after the interface had gone
+    uint64_t read_errors; ///< other errors of the socket
+    int32_t buffer_bytes; ///< receive buffer granted
+    int32_t link_is_down; ///< 1 = down or away now
     drv_stamp_t stamp;
 } drv_stats_t;
 
 typedef struct drv_source_t drv_source_t;
 
 typedef struct drv_source_ops_t {
-    int (*open)(drv_source_t* self, const drv_source_config_t* config);  ///< 0 or -errno
-    int (*fd)(const drv_source_t* self);                                 ///< to poll for reading, -1 = none just now
-    int (*read)(drv_source_t* self, drv_frame_t* frames, int capacity);  ///< frames, 0 = none now, DRV_END, -errno
-    void (*stats)(drv_source_t* self, drv_stats_t* out);                 ///< reads the kernel's drop counter too
-    void (*close)(drv_source_t* self);                                   ///< safe after a failed open; stats stay readable
+    int (*open)(drv_source_t* self, const drv_source_config_t* config); ///< 0 or -errno
+    int (*fd)(const drv_source_t* self);                                ///< to poll for reading, -1 = none just now
+    int (*read)(drv_source_t* self, drv_frame_t* frames, int capacity); ///< frames, 0 = none now, DRV_END, -errno
+    void (*stats)(drv_source_t* self, drv_stats_t* out);                ///< reads the kernel's drop counter too
+    void (*close)(drv_source_t* self); ///< safe after a failed open; stats stay readable
 } drv_source_ops_t;
 
 struct drv_source_t {

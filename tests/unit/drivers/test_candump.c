@@ -85,8 +85,10 @@ static void test_round_trip(void) {
         seed = seed * 1103515245u + 12345u;
         from.time_ns = (INT64_C(1700000000) + i) * 1000000000 + (int64_t)(seed % 1000000) * 1000;
         if (i & 1) from.flags |= DRV_FRAME_EXTENDED;
-        if (i & 2) from.flags |= (uint8_t)(DRV_FRAME_FD | (i & 4 ? DRV_FRAME_BRS : 0) | (i & 8 ? DRV_FRAME_ESI : 0));
-        else if (i & 16) from.flags |= DRV_FRAME_REMOTE;
+        if (i & 2)
+            from.flags |= (uint8_t)(DRV_FRAME_FD | (i & 4 ? DRV_FRAME_BRS : 0) | (i & 8 ? DRV_FRAME_ESI : 0));
+        else if (i & 16)
+            from.flags |= DRV_FRAME_REMOTE;
         from.id = seed >> 3 & (i & 1 ? 0x1FFFFFFF : 0x7FF);
         from.len = lengths[i % (i & 2 ? 16 : 9)];
         if (!(from.flags & DRV_FRAME_REMOTE))

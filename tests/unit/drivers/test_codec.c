@@ -40,8 +40,11 @@ static uint64_t slow_raw(const drv_signal_t* s, const uint8_t* data) {
 }
 
 static void check_layout(unsigned start, unsigned length, int big_endian, int is_signed) {
-    drv_signal_t s = {.start_bit = (uint16_t)start, .length = (uint16_t)length, .big_endian = (uint8_t)big_endian,
-                      .is_signed = (uint8_t)is_signed, .scale = 1};
+    drv_signal_t s = {.start_bit = (uint16_t)start,
+                      .length = (uint16_t)length,
+                      .big_endian = (uint8_t)big_endian,
+                      .is_signed = (uint8_t)is_signed,
+                      .scale = 1};
     if (!fits(&s)) {
         TEST_ASSERT_NOT_NULL(drv_signal_prepare(&s));
         return;
@@ -55,8 +58,10 @@ static void check_layout(unsigned start, unsigned length, int big_endian, int is
     TEST_ASSERT_EQUAL_INT(1, drv_signal_raw(&s, data, need, &raw));
     uint64_t mask = length == 64 ? UINT64_MAX : ((uint64_t)1 << length) - 1;
     TEST_ASSERT_EQUAL_HEX64(slow_raw(&s, data), (uint64_t)raw & mask);
-    if (!is_signed || !((uint64_t)raw >> (length - 1) & 1)) TEST_ASSERT_EQUAL_HEX64((uint64_t)raw & mask, (uint64_t)raw);
-    else TEST_ASSERT_TRUE(raw < 0);
+    if (!is_signed || !((uint64_t)raw >> (length - 1) & 1))
+        TEST_ASSERT_EQUAL_HEX64((uint64_t)raw & mask, (uint64_t)raw);
+    else
+        TEST_ASSERT_TRUE(raw < 0);
     memcpy(before, data, sizeof data);
     uint64_t fresh = next_random() & mask;
     TEST_ASSERT_EQUAL_INT(1, drv_signal_put(&s, data, 64, (int64_t)fresh));
@@ -87,10 +92,17 @@ static void test_known_values(void) {
 
 static void test_floats(void) {
     for (int big = 0; big < 2; ++big) {
-        drv_signal_t f = {.start_bit = (uint16_t)(big ? 7 : 0), .length = 32, .big_endian = (uint8_t)big,
-                          .value = DRV_VALUE_FLOAT32, .scale = 2, .offset = 1};
-        drv_signal_t d = {.start_bit = (uint16_t)(big ? 71 : 64), .length = 64, .big_endian = (uint8_t)big,
-                          .value = DRV_VALUE_FLOAT64, .scale = 1};
+        drv_signal_t f = {.start_bit = (uint16_t)(big ? 7 : 0),
+                          .length = 32,
+                          .big_endian = (uint8_t)big,
+                          .value = DRV_VALUE_FLOAT32,
+                          .scale = 2,
+                          .offset = 1};
+        drv_signal_t d = {.start_bit = (uint16_t)(big ? 71 : 64),
+                          .length = 64,
+                          .big_endian = (uint8_t)big,
+                          .value = DRV_VALUE_FLOAT64,
+                          .scale = 1};
         TEST_ASSERT_NULL(drv_signal_prepare(&f));
         TEST_ASSERT_NULL(drv_signal_prepare(&d));
         uint8_t data[64] = {0};

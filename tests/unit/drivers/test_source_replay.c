@@ -28,12 +28,14 @@ static int start(const char* text, size_t length, const char* first, const char*
     FILE* file = fopen(path, "w");
     fwrite(text, 1, length, file);
     fclose(file);
-    drv_source_config_t config = {.path = path, .interfaces = {first, second}, .interface_count = first ? second ? 2 : 1 : 0};
+    drv_source_config_t config = {
+        .path = path, .interfaces = {first, second}, .interface_count = first ? second ? 2 : 1 : 0};
     return source.ops->open(&source, &config);
 }
 
 static void test_two_interfaces_are_told_apart(void) {
-    const char* text = "(1.0) can0 001#\n(1.1) can1 002#\n\n(1.2) other 003#\r\n(1.3) can1 20000004#00\n(1.4) can0 001#R\n(1.5) can1 004#AA";
+    const char* text = "(1.0) can0 001#\n(1.1) can1 002#\n\n(1.2) other 003#\r\n(1.3) can1 20000004#00\n(1.4) can0 "
+                       "001#R\n(1.5) can1 004#AA";
     TEST_ASSERT_EQUAL_INT(0, start(text, strlen(text), "can0", "can1"));
     TEST_ASSERT_EQUAL_INT(3, source.ops->read(&source, frames, 64));
     TEST_ASSERT_EQUAL_INT(0, frames[0].bus);
@@ -71,7 +73,8 @@ static void test_many_lines(void) {
     enum { LINES = 30000 };
     char* text = malloc((size_t)LINES * 64);
     size_t length = 0;
-    for (int i = 0; i < LINES; ++i) length += (size_t)sprintf(text + length, "(%d.000001) can0 %08X#%.*s\n", i, i, 2 * (i % 9), "0011223344556677");
+    for (int i = 0; i < LINES; ++i)
+        length += (size_t)sprintf(text + length, "(%d.000001) can0 %08X#%.*s\n", i, i, 2 * (i % 9), "0011223344556677");
     TEST_ASSERT_EQUAL_INT(0, start(text, length, NULL, NULL));
     free(text);
     int next = 0, count;

@@ -79,7 +79,9 @@ void refuse(const std::string& text, std::initializer_list<const char*> words) {
     TEST_FAIL_MESSAGE(text.c_str());
 }
 
-void refuse_change(const char* from, const char* to, std::initializer_list<const char*> words) { refuse(replaced(good, from, to), words); }
+void refuse_change(const char* from, const char* to, std::initializer_list<const char*> words) {
+    refuse(replaced(good, from, to), words);
+}
 
 } // namespace
 
@@ -118,11 +120,13 @@ static void test_byte_order_mark_and_line_ends() {
 }
 
 static void test_unknown_keys() {
-    refuse_change("rate_hz", "rate_hzz", {"line 2", "[acquisition]", "\"rate_hzz\": unknown key", "did you mean \"rate_hz\"?"});
+    refuse_change("rate_hz", "rate_hzz",
+                  {"line 2", "[acquisition]", "\"rate_hzz\": unknown key", "did you mean \"rate_hz\"?"});
     refuse_change("[identification]", "[identifcation]", {"unknown section", "did you mean \"identification\"?"});
     refuse_change("title =", "windows_s =", {"line 3", "windows_s", "known here: rate_hz"});
     refuse_change("interface =", "interfase =", {"line 6", "[[bus]] \"can0\"", "did you mean \"interface\"?"});
-    refuse_change("role = \"aux\"", "role = \"aux\"\nsgined = true", {"[[channel]] \"raw\"", "did you mean \"signed\"?"});
+    refuse_change("role = \"aux\"", "role = \"aux\"\nsgined = true",
+                  {"[[channel]] \"raw\"", "did you mean \"signed\"?"});
     refuse("rate = 3\n" + good, {"line 1", "top level", "unknown key"});
     refuse_change("length = 8 }", "length = 8, lenght = 2 }", {"unknown \"lenght\"", "start_bit, length, byte_order"});
 }
@@ -149,12 +153,15 @@ static void test_not_available() {
     refuse_change("p = 20", "method = \"n4sid-cva\"", {"method", "not available in this version"});
     refuse_change("p = 20", "forgetting = 0.999", {"forgetting", "window_s", "choose one"});
     refuse_change("p = 20", "detrend = \"linear\"", {"detrend", "linear"});
-    refuse_change("interface = \"vcan0\"", "type = \"serial\"\ndevice = \"/dev/ttyUSB0\"", {"type", "not available in this version"});
-    refuse_change("interface = \"vcan0\"", "type = \"usb\"", {"type", "expected one of: socketcan, slcan, serial, replay"});
+    refuse_change("interface = \"vcan0\"", "type = \"serial\"\ndevice = \"/dev/ttyUSB0\"",
+                  {"type", "not available in this version"});
+    refuse_change("interface = \"vcan0\"", "type = \"usb\"",
+                  {"type", "expected one of: socketcan, slcan, serial, replay"});
 }
 
 static void test_channels() {
-    refuse_change("\"OKID_Force\"", "\"OKID_Forse\"", {"line 16", "[[channel]] \"f1\"", "did you mean \"OKID_Force\"?"});
+    refuse_change("\"OKID_Force\"", "\"OKID_Forse\"",
+                  {"line 16", "[[channel]] \"f1\"", "did you mean \"OKID_Force\"?"});
     refuse_change("\"Force1\"", "\"Force9\"", {"line 17", "found \"Force9\"", "OKID_Force"});
     refuse_change("\"Counter\"", "\"Count\"", {"sequence", "did you mean \"Counter\"?"});
     refuse_change("\"Counter\"", "\"Force2\"", {"sequence", "unsigned"});

@@ -45,13 +45,17 @@ live_config make_config(std::size_t messages, unsigned bits, double rate_hz = 10
     return config;
 }
 
-drv_frame_t make_frame(const live_config& config, std::size_t message, std::int64_t sample, std::uint64_t first_counter, double late_s = 0) {
+drv_frame_t make_frame(const live_config& config, std::size_t message, std::int64_t sample, std::uint64_t first_counter,
+                       double late_s = 0) {
     drv_frame_t frame{};
     const channel_config& channel = config.channels[message];
     frame.id = channel.frame.id;
     frame.len = 8;
-    frame.time_ns = day_ns + std::llround((static_cast<double>(sample) / config.rate_hz + late_s) * 1e9) + static_cast<std::int64_t>(message) * 20000;
-    if (channel.sequence) drv_signal_put(&*channel.sequence, frame.data, 8, static_cast<std::int64_t>(first_counter + static_cast<std::uint64_t>(sample)));
+    frame.time_ns = day_ns + std::llround((static_cast<double>(sample) / config.rate_hz + late_s) * 1e9) +
+                    static_cast<std::int64_t>(message) * 20000;
+    if (channel.sequence)
+        drv_signal_put(&*channel.sequence, frame.data, 8,
+                       static_cast<std::int64_t>(first_counter + static_cast<std::uint64_t>(sample)));
     drv_signal_put(&channel.layout, frame.data, 8, sample);
     return frame;
 }
@@ -95,7 +99,8 @@ struct stream {
     recorder out;
     grid on;
     explicit stream(live_config c) : config(std::move(c)), on(config, out) { out.width = config.channels.size(); }
-    void send(std::size_t message, std::int64_t sample, std::uint64_t first_counter, double late_s = 0, std::uint8_t loss = 0) {
+    void send(std::size_t message, std::int64_t sample, std::uint64_t first_counter, double late_s = 0,
+              std::uint8_t loss = 0) {
         drv_frame_t frame = make_frame(config, message, sample, first_counter, late_s);
         frame.loss = loss;
         on.push(frame);
@@ -108,10 +113,14 @@ void check_seed(unsigned seed) {
     static const unsigned widths[] = {8, 12, 16, 16, 32};
     const auto messages = static_cast<std::size_t>(pick(1, 6));
     const unsigned bits = widths[pick(0, 4)];
-    const std::uint64_t first_counter = std::uniform_int_distribution<std::uint64_t>(0, (std::uint64_t{1} << bits) - 1)(random);
+    const std::uint64_t first_counter =
+        std::uniform_int_distribution<std::uint64_t>(0, (std::uint64_t{1} << bits) - 1)(random);
     stream s(make_config(messages, bits));
     const int samples = pick(200, 900), joined = pick(0, static_cast<int>(messages) - 1);
-    struct sent { drv_frame_t frame; int place; };
+    struct sent {
+        drv_frame_t frame;
+        int place;
+    };
     std::vector<sent> frames;
     std::int64_t lost = 0, doubled = 0;
     const int loss_percent = pick(0, 20), burst_most = pick(1, 30);
@@ -142,8 +151,8 @@ void check_seed(unsigned seed) {
     for (const sent& each : frames) s.on.push(each.frame);
     s.on.finish();
     char text[160];
-    std::snprintf(text, sizeof text, "seed %u: %zu messages, %u bits, %d samples, %lld lost, reorder %d", seed, messages, bits, samples,
-                  static_cast<long long>(lost), shuffle);
+    std::snprintf(text, sizeof text, "seed %u: %zu messages, %u bits, %d samples, %lld lost, reorder %d", seed,
+                  messages, bits, samples, static_cast<long long>(lost), shuffle);
     TEST_ASSERT_EQUAL_INT64_MESSAGE(0, s.out.wrong, text);
     TEST_ASSERT_EQUAL_INT64_MESSAGE(lost, s.out.marked(), text);
     TEST_ASSERT_EQUAL_INT64_MESSAGE(lost, s.out.nans, text);
