@@ -18,7 +18,7 @@ DEMO_RIG = ROOT / "tests" / "replay" / "demo_rig.toml"
 CHANNELS = ["--inputs", "u1", "--outputs", "y1,y2"]
 RESULT_KEYS = [
     "schema", "version", "method", "fs_hz", "samples", "records", "gaps", "inputs", "outputs", "p", "rows", "order",
-    "hold", "detrend", "singular_values", "model", "markov", "modes", "fit", "warnings",
+    "hold", "detrend", "start", "singular_values", "model", "markov", "modes", "fit", "warnings",
 ]  # fmt: skip
 MODE_KEYS = ["frequency_hz", "damping_ratio", "shape_re", "shape_im", "mpc", "emac"]
 
