@@ -141,6 +141,44 @@ row lapack_ls(const bench_case& c, int p) {
     return {c.name, "lapack_ls", p, per_sample * 1e9, flop / per_sample * 1e-9, v.size() * 8};
 }
 
+/// The Gram sums of a whole record of 16-bit codes: one call of the accumulator (FFT path), or OpenBLAS on blocks of 4096.
+row whole_record(const bench_case& c, int p, int samples, bool fft) {
+    const int m = c.n_u + c.n_y, width = m * (p + 1);
+    const auto numbers = static_cast<std::size_t>(samples) * static_cast<std::size_t>(m);
+    const std::vector<double> v = white(numbers);
+    double seconds = 0;
+    std::size_t bytes = 0;
+    if (fft) {
+        const okid_accumulator_config_t config{c.n_u, c.n_y, p, OKID_SAMPLE_INT16, 0, 0, 1, 0, 0, 1};
+        std::vector<std::int16_t> codes(numbers);
+        std::transform(v.begin(), v.end(), codes.begin(),
+                       [](double x) { return static_cast<std::int16_t>(x * 30000); });
+        std::vector<char> memory(okid_accumulator_memsize(&config));
+        std::vector<double> gram(static_cast<std::size_t>(width) * static_cast<std::size_t>(width));
+        okid_accumulator_t* a = nullptr;
+        if (okid_accumulator_create(&a, &config, memory.data(), memory.size()) != OKID_OK) return {};
+        bytes = memory.size();
+        seconds = seconds_of([&] {
+            okid_accumulator_reset(a);
+            if (okid_accumulator_add_i16(a, codes.data(), static_cast<std::size_t>(samples)) < 0) return;
+            (void)okid_accumulator_rows(a);
+        });
+    } else {
+        constexpr int block = 4096;
+        const std::vector<double> lags = white(static_cast<std::size_t>(block) * static_cast<std::size_t>(width));
+        std::vector<double> sums(static_cast<std::size_t>(m * width));
+        bytes = (lags.size() + sums.size()) * 8;
+        seconds = seconds_of([&] {
+            for (int n = 0; n < samples; n += block)
+                cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, m, width, std::min(block, samples - n), 1,
+                            v.data() + static_cast<std::size_t>(n) * static_cast<std::size_t>(m), m, lags.data(), width,
+                            1, sums.data(), m);
+        });
+    }
+    const double per_sample = seconds / samples;
+    return {c.name, fft ? "fft" : "dgemm_blocks", p, per_sample * 1e9, 2.0 * m * width / per_sample * 1e-9, bytes};
+}
+
 struct bench_options {
     bool json = false;
     std::string save;
@@ -172,7 +210,14 @@ void run_bench(const bench_options& options) {
             rows.push_back(rls(c, p));
             rows.push_back(lapack_ls(c, p));
         }
+    const std::pair<int, std::pair<int, int>> records[] = {{1, {60, 20000}}, {2, {50, 100000}}}; // case, lags, samples
+    for (const auto& [which, size] : records)
+        for (const bool fft : {true, false}) rows.push_back(whole_record(cases[which], size.first, size.second, fft));
     nlohmann::ordered_json ratios, list = nlohmann::ordered_json::array();
+    for (const auto& [which, size] : records)
+        ratios[fmt::format("dgemm_blocks_over_fft_{}_p{}", cases[which].name, size.first)] =
+            cost(rows, cases[which].name, size.first, "dgemm_blocks") /
+            cost(rows, cases[which].name, size.first, "fft");
     for (const bench_case& c : cases)
         for (const int p : horizons) {
             const double own = cost(rows, c.name, p, "direct");
@@ -181,7 +226,7 @@ void run_bench(const bench_options& options) {
                 ratios[other + suffix] = cost(rows, c.name, p, other) / own;
         }
     for (const row& r : rows)
-        list.push_back({{"name", "absorb"},
+        list.push_back({{"name", r.kernel == "fft" || r.kernel == "dgemm_blocks" ? "whole_record" : "absorb"},
                         {"case", r.name},
                         {"p", r.p},
                         {"kernel", r.kernel},

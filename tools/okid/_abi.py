@@ -54,6 +54,7 @@ class AccumulatorConfig(Structure):
         ("forgetting", c_double),
         ("edges", c_int32),
         ("spare_slots", c_int32),
+        ("bulk", c_int32),
     ]
 
 

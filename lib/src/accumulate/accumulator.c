@@ -36,6 +36,7 @@ static int valid(const okid_accumulator_config_t* c) {
     if (!(c->forgetting > 0 && c->forgetting <= 1)) return 0;
     if (c->slots > 0 && (c->block == 0 || c->forgetting < 1)) return 0;
     if (c->forgetting < 1 && (c->block == 0 || !c->edges)) return 0;
+    if (c->bulk && (c->sample != OKID_SAMPLE_INT16 || c->block > 0)) return 0;
     return !(c->block > 0 && c->slots == 0 && !c->edges);
 }
 
@@ -56,6 +57,11 @@ static size_t lay_out(okid_accumulator_t* a) {
     at = aligned(at + (codes ? (split ? 3 : 1) * sums * number : 0));
     a->split_at = at;
     at = aligned(at + (split ? 2 * (pm + CHUNK * m) * number : 0));
+    a->spectrum_at = at;
+    if (c->bulk) {
+        a->plan = okid_spectrum_plan(a->m, c->lags);
+        at = aligned(at + okid_spectrum_doubles(&a->plan) * number);
+    }
     a->slot_mean = codes ? 2 * sums : sums;
     a->slot_head = a->slot_mean + m;
     a->slot_tail = a->slot_head + pm;
@@ -71,12 +77,18 @@ static size_t lay_out(okid_accumulator_t* a) {
     return aligned(at + (base ? (a->base_edge + planes * (pm * (pm + 1) / 2)) * number : 0));
 }
 
+static void begin(okid_accumulator_t* a, const okid_accumulator_config_t* config) {
+    a->config = *config;
+    a->m = config->n_u + config->n_y;
+    a->width = a->m * (config->lags + 1);
+    if (!okid_spectrum_pays(a->m, config->lags)) a->config.bulk = 0;
+}
+
 size_t okid_accumulator_memsize(const okid_accumulator_config_t* config) {
     if (!config || !valid(config)) return 0;
     okid_accumulator_t a;
     memset(&a, 0, sizeof a);
-    a.config = *config;
-    a.m = config->n_u + config->n_y;
+    begin(&a, config);
     return lay_out(&a) + ALIGN;
 }
 
@@ -87,13 +99,13 @@ okid_status_t okid_accumulator_create(okid_accumulator_t** self, const okid_accu
     if (bytes < okid_accumulator_memsize(config)) return OKID_ERR_MEMORY;
     okid_accumulator_t* a = (okid_accumulator_t*)aligned((size_t)block);
     memset(a, 0, sizeof *a);
-    a->config = *config;
-    a->m = config->n_u + config->n_y;
-    a->width = a->m * (config->lags + 1);
+    begin(a, config);
     const size_t size = lay_out(a);
     memset((char*)a + sizeof *a, 0, size - sizeof *a);
     for (int32_t r = 0; r < a->m; ++r) acc_scale(a)[r] = 1;
     a->kernel = okid_kernel_pick();
+    a->spectrum = okid_spectrum_pick();
+    if (a->config.bulk) okid_spectrum_create(&a->plan, acc_at(a, a->spectrum_at));
     *self = a;
     return OKID_OK;
 }
@@ -102,7 +114,8 @@ void okid_accumulator_reset(okid_accumulator_t* self) {
     const size_t size = lay_out(self), from = self->x_at;
     memset((char*)self + from, 0, size - from);
     memset(&self->stats, 0, sizeof self->stats);
-    self->base_weight = 0;
+    if (self->config.bulk) okid_spectrum_create(&self->plan, acc_at(self, self->spectrum_at));
+    self->base_weight = self->energy = 0;
     self->clock = 0;
     self->have = self->pending = self->open = self->closed = self->partial_rows = self->in_gap = 0;
 }
@@ -195,8 +208,64 @@ static void flush(okid_accumulator_t* a) {
     a->pending = 0;
 }
 
+/// Round what the spectra hold back to integers and add it to the open slot.
+static void flush_spectrum(okid_accumulator_t* a) {
+    if (!(a->energy > 0)) return;
+    fold_partial(a);
+    a->spectrum.flush(&a->plan, acc_at(a, a->spectrum_at), acc_at(a, a->partial_at));
+    a->partial_rows = 1; // integers far below 2^53: energy < 2^43 is what the error bound allows
+    fold_partial(a);
+    a->energy = 0;
+}
+
+/// Sum of squares of a channel over all windows of a batch, the largest of the channels; windows overlap by p samples.
+static double batch_energy(const okid_accumulator_t* a, const int16_t* codes) {
+    const int32_t m = a->m, p = a->plan.p, fresh = a->plan.fresh, total = spectrum_samples(&a->plan);
+    const double* x = acc_x(a);
+    int64_t most = 0;
+    for (int32_t c = 0; c < m; ++c) {
+        int64_t sum = 0;
+        for (int32_t n = 0; n < p; ++n) sum += (int64_t)x[n * m + c] * (int64_t)x[n * m + c];
+        for (int32_t n = 0; n < total; ++n) {
+            const int64_t square =
+                (int64_t)codes[(size_t)n * (size_t)m + (size_t)c] * codes[(size_t)n * (size_t)m + (size_t)c];
+            const int again = n % fresh >= fresh - p && n < total - fresh; // the next window begins with it
+            sum += again ? 2 * square : square;
+        }
+        if (sum > most) most = sum;
+    }
+    return (double)most;
+}
+
+/// Take whole batches of a long call through the FFT while the error of the sums is proven below 1/2.
+/// @return samples taken, 0 when the direct kernel has to do it
+static size_t feed_bulk(okid_accumulator_t* a, const int16_t* codes, size_t count) {
+    const int32_t m = a->m, p = a->plan.p, total = spectrum_samples(&a->plan);
+    if (count < (size_t)total) return 0;
+    flush(a);
+    const double energy = batch_energy(a, codes);
+    if (okid_spectrum_error(&a->plan, a->energy + energy) >= 0.5) flush_spectrum(a);
+    if (okid_spectrum_error(&a->plan, energy) >= 0.5) return 0;
+    double* x = acc_x(a);
+    slot_info_t* slot = acc_slot(a, a->open);
+    double* data = acc_slot_data(a, a->open);
+    if (slot->rows == 0) memcpy(data + a->slot_head, x, (size_t)(p * m) * sizeof *x);
+    a->spectrum.absorb(&a->plan, acc_at(a, a->spectrum_at), x, codes);
+    a->energy += energy > 0 ? energy : 1; // silence counts as rows too
+    int64_t* mean = (int64_t*)(data + a->slot_mean);
+    for (int32_t n = 0; n < total; ++n)
+        for (int32_t r = 0; r < m; ++r) mean[r] += codes[(size_t)n * (size_t)m + (size_t)r];
+    const int16_t* tail = codes + (size_t)(total - p) * (size_t)m;
+    for (int32_t i = 0; i < p * m; ++i) x[i] = tail[i];
+    slot->rows += total;
+    a->stats.rows += total;
+    a->clock += total;
+    return (size_t)total;
+}
+
 void okid_accumulator_settle(okid_accumulator_t* self) {
     flush(self);
+    flush_spectrum(self);
     fold_partial(self);
 }
 
@@ -273,7 +342,15 @@ static size_t feed(okid_accumulator_t* a, source_t* source, size_t count) {
 static void feed_run(okid_accumulator_t* a, source_t source, size_t count) {
     if (count > 0 && a->in_gap && a->config.slots == 0 && !a->config.edges) make_room(a);
     a->stats.samples += (int64_t)count;
-    while (count > 0) count -= feed(a, &source, count);
+    while (count > 0) {
+        size_t taken = 0;
+        if (a->config.bulk && a->have == a->config.lags) {
+            taken = feed_bulk(a, source.words, count);
+            source.words += taken * (size_t)a->m;
+        }
+        if (taken == 0) taken = feed(a, &source, count);
+        count -= taken;
+    }
 }
 
 static int finite_sample(const double* v, size_t numbers) {

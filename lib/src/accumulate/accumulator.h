@@ -7,6 +7,7 @@
 #include <okid/accumulator.h>
 
 #include "kernel.h"
+#include "spectrum.h"
 
 /// An unbroken piece of the record. Behind it in memory: S (m x m(p+1) row-major; codes: plane of low words, then plane of
 /// high words), the sum of v_n over its rows (m; codes: int64), head (the p samples before its first row) and tail (the
@@ -23,7 +24,11 @@ struct okid_accumulator {
     okid_accumulator_config_t config;
     okid_accumulator_stats_t stats;
     okid_kernel_fn* kernel;
-    size_t scale_at, x_at, scratch_at, partial_at, split_at, slots_at, base_at, slot_bytes; ///< bytes from this struct
+    spectrum_kernels_t spectrum;
+    spectrum_plan_t plan; ///< of the FFT path
+    double energy;        ///< of the samples in the spectra, 0 = none
+    size_t scale_at, x_at, scratch_at, partial_at, split_at, spectrum_at, slots_at, base_at,
+        slot_bytes;                              ///< bytes from this struct
     size_t slot_mean, slot_head, slot_tail;      ///< in numbers from the slot's data
     size_t base_mean, base_edge_mean, base_edge; ///< in numbers from the base
     int64_t clock;                               ///< samples seen, missing ones included

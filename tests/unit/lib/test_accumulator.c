@@ -117,6 +117,69 @@ static void codes_are_summed_exactly(void) {
     free(block);
 }
 
+/// The FFT path gives the bits of the direct kernel: long and short calls mixed, gaps, full scale, offsets, merging.
+static void bulk_equals_direct(void) {
+    enum { LONG = 20000 };
+    const int shapes[][3] = {{2, 6, 40}, {3, 10, 20}, {1, 3, 70}, {1, 1, 300}, {8, 12, 25}};
+    for (size_t k = 0; k < sizeof shapes / sizeof *shapes; ++k) {
+        const int m = shapes[k][0] + shapes[k][1], width = m * (shapes[k][2] + 1);
+        const size_t gram = (size_t)width * (size_t)width;
+        okid_accumulator_config_t config = {
+            shapes[k][0], shapes[k][1], shapes[k][2], OKID_SAMPLE_INT16, 0, 0, 1.0, 1, 0, 0};
+        void *b1, *b2, *b3;
+        okid_accumulator_t* direct = make(config, &b1);
+        config.bulk = 1;
+        okid_accumulator_t *bulk = make(config, &b2), *other = make(config, &b3);
+        TEST_ASSERT_GREATER_THAN(
+            okid_accumulator_memsize(&(okid_accumulator_config_t){1, 3, 5, OKID_SAMPLE_INT16, 0, 0, 1.0, 1, 0, 0}),
+            okid_accumulator_memsize(&config));
+        int16_t* v = malloc(sizeof *v * LONG * (size_t)m);
+        double *expected = malloc(sizeof *expected * gram), *actual = malloc(sizeof *actual * gram);
+        for (int kind = 0; kind < 4; ++kind) {
+            uint64_t state = 3;
+            for (int i = 0; i < LONG * m; ++i) {
+                const double x = rig_uniform(&state) - 0.5;
+                v[i] = (int16_t)(kind == 0   ? 65534 * x
+                                 : kind == 1 ? (x < 0 ? -32768 : 32767)
+                                 : kind == 2 ? 30000
+                                             : 40 * x);
+            }
+            okid_accumulator_reset(direct);
+            okid_accumulator_reset(bulk);
+            for (int n = 0, step = 0; n < LONG; n += step) {
+                step = (int)(rig_uniform(&state) * 9000);
+                if (step > LONG - n) step = LONG - n;
+                TEST_ASSERT_GREATER_OR_EQUAL(0, okid_accumulator_add_i16(direct, v + (size_t)n * (size_t)m, 1));
+                for (int i = 1; i < step; i += 100) // short calls never take the FFT
+                    TEST_ASSERT_GREATER_OR_EQUAL(0,
+                                                 okid_accumulator_add_i16(direct, v + (size_t)(n + i) * (size_t)m,
+                                                                          (size_t)(step - i < 100 ? step - i : 100)));
+                if (step == 0) step = 1;
+                TEST_ASSERT_GREATER_OR_EQUAL(0,
+                                             okid_accumulator_add_i16(bulk, v + (size_t)n * (size_t)m, (size_t)step));
+                if (n < LONG / 2 && n + step >= LONG / 2) {
+                    okid_accumulator_gap(direct, 2);
+                    okid_accumulator_gap(bulk, 2);
+                }
+            }
+            for (int detrend = 0; detrend < 2; ++detrend) {
+                TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(direct, (okid_detrend_t)detrend, expected, NULL));
+                TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(bulk, (okid_detrend_t)detrend, actual, NULL));
+                TEST_ASSERT_EQUAL_MEMORY(expected, actual, sizeof *expected * gram);
+            }
+        }
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_merge(other, bulk));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(other, OKID_DETREND_MEAN, actual, NULL));
+        TEST_ASSERT_EQUAL_MEMORY(expected, actual, sizeof *expected * gram);
+        free(v);
+        free(expected);
+        free(actual);
+        free(b1);
+        free(b2);
+        free(b3);
+    }
+}
+
 /// Full-scale 24-bit and 32-bit codes: exact against 128-bit sums, whatever the split; merged and windowed too.
 static void long_codes_are_summed_exactly(void) {
     static int32_t longs[N * RIG_M];
@@ -428,6 +491,7 @@ int main(void) {
     RUN_TEST(gram_equals_explicit_sum);
     RUN_TEST(any_split_gives_the_same_bits);
     RUN_TEST(codes_are_summed_exactly);
+    RUN_TEST(bulk_equals_direct);
     RUN_TEST(long_codes_are_summed_exactly);
     RUN_TEST(offsets_of_codes_cost_no_digits);
     RUN_TEST(missing_samples_drop_exactly_the_rows_they_touch);

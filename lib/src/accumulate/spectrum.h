@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    the lagged sums of 16-bit codes by FFT: the same integers as the direct kernel, for long lags and long calls
+#ifndef OKID_SPECTRUM_H
+#define OKID_SPECTRUM_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { SPECTRUM_LANES = 8, SPECTRUM_BATCH = 4 };
+
+/// Sizes for m channels and p lags.
+typedef struct spectrum_plan_t {
+    int32_t m, p;
+    int32_t length; ///< N, points of a transform, a power of two
+    int32_t fresh;  ///< L = N - p, new samples a transform takes
+    int32_t groups; ///< of SPECTRUM_LANES channels
+} spectrum_plan_t;
+
+/// What one call of the absorb function takes: SPECTRUM_BATCH * fresh samples.
+static inline int32_t spectrum_samples(const spectrum_plan_t* plan) { return SPECTRUM_BATCH * plan->fresh; }
+
+spectrum_plan_t okid_spectrum_plan(int32_t m, int32_t p);
+
+/// Is it faster than the direct kernel? A constant rule, so that a replay takes the same path; the sums are equal anyhow.
+int okid_spectrum_pays(int32_t m, int32_t p);
+
+/// Doubles of memory, and the one-time filling of its tables. The rest must be zero at the start.
+size_t okid_spectrum_doubles(const spectrum_plan_t* plan);
+void okid_spectrum_create(const spectrum_plan_t* plan, double* memory);
+
+/// Sums gathered since the last flush are exact after rounding while this stays below 1/2.
+double okid_spectrum_error(const spectrum_plan_t* plan, double energy);
+
+/// Absorb spectrum_samples() samples that follow the p samples of `history` (time order, m numbers each).
+/// @return the largest energy (sum of squares over the windows) of a channel, for okid_spectrum_error()
+typedef double okid_spectrum_absorb_fn(const spectrum_plan_t* plan, double* memory, const double* history,
+                                       const int16_t* codes);
+
+/// Write the sums S (m x m(p+1), row-major, as the direct kernel orders them) as exact integers in doubles and begin anew.
+typedef void okid_spectrum_flush_fn(const spectrum_plan_t* plan, double* memory, double* sums);
+
+typedef struct spectrum_kernels_t {
+    okid_spectrum_absorb_fn* absorb;
+    okid_spectrum_flush_fn* flush;
+} spectrum_kernels_t;
+
+/// The fastest this processor runs.
+spectrum_kernels_t okid_spectrum_pick(void);
+
+#endif
