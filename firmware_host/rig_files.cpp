@@ -93,7 +93,8 @@ std::string rig_csv(const rig_run& run) {
 std::string rig_config(const rig& rig, const rig_run& run, const std::string& dbc) {
     std::string out = "# written by okid simulate\n";
     auto text = std::back_inserter(out);
-    fmt::format_to(text, "[acquisition]\nrate_hz = {:#}\ntitle = \"virtual rig\"\n\n", run.rate_hz);
+    // TOML takes a whole number for a rate as well; "250." it does not take
+    fmt::format_to(text, "[acquisition]\nrate_hz = {}\ntitle = \"virtual rig\"\n\n", run.rate_hz);
     fmt::format_to(text,
                    "[[bus]]\nname = \"can0\"\ntype = \"socketcan\"\ninterface = \"{}\"\nbitrate = 1000000\ndbc = {}\n",
                    rig_interface, quoted(dbc));

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import ctypes
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -289,3 +291,20 @@ def test_float32_and_lists_and_strided_arrays() -> None:
             grams.append(sums.gram()[0])
     for other in grams[1:]:
         np.testing.assert_array_equal(grams[0], other)
+
+
+def test_a_pickle_works_in_another_process() -> None:
+    """The block holds no addresses: a worker process goes on where this one stopped."""
+    rng = np.random.default_rng(4)
+    codes = rng.integers(-9000, 9000, (9000, 8), dtype=np.int16)
+    sums = Accumulator(2, 6, 40, codes=16)
+    sums.add(codes[:6000])
+    program = (
+        "import pickle, sys; import numpy as np; sums, rest = pickle.load(sys.stdin.buffer); sums.add(rest);"
+        "sys.stdout.buffer.write(sums.gram('mean')[0].tobytes())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], input=pickle.dumps((sums, codes[6000:])), capture_output=True, check=True
+    )
+    sums.add(codes[6000:])
+    np.testing.assert_array_equal(np.frombuffer(done.stdout), sums.gram("mean")[0].ravel())

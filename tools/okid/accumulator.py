@@ -36,7 +36,8 @@ class Accumulator:
     Parameters: `n_u` inputs, `n_y` outputs, `lags` p; `codes` 16, 24 or 32 takes ADC codes of so many bits (int16, or
     int32 words) and sums them exactly, 0 takes real numbers; `block` and `slots` make a sliding window of
     slots * block sample periods (`spare_slots` more where gaps close slots early); `forgetting` lambda per sample
-    (needs `block`); `edges` False saves memory for one unbroken run. Raises InputError for sizes outside the
+    (needs `block`); `edges` False saves memory for one unbroken run; `bulk` lets long calls of 16-bit codes go through an
+    FFT where that is faster, with the same bits. Raises InputError for sizes outside the
     documented range. Source: lib/include/okid/accumulator.h, paper eq. 36-38.
     """
 
@@ -52,14 +53,16 @@ class Accumulator:
         forgetting: float = 1.0,
         edges: bool = True,
         spare_slots: int = 0,
+        bulk: bool = True,
     ) -> None:
         if codes not in _SAMPLE:
             raise InputError(
                 f"codes is {codes!r}, expected the bits of an ADC code: 16, 24 or 32, or 0 for real numbers"
             )
         self._config = _abi.AccumulatorConfig(
-            n_u, n_y, lags, _SAMPLE[codes], block, slots, forgetting, int(edges), spare_slots
-        )
+            n_u, n_y, lags, _SAMPLE[codes], block, slots, forgetting, int(edges), spare_slots,
+            int(bulk and codes == 16 and block == 0),
+        )  # fmt: skip
         size = int(_abi.library().okid_accumulator_memsize(ctypes.byref(self._config)))
         if size == 0:
             raise InputError(
@@ -230,6 +233,7 @@ class Accumulator:
             "forgetting": c.forgetting,
             "edges": bool(c.edges),
             "spare_slots": c.spare_slots,
+            "bulk": bool(c.bulk),
         }
 
     def copy(self) -> Accumulator:

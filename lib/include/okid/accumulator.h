@@ -41,7 +41,7 @@ typedef enum okid_sample_t {
 } okid_sample_t;
 
 /// One recursive accumulator. Private; lives inside the block given to okid_accumulator_create(). It holds offsets, no
-/// pointers: a memcpy of the block is a snapshot.
+/// pointers: a memcpy of the block is a snapshot, also for another process of the same library version.
 typedef struct okid_accumulator okid_accumulator_t;
 
 typedef struct okid_accumulator_config_t {

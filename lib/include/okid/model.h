@@ -35,7 +35,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_model_predict(const okid_model_t* mod
 
 /// Least-squares initial state: the x0 for which simulation over the record fits best in the output-error sense.
 /// Samples of y with a NaN carry no weight; a NaN in u counts as 0. @param x0  out, n_z
-/// Cost 2 count n_y n_z^2 flop. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_NUMERIC
+/// Cost 2 count n_y n_z^2 flop. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_NUMERIC
 OKID_NODISCARD OKID_API okid_status_t okid_model_initial_state(const okid_model_t* model, const double* u,
                                                                const double* y, size_t count, double* x0, double* work);
 

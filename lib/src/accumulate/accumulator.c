@@ -103,8 +103,6 @@ okid_status_t okid_accumulator_create(okid_accumulator_t** self, const okid_accu
     const size_t size = lay_out(a);
     memset((char*)a + sizeof *a, 0, size - sizeof *a);
     for (int32_t r = 0; r < a->m; ++r) acc_scale(a)[r] = 1;
-    a->kernel = okid_kernel_pick();
-    a->spectrum = okid_spectrum_pick();
     if (a->config.bulk) okid_spectrum_create(&a->plan, acc_at(a, a->spectrum_at));
     *self = a;
     return OKID_OK;
@@ -150,6 +148,7 @@ static void fold_partial(okid_accumulator_t* a) {
 
 /// 32-bit codes: kernel on the high and low halves of the codes, x = high 2^16 + low, 0 <= low < 2^16.
 static void run_split(okid_accumulator_t* a, const double* x, int32_t count) {
+    okid_kernel_fn* const kernel = okid_kernel_pick();
     const int32_t m = a->m, p = a->config.lags;
     const size_t numbers = (size_t)(p + count) * (size_t)m, sums = acc_sum_count(a);
     double *high = acc_at(a, a->split_at), *low = high + (size_t)(p + CHUNK) * (size_t)m;
@@ -160,15 +159,16 @@ static void run_split(okid_accumulator_t* a, const double* x, int32_t count) {
         low[i] = code - upper * 65536;
     }
     double* partial = acc_at(a, a->partial_at);
-    a->kernel(partial, high, high, m, p, count);
-    a->kernel(partial + sums, high, low, m, p, count);
-    a->kernel(partial + sums, low, high, m, p, count);
-    a->kernel(partial + 2 * sums, low, low, m, p, count);
+    kernel(partial, high, high, m, p, count);
+    kernel(partial + sums, high, low, m, p, count);
+    kernel(partial + sums, low, high, m, p, count);
+    kernel(partial + 2 * sums, low, low, m, p, count);
 }
 
 static void run_kernel(okid_accumulator_t* a, const double* x, int32_t count) {
+    okid_kernel_fn* const kernel = okid_kernel_pick(); // not kept in the block: a snapshot may go to another process
     if (!acc_has_codes(a)) {
-        a->kernel(acc_slot_data(a, a->open), x, x, a->m, a->config.lags, count);
+        kernel(acc_slot_data(a, a->open), x, x, a->m, a->config.lags, count);
         return;
     }
     const int32_t limit = fold_rows(a->config.sample);
@@ -178,7 +178,7 @@ static void run_kernel(okid_accumulator_t* a, const double* x, int32_t count) {
         if (a->config.sample == OKID_SAMPLE_INT32)
             run_split(a, x, piece);
         else
-            a->kernel(acc_at(a, a->partial_at), x, x, a->m, a->config.lags, piece);
+            kernel(acc_at(a, a->partial_at), x, x, a->m, a->config.lags, piece);
         a->partial_rows += piece;
         x += (size_t)piece * (size_t)a->m;
         count -= piece;
@@ -212,7 +212,7 @@ static void flush(okid_accumulator_t* a) {
 static void flush_spectrum(okid_accumulator_t* a) {
     if (!(a->energy > 0)) return;
     fold_partial(a);
-    a->spectrum.flush(&a->plan, acc_at(a, a->spectrum_at), acc_at(a, a->partial_at));
+    okid_spectrum_pick().flush(&a->plan, acc_at(a, a->spectrum_at), acc_at(a, a->partial_at));
     a->partial_rows = 1; // integers far below 2^53: energy < 2^43 is what the error bound allows
     fold_partial(a);
     a->energy = 0;
@@ -250,7 +250,7 @@ static size_t feed_bulk(okid_accumulator_t* a, const int16_t* codes, size_t coun
     slot_info_t* slot = acc_slot(a, a->open);
     double* data = acc_slot_data(a, a->open);
     if (slot->rows == 0) memcpy(data + a->slot_head, x, (size_t)(p * m) * sizeof *x);
-    a->spectrum.absorb(&a->plan, acc_at(a, a->spectrum_at), x, codes);
+    okid_spectrum_pick().absorb(&a->plan, acc_at(a, a->spectrum_at), x, codes);
     a->energy += energy > 0 ? energy : 1; // silence counts as rows too
     int64_t* mean = (int64_t*)(data + a->slot_mean);
     for (int32_t n = 0; n < total; ++n)

@@ -23,8 +23,6 @@ typedef struct slot_info_t {
 struct okid_accumulator {
     okid_accumulator_config_t config;
     okid_accumulator_stats_t stats;
-    okid_kernel_fn* kernel;
-    spectrum_kernels_t spectrum;
     spectrum_plan_t plan; ///< of the FFT path
     double energy;        ///< of the samples in the spectra, 0 = none
     size_t scale_at, x_at, scratch_at, partial_at, split_at, spectrum_at, slots_at, base_at,

@@ -16,6 +16,8 @@ using std::size_t;
 
 namespace {
 
+bool sized(const okid_model_t& m) { return m.n_u >= 0 && m.n_y >= 1 && m.n_z >= 1; }
+
 /// y = M x + y, M rows x cols column-major.
 void add_product(int rows, int cols, const double* M, const double* x, double* y) {
     for (int j = 0; j < cols; ++j) {
@@ -72,6 +74,7 @@ size_t okid_model_workspace(const okid_model_t* model) {
 okid_status_t okid_model_simulate(const okid_model_t* model, const double* u, size_t count, const double* x0, double* y,
                                   double* work) {
     if (model == nullptr || u == nullptr || y == nullptr || work == nullptr) return OKID_ERR_NULL;
+    if (!sized(*model)) return OKID_ERR_DIM;
     stepper s(*model, x0, work);
     double* spare = work + 2 * model->n_z;
     for (size_t n = 0; n < count; ++n) {
@@ -86,6 +89,7 @@ okid_status_t okid_model_predict(const okid_model_t* model, const double* u, con
                                  const double* x0, double* yhat, double* work) {
     if (model == nullptr || model->K == nullptr || u == nullptr || y == nullptr || yhat == nullptr || work == nullptr)
         return OKID_ERR_NULL;
+    if (!sized(*model)) return OKID_ERR_DIM;
     stepper s(*model, x0, work);
     double *spare = work + 2 * model->n_z, *innovation = spare + model->n_u;
     const auto ny = static_cast<size_t>(model->n_y);
@@ -103,6 +107,7 @@ okid_status_t okid_model_predict(const okid_model_t* model, const double* u, con
 okid_status_t okid_model_initial_state(const okid_model_t* model, const double* u, const double* y, size_t count,
                                        double* x0, double* work) {
     if (model == nullptr || u == nullptr || y == nullptr || x0 == nullptr || work == nullptr) return OKID_ERR_NULL;
+    if (!sized(*model)) return OKID_ERR_DIM;
     const auto z = static_cast<size_t>(model->n_z), ny = static_cast<size_t>(model->n_y),
                nu = static_cast<size_t>(model->n_u);
     stepper s(*model, nullptr, work);

@@ -291,7 +291,7 @@ void configuration_and_truth() {
     const rig_run run = okid_host::simulate_rig(r);
     const std::string config = okid_host::rig_config(r, run, "a \"b\".dbc");
     TEST_ASSERT_TRUE(config.find("dbc = \"a \\\"b\\\".dbc\"") != std::string::npos);
-    TEST_ASSERT_TRUE(config.find("rate_hz = 250.0") != std::string::npos);
+    TEST_ASSERT_TRUE(config.find("rate_hz = 250\n") != std::string::npos);
     TEST_ASSERT_TRUE(okid_host::rig_truth(r).find("\"schema\": \"okid.truth/1\"") != std::string::npos);
     TEST_ASSERT_EQUAL_UINT64(0, okid_host::rig_csv(run).find("# fs_hz: 250\n"));
 }
