@@ -5,6 +5,7 @@
 #include "config_schema.hpp"
 #include "error.hpp"
 #include "nearest_name.hpp"
+#include "units.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -225,6 +226,11 @@ void note_ignored(const toml::table& file, live_config& config) {
     for (const char* section : {"alarm", "trigger", "record", "publish", "geometry"})
         if (file.contains(section))
             config.warnings.push_back(fmt::format("[{}] is accepted, but does nothing in this version", section));
+    for (const channel_config& channel : config.channels)
+        if (!find_unit(channel.unit))
+            config.warnings.push_back(
+                fmt::format("channel \"{}\": the unit \"{}\" is not known, its numbers are taken as they are",
+                            channel.name, channel.unit));
 }
 
 } // namespace

@@ -35,10 +35,8 @@ struct channel_config {
     std::optional<drv_signal_t> selector; ///< multiplexor of the signal …
     std::uint64_t selector_value = 0;     ///< … and what it must hold
     std::optional<drv_signal_t> sequence; ///< counts samples
-    /// 9.80665 for channels in g, else 1.
-    double si_factor() const { return unit == "g" ? 9.80665 : 1.0; }
-    /// Unit of the decoded channel once si_factor() is applied.
-    std::string si_unit() const { return unit == "g" ? "m/s^2" : unit; }
+    double si_factor() const;             ///< from `unit` to the SI unit, 1 for a unit that is not known
+    std::string si_unit() const;          ///< of the decoded channel once si_factor() is applied
 };
 
 struct identification_config {

@@ -37,10 +37,15 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
             "{} is constant: it measures nothing. Leave it out of --outputs, or check the sensor and its wiring",
             channel_name(info.channel, context));
     case OKID_ERR_EXCITATION:
+        if (info.channel >= 0)
+            return fmt::format(
+                "not enough excitation: {} repeats the inputs before it and cannot be told apart from them. "
+                "Leave it out, or drive the forces independently",
+                channel_name(info.channel, context));
         return fmt::format(
-            "not enough excitation{}: the inputs cannot be told apart over {} lags (smallest over largest {:.1e}). "
-            "Use independent broad-band forces, lower --p, or leave out an input that repeats another",
-            info.channel >= 0 ? " by " + channel_name(info.channel, context) : "", config.p, info.input_excitation);
+            "not enough excitation: the inputs cannot be told apart over {} lags (smallest over largest {:.1e}). Use "
+            "independent broad-band forces or lower --p",
+            config.p, info.input_excitation);
     case OKID_ERR_UNSTABLE:
         return fmt::format(
             "no stable observer: plain least squares has spectral radius {:.6g}, and no ridge of the grid cures it. "
@@ -48,9 +53,10 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
             info.radius_plain);
     case OKID_ERR_NO_MODES:
         return fmt::format(
-            "the model of order {} has no underdamped mode below {:g} Hz: the record holds no vibration that answers "
-            "the inputs. Try a higher --order or --p, and check that inputs and outputs are not exchanged",
-            model.n_z, context.fs_hz / 2);
+            "no mode that holds (underdamped, below {:g} Hz, EMAC above 0.5) was found: the record shows no vibration "
+            "that answers the inputs. Try another --p or an --order, and check that inputs and outputs are not "
+            "exchanged",
+            context.fs_hz / 2);
     case OKID_ERR_NUMERIC:
         return "a factorisation did not converge. Check the record for extreme values; try a smaller --p";
     default: return okid_status_text(status);

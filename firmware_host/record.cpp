@@ -47,8 +47,46 @@ void centre_each(std::vector<record_data>& records, const record_options& option
     }
 }
 
+/// Lengths of the unbroken runs of complete samples.
+std::vector<long long> runs_of(const std::vector<record_data>& records, std::size_t n_u, std::size_t n_y) {
+    std::vector<long long> runs;
+    for (const record_data& record : records) {
+        long long run = 0;
+        for (std::size_t i = 0; i <= record.count; ++i) {
+            bool whole = i < record.count;
+            for (std::size_t k = 0; whole && k < n_u; ++k) whole = !std::isnan(record.u[i * n_u + k]);
+            for (std::size_t k = 0; whole && k < n_y; ++k) whole = !std::isnan(record.y[i * n_y + k]);
+            if (whole) {
+                ++run;
+            } else if (run > 0) {
+                runs.push_back(run);
+                run = 0;
+            }
+        }
+    }
+    return runs;
+}
+
+/// Gaps cost p rows each: the largest p up to `most` whose rows are ten times its unknowns; the best there is otherwise.
+int choose_p_beside_gaps(const std::vector<long long>& runs, int n_u, int n_y, int least, int most) {
+    int best = least;
+    double best_share = 0;
+    for (int p = most; p >= least; --p) {
+        long long rows = 0;
+        for (const long long run : runs) rows += std::max(0LL, run - p);
+        const double share = static_cast<double>(rows) / static_cast<double>(n_u + p * (n_u + n_y));
+        if (share >= 10) return p;
+        if (share > best_share) {
+            best_share = share;
+            best = p;
+        }
+    }
+    return best;
+}
+
 /// p for the samples there are, with the remark when it is smaller than asked for.
-int choose_p(const record_options& options, long long samples, result_context& context) {
+int choose_p(const record_options& options, const std::vector<record_data>& records, long long samples, bool gaps,
+             result_context& context) {
     const int n_u = static_cast<int>(options.inputs.size()), n_y = static_cast<int>(options.outputs.size());
     const int least_p = n_y >= 2 ? 1 : 2; // p n_y states: two make the first mode
     const long long least = 10LL * (n_u + least_p * (n_u + n_y));
@@ -58,12 +96,17 @@ int choose_p(const record_options& options, long long samples, result_context& c
                                   "inputs and {} outputs needs {} (10 for each unknown). Record longer or use fewer "
                                   "channels",
                                   samples, n_u, n_y, least));
-    const int p = okid_identify_usable_p(n_u, n_y, options.p, samples);
+    int p = okid_identify_usable_p(n_u, n_y, options.p, samples);
+    if (gaps) {
+        const auto runs = runs_of(records, options.inputs.size(), options.outputs.size());
+        p = choose_p_beside_gaps(runs, n_u, n_y, std::min(least_p, p), p);
+    }
     if (p < options.p)
         context.warnings.emplace_back("p_reduced",
-                                      fmt::format("p is {} instead of {}: {} samples bear no more unknowns (10 samples "
-                                                  "for each). Record longer for sharper damping",
-                                                  p, options.p, samples));
+                                      fmt::format("p is {} instead of {}: {} samples{} bear no more unknowns (10 rows "
+                                                  "for each). Record longer{} for sharper damping",
+                                                  p, options.p, samples, gaps ? " with these gaps" : "",
+                                                  gaps ? " or mend the gaps" : ""));
     return p;
 }
 
@@ -121,18 +164,6 @@ std::unique_ptr<std::byte[]> accumulate(const std::vector<record_data>& records,
         }
     }
     return block;
-}
-
-/// Into the model's own terms: means off, missing inputs 0 (outputs stay NaN and carry no weight).
-void centre(std::vector<record_data>& records, const okid_identified_t& model) {
-    const auto n_u = static_cast<std::size_t>(model.n_u), n_y = static_cast<std::size_t>(model.n_y);
-    for (record_data& record : records) {
-        for (std::size_t i = 0; i < record.u.size(); ++i) {
-            record.u[i] -= model.mean[i % n_u];
-            if (std::isnan(record.u[i])) record.u[i] = 0;
-        }
-        for (std::size_t i = 0; i < record.y.size(); ++i) record.y[i] -= model.mean[n_u + i % n_y];
-    }
 }
 
 result_context describe(const std::vector<record_data>& records, const record_options& options,
@@ -210,7 +241,7 @@ record_result identify_records(std::vector<record_data> records, const record_op
     okid_identify_config_t config{};
     config.n_u = static_cast<std::int32_t>(options.inputs.size());
     config.n_y = static_cast<std::int32_t>(options.outputs.size());
-    config.p = choose_p(options, total - missing.samples, result.context);
+    config.p = choose_p(options, records, total - missing.samples, missing.samples > 0, result.context);
     config.rows = options.rows;
     config.order = options.order;
     config.fs_hz = options.fs_hz;
@@ -229,8 +260,9 @@ record_result identify_records(std::vector<record_data> records, const record_op
     const okid_status_t status = okid_identify_run(identifier, accumulator, &result.model);
     if (status < 0) throw_identify_failure(status, result.model, config, result.context);
     tell(options, "simulating the model");
-    centre(records, result.model);
+    if (options.detrend == "mean") centre_each(records, options); // once more where that was done: no harm
     fit_records(records, result);
+    check_explains(result.context);
     return result;
 }
 

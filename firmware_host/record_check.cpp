@@ -119,6 +119,21 @@ void check_different_inputs(const std::vector<record_data>& records, const recor
     }
 }
 
+void check_explains(const result_context& context) {
+    constexpr double least_percent = 5;
+    double best = -1e300;
+    for (const auto* fits : {&context.simulation_percent, &context.prediction_percent})
+        for (const double fit : fits->value_or(std::vector<double>{}))
+            if (std::isfinite(fit)) best = std::max(best, fit);
+    if (best >= least_percent) return;
+    throw failure(
+        exit_no_model,
+        fmt::format(
+            "no model: the best one explains {:.1f} % of an output: the outputs do not answer these inputs, or a "
+            "sensor was overloaded. Check wiring, ranges and column names",
+            std::max(best, 0.0)));
+}
+
 void remark_early_hit(const std::vector<record_data>& records, int n_u, int p, result_context& context) {
     const auto inputs = static_cast<std::size_t>(n_u);
     double early = 0, total = 0;

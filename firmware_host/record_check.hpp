@@ -19,6 +19,9 @@ void check_different_inputs(const std::vector<record_data>& records, const recor
 /// A straight line is removed by --detrend linear and leaves rounding noise only; that is no excitation either.
 void check_not_a_line(const record_data& record, const record_data& before, const record_options& options);
 
+/// A model that neither simulates nor predicts a twentieth of any output says nothing about the structure.
+void check_explains(const result_context& context);
+
 /// A hit within the first p samples of every record serves as history only, and is lost: adds the remark hit_at_start.
 void remark_early_hit(const std::vector<record_data>& records, int n_u, int p, result_context& context);
 

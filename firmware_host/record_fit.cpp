@@ -26,9 +26,8 @@ std::size_t initial_state_samples(double radius, std::size_t count) {
     return needed < static_cast<double>(count) ? std::max<std::size_t>(static_cast<std::size_t>(needed), 1) : count;
 }
 
-void pool(const std::vector<double>& y, const std::vector<double>& estimate, std::size_t n_y,
-          std::vector<output_sums>& sums) {
-    for (std::size_t i = 0; i < y.size(); ++i) {
+void pool(const double* y, const std::vector<double>& estimate, std::size_t n_y, std::vector<output_sums>& sums) {
+    for (std::size_t i = 0; i < estimate.size(); ++i) {
         if (std::isnan(y[i])) continue;
         output_sums& s = sums[i % n_y];
         const double error = y[i] - estimate[i];
@@ -50,6 +49,54 @@ std::vector<double> percent(const std::vector<output_sums>& sums) {
     return out;
 }
 
+/// A stretch of a record without missing inputs.
+struct stretch {
+    std::size_t first, count;
+};
+
+/// What a missing force did is not known: the record is cut there. Stretches too short to tell their initial state from
+/// the noise are left out; a record without missing inputs is one stretch.
+std::vector<stretch> stretches_of(const record_data& record, std::size_t n_u, std::size_t least) {
+    std::vector<stretch> out;
+    std::size_t first = 0;
+    for (std::size_t i = 0; i <= record.count; ++i) {
+        bool present = i < record.count;
+        for (std::size_t k = 0; present && k < n_u; ++k) present = !std::isnan(record.u[i * n_u + k]);
+        if (present) continue;
+        if (i - first >= least || (first == 0 && i == record.count)) out.push_back({first, i - first});
+        first = i + 1;
+    }
+    return out;
+}
+
+struct fit_run {
+    const okid_model_t& model;
+    double radius;
+    bool predict;
+    std::vector<double> work;
+    std::vector<output_sums> simulated, predicted;
+
+    /// One stretch from its own least-squares initial state, which is returned.
+    std::vector<double> add(const record_data& record, const stretch& piece) {
+        const auto n_u = static_cast<std::size_t>(model.n_u), n_y = static_cast<std::size_t>(model.n_y);
+        const double *u = &record.u[piece.first * n_u], *y = &record.y[piece.first * n_y];
+        std::vector<double> x0(static_cast<std::size_t>(model.n_z)), estimate(piece.count * n_y);
+        const std::size_t used = initial_state_samples(radius, piece.count);
+        if (okid_model_initial_state(&model, u, y, used, x0.data(), work.data()) < 0)
+            std::fill(x0.begin(), x0.end(), 0.0);
+        if (okid_model_simulate(&model, u, piece.count, x0.data(), estimate.data(), work.data()) < 0)
+            throw failure(exit_no_model,
+                          fmt::format("{}: the model cannot be simulated over this record", record.path));
+        pool(y, estimate, n_y, simulated);
+        if (predict) {
+            if (okid_model_predict(&model, u, y, piece.count, x0.data(), estimate.data(), work.data()) < 0)
+                std::fill(estimate.begin(), estimate.end(), std::numeric_limits<double>::quiet_NaN());
+            pool(y, estimate, n_y, predicted);
+        }
+        return x0;
+    }
+};
+
 } // namespace
 
 void fit_records(const std::vector<record_data>& records, record_result& result) {
@@ -57,30 +104,28 @@ void fit_records(const std::vector<record_data>& records, record_result& result)
     const okid_model_t model{found.n_u, found.n_y, found.n_z, found.A, found.B, found.C, found.D, found.K};
     const auto n_y = static_cast<std::size_t>(found.n_y);
     const bool predict = found.K && !(found.warnings & OKID_NOTE_PREDICTOR_UNSTABLE);
-    std::vector<double> work(okid_model_workspace(&model));
-    std::vector<output_sums> simulated(n_y), predicted(n_y);
+    fit_run run{model,
+                found.model_radius,
+                predict,
+                std::vector<double>(okid_model_workspace(&model)),
+                std::vector<output_sums>(n_y),
+                std::vector<output_sums>(n_y)};
+    const std::size_t least = std::max<std::size_t>(20, 2 * static_cast<std::size_t>(found.n_z));
     std::vector<std::vector<double>> states;
     for (const record_data& record : records) {
-        std::vector<double> x0(static_cast<std::size_t>(found.n_z)), estimate(record.y.size());
-        const std::size_t used = initial_state_samples(found.model_radius, record.count);
-        if (okid_model_initial_state(&model, record.u.data(), record.y.data(), used, x0.data(), work.data()) < 0)
-            std::fill(x0.begin(), x0.end(), 0.0);
-        if (okid_model_simulate(&model, record.u.data(), record.count, x0.data(), estimate.data(), work.data()) < 0)
-            throw failure(exit_no_model,
-                          fmt::format("{}: the model cannot be simulated over this record", record.path));
-        pool(record.y, estimate, n_y, simulated);
-        if (predict) {
-            if (okid_model_predict(&model, record.u.data(), record.y.data(), record.count, x0.data(), estimate.data(),
-                                   work.data()) < 0)
-                std::fill(estimate.begin(), estimate.end(), std::numeric_limits<double>::quiet_NaN());
-            pool(record.y, estimate, n_y, predicted);
+        std::vector<double> first(static_cast<std::size_t>(found.n_z), 0.0);
+        bool begun = false;
+        for (const stretch& piece : stretches_of(record, static_cast<std::size_t>(found.n_u), least)) {
+            const std::vector<double> x0 = run.add(record, piece);
+            if (!begun) first = x0;
+            begun = true;
         }
-        states.push_back(std::move(x0));
+        states.push_back(std::move(first));
     }
     result.context.x0 = std::move(states);
-    result.context.simulation_percent = percent(simulated);
+    result.context.simulation_percent = percent(run.simulated);
     result.context.prediction_percent =
-        predict ? percent(predicted) : std::vector<double>(n_y, std::numeric_limits<double>::quiet_NaN());
+        predict ? percent(run.predicted) : std::vector<double>(n_y, std::numeric_limits<double>::quiet_NaN());
 }
 
 } // namespace okid_host

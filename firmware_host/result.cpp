@@ -160,6 +160,8 @@ nlohmann::ordered_json modes_json(const okid_identified_t& model) {
         mode["damping_ratio"] = number(model.damping_ratio[k]);
         mode["shape_re"] = vector_json(model.shape_re + at, model.n_y);
         mode["shape_im"] = vector_json(model.shape_im + at, model.n_y);
+        mode["frequency_std_hz"] = nullptr; // standard deviations: not estimated by this version
+        mode["damping_ratio_std"] = nullptr;
         mode["mpc"] = number(model.mpc[k]);
         mode["emac"] = number(model.emac[k]);
         out.push_back(std::move(mode));

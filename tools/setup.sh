@@ -75,8 +75,13 @@ list=$(mktemp)
   echo "setup: pip could not install tools/pyproject.toml [$tier]; see the lines above." >&2; rm -f "$list"; exit 4; }
 rm -f "$list"
 .venv/bin/python - <<'PY'
-import pathlib, sysconfig
-# `import okid` from the source tree: the binding finds build/libokid.so beside it.
+import pathlib, sys, sysconfig, tomllib
+# `import okid` from the source tree (the binding finds build/libokid.so beside it), and its commands in .venv/bin.
 pathlib.Path(sysconfig.get_paths()["purelib"], "okid-source.pth").write_text(str(pathlib.Path("tools").resolve()) + "\n")
+for name, target in tomllib.loads(pathlib.Path("tools/pyproject.toml").read_text())["project"]["scripts"].items():
+    module, function = target.split(":")
+    command = pathlib.Path(sys.executable).parent / name
+    command.write_text(f"#!{sys.executable}\nimport sys\nfrom {module} import {function}\nsys.exit({function}())\n")
+    command.chmod(0o755)
 PY
 cp tools/pyproject.toml ".venv/.okid-$tier"

@@ -17,6 +17,7 @@ enum { BUFFER_BYTES = 1 << 18, LONGEST_LINE = 1024 };
 typedef struct replay_t {
     int fd;
     int at_end;
+    int torn;          ///< the last line has no end
     size_t begin, end; ///< unread part of the buffer
     uint64_t line;     ///< number of the line given last
     int32_t interface_count;
@@ -83,6 +84,7 @@ static int next_line(drv_source_t* self, replay_t* state, const char** line, siz
         if (stop || (state->at_end && have > 0)) {
             *line = start;
             *length = stop ? (size_t)(stop - start) : have;
+            state->torn = stop == NULL;
             state->begin += *length + (stop ? 1 : 0);
             ++state->line;
             return 1;
@@ -129,6 +131,10 @@ static int replay_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
         drv_candump_error_t why;
         drv_frame_t* frame = &frames[count];
         if (drv_candump_parse(line, length, frame, interface, &why)) {
+            if (state->torn) { // the writer was killed within its last line
+                ++self->counts.torn;
+                continue;
+            }
             int code = refuse(self, state, &why);
             return count > 0 ? count : code;
         }

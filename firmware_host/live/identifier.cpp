@@ -152,7 +152,8 @@ okid_accumulator_stats_t identifier::stats() {
 }
 
 std::int64_t identifier::basis() {
-    const std::int64_t all = stats().samples;
+    const okid_accumulator_stats_t counts = stats();
+    const std::int64_t all = counts.samples + counts.missing; // as in a file: missing samples are samples of the record
     return memory_samples_ > 0 ? std::min(all, memory_samples_) : all;
 }
 

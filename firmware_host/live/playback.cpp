@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
+#include <utility>
 
 namespace okid_host {
 namespace {
@@ -95,6 +96,11 @@ const drv_frame_t* log_frames::next() {
         at_ = 0;
         if (count_ < 0 && count_ != DRV_END) throw failure(exit_usage, source_.error);
         if (count_ <= 0) {
+            drv_stats_t counts{};
+            source_.ops->stats(&source_, &counts);
+            if (counts.torn && !std::exchange(told_torn_, true))
+                fmt::print(stderr,
+                           "okid: warning: the last line of the log is torn (its writer was killed?): left out\n");
             count_ = 0;
             return nullptr;
         }

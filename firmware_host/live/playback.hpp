@@ -36,6 +36,7 @@ class log_frames {
 
   private:
     drv_source_t source_{};
+    bool told_torn_ = false;
     std::vector<drv_frame_t> batch_;
     int at_ = 0, count_ = 0;
 };

@@ -67,6 +67,8 @@ void session::frame(const drv_frame_t& frame) {
     drv_frame_t stamped = frame;
     stamped.time_ns = frame.time_ns / 1000 * 1000;
     start(stamped.time_ns);
+    if (first_ns_ == 0) first_ns_ = stamped.time_ns;
+    last_ns_ = stamped.time_ns;
     if (frame.bus < busy_s_.size()) busy_s_[frame.bus] += wire_s(frame, config_.buses[frame.bus]);
     grid_.push(stamped);
 }
@@ -192,9 +194,31 @@ result_context session::context() {
     out.gaps = identifier_.stats().gaps;
     out.hold = config_.identification.hold;
     out.detrend = config_.identification.detrend;
+    const okid_accumulator_stats_t stats = identifier_.stats();
+    if (stats.missing > 0)
+        out.warnings.emplace_back(
+            "missing_samples",
+            fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags start "
+                        "anew after each gap",
+                        stats.missing, stats.samples + stats.missing, stats.gaps, stats.gaps == 1 ? "" : "s"));
     for (std::size_t i = 0; i < config_.n_u + config_.n_y; ++i)
         (i < config_.n_u ? out.inputs : out.outputs).push_back(config_.channels[i].name);
     return out;
+}
+
+/// Counters say how many samples came, time stamps in what time: a rate_hz that is none of theirs scales every frequency.
+void session::remark_rate(result_context& about) const {
+    constexpr double tolerance = 0.02;
+    const double span_s = static_cast<double>(last_ns_ - first_ns_) * 1e-9;
+    if (now_ < 100 || !(span_s > 0)) return;
+    const double observed_hz = static_cast<double>(now_) / span_s;
+    if (std::abs(observed_hz / config_.rate_hz - 1) <= tolerance + 2.0 / static_cast<double>(now_)) return;
+    const std::string text =
+        fmt::format("by the time stamps {:.4g} samples came a second, but rate_hz is {:.10g}: every frequency scales "
+                    "with it. Mend rate_hz in {}, unless the frames were played at another speed",
+                    observed_hz, config_.rate_hz, config_.path);
+    fmt::print(stderr, "okid: warning: {}\n", text);
+    about.warnings.emplace_back("rate_mismatch", text);
 }
 
 void session::finish() {
@@ -204,7 +228,8 @@ void session::finish() {
     write_stats();
     view_.end();
     check_heard();
-    const result_context about = context();
+    result_context about = context();
+    remark_rate(about);
     if (status < 0) throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
     const ordered_json result = result_json(identifier_.model(), about);
     events_.write({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});

@@ -50,6 +50,7 @@ class session : private grid_sink {
     void check_heard() const;
     nlohmann::ordered_json bus_stats(std::size_t bus) const;
     result_context context();
+    void remark_rate(result_context& about) const;
     double seconds(std::int64_t samples) const { return static_cast<double>(samples) / config_.rate_hz; }
 
     const live_config& config_;
@@ -62,6 +63,7 @@ class session : private grid_sink {
     std::vector<device_losses> losses_;
     std::vector<double> busy_s_; ///< time on the wire of each bus, 0 without a bitrate
     std::int64_t update_samples_, stats_samples_, limit_ = 0, now_ = 0;
+    std::int64_t first_ns_ = 0, last_ns_ = 0; ///< time stamps of the stream
     std::int64_t gaps_ = 0;
     bool started_ = false;
 };

@@ -20,7 +20,9 @@ RESULT_KEYS = [
     "schema", "version", "method", "fs_hz", "samples", "records", "gaps", "inputs", "outputs", "p", "rows", "order",
     "hold", "detrend", "start", "singular_values", "model", "markov", "modes", "fit", "warnings",
 ]  # fmt: skip
-MODE_KEYS = ["frequency_hz", "damping_ratio", "shape_re", "shape_im", "mpc", "emac"]
+MODE_KEYS = [
+    "frequency_hz", "damping_ratio", "shape_re", "shape_im", "frequency_std_hz", "damping_ratio_std", "mpc", "emac",
+]  # fmt: skip
 
 
 def okid(*arguments: object) -> subprocess.CompletedProcess[str]:

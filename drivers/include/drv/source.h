@@ -47,6 +47,7 @@ typedef struct drv_stats_t {
     uint64_t restarts;
     uint64_t remote;      ///< remote requests, not delivered
     uint64_t foreign;     ///< log: frames of other interfaces, not delivered
+    uint64_t torn;        ///< log: 1 = its last line had no end and was no frame: left out
     uint64_t link_down;   ///< times the interface went down or away
     uint64_t reopened;    ///< times the socket was made anew after the interface had gone
     uint64_t read_errors; ///< other errors of the socket

@@ -174,11 +174,13 @@ okid_status_t automatic_order(okid_identify& s, okid_identified_t* out) {
     const okid::gap_choice gap = okid::order_by_gap(out->singular_values, out->singular_count, automatic_limit(s));
     if (gap.ratio >= okid::clear_gap && out->observer_info.radius_plain < 1) {
         const okid_status_t status = okid_identify_order(&s, gap.order, out);
-        if (status >= 0 && out->model_radius < 1) return status;
+        if (status >= 0 && out->model_radius < 1 && okid::consistency_score(s.emac, out->mode_count) > 0) return status;
     }
     const int order = scan_orders(s, out);
     out->warnings |= OKID_NOTE_ORDER_UNCLEAR;
-    return okid_identify_order(&s, order > 0 ? order : gap.order, out);
+    if (order > 0) return okid_identify_order(&s, order, out);
+    const okid_status_t status = okid_identify_order(&s, gap.order, out);
+    return status < 0 ? status : OKID_ERR_NO_MODES; // no stable model of any order has a mode that holds (EMAC > 0.5)
 }
 
 } // namespace

@@ -62,6 +62,23 @@ struct solver {
         }
     }
 
+    /// The first input that is a combination of those before it at the same instant; -1 when there is none.
+    int repeated_input() {
+        double* a = w.factor;
+        for (int j = 0; j < n_u; ++j)
+            for (int i = 0; i < n_u; ++i)
+                a[j * n_u + i] = gram[static_cast<size_t>(j) * static_cast<size_t>(n) + static_cast<size_t>(i)] *
+                                 w.scale[i] * w.scale[j];
+        for (int k = 0; k < n_u; ++k) {
+            if (!(a[k * n_u + k] > rank_tolerance)) return k;
+            for (int j = k + 1; j < n_u; ++j) {
+                const double f = a[j * n_u + k] / a[k * n_u + k];
+                for (int i = k + 1; i < n_u; ++i) a[j * n_u + i] -= f * a[k * n_u + i];
+            }
+        }
+        return -1;
+    }
+
     /// Rank and pivot ratio of the unit-diagonal Gram of all input lags, by pivoted Cholesky in `factor`.
     int input_rank() {
         const int size = n_u * (p + 1);
@@ -199,6 +216,8 @@ okid_status_t okid_observer_solve(const okid_observer_config_t* config, const do
             return c < s.n_u ? OKID_ERR_INPUT : OKID_ERR_OUTPUT;
         }
     s.equilibrate();
+    info->channel = s.repeated_input();
+    if (info->channel >= 0) return OKID_ERR_EXCITATION;
     if (s.input_rank() <= std::min(4, s.p) * s.n_u) return OKID_ERR_EXCITATION;
     const double ridge_min = config->ridge_min > 0 ? config->ridge_min : 1e-12;
     const bool numerical = ridge_min <= 1e-10; // a floor only: the refinement step takes it out again

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#include "units.hpp"
+
+#include "config.hpp"
+
+namespace okid_host {
+namespace {
+
+constexpr unit_rule rules[] = {
+    {"N", 1, "N"},
+    {"kN", 1e3, "N"},
+    {"mN", 1e-3, "N"},
+    {"lbf", 4.4482216152605, "N"},
+    {"Nm", 1, "Nm"},
+    {"N m", 1, "Nm"},
+    {"m/s^2", 1, "m/s^2"},
+    {"m/s2", 1, "m/s^2"},
+    {"m/s\u00b2", 1, "m/s^2"},
+    {"mm/s^2", 1e-3, "m/s^2"},
+    {"cm/s^2", 1e-2, "m/s^2"},
+    {"g", 9.80665, "m/s^2"},
+    {"mg", 9.80665e-3, "m/s^2"},
+    {"m/s", 1, "m/s"},
+    {"mm/s", 1e-3, "m/s"},
+    {"m", 1, "m"},
+    {"mm", 1e-3, "m"},
+    {"um", 1e-6, "m"},
+    {"\u00b5m", 1e-6, "m"},
+    {"", 1, ""},
+};
+
+} // namespace
+
+const unit_rule* find_unit(const std::string& name) {
+    for (const unit_rule& rule : rules)
+        if (name == rule.name) return &rule;
+    return nullptr;
+}
+
+double channel_config::si_factor() const {
+    const unit_rule* rule = find_unit(unit);
+    return rule ? rule->factor : 1;
+}
+
+std::string channel_config::si_unit() const {
+    const unit_rule* rule = find_unit(unit);
+    return rule ? rule->si : unit;
+}
+
+} // namespace okid_host
