@@ -168,6 +168,8 @@ void session::write_stats() {
                                                       {"missing", counts.expected - counts.received},
                                                       {"completeness_percent", percent}};
     }
+    const double rate_hz = observed_rate_hz();
+    event["rate_hz_by_stamps"] = rate_hz > 0 ? ordered_json(rate_hz) : ordered_json(nullptr);
     events_.write(event);
 }
 
@@ -206,19 +208,24 @@ result_context session::context() {
     return out;
 }
 
-/// Counters say how many samples came, time stamps in what time: a rate_hz that is none of theirs scales every frequency.
-void session::remark_rate(result_context& about) const {
-    constexpr double tolerance = 0.02;
+/// Samples a second by the time stamps; 0 before it can be told. Counters say how many came, stamps in what time.
+double session::observed_rate_hz() const {
     const double span_s = static_cast<double>(last_ns_ - first_ns_) * 1e-9;
-    if (now_ < 100 || !(span_s > 0)) return;
-    const double observed_hz = static_cast<double>(now_) / span_s;
+    return now_ >= 100 && span_s > 0 ? static_cast<double>(now_) / span_s : 0;
+}
+
+/// A rate_hz that is not that of the stamps scales every frequency. Not part of the result, which is the same for every
+/// speed a log is played at: it is told on stderr, and the stats carry the number.
+void session::remark_rate() const {
+    constexpr double tolerance = 0.02;
+    const double observed_hz = observed_rate_hz();
+    if (observed_hz == 0) return;
     if (std::abs(observed_hz / config_.rate_hz - 1) <= tolerance + 2.0 / static_cast<double>(now_)) return;
-    const std::string text =
-        fmt::format("by the time stamps {:.4g} samples came a second, but rate_hz is {:.10g}: every frequency scales "
-                    "with it. Mend rate_hz in {}, unless the frames were played at another speed",
-                    observed_hz, config_.rate_hz, config_.path);
-    fmt::print(stderr, "okid: warning: {}\n", text);
-    about.warnings.emplace_back("rate_mismatch", text);
+    fmt::print(
+        stderr,
+        "okid: warning: by the time stamps {:.4g} samples came a second, but rate_hz is {:.10g}: every frequency "
+        "scales with it. Mend rate_hz in {}, unless the frames were played at another speed\n",
+        observed_hz, config_.rate_hz, config_.path);
 }
 
 void session::finish() {
@@ -228,8 +235,8 @@ void session::finish() {
     write_stats();
     view_.end();
     check_heard();
-    result_context about = context();
-    remark_rate(about);
+    const result_context about = context();
+    remark_rate();
     if (status < 0) throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
     const ordered_json result = result_json(identifier_.model(), about);
     events_.write({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});

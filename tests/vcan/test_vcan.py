@@ -250,7 +250,7 @@ def test_link_down_and_up(short: Path) -> None:
     events = live.stop()
     gaps = [e for e in events if e["type"] == "gap"]
     assert {(g["first"], g["last"], g["cause"]) for g in gaps} == {(1200, 1299, "link_down")}
-    assert events[-1]["result"]["samples"] == 2900
+    assert events[-1]["result"]["samples"] == 3000
     assert "went down" in live.messages()
 
 
@@ -267,7 +267,7 @@ def test_interface_deleted_and_made_anew(short: Path) -> None:
     events = live.stop()
     gaps = [e for e in events if e["type"] == "gap"]
     assert {(g["first"], g["last"], g["cause"]) for g in gaps} == {(1200, 1299, "link_down")}
-    assert events[-1]["result"]["samples"] == 2900
+    assert events[-1]["result"]["samples"] == 3000
 
 
 def test_joined_in_the_middle(short: Path) -> None:
