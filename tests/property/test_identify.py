@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pickle
 import sys
@@ -160,7 +161,7 @@ def test_a_blow_at_the_start_needs_the_silent_past() -> None:
 
 def test_fits_are_the_formula(result: okid.Result) -> None:
     u, y = w1_record(1.0, 1)
-    centred_u, centred_y = u - u[40:].mean(axis=0), y - y[40:].mean(axis=0)
+    centred_u, centred_y = u - u.mean(axis=0), y - y.mean(axis=0)
     assert result.model.x0 is not None
     x0 = result.model.x0[0]
     matrices = (result.model.A, result.model.B, result.model.C, result.model.D)
@@ -173,6 +174,56 @@ def test_fits_are_the_formula(result: okid.Result) -> None:
         predicted = result.fit.prediction_percent[name]
         assert predicted is not None
         assert predicted > percent - 0.5
+
+
+def test_fits_start_anew_after_missing_inputs() -> None:
+    s = systems.w1()
+    u, y = (a.copy() for a in w1_record(1.0, 12, 6000))
+    u[0:3], u[2000:2500], u[2510], u[4000] = np.nan, np.nan, np.nan, np.nan  # nine samples alone: left out
+    y[3000:3005, 1] = np.nan
+    result = okid.identify(u + 7.0, y - 9.0, fs=s.fs)
+    m = result.model
+    assert m.x0 is not None
+    centred_u, centred_y = u - np.nanmean(u, axis=0), y - np.nanmean(y, axis=0)
+    measured, simulated = [], []
+    for turn, part in enumerate((slice(3, 2000), slice(2511, 4000), slice(4001, 6000))):
+        part_u, part_y = centred_u[part], centred_y[part]
+        x0 = m.initial_state(part_u, part_y)
+        if turn == 0:
+            np.testing.assert_allclose(m.x0[0], x0, rtol=1e-6, atol=1e-9 * np.max(np.abs(x0)))
+        measured.append(part_y)
+        simulated.append(systems.simulate((m.A, m.B, m.C, m.D), part_u, x0))
+    truth, made = np.concatenate(measured), np.concatenate(simulated)
+    for k, name in enumerate(result.outputs):
+        there = np.isfinite(truth[:, k])
+        spread = np.linalg.norm(truth[there, k] - truth[there, k].mean())
+        percent = 100.0 * (1.0 - np.linalg.norm((truth - made)[there, k]) / spread)
+        assert percent > 90.0
+        assert result.fit.simulation_percent[name] == pytest.approx(percent, abs=1e-6)
+
+
+def test_a_record_without_inputs_in_any_stretch_has_no_fit() -> None:
+    s = systems.w1()
+    A, B, C, D = s.discrete()
+    model = okid.Model(A, B, C, D, np.zeros((6, 3)), s.dt)
+    v = np.random.default_rng(1).standard_normal((100, 4))
+    v[::15, 0] = np.nan
+    fit, x0 = okid.record_fit.fit_records(model, [v], ["a", "b", "c"])
+    assert fit.simulation_percent == fit.prediction_percent == {"a": None, "b": None, "c": None}
+    np.testing.assert_array_equal(x0, np.zeros((1, 6)))
+
+
+def test_gaps_reduce_p() -> None:
+    s = systems.w1()
+    u, y = (a.copy() for a in w1_record(1.0, 13))
+    y[::20, 0] = np.nan  # 500 runs of 19
+    result = okid.identify(u, y, fs=s.fs, p=40)
+    rows = {p: 500 * max(0, 19 - p) / (1 + 4 * p) for p in range(1, 41)}
+    assert result.p == max(p for p in rows if rows[p] >= 10) == 17
+    assert "p_reduced" in [w.code for w in result.warnings]
+    single = w1_record(1.0, 13)[1].copy()
+    single[5000] = np.nan
+    assert okid.identify(u, single, fs=s.fs, p=40).p == 40
 
 
 def test_prediction_skips_missing_outputs(result: okid.Result) -> None:
@@ -220,6 +271,12 @@ def test_okid_result_1(result: okid.Result, tmp_path) -> None:
     assert np.array(data["markov"]["Y"]).shape == (161, 3, 1)
     assert len(data["singular_values"]) >= 6
     assert [len(m["shape_re"]) for m in data["modes"]] == [3, 3, 3]
+    assert list(data["modes"][0]) == (
+        "frequency_hz damping_ratio shape_re shape_im frequency_std_hz damping_ratio_std mpc emac".split()
+    )
+    assert data["modes"][0]["frequency_std_hz"] is data["modes"][0]["damping_ratio_std"] is None
+    assert result.mkr is result.pdc is None
+    assert data["version"] == okid.__version__
     assert not list(tmp_path.glob("*.part"))
 
 
@@ -244,6 +301,12 @@ def test_table_pickle_and_repr(result: okid.Result) -> None:
     text = result.table()
     assert f"{result.modes[0].frequency_hz:.5f}" in text
     assert "order 6" in text
+    assert "±" not in text
+    known = dataclasses.replace(result, modes=[result.modes[0]._replace(frequency_std_hz=0.00123), *result.modes[1:]])
+    lines = known.table().splitlines()
+    assert lines[3].count("±") == 1
+    assert "0.0012" in lines[4]
+    assert len({len(line) for line in lines[3:7]}) == 1
     again = pickle.loads(pickle.dumps(result))
     assert again.to_dict() == result.to_dict()
     with pytest.raises(okid.Error):

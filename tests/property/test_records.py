@@ -60,6 +60,38 @@ def test_csv_absent_file_and_column(tmp_path: Path) -> None:
         read_csv(tmp_path / "r.csv").columns(["a", "c"], "r.csv")
 
 
+def test_csv_columns_are_found_without_their_unit(tmp_path: Path) -> None:
+    (tmp_path / "r.csv").write_text("force1 [N],a [g],a [m/s^2],b [V],b\n1,2,3,4,5\n", encoding="utf-8")
+    record = read_csv(tmp_path / "r.csv")
+    wanted = ["b", "force1", "a [g]", "force1 [N]"]
+    np.testing.assert_array_equal(record.columns(wanted, "r.csv"), [[5, 1, 2, 1]])
+    for wrong in ("a", "force", ""):
+        with pytest.raises(okid.InputError, match="no column"):
+            record.columns([wrong], "r.csv")
+
+
+def test_segments_of_h1_follow_the_record() -> None:
+    rng = np.random.default_rng(1)
+    for samples in (500, 2000, 8192, 30000):
+        u, y = rng.standard_normal((samples, 1)), rng.standard_normal((samples, 2))
+        assert 8 <= okid.frf.h1(u, y, 100.0).averages <= 12
+    y[::97] = np.nan
+    measured = okid.frf.h1(u, y, 100.0)
+    assert measured.resolution_hz == pytest.approx(100.0 / 64)
+    assert measured.averages == 2 * (30000 // 97)
+    y[::50] = np.nan
+    with pytest.raises(okid.InputError, match="longest stretch .* 49 samples"):
+        okid.frf.h1(u, y, 100.0)
+    blow = np.zeros((1000, 1))
+    blow[5:8, 0] = 1.0
+    y = rng.standard_normal((1000, 2))
+    y[700:710] = np.nan
+    assert okid.frf.h1(blow, y, 100.0).resolution_hz == pytest.approx(100.0 / 700)
+    y[30] = np.nan
+    with pytest.raises(okid.InputError, match="only 30 unbroken"):
+        okid.frf.h1(blow, y, 100.0)
+
+
 def test_h1_and_synthesis_agree_with_the_structure() -> None:
     s = systems.w2()
     u, y = systems.record(s, 40000, 1.0, 1)

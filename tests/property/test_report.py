@@ -95,6 +95,45 @@ def test_live_results_without_fit_and_modes(made: tuple[Path, Path], tmp_path: P
     html = report.build(report.load_result(path))
     assert "no underdamped mode" in html
     assert "holds no fit" in html
+    data["modes"] = json.loads(made[0].read_text(encoding="utf-8"))["modes"]
+    path.write_text(json.dumps(data), encoding="utf-8")
+    live, own = report.load_result(path), report.load_result(made[0])
+    html = report.build(live, made[1])
+    assert "holds no fit" not in html
+    assert "<h2>Fit, computed by this report</h2>" in html
+    assert f"Computed by this report from {made[1]}" in html
+    assert "Computed by this report" not in report.build(own, made[1])
+    computed = report.measure(live, made[1]).fit
+    assert computed is not None
+    for key in ("simulation_percent", "prediction_percent"):
+        assert getattr(computed, key) == pytest.approx(own.raw["fit"][key], abs=1e-4)
+
+
+def test_records_with_regular_gaps(made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = made[1].read_text(encoding="utf-8").splitlines()
+    for every, words in ((97, "Hz lines; multiple coherence"), (60, "left out: the longest stretch")):
+        holed = [",".join(["nan"] * 8) if k >= 2 and k % every == 0 else line for k, line in enumerate(lines)]
+        (tmp_path / "gaps.csv").write_text("\n".join(holed) + "\n", encoding="utf-8")
+        target = tmp_path / "gaps.html"
+        status = report.main([str(made[0]), "--record", str(tmp_path / "gaps.csv"), "--out", str(target)])
+        assert status == 0, capsys.readouterr().err
+        html = target.read_text(encoding="utf-8")
+        assert words in html
+        assert ("Behind: largest singular value" in html) == (every == 97)
+
+
+def test_a_record_of_another_rate_is_refused(
+    made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = made[1].read_text(encoding="utf-8")
+    rate = text.splitlines()[0].split("=")[1].strip()
+    for factor, status in ((1.002, 2), (1.0005, 0)):
+        (tmp_path / "r.csv").write_text(text.replace(rate, repr(float(rate) * factor), 1), encoding="utf-8")
+        arguments = [str(made[0]), "--record", str(tmp_path / "r.csv"), "--out", str(tmp_path / "r.html")]
+        assert report.main(arguments) == status
+        message = capsys.readouterr().err
+        assert ("sampled at" in message) == (status == 2)
+        assert message.count("\n") == (status == 2)
 
 
 def test_many_outputs_show_the_best_pairs() -> None:
@@ -147,7 +186,11 @@ def test_broken_matrices_and_foreign_records(
     other.write_text("# fs_hz = 10\nx,y\n1,2\n", encoding="utf-8")
     assert report.main([str(made[0]), "--record", str(other), "--out", str(tmp_path / "o.html")]) == 2
     assert "no column 'shaker A'" in capsys.readouterr().err
+    capsys.readouterr()
     assert report.main([str(made[0]), "--out", str(tmp_path / "no" / "folder.html")]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith(f"okid-report: {tmp_path / 'no' / 'folder.html'}: No such file")
+    assert ".part" not in message
     assert not list(tmp_path.glob("*.html"))
 
 

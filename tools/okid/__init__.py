@@ -42,7 +42,14 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """okid.capture and okid.report load when they are first used: they bring python-can and matplotlib with them."""
+    """okid.capture and okid.report load when they are first used: they bring python-can and matplotlib with them.
+
+    okid.__version__ is asked of the C library.
+    """
+    if name == "__version__":
+        from okid._abi import library
+
+        return library().okid_version().decode()
     if name in ("capture", "report"):
         return import_module(f"okid.{name}")
     raise AttributeError(f"module 'okid' has no attribute {name!r}")

@@ -36,9 +36,9 @@ class Accumulator:
     Parameters: `n_u` inputs, `n_y` outputs, `lags` p; `codes` 16, 24 or 32 takes ADC codes of so many bits (int16, or
     int32 words) and sums them exactly, 0 takes real numbers; `block` and `slots` make a sliding window of
     slots * block sample periods (`spare_slots` more where gaps close slots early); `forgetting` lambda per sample
-    (needs `block`); `edges` False saves memory for one unbroken run; `bulk` lets long calls of 16-bit codes go through an
-    FFT where that is faster, with the same bits. Raises InputError for sizes outside the
-    documented range. Source: lib/include/okid/accumulator.h, paper eq. 36-38.
+    (needs `block`); `edges` False saves memory for one unbroken run; `bulk` lets long calls of 16-bit codes go through
+    an FFT where that is faster, with the same bits. Raises InputError for sizes outside the documented range.
+    Source: lib/include/okid/accumulator.h, paper eq. 36-38.
     """
 
     def __init__(

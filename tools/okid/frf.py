@@ -14,6 +14,7 @@ from okid._errors import InputError
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+SHORTEST = 64  # samples in a segment that is chosen here
 
 
 class Frf(NamedTuple):
@@ -42,15 +43,41 @@ def is_hit(u: ArrayLike, fraction: float = 0.05) -> bool:
     return bool(np.max(run) > 0.99 * total)
 
 
+def _runs(data: Real) -> list[tuple[int, int]]:
+    """First and end of every run of complete samples."""
+    broken = np.flatnonzero(~np.all(np.isfinite(data), axis=1))
+    edges = np.concatenate(([-1], broken, [len(data)])).tolist()
+    return [(a + 1, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a + 1]
+
+
 def _segments(data: Real, length: int, step: int) -> list[Real]:
     """Pieces of `length` complete samples; a missing sample starts the search anew behind it."""
-    broken = np.flatnonzero(~np.all(np.isfinite(data), axis=1))
-    edges = np.concatenate(([-1], broken, [len(data)]))
-    pieces = []
-    for left, right in zip(edges[:-1], edges[1:], strict=True):
-        for start in range(int(left) + 1, int(right) - length + 1, step):
-            pieces.append(data[start : start + length])
-    return pieces
+    return [data[k : k + length] for first, end in _runs(data) for k in range(first, end - length + 1, step)]
+
+
+def _struck_part(data: Real, n_u: int) -> Real:
+    """The run of complete samples with the hardest blow: what a record of a hammer test with gaps is good for."""
+    drive = data[:, :n_u] - np.nanmedian(data[:, :n_u], axis=0)
+    force = np.nan_to_num(np.sum(drive**2, axis=1))
+    first, end = max(_runs(data), key=lambda run: float(np.max(force[run[0] : run[1]])), default=(0, 0))
+    return data[first:end]
+
+
+def _segment_length(records: Sequence[Real]) -> int:
+    """About ten averages with half overlap; a power of two >= 64 with at least eight where samples are missing."""
+    runs = [end - first for data in records for first, end in _runs(data)]
+    longest = max(runs, default=0)
+    if longest < SHORTEST:
+        raise InputError(
+            f"the longest stretch without a missing sample has {longest} samples, a response function takes {SHORTEST}"
+        )
+    if len(runs) == len(records) and sum(runs) == sum(map(len, records)):
+        length = min(min(runs), 2 * sum(runs) // (10 + len(runs)))
+        return min(longest, max(SHORTEST, length - length % 2))
+    length = 1 << (longest.bit_length() - 1)
+    while length > SHORTEST and sum((n - length) // (length // 2) + 1 for n in runs if n >= length) < 8:
+        length //= 2
+    return length
 
 
 def h1(
@@ -63,23 +90,30 @@ def h1(
     """H1 estimate by Welch's method for all inputs together: G_yu G_uu^-1, averaged over segments and records.
 
     u (N, n_u) or 1-D, y (N, n_y) or 1-D, or lists of such arrays (several records); NaN = missing, segments avoid it.
-    Default: Hann windows of about 1/8 of the record with half overlap; the whole record, no window, for hammer blows.
-    Raises InputError when no complete segment is left. Source: Bendat and Piersol, multiple-input H1.
+    Default: Hann windows with half overlap, so long that about ten averages remain, shorter where gaps leave no longer
+    stretch; the whole record (its unbroken part with the blow), no window, for hammer blows.
+    Raises InputError when no complete segment is left, or none of 64 samples by default.
+    Source: Bendat and Piersol, multiple-input H1.
     """
     from okid.records import paired  # records imports nothing of this module
 
     inputs, outputs = paired(u, y)
     n_u = inputs[0].shape[1]
-    shortest = min(len(one) for one in inputs)
     hit = all(is_hit(one) for one in inputs)
-    if nperseg is None:
-        nperseg = shortest if hit else min(shortest, 2 ** max(6, int(np.log2(max(shortest // 8, 1)))))
+    records = [np.hstack(pair) for pair in zip(inputs, outputs, strict=True)]
+    if nperseg is None and hit:
+        records = [_struck_part(data, n_u) for data in records]
+        nperseg = min(len(data) for data in records)
+        if nperseg < SHORTEST:
+            raise InputError(f"only {nperseg} unbroken samples around a blow, a response function takes {SHORTEST}")
+    elif nperseg is None:
+        nperseg = _segment_length(records)
     shape = get_window(window or ("boxcar" if hit else "hann"), nperseg)
     n_y, lines, count = outputs[0].shape[1], nperseg // 2 + 1, 0
     guu, gyu = np.zeros((lines, n_u, n_u), np.complex128), np.zeros((lines, n_y, n_u), np.complex128)
     gyy = np.zeros((lines, n_y))
-    for drive, answer in zip(inputs, outputs, strict=True):
-        for piece in _segments(np.hstack([drive, answer]), nperseg, nperseg if hit else max(1, nperseg // 2)):
+    for data in records:
+        for piece in _segments(data, nperseg, nperseg if hit else max(1, nperseg // 2)):
             spectrum = np.fft.rfft((piece - piece.mean(axis=0)) * shape[:, None], axis=0)
             fu, fy = spectrum[:, :n_u], spectrum[:, n_u:]
             guu += fu[:, :, None] * fu[:, None, :].conj()

@@ -14,8 +14,9 @@ from okid._errors import IdentificationError, InputError
 from okid.accumulator import Accumulator
 from okid.identifier import Identified, Identifier, usable_p
 from okid.model import Model
+from okid.record_fit import detrended, fit_records
 from okid.records import paired
-from okid.result import Fit, Remark, Result, modes_of
+from okid.result import Remark, Result, modes_of
 
 Real = NDArray[np.float64]
 
@@ -48,25 +49,6 @@ def _check_moving(records: list[Real], names: list[str], n_u: int) -> None:
             reason = "excites nothing" if k < n_u else "measures nothing"
             status = _abi.ERR_INPUT if k < n_u else _abi.ERR_OUTPUT
             raise IdentificationError(f"no model: {kind} {name!r} is constant ({present[0]:g}): it {reason}", status)
-
-
-def _detrended(record: Real, kind: str) -> Real:
-    """The record without its mean or its straight line, channel by channel over the samples that are there."""
-    out = record.copy()
-    time = np.arange(len(record)) - (len(record) - 1) / 2.0
-    for k in range(record.shape[1]):
-        there = np.isfinite(record[:, k])
-        if not there.any():
-            continue
-        level, slope = float(np.mean(record[there, k])), 0.0
-        if kind == "linear":
-            middle = float(np.mean(time[there]))
-            spread = float(np.sum((time[there] - middle) ** 2))
-            if spread > 0.0:
-                slope = float(np.sum((time[there] - middle) * record[there, k]) / spread)
-            level -= slope * middle
-        out[:, k] -= level + slope * time
-    return out
 
 
 def _gap_count(records: list[Real]) -> tuple[int, int]:
@@ -128,45 +110,33 @@ def _remarks(found: Identified) -> list[Remark]:
     return out
 
 
-def _percent(pairs: list[tuple[Real, Real]], names: list[str]) -> dict[str, float | None]:
-    out: dict[str, float | None] = {}
-    for k, name in enumerate(names):
-        y = np.concatenate([measured[:, k] for measured, _ in pairs])
-        yhat = np.concatenate([estimate[:, k] for _, estimate in pairs])
-        there = np.isfinite(y)
-        spread = float(np.linalg.norm(y[there] - np.mean(y[there])))
-        with np.errstate(over="ignore", invalid="ignore"):
-            value = 100.0 * (1.0 - float(np.linalg.norm(y[there] - yhat[there])) / spread) if spread > 0.0 else math.nan
-        out[name] = value if math.isfinite(value) else None
-    return out
-
-
-def _fit(model: Model, found: Identified, records: list[Real], outputs: list[str]) -> Fit:
-    """Initial state of each record into model.x0, then both fits over all records."""
-    n_u, states = model.B.shape[1], []
-    simulated, predicted = [], []
-    unstable_predictor = bool(found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
+def _unbroken(records: list[Real]) -> NDArray[np.int64]:
+    """Lengths of the runs of complete samples, over all records."""
+    lengths = []
     for record in records:
-        centred = record - found.mean
-        u, y = np.nan_to_num(centred[:, :n_u]), centred[:, n_u:]
-        used = len(u)
-        if 0.0 < found.model_radius < 1.0:
-            used = max(1, min(used, int(math.log(1e-16) / math.log(found.model_radius))))
-        try:
-            x0 = model.initial_state(u[:used], y[:used])
-        except IdentificationError:
-            x0 = np.zeros(model.order)
-        states.append(x0)
-        simulated.append((y, model.simulate(u, x0)))
-        if not unstable_predictor:
-            predicted.append((y, model.predict(u, y, x0)))
-    model.x0 = np.array(states)
-    none: dict[str, float | None] = {name: None for name in outputs}
-    return Fit(_percent(simulated, outputs), _percent(predicted, outputs) if predicted else none)
+        broken = np.flatnonzero(~np.all(np.isfinite(record), axis=1))
+        lengths.append(np.diff(np.concatenate(([-1], broken, [len(record)]))) - 1)
+    return np.concatenate(lengths)
 
 
-def _usable(p: int, n_u: int, n_y: int, samples: int) -> tuple[int, list[Remark]]:
-    least = 10 * (n_u + (1 if n_y >= 2 else 2) * (n_u + n_y))
+def _usable_beside_gaps(runs: NDArray[np.int64], n_u: int, n_y: int, least: int, most: int) -> int:
+    """Gaps cost p rows each: the largest p <= `most` with ten rows an unknown, else the one with most."""
+    best, best_share = least, 0.0
+    for p in range(most, least - 1, -1):
+        share = float(np.sum(np.maximum(0, runs - p))) / (n_u + p * (n_u + n_y))
+        if share >= 10.0:
+            return p
+        if share > best_share:
+            best, best_share = p, share
+    return best
+
+
+def _usable(p: int, n_u: int, n_y: int, records: list[Real]) -> tuple[int, list[Remark]]:
+    """p, or the largest smaller one that leaves ten samples (rows, where samples are missing) for each unknown."""
+    runs = _unbroken(records)
+    samples, gaps = int(np.sum(runs)), int(np.sum(runs)) < sum(len(record) for record in records)
+    least_p = 1 if n_y >= 2 else 2  # p n_y states: two make the first mode
+    least = 10 * (n_u + least_p * (n_u + n_y))
     if samples < least:
         raise IdentificationError(
             f"no model: too few samples: {samples} complete ones, even the smallest model of {n_u} inputs and {n_y} "
@@ -174,9 +144,12 @@ def _usable(p: int, n_u: int, n_y: int, samples: int) -> tuple[int, list[Remark]
             _abi.ERR_TOO_SHORT,
         )
     used = usable_p(n_u, n_y, p, samples)
+    if gaps:
+        used = _usable_beside_gaps(runs, n_u, n_y, min(least_p, used), used)
     if used == p:
         return p, []
-    return used, [Remark("p_reduced", f"p is {used} instead of {p}: {samples} samples bear no more unknowns")]
+    text = f"p is {used} instead of {p}: {samples} samples{' with these gaps' if gaps else ''} bear no more unknowns"
+    return used, [Remark("p_reduced", text)]
 
 
 def _record_remarks(records: list[Real], n_u: int, p: int, start: str, counts: tuple[int, int, int]) -> list[Remark]:
@@ -194,7 +167,7 @@ def _record_remarks(records: list[Real], n_u: int, p: int, start: str, counts: t
 def _centred(records: list[Real], detrend: str, start: str) -> tuple[list[Real], str]:
     """The records as they go into the sums, and what the sums still have to remove themselves."""
     if detrend == "linear" or (detrend == "mean" and (start == "rest" or len(records) > 1)):
-        records = [_detrended(record, detrend) for record in records]
+        records = [detrended(record, detrend) for record in records]
     return records, "mean" if detrend == "mean" and start == "moving" else "none"
 
 
@@ -217,8 +190,9 @@ def identify(
     """Identify a structure from measured inputs and outputs.
 
     u (N, n_u) or (N,), y (N, n_y) or (N,) at `fs` Hz, or lists of such arrays: several records, merged exactly, each
-    centred by itself. NaN = missing sample: the regression leaves it out and re-arms, nothing is interpolated. The
-    arrays are never modified. `p` ARX horizon, reduced with a warning when the record is shorter than 10 unknowns;
+    centred by itself. NaN = missing sample: the regression leaves it out and re-arms, nothing is interpolated; the fits
+    and model.x0 are those of the record less its own mean (or line) and start anew after missing inputs. The
+    arrays are never modified. `p` ARX horizon, reduced with a warning when there are fewer than 10 samples an unknown;
     `rows` block rows of the Hankel matrices (default 2 p); `order` a number or "auto" (up to `max_order`);
     `detrend` "none", "mean" or "linear"; `hold` "zoh" or "foh": how the force behaved between samples.
     `start` "rest" says that every record begins just before the structure is struck: the silent past is then used
@@ -241,8 +215,9 @@ def identify(
     _check_moving(records, in_names + out_names, n_u)
     missing, gaps = _gap_count(records)
     samples = sum(len(record) for record in records)
-    horizon, remarks = _usable(horizon, n_u, n_y, samples - missing)
+    horizon, remarks = _usable(horizon, n_u, n_y, records)
     remarks += _record_remarks(records, n_u, horizon, start, (missing, gaps, samples))
+    own = [detrended(record, detrend) for record in records]  # what a user can make of the record alone
     records, centre = _centred(records, detrend, start)
     identifier = Identifier(
         n_u, n_y, fs=float(fs), p=horizon, rows=0 if rows is None else _whole("rows", rows, 1), order=wanted,
@@ -251,7 +226,7 @@ def identify(
     with _accumulate(records, n_u, horizon, start == "rest") as sums:
         found = identifier.run(sums)
     model = Model(found.A, found.B, found.C, found.D, found.K, found.dt)
-    fit = _fit(model, found, records, out_names)
+    fit, model.x0 = fit_records(model, own, out_names, predict=not found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
     return Result(
         method, float(fs), samples, len(records), gaps, in_names, out_names, found.p, found.rows, found.order, hold,
         detrend, start, found.singular_values, model, found.markov, modes_of(found), fit, _remarks(found) + remarks,

@@ -57,6 +57,11 @@ def paired(u: ArrayLike | Sequence[ArrayLike], y: ArrayLike | Sequence[ArrayLike
     return inputs, outputs
 
 
+def _base(name: str) -> str:
+    """A column name without its unit in brackets, as `okid identify` takes it off: "force1" of "force1 [N]"."""
+    return re.split(r"[\[(]", name, maxsplit=1)[0].strip()
+
+
 class CsvRecord(NamedTuple):
     """A CSV file: column names, samples (N, columns) with NaN for missing ones, sample rate in Hz or None."""
 
@@ -65,11 +70,22 @@ class CsvRecord(NamedTuple):
     fs_hz: float | None
 
     def columns(self, wanted: Sequence[str], source: str) -> Real:
-        """The columns of these names, in this order. InputError lists what the file has."""
-        missing = [name for name in wanted if name not in self.names]
+        """The columns of these names, in this order; "force" also finds "force [N]" when no other column is named so.
+
+        InputError lists what the file has.
+        """
+        found = {name: self._place(name) for name in wanted}
+        missing = [name for name, place in found.items() if place is None]
         if missing:
             raise InputError(f"{source}: no column {', '.join(map(repr, missing))}; it has {', '.join(self.names)}")
-        return self.samples[:, [self.names.index(name) for name in wanted]]
+        return self.samples[:, np.array([found[name] for name in wanted], dtype=np.intp)]
+
+    def _place(self, name: str) -> int | None:
+        """The column of this name, else the only one whose name without its unit it is."""
+        if name in self.names:
+            return self.names.index(name)
+        by_base = [k for k, full in enumerate(self.names) if name and _base(full) == name]
+        return by_base[0] if len(by_base) == 1 else None
 
 
 def _separator(header: str) -> str:

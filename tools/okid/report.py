@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import sys
@@ -21,7 +22,10 @@ from okid import _page, figures
 from okid._errors import Error, InputError
 from okid.frf import Frf, cmif, h1, synthesise
 from okid.identify import identify
+from okid.model import Model
+from okid.record_fit import detrended, fit_records
 from okid.records import read_csv
+from okid.result import Fit
 from okid.stabilization import OrderPoles
 
 Real = NDArray[np.float64]
@@ -96,11 +100,30 @@ def load_result(path: str | Path) -> Loaded:
 
 @dataclass
 class Measured:
-    """What the record adds."""
+    """What the record adds. frf None: `no_frf` says why; fit None: the result has its own."""
 
-    frf: Frf
+    frf: Frf | None
+    no_frf: str
     rows: list[OrderPoles]
+    fit: Fit | None
     source: str
+
+
+def _known_fit(raw: dict[str, Any], key: str) -> list[float | None]:
+    """The fits of the result in the order of its outputs."""
+    values = (raw.get("fit") or {}).get(key) or {}
+    return [values.get(name) for name in raw["outputs"]]
+
+
+def _own_fit(result: Loaded, u: Real, y: Real) -> Fit:
+    """Both fits of the model of the result over a record it does not know."""
+    m, raw = result.matrices, result.raw
+    n_z, n_y = len(m["A"]), len(m["C"])
+    gain = np.array(raw["model"].get("K") or [], dtype=np.float64)
+    predict = gain.shape == (n_z, n_y) and float(np.max(np.abs(np.linalg.eigvals(m["A"] - gain @ m["C"])))) < 1.0
+    model = Model(m["A"], m["B"], m["C"], m["D"], gain if predict else np.zeros((n_z, n_y)), 1.0 / result.fs)
+    record = detrended(np.hstack([u, y]), str(raw.get("detrend", "mean")))
+    return fit_records(model, [record], raw["outputs"], predict)[0]
 
 
 def measure(result: Loaded, path: str | Path) -> Measured:
@@ -108,12 +131,22 @@ def measure(result: Loaded, path: str | Path) -> Measured:
     raw = result.raw
     record = read_csv(path)
     u, y = record.columns(raw["inputs"], str(path)), record.columns(raw["outputs"], str(path))
+    if record.fs_hz is not None and abs(record.fs_hz - result.fs) > 1e-3 * result.fs:
+        raise InputError(
+            f"{path}: sampled at {record.fs_hz:g} Hz, but the result is of {result.fs:g} Hz: not the record it is from"
+        )
     again = identify(
         u, y, fs=result.fs, p=int(raw["p"]), rows=int(raw["rows"]), detrend=str(raw.get("detrend", "mean")),
         start=str(raw.get("start", "moving")), order=int(raw["order"]),
         max_order=max(int(raw["order"]) + 20, min(80, 3 * int(raw["order"]))),
     )  # fmt: skip
-    return Measured(h1(u, y, result.fs), again.stabilization(), str(path))
+    responses, reason = None, ""
+    try:
+        responses = h1(u, y, result.fs)
+    except InputError as fault:
+        reason = str(fault)
+    unknown = all(value is None for value in _known_fit(raw, "simulation_percent"))
+    return Measured(responses, reason, again.stabilization(), _own_fit(result, u, y) if unknown else None, str(path))
 
 
 def _plain(value: float | None, digits: str, factor: float = 1.0) -> str:
@@ -169,7 +202,8 @@ def _stabilization(result: Loaded, measured: Measured | None) -> str:
     if measured is None:
         return _page.section(title, _page.absent("Needs the record: run okid-report again with --record FILE.csv."))
     drawing = figures.figure(9.6, 4.8)
-    behind = (measured.frf.frequency_hz[1:], cmif(measured.frf.response[1:]))
+    data = measured.frf
+    behind = None if data is None else (data.frequency_hz[1:], cmif(data.response[1:]))
     figures.draw_stabilization(
         drawing.add_subplot(),
         measured.rows,
@@ -180,7 +214,10 @@ def _stabilization(result: Loaded, measured: Measured | None) -> str:
     )
     return _page.section(title, _page.picture(drawing, "poles over frequency and model order"), _page.note(
         "A pole holds when the next lower order has one within 1 % in frequency, 5 % in damping and MAC ≥ 0.98. Green "
-        "lines: modes of this result. Behind: largest singular value of the measured responses (CMIF), dB, no scale."
+        "lines: modes of this result." + (
+            "" if behind is None
+            else " Behind: largest singular value of the measured responses (CMIF), dB, no scale."
+        )
     ))  # fmt: skip
 
 
@@ -231,7 +268,9 @@ def _frf(result: Loaded, measured: Measured | None) -> tuple[str, list[tuple[int
     total = len(raw["outputs"]) * len(raw["inputs"])
     words = f"Magnitude: output unit over input unit. Shown: {len(pairs)} of {total} pairs"
     words += ", the strongest with the best coherence and every input." if len(pairs) < total else "."
-    if data is None:
+    if measured is not None and data is None:
+        more = f"Model only, the measured responses are left out: {measured.no_frf}."
+    elif data is None:
         more = "Model only: the measured response and the coherence need --record FILE.csv."
     else:
         more = f"Measured: H1, {data.averages} average(s), {data.resolution_hz:.3g} Hz lines; multiple coherence."
@@ -281,16 +320,25 @@ def _shapes(result: Loaded) -> list[str]:
     ]  # fmt: skip
 
 
-def _fit(result: Loaded) -> str:
-    fit = result.raw.get("fit") or {}
+def _fit(result: Loaded, measured: Measured | None) -> str:
     names = result.raw["outputs"]
-    parts = [[(fit.get(key) or {}).get(name) for name in names] for key in ("simulation_percent", "prediction_percent")]
+    parts = [_known_fit(result.raw, key) for key in ("simulation_percent", "prediction_percent")]
+    origin = ""
+    if measured is not None and measured.fit is not None:
+        made = measured.fit
+        parts = [[part[name] for name in names] for part in (made.simulation_percent, made.prediction_percent)]
+        origin = f" Computed by this report from {measured.source}: the result itself holds no simulation fit."
     if all(value is None for part in parts for value in part):
-        return _page.section("Fit", _page.absent("The result holds no fit (a live result keeps no record)."))
+        words = "The result holds no fit (a live result keeps no record)"
+        more = (
+            ": run okid-report again with --record FILE.csv." if measured is None else ", nor does the record give one."
+        )
+        return _page.section("Fit", _page.absent(words + more))
     drawing = figures.figure(max(4.0, min(9.6, 2.0 + 0.6 * len(names))), 3.0)
     figures.draw_fit(drawing.add_subplot(), names, parts[0], parts[1])
     words = "100 (1 − ‖y − ŷ‖ / ‖y − mean‖). Simulation: from input and initial state; prediction: one step ahead."
-    return _page.section("Fit", _page.picture(drawing, "fit percentage of each output"), _page.note(words))
+    title = "Fit, computed by this report" if origin else "Fit"
+    return _page.section(title, _page.picture(drawing, "fit percentage of each output"), _page.note(words + origin))
 
 
 def _markov(result: Loaded, pairs: Sequence[tuple[int, int]]) -> str:
@@ -316,7 +364,7 @@ def build(result: Loaded, record: str | Path | None = None, title: str | None = 
         responses, pairs = _frf(result, measured)
         sections = [
             _summary(result, measured), _modes(result), _singular_values(result), _stabilization(result, measured),
-            responses, *_shapes(result), _fit(result), _markov(result, pairs),
+            responses, *_shapes(result), _fit(result, measured), _markov(result, pairs),
         ]  # fmt: skip
     raw = result.raw
     count = len(raw["modes"])
@@ -348,8 +396,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"okid-report: {fault}", file=sys.stderr)
         return 2
     except OSError as fault:
-        part.unlink(missing_ok=True)
-        print(f"okid-report: {fault.filename or target}: {fault.strerror or fault}", file=sys.stderr)
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+        print(f"okid-report: {target}: {fault.strerror or fault}", file=sys.stderr)
         return 2
     print(f"{target}: {len(text) // 1024} KiB")
     return 0

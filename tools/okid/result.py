@@ -25,13 +25,15 @@ Real = NDArray[np.float64]
 
 
 class Mode(NamedTuple):
-    """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1."""
+    """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known."""
 
     frequency_hz: float
     damping_ratio: float
     shape: NDArray[np.complex128]
     mpc: float
     emac: float
+    frequency_std_hz: float | None = None
+    damping_ratio_std: float | None = None
 
 
 class Fit(NamedTuple):
@@ -62,6 +64,12 @@ def _number(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
 
 
+def _spread(value: float | None, factor: float) -> str:
+    """One cell of a column of standard deviations."""
+    known = _number(value)
+    return f" {'-' if known is None else format(factor * known, '.2g'):>9}"
+
+
 def _nested(array: Real) -> Any:
     if array.ndim == 1:
         return [_number(x) for x in array.tolist()]
@@ -70,7 +78,10 @@ def _nested(array: Real) -> Any:
 
 @dataclass
 class Result:
-    """What identify() returns. singular_values (s,) of H(0); markov (count, n_y, n_u) Y_0 .. by eq. 40."""
+    """What identify() returns. singular_values (s,) of H(0); markov (count, n_y, n_u) Y_0 .. by eq. 40.
+
+    mkr and pdc (mass, damping and stiffness; proportional damping) are not available in this version: always None.
+    """
 
     method: str
     fs_hz: float
@@ -93,6 +104,8 @@ class Result:
     warnings: list[Remark]
     observer: Observer
     identifier: Identifier | None = field(default=None, repr=False, compare=False)
+    mkr: dict[str, Any] | None = None
+    pdc: dict[str, Any] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "identifier": None}  # holds memory of the C library: cannot be pickled
@@ -129,6 +142,8 @@ class Result:
                     "damping_ratio": mode.damping_ratio,
                     "shape_re": _nested(mode.shape.real),
                     "shape_im": _nested(mode.shape.imag),
+                    "frequency_std_hz": _number(mode.frequency_std_hz),
+                    "damping_ratio_std": _number(mode.damping_ratio_std),
                     "mpc": _number(mode.mpc),
                     "emac": _number(mode.emac),
                 }
@@ -158,16 +173,20 @@ class Result:
 
     def table(self) -> str:
         """The modal table, fits and remarks as text for a person."""
+        f_std = any(_number(mode.frequency_std_hz) is not None for mode in self.modes)
+        z_std = any(_number(mode.damping_ratio_std) is not None for mode in self.modes)
         lines = [
             f"{self.method}: {self.samples} samples at {self.fs_hz:g} Hz, {self.records} record(s), {self.gaps} gap(s)",
             f"p {self.p}, {self.rows} block rows, order {self.order}, detrend {self.detrend}, start {self.start}",
             "",
-            "   #       f [Hz]     ζ [%]     MPC    EMAC",
+            "   #       f [Hz]" + "         ±" * f_std + "     ζ [%]" + "         ±" * z_std + "     MPC    EMAC",
         ]
-        lines += [
-            f"{k:4d} {mode.frequency_hz:12.5f} {100 * mode.damping_ratio:9.4f} {mode.mpc:7.4f} {mode.emac:7.4f}"
-            for k, mode in enumerate(self.modes, 1)
-        ]
+        for k, mode in enumerate(self.modes, 1):
+            line = f"{k:4d} {mode.frequency_hz:12.5f}"
+            line += _spread(mode.frequency_std_hz, 1.0) if f_std else ""
+            line += f" {100 * mode.damping_ratio:9.4f}"
+            line += _spread(mode.damping_ratio_std, 100.0) if z_std else ""
+            lines.append(f"{line} {mode.mpc:7.4f} {mode.emac:7.4f}")
         width = max([6, *(len(name) for name in self.outputs)])
         lines += ["", f"{'output':<{width}}  simulated [%]  predicted [%]"]
         for name in self.outputs:
