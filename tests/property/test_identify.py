@@ -396,3 +396,9 @@ def test_demo(capsys: pytest.CaptureFixture[str]) -> None:
     result = okid.demo()
     assert len(result.modes) == 3
     assert "truth: " in capsys.readouterr().out
+
+
+def test_outputs_that_do_not_answer_give_no_model() -> None:
+    rng = np.random.default_rng(8)
+    with pytest.raises(okid.IdentificationError, match="no model"):
+        okid.identify(rng.standard_normal(5000), rng.standard_normal((5000, 3)), fs=100.0)

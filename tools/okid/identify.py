@@ -16,7 +16,7 @@ from okid.identifier import Identified, Identifier, usable_p
 from okid.model import Model
 from okid.record_fit import detrended, fit_records
 from okid.records import paired
-from okid.result import Remark, Result, modes_of
+from okid.result import Fit, Remark, Result, modes_of
 
 Real = NDArray[np.float64]
 
@@ -152,6 +152,17 @@ def _usable(p: int, n_u: int, n_y: int, records: list[Real]) -> tuple[int, list[
     return used, [Remark("p_reduced", text)]
 
 
+def _check_explains(fit: Fit) -> None:
+    """Refuse a model that neither simulates nor predicts a twentieth of any output."""
+    numbers = [x for part in fit for x in part.values() if x is not None]
+    if max(numbers, default=0.0) < 5.0:
+        raise IdentificationError(
+            f"no model: the best one explains {max(numbers, default=0.0):.1f} % of an output: the outputs do not "
+            "answer these inputs, or a sensor was overloaded",
+            _abi.ERR_NO_MODES,
+        )
+
+
 def _record_remarks(records: list[Real], n_u: int, p: int, start: str, counts: tuple[int, int, int]) -> list[Remark]:
     missing, gaps, samples = counts
     out = []
@@ -227,6 +238,7 @@ def identify(
         found = identifier.run(sums)
     model = Model(found.A, found.B, found.C, found.D, found.K, found.dt)
     fit, model.x0 = fit_records(model, own, out_names, predict=not found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
+    _check_explains(fit)
     return Result(
         method, float(fs), samples, len(records), gaps, in_names, out_names, found.p, found.rows, found.order, hold,
         detrend, start, found.singular_values, model, found.markov, modes_of(found), fit, _remarks(found) + remarks,
