@@ -344,7 +344,7 @@ static void feed_run(okid_accumulator_t* a, source_t source, size_t count) {
     a->stats.samples += (int64_t)count;
     while (count > 0) {
         size_t taken = 0;
-        if (a->config.bulk && a->have == a->config.lags) {
+        if (a->config.bulk && source.words && a->have == a->config.lags) {
             taken = feed_bulk(a, source.words, count);
             source.words += taken * (size_t)a->m;
         }
