@@ -236,7 +236,8 @@ record_result identify_records(std::vector<record_data> records, const record_op
     check_different_inputs(records, options);
     if (options.detrend == "linear") detrend_linear(records, options);
     const bool at_rest = options.start == "rest";
-    if (options.detrend == "mean" && (records.size() > 1 || at_rest)) centre_each(records, options);
+    const bool own_means_first = options.detrend == "mean" && (records.size() > 1 || at_rest);
+    if (own_means_first) centre_each(records, options);
 
     okid_identify_config_t config{};
     config.n_u = static_cast<std::int32_t>(options.inputs.size());
@@ -260,7 +261,8 @@ record_result identify_records(std::vector<record_data> records, const record_op
     const okid_status_t status = okid_identify_run(identifier, accumulator, &result.model);
     if (status < 0) throw_identify_failure(status, result.model, config, result.context);
     tell(options, "simulating the model");
-    if (options.detrend == "mean") centre_each(records, options); // once more where that was done: no harm
+    if (options.detrend == "mean" && !own_means_first)
+        centre_each(records, options); // the fit is about the record's mean
     fit_records(records, result);
     check_explains(result.context);
     return result;

@@ -5,16 +5,11 @@
 // NUMERICS   plain sums in double; exact for 16-bit codes up to 2^22 samples
 // WORKSPACE  none; 2 m^2 (p+1) flop a sample
 #include "kernel.h"
+#include "isa.h"
 
 #include <string.h>
 
-#ifndef OKID_KERNEL_ISA
-#define OKID_KERNEL_ISA base
-#define OKID_KERNEL_IS_BASE 1
-#endif
-#define OKID_JOIN_(a, b) a##b
-#define OKID_JOIN(a, b) OKID_JOIN_(a, b)
-#define OKID_KERNEL OKID_JOIN(okid_kernel_, OKID_KERNEL_ISA)
+#define OKID_KERNEL OKID_FOR_ISA(okid_kernel_)
 
 #if defined(__AVX512F__)
 enum { LANES = 8, COLS = 5, MAX_ROWS = 5 };

@@ -10,18 +10,13 @@
 // NUMERICS   the sums are integers: rounding makes them exact while the error stays below 1/2, see okid_spectrum_error()
 // WORKSPACE  okid_spectrum_doubles(); about 5 m log2 N + 4 m^2 flop a sample
 #include "spectrum.h"
+#include "isa.h"
 
 #include <math.h>
 #include <string.h>
 
-#ifndef OKID_KERNEL_ISA
-#define OKID_KERNEL_ISA base
-#define OKID_KERNEL_IS_BASE 1
-#endif
-#define OKID_JOIN_(a, b) a##b
-#define OKID_JOIN(a, b) OKID_JOIN_(a, b)
-#define ABSORB OKID_JOIN(okid_spectrum_absorb_, OKID_KERNEL_ISA)
-#define FLUSH OKID_JOIN(okid_spectrum_flush_, OKID_KERNEL_ISA)
+#define ABSORB OKID_FOR_ISA(okid_spectrum_absorb_)
+#define FLUSH OKID_FOR_ISA(okid_spectrum_flush_)
 
 enum { V = SPECTRUM_LANES };
 typedef double lanes_t __attribute__((vector_size(V * sizeof(double)), aligned(8)));
