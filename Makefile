@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo test test-slow bench lint format sanitize clean
+.PHONY: help setup build demo test test-slow bench bench-check lint format sanitize clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 22
@@ -36,6 +36,9 @@ test-slow: ## the long tiers: more seeds, more frames
 bench: build ## speed of the kernels as ratios within one run
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --save build/bench.json
 
+bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
+	@$(PYTHON) tools/bench_check.py build/bench.json
+
 sanitize: ## unit tests under AddressSanitizer and UndefinedBehaviourSanitizer
 	@tools/setup.sh test
 	@cmake --preset sanitize --log-level=WARNING >/dev/null
@@ -52,4 +55,4 @@ format: ## rewrite C, C++ and Python in the house style
 	@.venv/bin/ruff format --config tools/pyproject.toml -q tools tests
 
 clean: ## remove build folders (not .venv)
-	@rm -rf build build-sanitize build-coverage
+	@rm -rf build build-sanitize build-coverage build-float

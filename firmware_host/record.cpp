@@ -132,7 +132,29 @@ void check_status(okid_status_t status, const char* what) {
     if (status < 0) throw failure(exit_no_model, fmt::format("no model: {}: {}", what, okid_status_text(status)));
 }
 
-/// All records into one accumulator, a gap between each two. At rest: p samples of silence before each.
+/// Feed all records, a gap between each two, p samples of silence before each that begins at rest.
+template <class Gap, class Add>
+void feed(const std::vector<record_data>& records, const okid_identify_config_t& config, bool at_rest, Gap gap,
+          Add add) {
+    const auto n_u = static_cast<std::size_t>(config.n_u), n_y = static_cast<std::size_t>(config.n_y);
+    constexpr std::size_t piece = 4096;
+    std::vector<double> v(piece * (n_u + n_y));
+    const std::vector<double> silence(at_rest ? static_cast<std::size_t>(config.p) * (n_u + n_y) : 0);
+    for (const record_data& record : records) {
+        gap();
+        if (at_rest) check_status(add(silence.data(), static_cast<std::size_t>(config.p)), record.path.c_str());
+        for (std::size_t first = 0; first < record.count; first += piece) {
+            const std::size_t n = std::min(piece, record.count - first);
+            for (std::size_t i = 0; i < n; ++i) {
+                std::copy_n(&record.u[(first + i) * n_u], n_u, &v[i * (n_u + n_y)]);
+                std::copy_n(&record.y[(first + i) * n_y], n_y, &v[i * (n_u + n_y) + n_u]);
+            }
+            check_status(add(v.data(), n), record.path.c_str());
+        }
+    }
+}
+
+/// All records into one accumulator.
 std::unique_ptr<std::byte[]> accumulate(const std::vector<record_data>& records, const okid_identify_config_t& config,
                                         bool at_rest, okid_accumulator_t*& accumulator) {
     okid_accumulator_config_t shape{};
@@ -145,25 +167,41 @@ std::unique_ptr<std::byte[]> accumulate(const std::vector<record_data>& records,
     const std::size_t bytes = okid_accumulator_memsize(&shape);
     auto block = library_memory(bytes, config.p);
     check_status(okid_accumulator_create(&accumulator, &shape, block.get(), bytes), "accumulator");
-    const auto n_u = static_cast<std::size_t>(config.n_u), n_y = static_cast<std::size_t>(config.n_y);
-    constexpr std::size_t piece = 4096;
-    std::vector<double> v(piece * (n_u + n_y));
-    const std::vector<double> silence(at_rest ? static_cast<std::size_t>(config.p) * (n_u + n_y) : 0);
-    for (const record_data& record : records) {
-        okid_accumulator_gap(accumulator, 0);
-        if (at_rest)
-            check_status(okid_accumulator_add(accumulator, silence.data(), static_cast<std::size_t>(config.p)),
-                         record.path.c_str());
-        for (std::size_t first = 0; first < record.count; first += piece) {
-            const std::size_t n = std::min(piece, record.count - first);
-            for (std::size_t i = 0; i < n; ++i) {
-                std::copy_n(&record.u[(first + i) * n_u], n_u, &v[i * (n_u + n_y)]);
-                std::copy_n(&record.y[(first + i) * n_y], n_y, &v[i * (n_u + n_y) + n_u]);
-            }
-            check_status(okid_accumulator_add(accumulator, v.data(), n), record.path.c_str());
-        }
-    }
+    feed(
+        records, config, at_rest, [&] { okid_accumulator_gap(accumulator, 0); },
+        [&](const double* v, std::size_t n) { return okid_accumulator_add(accumulator, v, n); });
     return block;
+}
+
+/// Nearly noise-free data lose half their digits in a Gram matrix: the record is in memory, so its QR factor is taken instead.
+/// What the Gram matrix gave stays when that fails. @return the status of the better model
+okid_status_t refine_by_factor(const std::vector<record_data>& records, const okid_identify_config_t& config,
+                               bool at_rest, okid_identify_t* identifier, okid_status_t status, record_result& result) {
+    const bool floor_only = result.model.observer_info.ridge <= 1e-10; // else a ridge decides, not rounding
+    if (status < 0 || !(result.model.warnings & OKID_NOTE_ILL_CONDITIONED) || !floor_only) return status;
+    okid_square_root_config_t shape{};
+    shape.n_u = config.n_u;
+    shape.n_y = config.n_y;
+    shape.lags = config.p;
+    shape.forgetting = 1;
+    const std::size_t bytes = okid_square_root_memsize(&shape);
+    const auto block = library_memory(bytes, config.p);
+    okid_square_root_t* square_root = nullptr;
+    check_status(okid_square_root_create(&square_root, &shape, block.get(), bytes), "QR factor");
+    feed(
+        records, config, at_rest, [&] { okid_square_root_gap(square_root, 0); },
+        [&](const double* v, std::size_t n) { return okid_square_root_add(square_root, v, n); });
+    okid_identified_t better{};
+    const okid_status_t found = okid_identify_run_factor(identifier, square_root, &better);
+    if (found < 0) { // the workspace is shared: make the first model again
+        okid_accumulator_t* accumulator = nullptr;
+        const auto sums = accumulate(records, config, at_rest, accumulator);
+        return okid_identify_run(identifier, accumulator, &result.model);
+    }
+    result.model = better;
+    result.context.warnings.emplace_back(
+        "qr_factor", "nearly noise-free data: solved from the QR factor of the record, not from its Gram matrix");
+    return found;
 }
 
 result_context describe(const std::vector<record_data>& records, const record_options& options,
@@ -258,7 +296,8 @@ record_result identify_records(std::vector<record_data> records, const record_op
     result.memory = library_memory(bytes, config.p);
     okid_identify_t* identifier = nullptr;
     check_status(okid_identify_create(&identifier, &config, result.memory.get(), bytes), "identifier");
-    const okid_status_t status = okid_identify_run(identifier, accumulator, &result.model);
+    okid_status_t status = okid_identify_run(identifier, accumulator, &result.model);
+    status = refine_by_factor(records, config, at_rest, identifier, status, result);
     if (status < 0) throw_identify_failure(status, result.model, config, result.context);
     tell(options, "simulating the model");
     if (options.detrend == "mean" && !own_means_first)

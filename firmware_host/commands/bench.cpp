@@ -31,7 +31,7 @@ struct row {
     std::string name, kernel;
     int p;
     double ns_per_sample, gflops;
-    std::size_t state_bytes;
+    std::size_t state_bytes; ///< what a sample is absorbed into, without buffers
 };
 
 /// Best of several rounds: the machine is shared, the fastest round is the one least disturbed.
@@ -58,8 +58,12 @@ std::vector<double> white(std::size_t count) {
 row direct(const bench_case& c, int p, bool codes) {
     constexpr int samples = 20000, block = 500;
     const int m = c.n_u + c.n_y;
-    const okid_accumulator_config_t config{c.n_u, c.n_y, p, codes ? OKID_SAMPLE_INT16 : OKID_SAMPLE_DOUBLE, 0, 0,
-                                           1,     0,     0};
+    okid_accumulator_config_t config{};
+    config.n_u = c.n_u;
+    config.n_y = c.n_y;
+    config.lags = p;
+    config.sample = codes ? OKID_SAMPLE_INT16 : OKID_SAMPLE_DOUBLE;
+    config.forgetting = 1;
     std::vector<char> memory(okid_accumulator_memsize(&config));
     okid_accumulator_t* a = nullptr;
     if (okid_accumulator_create(&a, &config, memory.data(), memory.size()) != OKID_OK) return {};
@@ -75,8 +79,28 @@ row direct(const bench_case& c, int p, bool codes) {
         }
     });
     const double per_sample = seconds / samples;
+    config.buffer = 1; // waiting samples are no state: the sums are the same without them, bit for bit
     return {c.name,           codes ? "direct_i16" : "direct",           p,
-            per_sample * 1e9, 2.0 * m * m * (p + 1) / per_sample * 1e-9, memory.size()};
+            per_sample * 1e9, 2.0 * m * m * (p + 1) / per_sample * 1e-9, okid_accumulator_memsize(&config)};
+}
+
+/// The second kernel: block QR of the whole lag row, for hardware with a single-precision unit only.
+row block_qr(const bench_case& c, int p) {
+    const int m = c.n_u + c.n_y, q = c.n_u + p * m, samples = std::max(600, 40000000 / (q * q));
+    okid_square_root_config_t config{};
+    config.n_u = c.n_u;
+    config.n_y = c.n_y;
+    config.lags = p;
+    config.forgetting = 1;
+    std::vector<char> memory(okid_square_root_memsize(&config));
+    okid_square_root_t* a = nullptr;
+    if (okid_square_root_create(&a, &config, memory.data(), memory.size()) != OKID_OK) return {};
+    const std::vector<double> v = white(static_cast<std::size_t>(samples * m));
+    const double seconds = seconds_of([&] {
+        if (okid_square_root_add(a, v.data(), static_cast<std::size_t>(samples)) < 0) return;
+    });
+    const double per_sample = seconds / samples, flop = 2.0 * (q + c.n_y) * (q + c.n_y);
+    return {c.name, "qr", p, per_sample * 1e9, flop / per_sample * 1e-9, memory.size()};
 }
 
 /// Textbook recursive least squares: one rank-one update of the q x q inverse a sample.
@@ -208,6 +232,7 @@ void run_bench(const bench_options& options) {
             rows.push_back(direct(c, p, true));
             rows.push_back(dgemm(c, p));
             rows.push_back(rls(c, p));
+            rows.push_back(block_qr(c, p));
             rows.push_back(lapack_ls(c, p));
         }
     const std::pair<int, std::pair<int, int>> records[] = {{1, {60, 20000}}, {2, {50, 100000}}}; // case, lags, samples
@@ -222,7 +247,7 @@ void run_bench(const bench_options& options) {
         for (const int p : horizons) {
             const double own = cost(rows, c.name, p, "direct");
             const std::string suffix = fmt::format("_over_direct_{}_p{}", c.name, p);
-            for (const char* other : {"rls", "dgemm", "lapack_ls", "direct_i16"})
+            for (const char* other : {"rls", "qr", "dgemm", "lapack_ls", "direct_i16"})
                 ratios[other + suffix] = cost(rows, c.name, p, other) / own;
         }
     for (const row& r : rows)

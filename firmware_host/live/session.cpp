@@ -203,6 +203,12 @@ result_context session::context() {
             fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags start "
                         "anew after each gap",
                         stats.missing, stats.samples + stats.missing, stats.gaps, stats.gaps == 1 ? "" : "s"));
+    if (stats.saturated > 0)
+        out.warnings.emplace_back(
+            "saturated",
+            fmt::format("{} codes stood at full scale: taken as they are, but a clipped signal bends every mode; lower "
+                        "the gain or the force",
+                        stats.saturated));
     for (std::size_t i = 0; i < config_.n_u + config_.n_y; ++i)
         (i < config_.n_u ? out.inputs : out.outputs).push_back(config_.channels[i].name);
     return out;

@@ -22,6 +22,7 @@ const char* okid_status_text(okid_status_t status) {
     case OKID_ERR_NUMERIC: return "a factorisation did not converge";
     case OKID_ERR_UNSTABLE: return "no regularisation gives a stable model";
     case OKID_ERR_NO_MODES: return "the model has no underdamped mode";
+    case OKID_ERR_FORMAT: return "the bytes are no serialised state of this version, or they are damaged";
     }
     return "unknown status";
 }

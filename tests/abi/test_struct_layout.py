@@ -14,7 +14,20 @@ from okid import _abi
 
 ROOT = Path(__file__).resolve().parents[2]
 INCLUDE = ROOT / "lib" / "include"
-CONSTANT_PREFIXES = ("OK", "WARN_", "ERR_", "SAMPLE_", "DETREND_", "METHOD_", "NOTE_")
+CONSTANT_PREFIXES = (
+    "OK",
+    "WARN_",
+    "ERR_",
+    "SAMPLE_",
+    "SUBSPACE_",
+    "DETREND_",
+    "METHOD_",
+    "SOLVER_",
+    "NOTE_",
+    "SENSE_",
+    "HOLD_",
+    "MKR_",
+)
 CONSTANTS = {name: value for name, value in vars(_abi).items() if name.startswith(CONSTANT_PREFIXES) and name.isupper()}
 # C parameter type (without const, names and spaces) -> kinds of ctypes that may stand for it
 SCALARS = {
@@ -26,11 +39,18 @@ SCALARS = {
     "okid_status_t": ctypes.c_int,
     "okid_detrend_t": ctypes.c_int,
 }
+POINTED = {
+    "double": ctypes.c_double,
+    "float": ctypes.c_float,
+    "int32_t": ctypes.c_int32,
+    "int16_t": ctypes.c_int16,
+}
 
 
 def headers_text() -> str:
     """All public headers without comments."""
     text = "\n".join(path.read_text(encoding="utf-8") for path in sorted((INCLUDE / "okid").glob("*.h")))
+    text = re.sub(r"\bokid_real_t\b", "double", text)  # what the shared library of hosts is built with
     return re.sub(r"//[^\n]*", "", re.sub(r"/\*.*?\*/", "", text, flags=re.S))
 
 
@@ -119,9 +139,8 @@ def test_arguments(name: str) -> None:
             target = plain.rstrip("*")
             if target in _abi.STRUCTS:
                 assert kind._type_ is _abi.STRUCTS[target], text
-            elif target in ("double", "int32_t", "int16_t"):
-                expected = {"double": ctypes.c_double, "int32_t": ctypes.c_int32, "int16_t": ctypes.c_int16}[target]
-                assert kind._type_ is expected, text
+            elif target in POINTED:
+                assert kind._type_ is POINTED[target], text
             else:
                 assert kind is ctypes.c_void_p or kind._type_ is ctypes.c_void_p, text
     plain_result = result.replace("const", "").replace(" ", "")

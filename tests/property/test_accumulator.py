@@ -79,10 +79,10 @@ def test_a_word_that_is_no_24_bit_code_is_refused() -> None:
     wrong[7, 1] = 2**23
     with Accumulator(1, 1, 2, codes=24) as sums:
         sums.add(v)
-        before = sums.snapshot()
+        before = sums.to_bytes()
         with pytest.raises(InputError):
             sums.add(wrong)
-        assert sums.snapshot() == before
+        assert sums.to_bytes() == before
 
 
 @given(sizes, seeds, st.lists(st.integers(0, 300), max_size=8), st.booleans(), st.booleans())
@@ -217,7 +217,7 @@ def test_snapshot_copy_and_pickle(whole: bool) -> None:
     v = codes(5, 400, 3) if whole else draw(5, 400, 3)
     with Accumulator(1, 2, 4, codes=16 * whole, block=32, slots=5) as sums:
         sums.add(v[:250])
-        kept, twin, thawed = sums.snapshot(), sums.copy(), pickle.loads(pickle.dumps(sums))
+        kept, twin, thawed = sums.to_bytes(), sums.copy(), pickle.loads(pickle.dumps(sums))
         before = sums.gram()[0]
         sums.add(v[250:])
         after = sums.gram()[0]
@@ -238,7 +238,7 @@ def test_errors_leave_the_state_unchanged() -> None:
         with pytest.raises(IdentificationError):
             sums.gram()
         sums.add(draw(1, 30, 3))
-        before = sums.snapshot()
+        before = sums.to_bytes()
         for wrong in (np.zeros((4, 2)), np.zeros(3), np.zeros((2, 3), complex), np.array([["a", "b", "c"]])):
             with pytest.raises(InputError):
                 sums.add(wrong)
@@ -249,7 +249,7 @@ def test_errors_leave_the_state_unchanged() -> None:
             exact.add(np.zeros((3, 3)))
         with pytest.raises(InputError):
             sums.gram("linear")
-        assert sums.snapshot() == before
+        assert sums.to_bytes() == before
     with pytest.raises(Error):
         sums.rows  # noqa: B018 - closed above
 

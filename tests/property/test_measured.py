@@ -74,7 +74,7 @@ def test_struck_plane_without_the_silent_past(plane: list[np.ndarray], chosen: t
     forces, answers = [plane[k][:, :1] for k in chosen], [plane[k][:, 1:] for k in chosen]
     result = okid.identify(forces, answers, fs=512.0, start="moving", hold="foh")
     assert found(result, PLANE_HZ, 0.5) == PLANE_HZ, result.table()
-    assert len(found(result, PLANE_ALL_HZ, 0.5)) >= 9  # from rest: 11, the hit is then in the sums
+    assert len(found(result, PLANE_ALL_HZ, 0.5)) >= 8  # from rest: 11, the hit is then in the sums
     assert result.model.radius() < 1.0
 
 

@@ -16,6 +16,7 @@ from okid.identify import identify
 from okid.model import Model
 from okid.records import read_csv
 from okid.result import Fit, Mode, Result
+from okid.square_root import SquareRoot
 from okid.stabilization import OrderPoles
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "Model",
     "OrderPoles",
     "Result",
+    "SquareRoot",
     "Stats",
     "demo",
     "frf",

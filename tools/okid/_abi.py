@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_int16, c_int32, c_int64, c_size_t, c_uint32
+from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int16, c_int32, c_int64, c_size_t, c_uint32
 from ctypes import c_void_p as opaque
 from functools import lru_cache
 from pathlib import Path
@@ -23,10 +23,12 @@ from okid._errors import Error, IdentificationError, InputError
 OK, WARN_MISSING, WARN_SATURATED, WARN_MODEL = 0, 1, 2, 3
 ERR_NULL, ERR_DIM, ERR_MEMORY, ERR_MISMATCH, ERR_RANGE = -1, -2, -3, -4, -5
 ERR_TOO_SHORT, ERR_INPUT, ERR_OUTPUT, ERR_EXCITATION = -6, -7, -8, -9
-ERR_NUMERIC, ERR_UNSTABLE, ERR_NO_MODES = -10, -11, -12
+ERR_NUMERIC, ERR_UNSTABLE, ERR_NO_MODES, ERR_FORMAT = -10, -11, -12, -13
 SAMPLE_DOUBLE, SAMPLE_INT16, SAMPLE_INT24, SAMPLE_INT32 = 0, 1, 2, 3
 DETREND_NONE, DETREND_MEAN = 0, 1
 METHOD_OKID_ERA = 0
+SOLVER_DENSE, SOLVER_STRUCTURED = 0, 1
+SUBSPACE_MOESP, SUBSPACE_CVA, SUBSPACE_SSARX = 0, 1, 2
 NOTE_ARX_STABILISED = 1 << 0
 NOTE_ILL_CONDITIONED = 1 << 1
 NOTE_FEW_ROWS = 1 << 2
@@ -35,10 +37,22 @@ NOTE_PREDICTOR_UNSTABLE = 1 << 4
 NOTE_ORDER_REDUCED = 1 << 5
 NOTE_ORDER_UNCLEAR = 1 << 6
 NOTE_WEAK_EXCITATION = 1 << 7
+SENSE_DISPLACEMENT, SENSE_VELOCITY, SENSE_ACCELERATION = 0, 1, 2
+HOLD_ZERO, HOLD_FIRST = 0, 1
+MKR_POLARITY = 1 << 0
+MKR_MASS = 1 << 1
+MKR_STIFFNESS = 1 << 2
+MKR_DAMPING = 1 << 3
+MKR_RESIDUAL = 1 << 4
+MKR_FEEDTHROUGH = 1 << 5
+MKR_COMPLEX = 1 << 6
+MKR_SPREAD = 1 << 7
+MKR_CLOSE = 1 << 8
 
 doubles = POINTER(c_double)
 int32s = POINTER(c_int32)
 int16s = POINTER(c_int16)
+floats = POINTER(c_float)
 
 
 class AccumulatorConfig(Structure):
@@ -55,6 +69,8 @@ class AccumulatorConfig(Structure):
         ("edges", c_int32),
         ("spare_slots", c_int32),
         ("bulk", c_int32),
+        ("saturated_missing", c_int32),
+        ("buffer", c_int32),
     ]
 
 
@@ -83,6 +99,7 @@ class IdentifyConfig(Structure):
         ("fs_hz", c_double),
         ("method", c_int),
         ("detrend", c_int),
+        ("solver", c_int),
     ]
 
 
@@ -90,6 +107,49 @@ class ModelView(Structure):
     """okid_model_t."""
 
     _fields_ = [(name, c_int32) for name in ("n_u", "n_y", "n_z")] + [(name, doubles) for name in "ABCDK"]
+
+
+class Mechanics(Structure):
+    """okid_mechanics_t."""
+
+    _fields_ = [(name, c_int32) for name in ("n_x", "n_u", "n_y")] + [
+        (name, doubles) for name in ("M", "R", "K", "B_a", "C_p", "C_v", "C_a")
+    ]
+
+
+class MkrConfig(Structure):
+    """okid_mkr_config_t."""
+
+    _fields_ = [
+        ("n_x", c_int32),
+        ("hold", c_int32),
+        ("dt", c_double),
+        ("input_dof", int32s),
+        ("input_gain", doubles),
+        ("output_dof", int32s),
+        ("output_gain", doubles),
+        ("output_sensing", int32s),
+    ]
+
+
+class Mkr(Structure):
+    """okid_mkr_t."""
+
+    _fields_: ClassVar[Any] = [
+        ("notes", c_uint32),
+        *((name, c_int32) for name in ("n_x", "admissible", "pairs", "dof", "feedthrough_row")),
+        *((name, doubles) for name in ("M", "K", "R", "R_normal")),
+        *((name, doubles) for name in ("frequency_hz", "damping_ratio", "lambda_re", "lambda_im", "W_re", "W_im")),
+        ("mode", int32s),
+        *((name, doubles) for name in ("strength", "mpc", "phase", "pair_spread")),
+        *((name, c_double) for name in ("margin", "residual", "feedthrough", "gain", "condition")),
+    ]
+
+
+class Pdc(Structure):
+    """okid_pdc_t."""
+
+    _fields_ = [(name, c_double) for name in ("alpha", "beta", "residual", "condition")]
 
 
 class ObserverConfig(Structure):
@@ -104,6 +164,30 @@ class ObserverInfo(Structure):
     _fields_ = [(name, c_double) for name in ("ridge", "radius", "radius_plain", "condition", "input_excitation")] + [
         ("channel", c_int32)
     ]
+
+
+class SquareRootConfig(Structure):
+    """okid_square_root_config_t."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("n_u", "n_y", "lags", "batch", "block", "slots", "spare_slots")),
+        ("forgetting", c_double),
+    ]
+
+
+class SubspaceConfig(Structure):
+    """okid_subspace_config_t."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("n_u", "n_y", "rows", "method", "max_order", "factor")),
+        ("ridge", c_double),
+    ]
+
+
+class SubspaceInfo(Structure):
+    """okid_subspace_info_t."""
+
+    _fields_ = [("ridge", c_double), ("input_excitation", c_double), ("channel", c_int32)]
 
 
 class Identified(Structure):
@@ -131,9 +215,16 @@ STRUCTS: dict[str, type[Structure]] = {
     "okid_era_config_t": EraConfig,
     "okid_identify_config_t": IdentifyConfig,
     "okid_identified_t": Identified,
+    "okid_mechanics_t": Mechanics,
+    "okid_mkr_config_t": MkrConfig,
+    "okid_mkr_t": Mkr,
     "okid_model_t": ModelView,
     "okid_observer_config_t": ObserverConfig,
     "okid_observer_info_t": ObserverInfo,
+    "okid_pdc_t": Pdc,
+    "okid_square_root_config_t": SquareRootConfig,
+    "okid_subspace_config_t": SubspaceConfig,
+    "okid_subspace_info_t": SubspaceInfo,
 }
 
 # name -> (result, arguments); a status is c_int
@@ -146,10 +237,17 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_accumulator_reset": (None, [opaque]),
     "okid_accumulator_set_units": (None, [opaque, doubles, doubles]),
     "okid_accumulator_add": (c_int, [opaque, doubles, c_size_t]),
+    "okid_accumulator_add_f32": (c_int, [opaque, floats, c_size_t]),
     "okid_accumulator_add_i16": (c_int, [opaque, int16s, c_size_t]),
     "okid_accumulator_add_i32": (c_int, [opaque, int32s, c_size_t]),
     "okid_accumulator_gap": (None, [opaque, c_int64]),
     "okid_accumulator_merge": (c_int, [opaque, opaque]),
+    "okid_accumulator_centre": (c_int, [opaque]),
+    "okid_accumulator_run": (c_int, [opaque, c_int] + [doubles] * 5),
+    "okid_accumulator_serialised_size": (c_size_t, [opaque]),
+    "okid_accumulator_serialise": (c_int, [opaque, opaque, c_size_t]),
+    "okid_accumulator_peek": (c_int, [opaque, c_size_t, POINTER(AccumulatorConfig)]),
+    "okid_accumulator_deserialise": (c_int, [opaque, opaque, c_size_t]),
     "okid_accumulator_stats": (None, [opaque, POINTER(AccumulatorStats)]),
     "okid_accumulator_config": (None, [opaque, POINTER(AccumulatorConfig)]),
     "okid_accumulator_rows": (c_int64, [opaque]),
@@ -159,6 +257,32 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
         c_int,
         [POINTER(ObserverConfig), doubles, c_int64, doubles, doubles, POINTER(ObserverInfo), opaque, c_size_t],
     ),
+    "okid_square_root_memsize": (c_size_t, [POINTER(SquareRootConfig)]),
+    "okid_square_root_create": (c_int, [POINTER(opaque), POINTER(SquareRootConfig), opaque, c_size_t]),
+    "okid_square_root_reset": (None, [opaque]),
+    "okid_square_root_set_units": (None, [opaque, doubles, doubles]),
+    "okid_square_root_add": (c_int, [opaque, doubles, c_size_t]),
+    "okid_square_root_add_f32": (c_int, [opaque, floats, c_size_t]),
+    "okid_square_root_add_i16": (c_int, [opaque, int16s, c_size_t]),
+    "okid_square_root_add_i32": (c_int, [opaque, int32s, c_size_t]),
+    "okid_square_root_gap": (None, [opaque, c_int64]),
+    "okid_square_root_merge": (c_int, [opaque, opaque]),
+    "okid_square_root_stats": (None, [opaque, POINTER(AccumulatorStats)]),
+    "okid_square_root_config": (None, [opaque, POINTER(SquareRootConfig)]),
+    "okid_square_root_rows": (c_int64, [opaque]),
+    "okid_square_root_gram": (c_int, [opaque, c_int, doubles, doubles]),
+    "okid_square_root_factor": (c_int, [opaque, c_int, doubles, doubles]),
+    "okid_observer_factor_memsize": (c_size_t, [POINTER(ObserverConfig)]),
+    "okid_observer_solve_factor": (
+        c_int,
+        [POINTER(ObserverConfig), doubles, c_int64, doubles, doubles, POINTER(ObserverInfo), opaque, c_size_t],
+    ),
+    "okid_structured_memsize": (c_size_t, [POINTER(ObserverConfig)]),
+    "okid_structured_solve": (
+        c_int,
+        [POINTER(ObserverConfig), c_int, doubles, doubles, doubles, doubles, c_int64, doubles, doubles]
+        + [POINTER(ObserverInfo), opaque, c_size_t],
+    ),
     "okid_markov_recursion": (c_int, [c_int32, c_int32, c_int32, doubles, c_int32, doubles, doubles]),
     "okid_era_memsize": (c_size_t, [POINTER(EraConfig)]),
     "okid_era_create": (c_int, [POINTER(opaque), POINTER(EraConfig), opaque, c_size_t]),
@@ -167,12 +291,38 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_era_max_order": (c_int32, [POINTER(EraConfig)]),
     "okid_era_realize": (c_int, [opaque, c_int32, doubles, doubles, doubles, doubles, doubles]),
     "okid_era_emac": (c_int, [opaque, c_int32, c_int32, doubles, doubles, doubles, doubles, doubles]),
+    "okid_subspace_max_order": (c_int32, [POINTER(SubspaceConfig)]),
+    "okid_subspace_memsize": (c_size_t, [POINTER(SubspaceConfig)]),
+    "okid_subspace_create": (c_int, [POINTER(opaque), POINTER(SubspaceConfig), opaque, c_size_t]),
+    "okid_subspace_decompose": (c_int, [opaque, doubles, c_int64, POINTER(SubspaceInfo)]),
+    "okid_subspace_decompose_factor": (c_int, [opaque, doubles, c_int64, POINTER(SubspaceInfo)]),
+    "okid_subspace_singular_values": (doubles, [opaque, int32s]),
+    "okid_subspace_realize": (c_int, [opaque, c_int32] + [doubles] * 6),
+    "okid_subspace_emac": (c_int, [opaque, c_int32, c_int32] + [doubles] * 6),
+    "okid_subspace_output_error_memsize": (c_size_t, [c_int32] * 4),
+    "okid_subspace_output_error": (
+        c_int,
+        [c_int32] * 3 + [doubles, doubles, c_int32, int32s] + [doubles] * 4 + [opaque, c_size_t],
+    ),
     "okid_modal_memsize": (c_size_t, [c_int32, c_int32]),
     "okid_modal_analyse": (
         c_int,
         [c_int32, c_int32, c_double, doubles, doubles, int32s] + [doubles] * 10 + [opaque, c_size_t],
     ),
     "okid_modal_mac": (c_double, [c_int32, doubles, doubles, doubles, doubles]),
+    "okid_mechanics_inputs": (c_int, [c_int32, c_int32, int32s, doubles, doubles]),
+    "okid_mechanics_outputs": (c_int, [c_int32, c_int32, int32s, doubles, int32s, doubles, doubles, doubles]),
+    "okid_mechanics_memsize": (c_size_t, [c_int32, c_int32]),
+    "okid_mechanics_continuous": (c_int, [POINTER(Mechanics), *[doubles] * 4, opaque, c_size_t]),
+    "okid_mechanics_modes": (c_int, [c_int32, *[doubles] * 3, int32s, *[doubles] * 4, opaque, c_size_t]),
+    "okid_mechanics_hold_memsize": (c_size_t, [c_int32, c_int32, c_int32]),
+    "okid_mechanics_c2d": (c_int, [_model, c_double, c_int32, *[doubles] * 3, opaque, c_size_t]),
+    "okid_mechanics_d2c": (c_int, [_model, c_double, c_int32, *[doubles] * 3, opaque, c_size_t]),
+    "okid_mkr_memsize": (c_size_t, [c_int32, c_int32, c_int32, c_int32]),
+    "okid_mkr_identify": (c_int, [_model, POINTER(MkrConfig), POINTER(Mkr), opaque, c_size_t]),
+    "okid_mkr_note": (c_char_p, [c_uint32]),
+    "okid_pdc_fit": (c_int, [c_int32, doubles, doubles, doubles, POINTER(Pdc)]),
+    "okid_pdc_damping": (c_int, [c_int32, POINTER(Pdc), doubles, doubles, doubles]),
     "okid_model_workspace": (c_size_t, [_model]),
     "okid_model_simulate": (c_int, [_model, doubles, c_size_t, doubles, doubles, doubles]),
     "okid_model_predict": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles, doubles]),
@@ -182,6 +332,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_identify_memsize": (c_size_t, [POINTER(IdentifyConfig)]),
     "okid_identify_create": (c_int, [POINTER(opaque), POINTER(IdentifyConfig), opaque, c_size_t]),
     "okid_identify_run": (c_int, [opaque, opaque, POINTER(Identified)]),
+    "okid_identify_run_factor": (c_int, [opaque, opaque, POINTER(Identified)]),
     "okid_identify_order": (c_int, [opaque, c_int32, POINTER(Identified)]),
 }
 
@@ -236,7 +387,7 @@ def check(status: int, what: str) -> int:
     if status >= 0:
         return status
     kind: type[Error] = Error
-    if status in (ERR_DIM, ERR_MISMATCH, ERR_RANGE):
+    if status in (ERR_DIM, ERR_MISMATCH, ERR_RANGE, ERR_FORMAT):
         kind = InputError
     elif status <= ERR_TOO_SHORT:
         kind = IdentificationError

@@ -37,7 +37,9 @@ class Accumulator:
     int32 words) and sums them exactly, 0 takes real numbers; `block` and `slots` make a sliding window of
     slots * block sample periods (`spare_slots` more where gaps close slots early); `forgetting` lambda per sample
     (needs `block`); `edges` False saves memory for one unbroken run; `bulk` lets long calls of 16-bit codes go through
-    an FFT where that is faster, with the same bits. Raises InputError for sizes outside the documented range.
+    an FFT where that is faster, with the same bits; `saturated` "keep" takes codes at full scale as they are, "missing"
+    makes their sample missing (both count them); `buffer` samples wait for the kernel (0 = 256).
+    Raises InputError for sizes outside the documented range.
     Source: lib/include/okid/accumulator.h, paper eq. 36-38.
     """
 
@@ -54,20 +56,24 @@ class Accumulator:
         edges: bool = True,
         spare_slots: int = 0,
         bulk: bool = True,
+        saturated: str = "keep",
+        buffer: int = 0,
     ) -> None:
         if codes not in _SAMPLE:
             raise InputError(
                 f"codes is {codes!r}, expected the bits of an ADC code: 16, 24 or 32, or 0 for real numbers"
             )
+        if saturated not in ("keep", "missing"):
+            raise InputError(f"saturated is {saturated!r}, expected 'keep' or 'missing'")
         self._config = _abi.AccumulatorConfig(
             n_u, n_y, lags, _SAMPLE[codes], block, slots, forgetting, int(edges), spare_slots,
-            int(bulk and codes == 16 and block == 0),
+            int(bulk and codes == 16 and block == 0), int(saturated == "missing"), buffer,
         )  # fmt: skip
         size = int(_abi.library().okid_accumulator_memsize(ctypes.byref(self._config)))
         if size == 0:
             raise InputError(
                 f"no accumulator for n_u={n_u}, n_y={n_y}, lags={lags}, block={block}, slots={slots}, "
-                f"forgetting={forgetting}, edges={edges}: see okid/accumulator.h for the ranges",
+                f"forgetting={forgetting}, edges={edges}, buffer={buffer}: see okid/accumulator.h for the ranges",
                 _abi.ERR_DIM,
             )
         self._block: NDArray[np.uint8] | None = _abi.block(size)
@@ -159,8 +165,13 @@ class Accumulator:
         else:
             if given.dtype.kind not in "fiub":
                 raise InputError(f"samples are {given.dtype}, expected real numbers")
-            real = np.ascontiguousarray(given, dtype=np.float64)
-            status = _abi.library().okid_accumulator_add(self.handle, _abi.pointer(real), real.shape[0])
+            if given.dtype == np.float32:
+                single = np.ascontiguousarray(given)
+                floats = single.ctypes.data_as(_abi.floats)
+                status = _abi.library().okid_accumulator_add_f32(self.handle, floats, len(single))
+            else:
+                real = np.ascontiguousarray(given, dtype=np.float64)
+                status = _abi.library().okid_accumulator_add(self.handle, _abi.pointer(real), len(real))
         return _abi.check(status, "add")
 
     def gap(self, count: int = 0) -> None:
@@ -170,6 +181,14 @@ class Accumulator:
     def merge(self, other: Accumulator) -> None:
         """Add all of `other` as further records. InputError when the two do not fit each other."""
         _abi.check(_abi.library().okid_accumulator_merge(self.handle, other.handle), "merge")
+
+    def centre(self) -> None:
+        """Take the offsets out of a finished record before it is merged with others: each channel less its own mean.
+
+        Takes no samples any more afterwards, only merges with accumulators that are centred too.
+        Raises InputError with a window, forgetting or without edges.
+        """
+        _abi.check(_abi.library().okid_accumulator_centre(self.handle), "centre")
 
     def reset(self) -> None:
         """Forget everything but the units."""
@@ -210,16 +229,41 @@ class Accumulator:
         _abi.check(status, "gram")
         return gram, mean
 
-    def snapshot(self) -> bytes:
-        """The whole state as bytes: what memcpy would copy."""
-        return self._memory().tobytes()
+    def run_sums(self, detrend: str = "mean") -> tuple[NDArray[np.float64], ...]:
+        """S (p+1, m, m), head (p, m), tail (p, m), sum (m) of one unbroken run: see okid_accumulator_run().
 
-    def restore(self, snapshot: bytes) -> None:
-        """Go back to a snapshot() of an accumulator of the same configuration. InputError when the size differs."""
-        memory = self._memory()
-        if len(snapshot) != memory.size:
-            raise InputError(f"the snapshot has {len(snapshot)} bytes, this accumulator {memory.size}")
-        memory[:] = np.frombuffer(snapshot, dtype=np.uint8)
+        Raises InputError when a gap has split the record, IdentificationError when there are no rows yet.
+        """
+        if detrend not in _DETREND:
+            raise InputError(f"detrend is {detrend!r}, expected 'mean' or 'none'")
+        m, p = self.channels, self.lags
+        sums, head, tail, total = np.empty((p + 1, m, m)), np.empty((p, m)), np.empty((p, m)), np.empty(m)
+        pointers = [_abi.pointer(array) for array in (sums, head, tail, total)]
+        _abi.check(_abi.library().okid_accumulator_run(self.handle, _DETREND[detrend], *pointers, None), "run_sums")
+        return sums.transpose(0, 2, 1), head, tail, total
+
+    def to_bytes(self) -> bytes:
+        """The whole state for a file or another machine: checked by a CRC, the same for every processor."""
+        out = np.empty(int(_abi.library().okid_accumulator_serialised_size(self.handle)), np.uint8)
+        _abi.check(_abi.library().okid_accumulator_serialise(self.handle, out.ctypes.data, out.size), "to_bytes")
+        return out.tobytes()
+
+    @staticmethod
+    def from_bytes(data: bytes) -> Accumulator:
+        """An accumulator that goes on where to_bytes() stood, bit for bit. InputError when the bytes are damaged."""
+        config = _abi.AccumulatorConfig()
+        _abi.check(_abi.library().okid_accumulator_peek(data, len(data), ctypes.byref(config)), "from_bytes")
+        made = Accumulator(
+            config.n_u, config.n_y, config.lags, codes=next(k for k, v in _SAMPLE.items() if v == config.sample),
+            block=config.block, slots=config.slots, forgetting=config.forgetting, edges=bool(config.edges),
+            spare_slots=config.spare_slots, saturated="missing" if config.saturated_missing else "keep",
+        )  # fmt: skip
+        made.restore(data)
+        return made
+
+    def restore(self, data: bytes) -> None:
+        """Go back to a state of to_bytes() of an accumulator of the same configuration, else InputError."""
+        _abi.check(_abi.library().okid_accumulator_deserialise(self.handle, data, len(data)), "restore")
 
     def _arguments(self) -> dict[str, Any]:
         c = self._config
@@ -234,17 +278,19 @@ class Accumulator:
             "edges": bool(c.edges),
             "spare_slots": c.spare_slots,
             "bulk": bool(c.bulk),
+            "saturated": "missing" if c.saturated_missing else "keep",
+            "buffer": c.buffer,
         }
 
     def copy(self) -> Accumulator:
         """An independent accumulator with the same state."""
         twin = Accumulator(**self._arguments())
-        twin.restore(self.snapshot())
+        twin.restore(self.to_bytes())
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"arguments": self._arguments(), "snapshot": self.snapshot()}
+        return {"arguments": self._arguments(), "state": self.to_bytes()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(**state["arguments"])  # type: ignore[misc]
-        self.restore(state["snapshot"])
+        self.restore(state["state"])

@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 from okid import _abi
 from okid._errors import IdentificationError, InputError
 from okid.accumulator import Accumulator
+from okid.square_root import SquareRoot
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+
+_SOLVER = {"dense": _abi.SOLVER_DENSE, "structured": _abi.SOLVER_STRUCTURED}
 
 
 class Observer(NamedTuple):
@@ -108,6 +112,7 @@ def _copy(raw: _abi.Identified) -> Identified:
 class Identifier:
     """Workspace for models of one shape; run() may be called as often as results are wanted.
 
+    `solver` "structured" needs O(m q) memory instead of q^2, and one unbroken run in the accumulator.
     `order` 0 = automatic, bounded by `max_order` (0 = the library's own bound); `rows` 0 = 2 p.
     Raises InputError for sizes outside the documented range. Source: lib/include/okid/identify.h, paper eq. 36-54.
     """
@@ -123,9 +128,14 @@ class Identifier:
         order: int = 0,
         max_order: int = 0,
         detrend: str = "mean",
+        solver: str = "dense",
     ) -> None:
+        if solver not in _SOLVER:
+            raise InputError(f"solver is {solver!r}, expected 'dense' or 'structured'")
         mode = _abi.DETREND_MEAN if detrend == "mean" else _abi.DETREND_NONE
-        self.config = _abi.IdentifyConfig(n_u, n_y, p, rows, order, max_order, fs, _abi.METHOD_OKID_ERA, mode)
+        self.config = _abi.IdentifyConfig(
+            n_u, n_y, p, rows, order, max_order, fs, _abi.METHOD_OKID_ERA, mode, _SOLVER[solver]
+        )
         size = int(_abi.library().okid_identify_memsize(ctypes.byref(self.config)))
         if size == 0:
             raise InputError(
@@ -141,12 +151,22 @@ class Identifier:
         _abi.check(status, "identifier")
         self._raw = _abi.Identified()
 
-    def run(self, accumulator: Accumulator) -> Identified:
-        """Identify from what the accumulator holds now; it is not changed.
+    def run(self, accumulator: Accumulator | SquareRoot) -> Identified:
+        """Identify from what the accumulator, or the factor of the second kernel, holds now; it is not changed.
 
-        Raises IdentificationError with `status` and, where one is at fault, `channel` as an attribute.
+        Raises InputError when it does not fit, IdentificationError with `status` and, where one is at fault, `channel`
+        as an attribute.
         """
-        status = int(_abi.library().okid_identify_run(self._handle, accumulator.handle, ctypes.byref(self._raw)))
+        library = _abi.library()
+        of_factor = isinstance(accumulator, SquareRoot)
+        run = library.okid_identify_run_factor if of_factor else library.okid_identify_run
+        status = int(run(self._handle, accumulator.handle, ctypes.byref(self._raw)))
+        if status == _abi.ERR_MISMATCH:
+            raise InputError(
+                "this accumulator does not fit: n_u, n_y and lags must be the identifier's, its solver 'dense' for a "
+                "SquareRoot, and one unbroken run must be in it for the solver 'structured'",
+                status,
+            )
         if status < 0:
             channel = int(self._raw.observer_info.channel)
             who = "" if channel < 0 else f" (channel {channel}, counted from 0: inputs, then outputs)"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,8 +18,10 @@ from okid.model import Model
 from okid.record_fit import detrended, fit_records
 from okid.records import paired
 from okid.result import Fit, Remark, Result, modes_of
+from okid.square_root import SquareRoot
 
 Real = NDArray[np.float64]
+Sums = TypeVar("Sums", Accumulator, SquareRoot)
 
 
 def _choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
@@ -71,15 +74,31 @@ def _silent_start(records: list[Real], n_u: int, p: int) -> bool:
     return total > 0.0 and early > 0.5 * total
 
 
-def _accumulate(records: list[Real], n_u: int, p: int, rest: bool) -> Accumulator:
-    m = records[0].shape[1]
-    total = Accumulator(n_u, m - n_u, p)
+def _feed(sums: Sums, records: list[Real], p: int, rest: bool) -> Sums:
     for record in records:
-        total.gap(0)
+        sums.gap(0)
         if rest:
-            total.add(np.zeros((p, m)))
-        total.add(record)
-    return total
+            sums.add(np.zeros((p, record.shape[1])))
+        sums.add(record)
+    return sums
+
+
+def _identify(
+    identifier: Identifier, records: list[Real], n_u: int, p: int, rest: bool
+) -> tuple[Identified, list[Remark]]:
+    """From the Gram matrix; nearly noise-free records, which lose half their digits in it, from their QR factor."""
+    n_y = records[0].shape[1] - n_u
+    with _feed(Accumulator(n_u, n_y, p), records, p, rest) as sums:
+        found = identifier.run(sums)
+        floor_only = found.observer.ridge <= 1e-10  # else a ridge decides, not rounding
+        if not (found.notes & _abi.NOTE_ILL_CONDITIONED and floor_only):
+            return found, []
+        try:
+            better = identifier.run(_feed(SquareRoot(n_u, n_y, p), records, p, rest))
+        except IdentificationError:
+            return identifier.run(sums), []
+    text = "nearly noise-free data: solved from the QR factor of the record, not from its Gram matrix"
+    return better, [Remark("qr_factor", text)]
 
 
 def _note_text(found: Identified, code: str) -> str:
@@ -234,13 +253,12 @@ def identify(
         n_u, n_y, fs=float(fs), p=horizon, rows=0 if rows is None else _whole("rows", rows, 1), order=wanted,
         max_order=0 if max_order is None else _whole("max_order", max_order, 1), detrend=centre,
     )  # fmt: skip
-    with _accumulate(records, n_u, horizon, start == "rest") as sums:
-        found = identifier.run(sums)
+    found, by_factor = _identify(identifier, records, n_u, horizon, start == "rest")
     model = Model(found.A, found.B, found.C, found.D, found.K, found.dt)
     fit, model.x0 = fit_records(model, own, out_names, predict=not found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
     _check_explains(fit)
     return Result(
         method, float(fs), samples, len(records), gaps, in_names, out_names, found.p, found.rows, found.order, hold,
-        detrend, start, found.singular_values, model, found.markov, modes_of(found), fit, _remarks(found) + remarks,
-        found.observer, identifier,
+        detrend, start, found.singular_values, model, found.markov, modes_of(found), fit,
+        _remarks(found) + by_factor + remarks, found.observer, identifier,
     )  # fmt: skip

@@ -9,8 +9,8 @@
 /// Samples stand in *slots*: a slot is an unbroken piece of the record (at most `block` samples where a window or
 /// forgetting is asked for). A gap closes a slot. Closed slots either stay in a ring (window, `slots` > 0) and fall out
 /// of it whole, or are folded into the base sums, which need the edge Gram of q^2/2 numbers (`edges` = 1).
-/// Samples wait in a small buffer until the kernel can take many at once: how a record is cut into calls changes
-/// nothing, not even the last bit of double sums (as long as the Gram matrix is looked at after the same samples).
+/// Samples wait in a small buffer (`buffer`) until the kernel can take many at once. Sums grow in the order of the samples:
+/// neither the cut of a record into calls nor the buffer changes anything, not even the last bit of double sums.
 ///
 /// Codes are summed exactly: any split of a record into calls, any order of merging gives bit-equal results. The bounds,
 /// with b bits a code and products of at most 2^(2b-2) in magnitude:
@@ -55,6 +55,10 @@ typedef struct okid_accumulator_config_t {
     int32_t edges;     ///< 1 = room for the edge Gram: gaps, several records, merge, forgetting; 0 = one unbroken run
     int32_t spare_slots; ///< window only: further slots, because each gap closes one early; full = the window shortens
     int32_t bulk;        ///< int16 only: 1 = FFT path for long calls, where it pays (same bits, less work, more memory)
+    int32_t
+        saturated_missing; ///< codes: 1 = a sample with a code at full scale is missing as a whole; 0 = taken, counted
+    int32_t
+        buffer; ///< samples that wait for the kernel; 0 = 256, 1 = none: least memory, for processors that have little
 } okid_accumulator_config_t;
 
 /// Counts since create or reset.
@@ -66,6 +70,24 @@ typedef struct okid_accumulator_stats_t {
     int64_t rows;      ///< regression rows now in the sums (window: of the window); each run gives its samples less p
     int64_t dropped;   ///< rows lost because edges = 0 and a second run began (the older run was dropped)
 } okid_accumulator_stats_t;
+
+/// Bytes of an accumulator of double samples for one unbroken run without a buffer (edges 0, slots 0, buffer 1): a constant
+/// for static arrays, never less than okid_accumulator_memsize(). Beside S (m^2 (p+1) numbers), the head and the lag window
+/// (p m each) it holds 4 m numbers and counters: at most 1.1 times 8 [m (q + n_y) + 2 p m] bytes for m >= 4, p >= 20.
+#define OKID_ACCUMULATOR_BYTES(n_u, n_y, p)                                                                            \
+    (8 * (((size_t)(n_u) + (n_y)) * ((size_t)(n_u) + (n_y)) * ((size_t)(p) + 1) + 2 * (size_t)(p) * ((n_u) + (n_y)) +  \
+          4 * ((size_t)(n_u) + (n_y))) +                                                                               \
+     320)
+
+/// The same for 16 or 24-bit codes, whose sums take two planes of 64-bit words, and one more where the kernel sums in double.
+#ifdef OKID_INTEGER_KERNEL
+#define OKID_ACCUMULATOR_PLANES 1
+#else
+#define OKID_ACCUMULATOR_PLANES 2
+#endif
+#define OKID_ACCUMULATOR_CODES_BYTES(n_u, n_y, p)                                                                      \
+    (OKID_ACCUMULATOR_BYTES(n_u, n_y, p) +                                                                             \
+     8 * OKID_ACCUMULATOR_PLANES * ((size_t)(n_u) + (n_y)) * ((size_t)(n_u) + (n_y)) * ((size_t)(p) + 1))
 
 /// Bytes okid_accumulator_create() needs (alignment slack included); 0 when the configuration is invalid.
 OKID_API size_t okid_accumulator_memsize(const okid_accumulator_config_t* config);
@@ -89,6 +111,10 @@ OKID_API void okid_accumulator_set_units(okid_accumulator_t* self, const double*
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add(okid_accumulator_t* self, const double* samples,
                                                            size_t count);
 
+/// The same for single-precision samples; the sums are double.
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_f32(okid_accumulator_t* self, const float* samples,
+                                                               size_t count);
+
 /// The same for 16-bit codes, summed exactly. @return also OKID_WARN_SATURATED, OKID_ERR_RANGE
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i16(okid_accumulator_t* self, const int16_t* codes,
                                                                size_t count);
@@ -102,8 +128,16 @@ OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i32(okid_accumulator_
 OKID_API void okid_accumulator_gap(okid_accumulator_t* self, int64_t count);
 
 /// Add all of `other` to `self` as further records (exact for codes). Both need edges = 1, slots = 0, the same n_u, n_y,
-/// lags and sample type. The open run of `self` ends; `other` keeps its content. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_RANGE
+/// lags and sample type. The open run of `self` ends; `other` keeps its content. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH (also: one of them
+/// centred, the other not), OKID_ERR_RANGE
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_t* other);
+
+/// Take the offsets out of a finished record before it is merged: every channel less its mean over the record, so that
+/// offsets that moved between records do no harm. Codes: less the mean rounded to 2^-8 code, exactly, so that any order of
+/// merging still gives the same bits. The run ends; no samples are taken any more (OKID_ERR_MISMATCH), only merges with others
+/// that are centred too (an empty accumulator takes either kind). Offsets given to set_units() no longer count.
+/// Needs edges = 1, slots = 0, forgetting = 1. Cost O((m p)^2). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_RANGE
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_centre(okid_accumulator_t* self);
 
 OKID_API void okid_accumulator_stats(const okid_accumulator_t* self, okid_accumulator_stats_t* out);
 OKID_API void okid_accumulator_config(const okid_accumulator_t* self, okid_accumulator_config_t* out);
@@ -118,6 +152,37 @@ OKID_API int64_t okid_accumulator_rows(const okid_accumulator_t* self);
 /// Cost O((m p)^2 (1 + slots)). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_TOO_SHORT (no rows)
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t detrend,
                                                             double* gram, double* mean);
+
+/// The sums of one unbroken run in engineering units: all that okid_structured_solve() needs, O(m q) numbers.
+/// With OKID_DETREND_MEAN the samples are taken less a constant near their mean (codes: the nearest whole code), which `sum`
+/// accounts for: removing the means with it is then harmless to the digits.
+/// @param S     out, m x m(p+1) column-major: S_0 .. S_p side by side, S_b(r, c) = sum of v_n[r] v_(n-b)[c]
+/// @param head  out, m x p: column a is v_(f-1-a), f the first regression row
+/// @param tail  out, m x p: column a is v_(l-a), l the last regression row
+/// @param sum   out, m: sum of v_n over the rows
+/// @param mean  out, m means of the lag-0 rows in engineering units, may be NULL
+/// Cost O(m^2 p slots). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_TOO_SHORT (no rows), OKID_ERR_MISMATCH (more than one run)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_run(okid_accumulator_t* self, okid_detrend_t detrend, double* S,
+                                                           double* head, double* tail, double* sum, double* mean);
+
+/// The whole state as bytes for a file, another machine or a later version; the same on every processor and in every build.
+/// Little endian: 8 bytes "OKIDACC\n"; int32 format (1), n_u, n_y, lags, sample, block, slots, edges, spare_slots,
+/// saturated_missing; double forgetting; the six counts of okid_accumulator_stats_t; int64 clock; double weight of the base;
+/// int32 samples of the lag window at hand, in a gap, centred, closed slots; scale and offset; the samples of the lag window in time order;
+/// each slot, oldest first (rows, clock at its start, joined; S: codes low words, then high words, value = high 2^48 + low;
+/// sum; head; tail with a window only); the base with edges and no window (S, sum, edge sums, edge Gram). Samples are doubles,
+/// codes int32. At the end the CRC-32 of all before it.
+OKID_API size_t okid_accumulator_serialised_size(okid_accumulator_t* self);
+/// @param bytes  room at `out`, at least okid_accumulator_serialised_size(). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MEMORY
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_serialise(okid_accumulator_t* self, void* out, size_t bytes);
+/// What the accumulator was created with (buffer and bulk are the reader's own business: 0), to create one that fits.
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_FORMAT (magic, version, length or CRC)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_peek(const void* in, size_t bytes,
+                                                            okid_accumulator_config_t* out);
+/// Put the state back and go on where it stopped, bit for bit. On error the state is unchanged.
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_FORMAT, OKID_ERR_MISMATCH (created otherwise)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_deserialise(okid_accumulator_t* self, const void* in,
+                                                                   size_t bytes);
 
 #ifdef __cplusplus
 }

@@ -26,10 +26,10 @@ OKID_NODISCARD OKID_API okid_status_t okid_era_create(okid_era_t** self, const o
 
 /// H(0) = R Sigma S^T (eq. 48). @param markov  Y_0 .. Y_(rows+cols), n_y x n_u blocks, column-major. Kept by reference.
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_NUMERIC. Cost of an SVD of (rows n_y) x (cols n_u).
-OKID_NODISCARD OKID_API okid_status_t okid_era_decompose(okid_era_t* self, const double* markov);
+OKID_NODISCARD OKID_API okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov);
 
 /// The singular values of H(0), descending; *count of them.
-OKID_API const double* okid_era_singular_values(const okid_era_t* self, int32_t* count);
+OKID_API const okid_real_t* okid_era_singular_values(const okid_era_t* self, int32_t* count);
 
 /// Largest order a realization can have.
 OKID_API int32_t okid_era_max_order(const okid_era_config_t* config);
@@ -37,15 +37,16 @@ OKID_API int32_t okid_era_max_order(const okid_era_config_t* config);
 /// A, B, C of one order (eq. 54), D = Y_0 is the caller's. @param order n_z in 1..max
 /// @param A  out n_z x n_z, B out n_z x n_u, C out n_y x n_z, column-major
 /// @param gain_markov  in, Y0_1 .. Y0_rows (n_y x n_y) or NULL; @param K  out n_z x n_y, Kalman gain = -L, or NULL
-OKID_NODISCARD OKID_API okid_status_t okid_era_realize(okid_era_t* self, int32_t order, double* A, double* B, double* C,
-                                                       const double* gain_markov, double* K);
+OKID_NODISCARD OKID_API okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, okid_real_t* B,
+                                                       okid_real_t* C, const okid_real_t* gain_markov, okid_real_t* K);
 
 /// EMAC of eigenvectors (Pappa, Elliott, Schenk 1993, output side): how well C A^k psi at the last block row of the
 /// identified observability matrix agrees with its prediction from the first; 0..1 per eigenvector.
 /// @param psi_re, psi_im  in, n_z x count eigenvectors of A; lambda likewise count numbers; emac out, count numbers
 OKID_NODISCARD OKID_API okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count,
-                                                    const double* lambda_re, const double* lambda_im,
-                                                    const double* psi_re, const double* psi_im, double* emac);
+                                                    const okid_real_t* lambda_re, const okid_real_t* lambda_im,
+                                                    const okid_real_t* psi_re, const okid_real_t* psi_im,
+                                                    okid_real_t* emac);
 
 #ifdef __cplusplus
 }

@@ -6,6 +6,7 @@
 
 #include <okid/accumulator.h>
 #include <okid/observer.h>
+#include <okid/square_root.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -14,6 +15,12 @@ extern "C" {
 typedef enum okid_method_t {
     OKID_METHOD_OKID_ERA = 0 ///< observer least squares, Markov recursion, ERA
 } okid_method_t;
+
+/// How the observer's least squares are solved from an accumulator.
+typedef enum okid_solver_t {
+    OKID_SOLVER_DENSE = 0,     ///< from the Gram matrix, (m(p+1))^2 doubles: fastest, any accumulator
+    OKID_SOLVER_STRUCTURED = 1 ///< from the sums themselves, O(m q) memory: one unbroken run (okid/structured.h)
+} okid_solver_t;
 
 /// Remarks on a valid result, as bits of okid_identified_t::warnings; okid_warning_code() and _text() name them.
 enum {
@@ -39,6 +46,7 @@ typedef struct okid_identify_config_t {
     double fs_hz;      ///< sample rate
     okid_method_t method;
     okid_detrend_t detrend;
+    okid_solver_t solver;
 } okid_identify_config_t;
 
 /// An identified model. Every pointer looks into the identifier's block and stays valid until the next run.
@@ -47,16 +55,16 @@ typedef struct okid_identified_t {
     int32_t n_u, n_y, n_z, p, rows;
     int32_t singular_count, markov_count, mode_count; ///< numbers in the arrays below
     int64_t regression_rows;
-    double dt;                       ///< s
-    const double *A, *B, *C, *D, *K; ///< column-major; K Kalman gain n_z x n_y
-    const double* singular_values;   ///< of H(0), descending
-    const double* markov;            ///< Y_0 .. Y_(markov_count-1), n_y x n_u blocks
-    const double* observer;          ///< theta, n_y x q
-    const double* innovation;        ///< n_y x n_y
-    const double* mean;              ///< m channel means that were removed (zeros for detrend none)
-    const double *frequency_hz, *damping_ratio, *mpc, *emac; ///< mode_count each
-    const double *shape_re, *shape_im;                       ///< n_y x mode_count
-    double model_radius;                                     ///< spectral radius of A
+    double dt;                            ///< s
+    const okid_real_t *A, *B, *C, *D, *K; ///< column-major; K Kalman gain n_z x n_y
+    const okid_real_t* singular_values;   ///< of H(0), descending
+    const okid_real_t* markov;            ///< Y_0 .. Y_(markov_count-1), n_y x n_u blocks
+    const okid_real_t* observer;          ///< theta, n_y x q
+    const okid_real_t* innovation;        ///< n_y x n_y
+    const double* mean;                   ///< m channel means that were removed (zeros for detrend none)
+    const okid_real_t *frequency_hz, *damping_ratio, *mpc, *emac; ///< mode_count each
+    const okid_real_t *shape_re, *shape_im;                       ///< n_y x mode_count
+    double model_radius;                                          ///< spectral radius of A
     okid_observer_info_t observer_info;
 } okid_identified_t;
 
@@ -73,9 +81,15 @@ OKID_NODISCARD OKID_API okid_status_t okid_identify_create(okid_identify_t** sel
 
 /// Identify from what the accumulator holds now. No heap. What the accumulator holds is not changed.
 /// @param out  filled also on error as far as the work went (observer_info.channel names the channel at fault)
-/// @return OKID_OK, OKID_WARN_MODEL, or the errors of okid_observer_solve() and OKID_ERR_NO_MODES
+/// @return OKID_OK, OKID_WARN_MODEL, or the errors of okid_observer_solve(), OKID_ERR_MISMATCH (sizes; with the structured
+///         solver also more than one run) and OKID_ERR_NO_MODES
 OKID_NODISCARD OKID_API okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator,
                                                         okid_identified_t* out);
+
+/// The same from the second kernel: nothing is squared, for noise-free or very lightly damped records (condition above 1e10)
+/// and as the cross-check. Needs a configuration with the dense solver. @return as okid_identify_run()
+OKID_NODISCARD OKID_API okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root,
+                                                               okid_identified_t* out);
 
 /// Realize another order from the same Markov parameters (stabilization diagrams): replaces A..K and the modes in `out`.
 OKID_NODISCARD OKID_API okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_identified_t* out);

@@ -16,8 +16,9 @@ extern "C" {
 /// @param system  out, count+1 blocks of n_y x n_u, column-major, one after the other
 /// @param gain    out, count blocks of n_y x n_y (Y0_1 first), may be NULL. Y0_k = C A^(k-1) L with L = -K (trap 3)
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM. Cost 2 count p n_y^2 m flop.
-OKID_NODISCARD OKID_API okid_status_t okid_markov_recursion(int32_t n_u, int32_t n_y, int32_t p, const double* theta,
-                                                            int32_t count, double* system, double* gain);
+OKID_NODISCARD OKID_API okid_status_t okid_markov_recursion(int32_t n_u, int32_t n_y, int32_t p,
+                                                            const okid_real_t* theta, int32_t count,
+                                                            okid_real_t* system, okid_real_t* gain);
 
 #ifdef __cplusplus
 }

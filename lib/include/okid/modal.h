@@ -23,15 +23,16 @@ OKID_API size_t okid_modal_memsize(int32_t n_y, int32_t n_z);
 /// @param mu_re, mu_im, psi_re, psi_im  out or NULL: eigenvalues (n_z/2) and eigenvectors (n_z x n_z/2) of those modes
 /// @param radius  out or NULL: spectral radius of A
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY, OKID_ERR_NUMERIC
-OKID_NODISCARD OKID_API okid_status_t okid_modal_analyse(int32_t n_y, int32_t n_z, double dt, const double* A,
-                                                         const double* C, int32_t* count, double* frequency_hz,
-                                                         double* damping_ratio, double* mpc, double* shape_re,
-                                                         double* shape_im, double* mu_re, double* mu_im, double* psi_re,
-                                                         double* psi_im, double* radius, void* work, size_t bytes);
+OKID_NODISCARD OKID_API okid_status_t okid_modal_analyse(int32_t n_y, int32_t n_z, double dt, const okid_real_t* A,
+                                                         const okid_real_t* C, int32_t* count,
+                                                         okid_real_t* frequency_hz, okid_real_t* damping_ratio,
+                                                         okid_real_t* mpc, okid_real_t* shape_re, okid_real_t* shape_im,
+                                                         okid_real_t* mu_re, okid_real_t* mu_im, okid_real_t* psi_re,
+                                                         okid_real_t* psi_im, double* radius, void* work, size_t bytes);
 
 /// Modal assurance criterion of two complex shapes of n entries: |a^H b|^2 / (a^H a)(b^H b), 0..1.
-OKID_API double okid_modal_mac(int32_t n, const double* a_re, const double* a_im, const double* b_re,
-                               const double* b_im);
+OKID_API double okid_modal_mac(int32_t n, const okid_real_t* a_re, const okid_real_t* a_im, const okid_real_t* b_re,
+                               const okid_real_t* b_im);
 
 #ifdef __cplusplus
 }

@@ -13,31 +13,33 @@ extern "C" {
 /// Views of a model; column-major. K may be NULL.
 typedef struct okid_model_t {
     int32_t n_u, n_y, n_z;
-    const double* A; ///< n_z x n_z
-    const double* B; ///< n_z x n_u
-    const double* C; ///< n_y x n_z
-    const double* D; ///< n_y x n_u
-    const double* K; ///< n_z x n_y, Kalman gain: x+ = A x + B u + K (y - C x - D u)
+    const okid_real_t* A; ///< n_z x n_z
+    const okid_real_t* B; ///< n_z x n_u
+    const okid_real_t* C; ///< n_y x n_z
+    const okid_real_t* D; ///< n_y x n_u
+    const okid_real_t* K; ///< n_z x n_y, Kalman gain: x+ = A x + B u + K (y - C x - D u)
 } okid_model_t;
 
-/// Doubles of scratch the three functions below need.
+/// Numbers (okid_real_t) of scratch the three functions below need.
 OKID_API size_t okid_model_workspace(const okid_model_t* model);
 
 /// y_n = C x_n + D u_n, x_(n+1) = A x_n + B u_n (eq. 13, 15).
-/// @param u  in, n_u x count; @param x0  in, n_z or NULL (0); @param y  out, n_y x count; work: workspace() doubles
-OKID_NODISCARD OKID_API okid_status_t okid_model_simulate(const okid_model_t* model, const double* u, size_t count,
-                                                          const double* x0, double* y, double* work);
+/// @param u  in, n_u x count; @param x0  in, n_z or NULL (0); @param y  out, n_y x count; work: workspace() numbers
+OKID_NODISCARD OKID_API okid_status_t okid_model_simulate(const okid_model_t* model, const okid_real_t* u, size_t count,
+                                                          const okid_real_t* x0, okid_real_t* y, okid_real_t* work);
 
 /// One-step predictor yhat_n from the samples before n and u_n. A sample with a NaN is skipped (no correction).
 /// @param y  in, n_y x count measured; @param yhat  out, n_y x count
-OKID_NODISCARD OKID_API okid_status_t okid_model_predict(const okid_model_t* model, const double* u, const double* y,
-                                                         size_t count, const double* x0, double* yhat, double* work);
+OKID_NODISCARD OKID_API okid_status_t okid_model_predict(const okid_model_t* model, const okid_real_t* u,
+                                                         const okid_real_t* y, size_t count, const okid_real_t* x0,
+                                                         okid_real_t* yhat, okid_real_t* work);
 
 /// Least-squares initial state: the x0 for which simulation over the record fits best in the output-error sense.
 /// Samples of y with a NaN carry no weight; a NaN in u counts as 0. @param x0  out, n_z
 /// Cost 2 count n_y n_z^2 flop. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_NUMERIC
-OKID_NODISCARD OKID_API okid_status_t okid_model_initial_state(const okid_model_t* model, const double* u,
-                                                               const double* y, size_t count, double* x0, double* work);
+OKID_NODISCARD OKID_API okid_status_t okid_model_initial_state(const okid_model_t* model, const okid_real_t* u,
+                                                               const okid_real_t* y, size_t count, okid_real_t* x0,
+                                                               okid_real_t* work);
 
 #ifdef __cplusplus
 }

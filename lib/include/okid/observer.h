@@ -33,6 +33,7 @@ OKID_API size_t okid_observer_memsize(const okid_observer_config_t* config);
 
 /// Solve y_n = theta [u_n; v_(n-1); ..; v_(n-p)] in the least-squares sense.
 /// Method: equilibrate to unit diagonal, ridge, Cholesky, one step of refinement, companion radius, ridge search.
+/// The normal equations are solved in double in every build; theta is rounded to okid_real_t at the end.
 /// @param gram        in, m(p+1) x m(p+1) column-major of okid_accumulator_gram()
 /// @param rows        in, regression rows behind it
 /// @param theta       out, n_y x q column-major: [D, Ybar_1 .. Ybar_p], each Ybar_h n_y x m = [Ybar^I_h, -Ybar^II_h]
@@ -42,7 +43,7 @@ OKID_API size_t okid_observer_memsize(const okid_observer_config_t* config);
 ///         OKID_ERR_EXCITATION, OKID_ERR_NUMERIC, OKID_ERR_UNSTABLE
 /// Cost q^3/3 + 2 q^2 n_y flop for each ridge tried.
 OKID_NODISCARD OKID_API okid_status_t okid_observer_solve(const okid_observer_config_t* config, const double* gram,
-                                                          int64_t rows, double* theta, double* innovation,
+                                                          int64_t rows, okid_real_t* theta, okid_real_t* innovation,
                                                           okid_observer_info_t* info, void* work, size_t bytes);
 
 #ifdef __cplusplus

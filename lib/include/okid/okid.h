@@ -7,8 +7,14 @@
 #include <okid/era.h>
 #include <okid/identify.h>
 #include <okid/markov.h>
+#include <okid/mechanics.h>
+#include <okid/mkr.h>
 #include <okid/modal.h>
 #include <okid/model.h>
 #include <okid/observer.h>
+#include <okid/pdc.h>
+#include <okid/square_root.h>
+#include <okid/structured.h>
+#include <okid/subspace.h>
 #include <okid/types.h>
 #endif

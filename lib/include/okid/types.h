@@ -23,6 +23,18 @@
 extern "C" {
 #endif
 
+/// The number type of results. double, or float where the library is built with -DOKID_REAL=float (a processor with a
+/// single-precision unit only); a program that uses such a library defines the same. The rule, in every build:
+///   double or integers: sums over samples (accumulator, Gram matrix, means), the normal equations of the observer, and
+///                       single numbers in structs and arguments (dt, fs_hz, ridge, condition, radius);
+///   okid_real_t:        every array from the observer's result on (theta, innovation, Markov parameters, singular values,
+///                       A B C D K, modes, simulated outputs) and the arithmetic between them.
+/// Limits near rounding (linalg.hpp: limit_of) follow the type.
+#ifndef OKID_REAL
+#define OKID_REAL double
+#endif
+typedef OKID_REAL okid_real_t;
+
 /// 0 ok; < 0 error and nothing changed; > 0 warning with a valid result.
 typedef enum okid_status_t {
     OKID_OK = 0,
@@ -40,7 +52,8 @@ typedef enum okid_status_t {
     OKID_ERR_EXCITATION = -9, ///< the inputs together do not excite enough to separate the unknowns
     OKID_ERR_NUMERIC = -10,   ///< a factorisation did not converge
     OKID_ERR_UNSTABLE = -11,  ///< no ridge on the grid gives a stable ARX model
-    OKID_ERR_NO_MODES = -12   ///< the model has no underdamped mode below Nyquist
+    OKID_ERR_NO_MODES = -12,  ///< the model has no underdamped mode below Nyquist
+    OKID_ERR_FORMAT = -13     ///< bytes that are no serialised state: magic, version, length or CRC
 } okid_status_t;
 
 /// One line of English for a status; never NULL.

@@ -1,158 +1,223 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    Gram matrix of [v_n; v_(n-1); ..; v_(n-p)] in engineering units from an accumulator, offsets removed
-// METHOD     gram_sums.h in the numbers of the sums; centring G - g g^T / N with g the lag-row sums, which follow from the
-//            running sums and the same edges. Exact sums take two words an entry: the high ones stand in the upper
-//            triangle, the low ones in the lower, those of the diagonal in the scratch
+// METHOD     gram_sums.h off the diagonal, in the numbers of the sums; exact sums take two words an entry: the high ones
+//            stand in the upper triangle, the low ones in the lower. The lag-row sums g stand on the diagonal meanwhile; its own
+//            entries are walked last. Centring of codes: with c the mean rounded to a code and r = g - N c the small rest,
+//            G - g g^T/N = (G - N c c^T - r c^T - c r^T) - r r^T/N, the bracket in integers
 // REFERENCE  docs/numerics.md, shift structure and offsets
 // NUMERICS   codes: one rounding an entry; doubles: a few eps of the largest entry of the diagonal
-// WORKSPACE  the caller's matrix and two rows of scratch in the block
+// WORKSPACE  none beside the caller's matrix
 #include "accumulator.h"
 #include "wide.h"
 
-#include <string.h>
-
-/// Tail of a slot: stored for closed ones, the live lag window for the open one.
-static const double* acc_tail(const okid_accumulator_t* a, int32_t index) {
-    return index == a->open ? acc_x(a) : acc_slot_data(a, index) + a->slot_tail;
-}
-
-/// Is the k-th slot of the ring continued without a gap by a slot that holds rows?
-static int acc_is_continued(const okid_accumulator_t* a, int32_t k) {
-    if (k >= a->closed) return 0;
-    const slot_info_t* next = acc_slot(a, (acc_oldest(a) + k + 1) % a->slot_count);
-    return next->joined && next->rows > 0;
-}
+#include <math.h>
 
 // Doubles.
 #define SUFFIX double
 #define ADD_SLOT(i, j, data, k) (gram[(j) * n + (i)] += (data)[k])
 #define ADD_BASE(i, j, base, k) (gram[(j) * n + (i)] += (base)[k])
 #define ADD_EDGE(i, j, edge, k) (gram[(j) * n + (i)] += (edge)[k])
-#define ADD_PRODUCT(i, j, x, y) (gram[(j) * n + (i)] += (x) * (y))
+#define ADD_PRODUCT(i, j, sign, x, y) (gram[(j) * n + (i)] += (sign) * (*(x) * *(y)))
 #define ADD_ENTRY(i, j, i2, j2) (gram[(j) * n + (i)] += gram[(j2) * n + (i2)])
 #include "gram_sums.h"
 
 // Codes with forgetting: exact slots, a fading base in double.
-static double slot_double(const okid_accumulator_t* a, const double* data, size_t k) {
+static double slot_number(const okid_accumulator_t* a, const double* data, size_t k) {
+    if (!acc_has_codes(a)) return data[k];
     const int64_t* words = (const int64_t*)data;
     return wide_double(words[acc_sum_count(a) + k], words[k]);
 }
 #define SUFFIX mixed
-#define ADD_SLOT(i, j, data, k) (gram[(j) * n + (i)] += slot_double(a, data, k))
+#define ADD_SLOT(i, j, data, k) (gram[(j) * n + (i)] += slot_number(a, data, k))
 #define ADD_BASE(i, j, base, k) (gram[(j) * n + (i)] += (base)[k])
 #define ADD_EDGE(i, j, edge, k) (gram[(j) * n + (i)] += (edge)[k])
-#define ADD_PRODUCT(i, j, x, y) (gram[(j) * n + (i)] += (x) * (y))
+#define ADD_PRODUCT(i, j, sign, x, y) (gram[(j) * n + (i)] += (sign) * (acc_number(a, x) * acc_number(a, y)))
 #define ADD_ENTRY(i, j, i2, j2) (gram[(j) * n + (i)] += gram[(j2) * n + (i2)])
 #include "gram_sums.h"
 
 // Codes, all exact.
-static inline int64_t* low_word(const okid_accumulator_t* a, double* gram, size_t i, size_t j) {
-    return (int64_t*)(i == j ? acc_scratch(a) + i : gram + i * (size_t)a->width + j);
-}
 #define HIGH(i, j) ((int64_t*)gram + (j) * n + (i))
+#define LOW(i, j) ((int64_t*)gram + (i) * n + (j))
 #define SUFFIX exact
 #define ADD_SLOT(i, j, data, k)                                                                                        \
-    wide_add_wide(HIGH(i, j), low_word(a, gram, i, j), ((const int64_t*)(data))[acc_sum_count(a) + (k)],               \
-                  ((const int64_t*)(data))[k])
+    wide_add_wide(HIGH(i, j), LOW(i, j), ((const int64_t*)(data))[acc_sum_count(a) + (k)], ((const int64_t*)(data))[k])
 #define ADD_BASE(i, j, base, k) ADD_SLOT(i, j, base, k)
 #define ADD_EDGE(i, j, edge, k)                                                                                        \
-    wide_add_wide(HIGH(i, j), low_word(a, gram, i, j), ((const int64_t*)(edge))[pm * (pm + 1) / 2 + (k)],              \
-                  ((const int64_t*)(edge))[k])
-#define ADD_PRODUCT(i, j, x, y) wide_add(HIGH(i, j), low_word(a, gram, i, j), (int64_t)(x) * (int64_t)(y))
-#define ADD_ENTRY(i, j, i2, j2)                                                                                        \
-    wide_add_wide(HIGH(i, j), low_word(a, gram, i, j), *HIGH(i2, j2), *low_word(a, gram, i2, j2))
+    wide_add_wide(HIGH(i, j), LOW(i, j), ((const int64_t*)(edge))[acc_edge_count(a) + (k)], ((const int64_t*)(edge))[k])
+#define ADD_PRODUCT(i, j, sign, x, y) wide_add(HIGH(i, j), LOW(i, j), (sign) * (acc_code(x) * acc_code(y)))
+#define ADD_ENTRY(i, j, i2, j2) wide_add_wide(HIGH(i, j), LOW(i, j), *HIGH(i2, j2), *LOW(i2, j2))
 #include "gram_sums.h"
+#undef HIGH
+#undef LOW
 
-/// Sums of the lag rows over all regression rows, n of them: g(lag + 1) = g(lag) + heads - tails of that lag. `exact`
-/// chooses 64-bit integers, else doubles.
-static void lag_sums(const okid_accumulator_t* a, int exact, double* out) {
-    const size_t m = (size_t)a->m, n = (size_t)a->width;
-    const double* base = a->base_weight > 0 ? acc_base(a) : NULL;
-    int64_t* integers = (int64_t*)out;
-    for (size_t i = 0; i < n; ++i) {
-        double sum = 0;
-        int64_t whole = 0;
-        if (i >= m) {
-            sum = exact ? 0 : out[i - m];
-            whole = exact ? integers[i - m] : 0;
+// The sums of the lag rows and the diagonal, entry by entry. What a slot's ends add to lag l + 1 of channel c: x(head) - x(tail).
+
+int64_t okid_accumulator_lag_sum_exact(const okid_accumulator_t* a, size_t i, int64_t before) {
+    const size_t m = (size_t)a->m, c = i % m, l = i / m - 1;
+    int64_t sum = i < m ? 0 : before;
+    for (int32_t k = 0; k <= a->closed; ++k) {
+        const int32_t index = acc_ring(a, k);
+        const slot_info_t* slot = acc_slot(a, index);
+        if (slot->rows == 0) continue;
+        const double* data = acc_slot_data(a, index);
+        if (i < m)
+            sum += ((const int64_t*)data)[acc_slot_sum(a) + c];
+        else {
+            if (k == 0 || !slot->joined) sum += acc_code(data + acc_slot_head(a) + acc_end(a, l, c));
+            if (!acc_is_continued(a, k)) sum -= acc_code(acc_tail(a, index) + acc_end(a, l, c));
         }
-        for (int32_t k = 0; k <= a->closed; ++k) {
-            const int32_t index = (acc_oldest(a) + k) % a->slot_count;
-            const slot_info_t* slot = acc_slot(a, index);
-            if (slot->rows == 0) continue;
-            const double* data = acc_slot_data(a, index);
-            if (i < m) {
-                const double* mean = data + a->slot_mean + i;
-                if (exact)
-                    whole += *(const int64_t*)mean;
-                else
-                    sum += acc_has_codes(a) ? (double)*(const int64_t*)mean : *mean;
-                continue;
-            }
-            const size_t at = ((size_t)a->config.lags - i / m) * m + i % m; // entry of lag i/m - 1 in time order
-            const double enters = k > 0 && slot->joined ? 0 : data[a->slot_head + at];
-            const double leaves = acc_is_continued(a, k) ? 0 : acc_tail(a, index)[at];
-            sum += enters - leaves;
-            whole += (int64_t)enters - (int64_t)leaves;
+    }
+    return a->base_weight > 0 ? sum + ((const int64_t*)acc_base(a))[acc_base_sum(a) + i] : sum;
+}
+
+double okid_accumulator_lag_sum(const okid_accumulator_t* a, size_t i, double before) {
+    const size_t m = (size_t)a->m, c = i % m, l = i / m - 1;
+    double sum = i < m ? 0 : before;
+    for (int32_t k = 0; k <= a->closed; ++k) {
+        const int32_t index = acc_ring(a, k);
+        const slot_info_t* slot = acc_slot(a, index);
+        if (slot->rows == 0) continue;
+        const double* data = acc_slot_data(a, index);
+        if (i < m) {
+            const double* at = data + acc_slot_sum(a) + c;
+            sum += acc_has_codes(a) ? (double)*(const int64_t*)at : *at;
+        } else {
+            if (k == 0 || !slot->joined) sum += acc_number(a, data + acc_slot_head(a) + acc_end(a, l, c));
+            if (!acc_is_continued(a, k)) sum -= acc_number(a, acc_tail(a, index) + acc_end(a, l, c));
         }
-        if (base) {
-            const double* part = base + a->base_mean + i; // the edge sums stand behind the sums
-            if (exact)
-                whole += *(const int64_t*)part;
-            else
-                sum += *part;
+    }
+    return a->base_weight > 0 ? sum + acc_base(a)[acc_base_sum(a) + i] : sum;
+}
+
+/// Diagonal entry i, given that of the same channel one lag before.
+static void diagonal_exact(const okid_accumulator_t* a, size_t i, int64_t* high, int64_t* low) {
+    const size_t m = (size_t)a->m, n = (size_t)a->width, p = (size_t)a->config.lags, c = i % m, l = i / m - 1;
+    const size_t at = c * n + p * m + c; // S_0(c, c)
+    if (i < m) *high = *low = 0;
+    for (int32_t k = 0; k <= a->closed; ++k) {
+        const int32_t index = acc_ring(a, k);
+        const slot_info_t* slot = acc_slot(a, index);
+        if (slot->rows == 0) continue;
+        const double* data = acc_slot_data(a, index);
+        if (i < m) {
+            const int64_t* words = (const int64_t*)data;
+            wide_add_wide(high, low, words[acc_sum_count(a) + at], words[at]);
+            continue;
         }
-        if (exact)
-            integers[i] = whole;
-        else
-            out[i] = sum;
+        const int64_t enters = acc_code(data + acc_slot_head(a) + acc_end(a, l, c)),
+                      leaves = acc_code(acc_tail(a, index) + acc_end(a, l, c));
+        if (k == 0 || !slot->joined) wide_add(high, low, enters * enters);
+        if (!acc_is_continued(a, k)) wide_add(high, low, -(leaves * leaves));
+    }
+    if (!(a->base_weight > 0)) return;
+    const int64_t *base = (const int64_t*)acc_base(a), *edge = base + acc_base_edge(a);
+    const size_t j = i - m, packed = j * (j + 1) / 2 + j;
+    if (i < m)
+        wide_add_wide(high, low, base[acc_sum_count(a) + at], base[at]);
+    else
+        wide_add_wide(high, low, edge[acc_edge_count(a) + packed], edge[packed]);
+}
+
+static double diagonal(const okid_accumulator_t* a, size_t i, double before) {
+    const size_t m = (size_t)a->m, n = (size_t)a->width, p = (size_t)a->config.lags, c = i % m, l = i / m - 1;
+    const size_t at = c * n + p * m + c;
+    double sum = i < m ? 0 : before;
+    for (int32_t k = 0; k <= a->closed; ++k) {
+        const int32_t index = acc_ring(a, k);
+        const slot_info_t* slot = acc_slot(a, index);
+        if (slot->rows == 0) continue;
+        const double* data = acc_slot_data(a, index);
+        if (i < m) {
+            sum += slot_number(a, data, at);
+            continue;
+        }
+        const double enters = acc_number(a, data + acc_slot_head(a) + acc_end(a, l, c)),
+                     leaves = acc_number(a, acc_tail(a, index) + acc_end(a, l, c));
+        if (k == 0 || !slot->joined) sum += enters * enters;
+        if (!acc_is_continued(a, k)) sum -= leaves * leaves;
+    }
+    if (!(a->base_weight > 0)) return sum;
+    const size_t j = i - m;
+    return sum + acc_base(a)[i < m ? at : acc_base_edge(a) + j * (j + 1) / 2 + j];
+}
+
+/// What turns an entry of the sums into one of the matrix; the lag-row sums stand on its diagonal.
+typedef struct finish_t {
+    const okid_accumulator_t* a;
+    double* gram;
+    double unit, rows; ///< unit: of a number in the sums, in codes
+    int64_t count;
+    okid_detrend_t detrend;
+} finish_t;
+
+static double* on_diagonal(const finish_t* f, size_t i) { return f->gram + i * ((size_t)f->a->width + 1); }
+static int64_t whole_sum(const finish_t* f, size_t i) { return *(const int64_t*)on_diagonal(f, i); }
+
+/// raw: without detrending as it is, else already centred.
+static double in_units(const finish_t* f, double raw, size_t ci, size_t cj, double gi, double gj) {
+    const double *scale = acc_scale(f->a), *offset = scale + f->a->m;
+    const double si = scale[ci] * f->unit, sj = scale[cj] * f->unit;
+    if (f->detrend == OKID_DETREND_MEAN || f->a->centred) return si * sj * raw;
+    return si * sj * raw + si * offset[cj] * gi + offset[ci] * sj * gj + f->rows * offset[ci] * offset[cj];
+}
+
+static void finish_double(const finish_t* f) {
+    const size_t m = (size_t)f->a->m, n = (size_t)f->a->width;
+    const double centre = f->detrend == OKID_DETREND_MEAN ? 1 / f->rows : 0;
+    for (size_t j = 0; j < n; ++j)
+        for (size_t i = 0; i < j; ++i) {
+            const double gi = *on_diagonal(f, i), gj = *on_diagonal(f, j);
+            f->gram[i * n + j] = f->gram[j * n + i] =
+                in_units(f, f->gram[j * n + i] - gi * gj * centre, i % m, j % m, gi, gj);
+        }
+    for (size_t c = 0; c < m; ++c) {
+        double raw = 0;
+        for (size_t i = c; i < n; i += m) {
+            const double g = *on_diagonal(f, i);
+            raw = diagonal(f->a, i, raw);
+            *on_diagonal(f, i) = in_units(f, raw - g * g * centre, c, c, g, g);
+        }
     }
 }
 
-static double row_weight(const okid_accumulator_t* a) {
-    double rows = a->base_weight;
-    for (int32_t k = 0; k <= a->closed; ++k) rows += (double)acc_slot(a, (acc_oldest(a) + k) % a->slot_count)->rows;
-    return rows;
+static double entry_exact(const finish_t* f, int64_t high, int64_t low, size_t ci, size_t cj, int64_t gi, int64_t gj,
+                          int64_t mean_i, int64_t mean_j) {
+    if (f->detrend != OKID_DETREND_MEAN) return in_units(f, wide_double(high, low), ci, cj, (double)gi, (double)gj);
+    const int64_t rest_i = gi - f->count * mean_i, rest_j = gj - f->count * mean_j;
+    wide_add_product(&high, &low, -gi, mean_j);
+    wide_add_product(&high, &low, -mean_i, rest_j);
+    return in_units(f, wide_double(high, low) - (double)rest_i * ((double)rest_j / f->rows), ci, cj, 0, 0);
 }
 
-/// Codes or samples -> engineering units, offsets removed or put in; gi, gj are the lag-row sums.
-static double entry_in_units(const okid_accumulator_t* a, double raw, double centred, size_t i, size_t j, double gi,
-                             double gj, double rows, okid_detrend_t detrend) {
-    const size_t m = (size_t)a->m;
-    const double *scale = acc_scale(a), *offset = scale + m;
-    const double si = scale[i % m], sj = scale[j % m], oi = offset[i % m], oj = offset[j % m];
-    if (detrend == OKID_DETREND_MEAN) return si * sj * centred;
-    return si * sj * raw + si * oj * gi + oi * sj * gj + rows * oi * oj;
-}
-
-static void finish_double(const okid_accumulator_t* a, okid_detrend_t detrend, double rows, const double* sums,
-                          double* gram) {
-    const size_t n = (size_t)a->width;
-    for (size_t j = 0; j < n; ++j)
-        for (size_t i = 0; i <= j; ++i) {
-            const double raw = gram[j * n + i], centred = raw - sums[i] * sums[j] / rows;
-            gram[j * n + i] = gram[i * n + j] = entry_in_units(a, raw, centred, i, j, sums[i], sums[j], rows, detrend);
+static void finish_exact(const finish_t* f) {
+    const size_t m = (size_t)f->a->m, n = (size_t)f->a->width;
+    int64_t* words = (int64_t*)f->gram;
+    for (size_t j = 0; j < n; ++j) {
+        const int64_t gj = whole_sum(f, j), mean_j = okid_accumulator_whole_mean(whole_sum(f, j % m), f->count);
+        for (size_t ci = 0; ci < m; ++ci) {
+            const int64_t mean_i = okid_accumulator_whole_mean(whole_sum(f, ci), f->count);
+            for (size_t i = ci; i < j; i += m)
+                f->gram[i * n + j] = f->gram[j * n + i] =
+                    entry_exact(f, words[j * n + i], words[i * n + j], ci, j % m, whole_sum(f, i), gj, mean_i, mean_j);
         }
-}
-
-static void finish_exact(const okid_accumulator_t* a, okid_detrend_t detrend, double rows, const int64_t* sums,
-                         double* gram) {
-    const size_t n = (size_t)a->width;
-    for (size_t j = 0; j < n; ++j)
-        for (size_t i = 0; i <= j; ++i) {
-            const int64_t high = ((const int64_t*)gram)[j * n + i], low = *low_word(a, gram, i, j);
-            const double raw = wide_double(high, low),
-                         centred = wide_centred(high, low, sums[i], sums[j], (int64_t)rows);
-            gram[j * n + i] = gram[i * n + j] =
-                entry_in_units(a, raw, centred, i, j, (double)sums[i], (double)sums[j], rows, detrend);
+    }
+    for (size_t c = 0; c < m; ++c) {
+        const int64_t mean = okid_accumulator_whole_mean(whole_sum(f, c), f->count);
+        int64_t high = 0, low = 0;
+        for (size_t i = c; i < n; i += m) {
+            const int64_t g = whole_sum(f, i);
+            diagonal_exact(f->a, i, &high, &low);
+            *on_diagonal(f, i) = entry_exact(f, high, low, c, c, g, g, mean, mean);
         }
+    }
 }
 
 okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t detrend, double* gram, double* mean) {
     if (!self || !gram) return OKID_ERR_NULL;
     okid_accumulator_settle(self);
-    const double rows = row_weight(self);
-    if (!(rows > 0)) return OKID_ERR_TOO_SHORT;
+    const finish_t f = {self,   gram, 1.0 / (1 << acc_fraction(self)), okid_accumulator_weight(self), self->stats.rows,
+                        detrend};
+    if (!(f.rows > 0)) return OKID_ERR_TOO_SHORT;
     const int exact = acc_base_is_exact(self);
     if (exact)
         gram_of_exact(self, gram);
@@ -160,15 +225,21 @@ okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t det
         gram_of_mixed(self, gram);
     else
         gram_of_double(self, gram);
-    double* sums = acc_scratch(self) + self->width; // the first half may hold low words of the diagonal
-    lag_sums(self, exact, sums);
-    for (int32_t r = 0; mean && r < self->m; ++r) {
-        const double sum = exact ? (double)((const int64_t*)sums)[r] : sums[r];
-        mean[r] = acc_scale(self)[r] * sum / rows + acc_scale(self)[self->m + r];
+    const size_t m = (size_t)self->m, n = (size_t)self->width;
+    for (size_t i = 0; i < n; ++i) {
+        const double* before = i < m ? on_diagonal(&f, i) : on_diagonal(&f, i - m);
+        if (exact)
+            *(int64_t*)on_diagonal(&f, i) = okid_accumulator_lag_sum_exact(self, i, *(const int64_t*)before);
+        else
+            *on_diagonal(&f, i) = okid_accumulator_lag_sum(self, i, *before);
+    }
+    for (size_t r = 0; mean && r < m; ++r) {
+        const double sum = exact ? (double)whole_sum(&f, r) : *on_diagonal(&f, r);
+        mean[r] = acc_scale(self)[r] * f.unit * sum / f.rows + (self->centred ? 0 : acc_scale(self)[m + r]);
     }
     if (exact)
-        finish_exact(self, detrend, rows, (const int64_t*)sums, gram);
+        finish_exact(&f);
     else
-        finish_double(self, detrend, rows, sums, gram);
+        finish_double(&f);
     return OKID_OK;
 }

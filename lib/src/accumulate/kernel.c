@@ -2,7 +2,7 @@
 // PURPOSE    shift-structured Gram update of a run of samples, one source for every instruction set
 // METHOD     matrix product without packing: the lag window of a sample is contiguous in memory, so a register tile of
 //            OKID_ROWS x OKID_COLS numbers is held over all samples of the run; the last tile overlaps its neighbour
-// NUMERICS   plain sums in double; exact for 16-bit codes up to 2^22 samples
+// NUMERICS   plain sums in double in the order of the samples; exact for 16-bit codes up to 2^22 samples
 // WORKSPACE  none; 2 m^2 (p+1) flop a sample
 #include "kernel.h"
 #include "isa.h"
@@ -15,6 +15,8 @@
 enum { LANES = 8, COLS = 5, MAX_ROWS = 5 };
 #elif defined(__AVX2__)
 enum { LANES = 4, COLS = 3, MAX_ROWS = 4 };
+#elif defined(__aarch64__)
+enum { LANES = 2, COLS = 4, MAX_ROWS = 5 };
 #else
 enum { LANES = 2, COLS = 2, MAX_ROWS = 4 };
 #endif
@@ -33,7 +35,7 @@ static inline lanes_t load(const double* p) {
 static inline __attribute__((always_inline)) void tile(double* S, int ld, const double* current, const double* window,
                                                        int m, int count, const int rows, int skip) {
     lanes_t acc[MAX_ROWS][COLS];
-    memset(acc, 0, sizeof acc);
+    for (int r = 0; r < rows; ++r) memcpy(acc[r], S + r * ld, sizeof acc[r]);
     for (int n = 0; n < count; ++n, current += m, window += m) {
         lanes_t w[COLS];
 #pragma GCC unroll 8
@@ -48,7 +50,7 @@ static inline __attribute__((always_inline)) void tile(double* S, int ld, const 
     double out[TILE];
     for (int r = 0; r < rows; ++r) {
         memcpy(out, acc[r], sizeof out);
-        for (int c = skip; c < TILE; ++c) S[r * ld + c] += out[c];
+        for (int c = skip; c < TILE; ++c) S[r * ld + c] = out[c];
     }
 }
 

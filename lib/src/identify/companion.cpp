@@ -2,8 +2,8 @@
 // PURPOSE    spectral radius of the companion matrix of an ARX model, without forming it
 // METHOD     power steps from a fixed start vector, then Arnoldi; restarts from the sum of the leading Ritz vectors
 // REFERENCE  Saad, Numerical Methods for Large Eigenvalue Problems (2011), ch. 6
-// NUMERICS   the radius is wanted to ~1e-6: lightly damped structures live there
-// WORKSPACE  (k+1) p n_y + O(k^2) doubles, k <= 64; each step 2 p n_y^2 flop
+// NUMERICS   the radius is wanted to ~1e-6: lightly damped structures live there (float comes to 2e-5)
+// WORKSPACE  (k+1) p n_y + O(k^2) numbers, k <= 64; each step 2 p n_y^2 flop
 #include "identify/companion.hpp"
 
 #include "linalg/linalg.hpp"
@@ -11,71 +11,75 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 namespace okid {
 namespace {
 
 using std::size_t;
 constexpr int dense_limit = 64, warm_steps = 200, restarts = 12, leading = 8;
-constexpr double tolerance = 1e-7;
+// Residual of the Ritz pair and length of a new basis vector, relative to a matrix of size 1, as far as rounding allows.
+constexpr okid_real_t rounding = std::numeric_limits<okid_real_t>::epsilon();
+constexpr okid_real_t tolerance = std::max(static_cast<okid_real_t>(1e-7), 50 * rounding);
+constexpr okid_real_t invariant = std::max(static_cast<okid_real_t>(1e-13), 8 * rounding);
 
 struct companion {
     int n_y, size;
-    const double* feedback; // n_y x size: theta^y_1 .. theta^y_p
+    const okid_real_t* feedback; // n_y x size: theta^y_1 .. theta^y_p
 
     /// next = companion * state, states stacked newest first.
-    void apply(const double* state, double* next) const {
+    void apply(const okid_real_t* state, okid_real_t* next) const {
         linalg::multiply(false, false, n_y, 1, size, 1, feedback, n_y, state, size, 0, next, size);
         std::copy(state, state + size - n_y, next + n_y);
     }
 };
 
-double norm(const double* v, int size) {
-    double sum = 0;
+okid_real_t norm(const okid_real_t* v, int size) {
+    okid_real_t sum = 0;
     for (int i = 0; i < size; ++i) sum += v[i] * v[i];
     return std::sqrt(sum);
 }
 
-void scale(double* v, int size, double factor) {
+void scale(okid_real_t* v, int size, okid_real_t factor) {
     for (int i = 0; i < size; ++i) v[i] *= factor;
 }
 
-void start_vector(double* v, int size) {
+void start_vector(okid_real_t* v, int size) {
     std::uint64_t state = 0x9E3779B97F4A7C15ULL;
     for (int i = 0; i < size; ++i) {
         state = state * 6364136223846793005ULL + 1442695040888963407ULL;
-        v[i] = static_cast<double>(state >> 11) / 9007199254740992.0 - 0.5;
+        v[i] = static_cast<okid_real_t>(static_cast<double>(state >> 11) / 9007199254740992.0 - 0.5);
     }
 }
 
-void power_steps(const companion& c, double* v, double* spare, int count) {
+void power_steps(const companion& c, okid_real_t* v, okid_real_t* spare, int count) {
     for (int i = 0; i < count; ++i) {
         c.apply(v, spare);
-        const double length = norm(spare, c.size);
+        const okid_real_t length = norm(spare, c.size);
         if (!(length > 0) || !std::isfinite(length)) return;
-        std::transform(spare, spare + c.size, v, [&](double x) { return x / length; });
+        std::transform(spare, spare + c.size, v, [&](okid_real_t x) { return x / length; });
     }
 }
 
 /// Arnoldi from basis column 0; returns the dimension reached, the next subdiagonal in *beyond.
-int arnoldi(const companion& c, companion_work& w, double* beyond) {
+int arnoldi(const companion& c, companion_work& w, okid_real_t* beyond) {
     const int k = w.dimension;
     const auto n = static_cast<size_t>(c.size);
-    std::fill(w.hessenberg, w.hessenberg + k * k, 0.0);
+    std::fill(w.hessenberg, w.hessenberg + k * k, okid_real_t{0});
     *beyond = 0;
     for (int j = 0; j < k; ++j) {
-        double* next = w.basis + static_cast<size_t>(j + 1) * n;
+        okid_real_t* next = w.basis + static_cast<size_t>(j + 1) * n;
         c.apply(w.basis + static_cast<size_t>(j) * n, next);
         for (int pass = 0; pass < 2; ++pass)
             for (int i = 0; i <= j; ++i) {
-                const double* b = w.basis + static_cast<size_t>(i) * n;
-                double h = 0;
+                const okid_real_t* b = w.basis + static_cast<size_t>(i) * n;
+                okid_real_t h = 0;
                 for (size_t e = 0; e < n; ++e) h += b[e] * next[e];
                 for (size_t e = 0; e < n; ++e) next[e] -= h * b[e];
                 w.hessenberg[j * k + i] += h;
             }
-        const double length = norm(next, c.size);
-        if (length < 1e-13) return j + 1; // invariant subspace
+        const okid_real_t length = norm(next, c.size);
+        if (length < invariant) return j + 1; // invariant subspace
         if (j + 1 < k)
             w.hessenberg[j * k + j + 1] = length;
         else
@@ -87,8 +91,8 @@ int arnoldi(const companion& c, companion_work& w, double* beyond) {
 
 /// Replace basis column 0 by the sum of the leading Ritz vectors.
 void restart(const companion& c, companion_work& w, int k) {
-    double weights[64] = {};
-    bool taken[64] = {};
+    okid_real_t weights[dense_limit] = {};
+    bool taken[dense_limit] = {};
     for (int count = 0; count < std::min(leading, k); ++count) {
         int best = -1;
         for (int i = 0; i < k; ++i)
@@ -96,15 +100,15 @@ void restart(const companion& c, companion_work& w, int k) {
         taken[best] = true;
         for (int i = 0; i < k; ++i) weights[i] += w.vectors[best * k + i];
     }
-    double* spare = w.basis + static_cast<size_t>(w.dimension) * static_cast<size_t>(c.size);
+    okid_real_t* spare = w.basis + static_cast<size_t>(w.dimension) * static_cast<size_t>(c.size);
     linalg::multiply(false, false, c.size, 1, k, 1, w.basis, c.size, weights, k, 0, spare, c.size);
-    const double length = norm(spare, c.size);
-    std::transform(spare, spare + c.size, w.basis, [&](double x) { return x / length; });
+    const okid_real_t length = norm(spare, c.size);
+    std::transform(spare, spare + c.size, w.basis, [&](okid_real_t x) { return x / length; });
 }
 
 double dense_radius(const companion& c, companion_work& w) {
     const auto n = static_cast<size_t>(c.size);
-    std::fill(w.hessenberg, w.hessenberg + n * n, 0.0);
+    std::fill(w.hessenberg, w.hessenberg + n * n, okid_real_t{0});
     for (size_t j = 0; j < n; ++j) {
         for (int i = 0; i < c.n_y; ++i)
             w.hessenberg[j * n + static_cast<size_t>(i)] =
@@ -112,7 +116,7 @@ double dense_radius(const companion& c, companion_work& w) {
         if (j + static_cast<size_t>(c.n_y) < n) w.hessenberg[j * n + j + static_cast<size_t>(c.n_y)] = 1;
     }
     if (linalg::eigen(c.size, w.hessenberg, w.re, w.im, nullptr, w.eigen) != 0) return HUGE_VAL;
-    double radius = 0;
+    okid_real_t radius = 0;
     for (size_t i = 0; i < n; ++i) radius = std::max(radius, std::hypot(w.re[i], w.im[i]));
     return radius;
 }
@@ -123,19 +127,19 @@ void companion_work::lay_out(int n_y, int p, arena& memory) {
     const int size = n_y * p;
     dimension = std::min(size, dense_limit);
     const auto k = static_cast<size_t>(dimension);
-    basis = memory.take<double>((k + 1) * static_cast<size_t>(size));
-    hessenberg = memory.take<double>(k * k);
-    vectors = memory.take<double>(k * k);
-    re = memory.take<double>(k);
-    im = memory.take<double>(k);
-    eigen = memory.take<double>(linalg::eigen_work(dimension));
-    feedback = memory.take<double>(static_cast<size_t>(size) * static_cast<size_t>(n_y));
+    basis = memory.take<okid_real_t>((k + 1) * static_cast<size_t>(size));
+    hessenberg = memory.take<okid_real_t>(k * k);
+    vectors = memory.take<okid_real_t>(k * k);
+    re = memory.take<okid_real_t>(k);
+    im = memory.take<okid_real_t>(k);
+    eigen = memory.take<okid_real_t>(linalg::eigen_work(dimension));
+    feedback = memory.take<okid_real_t>(static_cast<size_t>(size) * static_cast<size_t>(n_y));
 }
 
-double companion_radius(int n_u, int n_y, int p, const double* theta, companion_work& w) {
+double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, companion_work& w) {
     const auto ny = static_cast<size_t>(n_y), m = static_cast<size_t>(n_u) + ny;
     for (size_t h = 0; h < static_cast<size_t>(p); ++h) {
-        const double* own = theta + (static_cast<size_t>(n_u) + h * m + static_cast<size_t>(n_u)) * ny;
+        const okid_real_t* own = theta + (static_cast<size_t>(n_u) + h * m + static_cast<size_t>(n_u)) * ny;
         std::copy(own, own + ny * ny, w.feedback + h * ny * ny);
     }
     const companion c{n_y, n_y * p, w.feedback};
@@ -143,9 +147,9 @@ double companion_radius(int n_u, int n_y, int p, const double* theta, companion_
     start_vector(w.basis, c.size);
     power_steps(c, w.basis, w.basis + c.size, warm_steps);
     scale(w.basis, c.size, 1 / norm(w.basis, c.size));
-    double radius = 0;
+    okid_real_t radius = 0;
     for (int round = 0; round < restarts; ++round) {
-        double beyond = 0;
+        okid_real_t beyond = 0;
         const int k = arnoldi(c, w, &beyond);
         for (int j = 0; j < k && k < w.dimension; ++j) // repack when it ended early
             std::copy(w.hessenberg + j * w.dimension, w.hessenberg + j * w.dimension + k, w.hessenberg + j * k);
@@ -155,7 +159,7 @@ double companion_radius(int n_u, int n_y, int p, const double* theta, companion_
             if (std::hypot(w.re[i], w.im[i]) > std::hypot(w.re[best], w.im[best])) best = i;
         radius = std::hypot(w.re[best], w.im[best]);
         const int partner = w.im[best] == 0 ? best : w.im[best] > 0 ? best + 1 : best - 1;
-        const double last = std::hypot(w.vectors[best * k + k - 1], w.vectors[partner * k + k - 1]);
+        const okid_real_t last = std::hypot(w.vectors[best * k + k - 1], w.vectors[partner * k + k - 1]);
         if (beyond * last <= tolerance * radius) break;
         restart(c, w, k);
     }

@@ -3,16 +3,18 @@
 #pragma once
 #include "linalg/arena.hpp"
 
+#include <okid/types.h>
+
 namespace okid {
 
 struct companion_work {
-    double *basis, *hessenberg, *vectors, *re, *im, *eigen, *feedback;
+    okid_real_t *basis, *hessenberg, *vectors, *re, *im, *eigen, *feedback;
     int dimension;
     void lay_out(int n_y, int p, arena& memory);
 };
 
 /// Largest |eigenvalue| of y_n = sum_h theta^y_h y_(n-h), theta as okid_observer_solve() gives it. Small companions are
-/// solved densely, larger ones by restarted Arnoldi until the dominant Ritz pair has a residual below 1e-7.
-double companion_radius(int n_u, int n_y, int p, const double* theta, companion_work& work);
+/// solved densely, larger ones by restarted Arnoldi until the dominant Ritz pair has a residual below 1e-7 (6e-6 in float).
+double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, companion_work& work);
 
 } // namespace okid

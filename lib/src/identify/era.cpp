@@ -18,7 +18,7 @@ using std::size_t;
 struct okid_era {
     okid_era_config_t config;
     int height, breadth, rank; // of H: r n_y, c n_u, min of both
-    double *hankel, *left, *values, *right, *work, *product, *core, *rotated;
+    okid_real_t *hankel, *left, *values, *right, *work, *product, *core, *rotated;
 };
 
 namespace {
@@ -26,14 +26,14 @@ namespace {
 size_t lay_out(okid_era& e, okid::arena& memory) {
     const auto height = static_cast<size_t>(e.height), breadth = static_cast<size_t>(e.breadth),
                rank = static_cast<size_t>(e.rank);
-    e.hankel = memory.take<double>(height * breadth);
-    e.left = memory.take<double>(height * rank);
-    e.values = memory.take<double>(rank);
-    e.right = memory.take<double>(rank * breadth);
-    e.work = memory.take<double>(okid::linalg::svd_work(e.height, e.breadth));
-    e.product = memory.take<double>(height * std::max(rank, static_cast<size_t>(e.config.n_y)));
-    e.core = memory.take<double>(rank * rank);
-    e.rotated = memory.take<double>(rank * static_cast<size_t>(e.config.n_y));
+    e.hankel = memory.take<okid_real_t>(height * breadth);
+    e.left = memory.take<okid_real_t>(height * rank);
+    e.values = memory.take<okid_real_t>(rank);
+    e.right = memory.take<okid_real_t>(rank * breadth);
+    e.work = memory.take<okid_real_t>(okid::linalg::svd_work(e.height, e.breadth));
+    e.product = memory.take<okid_real_t>(height * std::max(rank, static_cast<size_t>(e.config.n_y)));
+    e.core = memory.take<okid_real_t>(rank * rank);
+    e.rotated = memory.take<okid_real_t>(rank * static_cast<size_t>(e.config.n_y));
     return memory.bytes();
 }
 
@@ -49,15 +49,15 @@ okid_era plan(const okid_era_config_t& c) {
 }
 
 /// H(shift): block (i, j) = Y_(i + j + 1 + shift).
-void fill_hankel(okid_era& e, const double* markov, int shift) {
+void fill_hankel(okid_era& e, const okid_real_t* markov, int shift) {
     const int ny = e.config.n_y, nu = e.config.n_u;
     for (int j = 0; j < e.config.cols; ++j)
         for (int c = 0; c < nu; ++c) {
-            double* column = e.hankel + static_cast<size_t>(j * nu + c) * static_cast<size_t>(e.height);
+            okid_real_t* column = e.hankel + static_cast<size_t>(j * nu + c) * static_cast<size_t>(e.height);
             for (int i = 0; i < e.config.rows; ++i) {
-                const double* y = markov + (static_cast<size_t>(i + j + 1 + shift) * static_cast<size_t>(nu) +
-                                            static_cast<size_t>(c)) *
-                                               static_cast<size_t>(ny);
+                const okid_real_t* y = markov + (static_cast<size_t>(i + j + 1 + shift) * static_cast<size_t>(nu) +
+                                                 static_cast<size_t>(c)) *
+                                                    static_cast<size_t>(ny);
                 std::copy(y, y + ny, column + static_cast<size_t>(i * ny));
             }
         }
@@ -90,7 +90,7 @@ okid_status_t okid_era_create(okid_era_t** self, const okid_era_config_t* config
     return OKID_OK;
 }
 
-okid_status_t okid_era_decompose(okid_era_t* self, const double* markov) {
+okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov) {
     if (self == nullptr || markov == nullptr) return OKID_ERR_NULL;
     okid_era& e = *self;
     fill_hankel(e, markov, 0);
@@ -104,13 +104,13 @@ okid_status_t okid_era_decompose(okid_era_t* self, const double* markov) {
     return OKID_OK;
 }
 
-const double* okid_era_singular_values(const okid_era_t* self, int32_t* count) {
+const okid_real_t* okid_era_singular_values(const okid_era_t* self, int32_t* count) {
     if (count != nullptr) *count = self->rank;
     return self->values;
 }
 
-okid_status_t okid_era_realize(okid_era_t* self, int32_t order, double* A, double* B, double* C,
-                               const double* gain_markov, double* K) {
+okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, okid_real_t* B, okid_real_t* C,
+                               const okid_real_t* gain_markov, okid_real_t* K) {
     if (self == nullptr || A == nullptr || B == nullptr || C == nullptr) return OKID_ERR_NULL;
     okid_era& e = *self;
     if (order < 1 || order > e.rank || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
@@ -128,7 +128,7 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, double* A, doubl
     // L = P^+ [Y0_1; ..; Y0_r], P = R Sigma^(1/2); K = -L. The stack is made in `product`, which is free by now.
     for (int c = 0; c < ny; ++c)
         for (int i = 0; i < e.config.rows; ++i) {
-            const double* y0 =
+            const okid_real_t* y0 =
                 gain_markov + (static_cast<size_t>(i * ny) + static_cast<size_t>(c)) * static_cast<size_t>(ny);
             std::copy(y0, y0 + ny,
                       e.product + static_cast<size_t>(c) * static_cast<size_t>(e.height) + static_cast<size_t>(i * ny));
@@ -140,38 +140,40 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, double* A, doubl
     return OKID_OK;
 }
 
-okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count, const double* lambda_re,
-                            const double* lambda_im, const double* psi_re, const double* psi_im, double* emac) {
+okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count, const okid_real_t* lambda_re,
+                            const okid_real_t* lambda_im, const okid_real_t* psi_re, const okid_real_t* psi_im,
+                            okid_real_t* emac) {
     if (self == nullptr || emac == nullptr) return OKID_ERR_NULL;
     const okid_era& e = *self;
     if (order < 1 || order > e.rank) return OKID_ERR_DIM;
     const int ny = e.config.n_y, last = (e.config.rows - 1) * ny;
-    constexpr double quarter_pi = 0.78539816339744831;
+    constexpr okid_real_t quarter_pi = static_cast<okid_real_t>(0.78539816339744831);
     for (int k = 0; k < count; ++k) {
-        const double* re = psi_re + static_cast<size_t>(k) * static_cast<size_t>(order);
-        const double* im = psi_im + static_cast<size_t>(k) * static_cast<size_t>(order);
-        const double steps = e.config.rows - 1, radius = std::pow(std::hypot(lambda_re[k], lambda_im[k]), steps);
-        const double angle = steps * std::atan2(lambda_im[k], lambda_re[k]);
-        double weighted = 0, total = 0;
+        const okid_real_t* re = psi_re + static_cast<size_t>(k) * static_cast<size_t>(order);
+        const okid_real_t* im = psi_im + static_cast<size_t>(k) * static_cast<size_t>(order);
+        const auto steps = static_cast<okid_real_t>(e.config.rows - 1);
+        const okid_real_t radius = std::pow(std::hypot(lambda_re[k], lambda_im[k]), steps);
+        const okid_real_t angle = steps * std::atan2(lambda_im[k], lambda_re[k]);
+        okid_real_t weighted = 0, total = 0;
         for (int o = 0; o < ny; ++o) {
-            double first_re = 0, first_im = 0, end_re = 0, end_im = 0;
+            okid_real_t first_re = 0, first_im = 0, end_re = 0, end_im = 0;
             for (int i = 0; i < order; ++i) {
-                const double* column = e.left + static_cast<size_t>(i) * static_cast<size_t>(e.height);
-                const double root = std::sqrt(e.values[i]);
+                const okid_real_t* column = e.left + static_cast<size_t>(i) * static_cast<size_t>(e.height);
+                const okid_real_t root = std::sqrt(e.values[i]);
                 first_re += root * column[o] * re[i];
                 first_im += root * column[o] * im[i];
                 end_re += root * column[last + o] * re[i];
                 end_im += root * column[last + o] * im[i];
             }
-            const double expected_re = radius * (first_re * std::cos(angle) - first_im * std::sin(angle));
-            const double expected_im = radius * (first_re * std::sin(angle) + first_im * std::cos(angle));
-            const double a = std::hypot(expected_re, expected_im), b = std::hypot(end_re, end_im);
-            const double weight = first_re * first_re + first_im * first_im;
+            const okid_real_t expected_re = radius * (first_re * std::cos(angle) - first_im * std::sin(angle));
+            const okid_real_t expected_im = radius * (first_re * std::sin(angle) + first_im * std::cos(angle));
+            const okid_real_t a = std::hypot(expected_re, expected_im), b = std::hypot(end_re, end_im);
+            const okid_real_t weight = first_re * first_re + first_im * first_im;
             total += weight;
             if (!(a > 0) || !(b > 0)) continue;
-            const double turn = std::abs(
+            const okid_real_t turn = std::abs(
                 std::atan2(end_im * expected_re - end_re * expected_im, end_re * expected_re + end_im * expected_im));
-            weighted += weight * std::min(a, b) / std::max(a, b) * std::max(0.0, 1 - turn / quarter_pi);
+            weighted += weight * std::min(a, b) / std::max(a, b) * std::max(okid_real_t{0}, 1 - turn / quarter_pi);
         }
         emac[k] = total > 0 ? weighted / total : 0;
     }

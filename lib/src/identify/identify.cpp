@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    one call from an accumulator to a model with its modes
-// METHOD     Gram matrix -> observer -> Markov parameters -> ERA -> order -> modes; see the modules
+// METHOD     Gram matrix, sums of one run or factor -> observer -> Markov parameters -> ERA -> order -> modes; see the modules
 // REFERENCE  paper eq. (36)-(54)
 // NUMERICS   see observer.cpp; the choice of the order: order.hpp
 // WORKSPACE  (m(p+1))^2 for the Gram matrix, the modules' own, all in the caller's block; no heap
@@ -8,6 +8,7 @@
 #include <okid/identify.h>
 #include <okid/markov.h>
 #include <okid/modal.h>
+#include <okid/structured.h>
 
 #include "identify/order.hpp"
 #include "linalg/arena.hpp"
@@ -24,10 +25,12 @@ struct okid_identify {
     okid_observer_config_t observer_config;
     int n_u, n_y, m, n, q, max_order, markov_last;
     size_t observer_bytes, modal_bytes;
-    double *gram, *theta, *innovation, *mean, *markov, *gain;
-    double *A, *B, *C, *D, *K, *closed_loop, *eigen_re, *eigen_im, *eigen_work;
-    double* scores; ///< of the order scan
-    double *frequency, *damping, *mpc, *emac, *shape_re, *shape_im, *mu_re, *mu_im, *psi_re, *psi_im;
+    double *gram, *mean;       ///< gram: the Gram matrix, its factor, or S of one run
+    double *head, *tail, *sum; ///< of one run
+    okid_real_t *theta, *innovation, *markov, *gain;
+    okid_real_t *A, *B, *C, *D, *K, *closed_loop, *eigen_re, *eigen_im, *eigen_work;
+    okid_real_t* scores; ///< of the order scan
+    okid_real_t *frequency, *damping, *mpc, *emac, *shape_re, *shape_im, *mu_re, *mu_im, *psi_re, *psi_im;
     void *observer_work, *modal_work, *era_block;
     okid_era_t* era;
 };
@@ -37,7 +40,8 @@ namespace {
 bool valid(const okid_identify_config_t& c) {
     return c.n_u >= 1 && c.n_y >= 1 && c.n_u + c.n_y <= 256 && c.p >= 1 && c.p <= 4096 && c.rows >= 0 &&
            c.rows <= 8192 && c.order >= 0 && c.max_order >= 0 && c.fs_hz > 0 && std::isfinite(c.fs_hz) &&
-           c.method == OKID_METHOD_OKID_ERA && (c.detrend == OKID_DETREND_NONE || c.detrend == OKID_DETREND_MEAN);
+           c.method == OKID_METHOD_OKID_ERA && (c.solver == OKID_SOLVER_DENSE || c.solver == OKID_SOLVER_STRUCTURED) &&
+           (c.detrend == OKID_DETREND_NONE || c.detrend == OKID_DETREND_MEAN);
 }
 
 okid_identify plan(const okid_identify_config_t& c) {
@@ -63,28 +67,33 @@ size_t lay_out(okid_identify& s, okid::arena& memory) {
                m = nu + ny;
     const auto z = static_cast<size_t>(s.max_order), last = static_cast<size_t>(s.markov_last),
                rows = static_cast<size_t>(s.config.rows);
-    auto doubles = [&](size_t count) { return memory.take<double>(count); };
-    s.gram = doubles(n * n);
-    s.theta = doubles(ny * static_cast<size_t>(s.q));
-    s.innovation = doubles(ny * ny);
-    s.mean = doubles(m);
-    s.markov = doubles((last + 1) * ny * nu);
-    s.gain = doubles(std::max(last, rows) * ny * ny);
-    s.A = doubles(z * z);
-    s.B = doubles(z * nu);
-    s.C = doubles(ny * z);
-    s.D = doubles(ny * nu);
-    s.K = doubles(z * ny);
-    s.closed_loop = doubles(z * z);
-    s.eigen_re = doubles(z);
-    s.eigen_im = doubles(z);
-    s.eigen_work = doubles(okid::linalg::eigen_work(s.max_order));
+    auto numbers = [&](size_t count) { return memory.take<okid_real_t>(count); };
+    const bool structured = s.config.solver == OKID_SOLVER_STRUCTURED;
+    s.gram = memory.take<double>(structured ? m * n : n * n);
+    for (double** each : {&s.head, &s.tail}) *each = memory.take<double>(structured ? n - m : 0);
+    s.sum = memory.take<double>(structured ? m : 0);
+    s.theta = numbers(ny * static_cast<size_t>(s.q));
+    s.innovation = numbers(ny * ny);
+    s.mean = memory.take<double>(m);
+    s.markov = numbers((last + 1) * ny * nu);
+    s.gain = numbers(std::max(last, rows) * ny * ny);
+    s.A = numbers(z * z);
+    s.B = numbers(z * nu);
+    s.C = numbers(ny * z);
+    s.D = numbers(ny * nu);
+    s.K = numbers(z * ny);
+    s.closed_loop = numbers(z * z);
+    s.eigen_re = numbers(z);
+    s.eigen_im = numbers(z);
+    s.eigen_work = numbers(okid::linalg::eigen_work(s.max_order));
     const size_t modes = z / 2 + 1;
-    s.scores = doubles(modes);
-    for (double** each : {&s.frequency, &s.damping, &s.mpc, &s.emac, &s.mu_re, &s.mu_im}) *each = doubles(modes);
-    for (double** each : {&s.shape_re, &s.shape_im}) *each = doubles(modes * ny);
-    for (double** each : {&s.psi_re, &s.psi_im}) *each = doubles(modes * z);
-    s.observer_bytes = okid_observer_memsize(&s.observer_config);
+    s.scores = numbers(modes);
+    for (okid_real_t** each : {&s.frequency, &s.damping, &s.mpc, &s.emac, &s.mu_re, &s.mu_im}) *each = numbers(modes);
+    for (okid_real_t** each : {&s.shape_re, &s.shape_im}) *each = numbers(modes * ny);
+    for (okid_real_t** each : {&s.psi_re, &s.psi_im}) *each = numbers(modes * z);
+    s.observer_bytes = structured ? okid_structured_memsize(&s.observer_config)
+                                  : std::max(okid_observer_memsize(&s.observer_config),
+                                             okid_observer_factor_memsize(&s.observer_config));
     s.observer_work = memory.take<char>(s.observer_bytes);
     s.modal_bytes = okid_modal_memsize(s.n_y, s.max_order);
     s.modal_work = memory.take<char>(s.modal_bytes);
@@ -93,14 +102,66 @@ size_t lay_out(okid_identify& s, okid::arena& memory) {
 }
 
 /// A constant channel, judged by its variance about its own mean; -1 when there is none.
-int constant_channel(const okid_identify& s, double rows) {
+/// @param square  channel -> sum of its squares, less its mean when that is removed
+template <class Square> int constant_channel(const okid_identify& s, double rows, Square square) {
     for (int c = 0; c < s.m; ++c) {
-        const double square = s.gram[static_cast<size_t>(c) * static_cast<size_t>(s.n + 1)],
-                     bias = rows * s.mean[c] * s.mean[c];
-        const double variance = s.config.detrend == OKID_DETREND_MEAN ? square : square - bias;
+        const double own = square(static_cast<size_t>(c)), bias = rows * s.mean[c] * s.mean[c];
+        const double variance = s.config.detrend == OKID_DETREND_MEAN ? own : own - bias;
         if (!(variance > 1e-13 * (std::abs(variance) + bias))) return c;
     }
     return -1;
+}
+
+okid_status_t constant_status(const okid_identify& s, okid_identified_t* out, int channel) {
+    out->observer_info.channel = channel;
+    return channel < 0 ? OKID_OK : channel < s.n_u ? OKID_ERR_INPUT : OKID_ERR_OUTPUT;
+}
+
+/// theta from the Gram matrix.
+okid_status_t observe_dense(okid_identify& s, okid_accumulator_t* accumulator, okid_identified_t* out) {
+    okid_status_t status = okid_accumulator_gram(accumulator, s.config.detrend, s.gram, s.mean);
+    if (status != OKID_OK) return status;
+    const int64_t rows = out->regression_rows;
+    status = constant_status(s, out, constant_channel(s, static_cast<double>(rows), [&](size_t c) {
+                                 return s.gram[c * static_cast<size_t>(s.n + 1)];
+                             }));
+    if (status != OKID_OK) return status;
+    return okid_observer_solve(&s.observer_config, s.gram, rows, s.theta, s.innovation, &out->observer_info,
+                               s.observer_work, s.observer_bytes);
+}
+
+/// theta from the sums of one run.
+okid_status_t observe_structured(okid_identify& s, okid_accumulator_t* accumulator, okid_identified_t* out) {
+    okid_status_t status = okid_accumulator_run(accumulator, s.config.detrend, s.gram, s.head, s.tail, s.sum, s.mean);
+    if (status != OKID_OK) return status;
+    const int64_t rows = out->regression_rows;
+    status = constant_status(s, out, constant_channel(s, static_cast<double>(rows), [&](size_t c) {
+                                 return s.gram[c * static_cast<size_t>(s.m + 1)];
+                             }));
+    if (status != OKID_OK) return status;
+    return okid_structured_solve(&s.observer_config, s.config.detrend, s.gram, s.head, s.tail, s.sum, rows, s.theta,
+                                 s.innovation, &out->observer_info, s.observer_work, s.observer_bytes);
+}
+
+/// theta from the triangular factor, columns [u_n, v_(n-1), .., y_n].
+okid_status_t observe_factor(okid_identify& s, okid_square_root_t* square_root, okid_identified_t* out) {
+    auto* factor = reinterpret_cast<okid_real_t*>(s.gram);
+    okid_status_t status = okid_square_root_factor(square_root, s.config.detrend, factor, s.mean);
+    if (status != OKID_OK) return status;
+    const int64_t rows = out->regression_rows;
+    status = constant_status(s, out, constant_channel(s, static_cast<double>(rows), [&](size_t c) {
+                                 const size_t column =
+                                     c < static_cast<size_t>(s.n_u) ? c : c + static_cast<size_t>(s.n - s.m);
+                                 double sum = 0;
+                                 for (size_t i = 0; i <= column; ++i) {
+                                     const double r = factor[column * static_cast<size_t>(s.n) + i];
+                                     sum += r * r;
+                                 }
+                                 return sum;
+                             }));
+    if (status != OKID_OK) return status;
+    return okid_observer_solve_factor(&s.observer_config, factor, rows, s.theta, s.innovation, &out->observer_info,
+                                      s.observer_work, s.observer_bytes);
 }
 
 /// Poles of the predictor A - K C.
@@ -108,7 +169,7 @@ double predictor_radius(okid_identify& s, int order) {
     std::copy(s.A, s.A + order * order, s.closed_loop);
     okid::linalg::multiply(false, false, order, order, s.n_y, -1, s.K, order, s.C, s.n_y, 1, s.closed_loop, order);
     if (okid::linalg::eigen(order, s.closed_loop, s.eigen_re, s.eigen_im, nullptr, s.eigen_work) != 0) return HUGE_VAL;
-    double radius = 0;
+    okid_real_t radius = 0;
     for (int i = 0; i < order; ++i) radius = std::max(radius, std::hypot(s.eigen_re[i], s.eigen_im[i]));
     return radius;
 }
@@ -236,24 +297,10 @@ okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_ide
     return out->warnings != 0 ? OKID_WARN_MODEL : OKID_OK;
 }
 
-okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator, okid_identified_t* out) {
-    if (self == nullptr || accumulator == nullptr || out == nullptr) return OKID_ERR_NULL;
-    okid_identify& s = *self;
-    okid_accumulator_config_t held;
-    okid_accumulator_config(accumulator, &held);
-    const int64_t rows = okid_accumulator_rows(accumulator);
-    begin(s, out, rows);
-    if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.config.p) return OKID_ERR_MISMATCH;
-    if (rows < s.q) return OKID_ERR_TOO_SHORT;
-    okid_status_t status = okid_accumulator_gram(accumulator, s.config.detrend, s.gram, s.mean);
-    if (status != OKID_OK) return status;
-    out->observer_info.channel = constant_channel(s, static_cast<double>(rows));
-    if (out->observer_info.channel >= 0) return out->observer_info.channel < s.n_u ? OKID_ERR_INPUT : OKID_ERR_OUTPUT;
-    status = okid_observer_solve(&s.observer_config, s.gram, rows, s.theta, s.innovation, &out->observer_info,
-                                 s.observer_work, s.observer_bytes);
-    if (status != OKID_OK) return status;
+/// From theta to the model of the order asked for.
+static okid_status_t identify_from_theta(okid_identify& s, okid_identified_t* out) {
     observer_notes(out, s.q);
-    status = okid_markov_recursion(s.n_u, s.n_y, s.config.p, s.theta, s.markov_last, s.markov, s.gain);
+    okid_status_t status = okid_markov_recursion(s.n_u, s.n_y, s.config.p, s.theta, s.markov_last, s.markov, s.gain);
     if (status != OKID_OK) return status;
     status = okid_era_decompose(s.era, s.markov);
     if (status != OKID_OK) return status;
@@ -262,7 +309,33 @@ okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accum
     point_to(s, out);
     if (s.config.order > 0) {
         if (s.config.order > s.max_order) out->warnings |= OKID_NOTE_ORDER_REDUCED;
-        return okid_identify_order(self, std::min(s.config.order, s.max_order), out);
+        return okid_identify_order(&s, std::min(s.config.order, s.max_order), out);
     }
     return automatic_order(s, out);
+}
+
+okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator, okid_identified_t* out) {
+    if (self == nullptr || accumulator == nullptr || out == nullptr) return OKID_ERR_NULL;
+    okid_identify& s = *self;
+    okid_accumulator_config_t held;
+    okid_accumulator_config(accumulator, &held);
+    begin(s, out, okid_accumulator_rows(accumulator));
+    if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.config.p) return OKID_ERR_MISMATCH;
+    if (out->regression_rows < s.q) return OKID_ERR_TOO_SHORT;
+    const okid_status_t status = s.config.solver == OKID_SOLVER_STRUCTURED ? observe_structured(s, accumulator, out)
+                                                                           : observe_dense(s, accumulator, out);
+    return status != OKID_OK ? status : identify_from_theta(s, out);
+}
+
+okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root, okid_identified_t* out) {
+    if (self == nullptr || square_root == nullptr || out == nullptr) return OKID_ERR_NULL;
+    okid_identify& s = *self;
+    okid_square_root_config_t held;
+    okid_square_root_config(square_root, &held);
+    begin(s, out, okid_square_root_rows(square_root));
+    if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.config.p || s.config.solver != OKID_SOLVER_DENSE)
+        return OKID_ERR_MISMATCH;
+    if (out->regression_rows < s.q) return OKID_ERR_TOO_SHORT;
+    const okid_status_t status = observe_factor(s, square_root, out);
+    return status != OKID_OK ? status : identify_from_theta(s, out);
 }

@@ -15,10 +15,10 @@ namespace {
 using std::size_t;
 
 /// target(n) = own(n) + sum_h theta^y_h target(n-h), blocks of n_y x width; block 0 of `target` has index `first`.
-void add_feedback(int n_u, int n_y, int p, const double* theta, double* target, int width, int n, int first) {
+void add_feedback(int n_u, int n_y, int p, const okid_real_t* theta, okid_real_t* target, int width, int n, int first) {
     const size_t m = static_cast<size_t>(n_u) + static_cast<size_t>(n_y),
                  size = static_cast<size_t>(n_y) * static_cast<size_t>(width);
-    double* out = target + static_cast<size_t>(n - first) * size;
+    okid_real_t* out = target + static_cast<size_t>(n - first) * size;
     for (int h = 1; h <= std::min(n - first, p); ++h) {
         const size_t column = static_cast<size_t>(n_u) + static_cast<size_t>(h - 1) * m + static_cast<size_t>(n_u);
         okid::linalg::multiply(false, false, n_y, width, n_y, 1, theta + column * static_cast<size_t>(n_y), n_y,
@@ -28,26 +28,26 @@ void add_feedback(int n_u, int n_y, int p, const double* theta, double* target, 
 
 } // namespace
 
-okid_status_t okid_markov_recursion(int32_t n_u, int32_t n_y, int32_t p, const double* theta, int32_t count,
-                                    double* system, double* gain) {
+okid_status_t okid_markov_recursion(int32_t n_u, int32_t n_y, int32_t p, const okid_real_t* theta, int32_t count,
+                                    okid_real_t* system, okid_real_t* gain) {
     if (theta == nullptr || system == nullptr) return OKID_ERR_NULL;
     if (n_u < 1 || n_y < 1 || p < 1 || count < 0) return OKID_ERR_DIM;
     const size_t ny = static_cast<size_t>(n_y), nu = static_cast<size_t>(n_u), m = nu + ny;
     std::copy(theta, theta + ny * nu, system); // Y_0 = D
     for (int n = 1; n <= count; ++n) {
-        const double* own = theta + (nu + static_cast<size_t>(n - 1) * m) * ny; // [Ybar^I_n, -Ybar^II_n]
-        double* y = system + static_cast<size_t>(n) * ny * nu;
+        const okid_real_t* own = theta + (nu + static_cast<size_t>(n - 1) * m) * ny; // [Ybar^I_n, -Ybar^II_n]
+        okid_real_t* y = system + static_cast<size_t>(n) * ny * nu;
         if (n <= p)
             std::copy(own, own + ny * nu, y);
         else
-            std::fill(y, y + ny * nu, 0.0);
+            std::fill(y, y + ny * nu, okid_real_t{0});
         add_feedback(n_u, n_y, p, theta, system, n_u, n, 0);
         if (gain == nullptr) continue;
-        double* y0 = gain + static_cast<size_t>(n - 1) * ny * ny;
+        okid_real_t* y0 = gain + static_cast<size_t>(n - 1) * ny * ny;
         if (n <= p)
-            std::transform(own + ny * nu, own + ny * m, y0, [](double x) { return -x; });
+            std::transform(own + ny * nu, own + ny * m, y0, [](okid_real_t x) { return -x; });
         else
-            std::fill(y0, y0 + ny * ny, 0.0);
+            std::fill(y0, y0 + ny * ny, okid_real_t{0});
         add_feedback(n_u, n_y, p, theta, gain, n_y, n, 1);
     }
     return OKID_OK;

@@ -4,10 +4,12 @@
 //            Arnoldi; when it reaches 1, the smallest ridge of a half-decade grid above which all are stable
 // REFERENCE  paper eq. (36)-(39); Phan, Horta, Juang, Longman (1992); docs/numerics.md trap 22 for the ridge
 // NUMERICS   squares cond(V): fine to 1e7 with exact sums; the refinement step takes the ridge of 1e-12 out again
+//            double in every build; theta is rounded to okid_real_t and its companion matrix judged as it is then
 // WORKSPACE  q^2 + 3 m (p+1) n_y doubles and the Arnoldi basis; q^3/3 + 2 q^2 n_y flop a ridge
 #include <okid/observer.h>
 
 #include "identify/companion.hpp"
+#include "identify/stabilise.hpp"
 #include "linalg/arena.hpp"
 #include "linalg/linalg.hpp"
 
@@ -18,7 +20,6 @@ namespace okid {
 namespace {
 
 using std::size_t;
-constexpr int grid_size = 23;            // 1e-12, 3e-12, … 1e-1
 constexpr double rank_tolerance = 1e-10; // of the unit-diagonal Gram of the input lags
 
 struct observer_work {
@@ -110,7 +111,7 @@ struct solver {
     }
 
     /// theta for one ridge; false when the ridged Gram is not positive definite.
-    bool solve(double ridge, bool refine_unridged, double* theta) {
+    bool solve(double ridge, bool refine_unridged, okid_real_t* theta) {
         double norm = 0;
         for (int j = 0; j < q; ++j) {
             double column = 0;
@@ -131,7 +132,8 @@ struct solver {
         residual(refine_unridged ? 0 : ridge);
         correct();
         for (int k = 0; k < q; ++k)
-            for (int o = 0; o < n_y; ++o) theta[k * n_y + o] = w.x[o * q + k] * w.scale[index(k)];
+            for (int o = 0; o < n_y; ++o)
+                theta[k * n_y + o] = static_cast<okid_real_t>(w.x[o * q + k] * w.scale[index(k)]);
         return true;
     }
 
@@ -157,35 +159,21 @@ struct solver {
         for (int i = 0; i < q * n_y; ++i) w.x[i] += w.estimate[i];
     }
 
-    /// Covariance of the residual from the Gram matrix: (G_yy - G_yv theta^T - theta G_vy + theta G theta^T) / dof.
-    void innovation(const double* theta, double* cov) {
+    /// Covariance of the residual from the Gram matrix: (G_yy - G_yv theta^T - theta G_vy + theta G theta^T) / dof, with
+    /// theta as it was before rounding.
+    void innovation(okid_real_t* cov) {
         std::fill(w.t, w.t + n * n_y, 0.0);
         for (int o = 0; o < n_y; ++o) {
             for (int k = 0; k < q; ++k)
-                w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + index(k)] = -theta[k * n_y + o];
+                w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + index(k)] = -(w.x[o * q + k] * w.scale[index(k)]);
             w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + static_cast<size_t>(n_u + o)] = 1;
         }
         linalg::multiply(false, false, n, n_y, n, 1, gram, n, w.t, n, 0, w.out, n);
         linalg::multiply(true, false, n_y, n_y, n, 1 / static_cast<double>(std::max(rows - q, 1LL)), w.t, n, w.out, n,
-                         0, cov, n_y);
+                         0, w.estimate, n_y);
+        std::transform(w.estimate, w.estimate + n_y * n_y, cov, [](double x) { return static_cast<okid_real_t>(x); });
     }
 };
-
-/// Go down the grid from its largest ridge while the companion matrix stays stable; theta is left at the smallest such
-/// ridge. From above, because stability is not monotone in the ridge: below the last unstable value lie islands where the
-/// radius is below 1 by chance and the model is poor.
-okid_status_t stabilise(solver& s, double ridge_min, double* theta) {
-    auto ridge_of = [&](int k) { return ridge_min * std::pow(10.0, 0.5 * k); };
-    auto stable = [&](int k) {
-        if (!s.solve(ridge_of(k), false, theta)) return false;
-        s.info->radius = companion_radius(s.n_u, s.n_y, s.p, theta, s.w.companion);
-        return s.info->radius < 1;
-    };
-    int k = grid_size - 1;
-    while (k > 0 && stable(k)) --k;
-    if (k == grid_size - 1) return OKID_ERR_UNSTABLE;
-    return stable(k + 1) ? OKID_OK : OKID_ERR_UNSTABLE;
-}
 
 } // namespace
 } // namespace okid
@@ -196,8 +184,9 @@ size_t okid_observer_memsize(const okid_observer_config_t* config) {
     return okid::lay_out(*config, memory, nullptr);
 }
 
-okid_status_t okid_observer_solve(const okid_observer_config_t* config, const double* gram, int64_t rows, double* theta,
-                                  double* innovation, okid_observer_info_t* info, void* work, size_t bytes) {
+okid_status_t okid_observer_solve(const okid_observer_config_t* config, const double* gram, int64_t rows,
+                                  okid_real_t* theta, okid_real_t* innovation, okid_observer_info_t* info, void* work,
+                                  size_t bytes) {
     if (config == nullptr || gram == nullptr || theta == nullptr || info == nullptr || work == nullptr)
         return OKID_ERR_NULL;
     const size_t needed = okid_observer_memsize(config);
@@ -224,9 +213,13 @@ okid_status_t okid_observer_solve(const okid_observer_config_t* config, const do
     if (!s.solve(ridge_min, numerical, theta) && !s.solve(ridge_min * 1e2, numerical, theta)) return OKID_ERR_NUMERIC;
     info->radius = info->radius_plain = okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.companion);
     if (!(info->radius < 1) && config->unstable == 0) {
-        const okid_status_t status = okid::stabilise(s, ridge_min, theta);
+        const okid_status_t status = okid::stabilise(ridge_min, [&](double ridge) {
+            if (!s.solve(ridge, false, theta)) return false;
+            info->radius = okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.companion);
+            return info->radius < 1;
+        });
         if (status != OKID_OK) return status;
     }
-    if (innovation != nullptr) s.innovation(theta, innovation);
+    if (innovation != nullptr) s.innovation(innovation);
     return OKID_OK;
 }

@@ -7,34 +7,37 @@
 // NUMERICS   a gap of 10 is below what white-noise simulations show (>= 14) and above what measured records show (<= 4)
 #include "identify/order.hpp"
 
+#include "linalg/linalg.hpp"
+
 #include <algorithm>
 
 namespace okid {
 
-gap_choice order_by_gap(const double* values, int count, int largest) {
-    constexpr double floor_ratio = 1e-13;
+gap_choice order_by_gap(const okid_real_t* values, int count, int largest) {
+    constexpr okid_real_t floor_ratio = linalg::limit_of<okid_real_t>(1e-13),
+                          least = linalg::limit_of<okid_real_t>(1e-16);
     const int last = std::min(largest, count - 1) / 2 * 2;
     gap_choice best{std::min(2, largest), 0};
     for (int n = 2; n <= last; n += 2) {
         if (!(values[n - 1] > floor_ratio * values[0])) break;
-        const double ratio = values[n - 1] / std::max(values[n], 1e-16 * values[0]);
+        const double ratio = values[n - 1] / std::max(values[n], least * values[0]);
         if (ratio > best.ratio) best = gap_choice{n, ratio};
     }
     return best;
 }
 
-double consistency_score(const double* emac, int count) {
-    double score = 0;
+okid_real_t consistency_score(const okid_real_t* emac, int count) {
+    okid_real_t score = 0;
     for (int k = 0; k < count; ++k) {
-        const double above = std::max(0.0, 2 * emac[k] - 1);
+        const okid_real_t above = std::max(okid_real_t{0}, 2 * emac[k] - 1);
         score += above * above * above * above;
     }
     return score;
 }
 
-int order_by_score(const double* scores, int count) {
-    constexpr double share = 0.9;
-    const double best = *std::max_element(scores, scores + count);
+int order_by_score(const okid_real_t* scores, int count) {
+    constexpr auto share = static_cast<okid_real_t>(0.9);
+    const okid_real_t best = *std::max_element(scores, scores + count);
     if (!(best > 0)) return 0;
     for (int k = 0; k < count; ++k)
         if (scores[k] >= share * best) return 2 * (k + 1);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    model order from the singular values of the Hankel matrix, or from how modes hold over the orders
 #pragma once
+#include <okid/types.h>
 
 namespace okid {
 
@@ -11,13 +12,13 @@ struct gap_choice {
 constexpr double clear_gap = 10.0; ///< a ratio that decides by itself
 
 /// The largest gap over even orders up to `largest`.
-gap_choice order_by_gap(const double* values, int count, int largest);
+gap_choice order_by_gap(const okid_real_t* values, int count, int largest);
 
 /// What a set of modes is worth: sum of (2 EMAC - 1)^4 over EMAC > 0.5. A structural mode counts nearly 1, a chance 0.75
 /// of a noise mode 0.06, so that many noise modes do not add up.
-double consistency_score(const double* emac, int count);
+okid_real_t consistency_score(const okid_real_t* emac, int count);
 
 /// scores[k] belongs to order 2 (k + 1), unstable models 0. The smallest order near the best score; 0 when none scores.
-int order_by_score(const double* scores, int count);
+int order_by_score(const okid_real_t* scores, int count);
 
 } // namespace okid

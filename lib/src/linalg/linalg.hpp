@@ -1,11 +1,25 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    the one seam between the library and its linear algebra; two backends of the same shape
 //            (linalg_lapacke.cpp for hosts, linalg_eigen.cpp for fixed memory without LAPACK)
-// RULES      column-major, caller's memory, no heap after warm_up(), no exceptions; int results: 0 ok, else the failure
+// RULES      column-major, caller's memory, no heap after warm_up(), no exceptions; int results: 0 ok, else the failure.
+//            Real is double or float, told by the pointers. Every build has all of it for okid_real_t, and what the
+//            normal equations need (multiply, cholesky…) for double
 #pragma once
+#include <okid/types.h>
+
 #include <cstddef>
+#include <limits>
+#include <type_traits>
 
 namespace okid::linalg {
+
+/// A limit near rounding, stated for double, in as many rounding units of Real (the very number where Real is double).
+template <class Real> constexpr Real limit_of(double in_double) {
+    return static_cast<Real>(in_double / std::numeric_limits<double>::epsilon()) * std::numeric_limits<Real>::epsilon();
+}
+
+/// A parameter that takes part in no deduction: constants and nullptr convert to what the other pointers say.
+template <class T> using as_is = std::common_type_t<T>;
 
 /// "lapacke" or "eigen".
 const char* name();
@@ -13,27 +27,28 @@ const char* name();
 /// Anything the backend allocates once (BLAS buffers, thread count 1) happens here, in create, not later.
 void warm_up();
 
-/// A (n x n, lower triangle) -> L with A = L L^T. @return 0, or the 1-based column whose pivot is not positive
-int cholesky(int n, double* a, int lda);
+/// A (n x n, lower triangle) -> L with A = L L^T; what then stands above the diagonal is no one's business. @return 0, or the 1-based column whose pivot is not positive
+template <class Real> int cholesky(int n, Real* a, int lda);
 
 /// B <- A^-1 B with the factor of cholesky(); b is n x count.
-void cholesky_solve(int n, const double* l, int ldl, double* b, int ldb, int count);
+template <class Real> void cholesky_solve(int n, const Real* l, int ldl, Real* b, int ldb, int count);
 
-/// 1-norm condition estimate of A from its factor and the 1-norm of A. work: 4 n doubles.
-double cholesky_condition(int n, const double* l, int ldl, double norm1, double* work);
+/// 1-norm condition estimate of A from its factor and the 1-norm of A. work: 4 n numbers.
+template <class Real> Real cholesky_condition(int n, const Real* l, int ldl, as_is<Real> norm1, Real* work);
 
 /// C <- alpha op(A) op(B) + beta C; C is rows x cols, inner products of length `inner`.
-void multiply(bool transpose_a, bool transpose_b, int rows, int cols, int inner, double alpha, const double* a, int lda,
-              const double* b, int ldb, double beta, double* c, int ldc);
+template <class Real>
+void multiply(bool transpose_a, bool transpose_b, int rows, int cols, int inner, as_is<Real> alpha, const Real* a,
+              int lda, const Real* b, int ldb, as_is<Real> beta, Real* c, int ldc);
 
 /// Economy SVD A (rows x cols) = U diag(s) V^T with k = min(rows, cols); A is destroyed.
-/// u: rows x k (ld rows), s: k descending, vt: k x cols (ld k). work: svd_work(rows, cols) doubles.
-std::size_t svd_work(int rows, int cols);
-int svd(int rows, int cols, double* a, double* u, double* s, double* vt, double* work);
+/// u: rows x k (ld rows), s: k descending, vt: k x cols (ld k). work: svd_work(rows, cols) numbers.
+template <class Real = okid_real_t> std::size_t svd_work(int rows, int cols);
+template <class Real> int svd(int rows, int cols, Real* a, Real* u, Real* s, Real* vt, Real* work);
 
 /// Eigenvalues of a general real n x n matrix (destroyed), and right eigenvectors unless vectors is nullptr: a complex
-/// pair k, k+1 has eigenvector vectors(:,k) +- i vectors(:,k+1). work: eigen_work(n) doubles.
-std::size_t eigen_work(int n);
-int eigen(int n, double* a, double* re, double* im, double* vectors, double* work);
+/// pair k, k+1 has eigenvector vectors(:,k) +- i vectors(:,k+1). work: eigen_work(n) numbers.
+template <class Real = okid_real_t> std::size_t eigen_work(int n);
+template <class Real> int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work);
 
 } // namespace okid::linalg

@@ -1,85 +1,161 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    linear algebra on the host: LAPACKE (its _work calls only: no heap of its own) on OpenBLAS, one thread
+// METHOD     LAPACK's d and s routines under one overloaded name each, below templates of linalg.hpp
 // NUMERICS   LAPACK's; workspace sizes are asked from LAPACK itself
 #include "linalg.hpp"
 
-#include <okid/types.h>
-
 #include <algorithm>
 #include <cblas.h>
-#include <cstring>
+#include <cmath>
 #include <lapacke.h>
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 
 namespace okid::linalg {
+namespace {
+
+using std::size_t;
+constexpr int layout = LAPACK_COL_MAJOR;
+
+lapack_int potrf(int n, double* a, int lda) { return LAPACKE_dpotrf_work(layout, 'L', n, a, lda); }
+lapack_int potrf(int n, float* a, int lda) { return LAPACKE_spotrf_work(layout, 'L', n, a, lda); }
+
+void potrs(int n, int count, const double* l, int ldl, double* b, int ldb) {
+    LAPACKE_dpotrs_work(layout, 'L', n, count, l, ldl, b, ldb);
+}
+void potrs(int n, int count, const float* l, int ldl, float* b, int ldb) {
+    LAPACKE_spotrs_work(layout, 'L', n, count, l, ldl, b, ldb);
+}
+
+void pocon(int n, const double* l, int ldl, double norm1, double* reciprocal, double* work, lapack_int* integers) {
+    LAPACKE_dpocon_work(layout, 'L', n, l, ldl, norm1, reciprocal, work, integers);
+}
+void pocon(int n, const float* l, int ldl, float norm1, float* reciprocal, float* work, lapack_int* integers) {
+    LAPACKE_spocon_work(layout, 'L', n, l, ldl, norm1, reciprocal, work, integers);
+}
+
+void gemm(CBLAS_TRANSPOSE ta, CBLAS_TRANSPOSE tb, int rows, int cols, int inner, double alpha, const double* a, int lda,
+          const double* b, int ldb, double beta, double* c, int ldc) {
+    cblas_dgemm(CblasColMajor, ta, tb, rows, cols, inner, alpha, a, lda, b, ldb, beta, c, ldc);
+}
+void gemm(CBLAS_TRANSPOSE ta, CBLAS_TRANSPOSE tb, int rows, int cols, int inner, float alpha, const float* a, int lda,
+          const float* b, int ldb, float beta, float* c, int ldc) {
+    cblas_sgemm(CblasColMajor, ta, tb, rows, cols, inner, alpha, a, lda, b, ldb, beta, c, ldc);
+}
+
+lapack_int gesdd(int rows, int cols, double* a, double* s, double* u, double* vt, int k, double* work, lapack_int size,
+                 lapack_int* integers) {
+    return LAPACKE_dgesdd_work(layout, 'S', rows, cols, a, rows, s, u, rows, vt, k, work, size, integers);
+}
+lapack_int gesdd(int rows, int cols, float* a, float* s, float* u, float* vt, int k, float* work, lapack_int size,
+                 lapack_int* integers) {
+    return LAPACKE_sgesdd_work(layout, 'S', rows, cols, a, rows, s, u, rows, vt, k, work, size, integers);
+}
+
+lapack_int geev(char vectors, int n, double* a, double* re, double* im, double* right, double* work, lapack_int size) {
+    return LAPACKE_dgeev_work(layout, 'N', vectors, n, a, n, re, im, nullptr, 1, right, n, work, size);
+}
+lapack_int geev(char vectors, int n, float* a, float* re, float* im, float* right, float* work, lapack_int size) {
+    return LAPACKE_sgeev_work(layout, 'N', vectors, n, a, n, re, im, nullptr, 1, right, n, work, size);
+}
+
+/// LAPACK answers a query in Real: above 2^24 a float may be rounded down, the next one is enough.
+template <class Real> lapack_int whole(Real wanted) {
+    return static_cast<lapack_int>(std::nextafter(wanted, std::numeric_limits<Real>::infinity()));
+}
+
+template <class Real> lapack_int svd_query(int rows, int cols) {
+    Real wanted = 0, none = 0;
+    lapack_int integer = 0;
+    gesdd(rows, cols, &none, &none, &none, &none, std::min(rows, cols), &wanted, -1, &integer);
+    return whole(wanted);
+}
+
+template <class Real> lapack_int eigen_query(int n) {
+    Real wanted = 0, none = 0;
+    geev('V', n, &none, &none, &none, &none, &wanted, -1);
+    return whole(wanted);
+}
+
+/// One call of each kernel, so that OpenBLAS takes its buffers now.
+template <class Real> void touch() {
+    Real a[64], b[64] = {}, c[64] = {};
+    for (int i = 0; i < 64; ++i) a[i] = i % 9 == 0 ? Real(2) : Real(0.1);
+    gemm(CblasNoTrans, CblasNoTrans, 8, 8, 8, 1, a, 8, b, 8, 0, c, 8);
+    potrf(8, a, 8);
+}
+
+} // namespace
 
 const char* name() { return "lapacke"; }
 
 void warm_up() {
     static const bool done = [] {
         if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
-        double a[64], b[64] = {}, c[64] = {};
-        for (int i = 0; i < 64; ++i) a[i] = i % 9 == 0 ? 2.0 : 0.1;
-        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, 8, 8, 8, 1, a, 8, b, 8, 0, c, 8);
-        LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', 8, a, 8);
+        touch<double>();
+        touch<float>();
         return true;
     }();
     (void)done;
 }
 
-int cholesky(int n, double* a, int lda) { return LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', n, a, lda); }
+template <class Real> int cholesky(int n, Real* a, int lda) { return potrf(n, a, lda); }
 
-void cholesky_solve(int n, const double* l, int ldl, double* b, int ldb, int count) {
-    LAPACKE_dpotrs_work(LAPACK_COL_MAJOR, 'L', n, count, l, ldl, b, ldb);
+template <class Real> void cholesky_solve(int n, const Real* l, int ldl, Real* b, int ldb, int count) {
+    potrs(n, count, l, ldl, b, ldb);
 }
 
-double cholesky_condition(int n, const double* l, int ldl, double norm1, double* work) {
-    double reciprocal = 0;
-    auto* integers = reinterpret_cast<lapack_int*>(work + 3 * static_cast<std::size_t>(n));
-    LAPACKE_dpocon_work(LAPACK_COL_MAJOR, 'L', n, l, ldl, norm1, &reciprocal, work, integers);
-    return reciprocal > 0 ? 1 / reciprocal : 1e300;
+template <class Real> Real cholesky_condition(int n, const Real* l, int ldl, as_is<Real> norm1, Real* work) {
+    Real reciprocal = 0;
+    auto* integers = reinterpret_cast<lapack_int*>(work + 3 * static_cast<size_t>(n));
+    pocon(n, l, ldl, norm1, &reciprocal, work, integers);
+    constexpr double none = 1e300; // singular to working accuracy
+    return reciprocal > 0 ? 1 / reciprocal
+                          : static_cast<Real>(std::min<double>(none, std::numeric_limits<Real>::max()));
 }
 
-void multiply(bool transpose_a, bool transpose_b, int rows, int cols, int inner, double alpha, const double* a, int lda,
-              const double* b, int ldb, double beta, double* c, int ldc) {
-    cblas_dgemm(CblasColMajor, transpose_a ? CblasTrans : CblasNoTrans, transpose_b ? CblasTrans : CblasNoTrans, rows,
-                cols, inner, alpha, a, lda, b, ldb, beta, c, ldc);
+template <class Real>
+void multiply(bool transpose_a, bool transpose_b, int rows, int cols, int inner, as_is<Real> alpha, const Real* a,
+              int lda, const Real* b, int ldb, as_is<Real> beta, Real* c, int ldc) {
+    gemm(transpose_a ? CblasTrans : CblasNoTrans, transpose_b ? CblasTrans : CblasNoTrans, rows, cols, inner, alpha, a,
+         lda, b, ldb, beta, c, ldc);
 }
 
-// dgesdd: 8 min(rows, cols) integers stand behind its double workspace.
-static lapack_int svd_query(int rows, int cols) {
-    double wanted = 0, none = 0;
-    lapack_int integer = 0;
-    const int k = std::min(rows, cols);
-    LAPACKE_dgesdd_work(LAPACK_COL_MAJOR, 'S', rows, cols, &none, rows, &none, &none, rows, &none, k, &wanted, -1,
-                        &integer);
-    return static_cast<lapack_int>(wanted);
+// gesdd: 8 min(rows, cols) integers stand behind its workspace of numbers.
+static_assert(sizeof(lapack_int) <= sizeof(float));
+template <class Real> size_t svd_work(int rows, int cols) {
+    return static_cast<size_t>(svd_query<Real>(rows, cols)) + 8 * static_cast<size_t>(std::min(rows, cols));
 }
 
-std::size_t svd_work(int rows, int cols) {
-    return static_cast<std::size_t>(svd_query(rows, cols)) + 8 * static_cast<std::size_t>(std::min(rows, cols));
-}
-
-int svd(int rows, int cols, double* a, double* u, double* s, double* vt, double* work) {
-    const int k = std::min(rows, cols);
-    const lapack_int size = svd_query(rows, cols);
+template <class Real> int svd(int rows, int cols, Real* a, Real* u, Real* s, Real* vt, Real* work) {
+    const lapack_int size = svd_query<Real>(rows, cols);
     auto* integers = reinterpret_cast<lapack_int*>(work + size);
-    return LAPACKE_dgesdd_work(LAPACK_COL_MAJOR, 'S', rows, cols, a, rows, s, u, rows, vt, k, work, size, integers);
+    return gesdd(rows, cols, a, s, u, vt, std::min(rows, cols), work, size, integers);
 }
 
-static lapack_int eigen_query(int n) {
-    double wanted = 0, none = 0;
-    LAPACKE_dgeev_work(LAPACK_COL_MAJOR, 'N', 'V', n, &none, n, &none, &none, &none, 1, &none, n, &wanted, -1);
-    return static_cast<lapack_int>(wanted);
+template <class Real> size_t eigen_work(int n) { return static_cast<size_t>(eigen_query<Real>(n)); }
+
+template <class Real> int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work) {
+    return geev(vectors != nullptr ? 'V' : 'N', n, a, re, im, vectors, work, eigen_query<Real>(n));
 }
 
-std::size_t eigen_work(int n) { return static_cast<std::size_t>(eigen_query(n)); }
+template int cholesky(int, double*, int);
+template void cholesky_solve(int, const double*, int, double*, int, int);
+template double cholesky_condition(int, const double*, int, double, double*);
+template void multiply(bool, bool, int, int, int, double, const double*, int, const double*, int, double, double*, int);
+template size_t svd_work<double>(int, int);
+template int svd(int, int, double*, double*, double*, double*, double*);
+template size_t eigen_work<double>(int);
+template int eigen(int, double*, double*, double*, double*, double*);
 
-int eigen(int n, double* a, double* re, double* im, double* vectors, double* work) {
-    return LAPACKE_dgeev_work(LAPACK_COL_MAJOR, 'N', vectors != nullptr ? 'V' : 'N', n, a, n, re, im, nullptr, 1,
-                              vectors, n, work, eigen_query(n));
-}
+template int cholesky(int, float*, int);
+template void cholesky_solve(int, const float*, int, float*, int, int);
+template float cholesky_condition(int, const float*, int, float, float*);
+template void multiply(bool, bool, int, int, int, float, const float*, int, const float*, int, float, float*, int);
+template size_t svd_work<float>(int, int);
+template int svd(int, int, float*, float*, float*, float*, float*);
+template size_t eigen_work<float>(int);
+template int eigen(int, float*, float*, float*, float*, float*);
 
 } // namespace okid::linalg
 

@@ -3,8 +3,9 @@
 // METHOD     eigenvectors of A; lambda = log(mu)/dt, f = |lambda|/2pi, zeta = -Re lambda/|lambda|, shape = C psi
 // REFERENCE  paper section 3.3; MPC and MAC: Pappa, Elliott, Schenk (1993)
 // NUMERICS   the principal logarithm is right only below Nyquist: pairs within 1 % of it and negative real poles are left
-//            out, and so is every pair with zeta <= 0 (an unstable pole is not a mode of a passive structure)
-// WORKSPACE  2 n_z^2 doubles and the eigensolver's
+//            out, and so is every pair with zeta <= 0 (an unstable pole is not a mode of a passive structure). The
+//            logarithm is taken in double: next to the unit circle it magnifies every rounding of |mu|
+// WORKSPACE  2 n_z^2 numbers and the eigensolver's
 #include <okid/modal.h>
 
 #include "linalg/arena.hpp"
@@ -20,18 +21,19 @@ namespace {
 constexpr double pi = 3.14159265358979323846, nyquist_margin = 0.99;
 
 struct modal_work {
-    double *a, *vectors, *re, *im, *eigen, *sorted;
+    okid_real_t *a, *vectors, *re, *im, *eigen;
+    double* sorted;
     int* order;
 };
 
 size_t lay_out(int n_z, okid::arena& memory, modal_work* work) {
     const auto n = static_cast<size_t>(n_z);
     modal_work w{};
-    w.a = memory.take<double>(n * n);
-    w.vectors = memory.take<double>(n * n);
-    w.re = memory.take<double>(n);
-    w.im = memory.take<double>(n);
-    w.eigen = memory.take<double>(okid::linalg::eigen_work(n_z));
+    w.a = memory.take<okid_real_t>(n * n);
+    w.vectors = memory.take<okid_real_t>(n * n);
+    w.re = memory.take<okid_real_t>(n);
+    w.im = memory.take<okid_real_t>(n);
+    w.eigen = memory.take<okid_real_t>(okid::linalg::eigen_work(n_z));
     w.sorted = memory.take<double>(n);
     w.order = memory.take<int>(n);
     if (work != nullptr) *work = w;
@@ -39,14 +41,14 @@ size_t lay_out(int n_z, okid::arena& memory, modal_work* work) {
 }
 
 /// Turn and scale a shape so that its largest entry is 1.
-void normalise(int n, double* re, double* im) {
+void normalise(int n, okid_real_t* re, okid_real_t* im) {
     int best = 0;
     for (int i = 1; i < n; ++i)
         if (std::hypot(re[i], im[i]) > std::hypot(re[best], im[best])) best = i;
-    const double a = re[best], b = im[best], square = a * a + b * b;
+    const okid_real_t a = re[best], b = im[best], square = a * a + b * b;
     if (!(square > 0)) return;
     for (int i = 0; i < n; ++i) {
-        const double x = (re[i] * a + im[i] * b) / square, y = (im[i] * a - re[i] * b) / square;
+        const okid_real_t x = (re[i] * a + im[i] * b) / square, y = (im[i] * a - re[i] * b) / square;
         re[i] = x;
         im[i] = y;
     }
@@ -54,14 +56,14 @@ void normalise(int n, double* re, double* im) {
     im[best] = 0;
 }
 
-double collinearity(int n, const double* re, const double* im) {
-    double xx = 0, yy = 0, xy = 0;
+okid_real_t collinearity(int n, const okid_real_t* re, const okid_real_t* im) {
+    okid_real_t xx = 0, yy = 0, xy = 0;
     for (int i = 0; i < n; ++i) {
         xx += re[i] * re[i];
         yy += im[i] * im[i];
         xy += re[i] * im[i];
     }
-    const double sum = xx + yy;
+    const okid_real_t sum = xx + yy;
     return sum > 0 ? ((xx - yy) * (xx - yy) + 4 * xy * xy) / (sum * sum) : 0;
 }
 
@@ -73,10 +75,11 @@ size_t okid_modal_memsize(int32_t n_y, int32_t n_z) {
     return lay_out(n_z, memory, nullptr);
 }
 
-okid_status_t okid_modal_analyse(int32_t n_y, int32_t n_z, double dt, const double* A, const double* C, int32_t* count,
-                                 double* frequency_hz, double* damping_ratio, double* mpc, double* shape_re,
-                                 double* shape_im, double* mu_re, double* mu_im, double* psi_re, double* psi_im,
-                                 double* radius, void* work, size_t bytes) {
+okid_status_t okid_modal_analyse(int32_t n_y, int32_t n_z, double dt, const okid_real_t* A, const okid_real_t* C,
+                                 int32_t* count, okid_real_t* frequency_hz, okid_real_t* damping_ratio,
+                                 okid_real_t* mpc, okid_real_t* shape_re, okid_real_t* shape_im, okid_real_t* mu_re,
+                                 okid_real_t* mu_im, okid_real_t* psi_re, okid_real_t* psi_im, double* radius,
+                                 void* work, size_t bytes) {
     if (A == nullptr || C == nullptr || count == nullptr || frequency_hz == nullptr || damping_ratio == nullptr ||
         mpc == nullptr || shape_re == nullptr || shape_im == nullptr || work == nullptr)
         return OKID_ERR_NULL;
@@ -92,28 +95,31 @@ okid_status_t okid_modal_analyse(int32_t n_y, int32_t n_z, double dt, const doub
     double largest = 0;
     int found = 0;
     for (int k = 0; k < n_z; ++k) {
-        const double size = std::hypot(w.re[k], w.im[k]);
+        const double re = w.re[k], im = w.im[k], size = std::hypot(re, im);
         largest = std::max(largest, size);
-        if (!(w.im[k] > 0) || !(size < 1) || !(size > 0)) continue;
-        const double angle = std::atan2(w.im[k], w.re[k]);
+        if (!(im > 0) || !(size < 1) || !(size > 0)) continue;
+        const double angle = std::atan2(im, re);
         const double omega = std::hypot(std::log(size), angle) / dt;
         if (angle > nyquist_margin * pi || omega * dt > pi) continue;
         w.sorted[k] = omega;
         w.order[found++] = k;
     }
-    std::sort(w.order, w.order + found, [&](int i, int j) { return w.sorted[i] < w.sorted[j]; });
+    for (int i = 1; i < found; ++i) // insertion: std::sort calls itself, and a stack has a bound here
+        for (int j = i; j > 0 && w.sorted[w.order[j]] < w.sorted[w.order[j - 1]]; --j)
+            std::swap(w.order[j], w.order[j - 1]);
     *count = found;
     if (radius != nullptr) *radius = largest;
     for (int i = 0; i < found; ++i) {
         const int k = w.order[i];
-        const double* re = w.vectors + static_cast<size_t>(k) * n;
-        const double* im = re + n;
-        double *to_re = shape_re + static_cast<size_t>(i) * ny, *to_im = shape_im + static_cast<size_t>(i) * ny;
+        const okid_real_t* re = w.vectors + static_cast<size_t>(k) * n;
+        const okid_real_t* im = re + n;
+        okid_real_t *to_re = shape_re + static_cast<size_t>(i) * ny, *to_im = shape_im + static_cast<size_t>(i) * ny;
         okid::linalg::multiply(false, false, n_y, 1, n_z, 1, C, n_y, re, n_z, 0, to_re, n_y);
         okid::linalg::multiply(false, false, n_y, 1, n_z, 1, C, n_y, im, n_z, 0, to_im, n_y);
         normalise(n_y, to_re, to_im);
-        frequency_hz[i] = w.sorted[k] / (2 * pi);
-        damping_ratio[i] = -std::log(std::hypot(w.re[k], w.im[k])) / (dt * w.sorted[k]);
+        const double size = std::hypot(static_cast<double>(w.re[k]), static_cast<double>(w.im[k]));
+        frequency_hz[i] = static_cast<okid_real_t>(w.sorted[k] / (2 * pi));
+        damping_ratio[i] = static_cast<okid_real_t>(-std::log(size) / (dt * w.sorted[k]));
         mpc[i] = collinearity(n_y, to_re, to_im);
         if (mu_re != nullptr) mu_re[i] = w.re[k];
         if (mu_im != nullptr) mu_im[i] = w.im[k];
@@ -123,8 +129,9 @@ okid_status_t okid_modal_analyse(int32_t n_y, int32_t n_z, double dt, const doub
     return OKID_OK;
 }
 
-double okid_modal_mac(int32_t n, const double* a_re, const double* a_im, const double* b_re, const double* b_im) {
-    double aa = 0, bb = 0, re = 0, im = 0;
+double okid_modal_mac(int32_t n, const okid_real_t* a_re, const okid_real_t* a_im, const okid_real_t* b_re,
+                      const okid_real_t* b_im) {
+    okid_real_t aa = 0, bb = 0, re = 0, im = 0;
     for (int32_t i = 0; i < n; ++i) {
         aa += a_re[i] * a_re[i] + a_im[i] * a_im[i];
         bb += b_re[i] * b_re[i] + b_im[i] * b_im[i];

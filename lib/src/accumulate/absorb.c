@@ -1,0 +1,400 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    the per-sample part of the accumulator: samples, gaps, what is missing, what is counted
+// METHOD     samples wait in x behind the last p ones until `buffer` are there; then the kernel takes them all. It adds in the
+//            order of the samples, so that neither the cut into calls nor the buffer changes a bit
+// REFERENCE  paper eq. (36)-(38) without the zero columns
+// NUMERICS   codes: exact, bounds in the public header; doubles: plain sums
+// WORKSPACE  none; touches the open slot and x only
+#include "accumulator.h"
+#include "wide.h"
+
+enum { SCAN = 256, SCAN_AHEAD = 16384 };
+
+/// Rows the kernel may sum before they are folded into pairs (see the public header).
+static int64_t fold_rows(okid_sample_t sample) {
+#ifdef OKID_INTEGER_KERNEL
+    return sample == OKID_SAMPLE_INT16 ? INT64_C(1) << 32 : INT64_C(1) << 16;
+#else
+    return sample == OKID_SAMPLE_INT16 ? 1 << 22 : sample == OKID_SAMPLE_INT24 ? 1 << 7 : 1 << 20;
+#endif
+}
+
+/// Rows whose sums of codes fit 63 bits.
+static int64_t row_limit(okid_sample_t sample) {
+    return INT64_C(1) << (sample == OKID_SAMPLE_INT16 ? 48 : sample == OKID_SAMPLE_INT24 ? 40 : 32);
+}
+
+/// Move the sums of the kernel into the pairs of the open slot.
+static void fold_partial(okid_accumulator_t* a) {
+    if (a->partial_rows == 0) return;
+    int64_t* low = (int64_t*)acc_slot_data(a, a->open);
+    const size_t count = acc_sum_count(a);
+    int64_t* high = low + count;
+    a->partial_rows = 0;
+#ifdef OKID_INTEGER_KERNEL
+    for (size_t i = 0; i < count; ++i) {
+        high[i] += low[i] >> WIDE_BITS;
+        low[i] &= WIDE_MASK;
+    }
+#else
+    double* partial = acc_at(a, a->partial_at);
+    if (a->config.sample == OKID_SAMPLE_INT32) {
+        for (size_t i = 0; i < count; ++i) {
+            wide_add_shifted(high + i, low + i, (int64_t)partial[i], 32);
+            wide_add_shifted(high + i, low + i, (int64_t)partial[count + i], 16);
+            wide_add_shifted(high + i, low + i, (int64_t)partial[2 * count + i], 0);
+        }
+        memset(partial, 0, 3 * count * sizeof *partial);
+    } else {
+        for (size_t i = 0; i < count; ++i) wide_add_shifted(high + i, low + i, (int64_t)partial[i], 0);
+        memset(partial, 0, count * sizeof *partial);
+    }
+#endif
+}
+
+#ifdef OKID_INTEGER_KERNEL
+static void sum_codes(okid_accumulator_t* a, const double* x, int32_t count) {
+    int64_t *low = (int64_t*)acc_slot_data(a, a->open), *high = low + acc_sum_count(a);
+    okid_kernel_integer(low, a->config.sample == OKID_SAMPLE_INT32 ? high : NULL, (const int64_t*)x, a->m,
+                        a->config.lags, count);
+}
+#else
+/// 32-bit codes: kernel on the high and low halves of the codes, x = high 2^16 + low, 0 <= low < 2^16.
+static void sum_codes(okid_accumulator_t* a, const double* x, int32_t count) {
+    okid_kernel_fn* const kernel = okid_kernel_pick();
+    const int32_t m = a->m, p = a->config.lags;
+    double* partial = acc_at(a, a->partial_at);
+    if (a->config.sample != OKID_SAMPLE_INT32) {
+        kernel(partial, x, x, m, p, count);
+        return;
+    }
+    const size_t numbers = (size_t)(p + count) * (size_t)m, sums = acc_sum_count(a);
+    double *high = acc_at(a, a->split_at), *low = high + (size_t)(p + a->config.buffer) * (size_t)m;
+    for (size_t i = 0; i < numbers; ++i) {
+        const int32_t code = (int32_t)x[i];
+        const int32_t upper = code >> 16;
+        high[i] = upper;
+        low[i] = code - upper * 65536;
+    }
+    kernel(partial, high, high, m, p, count);
+    kernel(partial + sums, high, low, m, p, count);
+    kernel(partial + sums, low, high, m, p, count);
+    kernel(partial + 2 * sums, low, low, m, p, count);
+}
+#endif
+
+static void run_kernel(okid_accumulator_t* a, const double* x, int32_t count) {
+    if (!acc_has_codes(a)) {
+        okid_kernel_pick()(acc_slot_data(a, a->open), x, x, a->m, a->config.lags, count);
+        return;
+    }
+    const int64_t limit = fold_rows(a->config.sample);
+    while (count > 0) {
+        if (a->partial_rows == limit) fold_partial(a);
+        const int64_t left = limit - a->partial_rows;
+        const int32_t piece = count < left ? count : (int32_t)left;
+        sum_codes(a, x, piece);
+        a->partial_rows += piece;
+        x += (size_t)piece * (size_t)a->m;
+        count -= piece;
+    }
+}
+
+/// The slot begins: the p samples before its first row are its head.
+static void keep_head(okid_accumulator_t* a, const double* history) {
+    if (acc_slot(a, a->open)->rows == 0)
+        memcpy(acc_slot_data(a, a->open) + acc_slot_head(a), history, acc_lag_count(a) * sizeof *history);
+}
+
+/// Sum `count` rows; x holds the p samples before them and then theirs.
+static void sum_rows(okid_accumulator_t* a, const double* x, int32_t count) {
+    const int32_t m = a->m;
+    keep_head(a, x);
+    run_kernel(a, x, count);
+    double* sum = acc_slot_data(a, a->open) + acc_slot_sum(a);
+    const double* newest = x + acc_lag_count(a);
+    for (int32_t n = 0; n < count; ++n, newest += m) {
+        if (acc_has_codes(a))
+            for (int32_t r = 0; r < m; ++r) ((int64_t*)sum)[r] += acc_code(newest + r);
+        else
+            for (int32_t r = 0; r < m; ++r) sum[r] += newest[r];
+    }
+    acc_slot(a, a->open)->rows += count;
+}
+
+/// Sum the samples that wait and keep the last p of them as the lag window.
+static void flush(okid_accumulator_t* a) {
+    if (a->pending == 0) return;
+    double* x = acc_x(a);
+    sum_rows(a, x, a->pending);
+    memmove(x, x + (size_t)a->pending * (size_t)a->m, acc_lag_count(a) * sizeof *x);
+    a->pending = 0;
+}
+
+/// Round what the spectra hold back to integers and add it to the open slot.
+static void flush_spectrum(okid_accumulator_t* a) {
+    if (!acc_bulk_on(&a->config) || !(acc_bulk(a)->energy > 0)) return;
+    fold_partial(a);
+    okid_spectrum_pick().flush(&acc_bulk(a)->plan, acc_spectra(a), acc_at(a, a->partial_at));
+    a->partial_rows = 1; // integers far below 2^53: energy < 2^43 is what the error bound allows
+    fold_partial(a);
+    acc_bulk(a)->energy = 0;
+}
+
+/// Sum of squares of a channel over all windows of a batch, the largest of the channels; windows overlap by p samples.
+static double batch_energy(const okid_accumulator_t* a, const spectrum_plan_t* plan, const int16_t* codes) {
+    const int32_t m = a->m, p = plan->p, fresh = plan->fresh, total = spectrum_samples(plan);
+    const double* x = acc_x(a);
+    int64_t most = 0;
+    for (int32_t c = 0; c < m; ++c) {
+        int64_t sum = 0;
+        for (int32_t n = 0; n < p; ++n) sum += (int64_t)x[n * m + c] * (int64_t)x[n * m + c];
+        for (int32_t n = 0; n < total; ++n) {
+            const int64_t square =
+                (int64_t)codes[(size_t)n * (size_t)m + (size_t)c] * codes[(size_t)n * (size_t)m + (size_t)c];
+            const int again = n % fresh >= fresh - p && n < total - fresh; // the next window begins with it
+            sum += again ? 2 * square : square;
+        }
+        if (sum > most) most = sum;
+    }
+    return (double)most;
+}
+
+/// The FFT path: take one batch when the call is long enough and its sums stay exact; returns the samples taken.
+static size_t feed_bulk(okid_accumulator_t* a, const int16_t* codes, size_t count) {
+    bulk_t* bulk = acc_bulk(a);
+    const int32_t m = a->m, p = bulk->plan.p, total = spectrum_samples(&bulk->plan);
+    if (count < (size_t)total) return 0;
+    flush(a);
+    const double energy = batch_energy(a, &bulk->plan, codes);
+    if (okid_spectrum_error(&bulk->plan, bulk->energy + energy) >= 0.5) flush_spectrum(a);
+    if (okid_spectrum_error(&bulk->plan, energy) >= 0.5) return 0;
+    double* x = acc_x(a);
+    keep_head(a, x);
+    okid_spectrum_pick().absorb(&bulk->plan, acc_spectra(a), x, codes);
+    bulk->energy += energy > 0 ? energy : 1; // silence counts as rows too
+    int64_t* sum = (int64_t*)(acc_slot_data(a, a->open) + acc_slot_sum(a));
+    for (int32_t n = 0; n < total; ++n)
+        for (int32_t r = 0; r < m; ++r) sum[r] += codes[(size_t)n * (size_t)m + (size_t)r];
+    const int16_t* tail = codes + (size_t)(total - p) * (size_t)m;
+    for (int32_t i = 0; i < p * m; ++i) x[i] = tail[i];
+    acc_slot(a, a->open)->rows += total;
+    a->stats.rows += total;
+    a->clock += total;
+    return (size_t)total;
+}
+
+void okid_accumulator_settle(okid_accumulator_t* self) {
+    flush(self);
+    flush_spectrum(self);
+    fold_partial(self);
+}
+
+void okid_accumulator_gap(okid_accumulator_t* self, int64_t count) {
+    if (self->have > 0 || self->in_gap == 0) {
+        okid_accumulator_close_slot(self, 0);
+        self->have = 0;
+        self->stats.gaps += count > 0;
+    }
+    self->in_gap = 1;
+    self->stats.missing += count;
+    self->clock += count;
+    slot_info_t* slot = acc_slot(self, self->open);
+    if (slot->rows == 0) slot->start = self->clock;
+}
+
+/// A second run begins where there is no room for the ends of the first: the first is dropped, and counted.
+static void make_room(okid_accumulator_t* a) {
+    const slot_info_t* slot = acc_slot(a, a->open);
+    a->stats.dropped += slot->rows;
+    a->stats.rows -= slot->rows;
+    okid_accumulator_clear_slot(a, a->open, 0);
+}
+
+/// What a call brings: m numbers a sample of one of four kinds.
+typedef struct source_t {
+    enum { FROM_DOUBLE, FROM_FLOAT, FROM_INT16, FROM_INT32 } kind;
+    const void* at;
+} source_t;
+
+static size_t number_bytes(source_t s) { return s.kind == FROM_DOUBLE ? 8 : s.kind == FROM_INT16 ? 2 : 4; }
+
+static source_t advance(source_t s, size_t numbers) {
+    return (source_t){s.kind, (const char*)s.at + numbers * number_bytes(s)};
+}
+
+static void copy_in(source_t source, double* to, size_t numbers) {
+    switch (source.kind) {
+    case FROM_DOUBLE: memcpy(to, source.at, numbers * sizeof *to); break;
+    case FROM_FLOAT:
+        for (size_t i = 0; i < numbers; ++i) to[i] = (double)((const float*)source.at)[i];
+        break;
+    case FROM_INT16:
+        for (size_t i = 0; i < numbers; ++i) acc_put_code(to + i, ((const int16_t*)source.at)[i]);
+        break;
+    default:
+        for (size_t i = 0; i < numbers; ++i) acc_put_code(to + i, ((const int32_t*)source.at)[i]);
+        break;
+    }
+}
+
+/// Take up to `count` samples of one run through x; returns how many were taken.
+static size_t feed(okid_accumulator_t* a, source_t source, size_t count) {
+    const int32_t m = a->m, p = a->config.lags;
+    const int arming = a->have < p;
+    int64_t room = p - a->have;
+    if (!arming) {
+        const int64_t left = a->config.block > 0 ? a->config.block - acc_slot(a, a->open)->rows : a->config.buffer;
+        room = (left < a->config.buffer ? left : a->config.buffer) - a->pending;
+    }
+    if (count > (size_t)room) count = (size_t)room;
+    const int32_t at = arming ? a->have : p + a->pending;
+    copy_in(source, acc_x(a) + (size_t)(at * m), count * (size_t)m);
+    a->clock += (int64_t)count;
+    a->in_gap = 0;
+    slot_info_t* slot = acc_slot(a, a->open);
+    if (arming) {
+        a->have += (int32_t)count;
+        if (slot->rows == 0) slot->start = a->clock;
+        return count;
+    }
+    a->pending += (int32_t)count;
+    a->stats.rows += (int64_t)count;
+    if (a->config.block > 0 && slot->rows + a->pending == a->config.block)
+        okid_accumulator_close_slot(a, 1);
+    else if (a->pending == a->config.buffer)
+        flush(a);
+    return count;
+}
+
+/// Doubles without a buffer: rows whose whole lag window lies in the caller's memory are summed there. `before` samples of
+/// the run stand in front of `samples`. Returns how many were taken.
+static size_t feed_in_place(okid_accumulator_t* a, const double* samples, size_t before, size_t count) {
+    const size_t m = (size_t)a->m, p = (size_t)a->config.lags;
+    if (before < p || a->have < a->config.lags) return 0;
+    const int64_t left = a->config.block > 0 ? a->config.block - acc_slot(a, a->open)->rows : 1 << 20;
+    if (count > (size_t)left) count = (size_t)left;
+    sum_rows(a, samples - p * m, (int32_t)count);
+    memcpy(acc_x(a), samples + count * m - p * m, p * m * sizeof *samples);
+    a->clock += (int64_t)count;
+    a->stats.rows += (int64_t)count;
+    if (a->config.block > 0 && acc_slot(a, a->open)->rows == a->config.block) okid_accumulator_close_slot(a, 1);
+    return count;
+}
+
+static void feed_run(okid_accumulator_t* a, source_t source, size_t count) {
+    if (count > 0 && a->in_gap && a->config.slots == 0 && !a->config.edges) make_room(a);
+    a->stats.samples += (int64_t)count;
+    for (size_t done = 0; done < count;) {
+        size_t taken = 0;
+        if (acc_bulk_on(&a->config) && source.kind == FROM_INT16 && a->have == a->config.lags)
+            taken = feed_bulk(a, (const int16_t*)source.at, count - done);
+        else if (a->config.buffer == 1 && source.kind == FROM_DOUBLE)
+            taken = feed_in_place(a, (const double*)source.at, done, count - done);
+        if (taken == 0) taken = feed(a, source, count - done);
+        source = advance(source, taken * (size_t)a->m);
+        done += taken;
+    }
+}
+
+/// Is every number finite, for codes: below full scale?
+static int usable(const okid_accumulator_t* a, source_t source, size_t numbers) {
+    if (source.kind == FROM_DOUBLE || source.kind == FROM_FLOAT) {
+        double sum = 0;
+        if (source.kind == FROM_DOUBLE)
+            for (size_t i = 0; i < numbers; ++i) sum += ((const double*)source.at)[i] * 0.0;
+        else
+            for (size_t i = 0; i < numbers; ++i) sum += (double)((const float*)source.at)[i] * 0.0;
+        return sum == 0;
+    }
+    const int32_t top = a->config.sample == OKID_SAMPLE_INT16   ? INT16_MAX
+                        : a->config.sample == OKID_SAMPLE_INT24 ? (1 << 23) - 1
+                                                                : INT32_MAX;
+    size_t full = 0;
+    if (source.kind == FROM_INT16)
+        for (size_t i = 0; i < numbers; ++i)
+            full += ((const int16_t*)source.at)[i] == top || ((const int16_t*)source.at)[i] == -top - 1;
+    else
+        for (size_t i = 0; i < numbers; ++i)
+            full += ((const int32_t*)source.at)[i] == top || ((const int32_t*)source.at)[i] == -top - 1;
+    return full == 0;
+}
+
+/// Feed what is usable, make gaps of the rest.
+static okid_status_t feed_usable(okid_accumulator_t* a, source_t source, size_t count) {
+    const size_t m = (size_t)a->m;
+    okid_status_t status = OKID_OK;
+    while (count > 0) {
+        const size_t most =
+            count < SCAN_AHEAD ? count : SCAN_AHEAD; // what was looked at is still in the cache when fed
+        size_t run = 0;
+        while (run < most) { // as far as whole pieces are usable, then sample by sample
+            const size_t piece = most - run < SCAN ? most - run : SCAN;
+            if (!usable(a, advance(source, run * m), piece * m)) break;
+            run += piece;
+        }
+        while (run < most && usable(a, advance(source, run * m), m)) ++run;
+        feed_run(a, source, run);
+        source = advance(source, run * m);
+        count -= run;
+        if (run == most) continue;
+        okid_accumulator_gap(a, 1);
+        status = OKID_WARN_MISSING;
+        source = advance(source, m);
+        --count;
+    }
+    return status;
+}
+
+okid_status_t okid_accumulator_add(okid_accumulator_t* self, const double* samples, size_t count) {
+    if (!self || (!samples && count > 0)) return OKID_ERR_NULL;
+    if (acc_has_codes(self) || self->centred) return OKID_ERR_MISMATCH;
+    return feed_usable(self, (source_t){FROM_DOUBLE, samples}, count);
+}
+
+okid_status_t okid_accumulator_add_f32(okid_accumulator_t* self, const float* samples, size_t count) {
+    if (!self || (!samples && count > 0)) return OKID_ERR_NULL;
+    if (acc_has_codes(self) || self->centred) return OKID_ERR_MISMATCH;
+    return feed_usable(self, (source_t){FROM_FLOAT, samples}, count);
+}
+
+/// Codes: saturated ones are counted and, if the configuration says so, make their sample missing.
+static okid_status_t add_codes(okid_accumulator_t* a, source_t source, size_t count, int64_t saturated) {
+    a->stats.saturated += saturated;
+    if (saturated && a->config.saturated_missing) {
+        (void)feed_usable(a, source, count);
+        return OKID_WARN_SATURATED;
+    }
+    feed_run(a, source, count);
+    return saturated ? OKID_WARN_SATURATED : OKID_OK;
+}
+
+static okid_status_t ready_for_codes(const okid_accumulator_t* a, const void* codes, size_t count, int is_int16) {
+    if (!a || (!codes && count > 0)) return OKID_ERR_NULL;
+    if (!acc_has_codes(a) || is_int16 != (a->config.sample == OKID_SAMPLE_INT16) || a->centred)
+        return OKID_ERR_MISMATCH;
+    return a->stats.rows + (int64_t)count > row_limit(a->config.sample) ? OKID_ERR_RANGE : OKID_OK;
+}
+
+okid_status_t okid_accumulator_add_i16(okid_accumulator_t* self, const int16_t* codes, size_t count) {
+    const okid_status_t status = ready_for_codes(self, codes, count, 1);
+    if (status != OKID_OK) return status;
+    const size_t numbers = count * (size_t)self->m;
+    int64_t saturated = 0;
+    for (size_t i = 0; i < numbers; ++i) saturated += codes[i] == INT16_MAX || codes[i] == INT16_MIN;
+    return add_codes(self, (source_t){FROM_INT16, codes}, count, saturated);
+}
+
+okid_status_t okid_accumulator_add_i32(okid_accumulator_t* self, const int32_t* codes, size_t count) {
+    const okid_status_t status = ready_for_codes(self, codes, count, 0);
+    if (status != OKID_OK) return status;
+    const int32_t top = self->config.sample == OKID_SAMPLE_INT24 ? (1 << 23) - 1 : INT32_MAX, bottom = -top - 1;
+    const size_t numbers = count * (size_t)self->m;
+    int64_t saturated = 0, outside = 0;
+    for (size_t i = 0; i < numbers; ++i) {
+        saturated += codes[i] == top || codes[i] == bottom;
+        outside += codes[i] > top || codes[i] < bottom;
+    }
+    if (outside) return OKID_ERR_RANGE;
+    return add_codes(self, (source_t){FROM_INT32, codes}, count, saturated);
+}

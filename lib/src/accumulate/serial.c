@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    an accumulator as bytes that another machine, another build or a later version can read
+// METHOD     one walk over the state counts, writes or reads; little endian, codes as integers, CRC-32 (IEEE 802.3) at the end
+// REFERENCE  the layout stands in accumulator.h at okid_accumulator_serialise()
+// NUMERICS   bit for bit
+// WORKSPACE  none; O(bytes)
+#include "accumulator.h"
+
+enum { FORMAT = 1, HEADER_WORDS = 10 };
+static const char MAGIC[8] = {'O', 'K', 'I', 'D', 'A', 'C', 'C', '\n'};
+
+static uint32_t crc32_of(const uint8_t* at, size_t count) {
+    static const uint32_t table[16] = {0x00000000, 0x1DB71064, 0x3B6E20C8, 0x26D930AC, 0x76DC4190, 0x6B6B51F4,
+                                       0x4DB26158, 0x5005713C, 0xEDB88320, 0xF00F9344, 0xD6D6A3E8, 0xCB61B38C,
+                                       0x9B64C2B0, 0x86D3D2D4, 0xA00AE278, 0xBDBDF21C};
+    uint32_t crc = 0xFFFFFFFF;
+    for (size_t i = 0; i < count; ++i) {
+        crc = (crc >> 4) ^ table[(crc ^ at[i]) & 15];
+        crc = (crc >> 4) ^ table[(crc ^ (uint32_t)(at[i] >> 4)) & 15];
+    }
+    return ~crc;
+}
+
+/// Where the walk stands. `to` or `from` or, for counting, neither.
+typedef struct walk_t {
+    uint8_t* to;
+    const uint8_t* from;
+    size_t at;
+} walk_t;
+
+static uint64_t walk_bits(walk_t* w, uint64_t bits, int bytes) {
+    uint64_t got = 0;
+    for (int i = 0; i < bytes; ++i, ++w->at) {
+        if (w->to) w->to[w->at] = (uint8_t)(bits >> 8 * i);
+        if (w->from) got |= (uint64_t)w->from[w->at] << 8 * i;
+    }
+    return w->from ? got : bits;
+}
+
+static void walk_i64(walk_t* w, int64_t* value) { *value = (int64_t)walk_bits(w, (uint64_t)*value, 8); }
+static void walk_i32(walk_t* w, int32_t* value) { *value = (int32_t)(uint32_t)walk_bits(w, (uint32_t)*value, 4); }
+
+/// Numbers of 64 bits as they are: doubles or integers.
+static void walk_numbers(walk_t* w, void* numbers, size_t count) {
+    char* at = (char*)numbers;
+    for (size_t i = 0; i < count; ++i, at += 8) {
+        uint64_t bits;
+        memcpy(&bits, at, 8);
+        bits = walk_bits(w, bits, 8);
+        memcpy(at, &bits, 8);
+    }
+}
+
+/// Samples: doubles, codes as 32-bit integers.
+static void walk_samples(walk_t* w, const okid_accumulator_t* a, double* samples, size_t count) {
+    if (!acc_has_codes(a)) {
+        walk_numbers(w, samples, count);
+        return;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        int32_t code = (int32_t)acc_code(samples + i);
+        walk_i32(w, &code);
+        acc_put_code(samples + i, code);
+    }
+}
+
+/// Magic, version and what two accumulators must have in common.
+static void walk_header(walk_t* w, okid_accumulator_config_t* c, int32_t* version, char* magic) {
+    for (int i = 0; i < 8; ++i) magic[i] = (char)walk_bits(w, (uint8_t)magic[i], 1);
+    int32_t sample = (int32_t)c->sample;
+    int32_t* const words[HEADER_WORDS] = {version,   &c->n_u,   &c->n_y,   &c->lags,        &sample,
+                                          &c->block, &c->slots, &c->edges, &c->spare_slots, &c->saturated_missing};
+    for (int i = 0; i < HEADER_WORDS; ++i) walk_i32(w, words[i]);
+    walk_numbers(w, &c->forgetting, 1);
+    c->sample = (okid_sample_t)sample;
+}
+
+static void walk_slot(walk_t* w, okid_accumulator_t* a, int32_t index) {
+    slot_info_t* slot = acc_slot(a, index);
+    double* data = acc_slot_data(a, index);
+    walk_numbers(w, slot, sizeof *slot / 8);
+    walk_numbers(w, data, acc_slot_head(a));
+    walk_samples(w, a, data + acc_slot_head(a), acc_lag_count(a));
+    if (a->config.slots > 0) walk_samples(w, a, data + acc_slot_tail(a), acc_lag_count(a));
+}
+
+/// Everything behind the header. The slots in the order of time, so that they lie from 0 on in the one that reads.
+static void walk_state(walk_t* w, okid_accumulator_t* a) {
+    walk_numbers(w, &a->stats, sizeof a->stats / 8);
+    walk_i64(w, &a->clock);
+    walk_numbers(w, &a->base_weight, 1);
+    int32_t* const words[] = {&a->have, &a->in_gap, &a->centred, &a->closed};
+    for (int i = 0; i < 4; ++i) walk_i32(w, words[i]);
+    if (w->from) a->open = a->closed;
+    walk_numbers(w, acc_scale(a), 2 * (size_t)a->m);
+    walk_samples(w, a, acc_x(a), (size_t)a->have * (size_t)a->m);
+    for (int32_t k = 0; k <= a->closed; ++k) walk_slot(w, a, acc_ring(a, k));
+    if (a->config.slots > 0 || !a->config.edges) return;
+    walk_numbers(w, acc_base(a), acc_base_edge(a) + acc_edge_count(a) * (acc_base_is_exact(a) ? 2 : 1));
+}
+
+static size_t walk_all(okid_accumulator_t* a, uint8_t* to) {
+    okid_accumulator_config_t config = a->config;
+    int32_t version = FORMAT;
+    char magic[8];
+    memcpy(magic, MAGIC, 8);
+    walk_t w = {to, NULL, 0};
+    walk_header(&w, &config, &version, magic);
+    walk_state(&w, a);
+    return w.at;
+}
+
+size_t okid_accumulator_serialised_size(okid_accumulator_t* self) {
+    if (!self) return 0;
+    okid_accumulator_settle(self);
+    return walk_all(self, NULL) + 4;
+}
+
+okid_status_t okid_accumulator_serialise(okid_accumulator_t* self, void* out, size_t bytes) {
+    if (!self || !out) return OKID_ERR_NULL;
+    if (bytes < okid_accumulator_serialised_size(self)) return OKID_ERR_MEMORY;
+    walk_t end = {(uint8_t*)out, NULL, walk_all(self, (uint8_t*)out)};
+    walk_bits(&end, crc32_of((const uint8_t*)out, end.at), 4);
+    return OKID_OK;
+}
+
+okid_status_t okid_accumulator_peek(const void* in, size_t bytes, okid_accumulator_config_t* out) {
+    if (!in || !out) return OKID_ERR_NULL;
+    if (bytes < 8 + 4 * HEADER_WORDS + 8 + 4) return OKID_ERR_FORMAT;
+    walk_t end = {NULL, (const uint8_t*)in, bytes - 4};
+    if ((uint32_t)walk_bits(&end, 0, 4) != crc32_of((const uint8_t*)in, bytes - 4)) return OKID_ERR_FORMAT;
+    okid_accumulator_config_t config = {0};
+    char magic[8];
+    int32_t version = 0;
+    walk_t w = {NULL, (const uint8_t*)in, 0};
+    walk_header(&w, &config, &version, magic);
+    if (memcmp(magic, MAGIC, 8) != 0 || version != FORMAT || okid_accumulator_memsize(&config) == 0)
+        return OKID_ERR_FORMAT;
+    *out = config;
+    return OKID_OK;
+}
+
+okid_status_t okid_accumulator_deserialise(okid_accumulator_t* self, const void* in, size_t bytes) {
+    if (!self) return OKID_ERR_NULL;
+    okid_accumulator_config_t c;
+    const okid_status_t status = okid_accumulator_peek(in, bytes, &c);
+    if (status != OKID_OK) return status;
+    const okid_accumulator_config_t* own = &self->config;
+    if (c.n_u != own->n_u || c.n_y != own->n_y || c.lags != own->lags || c.sample != own->sample ||
+        c.block != own->block || c.slots != own->slots || c.edges != own->edges || c.spare_slots != own->spare_slots ||
+        c.forgetting < own->forgetting || c.forgetting > own->forgetting)
+        return OKID_ERR_MISMATCH;
+    // The length must be that of the state before anything is touched: it depends on what is at hand only.
+    const size_t header = 8 + 4 * HEADER_WORDS + 8;
+    walk_t look = {NULL, (const uint8_t*)in, header + sizeof self->stats + 16};
+    if (bytes < look.at + 16) return OKID_ERR_FORMAT;
+    const int32_t kept[3] = {self->have, self->open, self->closed};
+    int32_t have = 0, closed = 0, other = 0;
+    walk_i32(&look, &have);
+    walk_i32(&look, &other);
+    walk_i32(&look, &other);
+    walk_i32(&look, &closed);
+    if (have < 0 || have > own->lags || closed < 0 || closed >= self->slot_count) return OKID_ERR_FORMAT;
+    self->have = have;
+    self->open = self->closed = closed;
+    walk_t count = {NULL, NULL, header};
+    walk_state(&count, self);
+    self->have = kept[0];
+    self->open = kept[1];
+    self->closed = kept[2];
+    if (count.at + 4 != bytes) return OKID_ERR_FORMAT;
+    okid_accumulator_reset(self);
+    walk_t w = {NULL, (const uint8_t*)in, header};
+    walk_state(&w, self);
+    return OKID_OK;
+}

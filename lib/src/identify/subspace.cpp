@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    subspace identification: memory, the weighted SVD, the calls of subspace.h
+// METHOD     LQ factor (hankel.cpp), weighting and SVD here; models in projection.cpp (MOESP, CVA) and ssarx.cpp
+// REFERENCE  paper eq. (68)-(83) and table 1; Van Overschee, De Moor (1996); EMAC: Pappa, Elliott, Schenk (1993)
+// NUMERICS   W2 = Pi needs no inverse (trap 6). W1 is the inverse of a Cholesky factor with a floor of 1e-12 of the
+//            diagonal: any factor of the covariance does, and without noise the covariance has rank n_z (trap 7)
+// WORKSPACE  see okid_subspace_memsize(); all in double but the SVD, which is in okid_real_t
+#include "identify/subspace.hpp"
+
+#include <cmath>
+#include <limits>
+#include <new>
+
+using std::size_t;
+
+struct okid_subspace {
+    okid_subspace_config_t config;
+    okid::subspace_sizes sizes;
+    okid::hankel_factor hankel;
+    okid::rank_cut cut;
+    okid::projection projection;
+    okid::ssarx ssarx;
+    okid::state_model model;
+    double rows;
+};
+
+namespace okid {
+namespace {
+
+constexpr double weight_floor = 1e-12;
+constexpr int most_rows = 32768, default_order = 128;
+
+size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
+
+bool valid(const okid_subspace_config_t& c) {
+    return c.n_u >= 0 && c.n_y >= 1 && c.rows >= 2 && c.max_order >= 0 && c.ridge >= 0 && c.ridge <= 1 &&
+           c.method >= OKID_SUBSPACE_MOESP && c.method <= OKID_SUBSPACE_SSARX && c.n_u <= most_rows &&
+           c.n_y <= most_rows && c.rows <= most_rows && 2LL * c.rows * (c.n_u + c.n_y) <= most_rows;
+}
+
+subspace_sizes sizes_of(const okid_subspace_config_t& c) {
+    const int carry = (c.rows - 1) * c.n_y;
+    const int m = c.n_u + c.n_y;
+    return {c.n_u,
+            c.n_y,
+            m,
+            c.rows,
+            c.rows * c.n_u,
+            c.rows * m,
+            c.rows * c.n_y,
+            std::min(c.max_order > 0 ? c.max_order : default_order, carry)};
+}
+
+size_t lay_out(okid_subspace& s, arena& memory) {
+    const subspace_sizes& z = s.sizes;
+    const int32_t method = s.config.method;
+    s.hankel = hankel_factor{};
+    s.hankel.n_u = z.n_u;
+    s.hankel.n_y = z.n_y;
+    s.hankel.i = z.i;
+    s.hankel.size = 2 * z.i * z.m;
+    s.hankel.lay_out(memory, s.config.factor != 0);
+    s.cut.lay_out(z, method != OKID_SUBSPACE_MOESP, memory);
+    if (method == OKID_SUBSPACE_SSARX)
+        s.ssarx.lay_out(z, memory);
+    else
+        s.projection.lay_out(z, memory);
+    s.model.lay_out(z, memory);
+    return memory.bytes();
+}
+
+void copy_out(const double* from, size_t count, okid_real_t* to) {
+    for (size_t k = 0; k < count; ++k) to[k] = static_cast<okid_real_t>(from[k]);
+}
+
+/// The common way of both forms of input, once the LQ factor stands.
+okid_status_t decompose(okid_subspace& s, int64_t rows) {
+    const bool by_states = s.config.method == OKID_SUBSPACE_SSARX, cva = s.config.method == OKID_SUBSPACE_CVA;
+    s.rows = static_cast<double>(rows);
+    const okid_status_t status =
+        by_states ? s.ssarx.decompose(s.sizes, s.hankel, s.cut) : s.projection.decompose(s.sizes, cva, s.hankel, s.cut);
+    if (status != OKID_OK) s.cut.carried = 0;
+    for (int k = 0; k < s.sizes.top; ++k) // states of SSARX: x ~ Sigma^(1/2), a sample at a time
+        s.model.scale[k] = by_states ? std::sqrt(static_cast<double>(s.cut.values[k]) * s.rows) : 1;
+    return status;
+}
+
+row_order order_of(const okid_subspace& s) {
+    return s.config.method == OKID_SUBSPACE_SSARX ? row_order::by_time : row_order::inputs_first;
+}
+
+} // namespace
+
+void state_model::lay_out(const subspace_sizes& z, arena& memory) {
+    A = memory.take<double>(area(z.top, z.top));
+    B = memory.take<double>(area(z.top, z.n_u));
+    C = memory.take<double>(area(z.n_y, z.top));
+    D = memory.take<double>(area(z.n_y, z.n_u));
+    K = memory.take<double>(area(z.top, z.n_y));
+    innovation = memory.take<double>(area(z.n_y, z.n_y));
+    scale = memory.take<double>(area(z.top, 1));
+}
+
+void rank_cut::lay_out(const subspace_sizes& z, bool weighted, arena& memory) {
+    weight = source = solve = nullptr;
+    if (weighted) {
+        weight = memory.take<double>(area(z.h, z.h));
+        source = memory.take<double>(area(z.h, z.w));
+    }
+    target = memory.take<okid_real_t>(area(z.h, z.w));
+    left = memory.take<okid_real_t>(area(z.h, z.h));
+    values = memory.take<okid_real_t>(area(z.h, 1));
+    right = memory.take<okid_real_t>(area(z.h, z.w));
+    svd = memory.take<okid_real_t>(linalg::svd_work<okid_real_t>(z.h, z.w));
+    solve = memory.take<double>(solve_work(2 * z.w));
+}
+
+bool rank_cut::whiten(const subspace_sizes& z) const {
+    double* norm = solve; // of the diagonal; free until the solve
+    for (int k = 0; k < z.h; ++k) norm[k] = std::sqrt(weight[at(k, k, z.h)]);
+    for (int c = 0; c < z.h; ++c) {
+        if (!(norm[c] > 0)) return false;
+        for (int r = c; r < z.h; ++r) weight[at(r, c, z.h)] /= norm[r] * norm[c];
+        weight[at(c, c, z.h)] = 1 + weight_floor;
+    }
+    if (linalg::cholesky(z.h, weight, z.h) != 0) return false;
+    for (int c = 0; c < z.h; ++c) {
+        std::fill(weight + at(0, c, z.h), weight + at(c, c, z.h), 0.0);
+        for (int r = c; r < z.h; ++r) weight[at(r, c, z.h)] *= norm[r];
+    }
+    solve_lower(z.h, weight, z.h, source, z.h, z.w, solve);
+    return true;
+}
+
+bool rank_cut::decompose(const subspace_sizes& z, const double* from, int ld) {
+    for (int c = 0; c < z.w; ++c) copy_out(from + at(0, c, ld), static_cast<size_t>(z.h), target + at(0, c, z.h));
+    if (linalg::svd(z.h, z.w, target, left, values, right, svd) != 0) return false;
+    constexpr okid_real_t rounding = 16 * std::numeric_limits<okid_real_t>::epsilon();
+    carried = 0;
+    while (carried < z.h && values[carried] > rounding * values[0]) ++carried;
+    return carried > 0;
+}
+
+} // namespace okid
+
+int32_t okid_subspace_max_order(const okid_subspace_config_t* config) {
+    return config == nullptr || !okid::valid(*config) ? 0 : okid::sizes_of(*config).top;
+}
+
+size_t okid_subspace_memsize(const okid_subspace_config_t* config) {
+    if (config == nullptr || !okid::valid(*config)) return 0;
+    okid_subspace s{};
+    s.config = *config;
+    s.sizes = okid::sizes_of(*config);
+    okid::arena memory;
+    memory.take<okid_subspace>(1);
+    return okid::lay_out(s, memory);
+}
+
+okid_status_t okid_subspace_create(okid_subspace_t** self, const okid_subspace_config_t* config, void* block,
+                                   size_t bytes) {
+    if (self == nullptr || config == nullptr || block == nullptr) return OKID_ERR_NULL;
+    const size_t needed = okid_subspace_memsize(config);
+    if (needed == 0) return OKID_ERR_DIM;
+    if (bytes < needed) return OKID_ERR_MEMORY;
+    okid::linalg::warm_up();
+    okid::arena memory(block);
+    auto* s = new (memory.take<okid_subspace>(1)) okid_subspace{};
+    s->config = *config;
+    s->sizes = okid::sizes_of(*config);
+    okid::lay_out(*s, memory);
+    *self = s;
+    return OKID_OK;
+}
+
+okid_status_t okid_subspace_decompose(okid_subspace_t* self, const double* gram, int64_t rows,
+                                      okid_subspace_info_t* info) {
+    if (self == nullptr || gram == nullptr || info == nullptr) return OKID_ERR_NULL;
+    *info = okid_subspace_info_t{0, 0, -1};
+    self->cut.carried = 0;
+    if (rows < self->hankel.size) return OKID_ERR_TOO_SHORT;
+    const okid_status_t status = self->hankel.from_gram(okid::order_of(*self), gram, self->config.ridge, info);
+    return status != OKID_OK ? status : okid::decompose(*self, rows);
+}
+
+okid_status_t okid_subspace_decompose_factor(okid_subspace_t* self, const okid_real_t* factor, int64_t rows,
+                                             okid_subspace_info_t* info) {
+    if (self == nullptr || factor == nullptr || info == nullptr) return OKID_ERR_NULL;
+    *info = okid_subspace_info_t{0, 0, -1};
+    self->cut.carried = 0;
+    if (self->config.factor == 0) return OKID_ERR_MISMATCH;
+    if (rows < self->hankel.size) return OKID_ERR_TOO_SHORT;
+    const okid_status_t status = self->hankel.from_factor(okid::order_of(*self), factor, self->config.ridge, info);
+    return status != OKID_OK ? status : okid::decompose(*self, rows);
+}
+
+const okid_real_t* okid_subspace_singular_values(const okid_subspace_t* self, int32_t* count) {
+    if (count != nullptr) *count = self->sizes.h;
+    return self->cut.values;
+}
+
+okid_status_t okid_subspace_realize(okid_subspace_t* self, int32_t order, okid_real_t* A, okid_real_t* B,
+                                    okid_real_t* C, okid_real_t* D, okid_real_t* K, okid_real_t* innovation) {
+    if (self == nullptr || A == nullptr || C == nullptr || (B == nullptr) != (D == nullptr)) return OKID_ERR_NULL;
+    okid_subspace& s = *self;
+    const okid::subspace_sizes& z = s.sizes;
+    if (order < 1 || order > std::min(z.top, s.cut.carried)) return OKID_ERR_DIM;
+    const bool inputs = B != nullptr && z.n_u > 0, gain = K != nullptr || innovation != nullptr;
+    const okid::state_model& m = s.model;
+    const okid_status_t status = s.config.method == OKID_SUBSPACE_SSARX
+                                     ? s.ssarx.realize(z, s.hankel, order, gain, m)
+                                     : s.projection.realize(z, s.hankel, order, inputs, gain, m);
+    if (status != OKID_OK) return status;
+    const auto n = static_cast<size_t>(order), ny = static_cast<size_t>(z.n_y), nu = static_cast<size_t>(z.n_u);
+    for (size_t c = 0; c < n; ++c) {
+        for (size_t r = 0; r < n; ++r) m.A[c * n + r] *= m.scale[r] / m.scale[c];
+        for (size_t o = 0; o < ny; ++o) m.C[c * ny + o] /= m.scale[c];
+    }
+    okid::copy_out(m.A, n * n, A);
+    okid::copy_out(m.C, ny * n, C);
+    if (inputs) {
+        for (size_t k = 0; k < n * nu; ++k) m.B[k] *= m.scale[k % n];
+        okid::copy_out(m.B, n * nu, B);
+        okid::copy_out(m.D, ny * nu, D);
+    }
+    for (size_t k = 0; gain && k < n * ny; ++k) m.K[k] *= m.scale[k % n];
+    if (K != nullptr) okid::copy_out(m.K, n * ny, K);
+    for (size_t k = 0; gain && k < ny * ny; ++k) m.innovation[k] /= s.rows;
+    if (innovation != nullptr) okid::copy_out(m.innovation, ny * ny, innovation);
+    return OKID_OK;
+}
+
+okid_status_t okid_subspace_emac(const okid_subspace_t* self, int32_t order, int32_t count, const okid_real_t* C,
+                                 const okid_real_t* lambda_re, const okid_real_t* lambda_im, const okid_real_t* psi_re,
+                                 const okid_real_t* psi_im, okid_real_t* emac) {
+    if (self == nullptr || C == nullptr || lambda_re == nullptr || lambda_im == nullptr || psi_re == nullptr ||
+        psi_im == nullptr || emac == nullptr)
+        return OKID_ERR_NULL;
+    const okid_subspace& s = *self;
+    const okid::subspace_sizes& z = s.sizes;
+    if (order < 1 || order > std::min(z.top, s.cut.carried) || count < 0) return OKID_ERR_DIM;
+    const bool by_states = s.config.method == OKID_SUBSPACE_SSARX;
+    const double* end = by_states ? s.ssarx.end : s.projection.end(z);
+    const int ld = by_states ? z.n_y : z.h;
+    constexpr double quarter_pi = 0.78539816339744831;
+    for (int k = 0; k < count; ++k) {
+        const okid_real_t *re = psi_re + okid::at(0, k, order), *im = psi_im + okid::at(0, k, order);
+        const double steps = z.i - 1, radius = std::pow(std::hypot(lambda_re[k], lambda_im[k]), steps);
+        const double angle = steps * std::atan2(lambda_im[k], lambda_re[k]);
+        double weighted = 0, total = 0;
+        for (int o = 0; o < z.n_y; ++o) {
+            double first_re = 0, first_im = 0, end_re = 0, end_im = 0;
+            for (int j = 0; j < order; ++j) {
+                const double first = C[okid::at(o, j, z.n_y)], last = end[okid::at(o, j, ld)] / s.model.scale[j];
+                first_re += first * re[j];
+                first_im += first * im[j];
+                end_re += last * re[j];
+                end_im += last * im[j];
+            }
+            const double expected_re = radius * (first_re * std::cos(angle) - first_im * std::sin(angle));
+            const double expected_im = radius * (first_re * std::sin(angle) + first_im * std::cos(angle));
+            const double a = std::hypot(expected_re, expected_im), b = std::hypot(end_re, end_im);
+            const double weight = first_re * first_re + first_im * first_im;
+            total += weight;
+            if (!(a > 0) || !(b > 0)) continue;
+            const double turn = std::abs(
+                std::atan2(end_im * expected_re - end_re * expected_im, end_re * expected_re + end_im * expected_im));
+            const double phase = std::max(0.0, 1 - turn / quarter_pi);
+            weighted += weight * std::min(a, b) / std::max(a, b) * phase;
+        }
+        emac[k] = static_cast<okid_real_t>(total > 0 ? weighted / total : 0);
+    }
+    return OKID_OK;
+}

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    what the subspace methods share: sizes, the weighted SVD, a model in double; and the two families of
+//            methods
+#pragma once
+#include "identify/hankel.hpp"
+#include "identify/triangular.hpp"
+
+namespace okid {
+
+struct subspace_sizes {
+    int n_u, n_y, m, i;
+    int a, w, h; ///< rows of U_f (i n_u), W_p (i m), Y_f (i n_y)
+    int top;     ///< largest order
+};
+
+/// A model of one order, before it is rounded to okid_real_t. State k is to be multiplied by scale[k].
+struct state_model {
+    double *A, *B, *C, *D, *K, *innovation, *scale;
+    void lay_out(const subspace_sizes& z, arena& memory);
+};
+
+/// Weighting and SVD of an h x w matrix.
+struct rank_cut {
+    double *weight, *source; ///< h x h lower factor of the weight, h x w what is cut
+    okid_real_t *target, *left, *values, *right, *svd;
+    double* solve;
+    int carried; ///< singular values above rounding
+
+    void lay_out(const subspace_sizes& z, bool weighted, arena& memory);
+    /// weight (lower triangle: a covariance) -> its Cholesky factor; source <- weight^-1 source.
+    bool whiten(const subspace_sizes& z) const;
+    /// left, values, right of the matrix at `from`.
+    bool decompose(const subspace_sizes& z, const double* from, int ld);
+};
+
+/// MOESP and CVA: the column space of the observability matrix.
+struct projection {
+    int width;                   ///< a + w + n_y: coordinates of U_f, W_p and y_i
+    double *gamma, *core;        ///< orthonormal h x top; Gamma_^T Gamma-bar, top x top
+    double *projected, *shifted; ///< Gamma^T L3, Gamma_^T (L3 one block later), top x width
+    double *cross, *autos;       ///< L31 L11^T, L11 L11^T
+    double *normal, *powers;     ///< of one order n: factor of Gamma_^T Gamma_; C A^k, h x n
+    double* theta;               ///< [D; B], p x n_u with p = n_y + n
+    double *states, *later;      ///< X_i, X_(i+1), n x width
+    double *outputs, *drive;     ///< y_i less what the model says, n_y x width; Gamma^T H, n x a
+    double *gain, *solve;        ///< work of kalman_gain() and of the solves
+    double *seen, *step;       ///< joint_inputs(): column e of Gamma^T T_k, k = 0.. (p of n x i); its recursion, n x n
+    double *grams, *lagged;    ///< sums of (C A^b)^T C A^b, i + 1 of n x n; Horner scheme, two of n x n
+    double *equations, *root;  ///< p n_u x p n_u; its diagonal, and scratch
+    double *chunk, *remainder; ///< columns of Gamma^T H L11 by unknown; (I - Gamma Gamma^T) cross
+
+    void lay_out(const subspace_sizes& z, arena& memory);
+    okid_status_t decompose(const subspace_sizes& z, bool cva, const hankel_factor& f, rank_cut& cut);
+    okid_status_t realize(const subspace_sizes& z, const hankel_factor& f, int order, bool inputs, bool gain,
+                          const state_model& out) const;
+    const double* end(const subspace_sizes& z) const { return gamma + z.h - z.n_y; }
+
+  private:
+    int orthonormalise(const subspace_sizes& z, int columns) const;
+    bool joint_inputs(const subspace_sizes& z, const hankel_factor& f, int order, const state_model& out) const;
+    void toeplitz_columns(const subspace_sizes& z, int order, const state_model& out) const;
+    void direct_part(const subspace_sizes& z, int order, const state_model& out) const;
+    void projected_part(const subspace_sizes& z, const hankel_factor& f, int order) const;
+    void right_side(const subspace_sizes& z, int order) const;
+    bool residual_gain(const subspace_sizes& z, const hankel_factor& f, int order, const state_model& out) const;
+};
+
+/// SSARX: the states themselves.
+struct ssarx {
+    int width;                            ///< w + m: coordinates of the past and of sample i
+    double *theta, *toeplitz, *corrected; ///< ARX model n_y x (w + n_u); correction h x w; future outputs, h x 2 w
+    double *basis, *next;                 ///< states in coordinates of the past, w x top; one sample later, top x width
+    double *core, *seen, *driven, *end; ///< products of basis with next, y_i, u_i; last observability block, n_y x top
+    double *force, *square, *output,
+        *later; ///< of one order: u_i less the states; its Gram; residuals of y_i and x_(i+1)
+    double *beside, *beside_square, *gain; ///< future inputs and states; Gram of the former; work of kalman_gain()
+
+    void lay_out(const subspace_sizes& z, arena& memory);
+    okid_status_t decompose(const subspace_sizes& z, const hankel_factor& f, rank_cut& cut) const;
+    okid_status_t realize(const subspace_sizes& z, const hankel_factor& f, int order, bool with_gain,
+                          const state_model& out) const;
+
+  private:
+    void correct(const subspace_sizes& z, const hankel_factor& f, double* solve) const;
+    bool last_block(const subspace_sizes& z, const hankel_factor& f, int orders) const;
+};
+
+} // namespace okid

@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: MIT
+// What is kept of an accumulator: its memory, its written form, its sums of one run, records centred one by one.
+#include "modal_rig.h"
+
+#include <okid/okid.h>
+#include <unity.h>
+
+enum { P = 7, N = 600, M = RIG_M, W = M * (P + 1) };
+
+static double* samples;
+static int32_t codes[N * M];
+static int16_t words[N * M];
+
+void setUp(void) {
+    rig_t rig;
+    rig_make(&rig);
+    samples = rig_record(&rig, N, 0.01, NULL, 1);
+    for (int i = 0; i < N * M; ++i) {
+        words[i] = (int16_t)lrint(fmax(-32000, fmin(32000, samples[i] * 2000 + 137 * (i % M))));
+        codes[i] = words[i] * 211;
+    }
+}
+void tearDown(void) { free(samples); }
+
+static okid_accumulator_t* make(okid_accumulator_config_t config, void** block) {
+    const size_t bytes = okid_accumulator_memsize(&config);
+    TEST_ASSERT_GREATER_THAN(0, bytes);
+    *block = malloc(bytes);
+    okid_accumulator_t* a = NULL;
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &config, *block, bytes));
+    return a;
+}
+
+static okid_accumulator_config_t config_of(okid_sample_t sample) {
+    return (okid_accumulator_config_t){
+        .n_u = RIG_NU, .n_y = RIG_NY, .lags = P, .sample = sample, .forgetting = 1, .edges = 1};
+}
+
+static okid_status_t feed(okid_accumulator_t* a, okid_sample_t sample, int first, int count) {
+    const size_t at = (size_t)(first * M), n = (size_t)count;
+    if (sample == OKID_SAMPLE_DOUBLE) return okid_accumulator_add(a, samples + at, n);
+    if (sample == OKID_SAMPLE_INT16) return okid_accumulator_add_i16(a, words + at, n);
+    return okid_accumulator_add_i32(a, codes + at, n);
+}
+
+static void same_bits(okid_accumulator_t* a, okid_accumulator_t* b) {
+    static double left[W * W], right[W * W];
+    okid_accumulator_stats_t one, two;
+    for (int detrend = 0; detrend < 2; ++detrend) {
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, (okid_detrend_t)detrend, left, NULL));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(b, (okid_detrend_t)detrend, right, NULL));
+        TEST_ASSERT_EQUAL_MEMORY(left, right, sizeof left);
+    }
+    okid_accumulator_stats(a, &one);
+    okid_accumulator_stats(b, &two);
+    TEST_ASSERT_EQUAL_MEMORY(&one, &two, sizeof one);
+}
+
+static void bytes_go_on_bit_for_bit(void) {
+    const okid_sample_t kinds[] = {OKID_SAMPLE_DOUBLE, OKID_SAMPLE_INT16, OKID_SAMPLE_INT24, OKID_SAMPLE_INT32};
+    for (int kind = 0; kind < 4; ++kind)
+        for (int mode = 0; mode < 4; ++mode) { // growing, one run, window, forgetting
+            okid_accumulator_config_t config = config_of(kinds[kind]);
+            config.edges = mode != 1 && mode != 2;
+            config.block = mode >= 2 ? 50 : 0;
+            config.slots = mode == 2 ? 4 : 0;
+            config.spare_slots = mode == 2 ? 2 : 0;
+            config.forgetting = mode == 3 ? 0.999 : 1;
+            void *block, *other;
+            okid_accumulator_t* a = make(config, &block);
+            okid_accumulator_set_units(a, (double[]){2, 3, 4, 5}, (double[]){1, 0, -1, 2});
+            TEST_ASSERT_EQUAL(OKID_OK, feed(a, kinds[kind], 0, 200));
+            if (mode != 1) okid_accumulator_gap(a, 3);
+            TEST_ASSERT_EQUAL(OKID_OK, feed(a, kinds[kind], 200, 217));
+            const size_t size = okid_accumulator_serialised_size(a);
+            void* bytes = malloc(size);
+            TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_accumulator_serialise(a, bytes, size - 1));
+            TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(a, bytes, size));
+            okid_accumulator_config_t found;
+            TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_peek(bytes, size, &found));
+            found.buffer = 1; // the reader's own business
+            okid_accumulator_t* b = make(found, &other);
+            TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_deserialise(b, bytes, size));
+            same_bits(a, b);
+            TEST_ASSERT_EQUAL(OKID_OK, feed(a, kinds[kind], 417, N - 417));
+            TEST_ASSERT_EQUAL(OKID_OK, feed(b, kinds[kind], 417, 10));
+            TEST_ASSERT_EQUAL(OKID_OK, feed(b, kinds[kind], 427, N - 427));
+            same_bits(a, b);
+            free(bytes);
+            free(block);
+            free(other);
+        }
+}
+
+static void damaged_bytes_change_nothing(void) {
+    void *block, *other;
+    okid_accumulator_t* a = make(config_of(OKID_SAMPLE_INT16), &block);
+    TEST_ASSERT_EQUAL(OKID_OK, feed(a, OKID_SAMPLE_INT16, 0, N));
+    const size_t size = okid_accumulator_serialised_size(a);
+    unsigned char* bytes = malloc(size);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(a, bytes, size));
+    okid_accumulator_t* b = make(config_of(OKID_SAMPLE_INT16), &other);
+    TEST_ASSERT_EQUAL(OKID_OK, feed(b, OKID_SAMPLE_INT16, 0, 100));
+    const int64_t rows = okid_accumulator_rows(b);
+    for (size_t i = 0; i < size; i += i < 100 ? 1 : 37) {
+        bytes[i] ^= 0x10;
+        TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, okid_accumulator_deserialise(b, bytes, size));
+        bytes[i] ^= 0x10;
+    }
+    for (size_t cut = 0; cut < size; cut += 97)
+        TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, okid_accumulator_deserialise(b, bytes, cut));
+    TEST_ASSERT_EQUAL_INT64(rows, okid_accumulator_rows(b));
+    okid_accumulator_config_t longer = config_of(OKID_SAMPLE_INT16);
+    longer.lags += 1;
+    free(other);
+    b = make(longer, &other);
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_accumulator_deserialise(b, bytes, size));
+    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_accumulator_deserialise(b, NULL, size));
+    free(bytes);
+    free(block);
+    free(other);
+}
+
+static char static_block[OKID_ACCUMULATOR_BYTES(RIG_NU, RIG_NY, P)];
+static char static_codes[OKID_ACCUMULATOR_CODES_BYTES(RIG_NU, RIG_NY, P)];
+
+static void constants_bound_the_memory(void) {
+    for (int n_u = 0; n_u <= 4; ++n_u)
+        for (int n_y = 1; n_y <= 12; ++n_y)
+            for (int p = 1; p <= 64; p += 7) {
+                okid_accumulator_config_t c = {n_u, n_y, p, OKID_SAMPLE_DOUBLE, 0, 0, 1.0, 0, 0, 0, 0, 1};
+                const size_t size = okid_accumulator_memsize(&c), bound = OKID_ACCUMULATOR_BYTES(n_u, n_y, p);
+                TEST_ASSERT_LESS_OR_EQUAL(bound, size);
+                TEST_ASSERT_GREATER_THAN(bound - 160, size); // a bound, not a waste
+                c.sample = OKID_SAMPLE_INT16;
+                TEST_ASSERT_LESS_OR_EQUAL(OKID_ACCUMULATOR_CODES_BYTES(n_u, n_y, p), okid_accumulator_memsize(&c));
+                c.sample = OKID_SAMPLE_INT24;
+                TEST_ASSERT_LESS_OR_EQUAL(OKID_ACCUMULATOR_CODES_BYTES(n_u, n_y, p), okid_accumulator_memsize(&c));
+            }
+    okid_accumulator_t* a;
+    okid_accumulator_config_t c = {RIG_NU, RIG_NY, P, OKID_SAMPLE_DOUBLE, 0, 0, 1.0, 0, 0, 0, 0, 1};
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &c, static_block, sizeof static_block));
+    c.sample = OKID_SAMPLE_INT16;
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &c, static_codes, sizeof static_codes));
+}
+
+/// The state of an unbroken record: at most 1.1 times S, the head and the lag window.
+static void the_state_is_small(void) {
+    const int sizes[3][2] = {{1, 3}, {2, 6}, {3, 10}};
+    for (int k = 0; k < 3; ++k)
+        for (int p = 20; p <= 40; p += 20) {
+            const int n_u = sizes[k][0], n_y = sizes[k][1], m = n_u + n_y, q = n_u + p * m;
+            const okid_accumulator_config_t c = {n_u, n_y, p, OKID_SAMPLE_DOUBLE, 0, 0, 1.0, 0, 0, 0, 0, 1};
+            TEST_ASSERT_LESS_OR_EQUAL(1.1 * 8 * (m * (q + n_y) + 2 * p * m), (double)okid_accumulator_memsize(&c));
+        }
+}
+
+static void the_buffer_changes_no_bit(void) {
+    const int buffers[] = {1, 2, 31, 256, 5000}, cuts[] = {1, 6, 7, 100, N};
+    okid_accumulator_config_t config = config_of(OKID_SAMPLE_DOUBLE);
+    void *block, *other;
+    okid_accumulator_t* whole = make(config, &block);
+    TEST_ASSERT_EQUAL(OKID_OK, feed(whole, OKID_SAMPLE_DOUBLE, 0, N));
+    for (int k = 0; k < 25; ++k) {
+        config.buffer = buffers[k / 5];
+        okid_accumulator_t* a = make(config, &other);
+        for (int n = 0; n < N; n += cuts[k % 5])
+            TEST_ASSERT_EQUAL(OKID_OK, feed(a, OKID_SAMPLE_DOUBLE, n, n + cuts[k % 5] > N ? N - n : cuts[k % 5]));
+        same_bits(whole, a);
+        free(other);
+    }
+    free(block);
+}
+
+static void single_precision_samples_sum_in_double(void) {
+    void *block, *other;
+    float single[N * M];
+    for (int i = 0; i < N * M; ++i) samples[i] = single[i] = (float)samples[i];
+    single[40 * M + 1] = NAN;
+    samples[40 * M + 1] = NAN;
+    okid_accumulator_t *a = make(config_of(OKID_SAMPLE_DOUBLE), &block),
+                       *b = make(config_of(OKID_SAMPLE_DOUBLE), &other);
+    TEST_ASSERT_EQUAL(OKID_WARN_MISSING, okid_accumulator_add(a, samples, N));
+    TEST_ASSERT_EQUAL(OKID_WARN_MISSING, okid_accumulator_add_f32(b, single, N));
+    same_bits(a, b);
+    free(block);
+    free(other);
+}
+
+static void saturated_samples_can_count_as_missing(void) {
+    const okid_sample_t kinds[] = {OKID_SAMPLE_INT16, OKID_SAMPLE_INT24, OKID_SAMPLE_INT32};
+    for (int kind = 0; kind < 3; ++kind) {
+        const int32_t top = kind == 0 ? INT16_MAX : kind == 1 ? (1 << 23) - 1 : INT32_MAX;
+        const int holes[] = {60, 61, 350};
+        okid_accumulator_config_t config = config_of(kinds[kind]);
+        void *block, *other;
+        okid_accumulator_t* told = make(config, &other);
+        config.saturated_missing = 1;
+        okid_accumulator_t* found = make(config, &block);
+        TEST_ASSERT_EQUAL(OKID_OK, feed(told, kinds[kind], 0, 60));
+        okid_accumulator_gap(told, 2);
+        TEST_ASSERT_EQUAL(OKID_OK, feed(told, kinds[kind], 62, 288));
+        okid_accumulator_gap(told, 1);
+        TEST_ASSERT_EQUAL(OKID_OK, feed(told, kinds[kind], 351, N - 351));
+        for (int k = 0; k < 3; ++k) {
+            words[holes[k] * M + k] = (int16_t)(k == 1 ? -top - 1 : top);
+            codes[holes[k] * M + k] = k == 1 ? -top - 1 : top;
+        }
+        TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, feed(found, kinds[kind], 0, N));
+        okid_accumulator_stats_t stats;
+        okid_accumulator_stats(found, &stats);
+        TEST_ASSERT_EQUAL_INT64(3, stats.saturated);
+        TEST_ASSERT_EQUAL_INT64(3, stats.missing);
+        double left[W * W], right[W * W];
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(told, OKID_DETREND_MEAN, left, NULL));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(found, OKID_DETREND_MEAN, right, NULL));
+        TEST_ASSERT_EQUAL_MEMORY(left, right, sizeof left);
+        free(block);
+        free(other);
+        tearDown();
+        setUp();
+    }
+}
+
+/// Gram matrix of rows [first + P, last) less `mean`, added to `gram`.
+static void add_rows(const double* v, int first, int last, const double* mean, double* gram) {
+    for (int n = first + P; n < last; ++n)
+        for (int j = 0; j < W; ++j)
+            for (int i = 0; i < W; ++i)
+                gram[j * W + i] +=
+                    (v[(n - i / M) * M + i % M] - mean[i % M]) * (v[(n - j / M) * M + j % M] - mean[j % M]);
+}
+
+/// Records whose offsets differ: each less its own mean, then merged.
+static void records_are_centred_one_by_one(void) {
+    static double expected[W * W], actual[W * W], first[W * W], v[N * M];
+    const okid_sample_t kinds[] = {OKID_SAMPLE_DOUBLE, OKID_SAMPLE_INT16, OKID_SAMPLE_INT32};
+    const int ends[] = {0, 150, 320, N}, orders[2][3] = {{0, 1, 2}, {2, 0, 1}};
+    for (int kind = 0; kind < 3; ++kind) {
+        for (int i = 0; i < N * M; ++i) { // an offset that moves from record to record
+            const int record = i / M < ends[1] ? 0 : i / M < ends[2] ? 1 : 2;
+            words[i] = (int16_t)(words[i] / 2 + 3000 * (record - 1));
+            codes[i] = words[i] * 60000;
+            samples[i] += 5 * record;
+            v[i] = kind == 0 ? samples[i] : kind == 1 ? words[i] : codes[i];
+        }
+        memset(expected, 0, sizeof expected);
+        for (int r = 0; r < 3; ++r) {
+            double mean[M] = {0};
+            for (int i = (ends[r] + P) * M; i < ends[r + 1] * M; ++i) mean[i % M] += v[i] / (ends[r + 1] - ends[r] - P);
+            add_rows(v, ends[r], ends[r + 1], mean, expected);
+        }
+        for (int order = 0; order < 2; ++order) {
+            void *block, *other;
+            okid_accumulator_t* total = make(config_of(kinds[kind]), &block);
+            for (int k = 0; k < 3; ++k) {
+                const int r = orders[order][k];
+                okid_accumulator_t* record = make(config_of(kinds[kind]), &other);
+                TEST_ASSERT_EQUAL(OKID_OK, feed(record, kinds[kind], ends[r], ends[r + 1] - ends[r]));
+                if (k == 1) TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_accumulator_merge(total, record));
+                TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_centre(record));
+                TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, feed(record, kinds[kind], 0, 1));
+                TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_merge(total, record));
+                free(other);
+            }
+            TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(total, OKID_DETREND_NONE, actual, NULL));
+            double scale = 0;
+            for (int i = 0; i < W * W; ++i) scale = fmax(scale, fabs(expected[i]));
+            const double left = kind == 1 ? 2e-6 : 1e-12; // what 2^-9 of a 16-bit code may leave
+            for (int i = 0; i < W * W; ++i) TEST_ASSERT_DOUBLE_WITHIN(left * scale, expected[i], actual[i]);
+            if (order == 0)
+                memcpy(first, actual, sizeof actual);
+            else if (kind > 0)
+                TEST_ASSERT_EQUAL_MEMORY(first, actual, sizeof actual);
+            free(block);
+        }
+        tearDown();
+        setUp();
+    }
+}
+
+/// S, head, tail and sum of a run give the Gram matrix back.
+static void one_run_is_exported(void) {
+    static double S[M * W], head[P * M], tail[P * M], sum[M], mean[M], same_mean[M], gram[W * W], expected[W * W], g[W];
+    const okid_sample_t kinds[] = {OKID_SAMPLE_DOUBLE, OKID_SAMPLE_INT16, OKID_SAMPLE_INT24};
+    for (int k = 0; k < 12; ++k) { // kind, detrend, window
+        const okid_sample_t kind = kinds[k / 4];
+        const okid_detrend_t detrend = (okid_detrend_t)(k & 1);
+        okid_accumulator_config_t config = config_of(kind);
+        if (k & 2) config.block = 40, config.slots = 5, config.edges = 0;
+        void* block;
+        okid_accumulator_t* a = make(config, &block);
+        okid_accumulator_set_units(a, (double[]){2, 0.5, 1, 3}, (double[]){1, 0, -1, 2});
+        TEST_ASSERT_EQUAL(OKID_ERR_TOO_SHORT, okid_accumulator_run(a, detrend, S, head, tail, sum, mean));
+        TEST_ASSERT_EQUAL(OKID_OK, feed(a, kind, 0, k & 2 ? P + 480 : N));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_run(a, detrend, S, head, tail, sum, mean));
+        const double rows = (double)okid_accumulator_rows(a);
+        for (int j = 0; j < W; ++j) {
+            g[j] = j < M ? sum[j] : g[j - M] + head[j - M] - tail[j - M];
+            for (int i = 0; i <= j; ++i)
+                gram[j * W + i] =
+                    i < M ? S[j * M + i]
+                          : gram[(j - M) * W + i - M] + head[i - M] * head[j - M] - tail[i - M] * tail[j - M];
+        }
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, detrend, expected, same_mean));
+        for (int r = 0; r < M; ++r) TEST_ASSERT_DOUBLE_WITHIN(1e-13 * fabs(mean[r]), same_mean[r], mean[r]);
+        double scale = 0;
+        for (int i = 0; i < W * W; ++i) scale = fmax(scale, fabs(expected[i]));
+        for (int j = 0; j < W; ++j)
+            for (int i = 0; i <= j; ++i)
+                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, expected[j * W + i],
+                                          gram[j * W + i] - (detrend ? g[i] * g[j] / rows : 0));
+        okid_accumulator_gap(a, 1);
+        TEST_ASSERT_EQUAL(OKID_OK, feed(a, kind, 0, 100));
+        TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_accumulator_run(a, detrend, S, head, tail, sum, mean));
+        free(block);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(bytes_go_on_bit_for_bit);
+    RUN_TEST(damaged_bytes_change_nothing);
+    RUN_TEST(constants_bound_the_memory);
+    RUN_TEST(the_state_is_small);
+    RUN_TEST(the_buffer_changes_no_bit);
+    RUN_TEST(single_precision_samples_sum_in_double);
+    RUN_TEST(saturated_samples_can_count_as_missing);
+    RUN_TEST(records_are_centred_one_by_one);
+    RUN_TEST(one_run_is_exported);
+    return UNITY_END();
+}

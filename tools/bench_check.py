@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""Judges the ratios of a bench run (okid.bench/1) against what the kernel promises. usage: bench_check.py FILE.json
+
+Ratios within one run, never times: machines differ and are shared.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+# ratio -> (smallest allowed, what it says)
+PROMISES = {
+    "rls_over_direct_W1_p40": (40.0, "a sample costs so many times less than in textbook RLS"),
+    "rls_over_direct_W2_p40": (80.0, "a sample costs so many times less than in textbook RLS"),
+    "rls_over_direct_W3_p40": (80.0, "a sample costs so many times less than in textbook RLS"),
+    "dgemm_over_direct_W2_p20": (0.5, "of the rate of OpenBLAS dgemm on the same product"),
+    "dgemm_over_direct_W2_p40": (0.5, "of the rate of OpenBLAS dgemm on the same product"),
+    "dgemm_over_direct_W3_p20": (0.5, "of the rate of OpenBLAS dgemm on the same product"),
+    "dgemm_over_direct_W3_p40": (0.5, "of the rate of OpenBLAS dgemm on the same product"),
+    "dgemm_blocks_over_fft_W2_p60": (5.0, "whole record: times faster than OpenBLAS on blocks of 4096"),
+    "dgemm_blocks_over_fft_W3_p50": (5.0, "whole record: times faster than OpenBLAS on blocks of 4096"),
+}
+# ratio -> (largest allowed, what it says); 5 % is what one run of a shared machine cannot tell apart
+LIMITS = {
+    f"direct_i16_over_direct_{case}_p{p}": (1.05, "16-bit codes cost no more than doubles")
+    for case in ("W1", "W2", "W3")
+    for p in (20, 40)
+}
+STATE = 1.1  # state of an unbroken record of doubles over 8 [m (q + n_y) + 2 p m] bytes
+SIZES = {"W1": (1, 3), "W2": (2, 6), "W3": (3, 10)}
+
+
+def main() -> int:
+    if len(sys.argv) != 2:
+        print(__doc__, file=sys.stderr)
+        return 2
+    bench = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    short = 0
+
+    def judge(name: str, value: float, good: bool, bound: str, meaning: str) -> None:
+        nonlocal short
+        short += not good
+        print(f"{'ok   ' if good else 'SHORT'} {name:34} {value:8.2f}  {bound:10} {meaning}")
+
+    for name, (least, meaning) in PROMISES.items():
+        value = float(bench["ratios"][name])
+        judge(name, value, value >= least, f">= {least:g}", meaning)
+    for name, (most, meaning) in LIMITS.items():
+        value = float(bench["ratios"][name])
+        judge(name, value, value <= most, f"<= {most:g}", meaning)
+    for row in bench["rows"]:
+        if row["kernel"] == "direct":
+            n_u, n_y = SIZES[row["case"]]
+            m, p = n_u + n_y, row["p"]
+            value = row["state_bytes"] / (8 * (m * (n_u + p * m + n_y) + 2 * p * m))
+            judge(f"state_{row['case']}_p{p}", value, value <= STATE, f"<= {STATE:g}", "state over its bare numbers")
+    print(f"{short} short" if short else "all promises kept")
+    return 1 if short else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
