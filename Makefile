@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo test test-slow bench bench-check lint format sanitize clean
+.PHONY: help setup build demo test test-slow test-embedded bench bench-check lint format sanitize clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 22
@@ -33,6 +33,10 @@ test-slow: ## the long tiers: more seeds, more frames
 	@cmake --build build -j$(JOBS) -- --quiet
 	@OKID_SLOW=1 tests/run
 
+test-embedded: ## the library on other processors, cross-compiled and run in an emulator
+	@tools/setup.sh embedded
+	@tests/embedded/run
+
 bench: build ## speed of the kernels as ratios within one run
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --save build/bench.json
 
@@ -55,4 +59,4 @@ format: ## rewrite C, C++ and Python in the house style
 	@.venv/bin/ruff format --config tools/pyproject.toml -q tools tests
 
 clean: ## remove build folders (not .venv)
-	@rm -rf build build-sanitize build-coverage build-float
+	@rm -rf build build-sanitize build-coverage build-float build-aarch64

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Installs what okid needs: Debian packages from tools/packages/*.txt and Python packages into .venv.
-# usage: tools/setup.sh [build|test|dev]   (each includes the one before)
+# usage: tools/setup.sh [build|test|dev|embedded]   (dev and embedded include test, test includes build)
 # Idempotent; silent when nothing is missing. Needs root or sudo only when a Debian package is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -9,6 +9,10 @@ tier=${1:-build}
 
 lists=(tools/packages/debian.txt)
 [ "$tier" = build ] || lists+=(tools/packages/debian-test.txt)
+if [ "$tier" = embedded ]; then
+  lists+=(tools/packages/debian-embedded.txt)
+  tier=test # Python needs nothing more
+fi
 
 installed() { [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null)" = installed ]; }
 
