@@ -69,13 +69,14 @@ def test_struck_plane_from_rest(plane: list[np.ndarray], chosen: tuple[int, ...]
     assert result.records == len(chosen)
 
 
-@pytest.mark.parametrize("chosen", [(0,), (1,)], ids=["record 1", "record 2"])
-def test_struck_plane_without_the_silent_past(plane: list[np.ndarray], chosen: tuple[int, ...]) -> None:
-    forces, answers = [plane[k][:, :1] for k in chosen], [plane[k][:, 1:] for k in chosen]
-    result = okid.identify(forces, answers, fs=512.0, start="moving", hold="foh")
-    assert found(result, PLANE_HZ, 0.5) == PLANE_HZ, result.table()
+@pytest.mark.parametrize(("chosen", "clear"), [(0, PLANE_HZ), (1, PLANE_HZ[:-1])], ids=["record 1", "record 2"])
+def test_struck_plane_without_the_silent_past(plane: list[np.ndarray], chosen: int, clear: list[float]) -> None:
+    """The hit is lost (and that is said): in record 2 the mode at 166 Hz is then too weak to hold."""
+    result = okid.identify(plane[chosen][:, :1], plane[chosen][:, 1:], fs=512.0, start="moving", hold="foh")
+    assert set(clear) <= set(found(result, PLANE_HZ, 0.5)), result.table()
     assert len(found(result, PLANE_ALL_HZ, 0.5)) >= 8  # from rest: 11, the hit is then in the sums
     assert result.model.radius() < 1.0
+    assert "hit_at_start" in [w.code for w in result.warnings]
 
 
 def test_a_hit_lost_in_the_first_samples_is_said(plane: list[np.ndarray]) -> None:
