@@ -4,6 +4,7 @@
 #include "config_channel.hpp"
 #include "config_schema.hpp"
 #include "error.hpp"
+#include "method.hpp"
 #include "nearest_name.hpp"
 #include "units.hpp"
 
@@ -191,9 +192,6 @@ void read_identification(const std::string& path, const toml::table& file, live_
     const config_place place{path, "[identification]"};
     const toml::table& t = *table;
     out.method = t["method"].value_or(out.method);
-    if (out.method != "okid-era")
-        refuse_key(place, *t.get("method"), "method",
-                   fmt::format("\"{}\" is not available in this version; okid-era is", out.method));
     out.hold = t["hold"].value_or(out.hold);
     out.detrend = t["detrend"].value_or(out.detrend);
     if (out.detrend == "linear")
@@ -208,17 +206,22 @@ void read_identification(const std::string& path, const toml::table& file, live_
     if (out.window_s && out.forgetting)
         refuse_key(place, *t.get("forgetting"), "forgetting",
                    "window_s is given too; a window and forgetting together are not available, choose one");
-    if (out.window_s && *out.window_s * config.rate_hz < 2.0 * out.p)
+    const bool subspace = is_subspace(method_of(out.method));
+    const int least = subspace ? 2 * (out.rows > 0 ? out.rows : 30) : 2 * out.p;
+    if (out.window_s && *out.window_s * config.rate_hz < least)
         refuse_key(place, *t.get("window_s"), "window_s",
-                   fmt::format("{:g} s are {:.0f} samples at {:g} Hz, expected more than 2 p = {}", *out.window_s,
-                               *out.window_s * config.rate_hz, config.rate_hz, 2 * out.p));
+                   fmt::format("{:g} s are {:.0f} samples at {:g} Hz, expected more than 2 {} = {}", *out.window_s,
+                               *out.window_s * config.rate_hz, config.rate_hz, subspace ? "rows" : "p", least));
     if (out.update_s * config.rate_hz < 1)
         refuse_key(
             place, *t.get("update_s"), "update_s",
             fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
-    if (t["mkr"].value_or(false))
+    out.mkr = t["mkr"].value_or(false);
+    if (out.mkr && config.n_u == 0)
         config.warnings.emplace_back(
-            "[identification] mkr: mass, stiffness and damping matrices are not available in this version");
+            "[identification] mkr: no [[channel]] has the role force, so there is no M, K and R");
+    const std::string fault = out.mkr && config.n_u > 0 && config.n_y > 0 ? plan_fault(live_mass_plan(config)) : "";
+    if (!fault.empty()) refuse_key(place, *t.get("mkr"), "mkr", fault + ". The key \"dof\" of [[channel]] says where");
 }
 
 /// Sections of later versions: checked, then said to do nothing.
@@ -253,10 +256,26 @@ void require_identifiable(const live_config& config) {
         refuse_file(
             config.path,
             "no [[channel]] has the role acceleration, velocity or displacement, expected at least one response");
-    if (config.n_u == 0)
-        refuse_file(config.path,
-                    "no [[channel]] has the role force: identification without a measured force (ambient) is not "
-                    "available in this version");
+    if (config.n_u == 0 && !is_subspace(method_of(config.identification.method)))
+        refuse_file(config.path, fmt::format("no [[channel]] has the role force: {} needs a measured force, an n4sid "
+                                             "method works without one (ambient)",
+                                             config.identification.method));
+}
+
+mass_plan live_mass_plan(const live_config& config) {
+    mass_plan plan;
+    plan.hold = config.identification.hold;
+    if (!config.identification.mkr) return plan;
+    for (std::size_t i = 0; i < config.n_u + config.n_y; ++i) {
+        const channel_config& channel = config.channels[i];
+        mass_channel& one = (i < config.n_u ? plan.inputs : plan.outputs).emplace_back();
+        one.name = channel.name;
+        one.dof = channel.dof;
+        one.sensing = channel.role == channel_role::displacement ? OKID_SENSE_DISPLACEMENT
+                      : channel.role == channel_role::velocity   ? OKID_SENSE_VELOCITY
+                                                                 : OKID_SENSE_ACCELERATION;
+    }
+    return plan;
 }
 
 std::vector<drv_filter_t> wanted_frames(const live_config& config, std::size_t bus) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // CONFIG.toml, read and checked whole before any device is opened.
 #pragma once
+#include "mass_matrices.hpp"
+
 #include <drv/codec.h>
 #include <drv/source.h>
 
@@ -41,9 +43,10 @@ struct channel_config {
 
 struct identification_config {
     std::string method = "okid-era", hold = "zoh", detrend = "mean";
-    int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, order 0 = automatic
+    int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, n4sid 30; order 0 = automatic
     std::optional<double> window_s, forgetting;
     double update_s = 0.5;
+    bool mkr = false; ///< M, K and R with the final result
 };
 
 struct live_config {
@@ -60,8 +63,11 @@ struct live_config {
 /// Read and check. Throws `failure` (exit 2) naming file, line, key, what was found and what was expected.
 live_config load_config(const std::string& path);
 
-/// Throws `failure` (exit 2) unless there is at least one force and one response channel.
+/// Throws `failure` (exit 2) unless there is at least one response channel, and one force for the okid methods.
 void require_identifiable(const live_config& config);
+
+/// Where the channels stand, with SI units; nothing is wanted without `mkr`.
+mass_plan live_mass_plan(const live_config& config);
 
 /// Identifiers a bus must deliver, each once.
 std::vector<drv_filter_t> wanted_frames(const live_config& config, std::size_t bus);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Why no model could be identified, and what to do about it.
 #include "error.hpp"
+#include "method.hpp"
 #include "result.hpp"
 
 #include <fmt/format.h>
@@ -21,13 +22,14 @@ std::string channel_name(int channel, const result_context& context) {
 std::string reason(okid_status_t status, const okid_identified_t& model, const okid_identify_config_t& config,
                    const result_context& context) {
     const okid_observer_info_t& info = model.observer_info;
-    const long long q = config.n_u + static_cast<long long>(config.p) * (config.n_u + config.n_y);
+    const long long q = config.n_u + static_cast<long long>(okid_identify_lags(&config)) * (config.n_u + config.n_y);
+    const std::string horizon = horizon_option(config), option = horizon.substr(0, horizon.find(' '));
     switch (status) {
     case OKID_ERR_TOO_SHORT:
         return fmt::format(
-            "too few samples: {} usable rows, but p {} has {} unknowns per output and needs more than {} rows in "
-            "unbroken stretches (10 times as many are advised). Record longer, lower --p, or mend the gaps",
-            model.regression_rows, config.p, q, q + config.n_y);
+            "too few samples: {} usable rows, but {} has {} unknowns per output and needs more than {} rows in "
+            "unbroken stretches (10 times as many are advised). Record longer, lower {}, or mend the gaps",
+            model.regression_rows, horizon, q, q + config.n_y, option);
     case OKID_ERR_INPUT:
         return fmt::format(
             "{} is constant: it excites nothing. Leave it out of --inputs, or check the force sensor and its wiring",
@@ -44,8 +46,8 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
                 channel_name(info.channel, context));
         return fmt::format(
             "not enough excitation: the inputs cannot be told apart over {} lags (smallest over largest {:.1e}). Use "
-            "independent broad-band forces or lower --p",
-            config.p, info.input_excitation);
+            "independent broad-band forces or lower {}",
+            okid_identify_lags(&config), info.input_excitation, option);
     case OKID_ERR_UNSTABLE:
         return fmt::format(
             "no stable observer: plain least squares has spectral radius {:.6g}, and no ridge of the grid cures it. "
@@ -54,11 +56,11 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
     case OKID_ERR_NO_MODES:
         return fmt::format(
             "no mode that holds (underdamped, below {:g} Hz, EMAC above 0.5) was found: the record shows no vibration "
-            "that answers the inputs. Try another --p or an --order, and check that inputs and outputs are not "
-            "exchanged",
-            context.fs_hz / 2);
+            "that {}. Try another {} or an --order, and check that inputs and outputs are not exchanged",
+            context.fs_hz / 2, config.n_u > 0 ? "answers the inputs" : "lasts", option);
     case OKID_ERR_NUMERIC:
-        return "a factorisation did not converge. Check the record for extreme values; try a smaller --p";
+        return fmt::format("a factorisation did not converge. Check the record for extreme values; try a smaller {}",
+                           option);
     default: return okid_status_text(status);
     }
 }

@@ -2,8 +2,12 @@
 #include "record.hpp"
 
 #include "error.hpp"
+#include "method.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
+#include "record_horizon.hpp"
+
+#include <okid/subspace.h>
 
 #include <algorithm>
 #include <cmath>
@@ -47,84 +51,21 @@ void centre_each(std::vector<record_data>& records, const record_options& option
     }
 }
 
-/// Lengths of the unbroken runs of complete samples.
-std::vector<long long> runs_of(const std::vector<record_data>& records, std::size_t n_u, std::size_t n_y) {
-    std::vector<long long> runs;
-    for (const record_data& record : records) {
-        long long run = 0;
-        for (std::size_t i = 0; i <= record.count; ++i) {
-            bool whole = i < record.count;
-            for (std::size_t k = 0; whole && k < n_u; ++k) whole = !std::isnan(record.u[i * n_u + k]);
-            for (std::size_t k = 0; whole && k < n_y; ++k) whole = !std::isnan(record.y[i * n_y + k]);
-            if (whole) {
-                ++run;
-            } else if (run > 0) {
-                runs.push_back(run);
-                run = 0;
-            }
-        }
-    }
-    return runs;
-}
-
-/// Gaps cost p rows each: the largest p up to `most` whose rows are ten times its unknowns; the best there is otherwise.
-int choose_p_beside_gaps(const std::vector<long long>& runs, int n_u, int n_y, int least, int most) {
-    int best = least;
-    double best_share = 0;
-    for (int p = most; p >= least; --p) {
-        long long rows = 0;
-        for (const long long run : runs) rows += std::max(0LL, run - p);
-        const double share = static_cast<double>(rows) / static_cast<double>(n_u + p * (n_u + n_y));
-        if (share >= 10) return p;
-        if (share > best_share) {
-            best_share = share;
-            best = p;
-        }
-    }
-    return best;
-}
-
-/// p for the samples there are, with the remark when it is smaller than asked for.
-int choose_p(const record_options& options, const std::vector<record_data>& records, long long samples, bool gaps,
-             result_context& context) {
-    const int n_u = static_cast<int>(options.inputs.size()), n_y = static_cast<int>(options.outputs.size());
-    const int least_p = n_y >= 2 ? 1 : 2; // p n_y states: two make the first mode
-    const long long least = 10LL * (n_u + least_p * (n_u + n_y));
-    if (samples < least)
-        throw failure(exit_no_model,
-                      fmt::format("no model: too few samples: {} complete samples, but even the smallest model of {} "
-                                  "inputs and {} outputs needs {} (10 for each unknown). Record longer or use fewer "
-                                  "channels",
-                                  samples, n_u, n_y, least));
-    int p = okid_identify_usable_p(n_u, n_y, options.p, samples);
-    if (gaps) {
-        const auto runs = runs_of(records, options.inputs.size(), options.outputs.size());
-        p = choose_p_beside_gaps(runs, n_u, n_y, std::min(least_p, p), p);
-    }
-    if (p < options.p)
-        context.warnings.emplace_back("p_reduced",
-                                      fmt::format("p is {} instead of {}: {} samples{} bear no more unknowns (10 rows "
-                                                  "for each). Record longer{} for sharper damping",
-                                                  p, options.p, samples, gaps ? " with these gaps" : "",
-                                                  gaps ? " or mend the gaps" : ""));
-    return p;
-}
-
 /// Bytes for one object of the library; refuses before the machine runs out.
-std::unique_ptr<std::byte[]> library_memory(std::size_t bytes, int p) {
+std::unique_ptr<std::byte[]> library_memory(std::size_t bytes, const okid_identify_config_t& config) {
     if (bytes == 0)
-        throw failure(exit_usage, fmt::format("--p {} with these channels, --rows and --order is outside what the "
-                                              "library takes",
-                                              p));
+        throw failure(exit_usage,
+                      fmt::format("{} with these channels, --rows and --order is outside what the library takes",
+                                  horizon_option(config)));
     const double machine = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
     std::unique_ptr<std::byte[]> block(static_cast<double>(bytes) < 0.8 * machine ? new (std::nothrow) std::byte[bytes]
                                                                                   : nullptr);
     if (!block)
         throw failure(
             exit_usage,
-            fmt::format("--p {} with these channels and --rows needs {:.1f} GB of memory, this machine has {:.1f} "
+            fmt::format("{} with these channels and --rows needs {:.1f} GB of memory, this machine has {:.1f} "
                         "GB: lower --p or --rows, or use fewer channels",
-                        p, static_cast<double>(bytes) / 1e9, machine / 1e9));
+                        horizon_option(config), static_cast<double>(bytes) / 1e9, machine / 1e9));
     return block;
 }
 
@@ -132,21 +73,22 @@ void check_status(okid_status_t status, const char* what) {
     if (status < 0) throw failure(exit_no_model, fmt::format("no model: {}: {}", what, okid_status_text(status)));
 }
 
-/// Feed all records, a gap between each two, p samples of silence before each that begins at rest.
+/// Feed all records, a gap between each two, as many samples of silence as lags before each that begins at rest.
 template <class Gap, class Add>
 void feed(const std::vector<record_data>& records, const okid_identify_config_t& config, bool at_rest, Gap gap,
           Add add) {
     const auto n_u = static_cast<std::size_t>(config.n_u), n_y = static_cast<std::size_t>(config.n_y);
     constexpr std::size_t piece = 4096;
     std::vector<double> v(piece * (n_u + n_y));
-    const std::vector<double> silence(at_rest ? static_cast<std::size_t>(config.p) * (n_u + n_y) : 0);
+    const auto lags = static_cast<std::size_t>(okid_identify_lags(&config));
+    const std::vector<double> silence(at_rest ? lags * (n_u + n_y) : 0);
     for (const record_data& record : records) {
         gap();
-        if (at_rest) check_status(add(silence.data(), static_cast<std::size_t>(config.p)), record.path.c_str());
+        if (at_rest) check_status(add(silence.data(), lags), record.path.c_str());
         for (std::size_t first = 0; first < record.count; first += piece) {
             const std::size_t n = std::min(piece, record.count - first);
             for (std::size_t i = 0; i < n; ++i) {
-                std::copy_n(&record.u[(first + i) * n_u], n_u, &v[i * (n_u + n_y)]);
+                std::copy_n(record.u.data() + (first + i) * n_u, n_u, &v[i * (n_u + n_y)]);
                 std::copy_n(&record.y[(first + i) * n_y], n_y, &v[i * (n_u + n_y) + n_u]);
             }
             check_status(add(v.data(), n), record.path.c_str());
@@ -160,12 +102,12 @@ std::unique_ptr<std::byte[]> accumulate(const std::vector<record_data>& records,
     okid_accumulator_config_t shape{};
     shape.n_u = config.n_u;
     shape.n_y = config.n_y;
-    shape.lags = config.p;
+    shape.lags = okid_identify_lags(&config);
     shape.sample = OKID_SAMPLE_DOUBLE;
     shape.forgetting = 1;
     shape.edges = 1;
     const std::size_t bytes = okid_accumulator_memsize(&shape);
-    auto block = library_memory(bytes, config.p);
+    auto block = library_memory(bytes, config);
     check_status(okid_accumulator_create(&accumulator, &shape, block.get(), bytes), "accumulator");
     feed(
         records, config, at_rest, [&] { okid_accumulator_gap(accumulator, 0); },
@@ -182,10 +124,10 @@ okid_status_t refine_by_factor(const std::vector<record_data>& records, const ok
     okid_square_root_config_t shape{};
     shape.n_u = config.n_u;
     shape.n_y = config.n_y;
-    shape.lags = config.p;
+    shape.lags = okid_identify_lags(&config);
     shape.forgetting = 1;
     const std::size_t bytes = okid_square_root_memsize(&shape);
-    const auto block = library_memory(bytes, config.p);
+    const auto block = library_memory(bytes, config);
     okid_square_root_t* square_root = nullptr;
     check_status(okid_square_root_create(&square_root, &shape, block.get(), bytes), "QR factor");
     feed(
@@ -202,6 +144,37 @@ okid_status_t refine_by_factor(const std::vector<record_data>& records, const ok
     result.context.warnings.emplace_back(
         "qr_factor", "nearly noise-free data: solved from the QR factor of the record, not from its Gram matrix");
     return found;
+}
+
+/// B and D of a subspace model that make the simulated outputs fit the records best. Where that fails, those of the
+/// subspace equations stay.
+void fit_inputs(const std::vector<record_data>& records, okid_identify_t* identifier, record_result& result) {
+    okid_identified_t& model = result.model;
+    const auto n_u = static_cast<std::size_t>(model.n_u), n_y = static_cast<std::size_t>(model.n_y), m = n_u + n_y;
+    std::vector<std::int32_t> counts;
+    std::vector<double> samples, B(n_u * static_cast<std::size_t>(model.n_z)), D(n_u * n_y);
+    for (const record_data& record : records) {
+        counts.push_back(static_cast<std::int32_t>(record.count));
+        const std::size_t first = samples.size();
+        samples.resize(first + record.count * m);
+        for (std::size_t n = 0; n < record.count; ++n) {
+            std::copy_n(record.u.data() + n * n_u, n_u, &samples[first + n * m]);
+            std::copy_n(record.y.data() + n * n_y, n_y, &samples[first + n * m + n_u]);
+        }
+    }
+    const auto count = static_cast<std::int32_t>(records.size());
+    const std::size_t bytes = okid_subspace_output_error_memsize(model.n_u, model.n_y, model.n_z, count);
+    std::vector<std::byte> work(bytes);
+    okid_status_t status = OKID_ERR_DIM;
+    if (bytes > 0)
+        status = okid_subspace_output_error(model.n_u, model.n_y, model.n_z, model.A, model.C, count, counts.data(),
+                                            samples.data(), B.data(), D.data(), nullptr, work.data(), bytes);
+    if (status >= 0) status = okid_identify_set_inputs(identifier, B.data(), D.data(), &model);
+    if (status < 0)
+        result.context.warnings.emplace_back(
+            "inputs_from_subspace",
+            fmt::format("B and D could not be fitted to the record ({}): they are those of the subspace equations",
+                        okid_status_text(status)));
 }
 
 result_context describe(const std::vector<record_data>& records, const record_options& options,
@@ -240,7 +213,7 @@ record_data split_record(const csv_record& record, std::size_t n_u, std::size_t 
     out.y.resize(out.count * n_y);
     for (std::size_t n = 0; n < out.count; ++n) {
         const double* sample = &record.samples[(first + n) * m];
-        std::copy_n(sample, n_u, &out.u[n * n_u]);
+        std::copy_n(sample, n_u, out.u.data() + n * n_u);
         std::copy_n(sample + n_u, n_y, &out.y[n * n_y]);
     }
     return out;
@@ -280,20 +253,20 @@ record_result identify_records(std::vector<record_data> records, const record_op
     okid_identify_config_t config{};
     config.n_u = static_cast<std::int32_t>(options.inputs.size());
     config.n_y = static_cast<std::int32_t>(options.outputs.size());
-    config.p = choose_p(options, records, total - missing.samples, missing.samples > 0, result.context);
-    config.rows = options.rows;
+    config.method = method_of(options.method);
+    choose_horizon(options, records, total - missing.samples, missing.samples > 0, config, result.context);
     config.order = options.order;
     config.fs_hz = options.fs_hz;
-    config.method = OKID_METHOD_OKID_ERA;
     config.detrend = options.detrend == "mean" && !at_rest ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
-    if (!at_rest) remark_early_hit(records, config.n_u, config.p, result.context);
+    if (!at_rest)
+        remark_early_hit(records, config.n_u, is_subspace(config.method) ? config.rows : config.p, result.context);
 
     tell(options, "summing lagged products");
     okid_accumulator_t* accumulator = nullptr;
     const auto sums = accumulate(records, config, at_rest, accumulator);
     tell(options, "identifying");
     const std::size_t bytes = okid_identify_memsize(&config);
-    result.memory = library_memory(bytes, config.p);
+    result.memory = library_memory(bytes, config);
     okid_identify_t* identifier = nullptr;
     check_status(okid_identify_create(&identifier, &config, result.memory.get(), bytes), "identifier");
     okid_status_t status = okid_identify_run(identifier, accumulator, &result.model);
@@ -302,8 +275,12 @@ record_result identify_records(std::vector<record_data> records, const record_op
     tell(options, "simulating the model");
     if (options.detrend == "mean" && !own_means_first)
         centre_each(records, options); // the fit is about the record's mean
+    if (is_subspace(config.method) && config.n_u > 0) fit_inputs(records, identifier, result);
     fit_records(records, result);
     check_explains(result.context);
+    remarks& said = result.context.warnings;
+    said.insert(said.end(), options.said.begin(), options.said.end());
+    if (options.mass.wanted()) result.context.mass = find_mass_matrices(result.model, options.mass, said);
     return result;
 }
 

@@ -22,10 +22,13 @@ struct record_data {
 struct record_options {
     std::vector<std::string> inputs, outputs;
     double fs_hz = 0;
-    int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, order 0 = automatic
+    int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, n4sid 30; order 0 = automatic
+    bool p_given = false;
     std::string method = "okid-era", hold = "zoh", detrend = "mean";
     std::string start =
-        "moving"; ///< "rest": each record begins before the structure was struck, its silent past is used
+        "moving";   ///< "rest": each record begins before the structure was struck, its silent past is used
+    mass_plan mass; ///< where the channels stand, when M, K and R are wanted
+    remarks said;   ///< known before the data are seen
     std::function<void(const char* stage)> stage; ///< told what begins; may be empty
 };
 

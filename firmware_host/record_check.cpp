@@ -54,7 +54,7 @@ missing_count count_missing(const std::vector<record_data>& records, std::size_t
         bool in_gap = false;
         for (std::size_t n = 0; n < record.count; ++n) {
             const auto nan = [](double x) { return std::isnan(x); };
-            const bool gone = std::any_of(&record.u[n * n_u], &record.u[n * n_u] + n_u, nan) ||
+            const bool gone = std::any_of(record.u.data() + n * n_u, record.u.data() + (n + 1) * n_u, nan) ||
                               std::any_of(&record.y[n * n_y], &record.y[n * n_y] + n_y, nan);
             out.samples += gone;
             out.gaps += gone && !in_gap;
@@ -104,6 +104,7 @@ void check_not_a_line(const record_data& record, const record_data& before, cons
 
 void check_different_inputs(const std::vector<record_data>& records, const record_options& options) {
     const auto n_u = static_cast<Eigen::Index>(options.inputs.size());
+    if (n_u == 0) return;
     Eigen::MatrixXd left = input_correlation(records, n_u);
     for (Eigen::Index k = 0; k < n_u; ++k) { // what is left of an input after the earlier ones explain what they can
         if (left(k, k) < 1e-10)

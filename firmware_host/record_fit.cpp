@@ -97,6 +97,22 @@ struct fit_run {
     }
 };
 
+/// Without inputs there is nothing to simulate: prediction from rest.
+void fit_ambient(const std::vector<record_data>& records, fit_run& run, result_context& context) {
+    const std::vector<double> rest(static_cast<std::size_t>(run.model.n_z));
+    for (const record_data& record : records) {
+        if (!run.predict) break;
+        std::vector<double> estimate(record.y.size());
+        if (okid_model_predict(&run.model, record.y.data(), record.y.data(), record.count, rest.data(), estimate.data(),
+                               run.work.data()) < 0)
+            std::fill(estimate.begin(), estimate.end(), std::numeric_limits<double>::quiet_NaN());
+        pool(record.y.data(), estimate, static_cast<std::size_t>(run.model.n_y), run.predicted);
+    }
+    context.prediction_percent =
+        run.predict ? percent(run.predicted)
+                    : std::vector<double>(run.predicted.size(), std::numeric_limits<double>::quiet_NaN());
+}
+
 } // namespace
 
 void fit_records(const std::vector<record_data>& records, record_result& result) {
@@ -110,6 +126,7 @@ void fit_records(const std::vector<record_data>& records, record_result& result)
                 std::vector<double>(okid_model_workspace(&model)),
                 std::vector<output_sums>(n_y),
                 std::vector<output_sums>(n_y)};
+    if (found.n_u == 0) return fit_ambient(records, run, result.context);
     const std::size_t least = std::max<std::size_t>(20, 2 * static_cast<std::size_t>(found.n_z));
     std::vector<std::vector<double>> states;
     for (const record_data& record : records) {

@@ -2,6 +2,7 @@
 #include "result.hpp"
 
 #include "error.hpp"
+#include "method.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -62,7 +63,8 @@ std::string counted(long long count, const char* noun) {
 
 std::string note_text(const okid_identified_t& model, std::uint32_t bit) {
     const okid_observer_info_t& info = model.observer_info;
-    const long long q = model.n_u + static_cast<long long>(model.p) * (model.n_u + model.n_y);
+    const auto kind = model.observer ? OKID_METHOD_OKID_ERA : OKID_METHOD_N4SID_MOESP;
+    const long long q = unknowns_of(kind, model.n_u, model.n_y, model.p);
     switch (bit) {
     case OKID_NOTE_ARX_STABILISED:
         return fmt::format(
@@ -196,6 +198,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["modes"] = modes_json(model);
     out["fit"]["simulation_percent"] = percent_json(context.simulation_percent, context.outputs);
     out["fit"]["prediction_percent"] = percent_json(context.prediction_percent, context.outputs);
+    if (context.mass) put_mass_json(*context.mass, out);
     out["warnings"] = ordered_json::array();
     for (const auto& [code, text] : result_warnings(model, context))
         out["warnings"].push_back(ordered_json{{"code", code}, {"text", text}});
@@ -208,9 +211,10 @@ std::string result_table(const okid_identified_t& model, const result_context& c
                     counted(model.n_y, "output"), counted(context.samples, "sample"), context.fs_hz,
                     static_cast<double>(context.samples) / context.fs_hz, counted(context.records, "record"));
     if (context.gaps) out += ", " + counted(context.gaps, "gap");
-    out +=
-        fmt::format("\np {}, {} block rows, order {}, detrend {}\n\n", model.p, model.rows, model.n_z, context.detrend);
+    out += fmt::format("\n{}{} block rows, order {}, detrend {}\n\n",
+                       model.observer ? fmt::format("p {}, ", model.p) : "", model.rows, model.n_z, context.detrend);
     out += mode_rows(model, context) + fit_text(context);
+    if (context.mass) out += mass_text(*context.mass);
     const auto warnings = result_warnings(model, context);
     if (!warnings.empty()) out += "\n";
     for (const auto& [code, text] : warnings) out += fmt::format("remark {}: {}\n", code, text);

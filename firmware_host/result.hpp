@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // An identified model as people and programs see it: okid.result/1 and the modal table.
 #pragma once
+#include "mass_matrices.hpp"
+
 #include <okid/identify.h>
 
 #include <nlohmann/json.hpp>
@@ -22,6 +24,7 @@ struct result_context {
     std::optional<std::vector<std::vector<double>>> x0;        ///< one initial state per record; absent live (null)
     std::optional<std::vector<double>> simulation_percent;     ///< per output; absent live (null)
     std::optional<std::vector<double>> prediction_percent;     ///< per output; absent = null
+    std::optional<mass_matrices> mass;                         ///< M, K, R where the channels have degrees of freedom
     std::vector<std::pair<std::string, std::string>> warnings; ///< further (code, text)
 };
 

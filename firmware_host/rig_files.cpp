@@ -3,6 +3,7 @@
 
 #include "rig_frames.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <fmt/format.h>
 #include <iterator>
@@ -49,6 +50,20 @@ std::string quoted(const std::string& text) {
             out += c;
     }
     return out + "\"";
+}
+
+/// Does every mass have a force or a sensor, and one both?
+bool mass_is_seen(const rig& rig) {
+    const auto in = [](const std::vector<int>& dofs, int dof) {
+        return std::find(dofs.begin(), dofs.end(), dof) != dofs.end();
+    };
+    bool pair = false;
+    for (int dof = 1; dof <= static_cast<int>(rig.body.M.rows()); ++dof) {
+        const bool force = in(rig.force_dofs, dof), sensor = in(rig.sense_dofs, dof);
+        if (!force && !sensor) return false;
+        pair = pair || (force && sensor);
+    }
+    return pair;
 }
 
 } // namespace
@@ -111,8 +126,8 @@ std::string rig_config(const rig& rig, const rig_run& run, const std::string& db
     fmt::format_to(text,
                    "\n[identification]\nmethod = \"okid-era\"\np = 40\nrows = 80\norder = \"auto\"\nhold = "
                    "\"{}\"\ndetrend = \"mean\"\n"
-                   "update_s = 1.0\n",
-                   rig.hold);
+                   "update_s = 1.0\nmkr = {}\n",
+                   rig.hold, mass_is_seen(rig));
     return out;
 }
 

@@ -15,6 +15,7 @@ constexpr unit_rule rules[] = {
     {"N m", 1, "Nm"},
     {"m/s^2", 1, "m/s^2"},
     {"m/s2", 1, "m/s^2"},
+    {"mps2", 1, "m/s^2"},
     {"m/s\u00b2", 1, "m/s^2"},
     {"mm/s^2", 1e-3, "m/s^2"},
     {"cm/s^2", 1e-2, "m/s^2"},

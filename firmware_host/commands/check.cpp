@@ -2,6 +2,7 @@
 // okid check: is a CONFIG.toml right? Opens no device.
 #include "../config.hpp"
 #include "../live/identifier.hpp"
+#include "../method.hpp"
 #include "../result.hpp"
 #include "commands.hpp"
 
@@ -72,8 +73,13 @@ std::string summary(const live_config& config, bool exact) {
     }
     out += fmt::format("\n{:g} Hz, {} force and {} response channel{}{}\n", config.rate_hz, config.n_u, config.n_y,
                        config.n_y == 1 ? "" : "s", exact ? ", 16-bit codes summed exactly" : "");
-    out += fmt::format("{}, p {}, {} block rows, an update each {:g} s, memory: {}\n", id.method, id.p,
-                       id.rows ? id.rows : 2 * id.p, id.update_s, memory_text(config));
+    const bool subspace = is_subspace(method_of(id.method));
+    out += fmt::format("{}, {}{} block rows, an update each {:g} s, memory: {}\n", id.method,
+                       subspace ? "" : fmt::format("p {}, ", id.p),
+                       id.rows    ? id.rows
+                       : subspace ? 30
+                                  : 2 * id.p,
+                       id.update_s, memory_text(config));
     for (const std::string& text : config.warnings) out += fmt::format("remark: {}\n", text);
     return out;
 }

@@ -5,6 +5,7 @@
 #include "../csv_header.hpp"
 #include "../error.hpp"
 #include "../mat_file.hpp"
+#include "../method.hpp"
 #include "../nearest_name.hpp"
 #include "../progress.hpp"
 #include "../record.hpp"
@@ -24,7 +25,7 @@ struct identify_arguments {
     std::vector<std::string> records;
     std::string inputs, outputs, method = "okid-era", order = "auto", hold = "zoh", detrend = "mean", start = "moving";
     std::string sensing = "acceleration", input_dofs, output_dofs, range, json, model;
-    std::string fs, p = "40", rows;
+    std::string fs, p, rows;
     bool refine = false, quiet = false;
 };
 
@@ -45,16 +46,8 @@ long long whole_number(const std::string& option, const std::string& text, long 
     return value;
 }
 
-void check_method(const std::string& method) {
-    one_of("--method", method, {"okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"});
-    if (method != "okid-era") usage(fmt::format("--method {} is not available in this version; okid-era is", method));
-}
-
 void check_not_available(const identify_arguments& given) {
     if (given.refine) usage("--refine (maximum likelihood) is not available in this version");
-    if (!given.input_dofs.empty() || !given.output_dofs.empty())
-        usage(
-            "--input-dofs and --output-dofs (mass, stiffness and damping matrices) are not available in this version");
 }
 
 /// The inputs and outputs, checked; names the columns there are when none were chosen.
@@ -63,12 +56,11 @@ void choose_channels(const identify_arguments& given, record_options& options) {
     if (given.outputs.empty())
         usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}",
                           given.records.front(), columns()));
-    if (given.inputs.empty())
-        usage(fmt::format(
-            "--inputs is missing, and identification without a measured force (ambient) is not available in this "
-            "version; {} has: {}",
-            given.records.front(), columns()));
-    options.inputs = split_names("--inputs", given.inputs);
+    if (given.inputs.empty() && !is_subspace(method_of(given.method)))
+        usage(fmt::format("--inputs is missing: {} needs a measured force, an n4sid method takes records without one "
+                          "(ambient); {} has: {}",
+                          given.method, given.records.front(), columns()));
+    if (!given.inputs.empty()) options.inputs = split_names("--inputs", given.inputs);
     options.outputs = split_names("--outputs", given.outputs);
     for (const std::string& name : options.outputs)
         if (std::find(options.inputs.begin(), options.inputs.end(), name) != options.inputs.end())
@@ -79,7 +71,8 @@ void choose_channels(const identify_arguments& given, record_options& options) {
                           options.inputs.size() + options.outputs.size()));
 }
 
-void check_sensing(const std::string& sensing, std::size_t outputs) {
+/// One kind for each output.
+std::vector<int> check_sensing(const std::string& sensing, std::size_t outputs) {
     std::vector<std::string> kinds;
     for (std::size_t at = 0; at <= sensing.size();) {
         const std::size_t comma = std::min(sensing.find(',', at), sensing.size());
@@ -90,16 +83,38 @@ void check_sensing(const std::string& sensing, std::size_t outputs) {
     if (kinds.size() != 1 && kinds.size() != outputs)
         usage(fmt::format("--sensing: found {} kinds for {} outputs, expected one for all or one for each",
                           kinds.size(), outputs));
+    std::vector<int> out;
+    for (std::size_t i = 0; i < outputs; ++i) out.push_back(sensing_of(kinds[kinds.size() == 1 ? 0 : i]));
+    return out;
+}
+
+/// The degrees of freedom of the channels, when any are given.
+mass_plan check_dofs(const identify_arguments& given, const record_options& options, const std::vector<int>& sensing) {
+    mass_plan plan;
+    if (given.input_dofs.empty() && given.output_dofs.empty()) return plan;
+    for (const auto& [option, other, list] : {std::tuple{"--input-dofs", "--output-dofs", &given.input_dofs},
+                                              std::tuple{"--output-dofs", "--input-dofs", &given.output_dofs}})
+        if (list->empty()) usage(fmt::format("{} is missing: {} is given, M, K and R need both", option, other));
+    for (const std::string& name : options.inputs) plan.inputs.emplace_back().name = name;
+    for (const std::string& name : options.outputs) plan.outputs.emplace_back().name = name;
+    for (std::size_t i = 0; i < sensing.size(); ++i) plan.outputs[i].sensing = sensing[i];
+    plan.hold = options.hold;
+    read_dofs("--input-dofs", given.input_dofs, "input", plan.inputs);
+    read_dofs("--output-dofs", given.output_dofs, "output", plan.outputs);
+    if (const std::string fault = plan_fault(plan); !fault.empty())
+        usage(fmt::format("--input-dofs, --output-dofs: {}", fault));
+    return plan;
 }
 
 record_options check_options(const identify_arguments& given) {
     record_options options;
-    check_method(given.method);
+    one_of("--method", given.method, method_names());
     check_not_available(given);
     one_of("--hold", given.hold, {"zoh", "foh"});
     one_of("--detrend", given.detrend, {"none", "mean", "linear"});
     one_of("--start", given.start, {"moving", "rest"});
-    options.p = static_cast<int>(whole_number("--p", given.p, 1, 4096));
+    options.p_given = !given.p.empty();
+    if (options.p_given) options.p = static_cast<int>(whole_number("--p", given.p, 1, 4096));
     if (!given.rows.empty()) options.rows = static_cast<int>(whole_number("--rows", given.rows, 2, 100000));
     if (given.order != "auto") {
         if (given.order.empty() || given.order[0] < '0' || given.order[0] > '9')
@@ -111,7 +126,7 @@ record_options check_options(const identify_arguments& given) {
     options.detrend = given.detrend;
     options.start = given.start;
     choose_channels(given, options);
-    check_sensing(given.sensing, options.outputs.size());
+    options.mass = check_dofs(given, options, check_sensing(given.sensing, options.outputs.size()));
     return options;
 }
 
@@ -162,12 +177,20 @@ std::vector<record_data> read_records(const identify_arguments& given, record_op
     request.columns.insert(request.columns.end(), options.outputs.begin(), options.outputs.end());
     request.fs_hz = check_rate(given.fs);
     std::vector<record_data> records;
+    std::vector<std::string> units;
     for (const std::string& path : given.records) {
         request.progress = [&](double megabytes) {
             display.stage(fmt::format("reading {}, {:.0f} MB", path, megabytes));
         };
         const csv_record record = read_csv(path, request);
-        if (records.empty()) options.fs_hz = record.fs_hz;
+        if (records.empty()) {
+            options.fs_hz = record.fs_hz;
+            units = record.units;
+            if (options.mass.wanted()) take_units(units, options.mass, options.said);
+        }
+        if (options.mass.wanted() && record.units != units)
+            usage(fmt::format("{}: the units in the header are not those of {}, expected the same for M, K and R", path,
+                              given.records.front()));
         if (std::abs(record.fs_hz - options.fs_hz) > 1e-6 * options.fs_hz)
             usage(fmt::format(
                 "{}: found a sample rate of {} Hz, expected {} Hz as in {}: only records of one rate can be merged",
@@ -212,12 +235,17 @@ void add_identify(CLI::App& app) {
     command->add_option("records", given->records, "CSV records of one structure, merged exactly")
         ->required()
         ->type_name("RECORD.csv");
-    command->add_option("--inputs", given->inputs, "force columns, with commas between")->type_name("NAMES");
+    command->add_option("--inputs", given->inputs, "force columns, with commas between; none = ambient, n4sid")
+        ->type_name("NAMES");
     command->add_option("--outputs", given->outputs, "response columns, with commas between")->type_name("NAMES");
     command->add_option("--fs", given->fs, "sample rate; default: what the file says")->type_name("HZ");
-    command->add_option("--method", given->method, "okid-era (default)")->type_name("NAME");
-    command->add_option("--p", given->p, "observer order in samples (default 40)")->type_name("N");
-    command->add_option("--rows", given->rows, "block rows of the Hankel matrix (default 2 p)")->type_name("N");
+    command
+        ->add_option("--method", given->method,
+                     "okid-era (default), okid-era-dc, n4sid-moesp, n4sid-cva or n4sid-ssarx")
+        ->type_name("NAME");
+    command->add_option("--p", given->p, "observer order in samples (default 40; not for n4sid)")->type_name("N");
+    command->add_option("--rows", given->rows, "block rows of the Hankel matrix (default 2 p, n4sid 30)")
+        ->type_name("N");
     command->add_option("--order", given->order, "number of states, or auto (default)")->type_name("N");
     command->add_option("--hold", given->hold, "force between samples: zoh (default) or foh")->type_name("KIND");
     command->add_option("--detrend", given->detrend, "none, mean (default) or linear")->type_name("KIND");
@@ -231,8 +259,15 @@ void add_identify(CLI::App& app) {
         ->add_option("--sensing", given->sensing,
                      "acceleration (default), velocity, displacement; one, or one per output")
         ->type_name("KIND");
-    command->add_option("--input-dofs", given->input_dofs, "not available in this version")->type_name("LIST");
-    command->add_option("--output-dofs", given->output_dofs, "not available in this version")->type_name("LIST");
+    command
+        ->add_option("--input-dofs", given->input_dofs,
+                     "where each force acts: numbers of degrees of freedom from 1 (-3: at 3, polarity reversed). With "
+                     "--output-dofs: mass, stiffness and damping matrices")
+        ->type_name("LIST");
+    command
+        ->add_option("--output-dofs", given->output_dofs,
+                     "where each sensor stands; every degree of freedom needs a force or a sensor, one needs both")
+        ->type_name("LIST");
     command->add_flag("--refine", given->refine, "not available in this version");
     command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")
         ->type_name("A:B");
@@ -240,8 +275,10 @@ void add_identify(CLI::App& app) {
     command->add_option("--model", given->model, "write A, B, C, D, K, dt as a MAT file for scipy")
         ->type_name("FILE.mat");
     command->add_flag("--quiet", given->quiet, "no table, no progress");
-    command->footer("Example:\n  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --json result.json\n"
-                    "A CSV has a line of column names, numbers below, and \"# fs_hz: 1024\" above (or use --fs).");
+    command->footer(
+        "Examples:\n  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --json result.json\n"
+        "  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --input-dofs 1 --output-dofs 1,2,3\n"
+        "A CSV has a line of column names, numbers below, and \"# fs_hz: 1024\" above (or use --fs).");
     command->callback([given] { identify(*given); });
 }
 

@@ -2,6 +2,7 @@
 #include "identifier.hpp"
 
 #include "../error.hpp"
+#include "../method.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -47,8 +48,8 @@ identifier::identifier(const live_config& config) : m_(config.n_u + config.n_y),
         codes_.resize(chunk * m_);
     else
         doubles_.resize(chunk * m_);
-    create_accumulator(config);
     create_identifier(config);
+    create_accumulator(config);
 }
 
 /// The window moves in whole blocks: about a twentieth of it, or one update where that is finer.
@@ -58,7 +59,7 @@ void identifier::create_accumulator(const live_config& config) {
     okid_accumulator_config_t a{};
     a.n_u = static_cast<std::int32_t>(config.n_u);
     a.n_y = static_cast<std::int32_t>(config.n_y);
-    a.lags = wanted.p;
+    a.lags = okid_identify_lags(&identify_config_);
     a.sample = exact_ ? OKID_SAMPLE_INT16 : OKID_SAMPLE_DOUBLE;
     a.forgetting = wanted.forgetting.value_or(1.0);
     a.edges = 1;
@@ -93,9 +94,9 @@ void identifier::create_identifier(const live_config& config) {
     c.rows = wanted.rows;
     c.order = wanted.order;
     c.fs_hz = config.rate_hz;
-    c.method = OKID_METHOD_OKID_ERA;
+    c.method = method_of(wanted.method);
     c.detrend = wanted.detrend == "none" ? OKID_DETREND_NONE : OKID_DETREND_MEAN;
-    q_ = c.n_u + std::int64_t{c.p} * (c.n_u + c.n_y);
+    q_ = c.n_u + std::int64_t{okid_identify_lags(&c)} * (c.n_u + c.n_y);
     const std::size_t bytes = okid_identify_memsize(&c);
     identify_block_ = allocate(config, bytes, "the identification");
     if (okid_identify_create(&identify_, &c, identify_block_.get(), bytes) != OKID_OK)

@@ -28,7 +28,7 @@ class identifier {
     const okid_identify_config_t& config() const { return identify_config_; }
 
     bool exact() const { return exact_; }        ///< 16-bit codes, summed exactly
-    std::int64_t unknowns() const { return q_; } ///< regressors q = n_u + p m
+    std::int64_t unknowns() const { return q_; } ///< regressors q = n_u + lags m
     std::int64_t rows();                         ///< regression rows now in the sums
     std::int64_t basis();                        ///< samples the model rests on
     okid_accumulator_stats_t stats();

@@ -234,6 +234,21 @@ void session::remark_rate() const {
         observed_hz, config_.rate_hz, config_.path);
 }
 
+/// M, K and R where the config asks for them; what stands in their way is no reason to lose the modes.
+void session::add_mass(result_context& about) const {
+    const mass_plan plan = live_mass_plan(config_);
+    if (!plan.wanted()) return;
+    for (const channel_config& channel : config_.channels)
+        if (channel.dof > 0 && channel.role != channel_role::aux && channel.unit == "g")
+            about.warnings.emplace_back(
+                "unit_converted", fmt::format("\"{}\" is in g: all numbers of it are in m/s^2 here", channel.name));
+    try {
+        about.mass = find_mass_matrices(identifier_.model(), plan, about.warnings);
+    } catch (const failure& why) {
+        about.warnings.emplace_back("mkr_failed", why.what());
+    }
+}
+
 void session::finish() {
     grid_.finish();
     start(std::int64_t{std::time(nullptr)} * 1000000000); // nothing was heard at all
@@ -241,9 +256,10 @@ void session::finish() {
     write_stats();
     view_.end();
     check_heard();
-    const result_context about = context();
+    result_context about = context();
     remark_rate();
     if (status < 0) throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
+    add_mass(about);
     const ordered_json result = result_json(identifier_.model(), about);
     events_.write({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
     if (!options_.json.empty())

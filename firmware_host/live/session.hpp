@@ -50,6 +50,7 @@ class session : private grid_sink {
     void check_heard() const;
     nlohmann::ordered_json bus_stats(std::size_t bus) const;
     result_context context();
+    void add_mass(result_context& about) const;
     double observed_rate_hz() const;
     void remark_rate() const;
     double seconds(std::int64_t samples) const { return static_cast<double>(samples) / config_.rate_hz; }

@@ -489,9 +489,9 @@ def test_repeated_input_is_not_enough_excitation(tmp_path: Path) -> None:
         (["--range", "500:100"], ("--range",)),
         (["--range", "0:601"], ("--range", "601")),
         (["--method", "magic"], ("--method", "okid-era")),
-        (["--method", "n4sid-cva"], ("n4sid-cva", "not available in this version")),
+        (["--method", "n4sid-cvo"], ("n4sid-cvo", 'did you mean "n4sid-cva"?')),
         (["--refine"], ("not available in this version",)),
-        (["--input-dofs", "1"], ("not available in this version",)),
+        (["--input-dofs", "1"], ("--output-dofs is missing",)),
         (["--outputs", "y1,u1"], ("--inputs and in --outputs",)),
         (["--outputs", "y1,y1"], ("--outputs", "twice")),
         (["--outputs", "y1,,y2"], ("--outputs", "empty name")),
@@ -519,7 +519,7 @@ def test_no_channels_named(record: Path) -> None:
         okid("identify", record, "--outputs", "y1"),
         2,
         "ambient",
-        "not available in this version",
+        "okid-era needs a measured force",
     )
 
 

@@ -13,6 +13,7 @@ from okid.accumulator import Accumulator, Stats
 from okid.demo import demo
 from okid.identifier import Identified, Identifier, usable_p
 from okid.identify import identify
+from okid.mkr import MassMatrices, ProportionalDamping
 from okid.model import Model
 from okid.records import read_csv
 from okid.result import Fit, Mode, Result
@@ -27,9 +28,11 @@ __all__ = [
     "Identified",
     "Identifier",
     "InputError",
+    "MassMatrices",
     "Mode",
     "Model",
     "OrderPoles",
+    "ProportionalDamping",
     "Result",
     "SquareRoot",
     "Stats",

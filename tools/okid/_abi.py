@@ -26,7 +26,8 @@ ERR_TOO_SHORT, ERR_INPUT, ERR_OUTPUT, ERR_EXCITATION = -6, -7, -8, -9
 ERR_NUMERIC, ERR_UNSTABLE, ERR_NO_MODES, ERR_FORMAT = -10, -11, -12, -13
 SAMPLE_DOUBLE, SAMPLE_INT16, SAMPLE_INT24, SAMPLE_INT32 = 0, 1, 2, 3
 DETREND_NONE, DETREND_MEAN = 0, 1
-METHOD_OKID_ERA = 0
+METHOD_OKID_ERA, METHOD_OKID_ERA_DC = 0, 1
+METHOD_N4SID_MOESP, METHOD_N4SID_CVA, METHOD_N4SID_SSARX = 2, 3, 4
 SOLVER_DENSE, SOLVER_STRUCTURED = 0, 1
 SUBSPACE_MOESP, SUBSPACE_CVA, SUBSPACE_SSARX = 0, 1, 2
 NOTE_ARX_STABILISED = 1 << 0
@@ -83,7 +84,7 @@ class AccumulatorStats(Structure):
 class EraConfig(Structure):
     """okid_era_config_t."""
 
-    _fields_ = [(name, c_int32) for name in ("n_u", "n_y", "rows", "cols")]
+    _fields_ = [(name, c_int32) for name in ("n_u", "n_y", "rows", "cols", "xi", "zeta", "tau")]
 
 
 class IdentifyConfig(Structure):
@@ -289,6 +290,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_era_decompose": (c_int, [opaque, doubles]),
     "okid_era_singular_values": (doubles, [opaque, int32s]),
     "okid_era_max_order": (c_int32, [POINTER(EraConfig)]),
+    "okid_era_markov_last": (c_int32, [POINTER(EraConfig)]),
     "okid_era_realize": (c_int, [opaque, c_int32, doubles, doubles, doubles, doubles, doubles]),
     "okid_era_emac": (c_int, [opaque, c_int32, c_int32, doubles, doubles, doubles, doubles, doubles]),
     "okid_subspace_max_order": (c_int32, [POINTER(SubspaceConfig)]),
@@ -329,11 +331,14 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_model_initial_state": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles]),
     "okid_warning_code": (c_char_p, [c_uint32]),
     "okid_identify_usable_p": (c_int32, [c_int32, c_int32, c_int32, c_int64]),
+    "okid_identify_lags": (c_int32, [POINTER(IdentifyConfig)]),
+    "okid_identify_max_order": (c_int32, [POINTER(IdentifyConfig)]),
     "okid_identify_memsize": (c_size_t, [POINTER(IdentifyConfig)]),
     "okid_identify_create": (c_int, [POINTER(opaque), POINTER(IdentifyConfig), opaque, c_size_t]),
     "okid_identify_run": (c_int, [opaque, opaque, POINTER(Identified)]),
     "okid_identify_run_factor": (c_int, [opaque, opaque, POINTER(Identified)]),
     "okid_identify_order": (c_int, [opaque, c_int32, POINTER(Identified)]),
+    "okid_identify_set_inputs": (c_int, [opaque, doubles, doubles, POINTER(Identified)]),
 }
 
 

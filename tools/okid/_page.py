@@ -17,6 +17,7 @@ body { margin: 0; background: #f4f6f8; color: #27323d;
 main { max-width: 1080px; margin: 0 auto; padding: 28px 24px 60px; }
 h1 { font-size: 26px; margin: 0 0 4px; color: #173f70; }
 h2 { font-size: 18px; margin: 0 0 10px; color: #173f70; }
+h3 { font-size: 14px; margin: 14px 0 4px; color: #45505b; }
 p.sub { margin: 0 0 18px; color: #5b6672; }
 section { background: #fff; border: 1px solid #dde3e9; border-radius: 8px; padding: 18px 20px; margin: 16px 0; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 14px; }

@@ -216,6 +216,18 @@ def draw_fit(
     ax.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 
 
+def draw_diagonals(ax: Axes, parts: Sequence[tuple[str, Real]]) -> None:
+    """Diagonals of matrices of one size as groups of bars, one group a degree of freedom."""
+    width = 0.8 / len(parts)
+    for k, (label, values) in enumerate(parts):
+        index = np.arange(1, len(values) + 1) + (k - (len(parts) - 1) / 2) * width
+        ax.bar(index, values, 0.92 * width, color=(BLUE, ORANGE, GREEN, GREY)[k % 4], label=label)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.axhline(0.0, color="#56616c", lw=0.7)
+    ax.grid(False, axis="x")
+    ax.legend(ncols=len(parts), loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+
+
 def draw_markov(ax: Axes, markov: Real, dt: float, pair: tuple[int, int], title: str) -> None:
     """Impulse response Y_1, Y_2 .. of one output and input over time; Y_0 (feed-through) as a dot."""
     out, into = pair

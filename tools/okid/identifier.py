@@ -18,6 +18,13 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
+METHODS = {
+    "okid-era": _abi.METHOD_OKID_ERA,
+    "okid-era-dc": _abi.METHOD_OKID_ERA_DC,
+    "n4sid-moesp": _abi.METHOD_N4SID_MOESP,
+    "n4sid-cva": _abi.METHOD_N4SID_CVA,
+    "n4sid-ssarx": _abi.METHOD_N4SID_SSARX,
+}
 _SOLVER = {"dense": _abi.SOLVER_DENSE, "structured": _abi.SOLVER_STRUCTURED}
 
 
@@ -34,8 +41,9 @@ class Observer(NamedTuple):
 class Identified(NamedTuple):
     """A copy of okid_identified_t: nothing points into the identifier any more.
 
-    A (n_z, n_z) .. K (n_z, n_y); singular_values (s,); markov (count, n_y, n_u); theta (n_y, q); innovation
-    (n_y, n_y); mean (m,) channel means that were removed; modes (k,) with shapes (k, n_y), largest entry 1.
+    A (n_z, n_z) .. K (n_z, n_y); singular_values (s,); markov (count, n_y, n_u); theta (n_y, q), of an n4sid method
+    (n_y, 0); innovation (n_y, n_y); mean (m,) channel means that were removed; modes (k,) with shapes (k, n_y),
+    largest entry 1.
     """
 
     notes: int
@@ -96,7 +104,7 @@ def _copy(raw: _abi.Identified) -> Identified:
         K=_matrix(raw.K, n_z, n_y),
         singular_values=_matrix(raw.singular_values, int(raw.singular_count), 1)[:, 0],
         markov=np.ascontiguousarray(markov),
-        theta=_matrix(raw.observer, n_y, n_u + p * (n_u + n_y)),
+        theta=_matrix(raw.observer, n_y, n_u + p * (n_u + n_y) if raw.observer else 0),
         innovation=_matrix(raw.innovation, n_y, n_y),
         mean=_matrix(raw.mean, n_u + n_y, 1)[:, 0],
         frequency_hz=_matrix(raw.frequency_hz, modes, 1)[:, 0],
@@ -112,9 +120,11 @@ def _copy(raw: _abi.Identified) -> Identified:
 class Identifier:
     """Workspace for models of one shape; run() may be called as often as results are wanted.
 
+    `method` one of METHODS; the accumulator must have `lags` lags. n4sid methods do not use p and take n_u = 0.
     `solver` "structured" needs O(m q) memory instead of q^2, and one unbroken run in the accumulator.
-    `order` 0 = automatic, bounded by `max_order` (0 = the library's own bound); `rows` 0 = 2 p.
-    Raises InputError for sizes outside the documented range. Source: lib/include/okid/identify.h, paper eq. 36-54.
+    `order` 0 = automatic, bounded by `max_order` (0 = the library's own bound); `rows` 0 = 2 p,
+    for n4sid methods 30.
+    Raises InputError for sizes outside the documented range. Source: lib/include/okid/identify.h, paper eq. 36-95.
     """
 
     def __init__(
@@ -129,18 +139,21 @@ class Identifier:
         max_order: int = 0,
         detrend: str = "mean",
         solver: str = "dense",
+        method: str = "okid-era",
     ) -> None:
+        if method not in METHODS:
+            raise InputError(f"method is {method!r}, expected one of {', '.join(map(repr, METHODS))}")
         if solver not in _SOLVER:
             raise InputError(f"solver is {solver!r}, expected 'dense' or 'structured'")
         mode = _abi.DETREND_MEAN if detrend == "mean" else _abi.DETREND_NONE
         self.config = _abi.IdentifyConfig(
-            n_u, n_y, p, rows, order, max_order, fs, _abi.METHOD_OKID_ERA, mode, _SOLVER[solver]
+            n_u, n_y, p, rows, order, max_order, fs, METHODS[method], mode, _SOLVER[solver]
         )
         size = int(_abi.library().okid_identify_memsize(ctypes.byref(self.config)))
         if size == 0:
             raise InputError(
-                f"n_u={n_u}, n_y={n_y}, fs={fs}, p={p}, rows={rows}, order={order}, max_order={max_order}: "
-                "outside what the library takes, see okid/identify.h",
+                f"method={method}, n_u={n_u}, n_y={n_y}, fs={fs}, p={p}, rows={rows}, order={order}, "
+                f"max_order={max_order}: outside what the library takes, see okid/identify.h",
                 _abi.ERR_DIM,
             )
         self._block = _abi.block(size)
@@ -175,16 +188,29 @@ class Identifier:
             raise fault
         return _copy(self._raw)
 
+    @property
+    def lags(self) -> int:
+        """Lags an accumulator must have for run()."""
+        return int(_abi.library().okid_identify_lags(ctypes.byref(self.config)))
+
     def realise(self, order: int) -> Identified:
-        """Another order from the Markov parameters of the last run(), for stabilization diagrams."""
+        """Another order from the decomposition of the last run(), for stabilization diagrams."""
         status = int(_abi.library().okid_identify_order(self._handle, order, ctypes.byref(self._raw)))
         _abi.check(status, f"order {order}")
         return _copy(self._raw)
 
+    def set_inputs(self, B: Real, D: Real) -> Identified:
+        """The n4sid model of the last run() with other B (n_z, n_u) and D (n_y, n_u); the Markov parameters follow."""
+        given = [np.asfortranarray(one, dtype=np.float64) for one in (B, D)]
+        raw = self._raw
+        if [one.shape for one in given] != [(raw.n_z, raw.n_u), (raw.n_y, raw.n_u)]:
+            raise InputError(f"B {given[0].shape} and D {given[1].shape} do not fit the model")
+        status = int(
+            _abi.library().okid_identify_set_inputs(self._handle, *map(_abi.pointer, given), ctypes.byref(raw))
+        )
+        _abi.check(status, "B and D")
+        return _copy(raw)
+
     def largest_order(self) -> int:
         """The largest order realise() can be asked for."""
-        rows = int(self.config.rows) or 2 * int(self.config.p)
-        era = _abi.EraConfig(self.config.n_u, self.config.n_y, rows, rows)
-        hankel = int(_abi.library().okid_era_max_order(ctypes.byref(era)))
-        bound = min(int(self.config.max_order) or 128, hankel, int(self.config.p * self.config.n_y))
-        return max(bound, min(int(self.config.order), hankel))
+        return int(_abi.library().okid_identify_max_order(ctypes.byref(self.config)))

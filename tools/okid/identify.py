@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from okid import _abi
-from okid._errors import IdentificationError, InputError
+from okid._errors import Error, IdentificationError, InputError
 from okid.accumulator import Accumulator
-from okid.identifier import Identified, Identifier, usable_p
+from okid.identifier import METHODS, Identified, Identifier, usable_p
+from okid.mkr import make_plan, mass_matrices
 from okid.model import Model
+from okid.output_error import refitted
 from okid.record_fit import detrended, fit_records
 from okid.records import paired
 from okid.result import Fit, Remark, Result, modes_of
@@ -67,38 +69,42 @@ def _gap_count(records: list[Real]) -> tuple[int, int]:
 def _silent_start(records: list[Real], n_u: int, p: int) -> bool:
     """True when most of the input energy lies in the first p samples of every record: a hit just after the trigger."""
     early = total = 0.0
-    for record in records:
+    for record in records if n_u > 0 else []:
         power = np.nansum((record[:, :n_u] - np.nanmedian(record[:, :n_u], axis=0)) ** 2, axis=1)
         early += float(np.sum(power[:p]))
         total += float(np.sum(power))
     return total > 0.0 and early > 0.5 * total
 
 
-def _feed(sums: Sums, records: list[Real], p: int, rest: bool) -> Sums:
+def _feed(sums: Sums, records: list[Real], lags: int, rest: bool) -> Sums:
     for record in records:
         sums.gap(0)
         if rest:
-            sums.add(np.zeros((p, record.shape[1])))
+            sums.add(np.zeros((lags, record.shape[1])))
         sums.add(record)
     return sums
 
 
-def _identify(
-    identifier: Identifier, records: list[Real], n_u: int, p: int, rest: bool
-) -> tuple[Identified, list[Remark]]:
+def _identify(identifier: Identifier, records: list[Real], n_u: int, rest: bool) -> tuple[Identified, list[Remark]]:
     """From the Gram matrix; nearly noise-free records, which lose half their digits in it, from their QR factor."""
-    n_y = records[0].shape[1] - n_u
-    with _feed(Accumulator(n_u, n_y, p), records, p, rest) as sums:
+    n_y, lags = records[0].shape[1] - n_u, identifier.lags
+    with _feed(Accumulator(n_u, n_y, lags), records, lags, rest) as sums:
         found = identifier.run(sums)
         floor_only = found.observer.ridge <= 1e-10  # else a ridge decides, not rounding
         if not (found.notes & _abi.NOTE_ILL_CONDITIONED and floor_only):
             return found, []
         try:
-            better = identifier.run(_feed(SquareRoot(n_u, n_y, p), records, p, rest))
+            better = identifier.run(_feed(SquareRoot(n_u, n_y, lags), records, lags, rest))
         except IdentificationError:
             return identifier.run(sums), []
     text = "nearly noise-free data: solved from the QR factor of the record, not from its Gram matrix"
     return better, [Remark("qr_factor", text)]
+
+
+def _unknowns(found: Identified) -> int:
+    """Regressors of an output: q of the observer, or the past and the future inputs of a subspace method."""
+    n_y, n_u = found.D.shape
+    return int(found.theta.shape[1]) or found.rows * (n_y + 2 * n_u)
 
 
 def _note_text(found: Identified, code: str) -> str:
@@ -108,7 +114,7 @@ def _note_text(found: Identified, code: str) -> str:
         f"{o.ridge:.1e} brought it to {o.radius:.6g}. Damping may come out slightly high",
         "ill_conditioned": f"the regression is ill-conditioned ({o.condition:.1e}): nearly noise-free data, or "
         "channels that repeat each other",
-        "few_rows": f"{found.regression_rows} usable rows for {found.theta.shape[1]} unknowns an output: much scatter",
+        "few_rows": f"{found.regression_rows} usable rows for {_unknowns(found)} unknowns an output: much scatter",
         "model_unstable": f"the model has a pole outside the unit circle (radius {found.model_radius:.6g})",
         "predictor_unstable": "the predictor A - K C is unstable: no prediction fit is given",
         "order_reduced": f"the order asked for is more than the data can carry; {found.order} is used",
@@ -171,6 +177,48 @@ def _usable(p: int, n_u: int, n_y: int, records: list[Real]) -> tuple[int, list[
     return used, [Remark("p_reduced", text)]
 
 
+def _usable_rows(rows: int, n_u: int, n_y: int, records: list[Real]) -> tuple[int, list[Remark]]:
+    """Block rows of a subspace method, or the most that leave ten Hankel columns for each row of past and input."""
+    runs = _unbroken(records)
+    least = 2 if n_y >= 2 else 3  # (rows - 1) n_y states: two make the first mode
+    for i in range(max(rows, least), least - 1, -1):
+        if int(np.sum(np.maximum(0, runs - (2 * i - 1)))) >= 10 * i * (n_y + 2 * n_u):
+            text = f"{i} block rows instead of {rows}: {int(np.sum(runs))} samples bear no more unknowns"
+            return i, [] if i == rows else [Remark("rows_reduced", text)]
+    raise IdentificationError(
+        f"no model: too few samples: {int(np.sum(runs))} complete ones, even the smallest model of {n_u} inputs and "
+        f"{n_y} outputs needs {10 * least * (n_y + 2 * n_u) + 2 * least - 1} without a gap",
+        _abi.ERR_TOO_SHORT,
+    )
+
+
+def _horizon(
+    method: str, p: int | None, rows: int | None, records: list[Real], n_u: int
+) -> tuple[int, int, list[Remark]]:
+    """p and the block rows (0 = default) that the records bear, with what there is to say about them."""
+    n_y = records[0].shape[1] - n_u
+    if not method.startswith("n4sid"):
+        used, remarks = _usable(40 if p is None else p, n_u, n_y, records)
+        return used, rows or 0, remarks
+    used, remarks = _usable_rows(rows or 30, n_u, n_y, records)
+    if p is not None:
+        remarks.append(Remark("p_ignored", f"p belongs to the okid methods: {method} looks back {used} block rows"))
+    return used, used, remarks
+
+
+def _with_inputs(
+    identifier: Identifier, found: Identified, records: list[Real], n_u: int
+) -> tuple[Identified, list[Remark]]:
+    """An n4sid model with B and D of the records; where that fails, those of the subspace equations stay."""
+    if n_u == 0:
+        return found, []
+    try:
+        return refitted(identifier, found, records, n_u), []
+    except Error:
+        text = "B and D could not be fitted to the record: they are those of the subspace equations"
+        return found, [Remark("inputs_from_subspace", text)]
+
+
 def _check_explains(fit: Fit) -> None:
     """Refuse a model that neither simulates nor predicts a twentieth of any output."""
     numbers = [x for part in fit for x in part.values() if x is not None]
@@ -202,12 +250,12 @@ def _centred(records: list[Real], detrend: str, start: str) -> tuple[list[Real],
 
 
 def identify(
-    u: ArrayLike | Sequence[ArrayLike],
+    u: ArrayLike | Sequence[ArrayLike] | None,
     y: ArrayLike | Sequence[ArrayLike],
     *,
     fs: float,
     method: str = "okid-era",
-    p: int = 40,
+    p: int | None = None,
     rows: int | None = None,
     order: int | str = "auto",
     max_order: int | None = None,
@@ -216,49 +264,68 @@ def identify(
     start: str = "moving",
     input_names: Sequence[str] | None = None,
     output_names: Sequence[str] | None = None,
+    input_dofs: Sequence[int] | None = None,
+    output_dofs: Sequence[int] | None = None,
+    sensing: str | Sequence[str] = "acceleration",
 ) -> Result:
     """Identify a structure from measured inputs and outputs.
 
     u (N, n_u) or (N,), y (N, n_y) or (N,) at `fs` Hz, or lists of such arrays: several records, merged exactly, each
     centred by itself. NaN = missing sample: the regression leaves it out and re-arms, nothing is interpolated; the fits
     and model.x0 are those of the record less its own mean (or line) and start anew after missing inputs. The
-    arrays are never modified. `p` ARX horizon, reduced with a warning when there are fewer than 10 samples an unknown;
-    `rows` block rows of the Hankel matrices (default 2 p); `order` a number or "auto" (up to `max_order`);
+    arrays are never modified. `method` "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx".
+    u None = no measured force (ambient): n4sid methods, modes and predictor only; there is no simulation fit.
+    `p` ARX horizon of the okid methods (default 40), reduced with a warning when there are fewer than 10 samples an
+    unknown; `rows` block rows of the Hankel matrices (default 2 p, n4sid 30 or what the record bears); `order` a
+    number or "auto" (up to `max_order`);
     `detrend` "none", "mean" or "linear"; `hold` "zoh" or "foh": how the force behaved between samples.
     `start` "rest" says that every record begins just before the structure is struck: the silent past is then used
     (paper eq. 38), without it the hit itself would be lost with the first p samples. "moving" assumes nothing.
 
+    `input_dofs`, `output_dofs`: the degree of freedom of each channel, from 1 (-3: at 3 with reversed polarity), turn
+    on result.mkr and result.pdc; `sensing` "acceleration", "velocity", "displacement", or one for each output. The
+    numbers are then taken as N, m/s^2, m/s, m. Every degree of freedom needs a force or a sensor, one needs both.
+
     Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
     """
-    _choice("method", method, ("okid-era",))
+    _choice("method", method, tuple(METHODS))
     _choice("detrend", detrend, ("none", "mean", "linear"))
     _choice("hold", hold, ("zoh", "foh"))
     _choice("start", start, ("moving", "rest"))
     if not (isinstance(fs, int | float | np.number) and math.isfinite(float(fs)) and float(fs) > 0.0):
         raise InputError(f"fs is {fs!r}, expected a sample rate in Hz > 0")
-    horizon = _whole("p", p, 1)
+    asked_p, asked_rows = (None if x is None else _whole(name, x, least) for name, x, least in
+                           (("p", p, 1), ("rows", rows, 2 if method.startswith("n4sid") else 1)))  # fmt: skip
     wanted = 0 if order == "auto" else _whole("order", order, 1)
     inputs, outputs = paired(u, y)
     n_u, n_y = inputs[0].shape[1], outputs[0].shape[1]
+    if n_u == 0 and not method.startswith("n4sid"):
+        raise InputError(f"{method} needs a measured force: without inputs (ambient) use an n4sid method")
     in_names, out_names = _names(input_names, "u", n_u), _names(output_names, "y", n_y)
+    plan = make_plan(input_dofs, output_dofs, sensing, hold, (n_u, n_y))
     records = [np.hstack(pair) for pair in zip(inputs, outputs, strict=True)]
     _check_moving(records, in_names + out_names, n_u)
     missing, gaps = _gap_count(records)
     samples = sum(len(record) for record in records)
-    horizon, remarks = _usable(horizon, n_u, n_y, records)
+    horizon, block_rows, remarks = _horizon(method, asked_p, asked_rows, records, n_u)
     remarks += _record_remarks(records, n_u, horizon, start, (missing, gaps, samples))
     own = [detrended(record, detrend) for record in records]  # what a user can make of the record alone
     records, centre = _centred(records, detrend, start)
     identifier = Identifier(
-        n_u, n_y, fs=float(fs), p=horizon, rows=0 if rows is None else _whole("rows", rows, 1), order=wanted,
+        n_u, n_y, fs=float(fs), p=horizon, rows=block_rows, order=wanted, method=method,
         max_order=0 if max_order is None else _whole("max_order", max_order, 1), detrend=centre,
     )  # fmt: skip
-    found, by_factor = _identify(identifier, records, n_u, horizon, start == "rest")
+    found, by_factor = _identify(identifier, records, n_u, start == "rest")
+    if method.startswith("n4sid"):
+        found, by_subspace = _with_inputs(identifier, found, own, n_u)
+        remarks += by_subspace
     model = Model(found.A, found.B, found.C, found.D, found.K, found.dt)
     fit, model.x0 = fit_records(model, own, out_names, predict=not found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
     _check_explains(fit)
+    mkr, pdc, said = (None, None, []) if plan is None else mass_matrices(model, plan, (in_names, out_names))
     return Result(
         method, float(fs), samples, len(records), gaps, in_names, out_names, found.p, found.rows, found.order, hold,
         detrend, start, found.singular_values, model, found.markov, modes_of(found), fit,
-        _remarks(found) + by_factor + remarks, found.observer, identifier,
+        _remarks(found) + by_factor + remarks + [Remark(*one) for one in said], found.observer,
+        identifier, mkr, pdc,
     )  # fmt: skip

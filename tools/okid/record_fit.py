@@ -64,13 +64,17 @@ def _driven(u: Real, least: int) -> list[slice]:
 
 def fit_records(
     model: Model, records: Sequence[Real], outputs: Sequence[str], predict: bool = True
-) -> tuple[Fit, Real]:
+) -> tuple[Fit, Real | None]:
     """Both fits over all records (N, n_u + n_y), inputs first, already detrended, and x0 (records, n_z) of each.
 
     A record is cut where an input is missing: each stretch has its own least-squares initial state, stretches of fewer
     than max(20, 2 order) samples are left out. x0 of a record is that of its first stretch, zero when it has none.
-    Missing outputs carry no weight. `predict` False leaves the prediction None (unstable predictor).
+    Missing outputs carry no weight. `predict` False leaves the prediction None (unstable predictor). Without inputs
+    there is nothing to simulate: prediction from rest, no x0.
     """
+    if model.B.shape[1] == 0:
+        pairs = [(r, model.predict(np.zeros((len(r), 0)), r)) for r in records] if predict else []
+        return Fit({name: None for name in outputs}, _percent(pairs, outputs)), None
     n_u, radius, states = model.B.shape[1], model.radius(), []
     informed = math.log(1e-16) / math.log(radius) if 0.0 < radius < 1.0 else math.inf  # then x0 has died away
     simulated: list[tuple[Real, Real]] = []

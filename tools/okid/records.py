@@ -40,12 +40,15 @@ def _many(values: ArrayLike | Sequence[ArrayLike], what: str) -> list[Real]:
     return [_one(values, what)]  # type: ignore[arg-type]
 
 
-def paired(u: ArrayLike | Sequence[ArrayLike], y: ArrayLike | Sequence[ArrayLike]) -> tuple[list[Real], list[Real]]:
-    """Records as two lists of float64 copies (N, n_u) and (N, n_y) of matching lengths.
+def paired(
+    u: ArrayLike | Sequence[ArrayLike] | None, y: ArrayLike | Sequence[ArrayLike]
+) -> tuple[list[Real], list[Real]]:
+    """Records as two lists of float64 copies (N, n_u) and (N, n_y) of matching lengths; u None = no inputs.
 
     A list or tuple of NumPy arrays is several records; everything else is one. InputError names what does not fit.
     """
-    inputs, outputs = _many(u, "u"), _many(y, "y")
+    outputs = _many(y, "y")
+    inputs = [np.zeros((len(one), 0)) for one in outputs] if u is None else _many(u, "u")
     if len(inputs) != len(outputs):
         raise InputError(f"u has {len(inputs)} records and y has {len(outputs)}")
     for k, (one, other) in enumerate(zip(inputs, outputs, strict=True)):

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from okid import _page, figures
 from okid._errors import Error, InputError
+from okid._mass_page import mass_section
 from okid.frf import Frf, cmif, h1, synthesise
 from okid.identify import identify
 from okid.model import Model
@@ -363,8 +364,9 @@ def build(result: Loaded, record: str | Path | None = None, title: str | None = 
     with matplotlib.rc_context(cast(Any, figures.STYLE)):
         responses, pairs = _frf(result, measured)
         sections = [
-            _summary(result, measured), _modes(result), _singular_values(result), _stabilization(result, measured),
-            responses, *_shapes(result), _fit(result, measured), _markov(result, pairs),
+            _summary(result, measured), _modes(result), *mass_section(result.raw), _singular_values(result),
+            _stabilization(result, measured), responses, *_shapes(result), _fit(result, measured),
+            _markov(result, pairs),
         ]  # fmt: skip
     raw = result.raw
     count = len(raw["modes"])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from okid import _abi
 from okid._errors import Error
+from okid.mkr import MassMatrices, ProportionalDamping, mass_table
 from okid.model import Model
 from okid.stabilization import OrderPoles, compare
 
@@ -78,9 +79,10 @@ def _nested(array: Real) -> Any:
 
 @dataclass
 class Result:
-    """What identify() returns. singular_values (s,) of H(0); markov (count, n_y, n_u) Y_0 .. by eq. 40.
+    """What identify() returns. singular_values (s,) of H(0), the correlations (ERA/DC) or the projection (n4sid);
+    markov (count, n_y, n_u) Y_0 .. by eq. 40, n4sid of the model.
 
-    mkr and pdc (mass, damping and stiffness; proportional damping) are not available in this version: always None.
+    mkr and pdc: mass, stiffness and damping where the channels have degrees of freedom, else None.
     """
 
     method: str
@@ -104,8 +106,8 @@ class Result:
     warnings: list[Remark]
     observer: Observer
     identifier: Identifier | None = field(default=None, repr=False, compare=False)
-    mkr: dict[str, Any] | None = None
-    pdc: dict[str, Any] | None = None
+    mkr: MassMatrices | None = None
+    pdc: ProportionalDamping | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "identifier": None}  # holds memory of the C library: cannot be pickled
@@ -153,6 +155,8 @@ class Result:
                 "simulation_percent": dict(self.fit.simulation_percent),
                 "prediction_percent": dict(self.fit.prediction_percent),
             },
+            **({} if self.mkr is None else {"mkr": self.mkr.to_dict()}),
+            **({} if self.pdc is None else {"pdc": self.pdc.to_dict()}),
             "warnings": [{"code": w.code, "text": w.text} for w in self.warnings],
         }
 
@@ -193,6 +197,8 @@ class Result:
             pair = (self.fit.simulation_percent.get(name), self.fit.prediction_percent.get(name))
             cells = ["-" if value is None else f"{value:.2f}" for value in pair]
             lines.append(f"{name:<{width}}  {cells[0]:>13}  {cells[1]:>13}")
+        if self.mkr is not None and self.pdc is not None:
+            lines += ["", mass_table(self.mkr, self.pdc)]
         lines += [f"warning {w.code}: {w.text}" for w in self.warnings]
         return "\n".join(lines)
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// @file era.h
 /// Eigensystem realization algorithm (paper eq. 43-54), Hankel matrix of the system Markov parameters only (trap 1);
-/// the observer gain follows by least squares from the observer-gain Markov parameters.
+/// the observer gain follows by least squares from the observer-gain Markov parameters. With tau > 0 the data
+/// correlations H(k) H(0)^T are realized in the place of H(k): ERA/DC (Juang, Cooper, Wright 1988).
 #ifndef OKID_ERA_H
 #define OKID_ERA_H
 
@@ -14,8 +15,14 @@ extern "C" {
 typedef struct okid_era_config_t {
     int32_t n_u, n_y;
     int32_t rows; ///< r, block rows of H(0)
-    int32_t cols; ///< c, block columns; Y_0 .. Y_(r+c) are needed
+    int32_t cols; ///< c, block columns
+    int32_t xi;   ///< ERA/DC: xi + 1 block rows of correlations, 0..64; ERA: 0
+    int32_t zeta; ///< ERA/DC: zeta + 1 block columns, 0..64; ERA: 0
+    int32_t tau;  ///< ERA/DC: lag between the correlations, 1..min(r, c); 0 = ERA
 } okid_era_config_t;
+
+/// The last Markov parameter that is needed: Y_0 .. Y_n with n = r + c + (xi + zeta) tau.
+OKID_API int32_t okid_era_markov_last(const okid_era_config_t* config);
 
 /// One decomposition, many orders. Private; lives in the caller's block.
 typedef struct okid_era okid_era_t;
@@ -24,17 +31,21 @@ OKID_API size_t okid_era_memsize(const okid_era_config_t* config);
 OKID_NODISCARD OKID_API okid_status_t okid_era_create(okid_era_t** self, const okid_era_config_t* config, void* block,
                                                       size_t bytes);
 
-/// H(0) = R Sigma S^T (eq. 48). @param markov  Y_0 .. Y_(rows+cols), n_y x n_u blocks, column-major. Kept by reference.
-/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_NUMERIC. Cost of an SVD of (rows n_y) x (cols n_u).
+/// ERA: H(0) = R Sigma S^T (eq. 48). ERA/DC: the same of the block Hankel matrix [RR((a+b) tau)] of the correlations
+/// RR(k) = H(k) H(0)^T, a = 0..xi, b = 0..zeta.
+/// @param markov  in, Y_0 .. Y_(okid_era_markov_last()), n_y x n_u blocks, column-major
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_NUMERIC. Cost of an SVD of (r n_y) x (c n_u); ERA/DC: of
+/// ((r + xi tau) n_y) x ((c + zeta tau) n_u) and of ((c + zeta tau) n_u) x ((zeta + 1) r n_y).
 OKID_NODISCARD OKID_API okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov);
 
-/// The singular values of H(0), descending; *count of them.
+/// The singular values of the matrix that was decomposed, descending; *count of them.
 OKID_API const okid_real_t* okid_era_singular_values(const okid_era_t* self, int32_t* count);
 
 /// Largest order a realization can have.
 OKID_API int32_t okid_era_max_order(const okid_era_config_t* config);
 
-/// A, B, C of one order (eq. 54), D = Y_0 is the caller's. @param order n_z in 1..max
+/// A, B, C of one order (eq. 54), D = Y_0 is the caller's; ERA/DC: B and K by least squares on the first r block rows
+/// of the observability matrix. @param order n_z in 1..max
 /// @param A  out n_z x n_z, B out n_z x n_u, C out n_y x n_z, column-major
 /// @param gain_markov  in, Y0_1 .. Y0_rows (n_y x n_y) or NULL; @param K  out n_z x n_y, Kalman gain = -L, or NULL
 OKID_NODISCARD OKID_API okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, okid_real_t* B,

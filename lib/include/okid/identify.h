@@ -13,7 +13,11 @@ extern "C" {
 #endif
 
 typedef enum okid_method_t {
-    OKID_METHOD_OKID_ERA = 0 ///< observer least squares, Markov recursion, ERA
+    OKID_METHOD_OKID_ERA = 0,    ///< observer least squares, Markov recursion, ERA
+    OKID_METHOD_OKID_ERA_DC = 1, ///< the same Markov parameters, ERA with data correlations (xi = zeta = 2, tau = 1)
+    OKID_METHOD_N4SID_MOESP = 2, ///< subspace methods, okid/subspace.h; they also take records without inputs
+    OKID_METHOD_N4SID_CVA = 3,
+    OKID_METHOD_N4SID_SSARX = 4
 } okid_method_t;
 
 /// How the observer's least squares are solved from an accumulator.
@@ -38,18 +42,19 @@ enum {
 OKID_API const char* okid_warning_code(uint32_t bit);
 
 typedef struct okid_identify_config_t {
-    int32_t n_u, n_y;
-    int32_t p;         ///< observer (ARX) order
-    int32_t rows;      ///< block rows and block columns of the Hankel matrices; 0 = 2 p
+    int32_t n_u, n_y;  ///< n_u = 0 (modes and predictor only): n4sid methods
+    int32_t p;         ///< observer (ARX) order; n4sid: not used
+    int32_t rows;      ///< block rows (okid: and columns) of the Hankel matrices; 0 = 2 p, n4sid 30
     int32_t order;     ///< n_z; 0 = automatic
     int32_t max_order; ///< bound of the automatic order and of the memory; 0 = min(128, what the Hankel matrix carries)
     double fs_hz;      ///< sample rate
     okid_method_t method;
     okid_detrend_t detrend;
-    okid_solver_t solver;
+    okid_solver_t solver; ///< n4sid: dense
 } okid_identify_config_t;
 
-/// An identified model. Every pointer looks into the identifier's block and stays valid until the next run.
+/// An identified model. Every pointer looks into the identifier's block and stays valid until the next run. Of an n4sid
+/// method p is rows (the past it looks back on), `observer` is NULL, observer_info.radius and radius_plain are 0.
 typedef struct okid_identified_t {
     uint32_t warnings; ///< OKID_NOTE_… bits
     int32_t n_u, n_y, n_z, p, rows;
@@ -57,11 +62,14 @@ typedef struct okid_identified_t {
     int64_t regression_rows;
     double dt;                            ///< s
     const okid_real_t *A, *B, *C, *D, *K; ///< column-major; K Kalman gain n_z x n_y
-    const okid_real_t* singular_values;   ///< of H(0), descending
-    const okid_real_t* markov;            ///< Y_0 .. Y_(markov_count-1), n_y x n_u blocks
-    const okid_real_t* observer;          ///< theta, n_y x q
-    const okid_real_t* innovation;        ///< n_y x n_y
-    const double* mean;                   ///< m channel means that were removed (zeros for detrend none)
+    /// Descending. okid-era: of H(0); okid-era-dc: of the matrix of correlations; n4sid: okid_subspace_singular_values()
+    const okid_real_t* singular_values;
+    /// Y_0 .. Y_(markov_count-1), n_y x n_u blocks, at least 2 rows + 1 (none when n_u = 0). okid: by eq. (40) from the
+    /// observer, n4sid: of the model
+    const okid_real_t* markov;
+    const okid_real_t* observer;   ///< theta, n_y x q, or NULL
+    const okid_real_t* innovation; ///< n_y x n_y
+    const double* mean;            ///< m channel means that were removed (zeros for detrend none)
     const okid_real_t *frequency_hz, *damping_ratio, *mpc, *emac; ///< mode_count each
     const okid_real_t *shape_re, *shape_im;                       ///< n_y x mode_count
     double model_radius;                                          ///< spectral radius of A
@@ -74,6 +82,9 @@ typedef struct okid_identify okid_identify_t;
 /// p as asked for, or the largest p with 10 q <= samples when that is smaller (at least 1).
 OKID_API int32_t okid_identify_usable_p(int32_t n_u, int32_t n_y, int32_t p, int64_t samples);
 
+/// Lags an accumulator must have for this configuration: p, or 2 rows - 1 for the n4sid methods; 0 when it is invalid.
+OKID_API int32_t okid_identify_lags(const okid_identify_config_t* config);
+
 /// Bytes okid_identify_create() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_identify_memsize(const okid_identify_config_t* config);
 OKID_NODISCARD OKID_API okid_status_t okid_identify_create(okid_identify_t** self, const okid_identify_config_t* config,
@@ -81,8 +92,8 @@ OKID_NODISCARD OKID_API okid_status_t okid_identify_create(okid_identify_t** sel
 
 /// Identify from what the accumulator holds now. No heap. What the accumulator holds is not changed.
 /// @param out  filled also on error as far as the work went (observer_info.channel names the channel at fault)
-/// @return OKID_OK, OKID_WARN_MODEL, or the errors of okid_observer_solve(), OKID_ERR_MISMATCH (sizes; with the structured
-///         solver also more than one run) and OKID_ERR_NO_MODES
+/// @return OKID_OK, OKID_WARN_MODEL, or the errors of okid_observer_solve() (n4sid: okid_subspace_decompose()),
+///         OKID_ERR_MISMATCH (sizes; with the structured solver also more than one run) and OKID_ERR_NO_MODES
 OKID_NODISCARD OKID_API okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator,
                                                         okid_identified_t* out);
 
@@ -91,8 +102,18 @@ OKID_NODISCARD OKID_API okid_status_t okid_identify_run(okid_identify_t* self, o
 OKID_NODISCARD OKID_API okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root,
                                                                okid_identified_t* out);
 
-/// Realize another order from the same Markov parameters (stabilization diagrams): replaces A..K and the modes in `out`.
+/// Largest order that can be asked for.
+OKID_API int32_t okid_identify_max_order(const okid_identify_config_t* config);
+
+/// Realize another order from the same decomposition (stabilization diagrams): replaces A..K and the modes in `out`; of
+/// an n4sid method also the innovation and the Markov parameters.
 OKID_NODISCARD OKID_API okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_identified_t* out);
+
+/// Put other B and D into the n4sid model of the last run, where the record itself could be fitted
+/// (okid_subspace_output_error()); the Markov parameters follow.
+/// @param B, D  in, n_z x n_u and n_y x n_u @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH (not of an n4sid method)
+OKID_NODISCARD OKID_API okid_status_t okid_identify_set_inputs(okid_identify_t* self, const okid_real_t* B,
+                                                               const okid_real_t* D, okid_identified_t* out);
 
 #ifdef __cplusplus
 }

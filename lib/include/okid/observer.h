@@ -22,8 +22,8 @@ typedef struct okid_observer_config_t {
 /// What the solve found, beside the parameters.
 typedef struct okid_observer_info_t {
     double ridge;  ///< ridge used, relative to the unit-diagonal Gram
-    double radius; ///< spectral radius of the ARX companion matrix with that ridge; beyond 64 states, where larger, its
-                   ///< growth over 64 samples: a response that first grows marks a poor model too
+    double radius; ///< spectral radius of the ARX companion matrix with that ridge; beyond 64 states its growth over 64
+                   ///< samples where that is above 1.0005: a response that first grows marks a poor model too
     double radius_plain;     ///< the same with ridge_min: >= 1 means the plain least squares is unstable (trap 22)
     double condition;        ///< estimate (1-norm) of the condition of the equilibrated, ridged Gram
     double input_excitation; ///< smallest over largest pivot of the equilibrated Gram of the input lags; near 0 = poor

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    eigensystem realization from system Markov parameters
+// PURPOSE    eigensystem realization from system Markov parameters, or from their data correlations
 // METHOD     SVD of H(0); R^T H(1) S once for every order that will be asked for; observer gain by least squares through
-//            the identified observability matrix
-// REFERENCE  paper eq. (43)-(54); Juang and Pappa (1985); EMAC: Pappa, Elliott, Schenk (1993)
+//            the identified observability matrix. ERA/DC: see era_correlation.cpp for the matrix that is decomposed
+// REFERENCE  paper eq. (43)-(54); Juang and Pappa (1985); ERA/DC: Juang, Cooper, Wright (1988); EMAC: Pappa, Elliott,
+//            Schenk (1993)
 // NUMERICS   the columns of H hold Y_k only: with Y0_k the truncation mixes noise modes in (trap 1)
 // WORKSPACE  2 H-sized matrices, the factors and LAPACK's; an SVD of (r n_y) x (c n_u) and 2 r n_y c n_u k flop
 #include <okid/era.h>
 
-#include "linalg/arena.hpp"
+#include "identify/era_correlation.hpp"
 #include "linalg/linalg.hpp"
 
 #include <algorithm>
@@ -17,11 +18,14 @@ using std::size_t;
 
 struct okid_era {
     okid_era_config_t config;
-    int height, breadth, rank; // of H: r n_y, c n_u, min of both
+    int height, breadth, rank; // of what is decomposed
     okid_real_t *hankel, *left, *values, *right, *work, *product, *core, *rotated;
+    okid::correlation correlation;
 };
 
 namespace {
+
+bool correlated(const okid_era& e) { return e.config.tau > 0; }
 
 size_t lay_out(okid_era& e, okid::arena& memory) {
     const auto height = static_cast<size_t>(e.height), breadth = static_cast<size_t>(e.breadth),
@@ -33,34 +37,48 @@ size_t lay_out(okid_era& e, okid::arena& memory) {
     e.work = memory.take<okid_real_t>(okid::linalg::svd_work(e.height, e.breadth));
     e.product = memory.take<okid_real_t>(height * std::max(rank, static_cast<size_t>(e.config.n_y)));
     e.core = memory.take<okid_real_t>(rank * rank);
-    e.rotated = memory.take<okid_real_t>(rank * static_cast<size_t>(e.config.n_y));
+    e.rotated = memory.take<okid_real_t>(rank * static_cast<size_t>(std::max(e.config.n_y, e.config.n_u)));
+    if (correlated(e)) e.correlation.lay_out(e.rank, memory);
     return memory.bytes();
 }
 
-bool valid(const okid_era_config_t& c) { return c.n_u >= 1 && c.n_y >= 1 && c.rows >= 1 && c.cols >= 1; }
+bool valid(const okid_era_config_t& c) {
+    if (c.n_u < 1 || c.n_y < 1 || c.rows < 1 || c.cols < 1) return false;
+    if (c.tau == 0) return c.xi == 0 && c.zeta == 0;
+    return c.tau >= 1 && c.tau <= std::min(c.rows, c.cols) && c.xi >= 0 && c.xi <= 64 && c.zeta >= 0 && c.zeta <= 64;
+}
 
 okid_era plan(const okid_era_config_t& c) {
     okid_era e{};
     e.config = c;
     e.height = c.rows * c.n_y;
     e.breadth = c.cols * c.n_u;
+    if (correlated(e)) {
+        e.correlation = okid::correlation(c);
+        e.height = e.correlation.rows * c.n_y;
+        e.breadth = e.correlation.rank;
+    }
     e.rank = std::min(e.height, e.breadth);
     return e;
 }
 
-/// H(shift): block (i, j) = Y_(i + j + 1 + shift).
-void fill_hankel(okid_era& e, const okid_real_t* markov, int shift) {
-    const int ny = e.config.n_y, nu = e.config.n_u;
-    for (int j = 0; j < e.config.cols; ++j)
-        for (int c = 0; c < nu; ++c) {
-            okid_real_t* column = e.hankel + static_cast<size_t>(j * nu + c) * static_cast<size_t>(e.height);
-            for (int i = 0; i < e.config.rows; ++i) {
-                const okid_real_t* y = markov + (static_cast<size_t>(i + j + 1 + shift) * static_cast<size_t>(nu) +
-                                                 static_cast<size_t>(c)) *
-                                                    static_cast<size_t>(ny);
-                std::copy(y, y + ny, column + static_cast<size_t>(i * ny));
-            }
-        }
+int largest_order(const okid_era& e) { return std::min(e.rank, e.config.rows * e.config.n_y); }
+
+/// The matrix to decompose (shift 0), or the one a sample later (shift 1).
+void fill(okid_era& e, const okid_real_t* markov, int shift) {
+    const okid_era_config_t& c = e.config;
+    if (correlated(e))
+        e.correlation.fill(markov, shift, e.hankel);
+    else
+        okid::fill_hankel(c.n_u, c.n_y, c.rows, c.cols, markov + (1 + shift) * c.n_u * c.n_y, e.hankel);
+}
+
+/// rotated (rank x count) <- P^+ rhs without Sigma: least squares on the first r block rows of the observability matrix.
+/// @param rhs  r n_y x count, leading dimension height
+bool project(okid_era& e, int order, const okid_real_t* rhs, int count) {
+    okid::linalg::multiply(true, false, order, count, e.config.rows * e.config.n_y, 1, e.left, e.height, rhs, e.height,
+                           0, e.rotated, e.rank);
+    return !correlated(e) || e.correlation.solve(order, e.rank, e.rotated, count);
 }
 
 } // namespace
@@ -74,7 +92,13 @@ size_t okid_era_memsize(const okid_era_config_t* config) {
 }
 
 int32_t okid_era_max_order(const okid_era_config_t* config) {
-    return config == nullptr ? 0 : std::min(config->rows * config->n_y, config->cols * config->n_u);
+    return config == nullptr || !valid(*config) ? 0 : largest_order(plan(*config));
+}
+
+int32_t okid_era_markov_last(const okid_era_config_t* config) {
+    return config == nullptr || !valid(*config)
+               ? 0
+               : config->rows + config->cols + (config->xi + config->zeta) * config->tau;
 }
 
 okid_status_t okid_era_create(okid_era_t** self, const okid_era_config_t* config, void* block, size_t bytes) {
@@ -93,14 +117,16 @@ okid_status_t okid_era_create(okid_era_t** self, const okid_era_config_t* config
 okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov) {
     if (self == nullptr || markov == nullptr) return OKID_ERR_NULL;
     okid_era& e = *self;
-    fill_hankel(e, markov, 0);
+    if (correlated(e) && !e.correlation.prepare(markov)) return OKID_ERR_NUMERIC;
+    fill(e, markov, 0);
     if (okid::linalg::svd(e.height, e.breadth, e.hankel, e.left, e.values, e.right, e.work) != 0)
         return OKID_ERR_NUMERIC;
-    fill_hankel(e, markov, 1);
+    fill(e, markov, 1);
     okid::linalg::multiply(false, true, e.height, e.rank, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0,
                            e.product, e.height);
     okid::linalg::multiply(true, false, e.rank, e.rank, e.height, 1, e.left, e.height, e.product, e.height, 0, e.core,
                            e.rank);
+    if (correlated(e)) e.correlation.observability(e.rank, e.left);
     return OKID_OK;
 }
 
@@ -113,13 +139,16 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, 
                                const okid_real_t* gain_markov, okid_real_t* K) {
     if (self == nullptr || A == nullptr || B == nullptr || C == nullptr) return OKID_ERR_NULL;
     okid_era& e = *self;
-    if (order < 1 || order > e.rank || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
+    if (order < 1 || order > largest_order(e) || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
     const int ny = e.config.n_y, nu = e.config.n_u;
     for (int j = 0; j < order; ++j)
         for (int i = 0; i < order; ++i)
             A[j * order + i] = e.core[j * e.rank + i] / std::sqrt(e.values[i] * e.values[j]);
+    if (correlated(e) && !project(e, order, e.correlation.input, nu)) return OKID_ERR_NUMERIC;
     for (int c = 0; c < nu; ++c)
-        for (int i = 0; i < order; ++i) B[c * order + i] = std::sqrt(e.values[i]) * e.right[c * e.rank + i];
+        for (int i = 0; i < order; ++i)
+            B[c * order + i] = correlated(e) ? e.rotated[c * e.rank + i] / std::sqrt(e.values[i])
+                                             : std::sqrt(e.values[i]) * e.right[c * e.rank + i];
     for (int j = 0; j < order; ++j)
         for (int o = 0; o < ny; ++o)
             C[j * ny + o] = e.left[static_cast<size_t>(j) * static_cast<size_t>(e.height) + static_cast<size_t>(o)] *
@@ -133,8 +162,7 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, 
             std::copy(y0, y0 + ny,
                       e.product + static_cast<size_t>(c) * static_cast<size_t>(e.height) + static_cast<size_t>(i * ny));
         }
-    okid::linalg::multiply(true, false, order, ny, e.height, 1, e.left, e.height, e.product, e.height, 0, e.rotated,
-                           e.rank);
+    if (!project(e, order, e.product, ny)) return OKID_ERR_NUMERIC;
     for (int c = 0; c < ny; ++c)
         for (int i = 0; i < order; ++i) K[c * order + i] = -e.rotated[c * e.rank + i] / std::sqrt(e.values[i]);
     return OKID_OK;
@@ -146,12 +174,12 @@ okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count, cons
     if (self == nullptr || emac == nullptr) return OKID_ERR_NULL;
     const okid_era& e = *self;
     if (order < 1 || order > e.rank) return OKID_ERR_DIM;
-    const int ny = e.config.n_y, last = (e.config.rows - 1) * ny;
+    const int ny = e.config.n_y, last = e.height - ny;
     constexpr okid_real_t quarter_pi = static_cast<okid_real_t>(0.78539816339744831);
     for (int k = 0; k < count; ++k) {
         const okid_real_t* re = psi_re + static_cast<size_t>(k) * static_cast<size_t>(order);
         const okid_real_t* im = psi_im + static_cast<size_t>(k) * static_cast<size_t>(order);
-        const auto steps = static_cast<okid_real_t>(e.config.rows - 1);
+        const auto steps = static_cast<okid_real_t>(e.height / ny - 1);
         const okid_real_t radius = std::pow(std::hypot(lambda_re[k], lambda_im[k]), steps);
         const okid_real_t angle = steps * std::atan2(lambda_im[k], lambda_re[k]);
         okid_real_t weighted = 0, total = 0;

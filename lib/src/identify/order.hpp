@@ -9,7 +9,9 @@ struct gap_choice {
     int order;    ///< even
     double ratio; ///< sigma_order / sigma_(order+1)
 };
-constexpr double clear_gap = 10.0; ///< a ratio that decides by itself
+/// Ratios that decide by themselves: of the values of a Hankel matrix, of correlations of it (ERA/DC), of canonical
+/// correlations (CVA, SSARX).
+constexpr double clear_gap = 10.0, clear_correlation_gap = 30.0, clear_canonical_gap = 2.5;
 
 /// The largest gap over even orders up to `largest`.
 gap_choice order_by_gap(const okid_real_t* values, int count, int largest);

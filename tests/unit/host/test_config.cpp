@@ -144,13 +144,14 @@ static void test_wrong_types_and_ranges() {
     refuse_change("length = 12", "length = 65", {"found 65", "from 1 to 64"});
     refuse_change("role = \"force\"", "role = \"forse\"", {"found \"forse\"", "did you mean \"force\"?"});
     refuse_change("window_s = 10", "window_s = 0.01", {"window_s", "2 p = 40"});
+    refuse_change("window_s = 10", "window_s = 0.01\nmethod = \"n4sid-moesp\"", {"window_s", "2 rows = "});
     refuse_change("window_s = 10", "update_s = 0.0001", {"update_s", "at least one sample"});
     refuse_change("[[bus]]", "[bus]", {"expected sections [[bus]]"});
     refuse_change("[identification]", "[[identification]]", {"expected a section [identification]"});
 }
 
 static void test_not_available() {
-    refuse_change("p = 20", "method = \"n4sid-cva\"", {"method", "not available in this version"});
+    refuse_change("p = 20", "method = \"n4sid-cvo\"", {"method", "did you mean \"n4sid-cva\"?"});
     refuse_change("p = 20", "forgetting = 0.999", {"forgetting", "window_s", "choose one"});
     refuse_change("p = 20", "detrend = \"linear\"", {"detrend", "linear"});
     refuse_change("interface = \"vcan0\"", "type = \"serial\"\ndevice = \"/dev/ttyUSB0\"",

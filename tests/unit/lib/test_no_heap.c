@@ -142,10 +142,51 @@ static void nothing_in_the_second_kernel(void) {
     free(v);
 }
 
+static void nothing_in_any_method(void) {
+    rig_t rig;
+    rig_make(&rig);
+    double* v = rig_record(&rig, N, 0.02, NULL, 3);
+    for (int method = OKID_METHOD_OKID_ERA_DC; method <= OKID_METHOD_N4SID_SSARX; ++method) {
+        const okid_identify_config_t ident = {
+            .n_u = RIG_NU, .n_y = RIG_NY, .p = 20, .rows = 20, .fs_hz = RIG_FS, .method = (okid_method_t)method};
+        const int lags = okid_identify_lags(&ident);
+        const okid_accumulator_config_t sums = {
+            .n_u = RIG_NU, .n_y = RIG_NY, .lags = lags, .forgetting = 1, .edges = 1};
+        const okid_square_root_config_t root = {.n_u = RIG_NU, .n_y = RIG_NY, .lags = lags, .forgetting = 1};
+        const size_t bytes[] = {okid_identify_memsize(&ident), okid_accumulator_memsize(&sums),
+                                okid_square_root_memsize(&root)};
+        void *b1 = malloc(bytes[0]), *b2 = malloc(bytes[1]), *b3 = malloc(bytes[2]);
+        okid_identify_t* s;
+        okid_accumulator_t* a;
+        okid_square_root_t* q;
+        okid_identified_t out;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&s, &ident, b1, bytes[0]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &sums, b2, bytes[1]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&q, &root, b3, bytes[2]));
+        const long before = calls;
+        okid_status_t added = okid_accumulator_add(a, v, N), scanned = OKID_OK;
+        const okid_status_t found = okid_identify_run(s, a, &out);
+        for (int order = 2; order <= 20; order += 2) scanned = okid_identify_order(s, order, &out);
+        if (added == OKID_OK) added = okid_square_root_add(q, v, N);
+        const okid_status_t again = okid_identify_run_factor(s, q, &out);
+        const long after = calls;
+        TEST_ASSERT_EQUAL(OKID_OK, added);
+        TEST_ASSERT_GREATER_OR_EQUAL(0, found);
+        TEST_ASSERT_GREATER_OR_EQUAL(0, scanned);
+        TEST_ASSERT_GREATER_OR_EQUAL(0, again);
+        TEST_ASSERT_EQUAL_MESSAGE(0, after - before, okid_backend());
+        free(b1);
+        free(b2);
+        free(b3);
+    }
+    free(v);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(the_interposer_counts);
     RUN_TEST(nothing_after_create);
     RUN_TEST(nothing_in_the_second_kernel);
+    RUN_TEST(nothing_in_any_method);
     return UNITY_END();
 }
