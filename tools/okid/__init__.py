@@ -9,7 +9,7 @@ from typing import Any
 
 from okid import frf, modal
 from okid._errors import Error, IdentificationError, InputError
-from okid.accumulator import Accumulator, Stats
+from okid.accumulator import Accumulator
 from okid.demo import demo
 from okid.identifier import Identified, Identifier, usable_p
 from okid.identify import identify
@@ -19,6 +19,7 @@ from okid.records import read_csv
 from okid.result import Fit, Mode, Result
 from okid.square_root import SquareRoot
 from okid.stabilization import OrderPoles
+from okid.sums import Stats
 
 __all__ = [
     "Accumulator",
