@@ -174,8 +174,11 @@ void read_channels(const std::string& path, const toml::table& file, live_config
     const auto rank = [](const channel_config& c) {
         return c.role == channel_role::force ? 0 : c.role == channel_role::aux ? 2 : 1;
     };
-    std::stable_sort(config.channels.begin(), config.channels.end(),
-                     [&](const channel_config& a, const channel_config& b) { return rank(a) < rank(b); });
+    std::vector<channel_config> ordered; // forces, responses, the rest; each in the order of the file
+    for (int wanted = 0; wanted <= 2; ++wanted)
+        for (const channel_config& channel : config.channels)
+            if (rank(channel) == wanted) ordered.push_back(channel);
+    config.channels = std::move(ordered);
     for (const channel_config& channel : config.channels) {
         config.n_u += rank(channel) == 0;
         config.n_y += rank(channel) == 1;

@@ -130,7 +130,7 @@ okid_status_t okid_accumulator_peek(const void* in, size_t bytes, okid_accumulat
     walk_t end = {NULL, (const uint8_t*)in, bytes - 4};
     if ((uint32_t)walk_bits(&end, 0, 4) != crc32_of((const uint8_t*)in, bytes - 4)) return OKID_ERR_FORMAT;
     okid_accumulator_config_t config = {0};
-    char magic[8];
+    char magic[8] = {0};
     int32_t version = 0;
     walk_t w = {NULL, (const uint8_t*)in, 0};
     walk_header(&w, &config, &version, magic);
