@@ -179,7 +179,8 @@ okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count, cons
     for (int k = 0; k < count; ++k) {
         const okid_real_t* re = psi_re + static_cast<size_t>(k) * static_cast<size_t>(order);
         const okid_real_t* im = psi_im + static_cast<size_t>(k) * static_cast<size_t>(order);
-        const auto steps = static_cast<okid_real_t>(e.height / ny - 1);
+        const int block_rows = e.height / ny;
+        const auto steps = static_cast<okid_real_t>(block_rows - 1);
         const okid_real_t radius = std::pow(std::hypot(lambda_re[k], lambda_im[k]), steps);
         const okid_real_t angle = steps * std::atan2(lambda_im[k], lambda_re[k]);
         okid_real_t weighted = 0, total = 0;
