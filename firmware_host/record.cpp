@@ -118,7 +118,8 @@ std::unique_ptr<std::byte[]> accumulate(const std::vector<record_data>& records,
 /// Nearly noise-free data lose half their digits in a Gram matrix: the record is in memory, so its QR factor is taken instead.
 /// What the Gram matrix gave stays when that fails. @return the status of the better model
 okid_status_t refine_by_factor(const std::vector<record_data>& records, const okid_identify_config_t& config,
-                               bool at_rest, okid_identify_t* identifier, okid_status_t status, record_result& result) {
+                               bool at_rest, okid_identify_t* identifier, okid_accumulator_t* accumulator,
+                               okid_status_t status, record_result& result) {
     const bool floor_only = result.model.observer_info.ridge <= 1e-10; // else a ridge decides, not rounding
     if (status < 0 || !(result.model.warnings & OKID_NOTE_ILL_CONDITIONED) || !floor_only) return status;
     okid_square_root_config_t shape{};
@@ -135,11 +136,7 @@ okid_status_t refine_by_factor(const std::vector<record_data>& records, const ok
         [&](const double* v, std::size_t n) { return okid_square_root_add(square_root, v, n); });
     okid_identified_t better{};
     const okid_status_t found = okid_identify_run_factor(identifier, square_root, &better);
-    if (found < 0) { // the workspace is shared: make the first model again
-        okid_accumulator_t* accumulator = nullptr;
-        const auto sums = accumulate(records, config, at_rest, accumulator);
-        return okid_identify_run(identifier, accumulator, &result.model);
-    }
+    if (found < 0) return okid_identify_run(identifier, accumulator, &result.model); // the workspace was shared
     result.model = better;
     result.context.warnings.emplace_back(
         "qr_factor", "nearly noise-free data: solved from the QR factor of the record, not from its Gram matrix");
@@ -270,7 +267,7 @@ record_result identify_records(std::vector<record_data> records, const record_op
     okid_identify_t* identifier = nullptr;
     check_status(okid_identify_create(&identifier, &config, result.memory.get(), bytes), "identifier");
     okid_status_t status = okid_identify_run(identifier, accumulator, &result.model);
-    status = refine_by_factor(records, config, at_rest, identifier, status, result);
+    status = refine_by_factor(records, config, at_rest, identifier, accumulator, status, result);
     if (status < 0) throw_identify_failure(status, result.model, config, result.context);
     tell(options, "simulating the model");
     if (options.detrend == "mean" && !own_means_first)

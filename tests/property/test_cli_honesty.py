@@ -2,27 +2,14 @@
 """What must not pass in silence: wrong rates, torn logs, missing forces, repeated inputs, records without vibration."""
 
 import json
-import os
 import pathlib
 import subprocess
 
 import numpy as np
 import pytest
+from program import ROOT, okid
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("OKID_PROGRAM", str(ROOT / "build" / "okid"))
 TRUTH = [10.96009, 31.84210, 45.66197]
-
-
-def okid(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [PROGRAM, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        stdin=subprocess.DEVNULL,
-        check=False,
-    )
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import random
 import subprocess
 from pathlib import Path
 
 import pytest
+from program import ROOT, okid
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("OKID_PROGRAM") or str(ROOT / "build" / "okid")
 DEMO_RIG = ROOT / "tests" / "replay" / "demo_rig.toml"
 CHANNELS = ["--inputs", "u1", "--outputs", "y1,y2"]
 RESULT_KEYS = [
@@ -23,16 +21,6 @@ RESULT_KEYS = [
 MODE_KEYS = [
     "frequency_hz", "damping_ratio", "shape_re", "shape_im", "frequency_std_hz", "damping_ratio_std", "mpc", "emac",
 ]  # fmt: skip
-
-
-def okid(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [PROGRAM, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        stdin=subprocess.DEVNULL,
-    )
 
 
 def refused(done: subprocess.CompletedProcess[str], code: int, *parts: str) -> None:

@@ -5,22 +5,21 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import subprocess
 from pathlib import Path
 
 import cantools
+import program
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 ROOT = Path(__file__).parents[2]
-OKID = os.environ.get("OKID_PROGRAM", str(ROOT / "build" / "okid"))
 RATE = 100
 
 
 def okid(*args: str, status: int = 0) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run([OKID, *args], capture_output=True, text=True, timeout=60, check=False)
+    done = program.okid(*args)
     assert done.returncode == status, f"{args}: {done.returncode}\n{done.stderr}"
     return done
 

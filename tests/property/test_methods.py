@@ -5,7 +5,6 @@ results, records without inputs, and the same numbers from both."""
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,11 @@ import okid
 import pytest
 import systems
 from numpy.typing import NDArray
+from program import okid as run
 from scipy.signal import detrend
 from test_measured import data_file
 
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("OKID_PROGRAM") or str(ROOT / "build" / "okid")
 Array = NDArray[np.float64]
 METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
 N4SID = METHODS[2:]
@@ -48,7 +47,7 @@ def of_result(s: systems.Structure, result: okid.Result) -> tuple[float, float]:
 
 
 def program(*arguments: object) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False)
+    done = run(*arguments)
     assert done.returncode == 0, done.stderr
     return done
 

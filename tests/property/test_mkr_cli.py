@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -17,17 +16,13 @@ import pytest
 import systems
 from numpy.typing import NDArray
 from okid import report
+from program import ROOT
+from program import okid as run
 from scipy.signal import cont2discrete
 
 Array = NDArray[np.float64]
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("OKID_PROGRAM") or str(ROOT / "build" / "okid")
 KINDS = ["displacement", "velocity", "acceleration"]
 SYSTEMS = {"w1": systems.w1(), "w2": systems.w2()}
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120)
 
 
 def measure(

@@ -54,10 +54,10 @@ static inline double error_normal(const structure_t* s) { return s_error(result.
 
 /// All three matrices, both ways to R, to the accuracy asked for.
 static inline void assert_exact(const structure_t* s) {
-    TEST_ASSERT_TRUE(error_M(s) < LIMIT(1e-12, 5e-4));
-    TEST_ASSERT_TRUE(error_K(s) < LIMIT(1e-12, 5e-4));
-    TEST_ASSERT_TRUE(error_R(s) < LIMIT(2e-11, 2e-2));
-    TEST_ASSERT_TRUE(error_normal(s) < LIMIT(2e-12, 1e-3));
+    TEST_ASSERT_TRUE(error_M(s) < TOLERANCE(1e-12, 5e-4));
+    TEST_ASSERT_TRUE(error_K(s) < TOLERANCE(1e-12, 5e-4));
+    TEST_ASSERT_TRUE(error_R(s) < TOLERANCE(2e-11, 2e-2));
+    TEST_ASSERT_TRUE(error_normal(s) < TOLERANCE(2e-12, 1e-3));
 }
 
 // ---- modes with known residues -----------------------------------------------------------------------------------------

@@ -71,6 +71,27 @@ static inline double* rig_record(const rig_t* rig, int count, double noise, cons
     return v;
 }
 
+/// The same record behind a steep low-pass filter (0.7 Nyquist) that the force does not see, with a little noise: plain
+/// least squares gives an unstable ARX model (trap 22).
+static inline double* rig_filtered(const double* v, int count) {
+    enum { HALF = 24 };
+    double* filtered = calloc((size_t)count * RIG_M, sizeof *filtered);
+    uint64_t state = 4;
+    for (int n = 0; n < count; ++n) {
+        filtered[n * RIG_M] = v[n * RIG_M];
+        for (int c = 1; c < RIG_M; ++c) {
+            double sum = 1e-3 * rig_normal(&state);
+            for (int k = -HALF; k <= HALF; ++k) {
+                if (n + k < 0 || n + k >= count) continue;
+                const double x = 3.14159265358979 * 0.7 * k, sinc = k ? sin(x) / x : 1;
+                sum += 0.7 * sinc * (0.54 + 0.46 * cos(3.14159265358979 * k / HALF)) * v[(n + k) * RIG_M + c];
+            }
+            filtered[n * RIG_M + c] = sum;
+        }
+    }
+    return filtered;
+}
+
 /// True Markov parameter Y_k of the rig (RIG_NY numbers).
 static inline void rig_markov(const rig_t* rig, int k, double* out) {
     if (k == 0) {

@@ -5,6 +5,8 @@
 #ifndef OKID_TEST_STRUCTURES_H
 #define OKID_TEST_STRUCTURES_H
 
+#include "tolerance.h"
+
 #include <math.h>
 #include <okid/okid.h>
 #include <stdint.h>
@@ -12,9 +14,6 @@
 #include <string.h>
 
 enum { S_MAX = 10, S_NU = 10, S_NY = 20, S_NZ = 40 };
-
-/// A limit in a double build, and in a float one.
-#define LIMIT(in_double, in_float) (sizeof(okid_real_t) == sizeof(double) ? (in_double) : (in_float))
 
 typedef struct structure_t {
     int n;

@@ -136,6 +136,22 @@ static inline int acc_is_continued(const okid_accumulator_t* a, int32_t k) {
     return next->joined && next->rows > 0;
 }
 
+/// A slot of the ring as the Gram matrix sees it: its sums, and those ends of its run that do not meet a neighbour's (there
+/// both cancel), else NULL.
+typedef struct acc_piece_t {
+    const double *data, *head, *tail;
+} acc_piece_t;
+
+/// The k-th slot of the ring, oldest first; 0 when it holds no rows.
+static inline int acc_piece(const okid_accumulator_t* a, int32_t k, acc_piece_t* out) {
+    const int32_t index = acc_ring(a, k);
+    const slot_info_t* slot = acc_slot(a, index);
+    out->data = acc_slot_data(a, index);
+    out->head = k > 0 && slot->joined ? NULL : out->data + acc_slot_head(a);
+    out->tail = acc_is_continued(a, k) ? NULL : acc_tail(a, index);
+    return slot->rows > 0;
+}
+
 /// Bring everything that waits into the sums of the open slot.
 void okid_accumulator_settle(okid_accumulator_t* self);
 

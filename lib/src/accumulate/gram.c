@@ -56,15 +56,13 @@ int64_t okid_accumulator_lag_sum_exact(const okid_accumulator_t* a, size_t i, in
     const size_t m = (size_t)a->m, c = i % m, l = i / m - 1;
     int64_t sum = i < m ? 0 : before;
     for (int32_t k = 0; k <= a->closed; ++k) {
-        const int32_t index = acc_ring(a, k);
-        const slot_info_t* slot = acc_slot(a, index);
-        if (slot->rows == 0) continue;
-        const double* data = acc_slot_data(a, index);
+        acc_piece_t piece;
+        if (!acc_piece(a, k, &piece)) continue;
         if (i < m)
-            sum += ((const int64_t*)data)[acc_slot_sum(a) + c];
+            sum += ((const int64_t*)piece.data)[acc_slot_sum(a) + c];
         else {
-            if (k == 0 || !slot->joined) sum += acc_code(data + acc_slot_head(a) + acc_end(a, l, c));
-            if (!acc_is_continued(a, k)) sum -= acc_code(acc_tail(a, index) + acc_end(a, l, c));
+            if (piece.head) sum += acc_code(piece.head + acc_end(a, l, c));
+            if (piece.tail) sum -= acc_code(piece.tail + acc_end(a, l, c));
         }
     }
     return a->base_weight > 0 ? sum + ((const int64_t*)acc_base(a))[acc_base_sum(a) + i] : sum;
@@ -74,16 +72,14 @@ double okid_accumulator_lag_sum(const okid_accumulator_t* a, size_t i, double be
     const size_t m = (size_t)a->m, c = i % m, l = i / m - 1;
     double sum = i < m ? 0 : before;
     for (int32_t k = 0; k <= a->closed; ++k) {
-        const int32_t index = acc_ring(a, k);
-        const slot_info_t* slot = acc_slot(a, index);
-        if (slot->rows == 0) continue;
-        const double* data = acc_slot_data(a, index);
+        acc_piece_t piece;
+        if (!acc_piece(a, k, &piece)) continue;
         if (i < m) {
-            const double* at = data + acc_slot_sum(a) + c;
+            const double* at = piece.data + acc_slot_sum(a) + c;
             sum += acc_has_codes(a) ? (double)*(const int64_t*)at : *at;
         } else {
-            if (k == 0 || !slot->joined) sum += acc_number(a, data + acc_slot_head(a) + acc_end(a, l, c));
-            if (!acc_is_continued(a, k)) sum -= acc_number(a, acc_tail(a, index) + acc_end(a, l, c));
+            if (piece.head) sum += acc_number(a, piece.head + acc_end(a, l, c));
+            if (piece.tail) sum -= acc_number(a, piece.tail + acc_end(a, l, c));
         }
     }
     return a->base_weight > 0 ? sum + acc_base(a)[acc_base_sum(a) + i] : sum;
@@ -95,19 +91,17 @@ static void diagonal_exact(const okid_accumulator_t* a, size_t i, int64_t* high,
     const size_t at = c * n + p * m + c; // S_0(c, c)
     if (i < m) *high = *low = 0;
     for (int32_t k = 0; k <= a->closed; ++k) {
-        const int32_t index = acc_ring(a, k);
-        const slot_info_t* slot = acc_slot(a, index);
-        if (slot->rows == 0) continue;
-        const double* data = acc_slot_data(a, index);
+        acc_piece_t piece;
+        if (!acc_piece(a, k, &piece)) continue;
         if (i < m) {
-            const int64_t* words = (const int64_t*)data;
+            const int64_t* words = (const int64_t*)piece.data;
             wide_add_wide(high, low, words[acc_sum_count(a) + at], words[at]);
             continue;
         }
-        const int64_t enters = acc_code(data + acc_slot_head(a) + acc_end(a, l, c)),
-                      leaves = acc_code(acc_tail(a, index) + acc_end(a, l, c));
-        if (k == 0 || !slot->joined) wide_add(high, low, enters * enters);
-        if (!acc_is_continued(a, k)) wide_add(high, low, -(leaves * leaves));
+        const int64_t enters = piece.head ? acc_code(piece.head + acc_end(a, l, c)) : 0,
+                      leaves = piece.tail ? acc_code(piece.tail + acc_end(a, l, c)) : 0;
+        wide_add(high, low, enters * enters);
+        wide_add(high, low, -(leaves * leaves));
     }
     if (!(a->base_weight > 0)) return;
     const int64_t *base = (const int64_t*)acc_base(a), *edge = base + acc_base_edge(a);
@@ -123,18 +117,16 @@ static double diagonal(const okid_accumulator_t* a, size_t i, double before) {
     const size_t at = c * n + p * m + c;
     double sum = i < m ? 0 : before;
     for (int32_t k = 0; k <= a->closed; ++k) {
-        const int32_t index = acc_ring(a, k);
-        const slot_info_t* slot = acc_slot(a, index);
-        if (slot->rows == 0) continue;
-        const double* data = acc_slot_data(a, index);
+        acc_piece_t piece;
+        if (!acc_piece(a, k, &piece)) continue;
         if (i < m) {
-            sum += slot_number(a, data, at);
+            sum += slot_number(a, piece.data, at);
             continue;
         }
-        const double enters = acc_number(a, data + acc_slot_head(a) + acc_end(a, l, c)),
-                     leaves = acc_number(a, acc_tail(a, index) + acc_end(a, l, c));
-        if (k == 0 || !slot->joined) sum += enters * enters;
-        if (!acc_is_continued(a, k)) sum -= leaves * leaves;
+        const double enters = piece.head ? acc_number(a, piece.head + acc_end(a, l, c)) : 0,
+                     leaves = piece.tail ? acc_number(a, piece.tail + acc_end(a, l, c)) : 0;
+        sum += enters * enters;
+        sum -= leaves * leaves;
     }
     if (!(a->base_weight > 0)) return sum;
     const size_t j = i - m;

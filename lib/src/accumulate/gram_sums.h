@@ -10,17 +10,15 @@
 
 /// The slots of the ring: sums into the first block row, ends of runs into the blocks below.
 static void FN(add_slot_)(const okid_accumulator_t* a, double* gram, int32_t k) {
-    const int32_t index = acc_ring(a, k);
-    const slot_info_t* slot = acc_slot(a, index);
-    if (slot->rows == 0) return;
+    acc_piece_t piece;
+    if (!acc_piece(a, k, &piece)) return;
     const size_t m = (size_t)a->m, n = (size_t)a->width, p = (size_t)a->config.lags;
-    const double* data = acc_slot_data(a, index);
     for (size_t b = 0, j = 0; b <= p; ++b)
         for (size_t c = 0; c < m; ++c, ++j)
-            for (size_t i = 0; i < m && i < j; ++i) ADD_SLOT(i, j, data, i * n + (p - b) * m + c);
+            for (size_t i = 0; i < m && i < j; ++i) ADD_SLOT(i, j, piece.data, i * n + (p - b) * m + c);
     for (int end = 0; end < 2; ++end) {
-        if (end == 0 ? k > 0 && slot->joined : acc_is_continued(a, k)) continue; // meets its neighbour: both cancel
-        const double* ends = end == 0 ? data + acc_slot_head(a) : acc_tail(a, index);
+        const double* ends = end == 0 ? piece.head : piece.tail;
+        if (!ends) continue;
         const int sign = end == 0 ? 1 : -1;
         for (size_t lj = 0, j = m; lj < p; ++lj)
             for (size_t cj = 0; cj < m; ++cj, ++j)

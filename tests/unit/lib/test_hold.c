@@ -1,33 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Continuous to discrete and back, for both holds.
-#include "structures.h"
-
-#include <unity.h>
-
-static structure_t s;
-static system_t m, c; // discrete or continuous model under test, and its continuous original
-static const double pi = 3.14159265358979323846;
-
-void setUp(void) {}
-void tearDown(void) {}
-
-static void assert_near(double expected, double relative, double found) {
-    TEST_ASSERT_DOUBLE_WITHIN(relative * fabs(expected), expected, found);
-}
-
-/// Structure `which`, two forces, a sensor of kind `first` + i on degree i (mod 3 kinds), continuous in c and m.
-static void make(int which, int first, int mixed) {
-    const int32_t forces[] = {0, 2};
-    int32_t dof[S_MAX], kind[S_MAX];
-    s_make(&s, which);
-    for (int i = 0; i < s.n; ++i) {
-        dof[i] = i;
-        kind[i] = mixed ? (first + i) % 3 : first;
-    }
-    s_instrument(&m, 2, forces, s.n, dof, kind);
-    TEST_ASSERT_EQUAL(OKID_OK, s_continuous(&s, &m));
-    c = m;
-}
+#include "mechanics_rig.h"
 
 static okid_status_t d2c(const system_t* from, int32_t hold, system_t* to) {
     const okid_model_t view = s_view(from);
@@ -128,7 +101,7 @@ static void sampling_is_exact_to_rounding(void) {
                     TEST_ASSERT_EQUAL(OKID_OK, s_sample(&m, hold));
                     sampling_errors(hold, error);
                     // 60 times Nyquist is 113 rad a sample, known to 113 eps, and D is a small difference there
-                    const double limit = LIMIT(1, 1e9) * (rate == 2 ? 2e-12 : 2e-15);
+                    const double limit = TOLERANCE(1, 1e9) * (rate == 2 ? 2e-12 : 2e-15);
                     for (int i = 0; i < 3; ++i) TEST_ASSERT_TRUE(error[i] < limit);
                 }
 }
@@ -159,7 +132,7 @@ static void held_step_and_straight_ramp_are_exact(void) {
             for (int o = 0; o < 3; ++o) {
                 const double y = (double)m.C[o] * z[0] + (double)m.C[3 + o] * z[1] + (double)m.D[o] * u;
                 const double expected = hold == OKID_HOLD_ZERO ? step[o] : ramp[o];
-                TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-11, 1e-2) * force * (1 + t), expected, y);
+                TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-11, 1e-2) * force * (1 + t), expected, y);
             }
             const double first = (double)m.A[0] * z[0] + (double)m.A[2] * z[1] + (double)m.B[0] * u;
             z[1] = (double)m.A[1] * z[0] + (double)m.A[3] * z[1] + (double)m.B[1] * u;
@@ -180,14 +153,14 @@ static void there_and_back(void) {
                 for (int i = 0; i < m.n_z; ++i) one_size[i] = i < m.n_x ? m.scale : 1;
                 s_rescale(&back, one_size);
                 s_rescale(&c, one_size);
-                TEST_ASSERT_TRUE(s_error(back.A, c.A, c.n_z * c.n_z) < LIMIT(1e-13, 1e-4));
-                TEST_ASSERT_TRUE(s_error(back.B, c.B, c.n_z * c.n_u) < LIMIT(1e-13, 1e-4));
+                TEST_ASSERT_TRUE(s_error(back.A, c.A, c.n_z * c.n_z) < TOLERANCE(1e-13, 1e-4));
+                TEST_ASSERT_TRUE(s_error(back.B, c.B, c.n_z * c.n_u) < TOLERANCE(1e-13, 1e-4));
                 double d = 0, size = 0; // D beside what the sampling adds to it
                 for (int i = 0; i < c.n_y * c.n_u; ++i) {
                     d = fmax(d, fabs((double)back.D[i] - (double)c.D[i]));
                     size = fmax(size, fabs((double)m.D[i]));
                 }
-                TEST_ASSERT_TRUE(d <= LIMIT(1e-13, 1e-4) * size);
+                TEST_ASSERT_TRUE(d <= TOLERANCE(1e-13, 1e-4) * size);
             }
 }
 
@@ -209,9 +182,9 @@ static void real_poles_go_back(void) {
         c = m;
         TEST_ASSERT_EQUAL(OKID_OK, s_sample(&m, hold));
         TEST_ASSERT_EQUAL(OKID_OK, d2c(&m, hold, &back));
-        TEST_ASSERT_TRUE(s_error(back.A, c.A, 16) < LIMIT(1e-12, 1e-4));
-        TEST_ASSERT_TRUE(s_error(back.B, c.B, 8) < LIMIT(1e-12, 1e-4));
-        TEST_ASSERT_TRUE(s_error(back.D, c.D, 4) < LIMIT(1e-13, 1e-5));
+        TEST_ASSERT_TRUE(s_error(back.A, c.A, 16) < TOLERANCE(1e-12, 1e-4));
+        TEST_ASSERT_TRUE(s_error(back.B, c.B, 8) < TOLERANCE(1e-12, 1e-4));
+        TEST_ASSERT_TRUE(s_error(back.D, c.D, 4) < TOLERANCE(1e-13, 1e-5));
     }
 }
 
@@ -232,7 +205,7 @@ static void trap_19_logarithm_and_input_factor(void) {
                 size += truth * truth;
             }
         TEST_ASSERT_TRUE(sqrt(naive / size) > 0.3);
-        TEST_ASSERT_TRUE(sqrt(right / size) < LIMIT(1e-13, 1e-4));
+        TEST_ASSERT_TRUE(sqrt(right / size) < TOLERANCE(1e-13, 1e-4));
     }
 
     make(1, OKID_SENSE_ACCELERATION, 0);
@@ -243,7 +216,7 @@ static void trap_19_logarithm_and_input_factor(void) {
     TEST_ASSERT_TRUE(alias < 0.7 * damped);
     // the sum of lambda^2 is the trace of A^2; only the imaginary part of this one pair has moved
     const double moved = square_trace(&back) - square_trace(&c);
-    assert_near(2 * damped * damped - 2 * alias * alias, LIMIT(1e-11, 1e-3), moved);
+    assert_near(2 * damped * damped - 2 * alias * alias, TOLERANCE(1e-11, 1e-3), moved);
 
     make(1, OKID_SENSE_ACCELERATION, 0);
     TEST_ASSERT_EQUAL(OKID_OK, s_sample(&m, OKID_HOLD_ZERO));
@@ -269,7 +242,7 @@ static void trap_16_hold_of_the_force(void) {
         TEST_ASSERT_EQUAL(OKID_OK, d2c(&m, OKID_HOLD_FIRST, &right));
         TEST_ASSERT_EQUAL(OKID_OK, d2c(&m, OKID_HOLD_ZERO, &wrong));
         TEST_ASSERT_EQUAL_MEMORY(right.A, wrong.A, sizeof(okid_real_t) * (size_t)(m.n_z * m.n_z));
-        TEST_ASSERT_TRUE(s_error(right.D, c.D, c.n_y * c.n_u) < LIMIT(1e-13, 1e-4));
+        TEST_ASSERT_TRUE(s_error(right.D, c.D, c.n_y * c.n_u) < TOLERANCE(1e-13, 1e-4));
         TEST_ASSERT_TRUE(s_error(wrong.D, c.D, c.n_y * c.n_u) > 0.2);
         TEST_ASSERT_TRUE(s_error(wrong.B, c.B, c.n_z * c.n_u) > 0.2);
     }
@@ -312,8 +285,8 @@ static void what_cannot_be_done_is_said(void) {
     s_instrument(&m, 1, dof, 1, dof, kind);
     TEST_ASSERT_EQUAL(OKID_OK, s_continuous(&s, &m));
     TEST_ASSERT_EQUAL(OKID_OK, s_sample(&m, OKID_HOLD_ZERO));
-    TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-16, 1e-8), 0.1, m.A[2]);
-    TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-17, 1e-9), 0.005, m.B[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-16, 1e-8), 0.1, m.A[2]);
+    TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-17, 1e-9), 0.005, m.B[0]);
     TEST_ASSERT_EQUAL(OKID_ERR_NUMERIC, d2c(&m, OKID_HOLD_ZERO, &back));
 }
 

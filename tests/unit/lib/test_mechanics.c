@@ -1,33 +1,6 @@
 // SPDX-License-Identifier: MIT
 // From M, R, K to state space and modes.
-#include "structures.h"
-
-#include <unity.h>
-
-static structure_t s;
-static system_t m, c; // discrete or continuous model under test, and its continuous original
-static const double pi = 3.14159265358979323846;
-
-void setUp(void) {}
-void tearDown(void) {}
-
-static void assert_near(double expected, double relative, double found) {
-    TEST_ASSERT_DOUBLE_WITHIN(relative * fabs(expected), expected, found);
-}
-
-/// Structure `which`, two forces, a sensor of kind `first` + i on degree i (mod 3 kinds), continuous in c and m.
-static void make(int which, int first, int mixed) {
-    const int32_t forces[] = {0, 2};
-    int32_t dof[S_MAX], kind[S_MAX];
-    s_make(&s, which);
-    for (int i = 0; i < s.n; ++i) {
-        dof[i] = i;
-        kind[i] = mixed ? (first + i) % 3 : first;
-    }
-    s_instrument(&m, 2, forces, s.n, dof, kind);
-    TEST_ASSERT_EQUAL(OKID_OK, s_continuous(&s, &m));
-    c = m;
-}
+#include "mechanics_rig.h"
 
 static okid_status_t modes(int n, const okid_real_t* M, const okid_real_t* R, const okid_real_t* K, int32_t* count,
                            okid_real_t* f, okid_real_t* zeta, okid_real_t* re, okid_real_t* im) {
@@ -79,7 +52,7 @@ static void continuous_model_is_newtons_law(void) {
                 }
             }
             for (int j = 0; j < 2; ++j) force -= (double)B_a[j * n + i] * u[j];
-            TEST_ASSERT_TRUE(fabs(force) < LIMIT(1e-13, 1e-5) * size);
+            TEST_ASSERT_TRUE(fabs(force) < TOLERANCE(1e-13, 1e-5) * size);
         }
         for (int o = 0; o < NY; ++o) {
             double y = (double)m.D[o] * u[0] + (double)m.D[NY + o] * u[1], expected = 0, size = 0;
@@ -89,7 +62,7 @@ static void continuous_model_is_newtons_law(void) {
                             (double)C_a[j * NY + o] * rate[n + j];
                 size += fabs((double)C_a[j * NY + o] * rate[n + j]);
             }
-            TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-4) * size, expected, y);
+            TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-4) * size, expected, y);
         }
     }
 }
@@ -140,8 +113,8 @@ static void modes_of_a_uniform_chain_in_closed_form(void) {
         for (int k = 0; k < N; ++k) {
             const double angle = (2 * k + 1) * pi / (2 * N + 1), omega = 2 * sqrt(spring / mass) * sin(angle / 2);
             const double ratio = damped ? alpha / (2 * omega) + beta * omega / 2 : 0;
-            assert_near(omega / (2 * pi), LIMIT(1e-13, 1e-5), f[k]);
-            TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-13, 1e-5), ratio, zeta[k]);
+            assert_near(omega / (2 * pi), TOLERANCE(1e-13, 1e-5), f[k]);
+            TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-13, 1e-5), ratio, zeta[k]);
             double top = 0; // shape sin(i angle), i = 1..N, largest entry 1
             for (int i = 0; i < N; ++i)
                 if (fabs(sin((i + 1) * angle)) > fabs(top)) top = sin((i + 1) * angle);
@@ -151,7 +124,7 @@ static void modes_of_a_uniform_chain_in_closed_form(void) {
                 misfit = fmax(misfit, hypot(re[k * N + i] - shape, im[k * N + i]));
                 opposite = fmax(opposite, hypot(re[k * N + i] + shape, im[k * N + i]));
             }
-            TEST_ASSERT_TRUE(fmin(misfit, opposite) < LIMIT(1e-11, 1e-3));
+            TEST_ASSERT_TRUE(fmin(misfit, opposite) < TOLERANCE(1e-11, 1e-3));
         }
     }
 }
@@ -163,13 +136,13 @@ static void modes_of_the_structures(void) {
         s_make(&s, which);
         TEST_ASSERT_EQUAL(OKID_OK, modes(s.n, s.M, s.R, s.K, &count, f, zeta, NULL, NULL));
         TEST_ASSERT_EQUAL(s.n, count);
-        assert_near(s.omega[0] / (2 * pi), LIMIT(1e-12, 1e-4), f[0]);
-        assert_near(s.omega[1] / (2 * pi), LIMIT(1e-12, 1e-4), f[s.n - 1]);
-        assert_near(0.01, LIMIT(1e-11, 1e-2), zeta[0]);
-        assert_near(0.01, LIMIT(1e-11, 1e-2), zeta[s.n - 1]);
+        assert_near(s.omega[0] / (2 * pi), TOLERANCE(1e-12, 1e-4), f[0]);
+        assert_near(s.omega[1] / (2 * pi), TOLERANCE(1e-12, 1e-4), f[s.n - 1]);
+        assert_near(0.01, TOLERANCE(1e-11, 1e-2), zeta[0]);
+        assert_near(0.01, TOLERANCE(1e-11, 1e-2), zeta[s.n - 1]);
         for (int k = 0; k < s.n; ++k) {
             const double omega = 2 * pi * f[k];
-            assert_near(s.alpha / (2 * omega) + s.beta * omega / 2, LIMIT(1e-11, 1e-2), zeta[k]);
+            assert_near(s.alpha / (2 * omega) + s.beta * omega / 2, TOLERANCE(1e-11, 1e-2), zeta[k]);
         }
     }
 }
@@ -183,14 +156,14 @@ static void rigid_and_overdamped_motions_are_no_modes(void) {
     int32_t count = 0;
     TEST_ASSERT_EQUAL(OKID_OK, modes(N, M, R, K, &count, f, zeta, re, im));
     TEST_ASSERT_EQUAL(1, count);
-    assert_near(sqrt(900 * 1.5) / (2 * pi), LIMIT(1e-12, 1e-5), f[0]);
-    TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-5), -0.5, re[0]);
-    TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-5), 1, re[1]);
+    assert_near(sqrt(900 * 1.5) / (2 * pi), TOLERANCE(1e-12, 1e-5), f[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-5), -0.5, re[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-5), 1, re[1]);
     R[8] = 6; // zeta 0.1
     TEST_ASSERT_EQUAL(OKID_OK, modes(N, M, R, K, &count, f, zeta, re, im));
     TEST_ASSERT_EQUAL(2, count);
-    assert_near(10 / (2 * pi), LIMIT(1e-12, 1e-5), f[0]);
-    assert_near(0.1, LIMIT(1e-12, 1e-5), zeta[0]);
+    assert_near(10 / (2 * pi), TOLERANCE(1e-12, 1e-5), f[0]);
+    assert_near(0.1, TOLERANCE(1e-12, 1e-5), zeta[0]);
 }
 
 static void wrong_use_is_refused(void) {

@@ -19,17 +19,18 @@ static void every_structure_sensing_and_hold(void) {
                     TEST_ASSERT_EQUAL(0, result.notes);
                     TEST_ASSERT_EQUAL(s.n, result.admissible);
                     TEST_ASSERT_EQUAL(which, result.pairs);
-                    TEST_ASSERT_TRUE(result.residual < LIMIT(1e-12, 1e-3));
-                    TEST_ASSERT_TRUE(result.feedthrough < LIMIT(1e-12, 1e-2));
+                    TEST_ASSERT_TRUE(result.residual < TOLERANCE(1e-12, 1e-3));
+                    TEST_ASSERT_TRUE(result.feedthrough < TOLERANCE(1e-12, 1e-2));
                     for (int k = 0; k < s.n; ++k) {
                         const double omega = 2 * RIG_PI * result.frequency_hz[k];
-                        TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 2e-4), s.alpha / (2 * omega) + s.beta * omega / 2,
+                        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 2e-4), s.alpha / (2 * omega) + s.beta * omega / 2,
                                                   result.damping_ratio[k]);
-                        TEST_ASSERT_TRUE(result.mpc[k] > LIMIT(1 - 1e-12, 1 - 1e-4));
-                        TEST_ASSERT_TRUE(fabs(result.phase[k]) < LIMIT(1e-12, 1e-3));
-                        TEST_ASSERT_TRUE(result.pair_spread[k] < LIMIT(1e-11, 1e-2));
+                        TEST_ASSERT_TRUE(result.mpc[k] > TOLERANCE(1 - 1e-12, 1 - 1e-4));
+                        TEST_ASSERT_TRUE(fabs(result.phase[k]) < TOLERANCE(1e-12, 1e-3));
+                        TEST_ASSERT_TRUE(result.pair_spread[k] < TOLERANCE(1e-11, 1e-2));
                     }
-                    if (kind == OKID_SENSE_ACCELERATION) TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-3), 1, result.gain);
+                    if (kind == OKID_SENSE_ACCELERATION)
+                        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-3), 1, result.gain);
                     if (kind < OKID_SENSE_ACCELERATION) TEST_ASSERT_EQUAL_DOUBLE(0, result.gain);
                 }
 }
@@ -79,7 +80,7 @@ static void flipped_and_scaled_channels(void) {
         s_scramble(&m, 3);
         TEST_ASSERT_EQUAL(OKID_OK, mkr_run(&m, 6, hold));
         assert_exact(&s);
-        TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-3), 1, result.gain);
+        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-3), 1, result.gain);
     }
 }
 
@@ -91,11 +92,11 @@ static void damping_of_any_kind(void) {
     mkr_system(&s, &m, 2, forces, 3, sensors, kinds, OKID_HOLD_ZERO, 5);
     const okid_status_t status = mkr_run(&m, 3, OKID_HOLD_ZERO);
     TEST_ASSERT_TRUE(status >= 0);
-    TEST_ASSERT_TRUE(error_M(&s) < LIMIT(1e-12, 1e-3));
-    TEST_ASSERT_TRUE(error_K(&s) < LIMIT(1e-12, 1e-3));
-    TEST_ASSERT_TRUE(error_R(&s) < LIMIT(1e-12, 1e-3));
+    TEST_ASSERT_TRUE(error_M(&s) < TOLERANCE(1e-12, 1e-3));
+    TEST_ASSERT_TRUE(error_K(&s) < TOLERANCE(1e-12, 1e-3));
+    TEST_ASSERT_TRUE(error_R(&s) < TOLERANCE(1e-12, 1e-3));
     TEST_ASSERT_TRUE(error_normal(&s) > 0.05);
-    TEST_ASSERT_TRUE(result.residual < LIMIT(1e-13, 1e-5)); // zero in the sum, no longer mode by mode
+    TEST_ASSERT_TRUE(result.residual < TOLERANCE(1e-13, 1e-5)); // zero in the sum, no longer mode by mode
     TEST_ASSERT_TRUE(result.mpc[1] < 0.9999);
 }
 
@@ -126,7 +127,7 @@ static void over_order_picks_the_modes_of_the_structure(void) {
                                                           NULL, NULL, NULL, NULL, NULL, work, bytes));
             TEST_ASSERT_EQUAL(count, result.admissible);
             for (int k = 0; k < s.n; ++k) // `mode` is the place in that list
-                TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-10, 1e-3) * f[result.mode[k]], f[result.mode[k]],
+                TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-10, 1e-3) * f[result.mode[k]], f[result.mode[k]],
                                           result.frequency_hz[k]);
             free(work);
         }

@@ -60,7 +60,7 @@ static void trap_11_transpose_not_conjugate(void) {
         mkr_standard(&s, &m, which, 2, OKID_HOLD_ZERO, 3);
         residues_of(&s, &known);
         naive_sum(s.n, s.n, known.lambda, known.w, 1, 0, 1, M);
-        TEST_ASSERT_TRUE(s_error_double(M, s.M, s.n * s.n) < LIMIT(1e-11, 1e-3));
+        TEST_ASSERT_TRUE(s_error_double(M, s.M, s.n * s.n) < TOLERANCE(1e-11, 1e-3));
         naive_sum(s.n, s.n, known.lambda, known.w, 1, 1, 1, M);
         TEST_ASSERT_TRUE(s_error_double(M, s.M, s.n * s.n) > 50);
         TEST_ASSERT_EQUAL(OKID_OK, mkr_run(&m, s.n, OKID_HOLD_ZERO));
@@ -135,13 +135,13 @@ static void trap_14_calibration(void) {
     TEST_ASSERT_EQUAL(OKID_OK, mkr_run(&m, 3, OKID_HOLD_ZERO));
     okid_real_t scaled[9];
     for (int i = 0; i < 9; ++i) scaled[i] = (okid_real_t)(s.M[i] * g / h);
-    TEST_ASSERT_TRUE(s_error(result.M, scaled, 9) < LIMIT(1e-12, 1e-4));
+    TEST_ASSERT_TRUE(s_error(result.M, scaled, 9) < TOLERANCE(1e-12, 1e-4));
     for (int i = 0; i < 9; ++i) scaled[i] = (okid_real_t)(s.K[i] * g / h);
-    TEST_ASSERT_TRUE(s_error(result.K, scaled, 9) < LIMIT(1e-12, 1e-4));
+    TEST_ASSERT_TRUE(s_error(result.K, scaled, 9) < TOLERANCE(1e-12, 1e-4));
     for (int i = 0; i < 9; ++i) scaled[i] = (okid_real_t)(s.R[i] * g / h);
-    TEST_ASSERT_TRUE(s_error(result.R, scaled, 9) < LIMIT(1e-11, 1e-2));
-    TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-3), 1, result.gain); // D is scaled alike
-    for (int i = 0; i < 3; ++i) m.output_gain[i] = (okid_real_t)h; // told the gains it is right again
+    TEST_ASSERT_TRUE(s_error(result.R, scaled, 9) < TOLERANCE(1e-11, 1e-2));
+    TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-3), 1, result.gain); // D is scaled alike
+    for (int i = 0; i < 3; ++i) m.output_gain[i] = (okid_real_t)h;     // told the gains it is right again
     m.input_gain[0] = (okid_real_t)(1 / g);
     TEST_ASSERT_EQUAL(OKID_OK, mkr_run(&m, 3, OKID_HOLD_ZERO));
     assert_exact(&s);
@@ -150,9 +150,9 @@ static void trap_14_calibration(void) {
     TEST_ASSERT_EQUAL(OKID_WARN_MODEL, mkr_run(&m, 3, OKID_HOLD_ZERO));
     TEST_ASSERT_EQUAL(OKID_MKR_POLARITY | OKID_MKR_STIFFNESS | OKID_MKR_DAMPING, result.notes);
     for (int i = 0; i < 9; ++i) scaled[i] = -s.M[i];
-    TEST_ASSERT_TRUE(s_error(result.M, scaled, 9) < LIMIT(1e-12, 1e-4));
+    TEST_ASSERT_TRUE(s_error(result.M, scaled, 9) < TOLERANCE(1e-12, 1e-4));
     for (int i = 0; i < 9; ++i) scaled[i] = -s.R[i];
-    TEST_ASSERT_TRUE(s_error(result.R_normal, scaled, 9) < LIMIT(1e-11, 1e-2));
+    TEST_ASSERT_TRUE(s_error(result.R_normal, scaled, 9) < TOLERANCE(1e-11, 1e-2));
 
     mkr_standard(&s, &m, 2, 2, OKID_HOLD_ZERO, 9);
     m.output_gain[3] = (okid_real_t)1.4;
@@ -175,7 +175,7 @@ static void trap_15_late_sensors(void) {
     TEST_ASSERT_TRUE(error_K(&s) < 1e-3);
     TEST_ASSERT_TRUE(error_normal(&s) < 1e-3);
     for (int k = 0; k < 3; ++k)
-        TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-4), -cimag(known.lambda[k]) * late / 2, result.phase[k]);
+        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-4), -cimag(known.lambda[k]) * late / 2, result.phase[k]);
 }
 
 // Trap 16: a force that was not held (hammer, load cell) taken for one that was: frequencies right, matrices not.
@@ -183,7 +183,7 @@ static void trap_16_hold(void) {
     for (int which = 1; which <= 3; ++which) {
         mkr_standard(&s, &m, which, 2, OKID_HOLD_FIRST, 4);
         TEST_ASSERT_EQUAL(OKID_WARN_MODEL, mkr_run(&m, s.n, OKID_HOLD_ZERO));
-        TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-5) * s.omega[1], s.omega[1],
+        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-5) * s.omega[1], s.omega[1],
                                   2 * RIG_PI * result.frequency_hz[s.n - 1]);
         TEST_ASSERT_TRUE(error_M(&s) > 0.3);
         TEST_ASSERT_TRUE(error_K(&s) > 0.3);
@@ -211,7 +211,7 @@ static void trap_17_sampled_before_the_update(void) {
         for (int k = 0; k < 3; ++k) s_reflect(&m, &seed);
         TEST_ASSERT_EQUAL(OKID_WARN_MODEL, mkr_run(&m, s.n, OKID_HOLD_ZERO));
         TEST_ASSERT_EQUAL(OKID_MKR_FEEDTHROUGH, result.notes);
-        TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-12, 1e-4), 0, result.gain);
+        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-4), 0, result.gain);
         assert_exact(&s);
     }
 }
@@ -234,7 +234,7 @@ static void trap_18_exactly_as_many_modes_as_degrees_of_freedom(void) {
         for (int i = 0; i < 3; ++i) w[k][i] = known.c[k][i] / square * t;
     }
     naive_sum(3, 3, known.lambda, w, -1, 0, -1, K);
-    TEST_ASSERT_TRUE(s_error_double(K, s.K, 9) < LIMIT(1e-11, 1e-3));
+    TEST_ASSERT_TRUE(s_error_double(K, s.K, 9) < TOLERANCE(1e-11, 1e-3));
     naive_sum(3, 4, known.lambda, w, -1, 0, -1, K);
     TEST_ASSERT_TRUE(s_error_double(K, s.K, 9) > 0.3);
     TEST_ASSERT_EQUAL(OKID_OK, mkr_run(&m, 3, OKID_HOLD_ZERO));
@@ -287,19 +287,19 @@ static void trap_21_closure_as_a_check(void) {
     mkr_standard(&s, &m, 1, 2, OKID_HOLD_ZERO, 1);
     const system_t exact = m;
     TEST_ASSERT_EQUAL(OKID_OK, mkr_run(&m, 3, OKID_HOLD_ZERO));
-    TEST_ASSERT_TRUE(result.residual < LIMIT(1e-13, 1e-5));
+    TEST_ASSERT_TRUE(result.residual < TOLERANCE(1e-13, 1e-5));
     residues_of(&s, &known);
     residues_channels(&known, &m, 1);
     for (int o = 0; o < 3; ++o) known.c[1][o] *= cexp(0.2 * I);
     residues_model(&known, &m);
     TEST_ASSERT_EQUAL(OKID_WARN_MODEL, mkr_run(&m, 3, OKID_HOLD_ZERO));
     TEST_ASSERT_TRUE(result.notes & OKID_MKR_RESIDUAL);
-    TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-10, 1e-3), 0.1, result.phase[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-10, 1e-3), 0.1, result.phase[1]);
 
     m = exact; // two of three modes asked for two degrees of freedom
     m.output_dof[2] = -1;
     TEST_ASSERT_EQUAL(OKID_WARN_MODEL, mkr_run(&m, 2, OKID_HOLD_ZERO));
-    TEST_ASSERT_TRUE(result.residual < LIMIT(1e-13, 1e-5));
+    TEST_ASSERT_TRUE(result.residual < TOLERANCE(1e-13, 1e-5));
     TEST_ASSERT_EQUAL(OKID_MKR_FEEDTHROUGH, result.notes & OKID_MKR_FEEDTHROUGH);
 }
 

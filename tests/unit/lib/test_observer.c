@@ -110,21 +110,8 @@ static void innovation_is_the_noise(void) {
 // Trap 22: outputs behind a steep anti-alias filter that the force does not see make the plain estimate unstable; the
 // smallest ridge of the grid that cures it is found.
 static void trap_22_unstable_arx_is_stabilised(void) {
-    enum { N = 3000, HALF = 24 };
-    double *v = rig_record(&rig, N, 0, NULL, 9), *filtered = calloc(N * RIG_M, sizeof *v);
-    uint64_t state = 4;
-    for (int n = 0; n < N; ++n) {
-        filtered[n * RIG_M] = v[n * RIG_M];
-        for (int c = 1; c < RIG_M; ++c) {
-            double sum = 1e-3 * rig_normal(&state);
-            for (int k = -HALF; k <= HALF; ++k) {
-                if (n + k < 0 || n + k >= N) continue;
-                const double x = 3.14159265358979 * 0.7 * k, sinc = k ? sin(x) / x : 1;
-                sum += 0.7 * sinc * (0.54 + 0.46 * cos(3.14159265358979 * k / HALF)) * v[(n + k) * RIG_M + c];
-            }
-            filtered[n * RIG_M + c] = sum;
-        }
-    }
+    enum { N = 3000 };
+    double *v = rig_record(&rig, N, 0, NULL, 9), *filtered = rig_filtered(v, N);
     gram_of(filtered, N, OKID_DETREND_MEAN);
     okid_observer_config_t leave = plain;
     leave.unstable = 1;

@@ -31,9 +31,9 @@ static void rayleigh_damping_is_found(void) {
     for (int i = 0; i < 4; ++i) {
         rayleigh(MODES, pairs[i][0], pairs[i][1]);
         TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_fit(MODES, frequency, zeta, NULL, &pdc));
-        TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-14, 1e-6), pairs[i][0], pdc.alpha);
-        TEST_ASSERT_DOUBLE_WITHIN(LIMIT(1e-18, 1e-10), pairs[i][1], pdc.beta);
-        TEST_ASSERT_TRUE(pdc.residual < LIMIT(1e-14, 1e-6));
+        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-14, 1e-6), pairs[i][0], pdc.alpha);
+        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-18, 1e-10), pairs[i][1], pdc.beta);
+        TEST_ASSERT_TRUE(pdc.residual < TOLERANCE(1e-14, 1e-6));
     }
 }
 
@@ -61,9 +61,9 @@ static void trap_20_columns_are_scaled_and_conjugates_do_not_matter(void) {
     }
     okid_pdc_t both;
     TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_fit(2 * MODES, f2, z2, NULL, &both));
-    assert_near(pdc.alpha, LIMIT(1e-13, 1e-6), both.alpha);
-    assert_near(pdc.beta, LIMIT(1e-13, 1e-6), both.beta);
-    assert_near(pdc.residual, LIMIT(1e-13, 1e-6), both.residual);
+    assert_near(pdc.alpha, TOLERANCE(1e-13, 1e-6), both.alpha);
+    assert_near(pdc.beta, TOLERANCE(1e-13, 1e-6), both.beta);
+    assert_near(pdc.residual, TOLERANCE(1e-13, 1e-6), both.residual);
     TEST_ASSERT_TRUE(pdc.residual > 0.02 && pdc.residual < 0.1);
 }
 
@@ -84,14 +84,14 @@ static void the_fit_is_the_weighted_least_squares_solution(void) {
         sa += weight[k] * a * fabs(e);
         sb += weight[k] * b * fabs(e);
     }
-    TEST_ASSERT_TRUE(fabs(ga) < LIMIT(1e-12, 1e-5) * sa);
-    TEST_ASSERT_TRUE(fabs(gb) < LIMIT(1e-12, 1e-5) * sb);
+    TEST_ASSERT_TRUE(fabs(ga) < TOLERANCE(1e-12, 1e-5) * sa);
+    TEST_ASSERT_TRUE(fabs(gb) < TOLERANCE(1e-12, 1e-5) * sb);
     for (int k = 2; k < MODES; ++k) weight[k] = 0; // two modes left: fitted exactly
     TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_fit(MODES, frequency, zeta, weight, &pdc));
-    TEST_ASSERT_TRUE(pdc.residual < LIMIT(1e-14, 1e-6));
+    TEST_ASSERT_TRUE(pdc.residual < TOLERANCE(1e-14, 1e-6));
     for (int k = 0; k < 2; ++k) {
         const double omega = 2 * pi * frequency[k];
-        assert_near(zeta[k], LIMIT(1e-13, 1e-6), (double)pdc.alpha / (2 * omega) + (double)pdc.beta * omega / 2);
+        assert_near(zeta[k], TOLERANCE(1e-13, 1e-6), (double)pdc.alpha / (2 * omega) + (double)pdc.beta * omega / 2);
     }
 }
 
@@ -104,9 +104,9 @@ static void one_mode_gives_the_right_matrix(void) {
     for (int count = 1; count <= 3; count += 2) { // three modes of one frequency say no more than one
         TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_fit(count, frequency, zeta, NULL, &pdc));
         TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_damping(1, &pdc, M, K, R));
-        assert_near(2 * 0.015 * omega * 2, LIMIT(1e-14, 1e-6), R[0]); // 2 zeta omega m
-        assert_near((double)pdc.alpha, LIMIT(1e-12, 1e-5), (double)pdc.beta * omega * omega);
-        TEST_ASSERT_TRUE(pdc.condition > LIMIT(1e14, 1e5));
+        assert_near(2 * 0.015 * omega * 2, TOLERANCE(1e-14, 1e-6), R[0]); // 2 zeta omega m
+        assert_near((double)pdc.alpha, TOLERANCE(1e-12, 1e-5), (double)pdc.beta * omega * omega);
+        TEST_ASSERT_TRUE(pdc.condition > TOLERANCE(1e14, 1e5));
     }
 }
 
@@ -122,9 +122,9 @@ static void damping_matrix_of_the_structures(void) {
         TEST_ASSERT_EQUAL(s.n, count);
         TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_fit(count, f, z, NULL, &pdc));
         TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_damping(s.n, &pdc, s.M, s.K, R));
-        assert_near(s.alpha, LIMIT(1e-11, 1e-2), pdc.alpha);
-        assert_near(s.beta, LIMIT(1e-11, 1e-2), pdc.beta);
-        TEST_ASSERT_TRUE(s_error(R, s.R, s.n * s.n) < LIMIT(1e-11, 1e-2));
+        assert_near(s.alpha, TOLERANCE(1e-11, 1e-2), pdc.alpha);
+        assert_near(s.beta, TOLERANCE(1e-11, 1e-2), pdc.beta);
+        TEST_ASSERT_TRUE(s_error(R, s.R, s.n * s.n) < TOLERANCE(1e-11, 1e-2));
         free(work);
     }
 }

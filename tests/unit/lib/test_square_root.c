@@ -360,21 +360,7 @@ static void innovation_is_the_noise(void) {
 // Trap 22: outputs behind a steep anti-alias filter that the force does not see. The smallest ridge that makes the model
 // stable is the one okid_observer_solve() finds.
 static void trap_22_unstable_arx_is_stabilised(void) {
-    enum { HALF = 24 };
-    double *v = rig_record(&rig, N, 0, NULL, 9), *filtered = calloc(N * RIG_M, sizeof *v);
-    uint64_t state = 4;
-    for (int n = 0; n < N; ++n) {
-        filtered[n * RIG_M] = v[n * RIG_M];
-        for (int c = 1; c < RIG_M; ++c) {
-            double sum = 1e-3 * rig_normal(&state);
-            for (int k = -HALF; k <= HALF; ++k) {
-                if (n + k < 0 || n + k >= N) continue;
-                const double x = 3.14159265358979 * 0.7 * k, sinc = k ? sin(x) / x : 1;
-                sum += 0.7 * sinc * (0.54 + 0.46 * cos(3.14159265358979 * k / HALF)) * v[(n + k) * RIG_M + c];
-            }
-            filtered[n * RIG_M + c] = sum;
-        }
-    }
+    double *v = rig_record(&rig, N, 0, NULL, 9), *filtered = rig_filtered(v, N);
     okid_observer_config_t leave = observer;
     leave.unstable = 1;
     TEST_ASSERT_EQUAL(OKID_OK, solve(&leave, filtered, N, OKID_DETREND_MEAN));

@@ -223,21 +223,7 @@ static void quantised_codes_are_solved(void) {
 
 // Trap 22: outputs behind a steep filter that the force does not see; the same ridge of the grid is found.
 static void unstable_arx_is_stabilised_alike(void) {
-    enum { HALF = 24 };
-    double *v = rig_record(&rig, N, 0, NULL, 9), *filtered = calloc(N * RIG_M, sizeof *v);
-    uint64_t state = 4;
-    for (int n = 0; n < N; ++n) {
-        filtered[n * RIG_M] = v[n * RIG_M];
-        for (int c = 1; c < RIG_M; ++c) {
-            double total = 1e-3 * rig_normal(&state);
-            for (int k = -HALF; k <= HALF; ++k) {
-                if (n + k < 0 || n + k >= N) continue;
-                const double x = 3.14159265358979 * 0.7 * k, sinc = k ? sin(x) / x : 1;
-                total += 0.7 * sinc * (0.54 + 0.46 * cos(3.14159265358979 * k / HALF)) * v[(n + k) * RIG_M + c];
-            }
-            filtered[n * RIG_M + c] = total;
-        }
-    }
+    double *v = rig_record(&rig, N, 0, NULL, 9), *filtered = rig_filtered(v, N);
     both(filtered, &plain, OKID_DETREND_MEAN);
     TEST_ASSERT_TRUE(info.radius_plain > 1.1 && info.radius < 1);
     TEST_ASSERT_TRUE(info.ridge > 1e-12);
