@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Structure:
-    """M q'' + R q' + K q = f, forces and accelerometers on chosen degrees of freedom (0-based)."""
+    """M q'' + R q' + K q = f, forces and sensors on chosen degrees of freedom (0-based)."""
 
     M: Array
     R: Array
@@ -25,6 +25,7 @@ class Structure:
     force_dofs: tuple[int, ...]
     sense_dofs: tuple[int, ...]
     dt: float
+    sensing: tuple[str, ...] = ()  # of each sensor, all acceleration when empty
 
     @property
     def fs(self) -> float:
@@ -39,7 +40,7 @@ class Structure:
         return omega / (2.0 * np.pi), zeta
 
     def discrete(self) -> tuple[Array, Array, Array, Array]:
-        """A, B, C, D for a force held over the sample, accelerations measured."""
+        """A, B, C, D for a force held over the sample."""
         n = len(self.M)
         minv = np.linalg.inv(self.M)
         a_c = np.block([[np.zeros((n, n)), np.eye(n)], [-minv @ self.K, -minv @ self.R]])
@@ -50,8 +51,11 @@ class Structure:
         big[: 2 * n, : 2 * n] = a_c
         big[: 2 * n, 2 * n :] = b_c
         step = expm(big * self.dt)
-        rows = list(self.sense_dofs)
-        return step[: 2 * n, : 2 * n], step[: 2 * n, 2 * n :], a_c[n:][rows], b_c[n:][rows]
+        first = {"displacement": 0, "velocity": 1, "acceleration": 2}  # block row of [q; q'; q'']
+        motion = np.vstack([np.eye(2 * n), a_c[n:]]), np.vstack([np.zeros((2 * n, b_c.shape[1])), b_c[n:]])
+        kinds = self.sensing or ("acceleration",) * len(self.sense_dofs)
+        rows = [first[kind] * n + dof for kind, dof in zip(kinds, self.sense_dofs, strict=True)]
+        return step[: 2 * n, : 2 * n], step[: 2 * n, 2 * n :], motion[0][rows], motion[1][rows]
 
 
 def rayleigh(M: Array, K: Array, zeta: float = 0.01) -> tuple[Array, float]:

@@ -2,8 +2,9 @@
 // PURPOSE    is an ARX model stable: radius of its companion matrix, without forming it
 // METHOD     two numbers. Growth: Arnoldi of a fixed vector, 64 steps, without any preparation; in a far from normal matrix
 //            its largest Ritz value stands above the spectral radius, as the response first grows before it decays, and such ARX
-//            models give poor Markov parameters. It counts where it is clearly above 1. Radius: 200 power steps, then
-//            Arnoldi; restarts from the sum of the leading Ritz vectors
+//            models give poor Markov parameters. It counts where it is clearly above 1, in the units given and in units of each
+//            output's own size: what grows in one of them only is of the units. Radius: 200 power steps, then Arnoldi;
+//            restarts from the sum of the leading Ritz vectors
 // REFERENCE  Saad, Numerical Methods for Large Eigenvalue Problems (2011), ch. 6
 // NUMERICS   the growth is well determined: rounding in theta moves it as little. The radius is wanted to ~1e-6: lightly damped
 //            structures live there (float comes to 2e-5)
@@ -149,6 +150,28 @@ bool largest_ritz(const companion& c, companion_work& w, ritz_pair* out) {
     return true;
 }
 
+/// The part of theta that feeds outputs back, in units of 1/scale, or as it is.
+template <class Scale>
+void take_feedback(int n_u, int n_y, int p, const okid_real_t* theta, const Scale* scale, okid_real_t* feedback) {
+    const auto ny = static_cast<size_t>(n_y), m = static_cast<size_t>(n_u) + ny;
+    for (size_t h = 0; h < static_cast<size_t>(p); ++h) {
+        const okid_real_t* own = theta + (static_cast<size_t>(n_u) + h * m + static_cast<size_t>(n_u)) * ny;
+        for (size_t c = 0; c < ny; ++c)
+            for (size_t r = 0; r < ny; ++r) {
+                const double unit =
+                    scale == nullptr ? 1 : static_cast<double>(scale[r]) / static_cast<double>(scale[c]);
+                feedback[(h * ny + c) * ny + r] = own[c * ny + r] * static_cast<okid_real_t>(unit);
+            }
+    }
+}
+
+/// Of a vector that holds everything, over as many samples as the basis has.
+okid_real_t growth_of(const companion& c, companion_work& w) {
+    ritz_pair pair;
+    start_vector(w.basis, c.size);
+    return largest_ritz(c, w, &pair) ? pair.size : HUGE_VAL;
+}
+
 } // namespace
 
 void companion_work::lay_out(int n_y, int p, arena& memory) {
@@ -164,21 +187,20 @@ void companion_work::lay_out(int n_y, int p, arena& memory) {
     feedback = memory.take<okid_real_t>(static_cast<size_t>(size) * static_cast<size_t>(n_y));
 }
 
-double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, companion_work& w) {
-    const auto ny = static_cast<size_t>(n_y), m = static_cast<size_t>(n_u) + ny;
-    for (size_t h = 0; h < static_cast<size_t>(p); ++h) {
-        const okid_real_t* own = theta + (static_cast<size_t>(n_u) + h * m + static_cast<size_t>(n_u)) * ny;
-        std::copy(own, own + ny * ny, w.feedback + h * ny * ny);
-    }
+template <class Scale>
+double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const Scale* scale, companion_work& w) {
     const companion c{n_y, n_y * p, w.feedback};
+    take_feedback(n_u, n_y, p, theta, scale, w.feedback);
     if (c.size <= dense_limit) return dense_radius(c, w);
-    ritz_pair pair;
-    start_vector(w.basis, c.size);
-    if (!largest_ritz(c, w, &pair)) return HUGE_VAL;
-    const okid_real_t growth = pair.size; // of a vector that holds everything, over as many samples as the basis has
+    okid_real_t growth = growth_of(c, w);
+    if (!(growth < growth_limit)) {
+        take_feedback<Scale>(n_u, n_y, p, theta, nullptr, w.feedback);
+        growth = std::min(growth, growth_of(c, w));
+    }
     if (!(growth < growth_limit)) return growth;
     start_vector(w.basis, c.size);
     power_steps(c, w.basis, w.basis + c.size, warm_steps);
+    ritz_pair pair;
     for (int round = 0; round < restarts; ++round) {
         if (!largest_ritz(c, w, &pair)) return HUGE_VAL;
         if (pair.residual <= tolerance * pair.size) break;
@@ -186,5 +208,8 @@ double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, compa
     }
     return pair.size;
 }
+
+template double companion_radius(int, int, int, const okid_real_t*, const float*, companion_work&);
+template double companion_radius(int, int, int, const okid_real_t*, const double*, companion_work&);
 
 } // namespace okid

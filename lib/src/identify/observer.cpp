@@ -211,11 +211,14 @@ okid_status_t okid_observer_solve(const okid_observer_config_t* config, const do
     const double ridge_min = config->ridge_min > 0 ? config->ridge_min : 1e-12;
     const bool numerical = ridge_min <= 1e-10; // a floor only: the refinement step takes it out again
     if (!s.solve(ridge_min, numerical, theta) && !s.solve(ridge_min * 1e2, numerical, theta)) return OKID_ERR_NUMERIC;
-    info->radius = info->radius_plain = okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.companion);
+    auto radius = [&] {
+        return okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.scale + s.n_u, s.w.companion);
+    };
+    info->radius = info->radius_plain = radius();
     if (!(info->radius < 1) && config->unstable == 0) {
         const okid_status_t status = okid::stabilise(ridge_min, [&](double ridge) {
             if (!s.solve(ridge, false, theta)) return false;
-            info->radius = okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.companion);
+            info->radius = radius();
             return info->radius < 1;
         });
         if (status != OKID_OK) return status;
