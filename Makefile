@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo test test-slow test-embedded bench bench-check lint format sanitize clean
+.PHONY: help setup build demo test test-slow test-embedded bench bench-check fuzz lint format sanitize clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 22
@@ -37,7 +37,8 @@ test-embedded: ## the library on other processors, cross-compiled and run in an 
 	@tools/setup.sh embedded
 	@tests/embedded/run
 
-bench: build ## speed of the kernels as ratios within one run
+bench: build ## speed of the kernels and of whole identifications as ratios within one run
+	@tools/setup.sh bench || echo "bench: going on without SLICOT"
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --save build/bench.json
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
@@ -49,6 +50,10 @@ sanitize: ## unit tests under AddressSanitizer and UndefinedBehaviourSanitizer
 	@cmake --build build-sanitize -j$(JOBS) -- --quiet
 	@ctest --test-dir build-sanitize --output-on-failure -j$(JOBS) --no-tests=error
 
+fuzz: ## fuzzers of every decoder and file reader, SECONDS=60 for all of them together
+	@tools/setup.sh fuzz
+	@tests/fuzz/run $(or $(SECONDS),60)
+
 lint: ## format, clang-tidy, ruff, mypy
 	@tools/setup.sh dev
 	@tools/lint.sh
@@ -59,4 +64,4 @@ format: ## rewrite C, C++ and Python in the house style
 	@.venv/bin/ruff format --config tools/pyproject.toml -q tools tests
 
 clean: ## remove build folders (not .venv)
-	@rm -rf build build-sanitize build-coverage build-float build-aarch64
+	@rm -rf build build-sanitize build-coverage build-float build-aarch64 build-fuzz

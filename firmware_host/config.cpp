@@ -2,10 +2,15 @@
 #include "config.hpp"
 
 #include "config_channel.hpp"
+#include "config_line.hpp"
 #include "config_schema.hpp"
+#include "config_send.hpp"
+#include "config_trigger.hpp"
+#include "deviations.hpp"
 #include "error.hpp"
 #include "method.hpp"
 #include "nearest_name.hpp"
+#include "presets.hpp"
 #include "units.hpp"
 
 #include <algorithm>
@@ -64,9 +69,8 @@ bus_config read_bus(const config_place& place, const toml::table& table) {
     bus.dbitrate = table["dbitrate"].value<double>();
     if (const auto dbc = table["dbc"].value<std::string>()) bus.dbc = beside(place.path, *dbc);
     if (const auto file = table["file"].value<std::string>()) bus.file = beside(place.path, *file);
-    if (bus.type == "slcan" || bus.type == "serial")
-        refuse_key(place, *table.get("type"), "type",
-                   fmt::format("\"{}\" is not available in this version; socketcan and replay are", bus.type));
+    read_line(place, table, bus);
+    read_sending(place, table, bus);
     if (bus.type == "socketcan")
         require_key(place, table, "interface", "a socketcan bus needs one, such as interface = \"can0\"");
     if (bus.type == "replay") require_key(place, table, "file", "a replay bus needs a candump -L log");
@@ -96,9 +100,14 @@ void read_buses(const std::string& path, const toml::table& file, live_config& c
         bus_config bus = read_bus(place, table);
         for (const bus_config& other : config.buses) {
             if (other.name == bus.name) refuse_key(place, *table.get("name"), "name", "another [[bus]] has this name");
-            if (!bus.interface.empty() && other.interface == bus.interface)
-                refuse_key(place, *table.get("interface"), "interface",
-                           fmt::format("bus \"{}\" uses it already", other.name));
+            for (const char* key : {"interface", "device"}) {
+                const auto mine = table[key].value<std::string>();
+                if (mine && *mine == (key[0] == 'i' ? other.interface : other.device))
+                    refuse_key(place, *table.get(key), key, fmt::format("bus \"{}\" uses it already", other.name));
+            }
+            if (bus.on_line() && other.interface == bus.interface)
+                refuse_key(place, *table.get("name"), "name",
+                           fmt::format("\"{}\" would stand for two buses in a log", bus.interface));
         }
         config.buses.push_back(std::move(bus));
     }
@@ -138,7 +147,7 @@ void share_sequence(const config_place& place, const toml::table& table, live_co
         if (other.name == channel.name)
             refuse_key(place, *table.get("name"), "name", "another [[channel]] has this name");
         if (other.bus != channel.bus || other.frame.id != channel.frame.id ||
-            other.frame.extended != channel.frame.extended)
+            other.frame.extended != channel.frame.extended || other.frame.mask != channel.frame.mask)
             continue;
         if (channel.sequence && other.sequence && !same_bits(channel.sequence, other.sequence))
             refuse_key(place, *table.get("sequence"), "sequence",
@@ -195,6 +204,9 @@ void read_identification(const std::string& path, const toml::table& file, live_
     const config_place place{path, "[identification]"};
     const toml::table& t = *table;
     out.method = t["method"].value_or(out.method);
+    out.hankel = t["hankel"].value_or(out.hankel);
+    if (const std::string fault = hankel_fault(out.hankel, out.method, config.n_u); !fault.empty())
+        refuse_key(place, *t.get("hankel"), "hankel", fault);
     out.hold = t["hold"].value_or(out.hold);
     out.detrend = t["detrend"].value_or(out.detrend);
     if (out.detrend == "linear")
@@ -206,15 +218,21 @@ void read_identification(const std::string& path, const toml::table& file, live_
     out.window_s = t["window_s"].value<double>();
     out.forgetting = t["forgetting"].value<double>();
     out.update_s = t["update_s"].value_or(out.update_s);
+    out.sigma_blocks = static_cast<int>(t["sigma_blocks"].value_or(std::int64_t{out.sigma_blocks}));
+    if (out.sigma_blocks > 0 && out.sigma_blocks < fewest_blocks)
+        refuse_key(place, *t.get("sigma_blocks"), "sigma_blocks",
+                   fmt::format("found {}, expected 0 (no standard deviations) or {} to 100", out.sigma_blocks,
+                               fewest_blocks));
     if (out.window_s && out.forgetting)
         refuse_key(place, *t.get("forgetting"), "forgetting",
                    "window_s is given too; a window and forgetting together are not available, choose one");
-    const bool subspace = is_subspace(method_of(out.method));
-    const int least = subspace ? 2 * (out.rows > 0 ? out.rows : 30) : 2 * out.p;
+    const okid_method_t method = method_of(out.method);
+    const bool by_rows = looks_back_rows(method, config.n_u);
+    const int least = 2 * (by_rows ? rows_used(method, config.n_u, out.p, out.rows) : out.p);
     if (out.window_s && *out.window_s * config.rate_hz < least)
         refuse_key(place, *t.get("window_s"), "window_s",
                    fmt::format("{:g} s are {:.0f} samples at {:g} Hz, expected more than 2 {} = {}", *out.window_s,
-                               *out.window_s * config.rate_hz, config.rate_hz, subspace ? "rows" : "p", least));
+                               *out.window_s * config.rate_hz, config.rate_hz, by_rows ? "rows" : "p", least));
     if (out.update_s * config.rate_hz < 1)
         refuse_key(
             place, *t.get("update_s"), "update_s",
@@ -229,7 +247,7 @@ void read_identification(const std::string& path, const toml::table& file, live_
 
 /// Sections of later versions: checked, then said to do nothing.
 void note_ignored(const toml::table& file, live_config& config) {
-    for (const char* section : {"alarm", "trigger", "record", "publish", "geometry"})
+    for (const char* section : {"alarm", "record", "publish", "geometry"})
         if (file.contains(section))
             config.warnings.push_back(fmt::format("[{}] is accepted, but does nothing in this version", section));
     for (const channel_config& channel : config.channels)
@@ -242,7 +260,8 @@ void note_ignored(const toml::table& file, live_config& config) {
 } // namespace
 
 live_config load_config(const std::string& path) {
-    const toml::table file = parse(path);
+    toml::table file = parse(path);
+    apply_presets(path, file);
     check_schema(path, file);
     live_config config;
     config.path = path;
@@ -250,6 +269,7 @@ live_config load_config(const std::string& path) {
     read_buses(path, file, config);
     read_channels(path, file, config);
     read_identification(path, file, config);
+    read_trigger(file, config);
     note_ignored(file, config);
     return config;
 }
@@ -259,10 +279,6 @@ void require_identifiable(const live_config& config) {
         refuse_file(
             config.path,
             "no [[channel]] has the role acceleration, velocity or displacement, expected at least one response");
-    if (config.n_u == 0 && !is_subspace(method_of(config.identification.method)))
-        refuse_file(config.path, fmt::format("no [[channel]] has the role force: {} needs a measured force, an n4sid "
-                                             "method works without one (ambient)",
-                                             config.identification.method));
 }
 
 mass_plan live_mass_plan(const live_config& config) {
@@ -286,7 +302,7 @@ std::vector<drv_filter_t> wanted_frames(const live_config& config, std::size_t b
     for (const channel_config& channel : config.channels) {
         if (channel.bus != bus) continue;
         const bool known = std::any_of(out.begin(), out.end(), [&](const drv_filter_t& f) {
-            return f.id == channel.frame.id && f.extended == channel.frame.extended;
+            return f.id == channel.frame.id && f.extended == channel.frame.extended && f.mask == channel.frame.mask;
         });
         if (!known) out.push_back(channel.frame);
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "config_channel.hpp"
 
+#include "config_line.hpp"
 #include "error.hpp"
 #include "nearest_name.hpp"
 
@@ -20,7 +21,7 @@ const dbc_message& find_message(const config_place& place, const toml::node& nod
                                 const std::string& name) {
     std::vector<std::string> names;
     for (const dbc_message& message : dbc.messages) {
-        if (message.name == name) return message;
+        if (message.name == name || message.long_name == name) return message;
         names.push_back(message.name);
     }
     refuse_key(place, node, "message",
@@ -33,7 +34,7 @@ const dbc_signal& find_signal(const config_place& place, const toml::node& node,
     std::vector<std::string> names;
     for (const dbc_signal& signal : message.signals) names.push_back(signal.name);
     for (const dbc_signal& signal : message.signals) {
-        if (signal.name != name) continue;
+        if (signal.name != name && signal.long_name != name) continue;
         drv_signal_t layout = signal.layout;
         const char* wrong = drv_signal_prepare(&layout);
         if (!wrong && drv_signal_bytes(&layout) > message.length) wrong = "the signal ends beyond the message";
@@ -85,6 +86,15 @@ drv_signal_t sequence_of_table(const config_place& place, const toml::table& tab
     return signal;
 }
 
+/// The group number: the destination of a message to one address (PDU1) is not part of it.
+std::uint32_t j1939_group(std::uint32_t number) { return (number >> 8 & 0xFF) < 240 ? number & 0x3FF00 : number; }
+
+/// Frames of a parameter group, whatever their priority and destination, of one sender or of all.
+drv_filter_t match_pgn(std::uint32_t number, const std::optional<int>& source) {
+    const std::uint32_t group = j1939_group(number), bits = (number >> 8 & 0xFF) < 240 ? 0x03FF0000u : 0x03FFFF00u;
+    return {group << 8 | static_cast<std::uint32_t>(source.value_or(0)), 1, bits | (source ? 0xFFu : 0u)};
+}
+
 void resolve_sequence(const config_place& place, const toml::table& table, const dbc_file* dbc,
                       const dbc_message* message, channel_config& channel) {
     const toml::node* node = table.get("sequence");
@@ -102,9 +112,31 @@ void resolve_sequence(const config_place& place, const toml::table& table, const
     check_sequence(place, *node, *channel.sequence);
 }
 
+/// The multiplexor of a signal, that one's own, and so on up to one that is always there.
+void resolve_selectors(const config_place& place, const toml::node& node, const dbc_file& dbc,
+                       const dbc_message& message, const dbc_signal& signal, channel_config& channel) {
+    const dbc_signal* inner = &signal;
+    while (!inner->mux_values.empty()) {
+        const auto outer = std::find_if(message.signals.begin(), message.signals.end(), [&](const dbc_signal& each) {
+            return inner->mux_switch.empty() ? each.multiplexor && each.mux_values.empty()
+                                             : each.name == inner->mux_switch;
+        });
+        const char* wrong = outer == message.signals.end()                       ? "has no multiplexor (M)"
+                            : channel.selectors.size() == message.signals.size() ? "has multiplexors in a circle"
+                                                                                 : nullptr;
+        if (wrong)
+            refuse_key(place, node, "signal",
+                       fmt::format("{}: line {}: the signal is multiplexed, but message {} {}", dbc.path, inner->line,
+                                   message.name, wrong));
+        channel.selectors.push_back(
+            {find_signal(place, node, "signal", dbc, message, outer->name).layout, inner->mux_values});
+        inner = &*outer;
+    }
+}
+
 void resolve_by_name(const config_place& place, const toml::table& table, const bus_config& bus, const dbc_file* dbc,
                      channel_config& channel) {
-    for (const char* key : {"can_id", "extended", "start_bit", "length", "byte_order", "signed", "value", "field"})
+    for (const char* key : {"can_id", "pgn", "extended", "start_bit", "length", "byte_order", "signed", "value"})
         if (const toml::node* node = table.get(key))
             refuse_key(place, *node, key,
                        "a channel has either message and signal of a dbc, or can_id and start_bit, not both");
@@ -120,37 +152,50 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
     channel.signal = *signal_node->value<std::string>();
     const dbc_message& message = find_message(place, *message_node, *dbc, channel.message);
     const dbc_signal& signal = find_signal(place, *signal_node, "signal", *dbc, message, channel.signal);
-    channel.frame = {message.id, static_cast<std::uint8_t>(message.extended)};
+    channel.frame = {message.id, static_cast<std::uint8_t>(message.extended), 0};
+    if (message.j1939)
+        channel.frame = match_pgn(message.id >> 8 & 0x3FFFF, table["source_address"].value<int>());
+    else if (const toml::node* node = table.get("source_address"))
+        refuse_key(place, *node, "source_address",
+                   fmt::format("message {} is no J1939 message: {} gives it no VFrameFormat J1939PG", message.name,
+                               dbc->path));
     channel.length = message.length;
     channel.layout = signal.layout;
     if (channel.unit.empty()) channel.unit = signal.unit;
-    if (signal.mux_value) {
-        const auto selector = std::find_if(message.signals.begin(), message.signals.end(),
-                                           [](const dbc_signal& each) { return each.multiplexor && !each.mux_value; });
-        if (selector == message.signals.end())
-            refuse_key(place, *signal_node, "signal",
-                       fmt::format("{}: line {}: the signal is multiplexed, but message {} has no "
-                                   "multiplexor (M)",
-                                   dbc->path, signal.line, message.name));
-        channel.selector = find_signal(place, *signal_node, "signal", *dbc, message, selector->name).layout;
-        channel.selector_value = *signal.mux_value;
-    }
+    resolve_selectors(place, *signal_node, *dbc, message, signal, channel);
     resolve_sequence(place, table, dbc, &message, channel);
+}
+
+/// `can_id`, or `pgn` with or without `source_address`.
+drv_filter_t identifier_of(const config_place& place, const toml::table& table) {
+    const toml::node *pgn = table.get("pgn"), *can_id = table.get("can_id"), *source = table.get("source_address");
+    if (pgn) {
+        for (const char* key : {"can_id", "extended"})
+            if (const toml::node* node = table.get(key))
+                refuse_key(place, *node, key, "a channel has either can_id or pgn, not both");
+        const auto number = static_cast<std::uint32_t>(*pgn->value<std::int64_t>());
+        if (number != j1939_group(number))
+            refuse_key(place, *pgn, "pgn",
+                       fmt::format("found {}, expected {}: below 0xF000 the low byte is an address, not part of it",
+                                   number, j1939_group(number)));
+        return match_pgn(number, table["source_address"].value<int>());
+    }
+    if (source) refuse_key(place, *source, "source_address", "it needs pgn beside it, or a J1939 message of a dbc");
+    const auto id = *can_id->value<std::int64_t>();
+    const bool extended = table["extended"].value_or(id > 0x7FF);
+    if (!extended && id > 0x7FF)
+        refuse_key(place, *can_id, "can_id", fmt::format("found {}, expected at most 2047 with extended = false", id));
+    return {static_cast<std::uint32_t>(id), static_cast<std::uint8_t>(extended), 0};
 }
 
 void resolve_by_bits(const config_place& place, const toml::table& table, channel_config& channel) {
     for (const char* key : {"can_id", "start_bit", "length"})
-        if (!table.get(key))
+        if (!table.get(key) && !(key[0] == 'c' && table.get("pgn")))
             refuse_table(place, table,
                          fmt::format("\"{}\" is missing: a channel needs message and signal (with a dbc on its bus), "
                                      "or can_id, start_bit and length",
                                      key));
-    const auto id = *table["can_id"].value<std::int64_t>();
-    const bool extended = table["extended"].value_or(id > 0x7FF);
-    if (!extended && id > 0x7FF)
-        refuse_key(place, *table.get("can_id"), "can_id",
-                   fmt::format("found {}, expected at most 2047 with extended = false", id));
-    channel.frame = {static_cast<std::uint32_t>(id), static_cast<std::uint8_t>(extended)};
+    channel.frame = identifier_of(place, table);
     channel.layout.start_bit = static_cast<std::uint16_t>(*table["start_bit"].value<std::int64_t>());
     channel.layout.length = static_cast<std::uint16_t>(*table["length"].value<std::int64_t>());
     const std::string order = table["byte_order"].value_or(std::string("little"));
@@ -168,11 +213,27 @@ void resolve_by_bits(const config_place& place, const toml::table& table, channe
 
 } // namespace
 
+bool multiplexor::holds(const drv_frame_t& frame) const {
+    std::int64_t raw = 0;
+    if (!drv_signal_raw(&layout, frame.data, frame.len, &raw)) return false;
+    const auto value = static_cast<std::uint64_t>(raw);
+    return std::any_of(values.begin(), values.end(),
+                       [&](const auto& range) { return value >= range.first && value <= range.second; });
+}
+
+bool multiplexor::operator==(const multiplexor& other) const {
+    return layout.start_bit == other.layout.start_bit && layout.length == other.layout.length &&
+           layout.big_endian == other.layout.big_endian && values == other.values;
+}
+
 void resolve_channel(const config_place& place, const toml::table& table, const bus_config& bus, const dbc_file* dbc,
                      channel_config& channel) {
-    if (const toml::node* node = table.get("field"))
-        refuse_key(place, *node, "field", "serial fields are not available in this version");
-    if (table.contains("message") || table.contains("signal"))
+    if (bus.serial())
+        resolve_field(place, table, bus, channel);
+    else if (const toml::node* node = table.get("field"))
+        refuse_key(place, *node, "field",
+                   fmt::format("bus \"{}\" is of type {}, only a serial bus has fields", bus.name, bus.type));
+    else if (table.contains("message") || table.contains("signal"))
         resolve_by_name(place, table, bus, dbc, channel);
     else
         resolve_by_bits(place, table, channel);
@@ -181,6 +242,7 @@ void resolve_channel(const config_place& place, const toml::table& table, const 
         if (channel.layout.scale == 0) refuse_key(place, *node, "scale", "found 0, expected another number");
     }
     if (const toml::node* node = table.get("offset")) channel.layout.offset = *node->value<double>();
+    channel.layout.offset -= table["zero_code"].value_or(0.0) * channel.layout.scale; // offset binary
 }
 
 } // namespace okid_host

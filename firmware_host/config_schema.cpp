@@ -14,7 +14,7 @@
 namespace okid_host {
 namespace {
 
-enum class kind { text, number, positive, whole, flag, choice, order, array, start_bits };
+enum class kind { text, number, positive, whole, flag, choice, order, array, start_bits, line, gpio };
 
 struct key_rule {
     const char* key;
@@ -30,6 +30,10 @@ struct section_rule {
     std::vector<key_rule> keys;
 };
 
+/// One lamp.
+const section_rule gpio_rule = {
+    "", false, {{"chip", kind::text}, {"line", kind::line, 0, 65535}, {"active_low", kind::flag}}};
+
 const std::vector<section_rule> schema = {
     {"acquisition",
      false,
@@ -43,19 +47,28 @@ const std::vector<section_rule> schema = {
     {"bus",
      true,
      {{"name", kind::text},
+      {"preset", kind::text},
       {"type", kind::choice, 0, 0, {"socketcan", "slcan", "serial", "replay"}},
       {"interface", kind::text},
       {"device", kind::text},
       {"baud", kind::whole, 50, 2e7},
-      {"framing", kind::choice, 0, 0, {"cobs", "ascii", "witmotion"}},
+      {"framing", kind::choice, 0, 0, {"cobs", "ascii", "witmotion", "vectornav"}},
+      {"counter_field", kind::whole, 0, 1023},
+      {"counter_bits", kind::whole, 2, 32},
+      {"btr", kind::text},
       {"file", kind::text},
       {"fd", kind::flag},
       {"bitrate", kind::whole, 1000, 2e7},
       {"dbitrate", kind::whole, 1000, 2e7},
-      {"dbc", kind::text}}},
+      {"dbc", kind::text},
+      {"sync_hz", kind::positive, 0, 1e4},
+      {"sync_id", kind::whole, 0, 0x1FFFFFFF},
+      {"sync_data", kind::text},
+      {"start", kind::array}}},
     {"channel",
      true,
      {{"name", kind::text},
+      {"preset", kind::text},
       {"role", kind::choice, 0, 0, {"force", "acceleration", "velocity", "displacement", "aux"}},
       {"dof", kind::whole, 1, 100000},
       {"unit", kind::text},
@@ -63,6 +76,8 @@ const std::vector<section_rule> schema = {
       {"message", kind::text},
       {"signal", kind::text},
       {"can_id", kind::whole, 0, 0x1FFFFFFF},
+      {"pgn", kind::whole, 0, 0x3FFFF},
+      {"source_address", kind::whole, 0, 255},
       {"extended", kind::flag},
       {"start_bit", kind::whole, 0, 511},
       {"length", kind::whole, 1, 64},
@@ -71,6 +86,7 @@ const std::vector<section_rule> schema = {
       {"value", kind::choice, 0, 0, {"integer", "float32", "float64"}},
       {"scale", kind::number},
       {"offset", kind::number},
+      {"zero_code", kind::number},
       {"field", kind::whole, 0, 1023},
       {"sequence", kind::start_bits}}},
     {"identification",
@@ -78,12 +94,14 @@ const std::vector<section_rule> schema = {
      {{"method", kind::choice, 0, 0, {"okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"}},
       {"p", kind::whole, 1, 4096},
       {"rows", kind::whole, 2, 100000},
+      {"hankel", kind::choice, 0, 0, {"system", "innovations", "literal"}},
       {"order", kind::order, 1, 10000},
       {"hold", kind::choice, 0, 0, {"zoh", "foh"}},
       {"detrend", kind::choice, 0, 0, {"none", "mean", "linear"}},
       {"window_s", kind::positive, 0, 1e6},
       {"forgetting", kind::positive, 0, 1},
       {"update_s", kind::positive, 0, 1e5},
+      {"sigma_blocks", kind::whole, 0, 100},
       {"mkr", kind::flag}}},
     {"alarm",
      false,
@@ -95,8 +113,10 @@ const std::vector<section_rule> schema = {
       {"level", kind::number},
       {"pretrigger_s", kind::number, 0, 1e5},
       {"chip", kind::text},
-      {"line", kind::whole, 0, 1023},
+      {"line", kind::line, 0, 65535},
+      {"active_low", kind::flag},
       {"edge", kind::choice, 0, 0, {"rising", "falling", "both"}}}},
+    {"lamps", false, {{"armed", kind::gpio}, {"go", kind::gpio}, {"alarm", kind::gpio}}},
     {"record",
      false,
      {{"directory", kind::text},
@@ -130,6 +150,8 @@ void check_choice(const config_place& place, const toml::node& node, const key_r
                            text ? did_you_mean(*text, rule.choices) : "", list_names(rule.choices)));
 }
 
+void check_table(const config_place& place, const toml::table& table, const section_rule& rule);
+
 void check_value(const config_place& place, const toml::node& node, const key_rule& rule) {
     const auto expect = [&](bool holds, const char* expected) {
         if (!holds)
@@ -148,6 +170,16 @@ void check_value(const config_place& place, const toml::node& node, const key_ru
             expect(node.is_integer(), "\"auto\" or a whole number");
             check_number(place, node, {rule.key, kind::whole, rule.low, rule.high});
         }
+        break;
+    case kind::line:
+        if (!node.is_string() || node.value<std::string>()->empty()) {
+            expect(node.is_integer(), "the number of a line on its chip or its name in quotes");
+            check_number(place, node, {rule.key, kind::whole, rule.low, rule.high});
+        }
+        break;
+    case kind::gpio:
+        expect(node.is_table(), "a GPIO line, such as { chip = \"gpiochip0\", line = 17 }");
+        check_table({place.path, fmt::format("{} {}", place.section, rule.key)}, *node.as_table(), gpio_rule);
         break;
     case kind::choice: check_choice(place, node, rule); break;
     default: check_number(place, node, rule);
@@ -209,8 +241,10 @@ void check_section(const std::string& path, std::string_view key, const toml::no
 } // namespace
 
 void refuse_key(const config_place& place, const toml::node& node, std::string_view key, const std::string& text) {
-    throw failure(exit_usage, fmt::format("{}: line {}, {}, key \"{}\": {}", place.path, node.source().begin.line,
-                                          place.section, printable(std::string(key)), text));
+    const auto line = node.source().begin.line; // keys taken over from a preset have none
+    throw failure(exit_usage, fmt::format("{}: {}, {}, key \"{}\": {}", place.path,
+                                          line ? fmt::format("line {}", line) : "from the preset", place.section,
+                                          printable(std::string(key)), text));
 }
 
 std::string found_value(const toml::node& node) {

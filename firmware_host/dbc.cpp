@@ -6,6 +6,7 @@
 #include "error.hpp"
 #include "nearest_name.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -20,6 +21,13 @@ namespace {
 
 constexpr std::uint32_t extended_bit = 0x80000000u;
 constexpr std::uint32_t no_message_id = 0xC0000000u; // VECTOR__INDEPENDENT_SIG_MSG: signals that belong to no frame
+
+/// What the attribute VFrameFormat says.
+struct frame_formats {
+    std::uint64_t j1939 = 3; ///< its number
+    bool j1939_by_default = false;
+    std::vector<std::uint32_t> told; ///< messages it names, as numbered in the file
+};
 
 /// One line under inspection; every refusal names file, line and column.
 class dbc_line {
@@ -44,6 +52,10 @@ class dbc_line {
     }
     void need(char wanted, const char* where) {
         if (!take(wanted)) refuse(fmt::format("'{}' {}", wanted, where));
+    }
+    bool done() {
+        blanks();
+        return at_ == text_.size();
     }
     std::string_view word() {
         blanks();
@@ -81,6 +93,9 @@ class dbc_line {
         while (at_ < text_.size() && text_[at_] != '"') ++at_;
         if (at_ == text_.size()) refuse("'\"' after the unit");
         return std::string(text_.substr(begin, at_++ - begin));
+    }
+    std::uint32_t message_id() {
+        return static_cast<std::uint32_t>(whole("the identifier of the message", 0xFFFFFFFFu));
     }
     std::size_t number_of_line() const { return number_; }
 
@@ -125,7 +140,7 @@ std::string to_utf8(const std::string& text) {
 /// `BO_ 256 Name: 8 Sender`
 void read_message(dbc_line& line, dbc_file& file, bool& kept) {
     dbc_message message;
-    const auto id = static_cast<std::uint32_t>(line.whole("the identifier of the message", 0xFFFFFFFFu));
+    const std::uint32_t id = line.message_id();
     message.name = line.name("the name of the message");
     line.need(':', "after the name of the message");
     message.length = static_cast<unsigned>(line.whole("the length of the message in bytes", 65535));
@@ -154,7 +169,8 @@ void read_multiplexing(dbc_line& line, dbc_signal& signal) {
     if (text[0] != 'm' || error != std::errc{} || (!rest.empty() && rest != "M"))
         line.refuse(fmt::format("M, m<number> or ':' after the name of the signal, found \"{}\"",
                                 printable(std::string(text))));
-    signal.mux_value = value;
+    signal.mux_values = {{value, value}};
+    signal.multiplexor = !rest.empty();
 }
 
 /// `SG_ Name m0 : 16|12@1- (0.1,0) [0|0] "N" Receiver`
@@ -192,20 +208,100 @@ dbc_signal read_signal(dbc_line& line) {
     return signal;
 }
 
+bool has_id(const dbc_message& message, std::uint32_t id) {
+    return message.id == (id & ~extended_bit) && message.extended == ((id & extended_bit) != 0);
+}
+
+template <class action> void for_signal(dbc_file& file, std::uint32_t id, const std::string& name, const action& act) {
+    for (dbc_message& message : file.messages)
+        for (dbc_signal& signal : message.signals)
+            if (has_id(message, id) && signal.name == name) act(signal);
+}
+
 /// `SIG_VALTYPE_ 256 Name : 1;`
 void read_value_type(dbc_line& line, dbc_file& file) {
-    const auto id = static_cast<std::uint32_t>(line.whole("the identifier of the message", 0xFFFFFFFFu));
+    const std::uint32_t id = line.message_id();
     const std::string name = line.name("the name of the signal");
     (void)line.take(':');
     const auto type = line.whole("the value type", 2);
-    for (dbc_message& message : file.messages) {
-        if (message.id != (id & ~extended_bit) || message.extended != ((id & extended_bit) != 0)) continue;
-        for (dbc_signal& signal : message.signals) {
-            if (signal.name != name) continue;
-            signal.layout.value = type == 1 ? DRV_VALUE_FLOAT32 : type == 2 ? DRV_VALUE_FLOAT64 : DRV_VALUE_INTEGER;
-            (void)drv_signal_prepare(&signal.layout);
-        }
+    for_signal(file, id, name, [&](dbc_signal& signal) {
+        signal.layout.value = type == 1 ? DRV_VALUE_FLOAT32 : type == 2 ? DRV_VALUE_FLOAT64 : DRV_VALUE_INTEGER;
+        (void)drv_signal_prepare(&signal.layout);
+    });
+}
+
+/// `SG_MUL_VAL_ 256 Signal Multiplexor 1-3, 7-7;`: which multiplexor, and more values than one.
+void read_extended_multiplexing(dbc_line& line, dbc_file& file) {
+    const std::uint32_t id = line.message_id();
+    const std::string name = line.name("the name of the signal"), outer = line.name("the name of the multiplexor");
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> values;
+    do {
+        const std::uint64_t low = line.whole("the first value", UINT64_MAX);
+        line.need('-', "between first and last value");
+        values.emplace_back(low, line.whole("the last value", UINT64_MAX));
+    } while (line.take(','));
+    for_signal(file, id, name, [&](dbc_signal& signal) {
+        signal.mux_switch = outer;
+        signal.mux_values = values;
+    });
+}
+
+/// `BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG";`: which number means J1939.
+void read_format_names(dbc_line& line, frame_formats& formats) {
+    if (line.word() != "BO_" || !line.take('"') || line.word() != "VFrameFormat" || !line.take('"')) return;
+    if (line.word() != "ENUM") return;
+    for (std::uint64_t number = 0; line.take('"'); ++number) {
+        if (line.word() == "J1939PG") formats.j1939 = number;
+        if (!line.take('"') || !line.take(',')) return;
     }
+}
+
+/// `BA_ "SystemSignalLongSymbol" SG_ 256 Short "The_long_name";`, and the same of a message with BO_.
+void read_long_name(dbc_line& line, dbc_file& file) {
+    const bool of_signal = line.word() == "SG_";
+    const std::uint32_t id = line.message_id();
+    const std::string name = of_signal ? line.name("the name of the signal") : "";
+    const std::string text = line.quoted();
+    if (of_signal) {
+        for_signal(file, id, name, [&](dbc_signal& signal) { signal.long_name = text; });
+        return;
+    }
+    for (dbc_message& message : file.messages)
+        if (has_id(message, id)) message.long_name = text;
+}
+
+/// Attributes that matter here: `BA_DEF_DEF_ "VFrameFormat" "J1939PG";` and `BA_ "VFrameFormat" BO_ 2566844926 3;` tell
+/// which identifiers stand for a parameter group.
+void read_attribute(dbc_line& line, std::string_view keyword, dbc_file& file, frame_formats& formats) {
+    if (keyword == "BA_DEF_") {
+        read_format_names(line, formats);
+        return;
+    }
+    if (!line.take('"')) return;
+    const std::string_view attribute = line.word();
+    if (!line.take('"')) return;
+    if (keyword == "BA_" && (attribute == "SystemSignalLongSymbol" || attribute == "SystemMessageLongSymbol"))
+        read_long_name(line, file);
+    if (attribute != "VFrameFormat") return;
+    if (keyword == "BA_DEF_DEF_") {
+        formats.j1939_by_default = line.take('"') ? line.word() == "J1939PG" : line.word() == "3";
+        return;
+    }
+    if (line.word() != "BO_") return;
+    const std::uint32_t id = line.message_id();
+    formats.told.push_back(id);
+    if (line.whole("the number of a frame format", 255) != formats.j1939) return;
+    for (dbc_message& message : file.messages)
+        if (message.extended && has_id(message, id)) message.j1939 = true;
+}
+
+/// Messages whose format is not told have that of the default.
+void apply_default_format(const frame_formats& formats, dbc_file& file) {
+    if (!formats.j1939_by_default) return;
+    for (dbc_message& message : file.messages)
+        if (message.extended &&
+            std::find(formats.told.begin(), formats.told.end(), message.id | extended_bit) == formats.told.end())
+            message.j1939 = true;
 }
 
 /// Does the line leave a string open?
@@ -227,6 +323,7 @@ dbc_file read_dbc(const std::string& path) {
         throw failure(exit_usage,
                       fmt::format("{}: cannot be read: {}", path, input ? "it is a folder" : std::strerror(errno)));
     std::string whole_line;
+    frame_formats formats;
     bool in_string = false, in_message = false, message_kept = false;
     for (std::size_t number = 1; std::getline(input, whole_line); ++number) {
         std::string_view text = whole_line;
@@ -244,12 +341,18 @@ dbc_file read_dbc(const std::string& path) {
             if (!in_message) line.refuse("a message (BO_) before its first signal");
             dbc_signal signal = read_signal(line);
             if (message_kept) file.messages.back().signals.push_back(std::move(signal));
+        } else if (!keyword.empty() && line.done()) {
+            in_message = false; // the section NS_ lists keywords, one a line
         } else if (keyword == "SIG_VALTYPE_") {
             read_value_type(line, file);
+        } else if (keyword == "SG_MUL_VAL_") {
+            read_extended_multiplexing(line, file);
         } else if (!keyword.empty()) {
             in_message = false;
+            if (keyword.substr(0, 3) == "BA_") read_attribute(line, keyword, file, formats);
         }
     }
+    apply_default_format(formats, file);
     if (file.messages.empty())
         throw failure(exit_usage,
                       fmt::format("{}: found no message, expected a DBC file with lines that begin with BO_", path));

@@ -4,24 +4,27 @@
 #include <drv/codec.h>
 
 #include <cstdint>
-#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace okid_host {
 
 struct dbc_signal {
     std::string name, unit;
-    drv_signal_t layout{};                  ///< prepared
-    bool multiplexor = false;               ///< selects which of the others are present
-    std::optional<std::uint64_t> mux_value; ///< present only when the multiplexor holds this
+    std::string long_name;    ///< names are cut at 32 letters; the attribute System…LongSymbol has the whole one, or ""
+    drv_signal_t layout{};    ///< prepared
+    bool multiplexor = false; ///< selects which of the others are present
+    std::string mux_switch;   ///< the multiplexor, "" = the only one of the message
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> mux_values; ///< present only while it holds one of these
     std::size_t line = 0;
 };
 
 struct dbc_message {
-    std::string name;
+    std::string name, long_name;
     std::uint32_t id = 0; ///< without the extended bit
     bool extended = false;
+    bool j1939 = false;  ///< the identifier stands for a parameter group (VFrameFormat J1939PG)
     unsigned length = 0; ///< bytes
     std::size_t line = 0;
     std::vector<dbc_signal> signals;

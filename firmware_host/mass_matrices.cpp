@@ -30,26 +30,7 @@ struct attempt {
 double gain_of(const mass_channel& channel) { return (channel.reversed ? -1 : 1) * channel.si; }
 
 attempt try_plan(const okid_identified_t& model, const mass_plan& plan) {
-    std::vector<std::int32_t> input_dof, output_dof, sensing;
-    std::vector<double> input_gain, output_gain;
-    for (const mass_channel& channel : plan.inputs) {
-        input_dof.push_back(channel.dof - 1);
-        input_gain.push_back(gain_of(channel));
-    }
-    for (const mass_channel& channel : plan.outputs) {
-        output_dof.push_back(channel.dof - 1);
-        output_gain.push_back(1 / gain_of(channel));
-        sensing.push_back(channel.sensing);
-    }
-    okid_mkr_config_t config{};
-    config.n_x = plan.size();
-    config.hold = plan.hold == "foh" ? OKID_HOLD_FIRST : OKID_HOLD_ZERO;
-    config.dt = model.dt;
-    config.input_dof = input_dof.data();
-    config.input_gain = input_gain.data();
-    config.output_dof = output_dof.data();
-    config.output_gain = output_gain.data();
-    config.output_sensing = sensing.data();
+    const mkr_arguments given(plan, model.dt);
     okid_model_t view{};
     view.n_u = model.n_u;
     view.n_y = model.n_y;
@@ -59,9 +40,9 @@ attempt try_plan(const okid_identified_t& model, const mass_plan& plan) {
     view.C = model.C;
     view.D = model.D;
     attempt out;
-    const std::size_t bytes = okid_mkr_memsize(model.n_u, model.n_y, model.n_z, config.n_x);
+    const std::size_t bytes = okid_mkr_memsize(model.n_u, model.n_y, model.n_z, given.config.n_x);
     out.work = std::make_unique<std::byte[]>(bytes);
-    out.status = okid_mkr_identify(&view, &config, &out.result, out.work.get(), bytes);
+    out.status = okid_mkr_identify(&view, &given.config, &out.result, out.work.get(), bytes);
     return out;
 }
 
@@ -149,6 +130,26 @@ mass_matrices take(const okid_mkr_t& result, const mass_plan& plan) {
 }
 
 } // namespace
+
+mkr_arguments::mkr_arguments(const mass_plan& plan, double dt) {
+    for (const mass_channel& channel : plan.inputs) {
+        input_dof.push_back(channel.dof - 1);
+        input_gain.push_back(gain_of(channel));
+    }
+    for (const mass_channel& channel : plan.outputs) {
+        output_dof.push_back(channel.dof - 1);
+        output_gain.push_back(1 / gain_of(channel));
+        sensing.push_back(channel.sensing);
+    }
+    config.n_x = plan.size();
+    config.hold = plan.hold == "foh" ? OKID_HOLD_FIRST : OKID_HOLD_ZERO;
+    config.dt = dt;
+    config.input_dof = input_dof.data();
+    config.input_gain = input_gain.data();
+    config.output_dof = output_dof.data();
+    config.output_gain = output_gain.data();
+    config.output_sensing = sensing.data();
+}
 
 int mass_plan::size() const {
     int largest = 0;

@@ -6,6 +6,8 @@
 #include <okid/mkr.h>
 #include <okid/pdc.h>
 
+#include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -42,11 +44,24 @@ struct mass_matrices {
     int n_x = 0;
     std::uint32_t notes = 0;
     std::vector<double> M, K, R, R_normal, R_pdc;
+    std::vector<double> M_std, K_std, R_std, R_normal_std; ///< standard deviations, NaN inside; empty: none
     okid_pdc_t pdc{};
+    double alpha_std = NAN, beta_std = NAN;
     std::vector<mass_mode> modes;
     int admissible = 0, pairs = 0;
     std::string feedthrough_output; ///< where the misfit is largest, "" without
     double residual = 0, feedthrough = 0, gain = 0, margin = 0, condition = 0;
+};
+
+/// The plan as okid_mkr_identify() takes it; `config` points into the rest.
+struct mkr_arguments {
+    std::vector<std::int32_t> input_dof, output_dof, sensing;
+    std::vector<double> input_gain, output_gain;
+    okid_mkr_config_t config{};
+
+    mkr_arguments(const mass_plan& plan, double dt);
+    mkr_arguments(const mkr_arguments&) = delete;
+    mkr_arguments& operator=(const mkr_arguments&) = delete;
 };
 
 /// "acceleration" … to okid_sensing_t; anything else is acceleration.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Mass, stiffness and damping matrices as JSON and as words.
-#include "mass_matrices.hpp"
+#include "deviations.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -51,8 +51,10 @@ ordered_json checks_json(const mass_matrices& found) {
     return out;
 }
 
-std::string square_text(const std::string& title, const std::vector<double>& values, int n) {
-    std::string out = fmt::format("{}\n  dof", title);
+/// With a row of standard deviations below each row of values, where there are any.
+std::string square_text(const std::string& title, const std::vector<double>& values, const std::vector<double>& std,
+                        int n) {
+    std::string out = fmt::format("{}{}\n  dof", title, std.empty() ? "" : ", ± one standard deviation");
     for (int j = 0; j < n; ++j) out += fmt::format(" {:>12}", j + 1);
     out += "\n";
     double largest = 0;
@@ -66,8 +68,21 @@ std::string square_text(const std::string& title, const std::vector<double>& val
             out += fixed ? fmt::format(" {:>12.{}f}", value, digits) : fmt::format(" {:>12.4e}", value);
         }
         out += "\n";
+        if (std.empty()) continue;
+        out += "     ";
+        for (int j = 0; j < n; ++j) out += fmt::format(" {:>12}", plus_minus(std[static_cast<std::size_t>(j * n + i)]));
+        out += "\n";
     }
     return out;
+}
+
+/// "(0.51 ±0.02) 1/s M + (1.2e-05 ±3e-07) s K", without brackets where no deviation is known.
+std::string proportional_text(const mass_matrices& found) {
+    const auto with = [](double value, double std) {
+        return std::isfinite(std) ? fmt::format("({:.5g} {})", value, plus_minus(std)) : fmt::format("{:.5g}", value);
+    };
+    return fmt::format("{} 1/s M + {} s K", with(found.pdc.alpha, found.alpha_std),
+                       with(found.pdc.beta, found.beta_std));
 }
 
 const char* yes_or_no(bool holds) { return holds ? "yes" : "NO"; }
@@ -142,7 +157,10 @@ void put_mass_json(const mass_matrices& found, ordered_json& result) {
     mkr["K"] = square_json(found.K, n);
     mkr["R"] = square_json(found.R, n);
     mkr["R_normal_modes"] = square_json(found.R_normal, n);
-    for (const char* key : {"M_std", "K_std", "R_std"}) mkr[key] = nullptr;
+    for (const auto& [key, std] :
+         {std::pair{"M_std", &found.M_std}, std::pair{"K_std", &found.K_std}, std::pair{"R_std", &found.R_std},
+          std::pair{"R_normal_modes_std", &found.R_normal_std}})
+        mkr[key] = std->empty() ? ordered_json(nullptr) : square_json(*std, n);
     mkr["checks"] = checks_json(found);
     mkr["modes"] = ordered_json::array();
     for (const mass_mode& mode : found.modes)
@@ -156,8 +174,8 @@ void put_mass_json(const mass_matrices& found, ordered_json& result) {
     pdc["alpha"] = number(found.pdc.alpha);
     pdc["beta"] = number(found.pdc.beta);
     pdc["R"] = square_json(found.R_pdc, n);
-    pdc["alpha_std"] = nullptr;
-    pdc["beta_std"] = nullptr;
+    pdc["alpha_std"] = number(found.alpha_std);
+    pdc["beta_std"] = number(found.beta_std);
     pdc["residual"] = number(found.pdc.residual);
     pdc["condition"] = number(found.pdc.condition);
     result["mkr"] = std::move(mkr);
@@ -168,15 +186,15 @@ std::string mass_text(const mass_matrices& found) {
     const int n = found.n_x;
     std::string out = fmt::format("\nmass, stiffness and damping of {} degree{} of freedom\n", n, n == 1 ? "" : "s");
     if (n <= widest) {
-        out += square_text("M [kg]", found.M, n) + square_text("K [N/m]", found.K, n);
-        out += square_text("R [N s/m]", found.R, n) + square_text("R [N s/m] of normal modes", found.R_normal, n);
-        out += square_text(fmt::format("R [N s/m] proportional: {:.5g} 1/s M + {:.5g} s K (damping ratios fit within "
-                                       "{:.2g} %)",
-                                       found.pdc.alpha, found.pdc.beta, 100 * found.pdc.residual),
-                           found.R_pdc, n);
+        out += square_text("M [kg]", found.M, found.M_std, n) + square_text("K [N/m]", found.K, found.K_std, n);
+        out += square_text("R [N s/m]", found.R, found.R_std, n);
+        out += square_text("R [N s/m] of normal modes", found.R_normal, found.R_normal_std, n);
+        out += square_text(fmt::format("R [N s/m] proportional: {} (damping ratios fit within {:.2g} %)",
+                                       proportional_text(found), 100 * found.pdc.residual),
+                           found.R_pdc, {}, n);
     } else {
         out += fmt::format("more than {} columns: the matrices stand in the result file (--json)\n", widest);
-        out += fmt::format("R proportional: {:.5g} 1/s M + {:.5g} s K\n", found.pdc.alpha, found.pdc.beta);
+        out += fmt::format("R proportional: {}\n", proportional_text(found));
     }
     return out + checks_text(found);
 }

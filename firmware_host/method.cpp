@@ -19,9 +19,40 @@ okid_method_t method_of(const std::string& name) {
 
 bool is_subspace(okid_method_t method) { return method >= OKID_METHOD_N4SID_MOESP; }
 
+bool looks_back_rows(okid_method_t method, std::size_t n_u) { return is_subspace(method) || n_u == 0; }
+
+int rows_used(okid_method_t method, std::size_t n_u, int p, int rows) {
+    if (rows > 0) return rows;
+    return is_subspace(method) ? 30 : n_u == 0 ? p : 2 * p;
+}
+
+const std::vector<std::string>& hankel_names() {
+    static const std::vector<std::string> names = {"system", "innovations", "literal"};
+    return names;
+}
+
+okid_hankel_t hankel_of(const std::string& name) {
+    const auto& names = hankel_names();
+    return static_cast<okid_hankel_t>(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
+std::string hankel_fault(const std::string& hankel, const std::string& method, std::size_t n_u) {
+    if (hankel == "system") return "";
+    if (is_subspace(method_of(method)))
+        return fmt::format("\"{}\" is for okid-era and okid-era-dc, {} has no Markov parameters in its matrix", hankel,
+                           method);
+    if (n_u == 0)
+        return fmt::format("\"{}\" needs a force: without one there are no Markov parameters, the matrix holds "
+                           "covariances of the responses",
+                           hankel);
+    return "";
+}
+
 std::string horizon_option(const okid_identify_config_t& config) {
-    return is_subspace(config.method) ? fmt::format("--rows {}", (okid_identify_lags(&config) + 1) / 2)
-                                      : fmt::format("--p {}", config.p);
+    const auto n_u = static_cast<std::size_t>(config.n_u);
+    return looks_back_rows(config.method, n_u)
+               ? fmt::format("--rows {}", rows_used(config.method, n_u, config.p, config.rows))
+               : fmt::format("--p {}", config.p);
 }
 
 long long unknowns_of(okid_method_t method, int n_u, int n_y, int horizon) {

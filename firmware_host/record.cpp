@@ -6,6 +6,8 @@
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_horizon.hpp"
+#include "record_refine.hpp"
+#include "record_uncertainty.hpp"
 
 #include <okid/subspace.h>
 
@@ -87,10 +89,7 @@ void feed(const std::vector<record_data>& records, const okid_identify_config_t&
         if (at_rest) check_status(add(silence.data(), lags), record.path.c_str());
         for (std::size_t first = 0; first < record.count; first += piece) {
             const std::size_t n = std::min(piece, record.count - first);
-            for (std::size_t i = 0; i < n; ++i) {
-                std::copy_n(record.u.data() + (first + i) * n_u, n_u, &v[i * (n_u + n_y)]);
-                std::copy_n(&record.y[(first + i) * n_y], n_y, &v[i * (n_u + n_y) + n_u]);
-            }
+            interleave(record, n_u, n_y, first, n, v.data());
             check_status(add(v.data(), n), record.path.c_str());
         }
     }
@@ -143,29 +142,42 @@ okid_status_t refine_by_factor(const std::vector<record_data>& records, const ok
     return found;
 }
 
-/// B and D of a subspace model that make the simulated outputs fit the records best. Where that fails, those of the
-/// subspace equations stay.
-void fit_inputs(const std::vector<record_data>& records, okid_identify_t* identifier, record_result& result) {
-    okid_identified_t& model = result.model;
-    const auto n_u = static_cast<std::size_t>(model.n_u), n_y = static_cast<std::size_t>(model.n_y), m = n_u + n_y;
+/// All records in one block, for okid_subspace_output_error().
+struct packed_records {
+    std::size_t n_u, n_y;
     std::vector<std::int32_t> counts;
-    std::vector<double> samples, B(n_u * static_cast<std::size_t>(model.n_z)), D(n_u * n_y);
-    for (const record_data& record : records) {
-        counts.push_back(static_cast<std::int32_t>(record.count));
-        const std::size_t first = samples.size();
-        samples.resize(first + record.count * m);
-        for (std::size_t n = 0; n < record.count; ++n) {
-            std::copy_n(record.u.data() + n * n_u, n_u, &samples[first + n * m]);
-            std::copy_n(record.y.data() + n * n_y, n_y, &samples[first + n * m + n_u]);
+    std::vector<std::size_t> starts; ///< of each record, in numbers
+    std::vector<double> samples;
+
+    packed_records(const std::vector<record_data>& records, std::size_t inputs, std::size_t outputs)
+        : n_u(inputs), n_y(outputs) {
+        for (const record_data& record : records) {
+            counts.push_back(static_cast<std::int32_t>(record.count));
+            starts.push_back(samples.size());
+            samples.resize(samples.size() + record.count * (n_u + n_y));
+            interleave(record, n_u, n_y, 0, record.count, samples.data() + starts.back());
         }
     }
-    const auto count = static_cast<std::int32_t>(records.size());
-    const std::size_t bytes = okid_subspace_output_error_memsize(model.n_u, model.n_y, model.n_z, count);
-    std::vector<std::byte> work(bytes);
-    okid_status_t status = OKID_ERR_DIM;
-    if (bytes > 0)
-        status = okid_subspace_output_error(model.n_u, model.n_y, model.n_z, model.A, model.C, count, counts.data(),
-                                            samples.data(), B.data(), D.data(), nullptr, work.data(), bytes);
+
+    /// B and D that make the simulated outputs of A and C fit best.
+    okid_status_t fit(int n_z, const double* A, const double* C, std::vector<double>& B, std::vector<double>& D) const {
+        const auto inputs = static_cast<std::int32_t>(n_u), outputs = static_cast<std::int32_t>(n_y);
+        const auto count = static_cast<std::int32_t>(counts.size());
+        B.resize(static_cast<std::size_t>(n_z) * n_u);
+        D.resize(n_y * n_u);
+        const std::size_t bytes = okid_subspace_output_error_memsize(inputs, outputs, n_z, count);
+        if (bytes == 0) return OKID_ERR_DIM;
+        std::vector<std::byte> work(bytes);
+        return okid_subspace_output_error(inputs, outputs, n_z, A, C, count, counts.data(), samples.data(), B.data(),
+                                          D.data(), nullptr, work.data(), bytes);
+    }
+};
+
+/// B and D of a subspace model from the records. Where that fails, those of the subspace equations stay.
+void fit_inputs(const packed_records& records, okid_identify_t* identifier, record_result& result) {
+    okid_identified_t& model = result.model;
+    std::vector<double> B, D;
+    okid_status_t status = records.fit(model.n_z, model.A, model.C, B, D);
     if (status >= 0) status = okid_identify_set_inputs(identifier, B.data(), D.data(), &model);
     if (status < 0)
         result.context.warnings.emplace_back(
@@ -174,10 +186,67 @@ void fit_inputs(const std::vector<record_data>& records, okid_identify_t* identi
                         okid_status_text(status)));
 }
 
+/// The same for the replicates: the outputs of the block that each leaves out are missing.
+void fit_inputs(packed_records& records, std::vector<replicate_model>& replicates) {
+    const std::size_t m = records.n_u + records.n_y;
+    for (replicate_model& replicate : replicates) {
+        if (!replicate.found()) continue;
+        std::vector<double> taken;
+        for (const record_piece& piece : replicate.pieces)
+            for (std::size_t n = piece.first; n < piece.last; ++n) {
+                double* y = &records.samples[records.starts[piece.record] + n * m + records.n_u];
+                taken.insert(taken.end(), y, y + records.n_y);
+                std::fill_n(y, records.n_y, NAN);
+            }
+        std::vector<double> B, D;
+        const okid_status_t status = records.fit(replicate.n_z, replicate.A.data(), replicate.C.data(), B, D);
+        if (status >= 0) std::swap(replicate.B, B), std::swap(replicate.D, D);
+        const double* back = taken.data();
+        for (const record_piece& piece : replicate.pieces)
+            for (std::size_t n = piece.first; n < piece.last; ++n, back += records.n_y)
+                std::copy_n(back, records.n_y, &records.samples[records.starts[piece.record] + n * m + records.n_u]);
+    }
+}
+
+/// Deviations of everything, and what a longer horizon would say.
+void find_deviations(const std::vector<record_data>& records, const okid_identify_config_t& config,
+                     const std::vector<replicate_model>& replicates, const record_options& options,
+                     record_result& result) {
+    if (replicates.empty()) {
+        result.context.warnings.emplace_back("no_deviation",
+                                             "the record is too short to be cut into blocks: no standard deviations");
+        return;
+    }
+    result.context.sigma = deviations_of(result.model, replicates, options.mass);
+    if (result.context.mass) add_deviations(*result.context.sigma, *result.context.mass);
+    if (!result.context.refined) // the likelihood knows no p
+        remark_finite_p(records, config, options.start == "rest", result.model, *result.context.sigma,
+                        result.context.warnings);
+}
+
+/// The poles of other orders and horizons of the same records.
+stabilization look_around(const std::vector<record_data>& records, const okid_identify_config_t& config, bool at_rest,
+                          okid_identify_t* identifier, okid_identified_t& model) {
+    return find_stabilization(identifier, config, model,
+                              [&](const okid_identify_config_t& other,
+                                  const std::function<void(okid_identify_t*, okid_identified_t&)>& hand_on) {
+                                  okid_accumulator_t* accumulator = nullptr;
+                                  const auto sums = accumulate(records, other, at_rest, accumulator);
+                                  const std::size_t bytes = okid_identify_memsize(&other);
+                                  const auto block = library_memory(bytes, other);
+                                  okid_identify_t* own = nullptr;
+                                  okid_identified_t found{};
+                                  if (okid_identify_create(&own, &other, block.get(), bytes) == OKID_OK &&
+                                      okid_identify_run(own, accumulator, &found) >= 0)
+                                      hand_on(own, found);
+                              });
+}
+
 result_context describe(const std::vector<record_data>& records, const record_options& options,
                         const missing_count& missing, long long total) {
     result_context context;
     context.method = options.method;
+    if (!looks_back_rows(method_of(options.method), options.inputs.size())) context.hankel = options.hankel;
     context.fs_hz = options.fs_hz;
     context.samples = total;
     context.records = static_cast<int>(records.size());
@@ -216,6 +285,14 @@ record_data split_record(const csv_record& record, std::size_t n_u, std::size_t 
     return out;
 }
 
+void interleave(const record_data& record, std::size_t n_u, std::size_t n_y, std::size_t first, std::size_t count,
+                double* out) {
+    for (std::size_t i = 0; i < count; ++i, out += n_u + n_y) {
+        std::copy_n(record.u.data() + (first + i) * n_u, n_u, out);
+        std::copy_n(record.y.data() + (first + i) * n_y, n_y, out + n_u);
+    }
+}
+
 void remove_lines(double* samples, std::size_t channels, std::size_t count) {
     const double middle = (static_cast<double>(count) - 1) / 2;
     for (std::size_t k = 0; k < channels; ++k) {
@@ -251,6 +328,7 @@ record_result identify_records(std::vector<record_data> records, const record_op
     config.n_u = static_cast<std::int32_t>(options.inputs.size());
     config.n_y = static_cast<std::int32_t>(options.outputs.size());
     config.method = method_of(options.method);
+    config.hankel = hankel_of(options.hankel);
     choose_horizon(options, records, total - missing.samples, missing.samples > 0, config, result.context);
     config.order = options.order;
     config.fs_hz = options.fs_hz;
@@ -269,15 +347,35 @@ record_result identify_records(std::vector<record_data> records, const record_op
     okid_status_t status = okid_identify_run(identifier, accumulator, &result.model);
     status = refine_by_factor(records, config, at_rest, identifier, accumulator, status, result);
     if (status < 0) throw_identify_failure(status, result.model, config, result.context);
+    if (options.stabilization) {
+        tell(options, "looking at other orders and horizons");
+        result.context.stable = look_around(records, config, at_rest, identifier, result.model);
+    }
+    tell(options, "leaving out one block after the other");
+    std::vector<replicate_model> replicates = leave_out_blocks(records, config, at_rest, accumulator, result.model);
     tell(options, "simulating the model");
     if (options.detrend == "mean" && !own_means_first)
         centre_each(records, options); // the fit is about the record's mean
-    if (is_subspace(config.method) && config.n_u > 0) fit_inputs(records, identifier, result);
+    if (is_subspace(config.method) && config.n_u > 0) {
+        packed_records packed(records, options.inputs.size(), options.outputs.size());
+        fit_inputs(packed, identifier, result);
+        if (options.mass.wanted()) fit_inputs(packed, replicates);
+    }
     fit_records(records, result);
+    if (options.refine) {
+        tell(options, "refining the model");
+        std::vector<replicate_model> refined = refine_model(records, options.detrend != "none", result);
+        if (!refined.empty()) replicates = std::move(refined);
+    }
     check_explains(result.context);
     remarks& said = result.context.warnings;
     said.insert(said.end(), options.said.begin(), options.said.end());
-    if (options.mass.wanted()) result.context.mass = find_mass_matrices(result.model, options.mass, said);
+    if (options.mass.wanted()) {
+        okid_identified_t structure = result.model;
+        if (result.context.refined) structure = without_skew(replicates, options.mass, result);
+        result.context.mass = find_mass_matrices(structure, options.mass, said);
+    }
+    find_deviations(records, config, replicates, options, result);
     return result;
 }
 

@@ -49,26 +49,6 @@ std::vector<double> percent(const std::vector<output_sums>& sums) {
     return out;
 }
 
-/// A stretch of a record without missing inputs.
-struct stretch {
-    std::size_t first, count;
-};
-
-/// What a missing force did is not known: the record is cut there. Stretches too short to tell their initial state from
-/// the noise are left out; a record without missing inputs is one stretch.
-std::vector<stretch> stretches_of(const record_data& record, std::size_t n_u, std::size_t least) {
-    std::vector<stretch> out;
-    std::size_t first = 0;
-    for (std::size_t i = 0; i <= record.count; ++i) {
-        bool present = i < record.count;
-        for (std::size_t k = 0; present && k < n_u; ++k) present = !std::isnan(record.u[i * n_u + k]);
-        if (present) continue;
-        if (i - first >= least || (first == 0 && i == record.count)) out.push_back({first, i - first});
-        first = i + 1;
-    }
-    return out;
-}
-
 struct fit_run {
     const okid_model_t& model;
     double radius;
@@ -114,6 +94,19 @@ void fit_ambient(const std::vector<record_data>& records, fit_run& run, result_c
 }
 
 } // namespace
+
+std::vector<stretch> stretches_of(const record_data& record, std::size_t n_u, std::size_t least) {
+    std::vector<stretch> out;
+    std::size_t first = 0;
+    for (std::size_t i = 0; i <= record.count; ++i) {
+        bool present = i < record.count;
+        for (std::size_t k = 0; present && k < n_u; ++k) present = !std::isnan(record.u[i * n_u + k]);
+        if (present) continue;
+        if (i - first >= least || (first == 0 && i == record.count)) out.push_back({first, i - first});
+        first = i + 1;
+    }
+    return out;
+}
 
 void fit_records(const std::vector<record_data>& records, record_result& result) {
     const okid_identified_t& found = result.model;

@@ -74,18 +74,20 @@ int choose_p(const record_options& options, const std::vector<record_data>& reco
     return p;
 }
 
-/// Block rows of a subspace method: as many as leave ten Hankel columns for each unknown.
+/// Block rows of a method without observer: as many as leave ten Hankel columns for each unknown.
 int choose_rows(const record_options& options, const std::vector<record_data>& records, long long samples,
-                result_context& context) {
-    constexpr int default_rows = 30;
-    const int n_u = static_cast<int>(options.inputs.size()), n_y = static_cast<int>(options.outputs.size());
+                okid_identify_config_t config, result_context& context) {
+    const int n_u = config.n_u, n_y = config.n_y;
     const int least = n_y >= 2 ? 2 : 3; // (rows - 1) n_y states: two make the first mode
-    const int wanted = options.rows > 0 ? options.rows : default_rows;
+    const int wanted = rows_used(config.method, options.inputs.size(), options.p, options.rows);
     const auto runs = runs_of(records, options.inputs.size(), options.outputs.size());
+    config.fs_hz = options.fs_hz;
     for (int i = std::max(wanted, least); i >= least; --i) {
+        config.rows = i;
+        const long long lags = okid_identify_lags(&config);
         long long columns = 0;
-        for (const long long run : runs) columns += std::max(0LL, run - (2LL * i - 1));
-        if (columns < 10 * unknowns_of(OKID_METHOD_N4SID_MOESP, n_u, n_y, i)) continue;
+        for (const long long run : runs) columns += std::max(0LL, run - lags);
+        if (columns < 10 * unknowns_of(config.method, n_u, n_y, i)) continue;
         if (i != wanted)
             context.warnings.emplace_back(
                 "rows_reduced", fmt::format("{} block rows instead of {}: {} samples bear no more unknowns (10 for "
@@ -96,25 +98,24 @@ int choose_rows(const record_options& options, const std::vector<record_data>& r
     throw failure(exit_no_model,
                   fmt::format("no model: too few samples: {} complete samples, but even the smallest model of {} "
                               "inputs and {} outputs needs {} in one stretch. Record longer or use fewer channels",
-                              samples, n_u, n_y,
-                              10 * unknowns_of(OKID_METHOD_N4SID_MOESP, n_u, n_y, least) + 2 * least - 1));
+                              samples, n_u, n_y, 10 * unknowns_of(config.method, n_u, n_y, least) + 2 * least - 1));
 }
 
 } // namespace
 
 void choose_horizon(const record_options& options, const std::vector<record_data>& records, long long samples,
                     bool gaps, okid_identify_config_t& config, result_context& context) {
-    if (!is_subspace(config.method)) {
+    if (!looks_back_rows(config.method, options.inputs.size())) {
         config.p = choose_p(options, records, samples, gaps, context);
         config.rows = options.rows;
         return;
     }
-    config.rows = choose_rows(options, records, samples, context);
+    config.rows = choose_rows(options, records, samples, config, context);
     config.p = 0;
-    if (options.p_given)
+    if (options.p_given && (is_subspace(config.method) || options.rows > 0))
         context.warnings.emplace_back("p_ignored",
-                                      fmt::format("--p belongs to the okid methods: {} looks back {} block "
-                                                  "rows (--rows)",
+                                      fmt::format("--p belongs to the observer of the okid methods: {} looks back {} "
+                                                  "block rows here (--rows)",
                                                   options.method, config.rows));
 }
 

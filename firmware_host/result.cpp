@@ -102,6 +102,10 @@ std::string note_text(const okid_identified_t& model, std::uint32_t bit) {
         return fmt::format("the inputs hardly excite some directions (smallest over largest {:.1e}): modes there are "
                            "uncertain. Use a broader-band force",
                            info.input_excitation);
+    case OKID_NOTE_LITERAL_HANKEL:
+        return "the Hankel matrix holds [Y_k Y0_k] unscaled, as eq. 42 is printed: the result depends on the units of "
+               "the inputs, and the observer's own modes mix into those of the structure, so that damping can be wrong "
+               "by half. Use --hankel system or innovations for results";
     default: return "";
     }
 }
@@ -128,7 +132,7 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
     const bool shapes = model.n_y > 1 && model.n_y <= most_shape_columns;
     bool any_doubtful = false;
     std::vector<std::size_t> width;
-    std::string out = "   #       f [Hz]     ζ [%]     MPC    EMAC";
+    std::string out = "   #       f [Hz]       ± σ     ζ [%]       ± σ     MPC    EMAC     CMI";
     for (int i = 0; shapes && i < model.n_y; ++i) {
         const auto at = static_cast<std::size_t>(i);
         const std::string name = at < context.outputs.size() ? context.outputs[at] : fmt::format("y{}", i + 1);
@@ -139,8 +143,12 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
     for (int k = 0; k < model.mode_count; ++k) {
         const bool doubtful = !(model.emac[k] >= doubtful_emac);
         any_doubtful = any_doubtful || doubtful;
-        out += fmt::format("{:>4}{}{:>12.5f} {:>9.4f} {:>7.4f} {:>7.4f}", k + 1, doubtful ? '?' : ' ',
-                           model.frequency_hz[k], 100 * model.damping_ratio[k], model.mpc[k], model.emac[k]);
+        const auto at_mode = static_cast<std::size_t>(k);
+        const double std_f = context.sigma ? context.sigma->frequency_hz[at_mode] : NAN,
+                     std_zeta = context.sigma ? context.sigma->damping_ratio[at_mode] : NAN;
+        out += fmt::format("{:>4}{}{:>12.5f} {:>9} {:>9.4f} {:>9} {:>7.4f} {:>7.4f} {:>7.4f}", k + 1,
+                           doubtful ? '?' : ' ', model.frequency_hz[k], plus_minus(std_f), 100 * model.damping_ratio[k],
+                           plus_minus(100 * std_zeta), model.mpc[k], model.emac[k], model.cmi[k]);
         for (int i = 0; shapes && i < model.n_y; ++i)
             out += fmt::format("  {:>{}.3f}", model.shape_re[i + static_cast<std::ptrdiff_t>(k) * model.n_y],
                                width[static_cast<std::size_t>(i)]);
@@ -153,8 +161,14 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
 
 } // namespace
 
-nlohmann::ordered_json modes_json(const okid_identified_t& model) {
+nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma) {
     ordered_json out = ordered_json::array();
+    const auto deviation = [&](std::vector<double> deviations::* of, int k) {
+        return sigma ? number((sigma->*of)[static_cast<std::size_t>(k)]) : ordered_json(nullptr);
+    };
+    const auto of_shape = [&](std::vector<double> deviations::* of, std::ptrdiff_t at) {
+        return sigma ? vector_json((sigma->*of).data() + at, model.n_y) : ordered_json(nullptr);
+    };
     for (int k = 0; k < model.mode_count; ++k) {
         const auto at = static_cast<std::ptrdiff_t>(k) * model.n_y;
         ordered_json mode;
@@ -162,10 +176,13 @@ nlohmann::ordered_json modes_json(const okid_identified_t& model) {
         mode["damping_ratio"] = number(model.damping_ratio[k]);
         mode["shape_re"] = vector_json(model.shape_re + at, model.n_y);
         mode["shape_im"] = vector_json(model.shape_im + at, model.n_y);
-        mode["frequency_std_hz"] = nullptr; // standard deviations: not estimated by this version
-        mode["damping_ratio_std"] = nullptr;
+        mode["frequency_std_hz"] = deviation(&deviations::frequency_hz, k);
+        mode["damping_ratio_std"] = deviation(&deviations::damping_ratio, k);
+        mode["shape_re_std"] = of_shape(&deviations::shape_re, at);
+        mode["shape_im_std"] = of_shape(&deviations::shape_im, at);
         mode["mpc"] = number(model.mpc[k]);
         mode["emac"] = number(model.emac[k]);
+        mode["cmi"] = number(model.cmi[k]);
         out.push_back(std::move(mode));
     }
     return out;
@@ -184,20 +201,25 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["outputs"] = context.outputs;
     out["p"] = model.p;
     out["rows"] = model.rows;
+    out["hankel"] = context.hankel ? ordered_json(*context.hankel) : ordered_json(nullptr);
     out["order"] = model.n_z;
     out["hold"] = context.hold;
     out["detrend"] = context.detrend;
     out["start"] = context.start;
     out["singular_values"] = vector_json(model.singular_values, model.singular_count);
+    out["singular_noise"] = number(model.noise_level);
     out["model"] = model_json(model, context);
     ordered_json blocks = ordered_json::array();
     const std::ptrdiff_t block = static_cast<std::ptrdiff_t>(model.n_y) * model.n_u;
     for (int k = 0; k < model.markov_count; ++k)
         blocks.push_back(matrix_json(model.markov + k * block, model.n_y, model.n_u));
     out["markov"]["Y"] = std::move(blocks);
-    out["modes"] = modes_json(model);
+    out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
     out["fit"]["simulation_percent"] = percent_json(context.simulation_percent, context.outputs);
     out["fit"]["prediction_percent"] = percent_json(context.prediction_percent, context.outputs);
+    if (context.stable) out["stabilization"] = stabilization_json(*context.stable);
+    if (context.refined) out["refinement"] = refinement_json(*context.refined, context.outputs);
+    if (context.skew) out["skew"] = skew_json(*context.skew, context.outputs);
     if (context.mass) put_mass_json(*context.mass, out);
     out["warnings"] = ordered_json::array();
     for (const auto& [code, text] : result_warnings(model, context))
@@ -214,6 +236,8 @@ std::string result_table(const okid_identified_t& model, const result_context& c
     out += fmt::format("\n{}{} block rows, order {}, detrend {}\n\n",
                        model.observer ? fmt::format("p {}, ", model.p) : "", model.rows, model.n_z, context.detrend);
     out += mode_rows(model, context) + fit_text(context);
+    if (context.stable) out += stabilization_text(*context.stable);
+    if (context.refined) out += refinement_text(*context.refined, context.outputs);
     if (context.mass) out += mass_text(*context.mass);
     const auto warnings = result_warnings(model, context);
     if (!warnings.empty()) out += "\n";

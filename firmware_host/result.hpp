@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // An identified model as people and programs see it: okid.result/1 and the modal table.
 #pragma once
-#include "mass_matrices.hpp"
+#include "deviations.hpp"
+#include "refinement.hpp"
+#include "record_stabilization.hpp"
 
 #include <okid/identify.h>
 
@@ -15,6 +17,7 @@ namespace okid_host {
 /// What the library does not know about a result.
 struct result_context {
     std::string method = "okid-era";
+    std::optional<std::string> hankel; ///< of methods with an observer
     double fs_hz = 0;
     long long samples = 0;
     int records = 1;
@@ -24,12 +27,17 @@ struct result_context {
     std::optional<std::vector<std::vector<double>>> x0;        ///< one initial state per record; absent live (null)
     std::optional<std::vector<double>> simulation_percent;     ///< per output; absent live (null)
     std::optional<std::vector<double>> prediction_percent;     ///< per output; absent = null
+    std::optional<deviations> sigma;                           ///< of the modes; absent = null
+    std::optional<stabilization> stable;                       ///< where it was asked for
+    std::optional<refinement> refined;                         ///< of a model that was refined
+    std::optional<channel_skew> skew;                          ///< delays of the outputs, of a refined model
     std::optional<mass_matrices> mass;                         ///< M, K, R where the channels have degrees of freedom
     std::vector<std::pair<std::string, std::string>> warnings; ///< further (code, text)
 };
 
-/// {"frequency_hz": …, "damping_ratio": …, "shape_re": […], "shape_im": […], "mpc": …, "emac": …} of every mode.
-nlohmann::ordered_json modes_json(const okid_identified_t& model);
+/// {"frequency_hz": …, "damping_ratio": …, "shape_re": […], "shape_im": […], "mpc": …, "emac": …, "cmi": …} of every mode.
+/// @param sigma  their standard deviations, or nullptr (null)
+nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma);
 
 /// The whole okid.result/1 object.
 nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context);

@@ -66,6 +66,18 @@ bool mass_is_seen(const rig& rig) {
     return pair;
 }
 
+std::string config_head(const rig_run& run) {
+    // TOML takes a whole number for a rate as well; "250." it does not take
+    return fmt::format("# written by okid simulate\n[acquisition]\nrate_hz = {}\ntitle = \"virtual rig\"\n\n",
+                       run.rate_hz);
+}
+
+std::string config_tail(const rig& rig) {
+    return fmt::format("\n[identification]\nmethod = \"okid-era\"\np = 40\nrows = 80\norder = \"auto\"\nhold = "
+                       "\"{}\"\ndetrend = \"mean\"\nupdate_s = 1.0\nmkr = {}\n",
+                       rig.hold, mass_is_seen(rig));
+}
+
 } // namespace
 
 std::string rig_truth(const rig& rig) {
@@ -106,10 +118,8 @@ std::string rig_csv(const rig_run& run) {
 }
 
 std::string rig_config(const rig& rig, const rig_run& run, const std::string& dbc) {
-    std::string out = "# written by okid simulate\n";
+    std::string out = config_head(run);
     auto text = std::back_inserter(out);
-    // TOML takes a whole number for a rate as well; "250." it does not take
-    fmt::format_to(text, "[acquisition]\nrate_hz = {}\ntitle = \"virtual rig\"\n\n", run.rate_hz);
     fmt::format_to(text,
                    "[[bus]]\nname = \"can0\"\ntype = \"socketcan\"\ninterface = \"{}\"\nbitrate = 1000000\ndbc = {}\n",
                    rig_interface, quoted(dbc));
@@ -123,12 +133,25 @@ std::string rig_config(const rig& rig, const rig_run& run, const std::string& db
                            channel.name, channel.role, channel.dof, channel.unit, message.name, channel.signal);
         }
     }
+    return out + config_tail(rig);
+}
+
+std::string rig_line_config(const rig& rig, const rig_run& run, const std::string& device, int baud) {
+    std::string out = config_head(run);
+    auto text = std::back_inserter(out);
     fmt::format_to(text,
-                   "\n[identification]\nmethod = \"okid-era\"\np = 40\nrows = 80\norder = \"auto\"\nhold = "
-                   "\"{}\"\ndetrend = \"mean\"\n"
-                   "update_s = 1.0\nmkr = {}\n",
-                   rig.hold, mass_is_seen(rig));
-    return out;
+                   "[[bus]]\nname = \"node\"\ntype = \"serial\"\n"
+                   "device = {} # okid simulate sends on this one; put the other end of the line here\nbaud = {}\n"
+                   "framing = \"cobs\"\n",
+                   quoted(device), baud);
+    for (std::size_t k = 0; k < run.channels.size(); ++k) {
+        const rig_channel& channel = run.channels[k];
+        fmt::format_to(text,
+                       "\n[[channel]]\nname = \"{}\"\nrole = \"{}\"\ndof = {}\nunit = \"{}\"\nbus = \"node\"\n"
+                       "field = {}\nscale = {}\n",
+                       channel.name, channel.role, channel.dof, channel.unit, k, channel.scale);
+    }
+    return out + config_tail(rig);
 }
 
 } // namespace okid_host

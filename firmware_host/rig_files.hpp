@@ -16,4 +16,7 @@ std::string rig_csv(const rig_run& run);
 /// A CONFIG.toml for `okid run` and `okid replay`; `dbc` as seen from its folder.
 std::string rig_config(const rig& rig, const rig_run& run, const std::string& dbc);
 
+/// The same for the rig as a node on a serial line.
+std::string rig_line_config(const rig& rig, const rig_run& run, const std::string& device, int baud);
+
 } // namespace okid_host

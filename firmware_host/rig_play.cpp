@@ -2,12 +2,17 @@
 #include "rig_play.hpp"
 
 #include "error.hpp"
+#include "live/serial_line.hpp"
+#include "live/stop_signal.hpp"
 #include "rig_frames.hpp"
+#include "rig_line.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <ctime>
+#include <drv/serial_port.h>
 #include <fmt/format.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
@@ -71,8 +76,29 @@ class can_sender {
     int fd_ = -1;
 };
 
+class line_sender {
+  public:
+    line_sender(const std::string& device, int baud) : device_(device) {
+        const int code = drv_serial_open(&port_, device.c_str(), baud);
+        if (code != 0) throw_line_failure(-code, device, port_.error);
+    }
+    ~line_sender() { drv_serial_close(&port_); }
+    line_sender(const line_sender&) = delete;
+    line_sender& operator=(const line_sender&) = delete;
+
+    void send(const std::vector<std::uint8_t>& bytes) {
+        constexpr int patience_ms = 5000;
+        if (drv_serial_write(&port_, bytes.data(), bytes.size(), patience_ms) != 0)
+            throw failure(exit_device, fmt::format("{}: {}", device_, port_.error));
+    }
+
+  private:
+    std::string device_;
+    drv_serial_t port_{};
+};
+
 void sleep_until(timespec moment) {
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &moment, nullptr) == EINTR) {
+    while (!stop_requested() && clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &moment, nullptr) == EINTR) {
     }
 }
 
@@ -85,18 +111,25 @@ timespec later(timespec start, double seconds) {
 
 } // namespace
 
-void play_rig(const rig_run& run, const std::string& interface) {
-    if (interface.rfind("/dev/", 0) == 0)
-        throw failure(
-            exit_usage,
-            fmt::format("--to {}: sending to a serial device is not available in this version; a CAN interface "
-                        "such as vcan0 is",
-                        interface));
-    const can_sender sender(interface);
-    const auto messages = rig_messages(run);
+bool is_device(const std::string& target) { return target.find('/') != std::string::npos; }
+
+void play_rig(const rig_run& run, const std::string& target, int baud) {
+    catch_stop_signals();
     timespec start{};
     clock_gettime(CLOCK_MONOTONIC, &start);
-    for (std::size_t n = 0; n < run.count; ++n) {
+    if (is_device(target)) {
+        line_sender line(target, baud);
+        const std::size_t most = rig_packet_samples(run);
+        for (std::size_t n = 0; n < run.count && !stop_requested(); n += most) {
+            const std::size_t count = std::min(most, run.count - n);
+            sleep_until(later(start, static_cast<double>(n + count - 1) / run.rate_hz)); // the last sample is there
+            line.send(rig_packet(run, n, count));
+        }
+        return;
+    }
+    const can_sender sender(target);
+    const auto messages = rig_messages(run);
+    for (std::size_t n = 0; n < run.count && !stop_requested(); ++n) {
         sleep_until(
             later(start, static_cast<double>(n) / run.rate_hz)); // the bus itself spaces the frames of one sample
         for (const rig_message& message : messages) sender.send(rig_frame(run, message, n, 0));

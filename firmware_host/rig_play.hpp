@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The rig's frames on a CAN interface in real time, each at its own absolute moment.
+// The rig in real time, each sample at its own absolute moment: as frames on a CAN interface or as packets on a serial
+// line.
 #pragma once
 #include "rig_run.hpp"
 
@@ -7,7 +8,11 @@
 
 namespace okid_host {
 
-/// Sends until the record ends. Throws `failure`: exit 4 when the interface cannot be used, 2 for a serial device.
-void play_rig(const rig_run& run, const std::string& interface);
+/// Is it a serial device, or a CAN interface?
+bool is_device(const std::string& target);
+
+/// Sends until the record ends or a signal comes. Throws `failure` (exit 4) when the target cannot be used.
+/// @param baud  of a serial device
+void play_rig(const rig_run& run, const std::string& target, int baud);
 
 } // namespace okid_host

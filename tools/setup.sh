@@ -1,16 +1,20 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Installs what okid needs: Debian packages from tools/packages/*.txt and Python packages into .venv.
-# usage: tools/setup.sh [build|test|dev|embedded]   (dev and embedded include test, test includes build)
+# usage: tools/setup.sh [build|bench|test|dev|embedded|fuzz]   (bench and test include build, the others test)
 # Idempotent; silent when nothing is missing. Needs root or sudo only when a Debian package is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tier=${1:-build}
 
 lists=(tools/packages/debian.txt)
+if [ "$tier" = bench ]; then
+  lists+=(tools/packages/debian-bench.txt)
+  tier=build # Python needs nothing more
+fi
 [ "$tier" = build ] || lists+=(tools/packages/debian-test.txt)
-if [ "$tier" = embedded ]; then
-  lists+=(tools/packages/debian-embedded.txt)
+if [ "$tier" = embedded ] || [ "$tier" = fuzz ]; then
+  lists+=("tools/packages/debian-$tier.txt")
   tier=test # Python needs nothing more
 fi
 
@@ -65,7 +69,7 @@ case $tier in
   build) covers="build test dev" ;;
   test) covers="test dev" ;;
   dev) covers="dev" ;;
-  *) echo "setup: no tier '$tier' (build, test, dev)" >&2; exit 2 ;;
+  *) echo "setup: no tier '$tier' (build, bench, test, dev, embedded, fuzz)" >&2; exit 2 ;;
 esac
 for one in $covers; do
   if cmp -s tools/pyproject.toml ".venv/.okid-$one"; then exit 0; fi

@@ -146,7 +146,7 @@ int drv_candump_parse(const char* line, size_t length, drv_frame_t* frame, char*
                       drv_candump_error_t* error) {
     while (length > 0 && (line[length - 1] == '\r' || line[length - 1] == ' ')) --length;
     cursor_t cursor = {line, 0, length, error};
-    memset(frame, 0, offsetof(drv_frame_t, data));
+    memset(frame, 0, sizeof *frame);
     if (parse_time(&cursor, &frame->time_ns) || skip_blanks(&cursor, "a blank after the time") ||
         parse_interface(&cursor, interface) || skip_blanks(&cursor, "a blank after the interface name") ||
         parse_id(&cursor, frame) || parse_body(&cursor, frame))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  frames out of a candump -L text log, as fast as they are asked for; pacing is the caller's
 // METHOD   large reads into one buffer, lines cut in place; a line that does not parse ends the replay and names itself
+#include <drv/can_error.h>
 #include <drv/candump.h>
 #include <drv/source.h>
 
@@ -142,7 +143,7 @@ static int replay_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
         if (bus < 0) {
             ++self->counts.foreign;
         } else if (frame->flags & DRV_FRAME_ERROR) {
-            ++self->counts.error_frames;
+            drv_can_error_count(&self->counts, frame->id, frame->data);
         } else if (frame->flags & DRV_FRAME_REMOTE) {
             ++self->counts.remote;
         } else {

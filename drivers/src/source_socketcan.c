@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  frames off a CAN interface, every loss counted and placed
 // METHOD   recvmmsg of 64 frames a call; the kernel's drop counter rides on each frame (SO_RXQ_OVFL), the lost tail is
-//          read from SO_MEMINFO at stats and close; an interface that vanished is bound again when it is back
+//          read from SO_MEMINFO at stats and close. What is polled is an epoll set of the socket and of a netlink socket
+//          that hears of every change of the interface: one that vanished is bound again as soon as it is back.
+//          The controller's own counters (netlink) are read once a second and whenever it sends an error message.
+#include <drv/can_error.h>
+#include <drv/link.h>
 #include <drv/source.h>
 
 #include <errno.h>
@@ -18,6 +22,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/epoll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/time.h>
@@ -25,12 +30,20 @@
 
 enum { BATCH = 64, CONTROL_BYTES = 256, DEFAULT_BUFFER = 8 << 20 };
 
+static const int64_t look_ns = 1000000000; // how old the controller's counters may be
+
 typedef struct socketcan_t {
     int fd;
-    int gone;         ///< the interface vanished: bind anew when it is back
-    uint32_t counted; ///< the kernel's drop counter of this socket, as far as it stands in the counts
-    uint32_t placed;  ///< the same as of the frame delivered last
-    uint8_t loss;     ///< DRV_LOSS_… of the next frame
+    int poll_fd;       ///< epoll set of fd and watch_fd
+    int watch_fd;      ///< tells of changes of interfaces, -1 = netlink cannot be had
+    int gone;          ///< the interface vanished: bind anew when it is back
+    int bound;         ///< index of the interface the socket is bound to
+    uint32_t counted;  ///< the kernel's drop counter of this socket, as far as it stands in the counts
+    uint32_t placed;   ///< the same as of the frame delivered last
+    uint8_t loss;      ///< DRV_LOSS_… of the next frame
+    int64_t looked_ns; ///< CLOCK_MONOTONIC of the last look at the controller
+    uint64_t driver_dropped, driver_overran; ///< since open, by the controller's counters
+    drv_link_t link;                         ///< as last read; its counters are the base of the next difference
     char interface[DRV_NAME_BYTES];
     struct can_filter filters[DRV_MAX_FILTERS];
     int filter_count;
@@ -82,7 +95,7 @@ static void set_options(drv_source_t* self, const socketcan_t* state, int fd) {
 }
 
 /// A bound socket, or -errno with the reason.
-static int make_socket(drv_source_t* self, const socketcan_t* state, int* up) {
+static int make_socket(drv_source_t* self, socketcan_t* state, int* up) {
     int fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
     if (fd < 0) {
         int code = errno;
@@ -110,6 +123,7 @@ static int make_socket(drv_source_t* self, const socketcan_t* state, int* up) {
         address.can_ifindex = (int)if_nametoindex(state->interface);
         if (address.can_ifindex == 0 || bind(fd, (struct sockaddr*)&address, sizeof address) != 0)
             code = address.can_ifindex == 0 ? ENODEV : errno;
+        state->bound = address.can_ifindex;
     }
     if (code == 0) return fd;
     close(fd);
@@ -124,6 +138,66 @@ static void lay_out_batch(socketcan_t* state) {
         state->messages[i].msg_hdr.msg_iovlen = 1;
         state->messages[i].msg_hdr.msg_control = state->control[i];
     }
+}
+
+static int add_to_poll_set(const socketcan_t* state, int fd) {
+    struct epoll_event event;
+    memset(&event, 0, sizeof event);
+    event.events = EPOLLIN;
+    event.data.fd = fd;
+    return epoll_ctl(state->poll_fd, EPOLL_CTL_ADD, fd, &event);
+}
+
+/// Without netlink the source serves all the same; then the caller's time-out finds the interface again.
+static int make_poll_set(drv_source_t* self, socketcan_t* state) {
+    state->watch_fd = drv_link_watch();
+    state->poll_fd = epoll_create1(EPOLL_CLOEXEC);
+    if (state->poll_fd >= 0 && add_to_poll_set(state, state->fd) == 0 &&
+        (state->watch_fd < 0 || add_to_poll_set(state, state->watch_fd) == 0))
+        return 0;
+    int code = errno;
+    if (state->watch_fd >= 0) close(state->watch_fd);
+    if (state->poll_fd >= 0) close(state->poll_fd);
+    close(state->fd);
+    return explain(self, code, state->interface, strerror(code));
+}
+
+static int64_t monotonic_ns(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+static void count_driver_losses(drv_source_t* self, socketcan_t* state) {
+    uint64_t overran =
+        self->counts.rx_overflows > state->driver_overran ? self->counts.rx_overflows : state->driver_overran;
+    uint64_t lost = state->driver_dropped + overran;
+    if (lost > self->counts.lost_driver) state->loss |= DRV_LOSS_DRIVER;
+    self->counts.lost_driver = lost;
+}
+
+/// Take in what the driver tells of the controller. Its overruns come as error messages too: the larger count holds.
+static void take_link(drv_source_t* self, socketcan_t* state, const drv_link_t* link) {
+    drv_stats_t* counts = &self->counts;
+    if (link->index == state->link.index) { // a device made anew counts from 0
+        uint64_t dropped = link->rx_dropped - state->link.rx_dropped,
+                 overran = link->rx_over_errors - state->link.rx_over_errors;
+        if (link->rx_dropped >= state->link.rx_dropped) state->driver_dropped += dropped;
+        if (link->rx_over_errors >= state->link.rx_over_errors) state->driver_overran += overran;
+    }
+    state->link = *link;
+    if (link->has_can_data) {
+        counts->state = link->state;
+        counts->restart_ms = link->restart_ms;
+        counts->bitrate = link->bitrate;
+    }
+    count_driver_losses(self, state);
+}
+
+static void look_at_controller(drv_source_t* self, socketcan_t* state) {
+    drv_link_t link;
+    state->looked_ns = monotonic_ns();
+    if (drv_link_read(state->interface, &link) == 0) take_link(self, state, &link);
 }
 
 static int socketcan_open(drv_source_t* self, const drv_source_config_t* config) {
@@ -143,7 +217,8 @@ static int socketcan_open(drv_source_t* self, const drv_source_config_t* config)
     for (int i = 0; i < state->filter_count; ++i) {
         int extended = config->filters[i].extended;
         state->filters[i].can_id = config->filters[i].id | (extended ? CAN_EFF_FLAG : 0);
-        state->filters[i].can_mask = (extended ? CAN_EFF_MASK : CAN_SFF_MASK) | CAN_EFF_FLAG | CAN_RTR_FLAG;
+        const uint32_t all = extended ? CAN_EFF_MASK : CAN_SFF_MASK, some = config->filters[i].mask;
+        state->filters[i].can_mask = (some ? some : all) | CAN_EFF_FLAG | CAN_RTR_FLAG;
     }
     lay_out_batch(state);
     int up = 0;
@@ -153,17 +228,19 @@ static int socketcan_open(drv_source_t* self, const drv_source_config_t* config)
         close(state->fd);
         code = explain(self, ENETDOWN, name, "is down");
     }
+    if (code == 0) code = make_poll_set(self, state);
     if (code) {
         free(state);
         return code;
     }
     self->state = state;
+    look_at_controller(self, state);
     return 0;
 }
 
 static int socketcan_fd(const drv_source_t* self) {
     const socketcan_t* state = self->state;
-    return state && !state->gone ? state->fd : -1;
+    return state ? state->poll_fd : -1;
 }
 
 /// Take in the kernel's drop counter (it wraps). @return frames dropped since last time
@@ -196,6 +273,7 @@ static void link_lost(drv_source_t* self, socketcan_t* state, int gone) {
     state->loss |= DRV_LOSS_LINK;
     if (gone && !state->gone) {
         read_drop_counter(self, state);
+        (void)epoll_ctl(state->poll_fd, EPOLL_CTL_DEL, state->fd, NULL);
         state->gone = 1;
     }
 }
@@ -206,13 +284,32 @@ static int try_again(drv_source_t* self, socketcan_t* state) {
     if (if_nametoindex(state->interface) == 0) return 0;
     int fd = make_socket(self, state, &up);
     if (fd < 0) return 0;
-    close(state->fd);
+    if (add_to_poll_set(state, fd) != 0) {
+        close(fd);
+        return 0;
+    }
+    close(state->fd); // leaves the poll set with it
     state->fd = fd;
     state->gone = 0;
     state->counted = state->placed = 0;
     ++self->counts.reopened;
+    self->counts.link_is_down = !up;
     self->error[0] = '\0';
     return 1;
+}
+
+/// Nothing was to be read: has the interface changed?
+static void hear_of_link(drv_source_t* self, socketcan_t* state) {
+    drv_link_t link;
+    if (state->watch_fd < 0 || !drv_link_changes(state->watch_fd, state->interface, &link)) return;
+    if (link.index == 0 && drv_link_read(state->interface, &link) != 0) return;
+    if (link.gone) return; // the socket says so itself
+    int renamed = link.index != state->bound;
+    if (renamed || !link.up)
+        link_lost(self, state, renamed);
+    else
+        self->counts.link_is_down = state->gone;
+    take_link(self, state, &link);
 }
 
 static void take_stamp(drv_frame_t* frame, const struct cmsghdr* part) {
@@ -247,14 +344,9 @@ static void take_control(drv_source_t* self, socketcan_t* state, struct msghdr* 
     }
 }
 
-static void count_error_frame(drv_source_t* self, socketcan_t* state, const struct canfd_frame* raw) {
-    ++self->counts.error_frames;
-    if (raw->can_id & CAN_ERR_BUSOFF) ++self->counts.bus_off;
-    if (raw->can_id & CAN_ERR_RESTARTED) ++self->counts.restarts;
-    if ((raw->can_id & CAN_ERR_CRTL) && (raw->data[1] & CAN_ERR_CRTL_RX_OVERFLOW)) {
-        ++self->counts.lost_driver;
-        state->loss |= DRV_LOSS_DRIVER;
-    }
+static void take_error_frame(drv_source_t* self, socketcan_t* state, const struct canfd_frame* raw) {
+    drv_can_error_count(&self->counts, raw->can_id & CAN_ERR_MASK, raw->data);
+    count_driver_losses(self, state);
 }
 
 /// One received message to a frame. @return 1, or 0 when it is no data
@@ -262,11 +354,14 @@ static int take_message(drv_source_t* self, socketcan_t* state, int index, drv_f
     const struct canfd_frame* raw = &state->frames[index];
     struct mmsghdr* message = &state->messages[index];
     int fd_frame = message->msg_len == CANFD_MTU;
-    if (!fd_frame && message->msg_len != CAN_MTU) return 0;
+    if (!fd_frame && message->msg_len != CAN_MTU) {
+        ++self->counts.read_errors;
+        return 0;
+    }
     memset(frame, 0, offsetof(drv_frame_t, data));
     take_control(self, state, &message->msg_hdr, frame);
     if (raw->can_id & CAN_ERR_FLAG) {
-        count_error_frame(self, state, raw);
+        take_error_frame(self, state, raw);
         return 0;
     }
     if (raw->can_id & CAN_RTR_FLAG) {
@@ -288,25 +383,38 @@ static int take_message(drv_source_t* self, socketcan_t* state, int index, drv_f
     return 1;
 }
 
-static int socketcan_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
-    socketcan_t* state = self->state;
-    if (!state) return -EBADF;
-    if (state->gone && !try_again(self, state)) return 0;
+/// The socket failed. @return 0 when the interface explains it, else -errno
+static int socket_failed(drv_source_t* self, socketcan_t* state, int code) {
+    if (code == EAGAIN || code == EWOULDBLOCK || code == EINTR) return 0;
+    if (code == ENETDOWN || code == ENODEV || code == ENXIO) {
+        link_lost(self, state, code != ENETDOWN);
+        return 0;
+    }
+    ++self->counts.read_errors;
+    if (code != ENOBUFS && code != ENOMEM) link_lost(self, state, 1); // whatever it is: a fresh socket
+    return explain(self, code, state->interface, strerror(code));
+}
+
+static int receive(socketcan_t* state, int capacity) {
     int batch = capacity < BATCH ? capacity : BATCH;
     for (int i = 0; i < batch; ++i) {
         state->messages[i].msg_hdr.msg_controllen = CONTROL_BYTES;
         state->messages[i].msg_hdr.msg_flags = 0;
     }
     int got = recvmmsg(state->fd, state->messages, (unsigned)batch, MSG_DONTWAIT, NULL);
+    return got < 0 ? -errno : got;
+}
+
+static int socketcan_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
+    socketcan_t* state = self->state;
+    if (!state) return -EBADF;
+    int got = state->gone ? -ENODEV : receive(state, capacity);
     if (got < 0) {
-        int code = errno;
-        if (code == EAGAIN || code == EWOULDBLOCK || code == EINTR) return 0;
-        if (code == ENETDOWN || code == ENODEV || code == ENXIO) {
-            link_lost(self, state, code != ENETDOWN);
-            return 0;
-        }
-        ++self->counts.read_errors;
-        return explain(self, code, state->interface, strerror(code));
+        int code = state->gone ? 0 : socket_failed(self, state, -got);
+        hear_of_link(self, state);
+        if (!state->gone || !try_again(self, state)) return code;
+        got = receive(state, capacity);
+        if (got < 0) return socket_failed(self, state, -got);
     }
     int count = 0;
     for (int i = 0; i < got; ++i) count += take_message(self, state, i, &frames[count]);
@@ -315,7 +423,10 @@ static int socketcan_read(drv_source_t* self, drv_frame_t* frames, int capacity)
 
 static void socketcan_stats(drv_source_t* self, drv_stats_t* out) {
     socketcan_t* state = self->state;
-    if (state) read_drop_counter(self, state);
+    if (state) {
+        read_drop_counter(self, state);
+        if (monotonic_ns() - state->looked_ns >= look_ns) look_at_controller(self, state);
+    }
     *out = self->counts;
 }
 
@@ -323,6 +434,9 @@ static void socketcan_close(drv_source_t* self) {
     socketcan_t* state = self->state;
     if (!state) return;
     read_drop_counter(self, state);
+    look_at_controller(self, state);
+    close(state->poll_fd);
+    if (state->watch_fd >= 0) close(state->watch_fd);
     close(state->fd);
     free(state);
     self->state = NULL;

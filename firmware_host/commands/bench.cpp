@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // okid bench: what a sample costs in the recursive kernel, beside textbook RLS, the same product by OpenBLAS, and LAPACK
-// least squares on the whole record. All in one run, one thread: the ratios count, not the times.
+// least squares on the whole record; and what whole identifications cost, beside SLICOT (bench_identify.cpp). All in one
+// run, one thread: the ratios count, not the times.
+#include "bench_identify.hpp"
 #include "commands.hpp"
 #include "result.hpp"
 
@@ -205,7 +207,7 @@ row whole_record(const bench_case& c, int p, int samples, bool fft) {
 
 struct bench_options {
     bool json = false;
-    std::string save;
+    std::string save, only;
 };
 
 double cost(const std::vector<row>& rows, const std::string& name, int p, const std::string& kernel) {
@@ -214,17 +216,20 @@ double cost(const std::vector<row>& rows, const std::string& name, int p, const 
     return 0;
 }
 
-void print(const std::vector<row>& rows, const nlohmann::ordered_json& ratios) {
-    fmt::print("{:4} {:>3}  {:11} {:>12} {:>9} {:>11}\n", "case", "p", "kernel", "ns/sample", "GFLOP/s", "state KiB");
+void print(const std::vector<row>& rows, const nlohmann::ordered_json& list, const nlohmann::ordered_json& ratios) {
+    if (!rows.empty())
+        fmt::print("{:4} {:>3}  {:11} {:>12} {:>9} {:>11}\n", "case", "p", "kernel", "ns/sample", "GFLOP/s",
+                   "state KiB");
     for (const row& r : rows)
         fmt::print("{:4} {:3}  {:11} {:12.1f} {:9.1f} {:11.1f}\n", r.name, r.p, r.kernel, r.ns_per_sample, r.gflops,
                    static_cast<double>(r.state_bytes) / 1024);
+    print_identifications(list);
     fmt::print("\nratios within this run\n");
-    for (const auto& [key, value] : ratios.items()) fmt::print("  {:32} {:8.2f}\n", key, value.get<double>());
+    for (const auto& [key, value] : ratios.items()) fmt::print("  {:52} {:8.2f}\n", key, value.get<double>());
 }
 
-void run_bench(const bench_options& options) {
-    openblas_set_num_threads(1);
+/// The cost of a sample: rows "absorb" and "whole_record".
+std::vector<row> bench_kernels(nlohmann::ordered_json& list, nlohmann::ordered_json& ratios) {
     std::vector<row> rows;
     for (const bench_case& c : cases)
         for (const int p : horizons) {
@@ -238,7 +243,6 @@ void run_bench(const bench_options& options) {
     const std::pair<int, std::pair<int, int>> records[] = {{1, {60, 20000}}, {2, {50, 100000}}}; // case, lags, samples
     for (const auto& [which, size] : records)
         for (const bool fft : {true, false}) rows.push_back(whole_record(cases[which], size.first, size.second, fft));
-    nlohmann::ordered_json ratios, list = nlohmann::ordered_json::array();
     for (const auto& [which, size] : records)
         ratios[fmt::format("dgemm_blocks_over_fft_{}_p{}", cases[which].name, size.first)] =
             cost(rows, cases[which].name, size.first, "dgemm_blocks") /
@@ -258,6 +262,15 @@ void run_bench(const bench_options& options) {
                         {"ns_per_sample", r.ns_per_sample},
                         {"gflops", r.gflops},
                         {"state_bytes", r.state_bytes}});
+    return rows;
+}
+
+void run_bench(const bench_options& options) {
+    openblas_set_num_threads(1);
+    std::vector<row> rows;
+    nlohmann::ordered_json ratios = nlohmann::ordered_json::object(), list = nlohmann::ordered_json::array();
+    if (options.only != "identifications") rows = bench_kernels(list, ratios);
+    if (options.only != "kernels") bench_identifications(list, ratios);
     const nlohmann::ordered_json machine{
         {"backend", okid_backend()}, {"threads", 1}, {"pointer_bits", 8 * sizeof(void*)}};
     const nlohmann::ordered_json all{
@@ -265,7 +278,7 @@ void run_bench(const bench_options& options) {
     if (options.json)
         fmt::print("{}\n", all.dump(1));
     else
-        print(rows, ratios);
+        print(rows, list, ratios);
     if (!options.save.empty()) write_whole_file(options.save, all.dump(1) + "\n");
 }
 
@@ -273,10 +286,13 @@ void run_bench(const bench_options& options) {
 
 void add_bench(CLI::App& app) {
     auto options = std::make_shared<bench_options>();
-    CLI::App* command = app.add_subcommand("bench", "what a sample costs, beside other kernels in the same run");
+    CLI::App* command =
+        app.add_subcommand("bench", "what a sample and a whole identification cost, beside others in the same run");
     command->add_flag("--json", options->json, "print okid.bench/1 instead of a table");
     command->add_option("--save", options->save, "also write okid.bench/1 to this file");
-    command->footer("Example:\n  okid bench --json > bench.json");
+    command->add_option("--only", options->only, "leave the other half out")
+        ->check(CLI::IsMember({"kernels", "identifications"}));
+    command->footer("Example:\n  okid bench --json > bench.json\n  okid bench --only identifications");
     command->callback([options] { run_bench(*options); });
 }
 

@@ -2,6 +2,7 @@
 // okid check: is a CONFIG.toml right? Opens no device.
 #include "../config.hpp"
 #include "../live/identifier.hpp"
+#include "../live/trigger.hpp"
 #include "../method.hpp"
 #include "../result.hpp"
 #include "commands.hpp"
@@ -36,8 +37,10 @@ ordered_json channel_json(const live_config& config, const channel_config& chann
                      {"unit", channel.unit},       {"bus", config.buses[channel.bus].name},
                      {"can_id", channel.frame.id}, {"extended", channel.frame.extended != 0}};
     out.update(bits_json(channel.layout));
-    out["multiplexor"] = channel.selector ? bits_json(*channel.selector) : ordered_json(nullptr);
-    out["multiplexor_value"] = channel.selector ? ordered_json(channel.selector_value) : ordered_json(nullptr);
+    const bool multiplexed = !channel.selectors.empty();
+    out["multiplexor"] = multiplexed ? bits_json(channel.selectors.front().layout) : ordered_json(nullptr);
+    out["multiplexor_value"] =
+        multiplexed ? ordered_json(channel.selectors.front().values.front().first) : ordered_json(nullptr);
     out["sequence"] = channel.sequence ? bits_json(*channel.sequence) : ordered_json(nullptr);
     return out;
 }
@@ -57,6 +60,21 @@ std::string memory_text(const live_config& config) {
     return "everything since the start";
 }
 
+/// When it begins, and the lamps.
+std::string start_text(const live_config& config) {
+    std::string out;
+    if (config.trigger.source != trigger_source::immediate)
+        out += fmt::format("begins with {}, and {:g} s before it\n", trigger(config).awaited(),
+                           config.trigger.pretrigger_s);
+    const auto tell = [&](const char* name, const std::optional<gpio_place>& lamp) {
+        if (lamp) out += fmt::format("lamp {}: {}{}\n", name, lamp->text(), lamp->active_low ? ", active low" : "");
+    };
+    tell("armed", config.lamps.armed);
+    tell("go", config.lamps.go);
+    tell("alarm", config.lamps.alarm);
+    return out;
+}
+
 std::string summary(const live_config& config, bool exact) {
     const identification_config& id = config.identification;
     std::string out = fmt::format("{}: well\n\n{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", config.path, "channel",
@@ -73,13 +91,11 @@ std::string summary(const live_config& config, bool exact) {
     }
     out += fmt::format("\n{:g} Hz, {} force and {} response channel{}{}\n", config.rate_hz, config.n_u, config.n_y,
                        config.n_y == 1 ? "" : "s", exact ? ", 16-bit codes summed exactly" : "");
-    const bool subspace = is_subspace(method_of(id.method));
+    const okid_method_t method = method_of(id.method);
     out += fmt::format("{}, {}{} block rows, an update each {:g} s, memory: {}\n", id.method,
-                       subspace ? "" : fmt::format("p {}, ", id.p),
-                       id.rows    ? id.rows
-                       : subspace ? 30
-                                  : 2 * id.p,
-                       id.update_s, memory_text(config));
+                       looks_back_rows(method, config.n_u) ? "" : fmt::format("p {}, ", id.p),
+                       rows_used(method, config.n_u, id.p, id.rows), id.update_s, memory_text(config));
+    out += start_text(config);
     for (const std::string& text : config.warnings) out += fmt::format("remark: {}\n", text);
     return out;
 }

@@ -2,7 +2,10 @@
 // okid doctor: what a live measurement needs of this machine, what is missing, and the command that mends it.
 #include "../config.hpp"
 #include "../error.hpp"
+#include "../live/can_link.hpp"
+#include "../live/gpio_lines.hpp"
 #include "../live/reader.hpp"
+#include "../live/serial_line.hpp"
 #include "../nearest_name.hpp"
 #include "commands.hpp"
 
@@ -10,12 +13,9 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
 #include <memory>
-#include <net/if.h>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <sys/socket.h>
@@ -85,58 +85,41 @@ bool check_kernel(findings& out) {
     return false;
 }
 
-/// What iproute2 tells of a link, an empty object when it does not.
-nlohmann::json link_details(const std::string& interface) {
-    if (!in_path("ip") || interface.find_first_not_of(
-                              "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-.") != std::string::npos)
-        return nlohmann::json::object();
-    FILE* pipe = popen(("ip -json -details link show dev " + interface + " 2>/dev/null").c_str(), "re");
-    if (!pipe) return nlohmann::json::object();
-    std::string text;
-    char piece[4096];
-    for (std::size_t got; (got = std::fread(piece, 1, sizeof piece, pipe)) > 0;) text.append(piece, got);
-    pclose(pipe);
-    const auto parsed = nlohmann::json::parse(text, nullptr, false);
-    return parsed.is_array() && !parsed.empty() && parsed[0].is_object() ? parsed[0] : nlohmann::json::object();
-}
-
 void check_interface(findings& out, const bus_config& bus) {
     const std::string what = fmt::format("bus {} ({})", bus.name, bus.interface);
-    const std::vector<std::string> there = can_interfaces();
-    if (std::find(there.begin(), there.end(), bus.interface) == there.end()) {
-        const bool other = if_nametoindex(bus.interface.c_str()) != 0;
-        out.missing(what,
-                    other ? "exists, but is no CAN interface"
-                          : "no such interface; CAN interfaces: " + (there.empty() ? "none" : list_names(there)),
+    drv_link_t link{};
+    const int code = drv_link_read(bus.interface.c_str(), &link);
+    if (code == -ENODEV) {
+        const std::vector<std::string> there = can_interfaces();
+        out.missing(what, "no such interface; CAN interfaces: " + (there.empty() ? "none" : list_names(there)),
                     fmt::format("plug the adapter in, or sudo ip link add {0} type vcan && sudo ip link set {0} up",
                                 bus.interface));
         return;
     }
-    const std::string folder = "/sys/class/net/" + bus.interface;
-    const nlohmann::json details = link_details(bus.interface);
-    const auto data = details.value("/linkinfo/info_data"_json_pointer, nlohmann::json::object());
-    const auto bitrate = data.value("/bittiming/bitrate"_json_pointer, 0LL);
-    const std::string rate = bitrate ? fmt::format(", {} bit/s", bitrate) : "";
-    if (!(std::strtoul(first_line(folder + "/flags").c_str(), nullptr, 16) & IFF_UP)) {
-        const bool real = details.value("/linkinfo/info_kind"_json_pointer, std::string()) == "can";
-        out.missing(what, "is down" + rate,
-                    fmt::format("sudo ip link set {} up{}", bus.interface,
-                                real ? " type can bitrate 1000000 restart-ms 100" : ""));
+    if (code != 0) {
+        out.note(what, fmt::format("netlink tells nothing of it ({})", std::strerror(-code)));
         return;
     }
-    if (bus.fd && std::atoi(first_line(folder + "/mtu").c_str()) < 72)
-        out.missing(what, "up, but its mtu carries no FD frames",
-                    fmt::format("sudo ip link set {0} down && sudo ip link set {0} mtu 72 up", bus.interface));
-    else if (bitrate && bus.bitrate && static_cast<double>(bitrate) != *bus.bitrate)
-        out.missing(
-            what, fmt::format("up{}, expected {:.0f} bit/s", rate, *bus.bitrate),
-            fmt::format("sudo ip link set {0} down && sudo ip link set {0} up type can bitrate {1:.0f} restart-ms 100",
-                        bus.interface, *bus.bitrate));
+    bool first = true;
+    for (const link_finding& each : judge_link(bus, link)) {
+        if (each.missing)
+            out.missing(what, each.found, each.remedy);
+        else if (first)
+            out.well(what, each.found);
+        else
+            out.note(what, each.found + (each.remedy.empty() ? "" : "; " + each.remedy));
+        first = false;
+    }
+}
+
+void check_line(findings& out, const bus_config& bus) {
+    const std::string what = fmt::format("bus {} ({})", bus.name, bus.type);
+    const line_finding seen = look_at_line(bus);
+    if (!seen.remedy.empty())
+        out.missing(what, seen.found, seen.remedy);
     else
-        out.well(what, "up" + rate);
-    if (bitrate && data.value("restart_ms", 0) == 0)
-        out.note(what, "restart-ms is 0: the bus stays off after bus-off; sudo ip link set " + bus.interface +
-                           " type can restart-ms 100 (while down)");
+        out.well(what, seen.found);
+    if (!seen.note.empty()) out.note(what, seen.note);
 }
 
 void check_buses(findings& out, const std::optional<live_config>& config, bool kernel_has_can) {
@@ -151,6 +134,7 @@ void check_buses(findings& out, const std::optional<live_config>& config, bool k
     }
     for (const bus_config& bus : config->buses) {
         if (bus.type == "socketcan" && kernel_has_can) check_interface(out, bus);
+        if (bus.on_line()) check_line(out, bus);
         if (bus.type != "replay") continue;
         const std::string what = fmt::format("bus {} (replay)", bus.name);
         if (access(bus.file.c_str(), R_OK) == 0)
@@ -161,7 +145,29 @@ void check_buses(findings& out, const std::optional<live_config>& config, bool k
     }
 }
 
-void check_limits(findings& out) {
+/// Trigger and lamps; without a config only whether there are chips.
+void check_lines(findings& out, const std::optional<live_config>& config) {
+    if (!config) {
+        char chips[512];
+        if (drv_gpio_list_chips(chips, sizeof chips) > 0) out.note("GPIO chips", chips);
+        return;
+    }
+    const auto check = [&](const std::string& what, const gpio_place& place, bool output, drv_gpio_edge_t edge) {
+        std::string remedy;
+        const std::string fault = gpio_fault(place, output, edge, remedy);
+        if (fault.empty())
+            out.well(what, place.text());
+        else
+            out.missing(what, fault, remedy);
+    };
+    if (config->trigger.source == trigger_source::gpio)
+        check("trigger line", config->trigger.place, false, config->trigger.edge);
+    if (config->lamps.armed) check("lamp armed", *config->lamps.armed, true, DRV_GPIO_NO_EDGE);
+    if (config->lamps.go) check("lamp go", *config->lamps.go, true, DRV_GPIO_NO_EDGE);
+    if (config->lamps.alarm) check("lamp alarm", *config->lamps.alarm, true, DRV_GPIO_NO_EDGE);
+}
+
+void check_buffers(findings& out) {
     const bool admin = has_net_admin();
     const long long limit = std::atoll(first_line("/proc/sys/net/core/rmem_max").c_str());
     if (limit >= wanted_buffer)
@@ -175,6 +181,14 @@ void check_limits(findings& out) {
                     fmt::format("sudo sysctl -w net.core.rmem_max={0} (keep it: echo net.core.rmem_max={0} | sudo tee "
                                 "/etc/sysctl.d/60-okid.conf)",
                                 wanted_buffer));
+    if (in_path("candump") && in_path("canplayer"))
+        out.well("can-utils", "candump and canplayer are there");
+    else
+        out.missing("can-utils", "candump and canplayer were not found (recording and playing logs)",
+                    "sudo apt-get install can-utils");
+}
+
+void check_clock(findings& out) {
     const std::string clock = first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource");
     const bool slow = clock == "hpet" || clock == "acpi_pm" || clock == "jiffies";
     if (clock.empty())
@@ -183,11 +197,6 @@ void check_limits(findings& out) {
         out.note("clock", clock + " is slow to read; time stamps of the kernel are coarser than with tsc");
     else
         out.well("clock", clock);
-    if (in_path("candump") && in_path("canplayer"))
-        out.well("can-utils", "candump and canplayer are there");
-    else
-        out.missing("can-utils", "candump and canplayer were not found (recording and playing logs)",
-                    "sudo apt-get install can-utils");
 }
 
 } // namespace
@@ -203,9 +212,13 @@ void add_doctor(CLI::App& app) {
         std::optional<live_config> config;
         if (!path->empty()) config = load_config(*path);
         findings out;
-        const bool kernel_has_can = check_kernel(out);
+        const bool wants_can = !config || std::any_of(config->buses.begin(), config->buses.end(),
+                                                      [](const bus_config& b) { return b.type == "socketcan"; });
+        const bool kernel_has_can = wants_can && check_kernel(out);
         check_buses(out, config, kernel_has_can);
-        check_limits(out);
+        check_lines(out, config);
+        if (wants_can) check_buffers(out);
+        check_clock(out);
         if (out.count() > 0)
             throw failure(exit_device,
                           fmt::format("{} thing{} missing, see above", out.count(), out.count() == 1 ? "" : "s"));

@@ -23,10 +23,11 @@ namespace {
 /// The command line as it was typed.
 struct identify_arguments {
     std::vector<std::string> records;
-    std::string inputs, outputs, method = "okid-era", order = "auto", hold = "zoh", detrend = "mean", start = "moving";
+    std::string inputs, outputs, method = "okid-era", hankel = "system", order = "auto", hold = "zoh", detrend = "mean",
+                                 start = "moving";
     std::string sensing = "acceleration", input_dofs, output_dofs, range, json, model;
     std::string fs, p, rows;
-    bool refine = false, quiet = false;
+    bool refine = false, stabilization = false, quiet = false;
 };
 
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
@@ -46,8 +47,9 @@ long long whole_number(const std::string& option, const std::string& text, long 
     return value;
 }
 
-void check_not_available(const identify_arguments& given) {
-    if (given.refine) usage("--refine (maximum likelihood) is not available in this version");
+void check_refine(const identify_arguments& given) {
+    if (given.refine && given.inputs.empty())
+        usage("--refine needs a measured force: without --inputs (ambient) there is nothing to simulate");
 }
 
 /// The inputs and outputs, checked; names the columns there are when none were chosen.
@@ -56,10 +58,6 @@ void choose_channels(const identify_arguments& given, record_options& options) {
     if (given.outputs.empty())
         usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}",
                           given.records.front(), columns()));
-    if (given.inputs.empty() && !is_subspace(method_of(given.method)))
-        usage(fmt::format("--inputs is missing: {} needs a measured force, an n4sid method takes records without one "
-                          "(ambient); {} has: {}",
-                          given.method, given.records.front(), columns()));
     if (!given.inputs.empty()) options.inputs = split_names("--inputs", given.inputs);
     options.outputs = split_names("--outputs", given.outputs);
     for (const std::string& name : options.outputs)
@@ -109,7 +107,8 @@ mass_plan check_dofs(const identify_arguments& given, const record_options& opti
 record_options check_options(const identify_arguments& given) {
     record_options options;
     one_of("--method", given.method, method_names());
-    check_not_available(given);
+    one_of("--hankel", given.hankel, hankel_names());
+    check_refine(given);
     one_of("--hold", given.hold, {"zoh", "foh"});
     one_of("--detrend", given.detrend, {"none", "mean", "linear"});
     one_of("--start", given.start, {"moving", "rest"});
@@ -121,11 +120,16 @@ record_options check_options(const identify_arguments& given) {
             usage(fmt::format("--order: found \"{}\", expected a whole number or auto", printable(given.order)));
         options.order = static_cast<int>(whole_number("--order", given.order, 1, 10000));
     }
+    options.stabilization = given.stabilization;
     options.method = given.method;
+    options.hankel = given.hankel;
+    options.refine = given.refine;
     options.hold = given.hold;
     options.detrend = given.detrend;
     options.start = given.start;
     choose_channels(given, options);
+    if (const std::string fault = hankel_fault(given.hankel, given.method, options.inputs.size()); !fault.empty())
+        usage("--hankel: " + fault);
     options.mass = check_dofs(given, options, check_sensing(given.sensing, options.outputs.size()));
     return options;
 }
@@ -235,7 +239,7 @@ void add_identify(CLI::App& app) {
     command->add_option("records", given->records, "CSV records of one structure, merged exactly")
         ->required()
         ->type_name("RECORD.csv");
-    command->add_option("--inputs", given->inputs, "force columns, with commas between; none = ambient, n4sid")
+    command->add_option("--inputs", given->inputs, "force columns, with commas between; none = ambient: modes only")
         ->type_name("NAMES");
     command->add_option("--outputs", given->outputs, "response columns, with commas between")->type_name("NAMES");
     command->add_option("--fs", given->fs, "sample rate; default: what the file says")->type_name("HZ");
@@ -244,8 +248,15 @@ void add_identify(CLI::App& app) {
                      "okid-era (default), okid-era-dc, n4sid-moesp, n4sid-cva or n4sid-ssarx")
         ->type_name("NAME");
     command->add_option("--p", given->p, "observer order in samples (default 40; not for n4sid)")->type_name("N");
-    command->add_option("--rows", given->rows, "block rows of the Hankel matrix (default 2 p, n4sid 30)")
+    command
+        ->add_option("--rows", given->rows,
+                     "block rows of the Hankel matrix (default 2 p, n4sid 30, okid without inputs p)")
         ->type_name("N");
+    command
+        ->add_option("--hankel", given->hankel,
+                     "what the Hankel matrix of the okid methods holds: system (default), innovations (those too, "
+                     "weighted: free of units) or literal (eq. 42 as printed, for comparison only)")
+        ->type_name("KIND");
     command->add_option("--order", given->order, "number of states, or auto (default)")->type_name("N");
     command->add_option("--hold", given->hold, "force between samples: zoh (default) or foh")->type_name("KIND");
     command->add_option("--detrend", given->detrend, "none, mean (default) or linear")->type_name("KIND");
@@ -268,7 +279,12 @@ void add_identify(CLI::App& app) {
         ->add_option("--output-dofs", given->output_dofs,
                      "where each sensor stands; every degree of freedom needs a force or a sensor, one needs both")
         ->type_name("LIST");
-    command->add_flag("--refine", given->refine, "not available in this version");
+    command->add_flag("--refine", given->refine,
+                      "improve the model by maximum likelihood: with noise at the sensors nothing can be more exact. "
+                      "Needs --inputs");
+    command->add_flag(
+        "--stabilization", given->stabilization,
+        "look at all orders and three horizons too, and list the modes that hold (JSON: \"stabilization\")");
     command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")
         ->type_name("A:B");
     command->add_option("--json", given->json, "write okid.result/1 to FILE, - is stdout")->type_name("FILE");

@@ -38,6 +38,16 @@ std::optional<double> parse_seconds(const char* option, const std::string& text)
     return value;
 }
 
+std::optional<std::int64_t> parse_stamp(const char* option, const std::string& text) {
+    if (text.empty()) return std::nullopt;
+    const auto value = positive(text);
+    if (!value || *value > 9e9)
+        throw failure(exit_usage, fmt::format("{}: found \"{}\", expected seconds as in a log, such as "
+                                              "1764000000.123456",
+                                              option, printable(text)));
+    return std::llround(*value * 1e6) * 1000;
+}
+
 std::optional<double> parse_speed(const std::string& text) {
     if (text.empty() || text == "max") return std::nullopt;
     const auto value = positive(text);

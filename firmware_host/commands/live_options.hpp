@@ -4,6 +4,7 @@
 #include "../live/session.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -17,6 +18,8 @@ void add_output_options(CLI::App& command, live_arguments& given);
 
 /// A number of seconds above 0; throws `failure` (exit 2).
 std::optional<double> parse_seconds(const char* option, const std::string& text);
+/// Seconds as they stand in a log, to nanoseconds at microseconds; throws `failure` (exit 2).
+std::optional<std::int64_t> parse_stamp(const char* option, const std::string& text);
 /// "max" or a factor above 0; nothing = as fast as possible.
 std::optional<double> parse_speed(const std::string& text);
 

@@ -5,13 +5,14 @@
 #include "commands.hpp"
 #include "live_options.hpp"
 
+#include <fmt/format.h>
 #include <memory>
 
 namespace okid_host {
 namespace {
 
 struct replay_arguments : live_arguments {
-    std::string log, to;
+    std::string log, to, trigger;
 };
 
 void replay(const replay_arguments& given) {
@@ -20,17 +21,24 @@ void replay(const replay_arguments& given) {
                       given.log + ": journals are not available in this version; a candump -L log (.log) is");
     const std::optional<double> speed = parse_speed(given.speed);
     if (!given.to.empty()) {
-        if (!given.config.empty() || !given.events.empty() || !given.json.empty() || !given.duration.empty())
+        if (!given.config.empty() || !given.events.empty() || !given.json.empty() || !given.duration.empty() ||
+            !given.trigger.empty())
             throw failure(
                 exit_usage,
-                "--to plays the log onto a bus and identifies nothing: leave -c, --events, --json and --duration out");
+                "--to plays the log onto a bus and identifies nothing: leave -c, --events, --json, --duration and "
+                "--trigger-at out");
         play_onto_bus(given.log, given.to, given.speed.empty() ? std::optional<double>(1.0) : speed);
         return;
     }
     if (given.config.empty())
         throw failure(exit_usage, "-c CONFIG.toml is missing (or --to INTERFACE, to play the log onto a bus)");
     const live_config config = load_config(given.config);
-    const session_options options = check_live(given, config);
+    session_options options = check_live(given, config);
+    options.trigger_ns = parse_stamp("--trigger-at", given.trigger);
+    if (options.trigger_ns && config.trigger.source != trigger_source::gpio)
+        throw failure(exit_usage, fmt::format("--trigger-at stands for the edge of a GPIO line, but [trigger] of {} "
+                                              "has another source",
+                                              config.path));
     play_through_session(given.log, config, options, speed);
 }
 
@@ -47,7 +55,12 @@ void add_replay(CLI::App& app) {
         ->add_option("--speed", given->speed,
                      "max (default), or a multiple of the log's own time (default with --to: 1)")
         ->type_name("N");
-    command->add_option("--to", given->to, "play onto this interface instead")->type_name("INTERFACE");
+    command->add_option("--to", given->to, "play onto this interface or slcan adapter instead")
+        ->type_name("vcan0|/dev/ttyACM0");
+    command
+        ->add_option("--trigger-at", given->trigger,
+                     "when the GPIO edge came, in the log's time (time_s of the trigger event of the live run)")
+        ->type_name("SECONDS");
     add_output_options(*command, *given);
     command->footer("The result is the same at every speed.\n\n"
                     "Examples:\n  okid replay frame.log -c frame.toml --json result.json\n  okid replay frame.log --to "

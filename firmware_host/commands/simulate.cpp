@@ -3,10 +3,12 @@
 #include "commands.hpp"
 
 #include "../error.hpp"
+#include "../live/stop_signal.hpp"
 #include "../progress.hpp"
 #include "../result.hpp"
 #include "../rig_files.hpp"
 #include "../rig_frames.hpp"
+#include "../rig_line.hpp"
 #include "../rig_play.hpp"
 #include "../whole_file.hpp"
 
@@ -21,12 +23,13 @@ namespace fs = std::filesystem;
 
 struct simulate_arguments {
     std::string rig, log, truth, csv, dbc, config, to;
+    int baud = rig_line_baud;
     bool quiet = false;
 };
 
 /// Where the DBC goes: as asked, else beside the configuration, else nowhere.
 std::string dbc_path(const simulate_arguments& given) {
-    if (!given.dbc.empty() || given.config.empty()) return given.dbc;
+    if (!given.dbc.empty() || given.config.empty() || is_device(given.to)) return given.dbc;
     if (given.config == "-")
         throw failure(exit_usage, "--config - needs --dbc FILE: the configuration names that file");
     return fs::path(given.config).replace_extension(".dbc").string();
@@ -65,10 +68,18 @@ void warn(const simulate_arguments& given, const std::string& text) {
     if (!given.quiet) std::fprintf(stderr, "okid: %s: %s\n", given.rig.c_str(), text.c_str());
 }
 
+void check_line(const simulate_arguments& given, const rig_run& run) {
+    if (!is_device(given.to)) return;
+    const double needed = rig_line_rate(run);
+    if (needed > given.baud)
+        warn(given, fmt::format("the packets need {:.0f} bit/s, a line of {} baud cannot carry them in real time",
+                                needed, given.baud));
+}
+
 void check_bus(const simulate_arguments& given, const rig_run& run) {
     const std::size_t messages = rig_messages(run).size();
     const double needed = static_cast<double>(messages) * 130e-6 * run.rate_hz;
-    if (needed > 0.95 && !(given.log.empty() && given.to.empty()))
+    if (needed > 0.95 && !(given.log.empty() && (given.to.empty() || is_device(given.to))))
         warn(
             given,
             fmt::format(
@@ -98,18 +109,23 @@ void simulate(const simulate_arguments& given) {
         display.stage("simulating");
         run = simulate_rig(rig);
         check_bus(given, run);
+        check_line(given, run);
         display.stage("writing");
         if (!given.log.empty()) write_whole_file(given.log, rig_log(run));
         if (!given.truth.empty()) write_whole_file(given.truth, rig_truth(rig));
         if (!given.csv.empty()) write_whole_file(given.csv, rig_csv(run));
         if (!dbc.empty()) write_whole_file(dbc, rig_dbc(run));
         if (!given.config.empty())
-            write_whole_file(given.config, rig_config(rig, run, dbc_from_config(dbc, given.config)));
+            write_whole_file(given.config, is_device(given.to)
+                                               ? rig_line_config(rig, run, given.to, given.baud)
+                                               : rig_config(rig, run, dbc_from_config(dbc, given.config)));
     }
     const bool to_stdout =
         given.log == "-" || given.truth == "-" || given.csv == "-" || given.dbc == "-" || given.config == "-";
     if (!given.quiet && !to_stdout) write_whole_file("-", summary(rig, run));
-    if (!given.to.empty()) play_rig(run, given.to);
+    if (given.to.empty()) return;
+    play_rig(run, given.to, given.baud);
+    if (stop_requested()) throw failure(exit_interrupted, "interrupted before the record ended");
 }
 
 } // namespace
@@ -125,7 +141,13 @@ void add_simulate(CLI::App& app) {
     command
         ->add_option("--config", given->config, "CONFIG.toml for okid run and okid replay (writes the DBC beside it)")
         ->type_name("FILE");
-    command->add_option("--to", given->to, "send the frames on a CAN interface, in real time")->type_name("IFACE");
+    command
+        ->add_option("--to", given->to, "send in real time: frames on a CAN interface, or packets on a serial device")
+        ->type_name("vcan0|/dev/pts/N");
+    command->add_option("--baud", given->baud, "of the serial device")
+        ->type_name("N")
+        ->check(CLI::Range(50, 20000000))
+        ->capture_default_str();
     command->add_flag("--quiet", given->quiet, "no summary, no warnings");
     command->footer("Example:\n  okid simulate rig.toml --log rig.log --truth truth.json --config rig-config.toml\n"
                     "  okid replay rig.log -c rig-config.toml\n"

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "capture.hpp"
 
+#include "bus_watch.hpp"
+#include "gpio_lines.hpp"
 #include "reader.hpp"
+#include "sender.hpp"
 #include "stop_signal.hpp"
 
 #include <chrono>
@@ -25,9 +28,9 @@ double seconds_since(clock_type::time_point then) {
 struct wake_event {
     int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     ~wake_event() { close(fd); }
-    void wait(int timeout_ms) const {
-        pollfd waits[2] = {{fd, POLLIN, 0}, {stop_fd(), POLLIN, 0}};
-        (void)poll(waits, 2, timeout_ms);
+    void wait(int timeout_ms, int other_fd) const {
+        pollfd waits[3] = {{fd, POLLIN, 0}, {stop_fd(), POLLIN, 0}, {other_fd, POLLIN, 0}};
+        (void)poll(waits, 3, timeout_ms);
         std::uint64_t count = 0;
         (void)!read(fd, &count, sizeof count);
     }
@@ -35,22 +38,28 @@ struct wake_event {
 
 class pump {
   public:
-    pump(const live_config& config, session& target) : session_(target), frames_(256) {
+    pump(const live_config& config, session& target) : session_(target), lines_(config), frames_(256) {
         for (std::size_t i = 0; i < config.buses.size(); ++i)
-            readers_.push_back(
-                std::make_unique<bus_reader>(config.buses[i].interface, i, wanted_frames(config, i), wake_.fd));
-        down_.assign(readers_.size(), 0);
+            readers_.push_back(std::make_unique<bus_reader>(config, i, wake_.fd));
+        for (const auto& reader : readers_) watches_.emplace_back(reader->interface());
+        senders_.resize(readers_.size());
+        for (std::size_t i = 0; i < config.buses.size(); ++i)
+            if (config.buses[i].sync_hz || !config.buses[i].start_frames.empty())
+                senders_[i] = std::make_unique<sync_sender>(config.buses[i]);
     }
 
     void run(const std::optional<double>& duration_s) {
         for (auto& reader : readers_) reader->start();
+        for (auto& sender : senders_)
+            if (sender) sender->start();
         const auto begin = clock_type::now();
         auto heard = begin;
         bool hinted = false;
         while (!session_.done() && !stop_requested()) {
-            wake_.wait(100);
+            wake_.wait(100, session_.triggered() ? -1 : lines_.fd());
+            lines_.serve(session_);
             if (move_frames(true)) heard = clock_type::now();
-            report_links();
+            report_buses();
             if (!session_.heard() && !hinted && seconds_since(begin) > 2) {
                 hinted = true;
                 std::fprintf(stderr, "okid: waiting for frames on %s ...\n", readers_.front()->interface().c_str());
@@ -58,10 +67,14 @@ class pump {
             // Stream seconds cannot end on a silent bus: then the clock ends it.
             if (duration_s && seconds_since(heard) > 2 && seconds_since(begin) > *duration_s + 2) break;
         }
+        for (auto& sender : senders_)
+            if (sender) sender->stop();
         for (auto& reader : readers_) reader->stop();
         while (!session_.done() && move_frames(false)) {
         }
         tell_losses();
+        report_buses();
+        report_sync();
     }
 
   private:
@@ -72,6 +85,7 @@ class pump {
                                     (count = reader->take(frames_.data(), frames_.size())) > 0;
                  any = true) {
                 tell_losses();
+                lines_.serve(session_);
                 for (std::size_t i = 0; i < count; ++i) session_.frame(frames_[i]);
             }
         return any;
@@ -82,21 +96,37 @@ class pump {
             session_.set_losses(i, {readers_[i]->stats().lost_overflow, readers_[i]->ring_overrun()});
     }
 
-    void report_links() {
+    void report_buses() {
         for (std::size_t i = 0; i < readers_.size(); ++i) {
-            const drv_stats_t stats = readers_[i]->stats();
-            if (stats.link_down == down_[i]) continue;
-            down_[i] = stats.link_down;
-            std::fprintf(stderr, "okid: interface %s went down or away; waiting for it\n",
-                         readers_[i]->interface().c_str());
+            bus_health health{readers_[i]->stats(), std::nullopt};
+            if (senders_[i]) health.sync = senders_[i]->report();
+            session_.set_health(i, health);
+            for (const bus_event& event : watches_[i].look(health.counts)) {
+                session_.bus_event(i, event.kind, event.text);
+                if (event.urgent) fmt::print(stderr, "okid: interface {}: {}\n", readers_[i]->interface(), event.text);
+            }
+        }
+    }
+
+    void report_sync() const {
+        for (std::size_t i = 0; i < senders_.size(); ++i) {
+            const sync_report sync = senders_[i] ? senders_[i]->report() : sync_report{};
+            if (sync.sent + sync.missed == 0) continue;
+            fmt::print(stderr,
+                       "okid: interface {}: {} SYNC frames sent, late by {:.0f} us (mean), {:.0f} us (sd), {:.0f} us "
+                       "(worst); {} left out{}\n",
+                       readers_[i]->interface(), sync.sent, sync.late_mean_us, sync.late_sd_us, sync.late_worst_us,
+                       sync.missed, sync.error.empty() ? "" : "; " + sync.error);
         }
     }
 
     wake_event wake_;
     session& session_;
+    gpio_lines lines_;
     std::vector<std::unique_ptr<bus_reader>> readers_;
     std::vector<drv_frame_t> frames_;
-    std::vector<std::uint64_t> down_;
+    std::vector<bus_watch> watches_;
+    std::vector<std::unique_ptr<sync_sender>> senders_;
 };
 
 } // namespace

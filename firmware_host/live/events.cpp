@@ -24,6 +24,13 @@ std::string state_text(const live_status& status) {
     return text;
 }
 
+/// "±0.0001" of mode k in the unit it is shown in.
+std::string deviation(const live_status& status, std::vector<double> deviations::* of, int k, double unit,
+                      const char* unknown) {
+    const double value = status.sigma ? unit * (status.sigma->*of)[static_cast<std::size_t>(k)] : NAN;
+    return std::isfinite(value) ? plus_minus(value) : unknown;
+}
+
 } // namespace
 
 event_stream::event_stream(const std::string& path) : path_(path) {
@@ -58,8 +65,10 @@ void live_view::show(const live_status& status) {
     }
     std::string line = fmt::format("t {:.3f} s", status.t);
     for (int k = 0; status.model && k < status.model->mode_count; ++k)
-        line += fmt::format("{} {:.4f} Hz {:.3f} %", k ? "," : ":", status.model->frequency_hz[k],
-                            100 * status.model->damping_ratio[k]);
+        line +=
+            fmt::format("{} {:.4f}{} Hz {:.3f}{} %", k ? "," : ":", status.model->frequency_hz[k],
+                        deviation(status, &deviations::frequency_hz, k, 1, ""), 100 * status.model->damping_ratio[k],
+                        deviation(status, &deviations::damping_ratio, k, 100, ""));
     fmt::print("{}; {}\n", line, state_text(status));
     std::fflush(stdout);
 }
@@ -73,11 +82,14 @@ void live_view::show_table(const live_status& status) {
     text += fmt::format("t {:10.3f} s   {} samples   {}{}{}\n", status.t, status.samples, on, state_text(status), off);
     drawn_ = 1;
     if (status.model) {
-        text += "   #       f [Hz]     ζ [%]     MPC    EMAC\n";
+        text += "   #       f [Hz]       ± σ     ζ [%]       ± σ     MPC    EMAC\n";
         ++drawn_;
         for (int k = 0; k < status.model->mode_count; ++k, ++drawn_)
-            text += fmt::format("{:>4} {:>12.5f} {:>9.4f} {:>7.4f} {:>7.4f}\n", k + 1, status.model->frequency_hz[k],
-                                100 * status.model->damping_ratio[k], status.model->mpc[k], status.model->emac[k]);
+            text += fmt::format("{:>4} {:>12.5f} {:>9} {:>9.4f} {:>9} {:>7.4f} {:>7.4f}\n", k + 1,
+                                status.model->frequency_hz[k], deviation(status, &deviations::frequency_hz, k, 1, "-"),
+                                100 * status.model->damping_ratio[k],
+                                deviation(status, &deviations::damping_ratio, k, 100, "-"), status.model->mpc[k],
+                                status.model->emac[k]);
     }
     std::fwrite(text.data(), 1, text.size(), stdout);
     std::fflush(stdout);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The stream of events of a live session: JSON lines for programs, a table for people. Both show the same numbers.
 #pragma once
+#include "../deviations.hpp"
+
 #include <okid/identify.h>
 
 #include <cstdio>
@@ -32,6 +34,7 @@ struct live_status {
     bool settled = false;
     long long samples = 0, missing = 0, gaps = 0;
     const okid_identified_t* model = nullptr; ///< NULL while there is none
+    const deviations* sigma = nullptr;        ///< of the model, NULL while there are none
     std::string waiting;                      ///< why there is none
 };
 

@@ -20,7 +20,7 @@ unsigned sendable(unsigned bytes) {
 
 bool same_message(const channel_config& a, const channel_config& b) {
     return a.bus == b.bus && a.frame.id == b.frame.id && a.frame.extended == b.frame.extended &&
-           a.selector_value == b.selector_value;
+           a.frame.mask == b.frame.mask && a.selectors == b.selectors;
 }
 
 } // namespace
@@ -55,9 +55,8 @@ bool frame_maker::fill(const message& from, std::int64_t index, const double* ro
         if (!std::isfinite(row[i])) return false;
         const int verdict = drv_signal_encode(&channel.layout, frame.data, frame.len, row[i] / channel.si_factor());
         saturated_ += verdict == 2;
-        if (channel.selector)
-            drv_signal_put(&*channel.selector, frame.data, frame.len,
-                           static_cast<std::int64_t>(channel.selector_value));
+        for (const multiplexor& each : channel.selectors)
+            drv_signal_put(&each.layout, frame.data, frame.len, static_cast<std::int64_t>(each.values.front().first));
         if (channel.sequence) drv_signal_put(&*channel.sequence, frame.data, frame.len, index);
     }
     return true;

@@ -3,6 +3,7 @@
 #include "grid.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <limits>
 
@@ -41,6 +42,7 @@ grid::grid(const live_config& config, grid_sink& sink)
     values_.assign(rows * width_, missing);
     present_.assign(rows * lanes_.size(), 0);
     slots_.assign(rows, 0);
+    times_.assign(rows, 0);
     held_.reserve(lanes_.size() * 64 + 256);
 }
 
@@ -50,22 +52,25 @@ void grid::build_lanes(const live_config& config) {
         const std::uint32_t key = lane_key(channel.bus, channel.frame.id, channel.frame.extended != 0);
         lane* found = nullptr;
         for (lane& each : lanes_)
-            if (each.bus == channel.bus && each.key == key &&
-                each.selector.has_value() == channel.selector.has_value() &&
-                (!channel.selector || each.selector_value == channel.selector_value))
+            if (each.bus == channel.bus && each.key == key && each.mask == channel.frame.mask &&
+                each.selectors == channel.selectors)
                 found = &each;
         if (!found) {
             lane fresh;
             fresh.key = key;
+            fresh.mask = channel.frame.mask;
+            if (fresh.mask && std::find(masks_.begin(), masks_.end(), fresh.mask) == masks_.end())
+                masks_.push_back(fresh.mask);
             fresh.bus = channel.bus;
             fresh.sequence = channel.sequence;
-            fresh.selector = channel.selector;
-            fresh.selector_value = channel.selector_value;
+            fresh.selectors = channel.selectors;
             lanes_.push_back(std::move(fresh));
             found = &lanes_.back();
         }
         found->channels.push_back(c);
     }
+    std::sort(masks_.begin(), masks_.end(),
+              [](std::uint32_t a, std::uint32_t b) { return std::bitset<32>(a).count() > std::bitset<32>(b).count(); });
     std::size_t most = 0;
     for (const lane& each : lanes_) most = std::max(most, each.channels.size());
     decoded_.resize(most);
@@ -79,22 +84,26 @@ void grid::build_lanes(const live_config& config) {
     }
 }
 
-/// The lane a frame belongs to: by identifier, then by multiplexor.
-grid::lane* grid::find_lane(const drv_frame_t& frame) {
-    const std::uint32_t key = lane_key(frame.bus, frame.id, (frame.flags & DRV_FRAME_EXTENDED) != 0);
+/// A frame belongs to every lane of its identifier whose multiplexors hold. @return there is a lane of that identifier
+bool grid::push_to_lanes(const drv_frame_t& frame, std::uint32_t mask) {
+    const std::uint32_t id = mask ? frame.id & mask : frame.id;
+    const std::uint32_t key = lane_key(frame.bus, id, (frame.flags & DRV_FRAME_EXTENDED) != 0);
     std::size_t at = hash_of(key, table_.size());
     while (table_[at] >= 0 && lanes_[static_cast<std::size_t>(table_[at])].key != key)
         at = (at + 1) & (table_.size() - 1);
+    bool known = false, received = false;
     for (int i = table_[at]; i >= 0; i = lanes_[static_cast<std::size_t>(i)].next) {
         lane& each = lanes_[static_cast<std::size_t>(i)];
-        if (each.bus != frame.bus) continue;
-        if (!each.selector) return &each;
-        std::int64_t page = 0;
-        if (drv_signal_raw(&*each.selector, frame.data, frame.len, &page) &&
-            static_cast<std::uint64_t>(page) == each.selector_value)
-            return &each;
+        if (each.bus != frame.bus || each.mask != mask) continue;
+        known = true;
+        if (!std::all_of(each.selectors.begin(), each.selectors.end(),
+                         [&](const multiplexor& m) { return m.holds(frame); }))
+            continue;
+        if (!received) ++buses_[frame.bus].received;
+        received = true;
+        push_to(each, frame);
     }
-    return nullptr;
+    return known;
 }
 
 bool grid::decode(lane& l, const drv_frame_t& frame) {
@@ -109,22 +118,24 @@ bool grid::decode(lane& l, const drv_frame_t& frame) {
 }
 
 void grid::push(const drv_frame_t& frame) {
-    if (frame.bus >= buses_.size()) return;
+    if (frame.bus >= buses_.size() || (frame.flags & (DRV_FRAME_ERROR | DRV_FRAME_REMOTE))) return;
     if (frame.loss)
         for (lane& each : lanes_)
             if (each.bus == frame.bus) each.loss |= frame.loss;
-    lane* l = find_lane(frame);
-    if (!l) return;
-    grid_bus_counts& counts = buses_[frame.bus];
-    ++counts.received;
-    if (!decode(*l, frame)) {
-        ++counts.decode_errors;
+    bool known = push_to_lanes(frame, 0); // an exact identifier comes before one that stands for many (a PGN)
+    for (const std::uint32_t mask : masks_)
+        if (!known && (frame.flags & DRV_FRAME_EXTENDED)) known = push_to_lanes(frame, mask);
+}
+
+void grid::push_to(lane& l, const drv_frame_t& frame) {
+    if (!decode(l, frame)) {
+        ++buses_[frame.bus].decode_errors;
         return;
     }
     if (!anchored_)
-        hold_until_anchored(*l, frame);
+        hold_until_anchored(l, frame);
     else
-        place(*l, frame);
+        place(l, frame);
 }
 
 /// Lay rows out in the ring up to and including `upto`; makes room by letting the oldest go.
@@ -137,6 +148,7 @@ void grid::open_rows(std::int64_t upto) {
         std::fill_n(row(opened_), width_, missing);
         std::fill_n(present(opened_), lanes_.size(), std::uint8_t{0});
         slot(opened_) = 0;
+        times_[static_cast<std::size_t>(opened_ & mask_)] = 0;
     }
 }
 
@@ -164,6 +176,8 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
     }
     if (late) ++counts.out_of_order;
     present(index)[which] = 1;
+    std::int64_t& time = times_[static_cast<std::size_t>(index & mask_)];
+    time = slot(index) == 0 ? frame.time_ns : std::min(time, frame.time_ns);
     ++slot(index);
     double* to = row(index);
     for (std::size_t i = 0; i < l.channels.size(); ++i) to[l.channels[i]] = decoded_[i];
@@ -239,8 +253,7 @@ void grid::finish() {
     if (!anchored_ && heard_ > 0) anchor();
     for (lane& l : lanes_) {
         release_late(l);
-        buses_[l.bus].decode_errors += l.suspected;
-        l.suspected = false;
+        end_suspicion(l);
     }
     const auto lanes = static_cast<std::int64_t>(lanes_.size());
     if (opened_ > next_ && slot(opened_ - 1) < lanes) --opened_;

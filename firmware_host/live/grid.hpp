@@ -5,7 +5,7 @@
 // Frames of one message (and multiplexor value) are a lane. Counters of all lanes count the same samples when they stand
 // close together at the start; a lane whose counter is unrelated is placed by time once, then counts on. The grid begins
 // with the first sample for which every lane has been heard, so a stream may be joined in the middle. A sample goes out
-// when it is complete, or when the newest eight frames of every lane that lacks it lie beyond it, or when any lane is
+// when it is complete, or when the newest nine frames of every lane that lacks it lie beyond it, or when any lane is
 // `window` samples ahead.
 #pragma once
 #include "../config.hpp"
@@ -66,6 +66,8 @@ class grid {
     void set_limit(std::int64_t count) { limit_ = count; }
     std::int64_t emitted() const { return next_; } ///< samples given to the sink, missing ones included
     bool started() const { return anchored_; }
+    /// The earliest time stamp of a sample the sink was just given.
+    std::int64_t time_ns(std::int64_t index) const { return times_[static_cast<std::size_t>(index & mask_)]; }
     const grid_bus_counts& bus(std::size_t index) const { return buses_[index]; }
     grid_channel_counts channel(std::size_t index) const;
     /// Channels of which no frame was ever received.
@@ -77,12 +79,12 @@ class grid {
         gap_cause cause = gap_cause::sequence;
     };
     struct lane {
-        std::uint32_t key = 0;
+        std::uint32_t key = 0, mask = 0; ///< mask: which bits of the identifier are in the key, 0 = all
         int next = -1; ///< another lane of the same identifier (multiplexing)
         std::size_t bus = 0;
         std::vector<std::size_t> channels;
-        std::optional<drv_signal_t> sequence, selector;
-        std::uint64_t selector_value = 0;
+        std::optional<drv_signal_t> sequence;
+        std::vector<multiplexor> selectors;
         // Where the lane stands on the grid.
         bool waiting = false, heard = false;
         std::uint64_t counter = 0; ///< as last received
@@ -91,13 +93,14 @@ class grid {
         std::uint8_t loss = 0;     ///< DRV_LOSS_… told by the bus since
         // A counter far off is believed when a second frame agrees.
         bool suspected = false;
+        std::int64_t suspect_age = 0; ///< frames that came in their places since
         drv_frame_t suspect{};
         // Cadence: when a frame is late, the next ones tell whether it was lost company or a burst.
         double phase_ns = 0, least_late = 0;
         std::array<drv_frame_t, 16> late{};
         std::size_t late_count = 0;
-        // The newest frames: what lies before all of them does not come any more.
-        std::array<std::int64_t, 8> recent{};
+        // The newest frames: what lies before all of them does not come any more (a frame may be eight places late).
+        std::array<std::int64_t, 9> recent{};
         std::size_t recent_at = 0;
         std::int64_t passed = std::numeric_limits<std::int64_t>::min();
         // The gap that is open.
@@ -107,7 +110,8 @@ class grid {
         std::size_t mark_count = 0;
     };
     void build_lanes(const live_config& config);
-    lane* find_lane(const drv_frame_t& frame);
+    bool push_to_lanes(const drv_frame_t& frame, std::uint32_t mask);
+    void push_to(lane& l, const drv_frame_t& frame);
     bool decode(lane& l, const drv_frame_t& frame);
     bool read_counter(const lane& l, const drv_frame_t& frame, std::uint64_t& counter) const;
 
@@ -119,6 +123,11 @@ class grid {
     void place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter);
     void move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool pause);
     bool count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& step) const;
+    void doubt_suspect(lane& l);
+    void drop_suspect(lane& l);
+    void recall_suspect(lane& l);
+    void accept_jump(lane& l, const drv_frame_t& frame);
+    void end_suspicion(lane& l);
     void judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter);
     std::int64_t place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const;
     void place_by_cadence(lane& l, const drv_frame_t& frame);
@@ -148,12 +157,14 @@ class grid {
     double rate_hz_, period_ns_;
     std::vector<channel_config> channels_;
     std::vector<lane> lanes_;
-    std::vector<int> table_; ///< hash of identifier to lane
+    std::vector<int> table_;           ///< hash of identifier to lane
+    std::vector<std::uint32_t> masks_; ///< of identifiers that stand for many, the strictest first
     std::size_t width_ = 0;
     std::int64_t reorder_ = 16, window_ = 0, mask_ = 0;
     std::vector<double> values_, decoded_;
     std::vector<std::uint8_t> present_;
     std::vector<std::int64_t> slots_; ///< how many lanes a row has
+    std::vector<std::int64_t> times_; ///< the earliest stamp of a row, 0 while it is empty
     std::int64_t limit_ = std::numeric_limits<std::int64_t>::max();
     std::int64_t next_ = 0, opened_ = 0; ///< next row to go out; rows below opened_ are laid out in the ring
     bool anchored_ = false;

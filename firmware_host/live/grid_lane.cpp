@@ -134,19 +134,43 @@ void grid::move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool p
 void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
     const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
     if (step <= 0 && (step >= -reorder_ || awaited(l, l.last + step))) { // again, or late
+        doubt_suspect(l);
         insert(l, l.last + step, frame);
         return;
     }
     std::int64_t far = step;
     const bool timed = count_rounds(l, frame, far);
-    if (!timed && (step < 0 || step > window_)) {
+    if (!timed && (step < 0 || step > (l.loss ? window_ : reorder_))) {
         judge_jump(l, frame, counter);
         return;
     }
-    buses_[l.bus].decode_errors += l.suspected; // one damaged frame
-    l.suspected = false;
+    doubt_suspect(l);
     l.counter = counter;
     move_on(l, frame, l.last + far, false);
+    recall_suspect(l);
+}
+
+/// The lane has come near the counter that was far off, or gone beyond it: it was right.
+void grid::recall_suspect(lane& l) {
+    std::uint64_t counter = 0;
+    if (!l.suspected || !read_counter(l, l.suspect, counter)) return;
+    const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+    const drv_frame_t frame = l.suspect;
+    decode(l, frame);
+    if (std::abs(step) > reorder_ && (step > 0 || !awaited(l, l.last + step))) return;
+    l.suspected = false;
+    place_by_counter(l, frame, counter);
+}
+
+/// A frame in its place came after a counter far off: it may have been on its way for long, a ninth one was not.
+void grid::doubt_suspect(lane& l) {
+    if (l.suspected && ++l.suspect_age > reorder_ / 2) drop_suspect(l);
+}
+
+/// The counter far off was one damaged frame.
+void grid::drop_suspect(lane& l) {
+    buses_[l.bus].decode_errors += l.suspected;
+    l.suspected = false;
 }
 
 /// After a known loss or a long silence the clock tells how often the counter went round. @return it does, and agrees
@@ -162,28 +186,59 @@ bool grid::count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& s
     return true;
 }
 
-/// A counter far off: one damaged frame, or did the sender jump or start anew? Two frames that agree decide.
+/// A counter far off: one damaged frame, or did frames get lost, or did the sender jump or start anew? Two frames that
+/// agree decide, in whichever order they came.
 void grid::judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
     std::uint64_t before = 0;
     if (l.suspected) {
         read_counter(l, l.suspect, before);
         const std::int64_t apart = wrapped_step(before, counter, l.sequence->length);
-        if (apart >= 1 && apart <= reorder_) {
-            const drv_frame_t earlier = l.suspect;
-            l.suspected = false;
-            const std::int64_t step = wrapped_step(l.counter, before, l.sequence->length);
-            const std::int64_t index = step > 0 ? l.last + step : place_restart(l, earlier, before);
-            l.counter = before;
-            decode(l, earlier);
-            move_on(l, earlier, index, false);
-            decode(l, frame);
-            place_by_counter(l, frame, counter);
+        if (apart == 0) {
+            ++buses_[l.bus].duplicate;
             return;
         }
-        ++buses_[l.bus].decode_errors; // nothing followed the one before
+        const auto ahead = [&](std::uint64_t c) {
+            const std::int64_t step = wrapped_step(l.counter, c, l.sequence->length);
+            return step > 0 && step <= window_;
+        };
+        if (std::abs(apart) <= (ahead(before) && ahead(counter) ? window_ : reorder_)) {
+            const drv_frame_t suspect = l.suspect;
+            l.suspected = false;
+            accept_jump(l, apart > 0 ? suspect : frame);
+            const drv_frame_t& later = apart > 0 ? frame : suspect;
+            decode(l, later);
+            place_by_counter(l, later, apart > 0 ? counter : before);
+            return;
+        }
+        drop_suspect(l); // nothing followed the one before
     }
     l.suspected = true;
+    l.suspect_age = 0;
     l.suspect = frame;
+}
+
+/// The lane goes on at this frame.
+void grid::accept_jump(lane& l, const drv_frame_t& frame) {
+    std::uint64_t counter = 0;
+    read_counter(l, frame, counter);
+    const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+    const std::int64_t index = step > 0 ? l.last + step : place_restart(l, frame, counter);
+    l.counter = counter;
+    decode(l, frame);
+    move_on(l, frame, index, false);
+}
+
+/// The stream ends and nothing can confirm a jump any more: one ahead is taken for a loss, one back for damage.
+void grid::end_suspicion(lane& l) {
+    std::uint64_t counter = 0;
+    if (!l.suspected || !read_counter(l, l.suspect, counter)) return;
+    const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+    if (step <= 0 || step > window_) {
+        drop_suspect(l);
+        return;
+    }
+    l.suspected = false;
+    accept_jump(l, drv_frame_t(l.suspect));
 }
 
 /// The sender's counter began anew: beside lanes that did so already, else by time, at least one sample apart.
@@ -263,6 +318,7 @@ void grid::note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause) {
     mark.cause = l.loss & DRV_LOSS_LINK       ? gap_cause::link_down
                  : l.loss & DRV_LOSS_OVERFLOW ? gap_cause::socket_overflow
                  : l.loss & DRV_LOSS_DRIVER   ? gap_cause::driver
+                 : l.loss & DRV_LOSS_CRC      ? gap_cause::crc
                  : pause                      ? gap_cause::stall
                                               : gap_cause::sequence;
 }

@@ -83,6 +83,9 @@ void identifier::create_accumulator(const live_config& config) {
     if (okid_accumulator_create(&accumulator_, &a, accumulator_block_.get(), bytes) != OKID_OK)
         throw failure(exit_usage, fmt::format("{}: [identification]: the accumulator cannot be made", config.path));
     okid_accumulator_set_units(accumulator_, scale_.data(), offset_.data());
+    if (wanted.sigma_blocks == 0) return;
+    blocks_ = std::make_unique<live_blocks>(a, identify_config_, wanted.sigma_blocks);
+    blocks_->set_units(scale_, offset_);
 }
 
 void identifier::create_identifier(const live_config& config) {
@@ -95,6 +98,7 @@ void identifier::create_identifier(const live_config& config) {
     c.order = wanted.order;
     c.fs_hz = config.rate_hz;
     c.method = method_of(wanted.method);
+    c.hankel = hankel_of(wanted.hankel);
     c.detrend = wanted.detrend == "none" ? OKID_DETREND_NONE : OKID_DETREND_MEAN;
     q_ = c.n_u + std::int64_t{okid_identify_lags(&c)} * (c.n_u + c.n_y);
     const std::size_t bytes = okid_identify_memsize(&c);
@@ -103,14 +107,25 @@ void identifier::create_identifier(const live_config& config) {
         throw failure(exit_usage, fmt::format("{}: [identification]: the identification cannot be made", config.path));
 }
 
-void identifier::flush() {
-    if (pending_ == 0) return;
-    const okid_status_t status = exact_ ? okid_accumulator_add_i16(accumulator_, codes_.data(), pending_)
-                                        : okid_accumulator_add(accumulator_, doubles_.data(), pending_);
+/// What waits into the sums, and into those of the blocks beside them.
+template <class Number> void identifier::absorb(const Number* samples) {
+    for (std::size_t done = 0; done < pending_;) {
+        const std::size_t n = blocks_ ? blocks_->room(accumulator_, pending_ - done) : pending_ - done;
+        const okid_status_t status = add_samples(accumulator_, samples + done * m_, n);
+        if (status < 0)
+            throw failure(exit_no_model,
+                          fmt::format("the samples cannot be summed any further: {}", okid_status_text(status)));
+        if (blocks_) blocks_->add(accumulator_, samples + done * m_, n);
+        done += n;
+    }
     pending_ = 0;
-    if (status < 0)
-        throw failure(exit_no_model,
-                      fmt::format("the samples cannot be summed any further: {}", okid_status_text(status)));
+}
+
+void identifier::flush() {
+    if (exact_)
+        absorb(codes_.data());
+    else
+        absorb(doubles_.data());
 }
 
 void identifier::add(const double* row) {
@@ -133,6 +148,7 @@ void identifier::add(const double* row) {
 void identifier::add_missing(std::int64_t count) {
     flush();
     okid_accumulator_gap(accumulator_, count);
+    if (blocks_) blocks_->gap(accumulator_, count);
 }
 
 okid_status_t identifier::run() {

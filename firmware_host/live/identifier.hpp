@@ -2,6 +2,7 @@
 // Samples of the grid into the accumulator, and a model out of it whenever it is asked for. All memory at the start.
 #pragma once
 #include "../config.hpp"
+#include "blocks.hpp"
 
 #include <okid/accumulator.h>
 #include <okid/identify.h>
@@ -25,6 +26,11 @@ class identifier {
     /// Identify from what is there. @return status of okid_identify_run(); the model stays valid until the next call
     okid_status_t run();
     const okid_identified_t& model() const { return model_; }
+    /// Standard deviations for the model of the last run(), of its modes and what the plan wants; none when sigma_blocks is
+    /// 0 or there is too little to cut into blocks.
+    std::optional<deviations> sigma(const mass_plan& plan) {
+        return blocks_ ? blocks_->sigma(accumulator_, model_, plan) : std::nullopt;
+    }
     const okid_identify_config_t& config() const { return identify_config_; }
 
     bool exact() const { return exact_; }        ///< 16-bit codes, summed exactly
@@ -37,6 +43,7 @@ class identifier {
     void flush();
     void create_accumulator(const live_config& config);
     void create_identifier(const live_config& config);
+    template <class Number> void absorb(const Number* samples);
 
     std::size_t m_;
     bool exact_;
@@ -49,6 +56,7 @@ class identifier {
     okid_identify_t* identify_ = nullptr;
     okid_identify_config_t identify_config_{};
     okid_identified_t model_{};
+    std::unique_ptr<live_blocks> blocks_;
 };
 
 } // namespace okid_host

@@ -3,14 +3,13 @@
 
 #include "../error.hpp"
 #include "../nearest_name.hpp"
-#include "reader.hpp"
+#include "frame_target.hpp"
 #include "stop_signal.hpp"
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
-#include <ctime>
-#include <drv/sink.h>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
@@ -19,13 +18,7 @@
 namespace okid_host {
 namespace {
 
-constexpr std::int64_t second_ns = 1000000000;
-
-std::int64_t monotonic_ns() {
-    timespec now{};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return std::int64_t{now.tv_sec} * second_ns + now.tv_nsec;
-}
+int stop_asked(void*) { return stop_requested(); }
 
 /// Second word of every line, each once, in order of appearance.
 std::vector<std::string> interfaces_of(const std::string& log) {
@@ -49,20 +42,15 @@ std::vector<std::string> interfaces_of(const std::string& log) {
 } // namespace
 
 bool pacer::wait_for(std::int64_t time_ns) {
-    if (stop_requested()) return false;
-    if (!speed_) return true;
-    if (begin_ns_ < 0) {
+    if (!speed_) return !stop_requested();
+    if (!begun_) {
+        begun_ = true;
         first_ns_ = time_ns;
-        begin_ns_ = monotonic_ns();
+        drv_pacer_start(&timing_, 0);
     }
-    const std::int64_t due = begin_ns_ + static_cast<std::int64_t>(static_cast<double>(time_ns - first_ns_) / *speed_);
-    while (due > monotonic_ns()) { // in short pieces, so that a signal is not missed
-        const std::int64_t piece = std::min(due, monotonic_ns() + second_ns / 10);
-        const timespec until{static_cast<std::time_t>(piece / second_ns), static_cast<long>(piece % second_ns)};
-        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
-        if (stop_requested()) return false;
-    }
-    return true;
+    const double offset_ns = static_cast<double>(time_ns - first_ns_) / *speed_;
+    constexpr double never_ns = 4e18;
+    return drv_pacer_wait(&timing_, std::llround(std::min(offset_ns, never_ns)), stop_asked, nullptr) != 0;
 }
 
 std::vector<std::string> map_interfaces(const std::string& log, const live_config& config) {
@@ -110,6 +98,11 @@ const drv_frame_t* log_frames::next() {
 
 void play_through_session(const std::string& log, const live_config& config, const session_options& options,
                           std::optional<double> speed) {
+    if (config.trigger.source == trigger_source::gpio && !options.trigger_ns)
+        throw failure(exit_usage, fmt::format("{}: [trigger] source = \"gpio\", but a log holds no edges. Say when it "
+                                              "came: --trigger-at SECONDS (a time of the log; time_s in the trigger "
+                                              "event of the live run), or give another source",
+                                              config.path));
     log_frames frames(log, map_interfaces(log, config));
     catch_stop_signals();
     session played(config, options);
@@ -124,20 +117,19 @@ void play_through_session(const std::string& log, const live_config& config, con
 
 void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed) {
     log_frames frames(log, {});
-    drv_sink_t sink{};
-    const int code = drv_sink_open(&sink, interface.c_str());
-    if (code != 0) throw_interface_failure(-code, interface, sink.error);
+    frame_target sink(interface);
     catch_stop_signals();
     pacer pace(speed);
-    int status = 0;
     while (const drv_frame_t* frame = frames.next()) {
         if (!pace.wait_for(frame->time_ns)) break;
-        if ((status = drv_sink_write(&sink, frame, 2000)) != 0) break;
+        sink.write(*frame);
     }
-    drv_sink_close(&sink);
-    if (status != 0) throw failure(exit_device, fmt::format("interface {}: {}", interface, sink.error));
-    if (stop_requested()) throw failure(exit_interrupted, fmt::format("interrupted after {} frames", sink.sent));
-    fmt::print("{} frames played onto {}\n", sink.sent, interface);
+    if (stop_requested()) throw failure(exit_interrupted, fmt::format("interrupted after {} frames", sink.sent()));
+    const drv_pacer_t& late = pace.lateness();
+    fmt::print("{} frames played onto {}{}\n", sink.sent(), interface,
+               speed ? fmt::format("; late by {:.0f} us (mean), {:.0f} us (sd), {:.0f} us (worst)", late.mean_ns / 1e3,
+                                   drv_pacer_deviation(&late) / 1e3, static_cast<double>(late.worst_ns) / 1e3)
+                     : "");
 }
 
 } // namespace okid_host

@@ -3,6 +3,8 @@
 #pragma once
 #include "session.hpp"
 
+#include <drv/pacer.h>
+
 #include <optional>
 #include <string>
 
@@ -14,10 +16,14 @@ class pacer {
     explicit pacer(std::optional<double> speed) : speed_(speed) {}
     /// Sleep until the stamp is due. @return false when a stop was asked for
     bool wait_for(std::int64_t time_ns);
+    /// How late the frames were.
+    const drv_pacer_t& lateness() const { return timing_; }
 
   private:
     std::optional<double> speed_;
-    std::int64_t first_ns_ = 0, begin_ns_ = -1;
+    bool begun_ = false;
+    std::int64_t first_ns_ = 0;
+    drv_pacer_t timing_{};
 };
 
 /// Which interface of the log feeds which bus: by name; a log with one interface feeds the only CAN bus.

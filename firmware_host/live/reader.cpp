@@ -4,6 +4,8 @@
 #include "../error.hpp"
 #include "../nearest_name.hpp"
 
+#include "serial_line.hpp"
+
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
@@ -12,6 +14,7 @@
 #include <fstream>
 #include <net/if_arp.h>
 #include <poll.h>
+#include <pthread.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -21,26 +24,32 @@ namespace {
 constexpr std::size_t ring_frames = 1 << 17; // 6 s of a saturated FD bus, 15 s of a classic one
 constexpr int look_ms = 100;                 // how often counters and a vanished interface are looked at
 constexpr int batches_between_looks = 64;
+constexpr int reader_priority = 10; // SCHED_FIFO
 
 } // namespace
 
-bus_reader::bus_reader(const std::string& interface, std::size_t bus, const std::vector<drv_filter_t>& frames,
-                       int wake_fd)
-    : interface_(interface), bus_(static_cast<std::uint8_t>(bus)), wake_fd_(wake_fd),
-      stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), block_(new std::byte[drv_ring_memsize(ring_frames)]),
-      batch_(64) {
+bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, int wake_fd)
+    : interface_(config_of_all.buses[bus].on_line() ? config_of_all.buses[bus].device
+                                                    : config_of_all.buses[bus].interface),
+      bus_(static_cast<std::uint8_t>(bus)), wake_fd_(wake_fd), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      block_(new std::byte[drv_ring_memsize(ring_frames)]), batch_(64) {
     ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));
-    source_.ops = &drv_source_socketcan;
+    const bus_config& mine = config_of_all.buses[bus];
+    const std::vector<drv_filter_t> frames = wanted_frames(config_of_all, bus);
+    source_.ops = mine.serial() ? &drv_source_serial : mine.on_line() ? &drv_source_slcan : &drv_source_socketcan;
     drv_source_config_t config{};
     config.interfaces[0] = interface_.c_str();
     config.interface_count = 1;
-    if (frames.size() <= DRV_MAX_FILTERS) {
+    if (mine.on_line()) config.line = line_settings(mine, config_of_all.rate_hz);
+    // The load of a bus is that of all its frames: then nothing is left out by the kernel.
+    if (frames.size() <= DRV_MAX_FILTERS && !mine.bitrate) {
         config.filters = frames.data();
         config.filter_count = static_cast<std::int32_t>(frames.size());
     }
     const int code = source_.ops->open(&source_, &config);
     if (code != 0) {
         close(stop_fd_);
+        if (mine.on_line()) throw_line_failure(-code, interface_, source_.error);
         throw_interface_failure(-code, interface_, source_.error);
     }
     publish_stats();
@@ -57,6 +66,10 @@ void bus_reader::start() {
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     thread_ = std::thread([this] { run(); });
+    // Before everything that computes, where the system lets us (root, or LimitRTPRIO).
+    sched_param first{};
+    first.sched_priority = reader_priority;
+    (void)pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &first);
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
@@ -68,10 +81,10 @@ void bus_reader::stop() {
     thread_.join();
 }
 
-/// One read of the source. @return frames moved
+/// One read of the source. @return frames moved, negative when it failed
 int bus_reader::drain_once() {
     const int count = source_.ops->read(&source_, batch_.data(), static_cast<int>(batch_.size()));
-    if (count <= 0) return 0;
+    if (count <= 0) return count;
     for (int i = 0; i < count; ++i) batch_[static_cast<std::size_t>(i)].bus = bus_;
     drv_ring_push(ring_, batch_.data(), static_cast<std::size_t>(count));
     const std::uint64_t one = 1;
@@ -92,11 +105,13 @@ drv_stats_t bus_reader::stats() const {
 }
 
 void bus_reader::run() {
+    int moved = 0;
     while (!stopping_) {
         pollfd waits[2] = {{stop_fd_, POLLIN, 0}, {source_.ops->fd(&source_), POLLIN, 0}};
-        (void)poll(waits, 2, look_ms); // a negative fd is left out: then only the time runs
+        // A negative fd is left out, and so is a source that fails: then only the time runs.
+        (void)poll(waits, moved < 0 ? 1 : 2, look_ms);
         for (int i = 0; i < batches_between_looks && !stopping_; ++i)
-            if (drain_once() == 0) break;
+            if ((moved = drain_once()) <= 0) break;
         publish_stats();
     }
     for (int i = 0; i < 1 << 14 && drain_once() > 0; ++i) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // One thread a bus that does nothing but empty the socket into a ring, so that no identification can make it overflow.
 #pragma once
+#include "../config.hpp"
+
 #include <drv/ring.h>
 #include <drv/source.h>
 
@@ -16,9 +18,9 @@ namespace okid_host {
 
 class bus_reader {
   public:
-    /// Opens the interface. Throws `failure` (exit 4) that says what is there and what to do.
+    /// Opens the interface or the serial line. Throws `failure` (exit 4) that says what is there and what to do.
     /// @param bus  number given to every frame; @param wake_fd  an eventfd written when frames wait
-    bus_reader(const std::string& interface, std::size_t bus, const std::vector<drv_filter_t>& frames, int wake_fd);
+    bus_reader(const live_config& config, std::size_t bus, int wake_fd);
     ~bus_reader();
     bus_reader(const bus_reader&) = delete;
     bus_reader& operator=(const bus_reader&) = delete;
@@ -31,7 +33,7 @@ class bus_reader {
     /// Counts of the source and of the ring, as of the last time the thread looked (at most 0.1 s ago).
     drv_stats_t stats() const;
     std::uint64_t ring_overrun() const { return drv_ring_overrun(ring_); }
-    const std::string& interface() const { return interface_; }
+    const std::string& interface() const { return interface_; } ///< or the device of a line
 
   private:
     void run();

@@ -2,10 +2,13 @@
 #include "session.hpp"
 
 #include "../error.hpp"
+#include "../method.hpp"
+#include "serial_line.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <drv/bus_load.h>
 #include <fmt/format.h>
 
 namespace okid_host {
@@ -28,22 +31,49 @@ std::int64_t samples_of(double seconds, double rate_hz) {
     return std::max<std::int64_t>(1, std::llround(seconds * rate_hz));
 }
 
-/// Longest time a frame can take on the wire (all stuff bits, gap included), s; 0 when the bit rate is not known.
-double wire_s(const drv_frame_t& frame, const bus_config& bus) {
-    if (!bus.bitrate) return 0;
-    const bool extended = (frame.flags & DRV_FRAME_EXTENDED) != 0;
-    if (!(frame.flags & DRV_FRAME_FD)) return ((extended ? 80 : 55) + 10.0 * frame.len) / *bus.bitrate;
-    const double fast = (frame.flags & DRV_FRAME_BRS) && bus.dbitrate ? *bus.dbitrate : *bus.bitrate;
-    const double slow_bits = extended ? 65 : 43,
-                 check_bits = frame.len > 16 ? 32 : 27; // check field with its fixed stuff bits
-    return slow_bits / *bus.bitrate + (1.25 * (8.0 * frame.len + 6) + check_bits) / fast;
+ordered_json health_json(const bus_health& health) {
+    const drv_stats_t& c = health.counts;
+    ordered_json out;
+    out["state"] = c.state == DRV_BUS_UNKNOWN ? ordered_json(nullptr) : ordered_json(drv_bus_state_name(c.state));
+    out["errors"] = {{"messages", c.error_frames},  {"bus_off", c.bus_off},
+                     {"restarted", c.restarts},     {"no_ack", c.no_ack},
+                     {"tx_timeout", c.tx_timeouts}, {"rx_overflow", c.rx_overflows},
+                     {"bus_error", c.bus_errors},   {"error_passive", c.error_passive},
+                     {"link_down", c.link_down}};
+    if (health.sync)
+        out["sync"] = {{"sent", health.sync->sent},
+                       {"missed", health.sync->missed},
+                       {"late_mean_us", health.sync->late_mean_us},
+                       {"late_sd_us", health.sync->late_sd_us},
+                       {"late_worst_us", health.sync->late_worst_us}};
+    return out;
+}
+
+/// Where a channel is looked for.
+std::string place_text(const channel_config& channel) {
+    if (channel.field) return fmt::format("field {}", *channel.field);
+    return fmt::format("{}identifier {:#x}{}", channel.message.empty() ? "" : "message " + channel.message + ", ",
+                       channel.frame.id, channel.frame.extended ? " extended" : "");
+}
+
+/// How the clock of a device runs beside the host's; null while that is not known.
+ordered_json clock_json(const drv_clock_fit_t& clock) {
+    double ppm = 0, sigma_ppm = 0;
+    if (drv_clock_fit_rate(&clock, &ppm, &sigma_ppm) != 0) return nullptr;
+    return {{"rate_ppm", ppm},
+            {"rate_std_ppm", sigma_ppm},
+            {"offset_std_us", 1e6 * std::sqrt(clock.variance[0])},
+            {"outliers", clock.outliers},
+            {"host_steps", clock.host_steps},
+            {"restarts", clock.restarts}};
 }
 
 } // namespace
 
 session::session(const live_config& config, const session_options& options)
     : config_(config), options_(options), events_(options.events), view_(options.events != "-" && options.json != "-"),
-      grid_(config, *this), identifier_(config), losses_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
+      grid_(config, *this), identifier_(config), trigger_(config), losses_(config.buses.size()),
+      health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)) {
     stats_samples_ =
         update_samples_ * std::max<std::int64_t>(1, std::llround(stats_every_s / config.identification.update_s));
@@ -51,6 +81,9 @@ session::session(const live_config& config, const session_options& options)
         limit_ = samples_of(*options.duration_s, config.rate_hz);
         grid_.set_limit(limit_);
     }
+    if (options.trigger_ns) trigger_.edge(*options.trigger_ns);
+    const drv_clock_config_t nanoseconds{1e9, 64, DRV_CLOCK_LATE, 0, 0};
+    for (drv_clock_fit_t& clock : clocks_) (void)drv_clock_fit_init(&clock, &nanoseconds);
 }
 
 void session::start(std::int64_t time_ns) {
@@ -69,14 +102,21 @@ void session::frame(const drv_frame_t& frame) {
     start(stamped.time_ns);
     if (first_ns_ == 0) first_ns_ = stamped.time_ns;
     last_ns_ = stamped.time_ns;
-    if (frame.bus < busy_s_.size()) busy_s_[frame.bus] += wire_s(frame, config_.buses[frame.bus]);
+    if (frame.bus < busy_s_.size() && config_.buses[frame.bus].bitrate)
+        busy_s_[frame.bus] +=
+            drv_wire_seconds(&frame, *config_.buses[frame.bus].bitrate, config_.buses[frame.bus].dbitrate.value_or(0));
+    if (frame.hw_time_ns != 0 && frame.bus < clocks_.size())
+        (void)drv_clock_fit_add(&clocks_[frame.bus], static_cast<std::uint64_t>(frame.hw_time_ns), frame.time_ns);
     grid_.push(stamped);
 }
 
 void session::on_sample(std::int64_t index, const double* row) {
     if (limit_ > 0 && index >= limit_) return;
     now_ = index + 1;
-    identifier_.add(row);
+    if (!trigger_.waiting())
+        identifier_.add(row);
+    else if (trigger_.add(index, row, 1, grid_.time_ns(index)))
+        begin(index);
     if (now_ % update_samples_ == 0) update(now_);
 }
 
@@ -84,8 +124,42 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
     if (limit_ > 0) count = std::min(count, limit_ - index);
     if (count <= 0) return;
     now_ = index + count;
-    identifier_.add_missing(count);
+    if (!trigger_.waiting())
+        identifier_.add_missing(count);
+    else
+        (void)trigger_.add(index, nullptr, count, 0);
     if (now_ / update_samples_ > index / update_samples_) update(now_);
+}
+
+void session::trigger_edge(std::int64_t time_ns) {
+    trigger_.edge(time_ns);
+    if (trigger_.look_back()) begin(now_);
+}
+
+/// The trigger has come: the samples that waited for it go in, with the updates up to sample `until` that they would
+/// have had if it had been known at its time.
+void session::begin(std::int64_t until) {
+    const std::int64_t sample = trigger_.sample();
+    events_.write({{"type", "trigger"},
+                   {"t", seconds(sample)},
+                   {"source", config_.trigger.source == trigger_source::gpio ? "gpio" : "level"},
+                   {"sample", sample},
+                   {"time_s", static_cast<double>(trigger_.time_ns() / 1000) / 1e6}});
+    trigger_.each_kept([&](std::int64_t first, const double* row, std::int64_t count) {
+        if (row)
+            identifier_.add(row);
+        else
+            identifier_.add_missing(count);
+        const std::int64_t end = first + count;
+        if (end > sample && end <= until && end / update_samples_ > first / update_samples_) show_modes(end);
+    });
+}
+
+lamp_state session::lamps() const {
+    lamp_state out;
+    out.armed = trigger_.waiting() || config_.trigger.source == trigger_source::immediate;
+    out.go = settled_;
+    return out;
 }
 
 void session::on_gap(const grid_gap& gap) {
@@ -99,8 +173,20 @@ void session::on_gap(const grid_gap& gap) {
                    {"cause", gap_cause_name(gap.cause)}});
 }
 
-/// Modes are shown once there are twice as many equations as unknowns: below that they only repeat the noise.
 void session::update(std::int64_t samples) {
+    if (trigger_.waiting()) {
+        live_status status;
+        status.t = seconds(samples);
+        status.waiting = "armed, waiting for " + trigger_.awaited();
+        view_.show(status);
+    } else {
+        show_modes(samples);
+    }
+    if (samples % stats_samples_ == 0) write_stats();
+}
+
+/// Modes are shown once there are twice as many equations as unknowns: below that they only repeat the noise.
+void session::show_modes(std::int64_t samples) {
     live_status status;
     status.t = seconds(samples);
     const okid_accumulator_stats_t stats = identifier_.stats();
@@ -109,14 +195,17 @@ void session::update(std::int64_t samples) {
     status.gaps = stats.gaps;
     const std::int64_t rows = identifier_.rows(), need = 2 * identifier_.unknowns();
     okid_status_t outcome = OKID_ERR_TOO_SHORT;
+    std::optional<deviations> sigma;
     if (rows >= need) outcome = identifier_.run();
     if (outcome >= 0) {
+        sigma = identifier_.sigma({});
         status.model = &identifier_.model();
+        status.sigma = sigma ? &*sigma : nullptr;
         status.settled = settling_.add(identifier_.model());
         const std::int64_t basis = identifier_.basis();
         events_.write({{"type", "modes"},
                        {"t", status.t},
-                       {"modes", modes_json(identifier_.model())},
+                       {"modes", modes_json(identifier_.model(), sigma ? &*sigma : nullptr)},
                        {"window_s", seconds(basis)},
                        {"samples", basis},
                        {"settled", status.settled}});
@@ -125,8 +214,8 @@ void session::update(std::int64_t samples) {
         status.waiting = rows < need ? fmt::format("waiting for samples, {} of {}", rows, need)
                                      : fmt::format("no model yet: {}", okid_status_text(outcome));
     }
+    settled_ = status.settled;
     view_.show(status);
-    if (samples % stats_samples_ == 0) write_stats();
 }
 
 /// Frames missing on the grid are booked under what the devices counted first; the rest was lost before it reached us.
@@ -137,22 +226,28 @@ ordered_json session::bus_stats(std::size_t bus) const {
     const std::uint64_t overflow = losses_[bus].socket_overflow, driver = losses_[bus].driver;
     const std::uint64_t sequence = lost(gap_cause::sequence) + beyond(lost(gap_cause::socket_overflow), overflow) +
                                    beyond(lost(gap_cause::driver), driver);
-    const std::uint64_t link = lost(gap_cause::link_down), stall = lost(gap_cause::stall);
+    const std::uint64_t link = lost(gap_cause::link_down), stall = lost(gap_cause::stall), crc = lost(gap_cause::crc);
     ordered_json out;
     out["received"] = counts.received;
-    out["lost"] = overflow + driver + sequence + link + stall;
-    out["lost_by"] = {{"socket_overflow", overflow},
-                      {"driver", driver},
-                      {"sequence", sequence},
-                      {"link_down", link},
-                      {"stall", stall}};
+    out["lost"] = overflow + driver + sequence + crc + link + stall;
+    out["lost_by"] = {{"socket_overflow", overflow}, {"driver", driver}, {"sequence", sequence}, {"crc", crc},
+                      {"link_down", link},           {"stall", stall}};
     out["out_of_order"] = counts.out_of_order;
     out["duplicate"] = counts.duplicate;
     out["decode_errors"] = counts.decode_errors;
     const bool known = config_.buses[bus].bitrate && now_ > 0;
     out["load_percent"] =
         known ? ordered_json(std::round(1e4 * busy_s_[bus] / seconds(now_)) / 100) : ordered_json(nullptr);
+    if (health_[bus])
+        out.update(config_.buses[bus].on_line() ? line_json(health_[bus]->counts) : health_json(*health_[bus]));
+    if (clocks_[bus].started) out["clock"] = clock_json(clocks_[bus]);
     return out;
+}
+
+void session::bus_event(std::size_t bus, const char* kind, const std::string& text) {
+    if (started_)
+        events_.write(
+            {{"type", "bus"}, {"t", seconds(now_)}, {"bus", config_.buses[bus].name}, {"event", kind}, {"text", text}});
 }
 
 void session::write_stats() {
@@ -179,18 +274,18 @@ void session::check_heard() const {
         const channel_config& channel = config_.channels[index];
         if (channel.role == channel_role::aux) continue;
         throw failure(exit_no_model,
-                      fmt::format("no usable frame of channel \"{}\" was received ({}identifier {:#x}{}, bus \"{}\"): "
-                                  "is the sensor on, and are "
-                                  "identifier and bus right in {}?",
-                                  channel.name, channel.message.empty() ? "" : "message " + channel.message + ", ",
-                                  channel.frame.id, channel.frame.extended ? " extended" : "",
-                                  config_.buses[channel.bus].name, config_.path));
+                      fmt::format("no usable {} of channel \"{}\" was received ({}, bus \"{}\"): is the sensor on, and "
+                                  "are {} and bus right in {}?",
+                                  channel.field ? "sample" : "frame", channel.name, place_text(channel),
+                                  config_.buses[channel.bus].name, channel.field ? "field" : "identifier",
+                                  config_.path));
     }
 }
 
 result_context session::context() {
     result_context out;
     out.method = config_.identification.method;
+    if (!looks_back_rows(method_of(out.method), config_.n_u)) out.hankel = config_.identification.hankel;
     out.fs_hz = config_.rate_hz;
     out.samples = identifier_.basis();
     out.gaps = identifier_.stats().gaps;
@@ -256,10 +351,13 @@ void session::finish() {
     write_stats();
     view_.end();
     check_heard();
+    if (trigger_.waiting()) throw failure(exit_no_model, trigger_.missed());
     result_context about = context();
     remark_rate();
     if (status < 0) throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
     add_mass(about);
+    about.sigma = identifier_.sigma(about.mass ? live_mass_plan(config_) : mass_plan{});
+    if (about.mass && about.sigma) add_deviations(*about.sigma, *about.mass);
     const ordered_json result = result_json(identifier_.model(), about);
     events_.write({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
     if (!options_.json.empty())

@@ -7,9 +7,12 @@
 #include "events.hpp"
 #include "grid.hpp"
 #include "identifier.hpp"
+#include "sender.hpp"
 #include "settling.hpp"
+#include "trigger.hpp"
 
 #include <cstdint>
+#include <drv/clock_fit.h>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,13 +20,25 @@
 namespace okid_host {
 
 struct session_options {
-    std::optional<double> duration_s; ///< stream seconds
-    std::string events, json;         ///< files, "-" = stdout, "" = none
+    std::optional<double> duration_s;       ///< stream seconds
+    std::string events, json;               ///< files, "-" = stdout, "" = none
+    std::optional<std::int64_t> trigger_ns; ///< a log holds no edge of a GPIO line: when it came
 };
 
 /// What the devices counted themselves.
 struct device_losses {
     std::uint64_t socket_overflow = 0, driver = 0;
+};
+
+/// What a CAN controller and the frames okid sends have to tell, for the stats.
+struct bus_health {
+    drv_stats_t counts{};
+    std::optional<sync_report> sync;
+};
+
+/// What the lamps show.
+struct lamp_state {
+    bool armed = false, go = false, alarm = false;
 };
 
 class session : private grid_sink {
@@ -32,6 +47,13 @@ class session : private grid_sink {
 
     void frame(const drv_frame_t& frame);
     void set_losses(std::size_t bus, const device_losses& losses) { losses_[bus] = losses; }
+    void set_health(std::size_t bus, const bus_health& health) { health_[bus] = health; }
+    /// Something happened on a bus; told once the stream has begun.
+    void bus_event(std::size_t bus, const char* kind, const std::string& text);
+    /// An edge of the trigger line, CLOCK_REALTIME. Nothing comes of it when the session does not wait for one.
+    void trigger_edge(std::int64_t time_ns);
+    bool triggered() const { return !trigger_.waiting(); }
+    lamp_state lamps() const;
     bool done() const { return limit_ > 0 && grid_.emitted() >= limit_; }
     double stream_s() const { return static_cast<double>(grid_.emitted()) / config_.rate_hz; }
     bool heard() const { return started_; }
@@ -45,7 +67,9 @@ class session : private grid_sink {
     void on_gap(const grid_gap& gap) override;
 
     void start(std::int64_t time_ns);
+    void begin(std::int64_t until);
     void update(std::int64_t samples);
+    void show_modes(std::int64_t samples);
     void write_stats();
     void check_heard() const;
     nlohmann::ordered_json bus_stats(std::size_t bus) const;
@@ -62,12 +86,15 @@ class session : private grid_sink {
     grid grid_;
     identifier identifier_;
     settling settling_;
+    trigger trigger_;
     std::vector<device_losses> losses_;
-    std::vector<double> busy_s_; ///< time on the wire of each bus, 0 without a bitrate
+    std::vector<std::optional<bus_health>> health_;
+    std::vector<drv_clock_fit_t> clocks_; ///< of the devices that stamp frames themselves
+    std::vector<double> busy_s_;          ///< time on the wire of each bus, 0 without a bitrate
     std::int64_t update_samples_, stats_samples_, limit_ = 0, now_ = 0;
     std::int64_t first_ns_ = 0, last_ns_ = 0; ///< time stamps of the stream
     std::int64_t gaps_ = 0;
-    bool started_ = false;
+    bool started_ = false, settled_ = false;
 };
 
 } // namespace okid_host

@@ -37,6 +37,7 @@ const char* okid_warning_code(uint32_t bit) {
     case OKID_NOTE_ORDER_REDUCED: return "order_reduced";
     case OKID_NOTE_ORDER_UNCLEAR: return "order_unclear";
     case OKID_NOTE_WEAK_EXCITATION: return "weak_excitation";
+    case OKID_NOTE_LITERAL_HANKEL: return "literal_hankel";
     default: return NULL;
     }
 }

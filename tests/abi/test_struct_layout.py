@@ -23,9 +23,11 @@ CONSTANT_PREFIXES = (
     "DETREND_",
     "METHOD_",
     "SOLVER_",
+    "HANKEL_",
     "NOTE_",
     "SENSE_",
     "HOLD_",
+    "HOLDS_",
     "MKR_",
 )
 CONSTANTS = {name: value for name, value in vars(_abi).items() if name.startswith(CONSTANT_PREFIXES) and name.isupper()}

@@ -15,11 +15,13 @@ from program import ROOT, okid
 DEMO_RIG = ROOT / "tests" / "replay" / "demo_rig.toml"
 CHANNELS = ["--inputs", "u1", "--outputs", "y1,y2"]
 RESULT_KEYS = [
-    "schema", "version", "method", "fs_hz", "samples", "records", "gaps", "inputs", "outputs", "p", "rows", "order",
-    "hold", "detrend", "start", "singular_values", "model", "markov", "modes", "fit", "warnings",
+    "schema", "version", "method", "fs_hz", "samples", "records", "gaps", "inputs", "outputs", "p", "rows", "hankel",
+    "order", "hold", "detrend", "start", "singular_values", "singular_noise", "model", "markov", "modes",
+    "fit", "warnings",
 ]  # fmt: skip
 MODE_KEYS = [
-    "frequency_hz", "damping_ratio", "shape_re", "shape_im", "frequency_std_hz", "damping_ratio_std", "mpc", "emac",
+    "frequency_hz", "damping_ratio", "shape_re", "shape_im", "frequency_std_hz", "damping_ratio_std", "shape_re_std",
+    "shape_im_std", "mpc", "emac", "cmi",
 ]  # fmt: skip
 
 
@@ -503,12 +505,9 @@ def test_wrong_options(record: Path, options: list[str], parts: tuple[str, ...])
 
 def test_no_channels_named(record: Path) -> None:
     refused(okid("identify", record), 2, "--outputs", "u1, y1, y2")
-    refused(
-        okid("identify", record, "--outputs", "y1"),
-        2,
-        "ambient",
-        "okid-era needs a measured force",
-    )
+    refused(okid("identify", record, "--outputs", "y1", "--hankel", "literal"), 2, "--hankel", "needs a force")
+    refused(identify(record, "--hankel", "innovation"), 2, "--hankel", 'did you mean "innovations"?')
+    refused(identify(record, "--method", "n4sid-cva", "--hankel", "literal"), 2, "--hankel", "n4sid-cva")
 
 
 def test_a_record_is_never_written_over(record: Path) -> None:

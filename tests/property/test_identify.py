@@ -272,9 +272,11 @@ def test_okid_result_1(result: okid.Result, tmp_path) -> None:
     assert len(data["singular_values"]) >= 6
     assert [len(m["shape_re"]) for m in data["modes"]] == [3, 3, 3]
     assert list(data["modes"][0]) == (
-        "frequency_hz damping_ratio shape_re shape_im frequency_std_hz damping_ratio_std mpc emac".split()
+        "frequency_hz damping_ratio shape_re shape_im frequency_std_hz damping_ratio_std shape_re_std shape_im_std "
+        "mpc emac cmi".split()
     )
-    assert data["modes"][0]["frequency_std_hz"] is data["modes"][0]["damping_ratio_std"] is None
+    assert 0.0 < data["modes"][0]["frequency_std_hz"] < 1e-3 * data["modes"][0]["frequency_hz"]
+    assert min(data["modes"][0]["shape_re_std"]) == 0.0  # the entry that is 1 by scaling
     assert result.mkr is result.pdc is None
     assert data["version"] == okid.__version__
     assert not list(tmp_path.glob("*.part"))
@@ -301,8 +303,10 @@ def test_table_pickle_and_repr(result: okid.Result) -> None:
     text = result.table()
     assert f"{result.modes[0].frequency_hz:.5f}" in text
     assert "order 6" in text
-    assert "±" not in text
-    known = dataclasses.replace(result, modes=[result.modes[0]._replace(frequency_std_hz=0.00123), *result.modes[1:]])
+    assert text.splitlines()[3].count("±") == 2
+    bare = [mode._replace(frequency_std_hz=None, damping_ratio_std=None) for mode in result.modes]
+    assert "±" not in dataclasses.replace(result, modes=bare).table()
+    known = dataclasses.replace(result, modes=[bare[0]._replace(frequency_std_hz=0.00123), *bare[1:]])
     lines = known.table().splitlines()
     assert lines[3].count("±") == 1
     assert "0.0012" in lines[4]

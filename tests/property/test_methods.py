@@ -120,7 +120,7 @@ def test_program_equals_python(method: str, tmp_path: Path) -> None:
             assert shown["fit"][kind][channel] == pytest.approx(value, abs=1e-6)
 
 
-@pytest.mark.parametrize("method", N4SID)
+@pytest.mark.parametrize("method", METHODS)
 def test_record_without_inputs(method: str, tmp_path: Path) -> None:
     """Modes and a predictor; nothing is simulated, and program and Python agree."""
     s = systems.w1()
@@ -145,13 +145,6 @@ def test_record_without_inputs(method: str, tmp_path: Path) -> None:
     assert shown["fit"]["prediction_percent"] == pytest.approx(own, abs=1e-6)
     table = program("identify", path, *options, "--model", tmp_path / "model.mat").stdout
     assert "0 inputs" in table and "remark" not in table
-
-
-def test_okid_methods_need_a_force() -> None:
-    y = systems.record(systems.w1(), 2000, 1.0, 5)[1]
-    for method in METHODS[:2]:
-        with pytest.raises(okid.InputError, match="measured force"):
-            okid.identify(None, y, fs=100.0, method=method)
 
 
 @pytest.mark.parametrize(

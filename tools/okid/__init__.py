@@ -18,11 +18,13 @@ from okid.model import Model
 from okid.records import read_csv
 from okid.result import Fit, Mode, Result
 from okid.square_root import SquareRoot
-from okid.stabilization import OrderPoles
+from okid.stabilization import Cluster, Criteria, OrderPoles, Stabilization, stabilization
 from okid.sums import Stats
 
 __all__ = [
     "Accumulator",
+    "Cluster",
+    "Criteria",
     "Error",
     "Fit",
     "IdentificationError",
@@ -36,6 +38,7 @@ __all__ = [
     "ProportionalDamping",
     "Result",
     "SquareRoot",
+    "Stabilization",
     "Stats",
     "demo",
     "frf",
@@ -43,6 +46,7 @@ __all__ = [
     "library_version",
     "modal",
     "read_csv",
+    "stabilization",
     "usable_p",
 ]
 

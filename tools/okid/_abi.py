@@ -29,6 +29,7 @@ DETREND_NONE, DETREND_MEAN = 0, 1
 METHOD_OKID_ERA, METHOD_OKID_ERA_DC = 0, 1
 METHOD_N4SID_MOESP, METHOD_N4SID_CVA, METHOD_N4SID_SSARX = 2, 3, 4
 SOLVER_DENSE, SOLVER_STRUCTURED = 0, 1
+HANKEL_SYSTEM, HANKEL_INNOVATIONS, HANKEL_LITERAL = 0, 1, 2
 SUBSPACE_MOESP, SUBSPACE_CVA, SUBSPACE_SSARX = 0, 1, 2
 NOTE_ARX_STABILISED = 1 << 0
 NOTE_ILL_CONDITIONED = 1 << 1
@@ -38,8 +39,10 @@ NOTE_PREDICTOR_UNSTABLE = 1 << 4
 NOTE_ORDER_REDUCED = 1 << 5
 NOTE_ORDER_UNCLEAR = 1 << 6
 NOTE_WEAK_EXCITATION = 1 << 7
+NOTE_LITERAL_HANKEL = 1 << 8
 SENSE_DISPLACEMENT, SENSE_VELOCITY, SENSE_ACCELERATION = 0, 1, 2
 HOLD_ZERO, HOLD_FIRST = 0, 1
+HOLDS_FREQUENCY, HOLDS_DAMPING, HOLDS_SHAPE = 1 << 0, 1 << 1, 1 << 2
 MKR_POLARITY = 1 << 0
 MKR_MASS = 1 << 1
 MKR_STIFFNESS = 1 << 2
@@ -101,6 +104,7 @@ class IdentifyConfig(Structure):
         ("method", c_int),
         ("detrend", c_int),
         ("solver", c_int),
+        ("hankel", c_int),
     ]
 
 
@@ -191,6 +195,77 @@ class SubspaceInfo(Structure):
     _fields_ = [("ridge", c_double), ("input_excitation", c_double), ("channel", c_int32)]
 
 
+class RefineConfig(Structure):
+    """okid_refine_config_t."""
+
+    _fields_ = [(name, c_int32) for name in ("n_u", "n_y", "n_z", "runs", "blocks", "iterations", "offset")]
+
+
+class Refined(Structure):
+    """okid_refined_t."""
+
+    _fields_: ClassVar[Any] = [
+        ("iterations", c_int32),
+        ("converged", c_int32),
+        ("samples", c_int64),
+        *((name, c_double) for name in ("gain", "decrement", "whiteness")),
+        *((name, doubles) for name in ("A", "B", "C", "D", "x0", "noise_std")),
+    ]
+
+
+class StabilizationConfig(Structure):
+    """okid_stabilization_config_t."""
+
+    _fields_ = [(name, c_int32) for name in ("n_y", "max_models", "max_poles")] + [
+        (name, c_double) for name in ("frequency", "damping", "mac", "share")
+    ]
+
+
+class Pole(Structure):
+    """okid_pole_t."""
+
+    _fields_ = [(name, c_double) for name in ("frequency_hz", "damping_ratio", "mpc", "emac")] + [
+        (name, c_int32) for name in ("horizon", "order", "holds", "cluster")
+    ]
+
+
+class Cluster(Structure):
+    """okid_cluster_t."""
+
+    _fields_ = [
+        *((name, c_double) for name in ("frequency_hz", "damping_ratio", "frequency_spread_hz")),
+        *((name, c_double) for name in ("damping_ratio_spread", "mpc")),
+        *((name, c_int32) for name in ("hits", "pole", "physical")),
+    ]
+
+
+class Stabilized(Structure):
+    """okid_stabilized_t."""
+
+    _fields_: ClassVar[Any] = [
+        *((name, c_int32) for name in ("model_count", "pole_count", "cluster_count")),
+        ("poles", POINTER(Pole)),
+        ("clusters", POINTER(Cluster)),
+    ]
+
+
+class SkewConfig(Structure):
+    """okid_skew_config_t."""
+
+    _fields_ = [*((name, c_int32) for name in ("n_u", "n_y", "n_z", "replicates")), ("mkr", POINTER(MkrConfig))]
+
+
+class SkewResult(Structure):
+    """okid_skew_result_t."""
+
+    _fields_: ClassVar[Any] = [
+        *((name, c_int32) for name in ("n_y", "undetermined", "corrected")),
+        *((name, doubles) for name in ("delay", "std")),
+        *((name, int32s) for name in ("late", "too_large")),
+        ("scatter", c_double),
+    ]
+
+
 class Identified(Structure):
     """okid_identified_t."""
 
@@ -202,10 +277,35 @@ class Identified(Structure):
         ("dt", c_double),
         *((name, doubles) for name in "ABCDK"),
         *((name, doubles) for name in ("singular_values", "markov", "observer", "innovation", "mean")),
-        *((name, doubles) for name in ("frequency_hz", "damping_ratio", "mpc", "emac", "shape_re", "shape_im")),
+        *((name, doubles) for name in ("frequency_hz", "damping_ratio", "mpc", "emac", "cmi", "shape_re", "shape_im")),
         ("model_radius", c_double),
+        ("noise_level", c_double),
         ("observer_info", ObserverInfo),
     ]
+
+
+class ReplicatesConfig(Structure):
+    """okid_replicates_config_t."""
+
+    _fields_ = [*((name, c_int32) for name in ("n_u", "n_y", "n_z")), ("mkr", POINTER(MkrConfig))]
+
+
+class Uncertainty(Structure):
+    """okid_uncertainty_t."""
+
+    _fields_: ClassVar[Any] = [
+        *((name, c_int32) for name in ("replicates", "models", "mode_count", "n_y", "n_x", "mkr_used")),
+        ("used", int32s),
+        *((name, doubles) for name in ("frequency_std_hz", "damping_ratio_std", "shape_re_std", "shape_im_std")),
+        *((name, doubles) for name in ("M_std", "K_std", "R_std", "R_normal_std")),
+        *((name, c_double) for name in ("alpha_std", "beta_std")),
+    ]
+
+
+class JackknifeConfig(Structure):
+    """okid_jackknife_config_t."""
+
+    _fields_ = [("identify", IdentifyConfig), ("sums", AccumulatorConfig)]
 
 
 _model = POINTER(ModelView)
@@ -213,9 +313,11 @@ _model = POINTER(ModelView)
 STRUCTS: dict[str, type[Structure]] = {
     "okid_accumulator_config_t": AccumulatorConfig,
     "okid_accumulator_stats_t": AccumulatorStats,
+    "okid_cluster_t": Cluster,
     "okid_era_config_t": EraConfig,
     "okid_identify_config_t": IdentifyConfig,
     "okid_identified_t": Identified,
+    "okid_jackknife_config_t": JackknifeConfig,
     "okid_mechanics_t": Mechanics,
     "okid_mkr_config_t": MkrConfig,
     "okid_mkr_t": Mkr,
@@ -223,9 +325,18 @@ STRUCTS: dict[str, type[Structure]] = {
     "okid_observer_config_t": ObserverConfig,
     "okid_observer_info_t": ObserverInfo,
     "okid_pdc_t": Pdc,
+    "okid_pole_t": Pole,
+    "okid_refine_config_t": RefineConfig,
+    "okid_refined_t": Refined,
+    "okid_skew_config_t": SkewConfig,
+    "okid_skew_result_t": SkewResult,
+    "okid_replicates_config_t": ReplicatesConfig,
     "okid_square_root_config_t": SquareRootConfig,
+    "okid_stabilization_config_t": StabilizationConfig,
+    "okid_stabilized_t": Stabilized,
     "okid_subspace_config_t": SubspaceConfig,
     "okid_subspace_info_t": SubspaceInfo,
+    "okid_uncertainty_t": Uncertainty,
 }
 
 # name -> (result, arguments); a status is c_int
@@ -243,6 +354,12 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_accumulator_add_i32": (c_int, [opaque, int32s, c_size_t]),
     "okid_accumulator_gap": (None, [opaque, c_int64]),
     "okid_accumulator_merge": (c_int, [opaque, opaque]),
+    "okid_accumulator_remove": (c_int, [opaque, opaque, c_double]),
+    "okid_accumulator_copy": (c_int, [opaque, opaque]),
+    "okid_accumulator_slots": (c_int32, [opaque]),
+    "okid_accumulator_slot_rows": (c_int64, [opaque, c_int32]),
+    "okid_accumulator_take_slots": (c_int, [opaque, opaque, c_int32, c_int32]),
+    "okid_accumulator_energy": (c_int, [opaque, c_int, doubles]),
     "okid_accumulator_centre": (c_int, [opaque]),
     "okid_accumulator_run": (c_int, [opaque, c_int] + [doubles] * 5),
     "okid_accumulator_serialised_size": (c_size_t, [opaque]),
@@ -325,6 +442,16 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_mkr_note": (c_char_p, [c_uint32]),
     "okid_pdc_fit": (c_int, [c_int32, doubles, doubles, doubles, POINTER(Pdc)]),
     "okid_pdc_damping": (c_int, [c_int32, POINTER(Pdc), doubles, doubles, doubles]),
+    "okid_refine_memsize": (c_size_t, [POINTER(RefineConfig)]),
+    "okid_refine_create": (c_int, [POINTER(opaque), POINTER(RefineConfig), opaque, c_size_t]),
+    "okid_refine_run": (c_int, [opaque, _model, int32s, doubles, POINTER(Refined)]),
+    "okid_refine_replicate": (c_int, [opaque, c_int32, *[doubles] * 4]),
+    "okid_skew_memsize": (c_size_t, [POINTER(SkewConfig)]),
+    "okid_skew_create": (c_int, [POINTER(opaque), POINTER(SkewConfig), opaque, c_size_t]),
+    "okid_skew_begin": (c_int, [opaque, _model]),
+    "okid_skew_add": (c_int, [opaque, _model]),
+    "okid_skew_finish": (c_int, [opaque, POINTER(SkewResult)]),
+    "okid_skew_correct": (c_int, [opaque, doubles, doubles]),
     "okid_model_workspace": (c_size_t, [_model]),
     "okid_model_simulate": (c_int, [_model, doubles, c_size_t, doubles, doubles, doubles]),
     "okid_model_predict": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles, doubles]),
@@ -337,8 +464,22 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_identify_create": (c_int, [POINTER(opaque), POINTER(IdentifyConfig), opaque, c_size_t]),
     "okid_identify_run": (c_int, [opaque, opaque, POINTER(Identified)]),
     "okid_identify_run_factor": (c_int, [opaque, opaque, POINTER(Identified)]),
+    "okid_identify_poles": (c_int, [opaque, c_int32, POINTER(Identified)]),
+    "okid_stabilization_memsize": (c_size_t, [POINTER(StabilizationConfig)]),
+    "okid_stabilization_create": (c_int, [POINTER(opaque), POINTER(StabilizationConfig), opaque, c_size_t]),
+    "okid_stabilization_add": (c_int, [opaque, POINTER(Identified)]),
+    "okid_stabilization_find": (c_int, [opaque, POINTER(Stabilized)]),
     "okid_identify_order": (c_int, [opaque, c_int32, POINTER(Identified)]),
     "okid_identify_set_inputs": (c_int, [opaque, doubles, doubles, POINTER(Identified)]),
+    "okid_replicates_memsize": (c_size_t, [POINTER(ReplicatesConfig)]),
+    "okid_replicates_create": (c_int, [POINTER(opaque), POINTER(ReplicatesConfig), opaque, c_size_t]),
+    "okid_replicates_begin": (c_int, [opaque, _model, c_double]),
+    "okid_replicates_add": (c_int, [opaque, _model, c_double]),
+    "okid_replicates_finish": (c_int, [opaque, POINTER(Uncertainty)]),
+    "okid_jackknife_memsize": (c_size_t, [POINTER(JackknifeConfig)]),
+    "okid_jackknife_create": (c_int, [POINTER(opaque), POINTER(JackknifeConfig), opaque, c_size_t]),
+    "okid_jackknife_begin": (c_int, [opaque, opaque, POINTER(Identified)]),
+    "okid_jackknife_delete": (c_int, [opaque, opaque, c_double, _model, doubles]),
 }
 
 

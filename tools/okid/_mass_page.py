@@ -13,7 +13,16 @@ from okid._errors import InputError
 MOST_SHOWN = 12  # columns that fit on the page
 
 
-def _matrix(title: str, values: Any) -> str:
+def _spread(title: str, values: Any, size: int) -> list[list[str]] | None:
+    """The standard deviations of a matrix, or None."""
+    if values is None:
+        return None
+    if len(values) != size or any(len(row) != size for row in values):
+        raise InputError(f"not a complete okid.result/1: the deviations of {title} do not fit the matrix")
+    return [["–" if x is None else f"±{float(x):.2g}" for x in row] for row in values]
+
+
+def _matrix(title: str, values: Any, deviations: Any = None) -> str:
     """A heading and the numbers; rows and columns are the degrees of freedom."""
     rows = np.array(values, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[0] != rows.shape[1]:
@@ -23,6 +32,10 @@ def _matrix(title: str, values: Any) -> str:
     style = f".{digits}f" if 1e-6 <= largest < 1e8 else ".4e"
     head = ["dof", *(str(k + 1) for k in range(len(rows)))]
     body = [[str(k), *(f"{x:{style}}" for x in row)] for k, row in enumerate(rows.tolist(), 1)]
+    spread = _spread(title, deviations, len(rows))
+    if spread is not None:
+        for row, own in zip(body, spread, strict=True):
+            row[1:] = [f"{x} {s}" for x, s in zip(row[1:], own, strict=True)]
     return f"<h3>{title}</h3>\n" + _page.table(head, body)
 
 
@@ -32,6 +45,11 @@ def _value(value: object, digits: str = ".3g") -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return format(value, digits) if isinstance(value, float) else str(value)
+
+
+def _with_deviation(pdc: dict[str, Any], name: str) -> str:
+    std = pdc.get(f"{name}_std")
+    return f"{float(pdc[name]):.5g}" + ("" if std is None else f" ±{float(std):.2g}")
 
 
 def _checks(checks: dict[str, Any]) -> str:
@@ -77,12 +95,13 @@ def mass_section(raw: dict[str, Any]) -> list[str]:
     try:
         parts = [_checks(mkr["checks"])]
         if len(mkr["M"]) <= MOST_SHOWN:
-            formula = f"R = α M + β K, α = {float(pdc['alpha']):.5g} 1/s, β = {float(pdc['beta']):.5g} s"
+            alpha, beta = (_with_deviation(pdc, name) for name in ("alpha", "beta"))
+            formula = f"R = α M + β K, α = {alpha} 1/s, β = {beta} s"
             parts += [
-                _matrix("M [kg]", mkr["M"]),
-                _matrix("K [N/m]", mkr["K"]),
-                _matrix("R [N s/m]", mkr["R"]),
-                _matrix("R [N s/m] of normal modes", mkr["R_normal_modes"]),
+                _matrix("M [kg]", mkr["M"], mkr.get("M_std")),
+                _matrix("K [N/m]", mkr["K"], mkr.get("K_std")),
+                _matrix("R [N s/m]", mkr["R"], mkr.get("R_std")),
+                _matrix("R [N s/m] of normal modes", mkr["R_normal_modes"], mkr.get("R_normal_modes_std")),
                 _matrix(f"R [N s/m] proportional: {formula}", pdc["R"]),
             ]
         else:

@@ -80,6 +80,27 @@ class Accumulator(Sums):
             raise InputError(f"this accumulator takes {self.codes}-bit codes as {wanted}, got {given.dtype}")
         return _abi.check(self._add_codes(given), "add")
 
+    def remove(self, part: Accumulator, weight: float = 1.0) -> None:
+        """Take a part of the record out again, the inverse of merge(): see okid_accumulator_remove().
+
+        A part of an unbroken record was fed with its own samples and the `lags` samples before them.
+        Raises InputError when the two do not fit each other.
+        """
+        _abi.check(self._call("remove", self.handle, part.handle, weight), "remove")
+
+    @property
+    def slots(self) -> int:
+        """Slots of the window that hold rows, the open one included; 1 without a window."""
+        return int(self._call("slots", self.handle))
+
+    def slot_rows(self, k: int) -> int:
+        """Regression rows in slot k, 0 = the oldest."""
+        return int(self._call("slot_rows", self.handle, k))
+
+    def take_slots(self, window: Accumulator, first: int, count: int) -> None:
+        """Add slots first .. first + count - 1 of a window to this accumulator, which has none itself."""
+        _abi.check(self._call("take_slots", self.handle, window.handle, first, count), "take_slots")
+
     def centre(self) -> None:
         """Take the offsets out of a finished record before it is merged with others: each channel less its own mean.
 

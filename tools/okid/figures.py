@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from okid.frf import Frf
 from okid.modal import mac_matrix, normalised
-from okid.stabilization import OrderPoles
+from okid.stabilization import Cluster, Stabilization
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -77,13 +77,16 @@ def draw_singular_values(ax: Axes, values: Real, order: int) -> None:
 
 def draw_stabilization(
     ax: Axes,
-    rows: Sequence[OrderPoles],
+    rows: Stabilization,
     shown_hz: float,
     chosen_hz: Sequence[float] = (),
     background: tuple[Real, Real] | None = None,
     order: int | None = None,
 ) -> None:
-    """Poles over frequency (up to `shown_hz`) and order; `background` (frequency, magnitude) behind in dB, no scale."""
+    """Poles over frequency (up to `shown_hz`) and order; `background` (frequency, magnitude) behind in dB, no scale.
+
+    A band marks each cluster that holds, with its hits above it, and a ring the pole nearest its medians.
+    """
     if background is not None:
         seen = background[0] <= shown_hz
         line, magnitude = background[0][seen], background[1][seen]
@@ -113,6 +116,14 @@ def draw_stabilization(
         if points[kind]:
             xy = np.array(points[kind])
             ax.scatter(xy[:, 0], xy[:, 1], s=size, c=colour, marker=marker, linewidths=0.8, label=label, zorder=3)
+    held = [mode for mode in rows.modes if mode.frequency_hz <= shown_hz]
+    width = rows.criteria.frequency
+    for mode in held:
+        ax.axvspan(mode.frequency_hz * (1.0 - width), mode.frequency_hz * (1.0 + width), color=BLUE, alpha=0.10, lw=0)
+    if held:
+        poles = np.array([_nearest_pole(rows, mode) for mode in held])
+        ax.scatter(poles[:, 0], poles[:, 1], s=70, facecolors="none", edgecolors=BLUE, linewidths=1.3, zorder=4,
+                   label="found by itself")  # fmt: skip
     if order is not None:
         ax.axhline(order, color=BLUE, lw=0.9, ls="--", label=f"order used ({order})")
     ax.set_xlim(0.0, shown_hz)
@@ -123,6 +134,13 @@ def draw_stabilization(
     ax.grid(False)
     handles, labels = ax.get_legend_handles_labels()
     ax.legend(handles[::-1], labels[::-1], ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+
+
+def _nearest_pole(rows: Stabilization, mode: Cluster) -> tuple[float, int]:
+    """Frequency and order of the pole that stands for a cluster."""
+    row = next(row for row in rows if (row.horizon, row.order) == (mode.horizon, mode.order))
+    own = row.frequency_hz[np.argmin(np.abs(row.frequency_hz - mode.frequency_hz))]
+    return float(own), row.order
 
 
 def draw_frf(axes: Sequence[Axes], measured: Frf | None, line: Real, model: Complex, pair: tuple[int, int]) -> None:

@@ -25,6 +25,11 @@ METHODS = {
     "n4sid-cva": _abi.METHOD_N4SID_CVA,
     "n4sid-ssarx": _abi.METHOD_N4SID_SSARX,
 }
+HANKEL = {
+    "system": _abi.HANKEL_SYSTEM,
+    "innovations": _abi.HANKEL_INNOVATIONS,
+    "literal": _abi.HANKEL_LITERAL,
+}
 _SOLVER = {"dense": _abi.SOLVER_DENSE, "structured": _abi.SOLVER_STRUCTURED}
 
 
@@ -42,8 +47,8 @@ class Identified(NamedTuple):
     """A copy of okid_identified_t: nothing points into the identifier any more.
 
     A (n_z, n_z) .. K (n_z, n_y); singular_values (s,); markov (count, n_y, n_u); theta (n_y, q), of an n4sid method
-    (n_y, 0); innovation (n_y, n_y); mean (m,) channel means that were removed; modes (k,) with shapes (k, n_y),
-    largest entry 1.
+    (n_y, 0); innovation (n_y, n_y); mean (m,) channel means that were removed; modes (k,) with cmi = emac x mpc and
+    shapes (k, n_y), largest entry 1.
     """
 
     notes: int
@@ -66,8 +71,10 @@ class Identified(NamedTuple):
     damping_ratio: Real
     mpc: Real
     emac: Real
+    cmi: Real
     shapes: Complex
     model_radius: float
+    noise_level: float
     observer: Observer
 
 
@@ -111,8 +118,10 @@ def _copy(raw: _abi.Identified) -> Identified:
         damping_ratio=_matrix(raw.damping_ratio, modes, 1)[:, 0],
         mpc=_matrix(raw.mpc, modes, 1)[:, 0],
         emac=_matrix(raw.emac, modes, 1)[:, 0],
+        cmi=_matrix(raw.cmi, modes, 1)[:, 0],
         shapes=shapes,
         model_radius=float(raw.model_radius),
+        noise_level=float(raw.noise_level),
         observer=Observer(*(float(getattr(info, name)) for name in Observer._fields)),
     )
 
@@ -120,7 +129,9 @@ def _copy(raw: _abi.Identified) -> Identified:
 class Identifier:
     """Workspace for models of one shape; run() may be called as often as results are wanted.
 
-    `method` one of METHODS; the accumulator must have `lags` lags. n4sid methods do not use p and take n_u = 0.
+    `method` one of METHODS; the accumulator must have `lags` lags. n4sid methods do not use p, okid methods without
+    inputs (n_u = 0, ambient) only as the default of rows. `hankel` "system", "innovations" or "literal": what the
+    Hankel matrix of the okid methods holds beside the system's Markov parameters, see okid/identify.h.
     `solver` "structured" needs O(m q) memory instead of q^2, and one unbroken run in the accumulator.
     `order` 0 = automatic, bounded by `max_order` (0 = the library's own bound); `rows` 0 = 2 p,
     for n4sid methods 30.
@@ -140,20 +151,23 @@ class Identifier:
         detrend: str = "mean",
         solver: str = "dense",
         method: str = "okid-era",
+        hankel: str = "system",
     ) -> None:
         if method not in METHODS:
             raise InputError(f"method is {method!r}, expected one of {', '.join(map(repr, METHODS))}")
         if solver not in _SOLVER:
             raise InputError(f"solver is {solver!r}, expected 'dense' or 'structured'")
+        if hankel not in HANKEL:
+            raise InputError(f"hankel is {hankel!r}, expected one of {', '.join(map(repr, HANKEL))}")
         mode = _abi.DETREND_MEAN if detrend == "mean" else _abi.DETREND_NONE
         self.config = _abi.IdentifyConfig(
-            n_u, n_y, p, rows, order, max_order, fs, METHODS[method], mode, _SOLVER[solver]
+            n_u, n_y, p, rows, order, max_order, fs, METHODS[method], mode, _SOLVER[solver], HANKEL[hankel]
         )
         size = int(_abi.library().okid_identify_memsize(ctypes.byref(self.config)))
         if size == 0:
             raise InputError(
                 f"method={method}, n_u={n_u}, n_y={n_y}, fs={fs}, p={p}, rows={rows}, order={order}, "
-                f"max_order={max_order}: outside what the library takes, see okid/identify.h",
+                f"max_order={max_order}, hankel={hankel}: outside what the library takes, see okid/identify.h",
                 _abi.ERR_DIM,
             )
         self._block = _abi.block(size)
@@ -189,6 +203,16 @@ class Identifier:
         return _copy(self._raw)
 
     @property
+    def raw(self) -> Any:
+        """okid_identified_t of the last run(), by reference."""
+        return ctypes.byref(self._raw)
+
+    @property
+    def order(self) -> int:
+        """n_z of the last run()."""
+        return int(self._raw.n_z)
+
+    @property
     def lags(self) -> int:
         """Lags an accumulator must have for run()."""
         return int(_abi.library().okid_identify_lags(ctypes.byref(self.config)))
@@ -198,6 +222,24 @@ class Identifier:
         status = int(_abi.library().okid_identify_order(self._handle, order, ctypes.byref(self._raw)))
         _abi.check(status, f"order {order}")
         return _copy(self._raw)
+
+    def poles(self, order: int) -> Identified:
+        """The modes of another order only, much cheaper: A and C are that order's, B, D, K, innovation are zeros."""
+        status = int(_abi.library().okid_identify_poles(self._handle, order, ctypes.byref(self._raw)))
+        _abi.check(status, f"order {order}")
+        found = _copy(self._raw)
+        blank = {name: np.zeros_like(getattr(found, name)) for name in ("B", "D", "K", "innovation")}
+        return found._replace(**blank)
+
+    @property
+    def subspace(self) -> bool:
+        """An n4sid method."""
+        return bool(self.config.method >= _abi.METHOD_N4SID_MOESP)
+
+    @property
+    def block_rows(self) -> int:
+        """Block rows of the Hankel matrices of the last run()."""
+        return int(self._raw.rows)
 
     def set_inputs(self, B: Real, D: Real) -> Identified:
         """The n4sid model of the last run() with other B (n_z, n_u) and D (n_y, n_u); the Markov parameters follow."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -13,14 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 from okid import _abi
 from okid._errors import Error, IdentificationError, InputError
 from okid.accumulator import Accumulator
-from okid.identifier import METHODS, Identified, Identifier, usable_p
-from okid.mkr import make_plan, mass_matrices
+from okid.identifier import HANKEL, METHODS, Identified, Identifier, usable_p
+from okid.mkr import MassMatrices, Plan, ProportionalDamping, make_plan, mass_matrices
 from okid.model import Model
-from okid.output_error import refitted
+from okid.output_error import fit_inputs, refitted
 from okid.record_fit import detrended, fit_records
 from okid.records import paired
-from okid.result import Fit, Remark, Result, modes_of
+from okid.refine import refined
+from okid.result import Fit, Mode, Remark, Result, modes_of, put_deviations, with_deviations
+from okid.skew import without_skew
 from okid.square_root import SquareRoot
+from okid.uncertainty import Piece, Replicate, deviations, finite_p_bias, leave_out_blocks
 
 Real = NDArray[np.float64]
 Sums = TypeVar("Sums", Accumulator, SquareRoot)
@@ -85,20 +88,44 @@ def _feed(sums: Sums, records: list[Real], lags: int, rest: bool) -> Sums:
     return sums
 
 
-def _identify(identifier: Identifier, records: list[Real], n_u: int, rest: bool) -> tuple[Identified, list[Remark]]:
+def _better(
+    identifier: Identifier, sums: Accumulator, records: list[Real], rest: bool
+) -> tuple[Identified, list[Remark]]:
     """From the Gram matrix; nearly noise-free records, which lose half their digits in it, from their QR factor."""
-    n_y, lags = records[0].shape[1] - n_u, identifier.lags
-    with _feed(Accumulator(n_u, n_y, lags), records, lags, rest) as sums:
-        found = identifier.run(sums)
-        floor_only = found.observer.ridge <= 1e-10  # else a ridge decides, not rounding
-        if not (found.notes & _abi.NOTE_ILL_CONDITIONED and floor_only):
-            return found, []
-        try:
-            better = identifier.run(_feed(SquareRoot(n_u, n_y, lags), records, lags, rest))
-        except IdentificationError:
-            return identifier.run(sums), []
+    found = identifier.run(sums)
+    floor_only = found.observer.ridge <= 1e-10  # else a ridge decides, not rounding
+    if not (found.notes & _abi.NOTE_ILL_CONDITIONED and floor_only):
+        return found, []
+    try:
+        better = identifier.run(_feed(SquareRoot(sums.n_u, sums.n_y, sums.lags), records, sums.lags, rest))
+    except IdentificationError:
+        return identifier.run(sums), []
     text = "nearly noise-free data: solved from the QR factor of the record, not from its Gram matrix"
     return better, [Remark("qr_factor", text)]
+
+
+def _identify(
+    identifier: Identifier, records: list[Real], n_u: int, rest: bool, deviate: bool
+) -> tuple[Identified, list[Remark], list[Replicate]]:
+    """The model, and those of the record less one block each when `deviate`."""
+    n_y, lags = records[0].shape[1] - n_u, identifier.lags
+    with _feed(Accumulator(n_u, n_y, lags), records, lags, rest) as sums:
+        found, remarks = _better(identifier, sums, records, rest)
+        return found, remarks, leave_out_blocks(identifier, records, sums, rest) if deviate else []
+
+
+def _refitting(own: list[Real], n_u: int) -> Callable[[Model, list[Piece]], Model]:
+    """B and D of an n4sid replicate as the full model has them: from the records, without what the replicate lacks."""
+
+    def refit(model: Model, pieces: list[Piece]) -> Model:
+        less = list(own)
+        for r, first, last in pieces:
+            less[r] = less[r].copy()
+            less[r][first:last, n_u:] = np.nan
+        B, D = fit_inputs(model.A, model.C, less, n_u)
+        return Model(model.A, B, model.C, D, model.K, model.dt)
+
+    return refit
 
 
 def _unknowns(found: Identified) -> int:
@@ -120,6 +147,8 @@ def _note_text(found: Identified, code: str) -> str:
         "order_reduced": f"the order asked for is more than the data can carry; {found.order} is used",
         "order_unclear": f"no clear gap in the singular values: order {found.order} keeps the consistent modes. "
         "Compare a few orders, see stabilization()",
+        "literal_hankel": "the Hankel matrix holds [Y_k Y0_k] unscaled (eq. 42 as printed): the result depends on the "
+        "units of the inputs, and the observer's own modes mix into the structure's: damping can be wrong by half",
         "weak_excitation": f"the inputs hardly excite some directions (smallest over largest {o.input_excitation:.1e})",
     }
     return texts.get(code, code)
@@ -177,12 +206,14 @@ def _usable(p: int, n_u: int, n_y: int, records: list[Real]) -> tuple[int, list[
     return used, [Remark("p_reduced", text)]
 
 
-def _usable_rows(rows: int, n_u: int, n_y: int, records: list[Real]) -> tuple[int, list[Remark]]:
-    """Block rows of a subspace method, or the most that leave ten Hankel columns for each row of past and input."""
+def _usable_rows(rows: int, method: str, n_u: int, n_y: int, records: list[Real]) -> tuple[int, list[Remark]]:
+    """Block rows of a method without observer, or the most that leave ten Hankel columns for each row of past and
+    input."""
     runs = _unbroken(records)
+    more = {"okid-era": 1, "okid-era-dc": 5}.get(method, 0)  # lags: 2 rows - 1 + more
     least = 2 if n_y >= 2 else 3  # (rows - 1) n_y states: two make the first mode
     for i in range(max(rows, least), least - 1, -1):
-        if int(np.sum(np.maximum(0, runs - (2 * i - 1)))) >= 10 * i * (n_y + 2 * n_u):
+        if int(np.sum(np.maximum(0, runs - (2 * i - 1 + more)))) >= 10 * i * (n_y + 2 * n_u):
             text = f"{i} block rows instead of {rows}: {int(np.sum(runs))} samples bear no more unknowns"
             return i, [] if i == rows else [Remark("rows_reduced", text)]
     raise IdentificationError(
@@ -197,12 +228,14 @@ def _horizon(
 ) -> tuple[int, int, list[Remark]]:
     """p and the block rows (0 = default) that the records bear, with what there is to say about them."""
     n_y = records[0].shape[1] - n_u
-    if not method.startswith("n4sid"):
+    if n_u > 0 and not method.startswith("n4sid"):
         used, remarks = _usable(40 if p is None else p, n_u, n_y, records)
         return used, rows or 0, remarks
-    used, remarks = _usable_rows(rows or 30, n_u, n_y, records)
-    if p is not None:
-        remarks.append(Remark("p_ignored", f"p belongs to the okid methods: {method} looks back {used} block rows"))
+    subspace = method.startswith("n4sid")
+    used, remarks = _usable_rows(rows or (30 if subspace else p or 40), method, n_u, n_y, records)
+    if p is not None and (subspace or rows is not None):
+        text = f"p belongs to the observer of the okid methods: {method} looks back {used} block rows here"
+        remarks.append(Remark("p_ignored", text))
     return used, used, remarks
 
 
@@ -217,6 +250,22 @@ def _with_inputs(
     except Error:
         text = "B and D could not be fitted to the record: they are those of the subspace equations"
         return found, [Remark("inputs_from_subspace", text)]
+
+
+def _deviate(
+    model: Model,
+    modes: list[Mode],
+    replicates: list[Replicate],
+    plan: Plan | None,
+    refit: Callable[[Model, list[Piece]], Model] | None,
+    masses: tuple[MassMatrices | None, ProportionalDamping | None],
+) -> tuple[list[Mode], list[Remark]]:
+    """The modes with their standard deviations; those of the matrices are written into `masses`."""
+    sigma = deviations(model, replicates, plan, refit)
+    if sigma is None:
+        return modes, [Remark("no_deviation", "the record is too short to be cut into blocks: no standard deviations")]
+    put_deviations(sigma, *masses)
+    return with_deviations(modes, sigma), []
 
 
 def _check_explains(fit: Fit) -> None:
@@ -259,6 +308,7 @@ def identify(
     rows: int | None = None,
     order: int | str = "auto",
     max_order: int | None = None,
+    hankel: str = "system",
     detrend: str = "mean",
     hold: str = "zoh",
     start: str = "moving",
@@ -267,6 +317,7 @@ def identify(
     input_dofs: Sequence[int] | None = None,
     output_dofs: Sequence[int] | None = None,
     sensing: str | Sequence[str] = "acceleration",
+    refine: bool = False,
 ) -> Result:
     """Identify a structure from measured inputs and outputs.
 
@@ -274,10 +325,12 @@ def identify(
     centred by itself. NaN = missing sample: the regression leaves it out and re-arms, nothing is interpolated; the fits
     and model.x0 are those of the record less its own mean (or line) and start anew after missing inputs. The
     arrays are never modified. `method` "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx".
-    u None = no measured force (ambient): n4sid methods, modes and predictor only; there is no simulation fit.
+    u None = no measured force (ambient): modes and predictor only, there is no simulation fit; the okid methods then
+    realize the covariances of the outputs.
     `p` ARX horizon of the okid methods (default 40), reduced with a warning when there are fewer than 10 samples an
-    unknown; `rows` block rows of the Hankel matrices (default 2 p, n4sid 30 or what the record bears); `order` a
-    number or "auto" (up to `max_order`);
+    unknown; `rows` block rows of the Hankel matrices (default 2 p, n4sid 30, okid without u p, or what the record
+    bears); `order` a number or "auto" (up to `max_order`); `hankel` what the Hankel matrix of the okid methods holds:
+    "system" Markov parameters, those of the "innovations" too (weighted, free of units), or "literal" eq. 42 (warns);
     `detrend` "none", "mean" or "linear"; `hold` "zoh" or "foh": how the force behaved between samples.
     `start` "rest" says that every record begins just before the structure is struck: the silent past is then used
     (paper eq. 38), without it the hit itself would be lost with the first p samples. "moving" assumes nothing.
@@ -285,6 +338,10 @@ def identify(
     `input_dofs`, `output_dofs`: the degree of freedom of each channel, from 1 (-3: at 3 with reversed polarity), turn
     on result.mkr and result.pdc; `sensing` "acceleration", "velocity", "displacement", or one for each output. The
     numbers are then taken as N, m/s^2, m/s, m. Every degree of freedom needs a force or a sensor, one needs both.
+
+    `refine`: improve the model by maximum likelihood, with noise at the sensors to the Cramér-Rao bound
+    (result.refinement; a remark refine_failed when nothing was to be had). Needs u. With degrees of freedom also
+    the delay of every output (result.skew), which is taken out of M, K and R.
 
     Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
     """
@@ -297,11 +354,15 @@ def identify(
     asked_p, asked_rows = (None if x is None else _whole(name, x, least) for name, x, least in
                            (("p", p, 1), ("rows", rows, 2 if method.startswith("n4sid") else 1)))  # fmt: skip
     wanted = 0 if order == "auto" else _whole("order", order, 1)
+    _choice("hankel", hankel, tuple(HANKEL))
     inputs, outputs = paired(u, y)
     n_u, n_y = inputs[0].shape[1], outputs[0].shape[1]
-    if n_u == 0 and not method.startswith("n4sid"):
-        raise InputError(f"{method} needs a measured force: without inputs (ambient) use an n4sid method")
+    by_observer = n_u > 0 and not method.startswith("n4sid")
+    if hankel != "system" and not by_observer:
+        raise InputError(f"hankel={hankel!r} is for okid-era and okid-era-dc with a measured force")
     in_names, out_names = _names(input_names, "u", n_u), _names(output_names, "y", n_y)
+    if refine and n_u == 0:
+        raise InputError("refine needs a measured force: without inputs (ambient) there is nothing to simulate")
     plan = make_plan(input_dofs, output_dofs, sensing, hold, (n_u, n_y))
     records = [np.hstack(pair) for pair in zip(inputs, outputs, strict=True)]
     _check_moving(records, in_names + out_names, n_u)
@@ -312,20 +373,42 @@ def identify(
     own = [detrended(record, detrend) for record in records]  # what a user can make of the record alone
     records, centre = _centred(records, detrend, start)
     identifier = Identifier(
-        n_u, n_y, fs=float(fs), p=horizon, rows=block_rows, order=wanted, method=method,
+        n_u, n_y, fs=float(fs), p=horizon, rows=block_rows, order=wanted, method=method, hankel=hankel,
         max_order=0 if max_order is None else _whole("max_order", max_order, 1), detrend=centre,
     )  # fmt: skip
-    found, by_factor = _identify(identifier, records, n_u, start == "rest")
+    found, by_factor, replicates = _identify(identifier, records, n_u, start == "rest", not refine)
     if method.startswith("n4sid"):
         found, by_subspace = _with_inputs(identifier, found, own, n_u)
         remarks += by_subspace
     model = Model(found.A, found.B, found.C, found.D, found.K, found.dt)
     fit, model.x0 = fit_records(model, own, out_names, predict=not found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
+    refinement = None
+    if refine:
+        found, model, fit, refinement, of_refinement = refined(found, model, fit, own, out_names, detrend != "none")
+        remarks += of_refinement
     _check_explains(fit)
-    mkr, pdc, said = (None, None, []) if plan is None else mass_matrices(model, plan, (in_names, out_names))
+    structure, skew = model, None
+    if plan is not None and refinement is not None:
+        structure, skew, of_skew = without_skew(model, refinement.replicates, plan, out_names)
+        remarks += of_skew
+    mkr, pdc, said = (None, None, []) if plan is None else mass_matrices(structure, plan, (in_names, out_names))
+    modes, refit = modes_of(found), None
+    if refinement is not None:
+        replicates = [Replicate(one, 1.0 / len(refinement.replicates), []) for one in refinement.replicates]
+    elif refine:
+        replicates = _identify(identifier, records, n_u, start == "rest", True)[2]
+    if refinement is None and plan is not None and method.startswith("n4sid"):
+        refit = _refitting(own, n_u)
+    modes, of_sigma = _deviate(model, modes, replicates, plan, refit, (mkr, pdc))
+    remarks += of_sigma
+    if by_observer and refinement is None:
+        moved = finite_p_bias(identifier.config, records, start == "rest", modes, found.order)
+        remarks += [] if moved is None else [Remark("finite_p_bias", moved)]
     return Result(
         method, float(fs), samples, len(records), gaps, in_names, out_names, found.p, found.rows, found.order, hold,
-        detrend, start, found.singular_values, model, found.markov, modes_of(found), fit,
+        detrend, start, found.singular_values, model, found.markov, modes, fit,
         _remarks(found) + by_factor + remarks + [Remark(*one) for one in said], found.observer,
-        identifier, mkr, pdc,
+        identifier, mkr, pdc, hankel=hankel if by_observer else None,
+        singular_noise=found.noise_level if math.isfinite(found.noise_level) else None, refinement=refinement,
+        skew=skew,
     )  # fmt: skip

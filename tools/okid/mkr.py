@@ -44,13 +44,14 @@ class MassMatrices:
     M_std: Real | None = None
     K_std: Real | None = None
     R_std: Real | None = None
+    R_normal_modes_std: Real | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The key "mkr" of okid.result/1."""
         out: dict[str, Any] = {name: getattr(self, name).tolist() for name in ("M", "K", "R", "R_normal_modes")}
-        for name in ("M_std", "K_std", "R_std"):
+        for name in ("M_std", "K_std", "R_std", "R_normal_modes_std"):
             value = getattr(self, name)
-            out[name] = None if value is None else value.tolist()
+            out[name] = None if value is None else [[_number(x) for x in row] for row in value.tolist()]
         return {**out, "checks": dict(self.checks), "modes": [dict(mode) for mode in self.modes]}
 
 
@@ -133,6 +134,19 @@ def make_plan(
     return plan
 
 
+def raw_plan(plan: Plan, dt: float) -> tuple[Any, list[NDArray[Any]]]:
+    """okid_mkr_config_t, and the arrays it points to."""
+    places = [np.abs(np.array(dofs, np.int32)) - np.int32(1) for dofs in (plan.inputs, plan.outputs)]
+    kinds = np.array([SENSING.index(kind) for kind in plan.sensing], np.int32)
+    gains = [np.sign(np.array(dofs, np.float64)) for dofs in (plan.inputs, plan.outputs)]
+    whole = [x.ctypes.data_as(_abi.int32s) for x in (*places, kinds)]
+    hold = _abi.HOLD_FIRST if plan.hold == "foh" else _abi.HOLD_ZERO
+    config = _abi.MkrConfig(
+        plan.size, hold, dt, whole[0], _abi.pointer(gains[0]), whole[1], _abi.pointer(gains[1]), whole[2]
+    )
+    return config, [*places, kinds, *gains]
+
+
 class _Attempt:
     """One okid_mkr_identify(); `raw` points into `work`."""
 
@@ -141,14 +155,7 @@ class _Attempt:
         kept = [np.asfortranarray(one, dtype=np.float64) for one in (model.A, model.B, model.C, model.D)]
         n_u, n_y, n_z, n_x = kept[1].shape[1], len(kept[2]), len(kept[0]), plan.size
         view = _abi.ModelView(n_u, n_y, n_z, *map(_abi.pointer, kept), None)
-        places = [np.abs(np.array(dofs, np.int32)) - np.int32(1) for dofs in (plan.inputs, plan.outputs)]
-        kinds = np.array([SENSING.index(kind) for kind in plan.sensing], np.int32)
-        gains = [np.sign(np.array(dofs, np.float64)) for dofs in (plan.inputs, plan.outputs)]
-        whole = [x.ctypes.data_as(_abi.int32s) for x in (*places, kinds)]
-        hold = _abi.HOLD_FIRST if plan.hold == "foh" else _abi.HOLD_ZERO
-        config = _abi.MkrConfig(
-            n_x, hold, model.dt, whole[0], _abi.pointer(gains[0]), whole[1], _abi.pointer(gains[1]), whole[2]
-        )
+        config, pointed = raw_plan(plan, model.dt)
         self.work = _abi.block(int(library.okid_mkr_memsize(n_u, n_y, n_z, n_x)))
         self.raw = _abi.Mkr()
         self.status = int(
@@ -156,6 +163,7 @@ class _Attempt:
                 ctypes.byref(view), ctypes.byref(config), ctypes.byref(self.raw), self.work.ctypes.data, self.work.size
             )
         )
+        del pointed
 
     def square(self, name: str) -> Real:
         n = int(self.raw.n_x)
@@ -301,14 +309,29 @@ def mass_matrices(
     return found, pdc, said
 
 
-def square_text(title: str, matrix: Real) -> str:
-    """A matrix with its degrees of freedom for a person."""
+def _plus_minus(value: float | None) -> str:
+    return f"±{value:.2g}" if value is not None and math.isfinite(value) else "-"
+
+
+def square_text(title: str, matrix: Real, std: Real | None = None) -> str:
+    """A matrix with its degrees of freedom for a person; below each row its standard deviations, if there are any."""
     largest = float(np.max(np.abs(matrix)))
     exponent = math.floor(math.log10(largest)) if largest > 0.0 else 0
     style = f"12.{min(max(5 - exponent, 0), 12)}f" if -6 <= exponent < 7 else "12.4e"
-    lines = [title, "  dof" + "".join(f" {k:>12d}" for k in range(1, len(matrix) + 1))]
-    lines += [f"{k:>5d}" + "".join(f" {x:{style}}" for x in row) for k, row in enumerate(matrix.tolist(), 1)]
+    said = "" if std is None else ", ± one standard deviation"
+    lines = [title + said, "  dof" + "".join(f" {k:>12d}" for k in range(1, len(matrix) + 1))]
+    for k, row in enumerate(matrix.tolist()):
+        lines.append(f"{k + 1:>5d}" + "".join(f" {x:{style}}" for x in row))
+        if std is not None:
+            lines.append("     " + "".join(f" {_plus_minus(x):>12}" for x in std[k].tolist()))
     return "\n".join(lines)
+
+
+def proportional_text(pdc: ProportionalDamping) -> str:
+    """R = alpha M + beta K with its deviations."""
+    parts = [(pdc.alpha, pdc.alpha_std), (pdc.beta, pdc.beta_std)]
+    alpha, beta = (f"{x:.5g}" if std is None else f"({x:.5g} {_plus_minus(std)})" for x, std in parts)
+    return f"{alpha} 1/s M + {beta} s K"
 
 
 def mass_table(mkr: MassMatrices, pdc: ProportionalDamping) -> str:
@@ -320,11 +343,11 @@ def mass_table(mkr: MassMatrices, pdc: ProportionalDamping) -> str:
     chosen += "" if margin is None else f", the weakest {margin:.3g} times stronger than the best left out"
     return "\n".join(
         [
-            square_text("M [kg]", mkr.M),
-            square_text("K [N/m]", mkr.K),
-            square_text("R [N s/m]", mkr.R),
-            square_text("R [N s/m] of normal modes", mkr.R_normal_modes),
-            square_text(f"R [N s/m] proportional: {pdc.alpha:.5g} 1/s M + {pdc.beta:.5g} s K", pdc.R),
+            square_text("M [kg]", mkr.M, mkr.M_std),
+            square_text("K [N/m]", mkr.K, mkr.K_std),
+            square_text("R [N s/m]", mkr.R, mkr.R_std),
+            square_text("R [N s/m] of normal modes", mkr.R_normal_modes, mkr.R_normal_modes_std),
+            square_text(f"R [N s/m] proportional: {proportional_text(pdc)}", pdc.R),
             f"positive definite: {signs}",
             f"residual of W W^T = 0: {checks['ww_residual']:.2g} (doubtful above 0.03); misfit of D to M: "
             f"{checks['feedthrough_misfit']:.2g} (doubtful above 0.1)",

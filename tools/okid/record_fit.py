@@ -53,7 +53,7 @@ def _percent(pairs: list[tuple[Real, Real]], names: Sequence[str]) -> dict[str, 
     return out
 
 
-def _driven(u: Real, least: int) -> list[slice]:
+def stretches(u: Real, least: int) -> list[slice]:
     """The stretches of at least `least` samples in which no input is missing; the whole record when none is."""
     broken = np.flatnonzero(~np.all(np.isfinite(u), axis=1))
     if len(broken) == 0:
@@ -81,7 +81,7 @@ def fit_records(
     predicted: list[tuple[Real, Real]] = []
     for record in records:
         first = np.zeros(model.order)
-        for turn, piece in enumerate(_driven(record[:, :n_u], max(20, 2 * model.order))):
+        for turn, piece in enumerate(stretches(record[:, :n_u], max(20, 2 * model.order))):
             u, y = record[piece, :n_u], record[piece, n_u:]
             used = max(1, int(min(len(u), informed)))
             try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,10 +17,13 @@ from okid import _abi
 from okid._errors import Error
 from okid.mkr import MassMatrices, ProportionalDamping, mass_table
 from okid.model import Model
-from okid.stabilization import OrderPoles, compare
+from okid.stabilization import Criteria, Stabilization, of_identifiers
 
 if TYPE_CHECKING:
     from okid.identifier import Identified, Identifier, Observer
+    from okid.refine import Refinement
+    from okid.skew import Skew
+    from okid.uncertainty import Uncertainty
 
 Real = NDArray[np.float64]
 
@@ -35,6 +38,13 @@ class Mode(NamedTuple):
     emac: float
     frequency_std_hz: float | None = None
     damping_ratio_std: float | None = None
+    shape_re_std: Real | None = None
+    shape_im_std: Real | None = None
+
+    @property
+    def cmi(self) -> float:
+        """Consistent-mode indicator EMAC x MPC, 0..1."""
+        return self.emac * self.mpc
 
 
 class Fit(NamedTuple):
@@ -59,6 +69,28 @@ def modes_of(found: Identified) -> list[Mode]:
             found.frequency_hz, found.damping_ratio, found.shapes, found.mpc, found.emac, strict=True
         )
     ]
+
+
+def with_deviations(modes: list[Mode], sigma: Uncertainty) -> list[Mode]:
+    """The same modes with their standard deviations."""
+    return [
+        mode._replace(
+            frequency_std_hz=_number(float(sigma.frequency_hz[k])),
+            damping_ratio_std=_number(float(sigma.damping_ratio[k])),
+            shape_re_std=sigma.shape_re[k],
+            shape_im_std=sigma.shape_im[k],
+        )
+        for k, mode in enumerate(modes)
+    ]
+
+
+def put_deviations(sigma: Uncertainty, mkr: MassMatrices | None, pdc: ProportionalDamping | None) -> None:
+    """Standard deviations of the matrices, alpha and beta to where they are, if they are."""
+    if mkr is not None:
+        mkr.M_std, mkr.K_std, mkr.R_std = sigma.M, sigma.K, sigma.R
+        mkr.R_normal_modes_std = sigma.R_normal_modes
+    if pdc is not None:
+        pdc.alpha_std, pdc.beta_std = _number(sigma.alpha), _number(sigma.beta)
 
 
 def _number(value: float | None) -> float | None:
@@ -108,6 +140,10 @@ class Result:
     identifier: Identifier | None = field(default=None, repr=False, compare=False)
     mkr: MassMatrices | None = None
     pdc: ProportionalDamping | None = None
+    hankel: str | None = None  # of methods with an observer
+    singular_noise: float | None = None  # singular values up to this can come from the observer's errors alone
+    refinement: Refinement | None = None  # with refine=True
+    skew: Skew | None = None  # with refine=True and degrees of freedom
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "identifier": None}  # holds memory of the C library: cannot be pickled
@@ -127,11 +163,13 @@ class Result:
             "outputs": list(self.outputs),
             "p": self.p,
             "rows": self.rows,
+            "hankel": self.hankel,
             "order": self.order,
             "hold": self.hold,
             "detrend": self.detrend,
             "start": self.start,
             "singular_values": _nested(self.singular_values),
+            "singular_noise": _number(self.singular_noise),
             "model": {
                 "dt": m.dt,
                 **{name: _nested(getattr(m, name)) for name in "ABCDK"},
@@ -146,8 +184,11 @@ class Result:
                     "shape_im": _nested(mode.shape.imag),
                     "frequency_std_hz": _number(mode.frequency_std_hz),
                     "damping_ratio_std": _number(mode.damping_ratio_std),
+                    "shape_re_std": None if mode.shape_re_std is None else _nested(mode.shape_re_std),
+                    "shape_im_std": None if mode.shape_im_std is None else _nested(mode.shape_im_std),
                     "mpc": _number(mode.mpc),
                     "emac": _number(mode.emac),
+                    "cmi": _number(mode.cmi),
                 }
                 for mode in self.modes
             ],
@@ -155,6 +196,8 @@ class Result:
                 "simulation_percent": dict(self.fit.simulation_percent),
                 "prediction_percent": dict(self.fit.prediction_percent),
             },
+            **({} if self.refinement is None else {"refinement": self.refinement.to_dict(self.outputs)}),
+            **({} if self.skew is None else {"skew": self.skew.to_dict(self.outputs)}),
             **({} if self.mkr is None else {"mkr": self.mkr.to_dict()}),
             **({} if self.pdc is None else {"pdc": self.pdc.to_dict()}),
             "warnings": [{"code": w.code, "text": w.text} for w in self.warnings],
@@ -183,48 +226,42 @@ class Result:
             f"{self.method}: {self.samples} samples at {self.fs_hz:g} Hz, {self.records} record(s), {self.gaps} gap(s)",
             f"p {self.p}, {self.rows} block rows, order {self.order}, detrend {self.detrend}, start {self.start}",
             "",
-            "   #       f [Hz]" + "         ±" * f_std + "     ζ [%]" + "         ±" * z_std + "     MPC    EMAC",
+            f"   #       f [Hz]{'         ±' * f_std}     ζ [%]{'         ±' * z_std}     MPC    EMAC     CMI",
         ]
         for k, mode in enumerate(self.modes, 1):
             line = f"{k:4d} {mode.frequency_hz:12.5f}"
             line += _spread(mode.frequency_std_hz, 1.0) if f_std else ""
             line += f" {100 * mode.damping_ratio:9.4f}"
             line += _spread(mode.damping_ratio_std, 100.0) if z_std else ""
-            lines.append(f"{line} {mode.mpc:7.4f} {mode.emac:7.4f}")
+            lines.append(f"{line} {mode.mpc:7.4f} {mode.emac:7.4f} {mode.cmi:7.4f}")
         width = max([6, *(len(name) for name in self.outputs)])
         lines += ["", f"{'output':<{width}}  simulated [%]  predicted [%]"]
         for name in self.outputs:
             pair = (self.fit.simulation_percent.get(name), self.fit.prediction_percent.get(name))
             cells = ["-" if value is None else f"{value:.2f}" for value in pair]
             lines.append(f"{name:<{width}}  {cells[0]:>13}  {cells[1]:>13}")
+        if self.refinement is not None:
+            lines += ["", self.refinement.text(self.outputs)]
         if self.mkr is not None and self.pdc is not None:
             lines += ["", mass_table(self.mkr, self.pdc)]
         lines += [f"warning {w.code}: {w.text}" for w in self.warnings]
         return "\n".join(lines)
 
-    def stabilization(self, orders: Iterable[int] | None = None) -> list[OrderPoles]:
-        """Poles of other orders from the same Markov parameters, each compared with the order before.
+    def stabilization(self, orders: Iterable[int] | None = None, criteria: Criteria | None = None) -> Stabilization:
+        """Poles of other orders from the same decomposition, each compared with the order before, and their clusters.
 
-        Default: every even order up to the largest. Orders the data cannot carry are left out. Raises Error on a
-        result that was unpickled: it has no Markov decomposition any more.
+        Default: every even order the data carry. Orders they cannot carry are left out. Several horizons:
+        okid.stabilization(). Raises Error on a result that was unpickled: it has no decomposition any more.
         """
         if self.identifier is None:
             raise Error("this result no longer holds its decomposition: identify again for a stabilization diagram")
-        largest = self.identifier.largest_order()
-        wanted: Sequence[int] = sorted({n for n in (orders or range(2, largest + 1, 2)) if 1 <= n <= largest})
-        runs = []
-        for n in wanted:
-            try:
-                found = self.identifier.realise(n)
-            except Error as fault:
-                if fault.status not in (_abi.ERR_NO_MODES, _abi.ERR_NUMERIC):
-                    raise
-                continue  # no pole to draw at this order
-            runs.append((n, found.frequency_hz, found.damping_ratio, found.shapes))
-        return compare(runs)
+        return of_identifiers([self.identifier], orders, criteria)
 
     def plot_stabilization(self, ax: Any = None, orders: Iterable[int] | None = None) -> Any:
-        """Draw the stabilization diagram into `ax` (default: a new matplotlib figure); returns the axes."""
+        """Draw the stabilization diagram into `ax` (default: a new matplotlib figure); returns the axes.
+
+        Lines: modes of this result; bands and rings: the clusters that hold, and the pole nearest each one's medians.
+        """
         from okid.figures import draw_stabilization
 
         if ax is None:

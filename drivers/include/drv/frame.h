@@ -25,7 +25,8 @@ enum {
 enum {
     DRV_LOSS_OVERFLOW = 1 << 0, ///< the socket's receive buffer was full
     DRV_LOSS_DRIVER = 1 << 1,   ///< the controller's queue or our own ring was full
-    DRV_LOSS_LINK = 1 << 2      ///< the interface was down or away
+    DRV_LOSS_LINK = 1 << 2,     ///< the interface was down or away
+    DRV_LOSS_CRC = 1 << 3       ///< serial: bytes arrived that made no valid packet
 };
 
 typedef struct drv_frame_t {

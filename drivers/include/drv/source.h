@@ -7,22 +7,43 @@
 #ifndef DRV_SOURCE_H
 #define DRV_SOURCE_H
 
+#include <drv/decoder.h>
 #include <drv/frame.h>
+#include <drv/link.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-enum { DRV_NAME_BYTES = 16, DRV_ERROR_BYTES = 320, DRV_MAX_FILTERS = 512, DRV_MAX_BUSES = 32 };
+enum {
+    DRV_NAME_BYTES = 16,
+    DRV_ERROR_BYTES = 320,
+    DRV_ERROR_TEXT_BYTES = 120,
+    DRV_MAX_FILTERS = 512,
+    DRV_MAX_BUSES = 32
+};
 
 /// read() at the end of a log.
 #define DRV_END (-4095)
 
-/// One identifier wanted; nothing else passes the kernel.
+/// One identifier wanted, or many alike; nothing else passes the kernel.
 typedef struct drv_filter_t {
     uint32_t id;
     uint8_t extended;
+    uint32_t mask; ///< bits of the identifier that must agree with `id`; 0 = all of them
 } drv_filter_t;
+
+/// Of a serial line.
+typedef struct drv_line_config_t {
+    const char* device; ///< best of /dev/serial/by-id/: that name finds the device again after it was unplugged
+    int32_t baud;
+    drv_framing_t framing; ///< serial
+    int32_t counter;       ///< serial, lines of text: 1 + the field that counts samples, 0 = none
+    double rate_hz;        ///< serial: of the samples, for the stamps of those that share a packet
+    int32_t bitrate;       ///< slcan: of the CAN bus, bit/s; 0 = leave the adapter's own
+    int32_t dbitrate;      ///< slcan: of the data of FD frames; 0 = leave it
+    const char* btr;       ///< slcan: bit timing registers as the adapter wants them (command s), instead of bitrate
+} drv_line_config_t;
 
 typedef struct drv_source_config_t {
     const char*
@@ -31,7 +52,8 @@ typedef struct drv_source_config_t {
     const char* path;              ///< log only
     const drv_filter_t* filters;   ///< socket only; NULL = everything
     int32_t filter_count;
-    int32_t buffer_bytes; ///< receive buffer asked for, 0 = 8 MiB
+    int32_t buffer_bytes;   ///< receive buffer asked for, 0 = 8 MiB
+    drv_line_config_t line; ///< serial and slcan only
 } drv_source_config_t;
 
 /// How frames were stamped, best first.
@@ -41,19 +63,34 @@ typedef enum drv_stamp_t { DRV_STAMP_NONE, DRV_STAMP_US, DRV_STAMP_NS, DRV_STAMP
 typedef struct drv_stats_t {
     uint64_t received;      ///< data frames delivered
     uint64_t lost_overflow; ///< frames the kernel dropped because the receive buffer was full
-    uint64_t lost_driver;   ///< times the controller said its own queue overran
-    uint64_t error_frames;  ///< error messages of the controller, the next two among them
+    uint64_t lost_driver;   ///< frames the driver dropped, and times the controller's own queue overran
+    uint64_t error_frames;  ///< error messages of the controller; the next seven count those of one class
     uint64_t bus_off;
-    uint64_t restarts;
-    uint64_t remote;      ///< remote requests, not delivered
-    uint64_t foreign;     ///< log: frames of other interfaces, not delivered
-    uint64_t torn;        ///< log: 1 = its last line had no end and was no frame: left out
-    uint64_t link_down;   ///< times the interface went down or away
-    uint64_t reopened;    ///< times the socket was made anew after the interface had gone
-    uint64_t read_errors; ///< other errors of the socket
-    int32_t buffer_bytes; ///< receive buffer granted
-    int32_t link_is_down; ///< 1 = down or away now
+    uint64_t restarts; ///< after bus-off
+    uint64_t no_ack;   ///< sent, and nobody acknowledged
+    uint64_t tx_timeouts;
+    uint64_t rx_overflows;  ///< the controller's receive queue overran
+    uint64_t error_passive; ///< entered the error-passive state
+    uint64_t bus_errors;    ///< bit, stuff, form, CRC errors on the wire
+    uint64_t remote;        ///< remote requests, not delivered
+    uint64_t foreign;       ///< log: frames of other interfaces, not delivered
+    uint64_t torn;          ///< log: 1 = its last line had no end and was no frame: left out
+    uint64_t link_down;     ///< times the interface went down or away
+    uint64_t reopened;      ///< times the socket was made anew after the interface had gone
+    uint64_t read_errors;   ///< other errors of the socket
+    int32_t buffer_bytes;   ///< receive buffer granted
+    int32_t link_is_down;   ///< 1 = down or away now
+    uint64_t bytes;         ///< serial and slcan: bytes read
+    uint64_t damaged;       ///< serial: packets or lines refused; slcan: lines that are no frame
+    uint64_t skipped;       ///< serial: bytes that belonged to no packet
+    uint64_t refused;       ///< slcan: commands and frames the adapter answered with an error (bell)
+    uint64_t line_overruns; ///< serial line: bytes lost in the hardware or the kernel, in lost_driver too
+    uint64_t line_errors;   ///< serial line: bytes with a framing or parity error, as from a wrong baud rate
     drv_stamp_t stamp;
+    drv_bus_state_t state;                 ///< of the controller, as last told
+    uint32_t restart_ms;                   ///< of the interface; 0 = it stays off after bus-off, or is virtual
+    uint32_t bitrate;                      ///< of the interface, bit/s; 0 = virtual
+    char last_error[DRV_ERROR_TEXT_BYTES]; ///< what the newest error message said, "" = there was none
 } drv_stats_t;
 
 typedef struct drv_source_t drv_source_t;
@@ -75,6 +112,8 @@ struct drv_source_t {
 
 extern const drv_source_ops_t drv_source_socketcan; ///< a CAN_RAW socket, classic and FD
 extern const drv_source_ops_t drv_source_replay;    ///< a `candump -L` text log
+extern const drv_source_ops_t drv_source_serial;    ///< a serial line of samples, line_frame.h
+extern const drv_source_ops_t drv_source_slcan;     ///< a CAN adapter on a serial line
 
 #ifdef __cplusplus
 }

@@ -97,6 +97,10 @@ OKID_NODISCARD OKID_API okid_status_t okid_accumulator_create(okid_accumulator_t
                                                               const okid_accumulator_config_t* config, void* block,
                                                               size_t bytes);
 
+/// Become what `from` is, units and all; both were created with the same configuration. @return OKID_OK, OKID_ERR_NULL,
+/// OKID_ERR_MISMATCH
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_copy(okid_accumulator_t* self, const okid_accumulator_t* from);
+
 /// Forget everything; the units stay.
 OKID_API void okid_accumulator_reset(okid_accumulator_t* self);
 
@@ -132,6 +136,29 @@ OKID_API void okid_accumulator_gap(okid_accumulator_t* self, int64_t count);
 /// centred, the other not), OKID_ERR_RANGE
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_t* other);
 
+/// Take `part` out of `self` again: the inverse of okid_accumulator_merge(), to the last bit for codes. What is left is the
+/// record without that part, as if a gap stood there. A part of an unbroken record is an accumulator that was fed with its own
+/// samples and, before them, the p = lags samples in front: then its rows are those of its own samples, and the parts add
+/// up to the whole. The open run of `self` ends. Both need edges = 1, slots = 0 and the same forgetting; with forgetting
+/// the part must begin and end where slots of `self` do.
+/// @param weight  1; with forgetting lambda^(rows of `self` in slots closed since the part ended), 0 < weight <= 1
+/// Cost O((m p)^2). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH (also: it has fewer rows than the part),
+/// OKID_ERR_RANGE (weight)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_remove(okid_accumulator_t* self, okid_accumulator_t* part,
+                                                              double weight);
+
+/// Slots that hold the rows now, the open one included and last; without a window 1.
+OKID_API int32_t okid_accumulator_slots(const okid_accumulator_t* self);
+/// Regression rows in slot k, 0 = the oldest; 0 for a slot that does not exist.
+OKID_API int64_t okid_accumulator_slot_rows(const okid_accumulator_t* self, int32_t k);
+
+/// Add slots first .. first + count - 1 of a window to `self`: a part of the window, or all of it as a record that parts can
+/// be removed from. `from` keeps its content; the open run of `self` ends. `self` needs edges = 1, slots = 0, forgetting = 1 and
+/// the n_u, n_y, lags and sample type of `from`; neither may be centred. Cost O((m p)^2) an unbroken run of slots.
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_DIM (slots that do not exist)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_take_slots(okid_accumulator_t* self, okid_accumulator_t* from,
+                                                                  int32_t first, int32_t count);
+
 /// Take the offsets out of a finished record before it is merged: every channel less its mean over the record, so that
 /// offsets that moved between records do no harm. Codes: less the mean rounded to 2^-8 code, exactly, so that any order of
 /// merging still gives the same bits. The run ends; no samples are taken any more (OKID_ERR_MISMATCH), only merges with others
@@ -152,6 +179,11 @@ OKID_API int64_t okid_accumulator_rows(const okid_accumulator_t* self);
 /// Cost O((m p)^2 (1 + slots)). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_TOO_SHORT (no rows)
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t detrend,
                                                             double* gram, double* mean);
+
+/// The first m entries of the Gram matrix's diagonal: sum of squares of each channel over the rows. O(m slots) flop.
+/// @param energy  out, m numbers. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_TOO_SHORT (no rows)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_energy(okid_accumulator_t* self, okid_detrend_t detrend,
+                                                              double* energy);
 
 /// The sums of one unbroken run in engineering units: all that okid_structured_solve() needs, O(m q) numbers.
 /// With OKID_DETREND_MEAN the samples are taken less a constant near their mean (codes: the nearest whole code), which `sum`

@@ -13,12 +13,21 @@ extern "C" {
 #endif
 
 typedef enum okid_method_t {
-    OKID_METHOD_OKID_ERA = 0,    ///< observer least squares, Markov recursion, ERA
+    OKID_METHOD_OKID_ERA = 0,    ///< observer least squares, Markov recursion, ERA. Without inputs: ERA on the
+                                 ///< covariances of the outputs, which stand in the place of the Markov parameters
     OKID_METHOD_OKID_ERA_DC = 1, ///< the same Markov parameters, ERA with data correlations (xi = zeta = 2, tau = 1)
-    OKID_METHOD_N4SID_MOESP = 2, ///< subspace methods, okid/subspace.h; they also take records without inputs
+    OKID_METHOD_N4SID_MOESP = 2, ///< subspace methods, okid/subspace.h; with and without inputs
     OKID_METHOD_N4SID_CVA = 3,
     OKID_METHOD_N4SID_SSARX = 4
 } okid_method_t;
+
+/// What a block of the Hankel matrix of okid-era and okid-era-dc holds (records with inputs). In all three the gain K
+/// follows by least squares through the observability matrix.
+typedef enum okid_hankel_t {
+    OKID_HANKEL_SYSTEM = 0,      ///< Y_k
+    OKID_HANKEL_INNOVATIONS = 1, ///< [Y_k Su^(1/2), Y0_k Se^(1/2)], Su covariance of the inputs, Se of the innovations
+    OKID_HANKEL_LITERAL = 2      ///< [Y_k Y0_k], eq. 42 as printed: depends on units and takes in noise modes (trap 1)
+} okid_hankel_t;
 
 /// How the observer's least squares are solved from an accumulator.
 typedef enum okid_solver_t {
@@ -36,25 +45,28 @@ enum {
     OKID_NOTE_ORDER_REDUCED = 1 << 5,      ///< the order asked for exceeds what the Hankel matrix can carry
     OKID_NOTE_ORDER_UNCLEAR =
         1 << 6, ///< no clear gap in the singular values: smallest order that keeps the consistent modes
-    OKID_NOTE_WEAK_EXCITATION = 1 << 7 ///< the inputs excite some directions only weakly
+    OKID_NOTE_WEAK_EXCITATION = 1 << 7, ///< the inputs excite some directions only weakly
+    OKID_NOTE_LITERAL_HANKEL = 1 << 8   ///< OKID_HANKEL_LITERAL was asked for: damping depends on the units
 };
 /// Name of a single bit as in okid.result/1 ("arx_stabilised", ...), NULL for an unknown one.
 OKID_API const char* okid_warning_code(uint32_t bit);
 
 typedef struct okid_identify_config_t {
-    int32_t n_u, n_y;  ///< n_u = 0 (modes and predictor only): n4sid methods
-    int32_t p;         ///< observer (ARX) order; n4sid: not used
-    int32_t rows;      ///< block rows (okid: and columns) of the Hankel matrices; 0 = 2 p, n4sid 30
-    int32_t order;     ///< n_z; 0 = automatic
+    int32_t n_u, n_y; ///< n_u = 0 (ambient): modes and predictor only
+    int32_t p;        ///< observer (ARX) order; n4sid: not used; okid without inputs: only the default of rows
+    int32_t rows;  ///< block rows (okid: and columns) of the Hankel matrices; 0 = 2 p, n4sid 30, okid without inputs p
+    int32_t order; ///< n_z; 0 = automatic
     int32_t max_order; ///< bound of the automatic order and of the memory; 0 = min(128, what the Hankel matrix carries)
     double fs_hz;      ///< sample rate
     okid_method_t method;
     okid_detrend_t detrend;
-    okid_solver_t solver; ///< n4sid: dense
+    okid_solver_t solver; ///< n4sid, and okid without inputs: dense
+    okid_hankel_t hankel; ///< n4sid, and okid without inputs: system
 } okid_identify_config_t;
 
 /// An identified model. Every pointer looks into the identifier's block and stays valid until the next run. Of an n4sid
-/// method p is rows (the past it looks back on), `observer` is NULL, observer_info.radius and radius_plain are 0.
+/// method, and of an okid method without inputs, p is rows (the past it looks back on), `observer` is NULL,
+/// observer_info.radius and radius_plain are 0.
 typedef struct okid_identified_t {
     uint32_t warnings; ///< OKID_NOTE_… bits
     int32_t n_u, n_y, n_z, p, rows;
@@ -62,7 +74,8 @@ typedef struct okid_identified_t {
     int64_t regression_rows;
     double dt;                            ///< s
     const okid_real_t *A, *B, *C, *D, *K; ///< column-major; K Kalman gain n_z x n_y
-    /// Descending. okid-era: of H(0); okid-era-dc: of the matrix of correlations; n4sid: okid_subspace_singular_values()
+    /// Descending. okid-era: of H(0) (without inputs: of covariances of outputs scaled to unit variance); okid-era-dc: of
+    /// the matrix of correlations; n4sid: okid_subspace_singular_values()
     const okid_real_t* singular_values;
     /// Y_0 .. Y_(markov_count-1), n_y x n_u blocks, at least 2 rows + 1 (none when n_u = 0). okid: by eq. (40) from the
     /// observer, n4sid: of the model
@@ -71,8 +84,13 @@ typedef struct okid_identified_t {
     const okid_real_t* innovation; ///< n_y x n_y
     const double* mean;            ///< m channel means that were removed (zeros for detrend none)
     const okid_real_t *frequency_hz, *damping_ratio, *mpc, *emac; ///< mode_count each
-    const okid_real_t *shape_re, *shape_im;                       ///< n_y x mode_count
-    double model_radius;                                          ///< spectral radius of A
+    const okid_real_t* cmi; ///< mode_count; consistent-mode indicator EMAC x MPC (Pappa, Elliott, Schenk 1993)
+    const okid_real_t *shape_re, *shape_im; ///< n_y x mode_count
+    double model_radius;                    ///< spectral radius of A
+    /// Singular values up to this can come from the errors of the observer alone (okid-era with inputs and automatic order,
+    /// Hankel matrix of the system, dense solver; else NaN). One above it need not be a mode: drift, hum and a finite p
+    /// leave more than least squares knows of
+    double noise_level;
     okid_observer_info_t observer_info;
 } okid_identified_t;
 
@@ -82,7 +100,8 @@ typedef struct okid_identify okid_identify_t;
 /// p as asked for, or the largest p with 10 q <= samples when that is smaller (at least 1).
 OKID_API int32_t okid_identify_usable_p(int32_t n_u, int32_t n_y, int32_t p, int64_t samples);
 
-/// Lags an accumulator must have for this configuration: p, or 2 rows - 1 for the n4sid methods; 0 when it is invalid.
+/// Lags an accumulator must have for this configuration: p, 2 rows - 1 for the n4sid methods, 2 rows for okid-era without
+/// inputs (okid-era-dc: 4 more); 0 when it is invalid.
 OKID_API int32_t okid_identify_lags(const okid_identify_config_t* config);
 
 /// Bytes okid_identify_create() needs; 0 when the configuration is invalid.
@@ -98,7 +117,8 @@ OKID_NODISCARD OKID_API okid_status_t okid_identify_run(okid_identify_t* self, o
                                                         okid_identified_t* out);
 
 /// The same from the second kernel: nothing is squared, for noise-free or very lightly damped records (condition above 1e10)
-/// and as the cross-check. Needs a configuration with the dense solver. @return as okid_identify_run()
+/// and as the cross-check. Needs a configuration with the dense solver, and inputs for the okid methods (covariances are
+/// squares anyway). @return as okid_identify_run()
 OKID_NODISCARD OKID_API okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root,
                                                                okid_identified_t* out);
 
@@ -108,6 +128,10 @@ OKID_API int32_t okid_identify_max_order(const okid_identify_config_t* config);
 /// Realize another order from the same decomposition (stabilization diagrams): replaces A..K and the modes in `out`; of
 /// an n4sid method also the innovation and the Markov parameters.
 OKID_NODISCARD OKID_API okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_identified_t* out);
+
+/// The modes of another order only: A, C and the modes in `out` are replaced, B, D, K are not (many times cheaper). For
+/// okid_stabilization_add(); okid_identify_order() makes `out` whole again.
+OKID_NODISCARD OKID_API okid_status_t okid_identify_poles(okid_identify_t* self, int32_t order, okid_identified_t* out);
 
 /// Put other B and D into the n4sid model of the last run, where the record itself could be fitted
 /// (okid_subspace_output_error()); the Markov parameters follow.

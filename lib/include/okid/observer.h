@@ -15,8 +15,9 @@ typedef struct okid_observer_config_t {
     int32_t n_y;      ///< outputs, >= 1
     int32_t p;        ///< lags
     double ridge_min; ///< ridge on the unit-diagonal Gram, >= 0; 0 = 1e-12
-    int32_t
-        unstable; ///< 0 = search the smallest ridge on a half-decade grid that makes the ARX model stable; 1 = leave it
+    /// 0 = search the smallest ridge on a half-decade grid that makes the ARX model stable; 1 = leave it; 2 = theta and
+    /// the innovation only, for a record like one already solved: radius, condition and excitation are not looked at (0)
+    int32_t unstable;
 } okid_observer_config_t;
 
 /// What the solve found, beside the parameters.

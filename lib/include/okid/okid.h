@@ -13,8 +13,12 @@
 #include <okid/model.h>
 #include <okid/observer.h>
 #include <okid/pdc.h>
+#include <okid/refine.h>
+#include <okid/skew.h>
 #include <okid/square_root.h>
+#include <okid/stabilization.h>
 #include <okid/structured.h>
 #include <okid/subspace.h>
 #include <okid/types.h>
+#include <okid/uncertainty.h>
 #endif

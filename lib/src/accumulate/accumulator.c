@@ -53,7 +53,7 @@ static uint64_t lay_out(okid_accumulator_t* a) {
         const spectrum_plan_t plan = okid_spectrum_plan(a->m, c->lags);
         take(&at, sizeof(bulk_t) / 8 + okid_spectrum_doubles(&plan));
     }
-    a->slot_numbers = (uint32_t)(sizeof(slot_info_t) / 8 + acc_slot_tail(a) + (ring || base ? pm : 0));
+    a->slot_numbers = (uint32_t)(sizeof(slot_info_t) / 8 + acc_slot_tail(a) + (ring ? pm : 0));
     a->slot_count = ring ? c->slots + c->spare_slots + 1 : 1;
     a->slots_at = take(&at, (uint64_t)a->slot_numbers * (uint64_t)a->slot_count);
     const uint64_t edges = acc_base_edge(a) + acc_edge_count(a) * (acc_base_is_exact(a) ? 2 : 1);
@@ -98,6 +98,18 @@ okid_status_t okid_accumulator_create(okid_accumulator_t** self, const okid_accu
     for (int32_t r = 0; r < a->m; ++r) acc_scale(a)[r] = 1;
     prepare_bulk(a);
     *self = a;
+    return OKID_OK;
+}
+
+okid_status_t okid_accumulator_copy(okid_accumulator_t* self, const okid_accumulator_t* from) {
+    if (!self || !from) return OKID_ERR_NULL;
+    const okid_accumulator_config_t *a = &self->config, *b = &from->config;
+    if (a->n_u != b->n_u || a->n_y != b->n_y || a->lags != b->lags || a->sample != b->sample || a->block != b->block ||
+        a->slots != b->slots || a->forgetting != b->forgetting || a->edges != b->edges ||
+        a->spare_slots != b->spare_slots || a->bulk != b->bulk || a->saturated_missing != b->saturated_missing ||
+        a->buffer != b->buffer)
+        return OKID_ERR_MISMATCH;
+    if (self != from) memcpy(self, from, (size_t)lay_out(self) * 8);
     return OKID_OK;
 }
 

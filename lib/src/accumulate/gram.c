@@ -235,3 +235,24 @@ okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t det
         finish_double(&f);
     return OKID_OK;
 }
+
+okid_status_t okid_accumulator_energy(okid_accumulator_t* self, okid_detrend_t detrend, double* energy) {
+    if (!self || !energy) return OKID_ERR_NULL;
+    okid_accumulator_settle(self);
+    const finish_t f = {self,   NULL, 1.0 / (1 << acc_fraction(self)), okid_accumulator_weight(self), self->stats.rows,
+                        detrend};
+    if (!(f.rows > 0)) return OKID_ERR_TOO_SHORT;
+    for (size_t c = 0; c < (size_t)self->m; ++c) {
+        if (acc_base_is_exact(self)) {
+            const int64_t g = okid_accumulator_lag_sum_exact(self, c, 0),
+                          mean = okid_accumulator_whole_mean(g, f.count);
+            int64_t high = 0, low = 0;
+            diagonal_exact(self, c, &high, &low);
+            energy[c] = entry_exact(&f, high, low, c, c, g, g, mean, mean);
+        } else {
+            const double g = okid_accumulator_lag_sum(self, c, 0), raw = diagonal(self, c, 0);
+            energy[c] = in_units(&f, detrend == OKID_DETREND_MEAN ? raw - g * g / f.rows : raw, c, c, g, g);
+        }
+    }
+    return OKID_OK;
+}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    what happens when an unbroken piece of the record ends: into the ring, or into the base; merging of records
-// METHOD     window: whole slots fall out of a ring, nothing is ever subtracted. Growing: base += slot, and the ends of the
+// PURPOSE    what happens when an unbroken piece of the record ends: into the ring, or into the base; records and parts of
+//            records added and taken away
+// METHOD     window: whole slots fall out of a ring, nothing is subtracted in it. Growing: base += slot, and the ends of the
 //            run go into the edge Gram as outer products. Forgetting: base *= lambda^rows before
 // REFERENCE  docs/decisions/0001-gap-closes-a-slot.md
 // NUMERICS   codes: exact (wide.h); doubles: one addition a slot
@@ -17,66 +18,79 @@ void okid_accumulator_clear_slot(okid_accumulator_t* self, int32_t index, int jo
     slot->start = self->clock - self->pending;
 }
 
-/// Exact base += open slot: sums, then the ends of its run.
-static void fold_exact(okid_accumulator_t* a, const double* head, const double* tail) {
-    const size_t m = (size_t)a->m, p = (size_t)a->config.lags, sums = acc_sum_count(a), packed = acc_edge_count(a);
-    const int64_t* data = (const int64_t*)acc_slot_data(a, a->open);
-    int64_t* base = (int64_t*)acc_base(a);
-    for (size_t i = 0; i < sums; ++i) wide_add_wide(base + sums + i, base + i, data[sums + i], data[i]);
-    for (size_t r = 0; r < m; ++r) base[acc_base_sum(a) + r] += data[acc_slot_sum(a) + r];
-    int64_t *low = base + acc_base_edge(a), *high = low + packed, *edge_sum = base + acc_base_edge_sum(a);
+/// base = keep * base + gain * (sums of one slot of `from`). Codes without forgetting: exact, keep 1, gain 1 or -1.
+static void add_sums(okid_accumulator_t* a, const double* data, double keep, double gain) {
+    const size_t m = (size_t)a->m, sums = acc_sum_count(a), at = acc_slot_sum(a);
+    const int64_t* codes = (const int64_t*)data;
+    if (acc_base_is_exact(a)) {
+        int64_t* base = (int64_t*)acc_base(a);
+        const int64_t sign = gain < 0 ? -1 : 1;
+        for (size_t i = 0; i < sums; ++i)
+            wide_add_wide(base + sums + i, base + i, sign * codes[sums + i], sign * codes[i]);
+        for (size_t r = 0; r < m; ++r) base[acc_base_sum(a) + r] += sign * codes[at + r];
+        return;
+    }
+    const int exact = acc_has_codes(a);
+    double *base = acc_base(a), *sum = base + acc_base_sum(a);
+    for (size_t i = 0; i < sums; ++i)
+        base[i] = keep * base[i] + gain * (exact ? wide_double(codes[sums + i], codes[i]) : data[i]);
+    for (size_t r = 0; r < m; ++r) sum[r] = keep * sum[r] + gain * (exact ? (double)codes[at + r] : data[at + r]);
+}
+
+/// Exact: the outer products of one end of a run into the edge Gram, `sign` 1 for a head, -1 for a tail.
+static void add_end_exact(okid_accumulator_t* a, const double* end, int64_t sign) {
+    const size_t m = (size_t)a->m, p = (size_t)a->config.lags, packed = acc_edge_count(a);
+    int64_t *base = (int64_t*)acc_base(a), *low = base + acc_base_edge(a), *high = low + packed,
+            *edge_sum = base + acc_base_edge_sum(a);
     for (size_t lj = 0; lj < p; ++lj)
         for (size_t cj = 0; cj < m; ++cj) {
             const size_t j = lj * m + cj, column = j * (j + 1) / 2;
-            const int64_t hj = acc_code(head + acc_end(a, lj, cj)), tj = acc_code(tail + acc_end(a, lj, cj));
-            edge_sum[j] += hj - tj;
+            const int64_t xj = sign * acc_code(end + acc_end(a, lj, cj));
+            edge_sum[j] += xj;
             for (size_t li = 0, i = 0; li <= lj; ++li) {
-                const double *h = head + acc_end(a, li, 0), *t = tail + acc_end(a, li, 0);
-                for (size_t ci = 0; ci < m && i <= j; ++ci, ++i) {
-                    wide_add(high + column + i, low + column + i, acc_code(h + ci) * hj);
-                    wide_add(high + column + i, low + column + i, -(acc_code(t + ci) * tj));
-                }
+                const double* x = end + acc_end(a, li, 0);
+                for (size_t ci = 0; ci < m && i <= j; ++ci, ++i)
+                    wide_add(high + column + i, low + column + i, acc_code(x + ci) * xj);
             }
         }
 }
 
-/// base = weight * base + open slot in double.
-static void fold_double(okid_accumulator_t* a, double weight, const double* head, const double* tail) {
-    const size_t m = (size_t)a->m, p = (size_t)a->config.lags, sums = acc_sum_count(a);
-    const double* data = acc_slot_data(a, a->open);
-    const int64_t* codes = (const int64_t*)data;
-    const int exact = acc_has_codes(a);
-    double *base = acc_base(a), *sum = base + acc_base_sum(a), *edge = base + acc_base_edge(a);
-    for (size_t i = 0; i < sums; ++i)
-        base[i] = weight * base[i] + (exact ? wide_double(codes[sums + i], codes[i]) : data[i]);
-    for (size_t r = 0; r < m; ++r) {
-        const size_t at = acc_slot_sum(a) + r;
-        sum[r] = weight * sum[r] + (exact ? (double)codes[at] : data[at]);
-    }
-    double* edge_sum = base + acc_base_edge_sum(a);
+/// The same in double: edge = keep * edge + sign * products.
+static void add_end_double(okid_accumulator_t* a, const double* end, double keep, double sign) {
+    const size_t m = (size_t)a->m, p = (size_t)a->config.lags;
+    double *base = acc_base(a), *edge = base + acc_base_edge(a), *edge_sum = base + acc_base_edge_sum(a);
     for (size_t lj = 0; lj < p; ++lj)
         for (size_t cj = 0; cj < m; ++cj) {
             const size_t j = lj * m + cj;
-            const double hj = acc_number(a, head + acc_end(a, lj, cj)), tj = acc_number(a, tail + acc_end(a, lj, cj));
-            edge_sum[j] = weight * edge_sum[j] + hj - tj;
+            const double xj = sign * acc_number(a, end + acc_end(a, lj, cj));
+            edge_sum[j] = keep * edge_sum[j] + xj;
             double* column = edge + j * (j + 1) / 2;
             for (size_t li = 0, i = 0; li <= lj; ++li) {
-                const double *h = head + acc_end(a, li, 0), *t = tail + acc_end(a, li, 0);
+                const double* x = end + acc_end(a, li, 0);
                 for (size_t ci = 0; ci < m && i <= j; ++ci, ++i)
-                    column[i] = weight * column[i] + acc_number(a, h + ci) * hj - acc_number(a, t + ci) * tj;
+                    column[i] = keep * column[i] + acc_number(a, x + ci) * xj;
             }
         }
 }
 
-/// The open slot goes into the base. Its tail must stand.
-static void fold_slot_into_base(okid_accumulator_t* a, double weight) {
-    const double *head = acc_slot_data(a, a->open) + acc_slot_head(a),
-                 *tail = acc_slot_data(a, a->open) + acc_slot_tail(a);
-    if (acc_base_is_exact(a))
-        fold_exact(a, head, tail);
-    else
-        fold_double(a, weight, head, tail);
-    a->base_weight = a->base_weight * weight + (double)acc_slot(a, a->open)->rows;
+/// A slot into the base: base = keep * base + gain * slot. An end that meets a neighbour's is NULL: there both cancel.
+static void fold_slot(okid_accumulator_t* a, const acc_piece_t* piece, int64_t rows, double keep, double gain) {
+    add_sums(a, piece->data, keep, gain);
+    for (int end = 0; end < 2; ++end) {
+        const double* at = end == 0 ? piece->head : piece->tail;
+        const double sign = end == 0 ? gain : -gain;
+        if (at && acc_base_is_exact(a))
+            add_end_exact(a, at, sign < 0 ? -1 : 1);
+        else if (at)
+            add_end_double(a, at, end == 0 ? keep : 1, sign);
+    }
+    a->base_weight = a->base_weight * keep + gain * (double)rows;
+}
+
+/// The open slot as a run of its own.
+static acc_piece_t open_piece(const okid_accumulator_t* a) {
+    const double* data = acc_slot_data(a, a->open);
+    return (acc_piece_t){data, data + acc_slot_head(a), acc_x(a)};
 }
 
 static void drop_oldest(okid_accumulator_t* a) {
@@ -93,12 +107,13 @@ void okid_accumulator_close_slot(okid_accumulator_t* self, int joined) {
         return;
     }
     if (c->slots == 0 && !c->edges) return; // stays until another run needs the place
-    memcpy(acc_slot_data(self, self->open) + acc_slot_tail(self), acc_x(self), acc_lag_count(self) * sizeof(double));
     if (c->slots == 0) {
-        fold_slot_into_base(self, c->forgetting < 1 ? pow(c->forgetting, (double)slot->rows) : 1);
+        const acc_piece_t piece = open_piece(self);
+        fold_slot(self, &piece, slot->rows, c->forgetting < 1 ? pow(c->forgetting, (double)slot->rows) : 1, 1);
         okid_accumulator_clear_slot(self, self->open, joined);
         return;
     }
+    memcpy(acc_slot_data(self, self->open) + acc_slot_tail(self), acc_x(self), acc_lag_count(self) * sizeof(double));
     self->closed += 1;
     self->open = (self->open + 1) % self->slot_count;
     const int64_t window = (int64_t)c->slots * c->block;
@@ -108,54 +123,122 @@ void okid_accumulator_close_slot(okid_accumulator_t* self, int joined) {
     okid_accumulator_clear_slot(self, self->open, joined);
 }
 
-/// self.base += other.base, exact or double as both are.
-static void add_base(okid_accumulator_t* self, const okid_accumulator_t* other) {
+/// self.base += gain * other.base, exact (gain 1 or -1) or double as both are.
+static void add_base(okid_accumulator_t* self, const okid_accumulator_t* other, double gain) {
     const size_t sums = acc_sum_count(self), packed = acc_edge_count(self), edge = acc_base_edge(self);
+    self->base_weight += gain * other->base_weight;
     if (!acc_base_is_exact(self)) {
         double* to = acc_base(self);
         const double* from = acc_base(other);
-        for (size_t i = 0; i < edge + packed; ++i) to[i] += from[i];
+        for (size_t i = 0; i < edge + packed; ++i) to[i] += gain * from[i];
         return;
     }
+    const int64_t sign = gain < 0 ? -1 : 1;
     int64_t* to = (int64_t*)acc_base(self);
     const int64_t* from = (const int64_t*)acc_base(other);
-    for (size_t i = 0; i < sums; ++i) wide_add_wide(to + sums + i, to + i, from[sums + i], from[i]);
-    for (size_t i = acc_base_sum(self); i < edge; ++i) to[i] += from[i];
-    for (size_t i = edge; i < edge + packed; ++i) wide_add_wide(to + packed + i, to + i, from[packed + i], from[i]);
+    for (size_t i = 0; i < sums; ++i) wide_add_wide(to + sums + i, to + i, sign * from[sums + i], sign * from[i]);
+    for (size_t i = acc_base_sum(self); i < edge; ++i) to[i] += sign * from[i];
+    for (size_t i = edge; i < edge + packed; ++i)
+        wide_add_wide(to + packed + i, to + i, sign * from[packed + i], sign * from[i]);
 }
 
-/// The open slot of `other` becomes a closed record of `self`.
-static void adopt_open_slot(okid_accumulator_t* self, const okid_accumulator_t* other) {
-    if (acc_slot(other, other->open)->rows == 0) return;
-    memcpy(acc_slot(self, self->open), acc_slot(other, other->open), (size_t)self->slot_numbers * sizeof(double));
-    memcpy(acc_slot_data(self, self->open) + acc_slot_tail(self), acc_x(other), acc_lag_count(self) * sizeof(double));
-    fold_slot_into_base(self, 1);
+/// Everything of `other` into the base, its open slot as a closed record.
+static void add_all(okid_accumulator_t* self, okid_accumulator_t* other, double gain) {
+    okid_accumulator_settle(other);
+    add_base(self, other, gain);
+    const int64_t rows = acc_slot(other, other->open)->rows;
+    const acc_piece_t piece = open_piece(other);
+    if (rows > 0) fold_slot(self, &piece, rows, 1, gain);
+}
+
+static void add_counts(okid_accumulator_t* self, const okid_accumulator_t* other, int64_t sign) {
+    okid_accumulator_stats_t* s = &self->stats;
+    s->samples += sign * other->stats.samples;
+    s->missing += sign * other->stats.missing;
+    s->gaps += sign * other->stats.gaps;
+    s->saturated += sign * other->stats.saturated;
+    s->rows += sign * other->stats.rows;
+    self->clock += sign * other->clock;
+    acc_slot(self, self->open)->start = self->clock;
+}
+
+/// The open slot goes into the base as it stands beside it, nothing fades; the next sample begins another run.
+static void end_run(okid_accumulator_t* self) {
+    okid_accumulator_settle(self);
+    const int64_t rows = acc_slot(self, self->open)->rows;
+    const acc_piece_t piece = open_piece(self);
+    if (rows > 0) fold_slot(self, &piece, rows, 1, 1);
     okid_accumulator_clear_slot(self, self->open, 0);
+    self->have = 0;
+    self->in_gap = 1;
+}
+
+/// Same channels, lags and samples, and room for the ends of runs in both bases?
+static int alike(const okid_accumulator_t* self, const okid_accumulator_t* other) {
+    const okid_accumulator_config_t *a = &self->config, *b = &other->config;
+    return a->n_u == b->n_u && a->n_y == b->n_y && a->lags == b->lags && a->sample == b->sample && self != other;
 }
 
 okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_t* other) {
     if (!self || !other) return OKID_ERR_NULL;
     const okid_accumulator_config_t *a = &self->config, *b = &other->config;
-    if (a->n_u != b->n_u || a->n_y != b->n_y || a->lags != b->lags || a->sample != b->sample || !a->edges ||
-        !b->edges || a->slots || b->slots || a->forgetting != 1 || b->forgetting != 1 || self == other)
+    if (!alike(self, other) || !a->edges || !b->edges || a->slots || b->slots || a->forgetting != 1 ||
+        b->forgetting != 1)
         return OKID_ERR_MISMATCH;
     const int empty = self->stats.rows == 0 && self->stats.samples == 0;
     if (self->centred != other->centred && !empty && other->stats.rows > 0) return OKID_ERR_MISMATCH;
     if (self->stats.rows > INT64_MAX / 2 - other->stats.rows) return OKID_ERR_RANGE;
     if (empty) self->centred = other->centred;
-    okid_accumulator_close_slot(self, 0);
-    self->have = 0;
-    self->in_gap = 1;
-    okid_accumulator_settle(other);
-    add_base(self, other);
-    self->base_weight += other->base_weight;
-    adopt_open_slot(self, other);
-    self->stats.samples += other->stats.samples;
-    self->stats.missing += other->stats.missing;
-    self->stats.gaps += other->stats.gaps;
-    self->stats.saturated += other->stats.saturated;
-    self->stats.rows += other->stats.rows;
-    self->clock += other->clock;
+    end_run(self);
+    add_all(self, other, 1);
+    add_counts(self, other, 1);
+    return OKID_OK;
+}
+
+okid_status_t okid_accumulator_remove(okid_accumulator_t* self, okid_accumulator_t* part, double weight) {
+    if (!self || !part) return OKID_ERR_NULL;
+    const okid_accumulator_config_t *a = &self->config, *b = &part->config;
+    if (!alike(self, part) || !a->edges || !b->edges || a->slots || b->slots || a->forgetting != b->forgetting ||
+        self->stats.rows < part->stats.rows || (part->stats.rows > 0 && self->centred != part->centred))
+        return OKID_ERR_MISMATCH;
+    if (!(weight > 0 && weight <= 1) || (weight < 1 && a->forgetting == 1)) return OKID_ERR_RANGE;
+    end_run(self);
+    add_all(self, part, -weight);
+    add_counts(self, part, -1);
+    if (self->stats.rows == 0) { // doubles leave their rounding
+        memset(acc_base(self), 0, (acc_base_edge(self) + acc_edge_count(self) * (acc_base_is_exact(self) ? 2 : 1)) * 8);
+        self->base_weight = 0;
+    }
+    return OKID_OK;
+}
+
+int32_t okid_accumulator_slots(const okid_accumulator_t* self) { return self->closed + 1; }
+
+int64_t okid_accumulator_slot_rows(const okid_accumulator_t* self, int32_t k) {
+    if (k < 0 || k > self->closed) return 0;
+    return acc_slot(self, acc_ring(self, k))->rows + (k == self->closed ? self->pending : 0);
+}
+
+okid_status_t okid_accumulator_take_slots(okid_accumulator_t* self, okid_accumulator_t* from, int32_t first,
+                                          int32_t count) {
+    if (!self || !from) return OKID_ERR_NULL;
+    const okid_accumulator_config_t* a = &self->config;
+    if (!alike(self, from) || !a->edges || a->slots || a->forgetting != 1 || self->centred || from->centred)
+        return OKID_ERR_MISMATCH;
+    if (first < 0 || count < 0 || first > from->closed + 1 - count) return OKID_ERR_DIM;
+    end_run(self);
+    okid_accumulator_settle(from);
+    for (int32_t k = first; k < first + count; ++k) {
+        acc_piece_t piece;
+        if (!acc_piece(from, k, &piece)) continue;
+        const slot_info_t* slot = acc_slot(from, acc_ring(from, k));
+        if (k == first) piece.head = piece.data + acc_slot_head(from);
+        if (k == first + count - 1) piece.tail = acc_tail(from, acc_ring(from, k));
+        fold_slot(self, &piece, slot->rows, 1, 1);
+        self->stats.rows += slot->rows;
+        self->stats.samples += slot->rows;
+        self->clock += slot->rows;
+    }
     acc_slot(self, self->open)->start = self->clock;
     return OKID_OK;
 }

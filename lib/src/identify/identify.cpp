@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    one call from an accumulator to a model with its modes
-// METHOD     OKID (identify_observer.cpp) or a subspace (identify_subspace.cpp), then order and modes (identify_order.cpp)
+// METHOD     OKID (identify_observer.cpp), covariances of the outputs (identify_covariance.cpp) or a subspace
+//            (identify_subspace.cpp), then order and modes (identify_order.cpp)
 // REFERENCE  paper eq. (36)-(95)
 // NUMERICS   see the modules
 // WORKSPACE  (m(lags+1))^2 for the Gram matrix, the modules' own, all in the caller's block; no heap
@@ -26,22 +27,38 @@ bool is_subspace(okid_method_t method) {
 
 bool valid_sizes(const okid_identify_config_t& c) {
     if (c.n_y < 1 || c.n_u < 0 || c.n_u + c.n_y > 256 || c.rows < 0 || c.rows > 8192) return false;
-    if (is_subspace(c.method)) return c.rows != 1 && c.solver == OKID_SOLVER_DENSE;
-    return (c.method == OKID_METHOD_OKID_ERA || c.method == OKID_METHOD_OKID_ERA_DC) && c.n_u >= 1 && c.p >= 1 &&
-           c.p <= 4096 && (c.solver == OKID_SOLVER_DENSE || c.solver == OKID_SOLVER_STRUCTURED);
+    if (is_subspace(c.method)) return c.rows != 1 && c.solver == OKID_SOLVER_DENSE && c.hankel == OKID_HANKEL_SYSTEM;
+    if (c.method != OKID_METHOD_OKID_ERA && c.method != OKID_METHOD_OKID_ERA_DC) return false;
+    if (c.n_u == 0)
+        return c.p >= 0 && c.p <= 4096 && std::max(c.p, c.rows) >= 1 && c.solver == OKID_SOLVER_DENSE &&
+               c.hankel == OKID_HANKEL_SYSTEM;
+    return c.p >= 1 && c.p <= 4096 && (c.solver == OKID_SOLVER_DENSE || c.solver == OKID_SOLVER_STRUCTURED) &&
+           c.hankel >= OKID_HANKEL_SYSTEM && c.hankel <= OKID_HANKEL_LITERAL;
+}
+
+void plan_era(okid_identify& s) {
+    const okid_identify_config_t& c = s.config;
+    s.width = s.by_covariance ? c.n_y : c.hankel == OKID_HANKEL_SYSTEM ? c.n_u : s.m;
+    s.era_config = okid_era_config_t{s.width, c.n_y, c.rows, c.rows, 0, 0, 0};
+    if (c.method == OKID_METHOD_OKID_ERA_DC) s.era_config.xi = s.era_config.zeta = 2, s.era_config.tau = 1;
+    s.markov_last = okid_era_markov_last(&s.era_config);
+    const int carried = okid_era_max_order(&s.era_config), past = s.by_covariance ? c.rows : c.p;
+    s.max_order = std::min({c.max_order > 0 ? c.max_order : default_order, carried, past * c.n_y});
+    s.max_order = std::max(s.max_order, std::min(c.order, carried));
 }
 
 void plan_observer(okid_identify& s) {
     const okid_identify_config_t& c = s.config;
+    plan_era(s);
     s.lags = c.p;
-    s.era_config = okid_era_config_t{c.n_u, c.n_y, c.rows, c.rows, 0, 0, 0};
-    if (c.method == OKID_METHOD_OKID_ERA_DC) s.era_config.xi = s.era_config.zeta = 2, s.era_config.tau = 1;
     s.observer_config = okid_observer_config_t{c.n_u, c.n_y, c.p, 0, 0};
     s.q = s.n_u + c.p * s.m;
-    s.markov_last = okid_era_markov_last(&s.era_config);
-    const int carried = okid_era_max_order(&s.era_config);
-    s.max_order = std::min({c.max_order > 0 ? c.max_order : default_order, carried, c.p * c.n_y});
-    s.max_order = std::max(s.max_order, std::min(c.order, carried));
+}
+
+void plan_covariance(okid_identify& s) {
+    plan_era(s);
+    s.lags = s.markov_last;
+    s.q = s.config.rows * s.n_y;
 }
 
 void plan_subspace(okid_identify& s) {
@@ -62,9 +79,12 @@ okid_identify plan(const okid_identify_config_t& c) {
     s.n_u = c.n_u;
     s.n_y = c.n_y;
     s.m = c.n_u + c.n_y;
-    if (c.rows == 0) s.config.rows = s.by_subspace ? default_rows : 2 * c.p;
+    s.by_covariance = !s.by_subspace && c.n_u == 0;
+    if (c.rows == 0) s.config.rows = s.by_subspace ? default_rows : s.by_covariance ? c.p : 2 * c.p;
     if (s.by_subspace)
         plan_subspace(s);
+    else if (s.by_covariance)
+        plan_covariance(s);
     else
         plan_observer(s);
     s.n = s.m * (s.lags + 1);
@@ -79,7 +99,7 @@ bool valid(const okid_identify_config_t& c) {
     return !s.by_subspace || okid_subspace_max_order(&s.subspace_config) > 0;
 }
 
-/// What the observer and ERA need, or the subspace in their place.
+/// What the observer or the covariances and ERA need, or the subspace in their place.
 void lay_out_storey(okid_identify& s, okid::arena& memory) {
     const auto n = static_cast<size_t>(s.n), ny = static_cast<size_t>(s.n_y), m = static_cast<size_t>(s.m);
     if (s.by_subspace) {
@@ -89,16 +109,28 @@ void lay_out_storey(okid_identify& s, okid::arena& memory) {
         s.storey_block = memory.take<char>(okid_subspace_memsize(&s.subspace_config));
         return;
     }
+    if (s.by_covariance) {
+        s.gram = memory.take<double>(n * n);
+        okid::lay_out_covariance(s, memory);
+        s.storey_block = memory.take<char>(okid_era_memsize(&s.era_config));
+        return;
+    }
     const bool structured = s.config.solver == OKID_SOLVER_STRUCTURED;
     s.gram = memory.take<double>(structured ? m * n : n * n);
     for (double** each : {&s.head, &s.tail}) *each = memory.take<double>(structured ? n - m : 0);
     s.sum = memory.take<double>(structured ? m : 0);
     s.theta = memory.take<okid_real_t>(ny * static_cast<size_t>(s.q));
     s.gain = memory.take<okid_real_t>(static_cast<size_t>(std::max(s.markov_last, s.config.rows)) * ny * ny);
+    if (s.config.hankel != OKID_HANKEL_SYSTEM) {
+        s.sequence = memory.take<okid_real_t>((static_cast<size_t>(s.markov_last) + 1) * ny * m);
+        s.input_root = memory.take<okid_real_t>((m - ny) * (m - ny));
+        s.innovation_root = memory.take<okid_real_t>(ny * ny);
+    }
     s.observer_bytes = structured ? okid_structured_memsize(&s.observer_config)
                                   : std::max(okid_observer_memsize(&s.observer_config),
                                              okid_observer_factor_memsize(&s.observer_config));
     s.observer_work = memory.take<char>(s.observer_bytes);
+    if (okid::knows_noise(s.config)) s.noise.lay_out(s.observer_config, s.config.rows, s.markov_last, memory);
     s.storey_block = memory.take<char>(okid_era_memsize(&s.era_config));
 }
 
@@ -111,7 +143,7 @@ size_t lay_out(okid_identify& s, okid::arena& memory) {
     s.mean = memory.take<double>(static_cast<size_t>(s.m));
     s.markov = numbers((static_cast<size_t>(s.markov_last) + 1) * ny * nu);
     s.A = numbers(z * z);
-    s.B = numbers(z * nu);
+    s.B = numbers(z * (s.by_subspace ? nu : static_cast<size_t>(s.width)));
     s.C = numbers(ny * z);
     s.D = numbers(ny * nu);
     s.K = numbers(z * ny);
@@ -120,7 +152,8 @@ size_t lay_out(okid_identify& s, okid::arena& memory) {
     s.eigen_im = numbers(z);
     s.eigen_work = numbers(okid::linalg::eigen_work(s.max_order));
     s.scores = numbers(modes);
-    for (okid_real_t** each : {&s.frequency, &s.damping, &s.mpc, &s.emac, &s.mu_re, &s.mu_im}) *each = numbers(modes);
+    for (okid_real_t** each : {&s.frequency, &s.damping, &s.mpc, &s.emac, &s.cmi, &s.mu_re, &s.mu_im})
+        *each = numbers(modes);
     for (okid_real_t** each : {&s.shape_re, &s.shape_im}) *each = numbers(modes * ny);
     for (okid_real_t** each : {&s.psi_re, &s.psi_im}) *each = numbers(modes * z);
     s.modal_bytes = okid_modal_memsize(s.n_y, s.max_order);
@@ -143,6 +176,7 @@ void point_to(const okid_identify& s, okid_identified_t* out) {
     out->damping_ratio = s.damping;
     out->mpc = s.mpc;
     out->emac = s.emac;
+    out->cmi = s.cmi;
     out->shape_re = s.shape_re;
     out->shape_im = s.shape_im;
     out->singular_values = s.by_subspace ? okid_subspace_singular_values(s.subspace, &out->singular_count)
@@ -153,11 +187,19 @@ void begin(const okid_identify& s, okid_identified_t* out, int64_t rows) {
     *out = okid_identified_t{};
     out->n_u = s.n_u;
     out->n_y = s.n_y;
-    out->p = s.by_subspace ? s.config.rows : s.config.p;
+    out->p = s.by_subspace || s.by_covariance ? s.config.rows : s.config.p;
     out->rows = s.config.rows;
     out->dt = 1 / s.config.fs_hz;
     out->regression_rows = rows;
     out->observer_info.channel = -1;
+    out->noise_level = NAN;
+}
+
+okid_status_t decompose(okid_identify& s, okid_accumulator_t* accumulator, okid_identified_t* out) {
+    const auto by = s.by_subspace     ? okid::decompose_subspace_gram
+                    : s.by_covariance ? okid::decompose_covariance
+                                      : okid::decompose_observer_gram;
+    return by(s, accumulator, out);
 }
 
 /// From what was decomposed to the model.
@@ -169,6 +211,18 @@ okid_status_t finish(okid_identify& s, okid_status_t decomposed, okid_identified
 }
 
 } // namespace
+
+okid_status_t okid::replicate(okid_identify& s, okid_accumulator_t* accumulator, int order, okid_identified_t* out) {
+    begin(s, out, okid_accumulator_rows(accumulator));
+    s.follow = order;
+    okid_status_t status = decompose(s, accumulator, out);
+    if (status == OKID_OK) status = realise_model(s, order);
+    s.follow = 0;
+    if (status != OKID_OK) return status;
+    point_to(s, out);
+    out->n_z = order;
+    return OKID_OK;
+}
 
 int32_t okid_identify_usable_p(int32_t n_u, int32_t n_y, int32_t p, int64_t samples) {
     const int64_t m = n_u + n_y;
@@ -216,10 +270,7 @@ okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accum
     okid_accumulator_config(accumulator, &held);
     begin(s, out, okid_accumulator_rows(accumulator));
     if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.lags) return OKID_ERR_MISMATCH;
-    return finish(s,
-                  s.by_subspace ? okid::decompose_subspace(s, accumulator, out)
-                                : okid::decompose_observer(s, accumulator, out),
-                  out);
+    return finish(s, decompose(s, accumulator, out), out);
 }
 
 okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root, okid_identified_t* out) {
@@ -228,10 +279,11 @@ okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t
     okid_square_root_config_t held;
     okid_square_root_config(square_root, &held);
     begin(s, out, okid_square_root_rows(square_root));
-    if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.lags || s.config.solver != OKID_SOLVER_DENSE)
+    if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.lags || s.config.solver != OKID_SOLVER_DENSE ||
+        s.by_covariance)
         return OKID_ERR_MISMATCH;
     return finish(s,
-                  s.by_subspace ? okid::decompose_subspace(s, square_root, out)
-                                : okid::decompose_observer(s, square_root, out),
+                  s.by_subspace ? okid::decompose_subspace_factor(s, square_root, out)
+                                : okid::decompose_observer_factor(s, square_root, out),
                   out);
 }

@@ -78,11 +78,13 @@ void observer_notes(okid_identified_t* out, int q) {
 /// From theta to the singular values.
 okid_status_t decompose_theta(okid_identify& s, okid_identified_t* out) {
     observer_notes(out, s.q);
-    const okid_status_t status =
-        okid_markov_recursion(s.n_u, s.n_y, s.config.p, s.theta, s.markov_last, s.markov, s.gain);
+    const okid_status_t status = okid_markov_recursion(s.n_u, s.n_y, s.config.p, s.theta, s.markov_last, s.markov,
+                                                       s.follow > 0 && s.followed != nullptr ? nullptr : s.gain);
     if (status != OKID_OK) return status;
     std::copy(s.markov, s.markov + s.n_y * s.n_u, s.D);
-    return okid_era_decompose(s.era, s.markov);
+    if (s.config.hankel == OKID_HANKEL_LITERAL) out->warnings |= OKID_NOTE_LITERAL_HANKEL;
+    if (s.follow > 0 && s.followed != nullptr) return OKID_OK;
+    return okid_era_decompose(s.era, hankel_blocks(s));
 }
 
 } // namespace
@@ -108,17 +110,26 @@ okid_status_t check_constant_factor(const okid_identify& s, okid_identified_t* o
                            }));
 }
 
-okid_status_t decompose_observer(okid_identify& s, okid_accumulator_t* accumulator, okid_identified_t* out) {
+okid_status_t decompose_observer_gram(okid_identify& s, okid_accumulator_t* accumulator, okid_identified_t* out) {
     if (out->regression_rows < s.q) return OKID_ERR_TOO_SHORT;
-    const okid_status_t status = s.config.solver == OKID_SOLVER_STRUCTURED ? observe_structured(s, accumulator, out)
-                                                                           : observe_dense(s, accumulator, out);
-    return status != OKID_OK ? status : decompose_theta(s, out);
+    const bool structured = s.config.solver == OKID_SOLVER_STRUCTURED;
+    const okid_status_t status =
+        structured ? observe_structured(s, accumulator, out) : observe_dense(s, accumulator, out);
+    if (status != OKID_OK) return status;
+    weigh_by_gram(s, structured ? s.m : s.n, out->regression_rows);
+    const okid_status_t decomposed = decompose_theta(s, out);
+    if (decomposed == OKID_OK && s.follow == 0 && knows_noise(s.config))
+        out->noise_level = noise_level(s.observer_config, s.observer_work, s.theta, s.innovation, s.markov,
+                                       s.config.rows, s.markov_last, s.noise);
+    return decomposed;
 }
 
-okid_status_t decompose_observer(okid_identify& s, okid_square_root_t* square_root, okid_identified_t* out) {
+okid_status_t decompose_observer_factor(okid_identify& s, okid_square_root_t* square_root, okid_identified_t* out) {
     if (out->regression_rows < s.q) return OKID_ERR_TOO_SHORT;
     const okid_status_t status = observe_factor(s, square_root, out);
-    return status != OKID_OK ? status : decompose_theta(s, out);
+    if (status != OKID_OK) return status;
+    weigh_by_factor(s, out->regression_rows);
+    return decompose_theta(s, out);
 }
 
 } // namespace okid

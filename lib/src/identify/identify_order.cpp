@@ -41,8 +41,9 @@ okid_status_t realise_subspace(okid_identify& s, int order, bool whole) {
 
 okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t* out) {
     if (order < 1 || order > s.max_order) return OKID_ERR_DIM;
-    okid_status_t status = s.by_subspace ? realise_subspace(s, order, whole)
-                                         : okid_era_realize(s.era, order, s.A, s.B, s.C, whole ? s.gain : nullptr, s.K);
+    okid_status_t status = s.by_subspace     ? realise_subspace(s, order, whole)
+                           : s.by_covariance ? realise_covariance(s, order, whole)
+                                             : realise_era(s, order, whole);
     if (status != OKID_OK) return status;
     out->n_z = order;
     out->warnings &= ~static_cast<uint32_t>(OKID_NOTE_MODEL_UNSTABLE | OKID_NOTE_PREDICTOR_UNSTABLE);
@@ -54,6 +55,7 @@ okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t
                                                 s.psi_im, s.emac)
                            : okid_era_emac(s.era, order, out->mode_count, s.mu_re, s.mu_im, s.psi_re, s.psi_im, s.emac);
     if (status != OKID_OK) return status;
+    for (int k = 0; k < out->mode_count; ++k) s.cmi[k] = s.emac[k] * s.mpc[k];
     if (!(out->model_radius < 1)) out->warnings |= OKID_NOTE_MODEL_UNSTABLE;
     if (whole && !(predictor_radius(s, order) < 1)) out->warnings |= OKID_NOTE_PREDICTOR_UNSTABLE;
     if (whole && s.by_subspace) model_markov(s, order);
@@ -64,14 +66,15 @@ okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t
 /// Near the rank that p (n4sid: rows) past samples can have at most, every pole, noise too, looks consistent: automatic
 /// orders stay below half of it.
 int automatic_limit(const okid_identify& s) {
-    const int past = s.by_subspace ? s.config.rows : s.config.p;
+    const int past = s.by_subspace || s.by_covariance ? s.config.rows : s.config.p;
     return std::max(2, std::min(s.max_order, past * s.n_y / 2) / 2 * 2);
 }
 
-/// Realise every even order and score it; 0 when no stable model has a consistent mode.
-int scan_orders(okid_identify& s, okid_identified_t* out) {
-    const int count = automatic_limit(s) / 2;
-    for (int k = 0; k < count; ++k) {
+/// Realise every even order from `least` to `largest` and score it; 0 when no stable model has a consistent mode.
+int scan_orders(okid_identify& s, int least, int largest, okid_identified_t* out) {
+    const int count = largest / 2;
+    std::fill(s.scores, s.scores + count, okid_real_t{0});
+    for (int k = least / 2 - 1; k < count; ++k) {
         const okid_status_t status = realise(s, 2 * (k + 1), false, out);
         const bool usable = status >= 0 && out->model_radius < 1;
         s.scores[k] = usable ? consistency_score(s.emac, out->mode_count) : 0;
@@ -84,14 +87,27 @@ double clear_gap_of(okid_method_t method) {
     return method == OKID_METHOD_N4SID_CVA || method == OKID_METHOD_N4SID_SSARX ? clear_canonical_gap : clear_gap;
 }
 
-/// A clear gap in the singular values decides, if its model is stable and no ridge has bent the values; else the scan.
+/// Singular values above the noise level; 0 where that is not known, or a ridge has bent the values.
+int above_noise(const okid_identified_t& out) {
+    if (!(out.noise_level > 0) || !(out.observer_info.radius_plain < 1)) return 0;
+    return static_cast<int>(std::count_if(out.singular_values, out.singular_values + out.singular_count,
+                                          [&](okid_real_t value) { return value > out.noise_level; }));
+}
+
+/// A gap in the singular values decides, if it is clear or stands where the noise begins, its model is stable and no ridge
+/// has bent the values; else the scan, from what stands above the noise to twice as much.
 okid_status_t automatic_order(okid_identify& s, okid_identified_t* out) {
-    const gap_choice gap = order_by_gap(out->singular_values, out->singular_count, automatic_limit(s));
-    if (gap.ratio >= clear_gap_of(s.config.method) && out->observer_info.radius_plain < 1) {
+    const int limit = automatic_limit(s), signal = above_noise(*out);
+    const gap_choice gap = order_by_gap(out->singular_values, out->singular_count, limit);
+    const bool clear =
+        gap.ratio >= clear_gap_of(s.config.method) || (gap.order == signal && gap.ratio >= least_gap_at_noise);
+    if (clear && out->observer_info.radius_plain < 1) {
         const okid_status_t status = realise(s, gap.order, true, out);
         if (status >= 0 && out->model_radius < 1 && consistency_score(s.emac, out->mode_count) > 0) return status;
     }
-    const int order = scan_orders(s, out);
+    int order = 0;
+    if (signal >= 2) order = scan_orders(s, std::min(limit, signal) / 2 * 2, std::min(limit, 2 * signal), out);
+    if (order == 0) order = scan_orders(s, 2, limit, out);
     out->warnings |= OKID_NOTE_ORDER_UNCLEAR;
     if (order > 0) return realise(s, order, true, out);
     const okid_status_t status = realise(s, gap.order, true, out);
@@ -99,6 +115,14 @@ okid_status_t automatic_order(okid_identify& s, okid_identified_t* out) {
 }
 
 } // namespace
+
+okid_status_t realise_model(okid_identify& s, int order) {
+    if (s.followed != nullptr) return s.followed->realise(s.era_config, s.markov, s.A, s.B, s.C);
+    if (s.by_covariance) return realise_covariance(s, order, false);
+    if (!s.by_subspace) return realise_era(s, order, false);
+    return okid_subspace_realize(s.subspace, order, s.A, s.n_u > 0 ? s.B : nullptr, s.C, s.n_u > 0 ? s.D : nullptr,
+                                 nullptr, nullptr);
+}
 
 okid_status_t choose_order(okid_identify& s, okid_identified_t* out) {
     if (s.config.order == 0) return automatic_order(s, out);
@@ -111,6 +135,11 @@ okid_status_t choose_order(okid_identify& s, okid_identified_t* out) {
 okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_identified_t* out) {
     if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
     return okid::realise(*self, order, true, out);
+}
+
+okid_status_t okid_identify_poles(okid_identify_t* self, int32_t order, okid_identified_t* out) {
+    if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
+    return okid::realise(*self, order, false, out);
 }
 
 okid_status_t okid_identify_set_inputs(okid_identify_t* self, const okid_real_t* B, const okid_real_t* D,

@@ -2,11 +2,13 @@
 // PURPOSE    the subspace methods' part of the one call
 // METHOD     Gram matrix or factor -> weighted projection; Markov parameters by the recursion C A^k B
 // REFERENCE  paper eq. (55)-(95)
-// NUMERICS   see subspace.cpp. The condition is that of the unit-diagonal Gram matrix of all 2 i m rows; from a factor
-//            the ratio of its pivots, squared
+// NUMERICS   see subspace.cpp. The condition is that of the unit-diagonal Gram matrix of all 2 i m rows, from the factor
+//            that the decomposition made (with its ridge of 1e-13: no more than some 1e13 times n); from a factor of the
+//            rows the ratio of its pivots, squared
 // WORKSPACE  the subspace's own
 #include "identify/identify.hpp"
 
+#include "identify/subspace.hpp"
 #include "linalg/linalg.hpp"
 
 #include <algorithm>
@@ -17,23 +19,23 @@ using std::size_t;
 namespace okid {
 namespace {
 
-constexpr double no_pivot = 1e16; // condition of what rounding has made singular
+constexpr double no_pivot = 1e16;        // condition of what rounding has made singular
+constexpr double rounding_ridge = 1e-12; // more than this is needed only by what rounding has made indefinite
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
-/// Of the Gram matrix, which is destroyed.
-double gram_condition(const okid_identify& s) {
+/// Of the Gram matrix, which is destroyed, once it has been decomposed with this ridge.
+double gram_condition(const okid_identify& s, double ridge) {
+    if (ridge > rounding_ridge) return no_pivot;
     double *scale = s.estimate, norm = 0;
     for (int c = 0; c < s.n; ++c) scale[c] = 1 / std::sqrt(s.gram[area(c, s.n + 1)]);
     for (int c = 0; c < s.n; ++c) {
-        double sum = 0, *column = s.gram + area(c, s.n);
-        for (int r = 0; r < s.n; ++r) {
-            column[r] *= scale[r] * scale[c];
-            sum += std::abs(column[r]);
-        }
-        norm = std::max(norm, sum);
+        double sum = 0;
+        const double* column = s.gram + area(c, s.n);
+        for (int r = 0; r < s.n; ++r) sum += std::abs(column[r]) * scale[r];
+        norm = std::max(norm, sum * scale[c]);
     }
-    if (linalg::cholesky(s.n, s.gram, s.n) != 0) return no_pivot;
+    unit_factor(s.subspace, s.gram);
     return linalg::cholesky_condition(s.n, s.gram, s.n, norm, s.estimate);
 }
 
@@ -62,7 +64,7 @@ void note(const okid_identify& s, const okid_subspace_info_t& info, double condi
 
 } // namespace
 
-okid_status_t decompose_subspace(okid_identify& s, okid_accumulator_t* accumulator, okid_identified_t* out) {
+okid_status_t decompose_subspace_gram(okid_identify& s, okid_accumulator_t* accumulator, okid_identified_t* out) {
     if (out->regression_rows < s.n) return OKID_ERR_TOO_SHORT;
     okid_status_t status = okid_accumulator_gram(accumulator, s.config.detrend, s.gram, s.mean);
     if (status == OKID_OK) status = check_constant_gram(s, s.n, out);
@@ -70,11 +72,11 @@ okid_status_t decompose_subspace(okid_identify& s, okid_accumulator_t* accumulat
     okid_subspace_info_t info;
     status = okid_subspace_decompose(s.subspace, s.gram, out->regression_rows, &info);
     out->observer_info.channel = info.channel;
-    if (status == OKID_OK) note(s, info, gram_condition(s), out);
+    if (status == OKID_OK) note(s, info, s.follow > 0 ? 0 : gram_condition(s, info.ridge), out);
     return status;
 }
 
-okid_status_t decompose_subspace(okid_identify& s, okid_square_root_t* square_root, okid_identified_t* out) {
+okid_status_t decompose_subspace_factor(okid_identify& s, okid_square_root_t* square_root, okid_identified_t* out) {
     if (out->regression_rows < s.n) return OKID_ERR_TOO_SHORT;
     auto* factor = reinterpret_cast<okid_real_t*>(s.gram);
     okid_status_t status = okid_square_root_factor(square_root, s.config.detrend, factor, s.mean);

@@ -9,7 +9,9 @@
 #include <okid/observer.h>
 
 #include "identify/companion.hpp"
+#include "identify/noise_level.hpp"
 #include "identify/stabilise.hpp"
+#include "identify/triangular.hpp"
 #include "linalg/arena.hpp"
 #include "linalg/linalg.hpp"
 
@@ -49,6 +51,7 @@ struct solver {
     int n_u, n_y, p, m, n, q;
     const double* gram;
     long long rows;
+    bool bare; // of a replicate: theta and nothing else
     observer_work w;
     okid_observer_info_t* info;
 
@@ -124,13 +127,15 @@ struct solver {
             norm = std::max(norm, column);
         }
         if (linalg::cholesky(q, w.factor, q) != 0) return false;
-        info->condition = linalg::cholesky_condition(q, w.factor, q, norm, w.condition);
         info->ridge = ridge;
         std::fill(w.x, w.x + q * n_y, 0.0);
-        residual(0);
+        residual(0, true);
         correct();
-        residual(refine_unridged ? 0 : ridge);
-        correct();
+        if (!bare) {
+            info->condition = linalg::cholesky_condition(q, w.factor, q, norm, w.condition);
+            residual(refine_unridged ? 0 : ridge, false);
+            correct();
+        }
         for (int k = 0; k < q; ++k)
             for (int o = 0; o < n_y; ++o)
                 theta[k * n_y + o] = static_cast<okid_real_t>(w.x[o * q + k] * w.scale[index(k)]);
@@ -138,12 +143,15 @@ struct solver {
     }
 
     /// estimate = right-hand side - (scaled Gram + ridge) x.
-    void residual(double ridge) {
+    void residual(double ridge, bool of_zero) {
         std::fill(w.t, w.t + n * n_y, 0.0);
         for (int o = 0; o < n_y; ++o)
             for (int k = 0; k < q; ++k)
                 w.t[static_cast<size_t>(o) * static_cast<size_t>(n) + index(k)] = w.x[o * q + k] * w.scale[index(k)];
-        linalg::multiply(false, false, n, n_y, n, 1, gram, n, w.t, n, 0, w.out, n);
+        if (of_zero)
+            std::fill(w.out, w.out + n * n_y, 0.0);
+        else
+            linalg::multiply(false, false, n, n_y, n, 1, gram, n, w.t, n, 0, w.out, n);
         for (int o = 0; o < n_y; ++o)
             for (int k = 0; k < q; ++k) {
                 const size_t i = index(k);
@@ -176,6 +184,19 @@ struct solver {
 };
 
 } // namespace
+
+void observer_error(const okid_observer_config_t& config, void* work, double* draw, double* solve) {
+    arena memory(work);
+    observer_work w;
+    lay_out(config, memory, &w);
+    const int m = config.n_u + config.n_y, q = config.n_u + config.p * m;
+    solve_lower_right(q, w.factor, q, draw, config.n_y, config.n_y, solve);
+    for (int k = 0; k < q; ++k) {
+        const double scale = w.scale[k < config.n_u ? k : k + config.n_y];
+        for (int o = 0; o < config.n_y; ++o) draw[k * config.n_y + o] *= scale;
+    }
+}
+
 } // namespace okid
 
 size_t okid_observer_memsize(const okid_observer_config_t* config) {
@@ -194,7 +215,8 @@ okid_status_t okid_observer_solve(const okid_observer_config_t* config, const do
     if (bytes < needed) return OKID_ERR_MEMORY;
     *info = okid_observer_info_t{0, 0, 0, 0, 0, -1};
     const int m = config->n_u + config->n_y, n = m * (config->p + 1);
-    okid::solver s{config->n_u, config->n_y, config->p, m, n, n - config->n_y, gram, rows, {}, info};
+    okid::solver s{config->n_u, config->n_y,           config->p, m,   n, n - config->n_y, gram,
+                   rows,        config->unstable == 2, {},        info};
     okid::arena memory(work);
     okid::lay_out(*config, memory, &s.w);
     okid::linalg::warm_up();
@@ -205,15 +227,17 @@ okid_status_t okid_observer_solve(const okid_observer_config_t* config, const do
             return c < s.n_u ? OKID_ERR_INPUT : OKID_ERR_OUTPUT;
         }
     s.equilibrate();
-    info->channel = s.repeated_input();
+    if (!s.bare) info->channel = s.repeated_input();
     if (info->channel >= 0) return OKID_ERR_EXCITATION;
-    if (s.input_rank() <= std::min(4, s.p) * s.n_u) return OKID_ERR_EXCITATION;
+    if (!s.bare && s.input_rank() <= std::min(4, s.p) * s.n_u) return OKID_ERR_EXCITATION;
     const double ridge_min = config->ridge_min > 0 ? config->ridge_min : 1e-12;
     const bool numerical = ridge_min <= 1e-10; // a floor only: the refinement step takes it out again
     if (!s.solve(ridge_min, numerical, theta) && !s.solve(ridge_min * 1e2, numerical, theta)) return OKID_ERR_NUMERIC;
-    auto radius = [&] {
-        return okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.scale + s.n_u, s.w.companion);
-    };
+    if (s.bare) {
+        if (innovation != nullptr) s.innovation(innovation);
+        return OKID_OK;
+    }
+    auto radius = [&] { return okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.scale + s.n_u, s.w.companion); };
     info->radius = info->radius_plain = radius();
     if (!(info->radius < 1) && config->unstable == 0) {
         const okid_status_t status = okid::stabilise(ridge_min, [&](double ridge) {

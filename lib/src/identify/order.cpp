@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    model order from the singular values of the Hankel matrix, or from how modes hold over the orders
-// METHOD     gap: largest ratio sigma_n / sigma_(n+1) over even n. Where no gap stands out (real structures) every even
-//            order is realised and scored by the EMAC of its consistent modes; the smallest stable order that reaches
-//            nine tenths of the best score is taken
+// METHOD     gap: largest ratio sigma_n / sigma_(n+1) over even n. A smaller gap is believed where it stands just at the
+//            level of the observer's errors (noise_level.cpp). Where no gap stands out (real structures) every even order
+//            is realised, between once and twice the number of values above that level where it is known, and scored by
+//            the EMAC of its consistent modes; the smallest stable order that reaches nine tenths of the best score is taken
 // REFERENCE  docs/numerics.md, order; EMAC: Pappa, Elliott, Schenk (1993)
 // NUMERICS   a gap of 10 is below what white-noise simulations show (>= 14) and above what measured records show (<= 4).
 //            Correlations square the signal's part and mix the noise with it: 72 and more, up to 17 inside the signal.
-//            Canonical correlations are bounded by 1: 3.0 and more, up to 1.2 inside
+//            Canonical correlations are bounded by 1: 3.0 and more, up to 1.2 inside. Measured records have fewer values
+//            above the observer's errors than modes that hold, or more (25 to 35 for plates and frames with 11 to 14):
+//            that level alone decides nothing
 #include "identify/order.hpp"
 
 #include "linalg/linalg.hpp"

@@ -11,6 +11,7 @@ struct gap_choice {
 };
 /// Ratios that decide by themselves: of the values of a Hankel matrix, of correlations of it (ERA/DC), of canonical
 /// correlations (CVA, SSARX).
+constexpr double least_gap_at_noise = 2.0; ///< of a Hankel matrix, where the gap stands at the noise level
 constexpr double clear_gap = 10.0, clear_correlation_gap = 30.0, clear_canonical_gap = 2.5;
 
 /// The largest gap over even orders up to `largest`.

@@ -55,32 +55,8 @@ void projection::lay_out(const subspace_sizes& z, arena& memory) {
     remainder = memory.take<double>(area(z.h, z.a) + area(n, z.a));
 }
 
-/// gamma <- gamma R^-1 with orthonormal columns, twice by Cholesky of gamma^T gamma. @return columns that are
-/// independent
-int projection::orthonormalise(const subspace_sizes& z, int columns) const {
-    for (int pass = 0; pass < 2; ++pass) {
-        multiply(true, false, columns, columns, z.h, 1, gamma, z.h, gamma, z.h, 0, core, z.top);
-        for (int k = 0; k < columns; ++k) { // unit columns
-            const double norm = std::sqrt(core[at(k, k, z.top)]);
-            if (!(norm > 0)) return k;
-            for (int r = 0; r < z.h; ++r) gamma[at(r, k, z.h)] /= norm;
-            for (int j = 0; j < columns; ++j) {
-                core[at(k, j, z.top)] /= norm;
-                core[at(j, k, z.top)] /= norm;
-            }
-        }
-        const int failed = linalg::cholesky(columns, core, z.top);
-        if (failed != 0) return failed - 1;
-        for (int c = 0; c < columns; ++c) { // gamma L^-T
-            double* column = gamma + at(0, c, z.h);
-            if (c > 0) multiply(false, true, z.h, 1, c, -1, gamma, z.h, core + c, z.top, 1, column, z.h);
-            for (int r = 0; r < z.h; ++r) column[r] /= core[at(c, c, z.top)];
-        }
-    }
-    return columns;
-}
-
-okid_status_t projection::decompose(const subspace_sizes& z, bool cva, const hankel_factor& f, rank_cut& cut) {
+okid_status_t projection::decompose(const subspace_sizes& z, bool cva, bool squares, const hankel_factor& f,
+                                    rank_cut& cut) {
     const double *L3 = f.L + z.a + z.w, *L32 = L3 + at(0, z.a, f.size), *L33 = L3 + at(0, z.a + z.w, f.size);
     if (cva) {
         lower_product(z.h, [&](int) { return z.w; }, L32, f.size, 0, cut.weight, z.h);
@@ -89,14 +65,13 @@ okid_status_t projection::decompose(const subspace_sizes& z, bool cva, const han
             std::copy(L32 + at(0, c, f.size), L32 + at(z.h, c, f.size), cut.source + at(0, c, z.h));
         if (!cut.whiten(z)) return OKID_ERR_NUMERIC;
     }
-    if (!cut.decompose(z, cva ? cut.source : L32, cva ? z.h : f.size)) return OKID_ERR_NUMERIC;
-    int columns = std::min(z.top, cut.carried);
-    double* vectors = cva ? cut.source : gamma;
-    for (int k = 0; k < columns; ++k)
-        for (int r = 0; r < z.h; ++r) vectors[at(r, k, z.h)] = static_cast<double>(cut.left[at(r, k, z.h)]);
-    if (cva) multiply(false, false, z.h, columns, z.h, 1, cut.weight, z.h, vectors, z.h, 0, gamma, z.h);
-    const int independent = orthonormalise(z, columns);
-    if (independent < columns) columns = cut.carried = independent;
+    if (!cut.decompose(z, cva ? cut.source : L32, cva ? z.h : f.size, squares)) return OKID_ERR_NUMERIC;
+    int columns = cut.carried;
+    if (cva)
+        multiply(false, false, z.h, columns, z.h, 1, cut.weight, z.h, cut.left, z.h, 0, gamma, z.h);
+    else
+        std::copy(cut.left, cut.left + at(0, columns, z.h), gamma);
+    columns = cut.carried = orthonormalise(z.h, columns, gamma, core, z.top);
     if (columns == 0) return OKID_ERR_NUMERIC;
     const int short_h = z.h - z.n_y;
     multiply(true, false, columns, columns, short_h, 1, gamma, z.h, gamma + z.n_y, z.h, 0, core, z.top);

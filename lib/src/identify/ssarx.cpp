@@ -79,16 +79,16 @@ void ssarx::correct(const subspace_sizes& z, const hankel_factor& f, double* sol
     }
 }
 
-okid_status_t ssarx::decompose(const subspace_sizes& z, const hankel_factor& f, rank_cut& cut) const {
+okid_status_t ssarx::decompose(const subspace_sizes& z, bool squares, const hankel_factor& f, rank_cut& cut) const {
     correct(z, f, cut.solve);
     lower_product(z.h, [&](int row) { return z.w + (row / z.n_y + 1) * z.m; }, corrected, z.h, 0, cut.weight, z.h);
     std::copy(corrected, corrected + at(0, z.w, z.h), cut.source);
-    if (!cut.whiten(z) || !cut.decompose(z, cut.source, z.h)) return OKID_ERR_NUMERIC;
-    const int orders = std::min(z.top, cut.carried);
+    if (!cut.whiten(z) || !cut.decompose(z, cut.source, z.h, squares)) return OKID_ERR_NUMERIC;
+    const int orders = cut.carried = orthonormalise(z.w, cut.carried, cut.right, core, z.top);
+    if (orders == 0) return OKID_ERR_NUMERIC;
     double* J = later; // of orders: V^T F11^-1
     for (int c = 0; c < z.w; ++c)
-        for (int k = 0; k < orders; ++k)
-            basis[at(c, k, z.w)] = J[at(k, c, z.top)] = static_cast<double>(cut.right[at(k, c, z.h)]);
+        for (int k = 0; k < orders; ++k) basis[at(c, k, z.w)] = J[at(k, c, z.top)] = cut.right[at(c, k, z.w)];
     solve_lower_right(z.w, f.L, f.size, J, z.top, orders, cut.solve);
     multiply(false, false, orders, width, z.w, 1, J, z.top, f.L + z.m, f.size, 0, next, z.top);
     multiply(false, false, orders, orders, z.w, 1, next, z.top, basis, z.w, 0, core, z.top);

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    subspace identification: memory, the weighted SVD, the calls of subspace.h
-// METHOD     LQ factor (hankel.cpp), weighting and SVD here; models in projection.cpp (MOESP, CVA) and ssarx.cpp
+// PURPOSE    subspace identification: memory, the calls of subspace.h
+// METHOD     LQ factor (hankel.cpp), weighting and SVD (subspace_cut.cpp); models in projection.cpp (MOESP, CVA) and
+//            ssarx.cpp
 // REFERENCE  paper eq. (68)-(83) and table 1; Van Overschee, De Moor (1996); EMAC: Pappa, Elliott, Schenk (1993)
-// NUMERICS   W2 = Pi needs no inverse (trap 6). W1 is the inverse of a Cholesky factor with a floor of 1e-12 of the
-//            diagonal: any factor of the covariance does, and without noise the covariance has rank n_z (trap 7)
-// WORKSPACE  see okid_subspace_memsize(); all in double but the SVD, which is in okid_real_t
+// NUMERICS   those of the parts
+// WORKSPACE  see okid_subspace_memsize()
 #include "identify/subspace.hpp"
 
 #include <cmath>
-#include <limits>
 #include <new>
 
 using std::size_t;
@@ -27,7 +26,6 @@ struct okid_subspace {
 namespace okid {
 namespace {
 
-constexpr double weight_floor = 1e-12;
 constexpr int most_rows = 32768, default_order = 128;
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
@@ -60,7 +58,7 @@ size_t lay_out(okid_subspace& s, arena& memory) {
     s.hankel.i = z.i;
     s.hankel.size = 2 * z.i * z.m;
     s.hankel.lay_out(memory, s.config.factor != 0);
-    s.cut.lay_out(z, method != OKID_SUBSPACE_MOESP, memory);
+    s.cut.lay_out(z, method != OKID_SUBSPACE_MOESP, method == OKID_SUBSPACE_SSARX, memory);
     if (method == OKID_SUBSPACE_SSARX)
         s.ssarx.lay_out(z, memory);
     else
@@ -73,12 +71,12 @@ void copy_out(const double* from, size_t count, okid_real_t* to) {
     for (size_t k = 0; k < count; ++k) to[k] = static_cast<okid_real_t>(from[k]);
 }
 
-/// The common way of both forms of input, once the LQ factor stands.
-okid_status_t decompose(okid_subspace& s, int64_t rows) {
+/// The common way of both forms of input, once the LQ factor stands. squares: it came from the Gram matrix
+okid_status_t decompose(okid_subspace& s, int64_t rows, bool squares) {
     const bool by_states = s.config.method == OKID_SUBSPACE_SSARX, cva = s.config.method == OKID_SUBSPACE_CVA;
     s.rows = static_cast<double>(rows);
-    const okid_status_t status =
-        by_states ? s.ssarx.decompose(s.sizes, s.hankel, s.cut) : s.projection.decompose(s.sizes, cva, s.hankel, s.cut);
+    const okid_status_t status = by_states ? s.ssarx.decompose(s.sizes, squares, s.hankel, s.cut)
+                                           : s.projection.decompose(s.sizes, cva, squares, s.hankel, s.cut);
     if (status != OKID_OK) s.cut.carried = 0;
     for (int k = 0; k < s.sizes.top; ++k) // states of SSARX: x ~ Sigma^(1/2), a sample at a time
         s.model.scale[k] = by_states ? std::sqrt(static_cast<double>(s.cut.values[k]) * s.rows) : 1;
@@ -101,44 +99,10 @@ void state_model::lay_out(const subspace_sizes& z, arena& memory) {
     scale = memory.take<double>(area(z.top, 1));
 }
 
-void rank_cut::lay_out(const subspace_sizes& z, bool weighted, arena& memory) {
-    weight = source = solve = nullptr;
-    if (weighted) {
-        weight = memory.take<double>(area(z.h, z.h));
-        source = memory.take<double>(area(z.h, z.w));
-    }
-    target = memory.take<okid_real_t>(area(z.h, z.w));
-    left = memory.take<okid_real_t>(area(z.h, z.h));
-    values = memory.take<okid_real_t>(area(z.h, 1));
-    right = memory.take<okid_real_t>(area(z.h, z.w));
-    svd = memory.take<okid_real_t>(linalg::svd_work<okid_real_t>(z.h, z.w));
-    solve = memory.take<double>(solve_work(2 * z.w));
-}
-
-bool rank_cut::whiten(const subspace_sizes& z) const {
-    double* norm = solve; // of the diagonal; free until the solve
-    for (int k = 0; k < z.h; ++k) norm[k] = std::sqrt(weight[at(k, k, z.h)]);
-    for (int c = 0; c < z.h; ++c) {
-        if (!(norm[c] > 0)) return false;
-        for (int r = c; r < z.h; ++r) weight[at(r, c, z.h)] /= norm[r] * norm[c];
-        weight[at(c, c, z.h)] = 1 + weight_floor;
-    }
-    if (linalg::cholesky(z.h, weight, z.h) != 0) return false;
-    for (int c = 0; c < z.h; ++c) {
-        std::fill(weight + at(0, c, z.h), weight + at(c, c, z.h), 0.0);
-        for (int r = c; r < z.h; ++r) weight[at(r, c, z.h)] *= norm[r];
-    }
-    solve_lower(z.h, weight, z.h, source, z.h, z.w, solve);
-    return true;
-}
-
-bool rank_cut::decompose(const subspace_sizes& z, const double* from, int ld) {
-    for (int c = 0; c < z.w; ++c) copy_out(from + at(0, c, ld), static_cast<size_t>(z.h), target + at(0, c, z.h));
-    if (linalg::svd(z.h, z.w, target, left, values, right, svd) != 0) return false;
-    constexpr okid_real_t rounding = 16 * std::numeric_limits<okid_real_t>::epsilon();
-    carried = 0;
-    while (carried < z.h && values[carried] > rounding * values[0]) ++carried;
-    return carried > 0;
+void unit_factor(const okid_subspace_t* self, double* L) {
+    const hankel_factor& f = self->hankel;
+    for (int c = 0; c < f.size; ++c)
+        for (int r = c; r < f.size; ++r) L[at(r, c, f.size)] = f.L[at(r, c, f.size)] * f.unit[r];
 }
 
 } // namespace okid
@@ -180,7 +144,7 @@ okid_status_t okid_subspace_decompose(okid_subspace_t* self, const double* gram,
     self->cut.carried = 0;
     if (rows < self->hankel.size) return OKID_ERR_TOO_SHORT;
     const okid_status_t status = self->hankel.from_gram(okid::order_of(*self), gram, self->config.ridge, info);
-    return status != OKID_OK ? status : okid::decompose(*self, rows);
+    return status != OKID_OK ? status : okid::decompose(*self, rows, true);
 }
 
 okid_status_t okid_subspace_decompose_factor(okid_subspace_t* self, const okid_real_t* factor, int64_t rows,
@@ -191,7 +155,7 @@ okid_status_t okid_subspace_decompose_factor(okid_subspace_t* self, const okid_r
     if (self->config.factor == 0) return OKID_ERR_MISMATCH;
     if (rows < self->hankel.size) return OKID_ERR_TOO_SHORT;
     const okid_status_t status = self->hankel.from_factor(okid::order_of(*self), factor, self->config.ridge, info);
-    return status != OKID_OK ? status : okid::decompose(*self, rows);
+    return status != OKID_OK ? status : okid::decompose(*self, rows, false);
 }
 
 const okid_real_t* okid_subspace_singular_values(const okid_subspace_t* self, int32_t* count) {

@@ -19,19 +19,37 @@ struct state_model {
     void lay_out(const subspace_sizes& z, arena& memory);
 };
 
-/// Weighting and SVD of an h x w matrix.
+/// Weighting of an h x w matrix A, its singular values and its leading singular vectors of one side.
 struct rank_cut {
     double *weight, *source; ///< h x h lower factor of the weight, h x w what is cut
-    okid_real_t *target, *left, *values, *right, *svd;
+    double *left, *right;    ///< left singular vectors, h x top, or right ones, w x top, as laid out: see decompose()
+    okid_real_t* values;
     double* solve;
-    int carried; ///< singular values above rounding
+    int carried; ///< orders that the singular values carry
 
-    void lay_out(const subspace_sizes& z, bool weighted, arena& memory);
+    void lay_out(const subspace_sizes& z, bool weighted, bool right_side, arena& memory);
     /// weight (lower triangle: a covariance) -> its Cholesky factor; source <- weight^-1 source.
     bool whiten(const subspace_sizes& z) const;
-    /// left, values, right of the matrix at `from`.
-    bool decompose(const subspace_sizes& z, const double* from, int ld);
+    /// values, carried and vectors of the matrix at `from`. Where it came from a Gram matrix (squares) A A^T may serve;
+    /// the vectors then span what they should and are neither unit nor orthogonal: orthonormalise() them.
+    bool decompose(const subspace_sizes& z, const double* from, int ld, bool squares);
+
+  private:
+    bool right_side_;
+    double *square_, *symmetric_;                 ///< A A^T and the work of linalg::symmetric(), in one place with
+    okid_real_t *target_, *left_, *right_, *svd_; ///< what linalg::svd() takes
+    void share(const subspace_sizes& z, arena& memory);
+    bool by_squares(const subspace_sizes& z, const double* from, int ld);
+    bool by_svd(const subspace_sizes& z, const double* from, int ld);
 };
+
+/// X (rows x columns, ld rows) <- X R^-1 with orthonormal columns, by Cholesky of X^T X, again while that is needed. core:
+/// top x top. @return columns that are independent
+int orthonormalise(int rows, int columns, double* x, double* core, int top);
+
+/// The Cholesky factor of the Gram matrix with unit diagonal and ridge, in the order of rows of the method: into the
+/// lower triangle of L (size x size).
+void unit_factor(const okid_subspace_t* self, double* L);
 
 /// MOESP and CVA: the column space of the observability matrix.
 struct projection {
@@ -50,13 +68,12 @@ struct projection {
     double *chunk, *remainder; ///< columns of Gamma^T H L11 by unknown; (I - Gamma Gamma^T) cross
 
     void lay_out(const subspace_sizes& z, arena& memory);
-    okid_status_t decompose(const subspace_sizes& z, bool cva, const hankel_factor& f, rank_cut& cut);
+    okid_status_t decompose(const subspace_sizes& z, bool cva, bool squares, const hankel_factor& f, rank_cut& cut);
     okid_status_t realize(const subspace_sizes& z, const hankel_factor& f, int order, bool inputs, bool gain,
                           const state_model& out) const;
     const double* end(const subspace_sizes& z) const { return gamma + z.h - z.n_y; }
 
   private:
-    int orthonormalise(const subspace_sizes& z, int columns) const;
     bool joint_inputs(const subspace_sizes& z, const hankel_factor& f, int order, const state_model& out) const;
     void toeplitz_columns(const subspace_sizes& z, int order, const state_model& out) const;
     void direct_part(const subspace_sizes& z, int order, const state_model& out) const;
@@ -76,7 +93,7 @@ struct ssarx {
     double *beside, *beside_square, *gain; ///< future inputs and states; Gram of the former; work of kalman_gain()
 
     void lay_out(const subspace_sizes& z, arena& memory);
-    okid_status_t decompose(const subspace_sizes& z, const hankel_factor& f, rank_cut& cut) const;
+    okid_status_t decompose(const subspace_sizes& z, bool squares, const hankel_factor& f, rank_cut& cut) const;
     okid_status_t realize(const subspace_sizes& z, const hankel_factor& f, int order, bool with_gain,
                           const state_model& out) const;
 

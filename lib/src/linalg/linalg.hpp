@@ -46,6 +46,11 @@ void multiply(bool transpose_a, bool transpose_b, int rows, int cols, int inner,
 template <class Real = okid_real_t> std::size_t svd_work(int rows, int cols);
 template <class Real> int svd(int rows, int cols, Real* a, Real* u, Real* s, Real* vt, Real* work);
 
+/// Symmetric A (n x n, not zero, lower triangle; destroyed): its n eigenvalues, descending, and the eigenvectors of the k largest
+/// (n x k, ld n). Small eigenvalues have the absolute error of the large ones. work: symmetric_work(n, k) numbers.
+std::size_t symmetric_work(int n, int k);
+int symmetric(int n, double* a, int k, double* values, double* vectors, double* work);
+
 /// Eigenvalues of a general real n x n matrix (destroyed), and right eigenvectors unless vectors is nullptr: a complex
 /// pair k, k+1 has eigenvector vectors(:,k) +- i vectors(:,k+1). work: eigen_work(n) numbers.
 template <class Real = okid_real_t> std::size_t eigen_work(int n);

@@ -178,15 +178,16 @@ namespace {
 /// One-sided Jacobi of g (k x k): columns become orthogonal, v collects the rotations.
 template <class Real> bool jacobi(matrix<Real> g, matrix<Real> v) {
     const int k = static_cast<int>(g.cols());
-    // The matrix is of size 1: a product of squared lengths that underflows belongs to columns of mere rounding.
-    constexpr Real orthogonal = limit_of<Real>(1e-15), negligible = std::numeric_limits<Real>::min();
+    // The matrix is of size 1: columns shorter than its rounding are left as they are. Turned against each other they
+    // would stay rounding, of another direction in every sweep.
+    constexpr Real orthogonal = limit_of<Real>(1e-15), rounding = std::numeric_limits<Real>::epsilon();
     v.setIdentity();
     for (int sweep = 0; sweep < 60; ++sweep) {
         bool still = false;
         for (int p = 0; p + 1 < k; ++p)
             for (int q = p + 1; q < k; ++q) {
                 const Real pp = g.col(p).squaredNorm(), qq = g.col(q).squaredNorm(), pq = g.col(p).dot(g.col(q));
-                if (pp * qq < negligible || std::abs(pq) <= orthogonal * std::sqrt(pp * qq)) continue;
+                if (std::min(pp, qq) < rounding * rounding || std::abs(pq) <= orthogonal * std::sqrt(pp * qq)) continue;
                 still = true;
                 const Real tau = (qq - pp) / (2 * pq);
                 const Real t = std::copysign(1 / (std::abs(tau) + std::sqrt(1 + tau * tau)), tau);

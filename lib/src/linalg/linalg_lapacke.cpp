@@ -77,6 +77,60 @@ template <class Real> lapack_int eigen_query(int n) {
     return whole(wanted);
 }
 
+/// Up to here each of k vectors of n by inverse iteration costs less than all of them by divide and conquer.
+bool few(int n, int k) { return 3 * k <= n; }
+
+lapack_int syevd_query(int n, lapack_int* integers) {
+    double wanted = 0, none = 0;
+    LAPACKE_dsyevd_work(layout, 'V', 'L', n, &none, n, &none, &wanted, -1, integers, -1);
+    return whole(wanted);
+}
+
+lapack_int tridiagonal_query(int n, int k) {
+    double reduce = 0, back = 0, none = 0;
+    LAPACKE_dsytrd_work(layout, 'L', n, &none, n, &none, &none, &none, &reduce, -1);
+    LAPACKE_dormtr_work(layout, 'L', 'L', 'N', n, k, &none, n, &none, &none, n, &back, -1);
+    return std::max({whole(reduce), whole(back), static_cast<lapack_int>(5 * n)});
+}
+
+void reverse_columns(int n, int k, double* vectors) {
+    for (int j = 0; j < k / 2; ++j)
+        std::swap_ranges(vectors + static_cast<size_t>(j) * static_cast<size_t>(n),
+                         vectors + static_cast<size_t>(j + 1) * static_cast<size_t>(n),
+                         vectors + static_cast<size_t>(k - 1 - j) * static_cast<size_t>(n));
+}
+
+/// Inverse iteration takes the form for irreducible: no subdiagonal entry below one rounding of the largest entry.
+void couple(int n, const double* d, double* e) {
+    double largest = 0;
+    for (int k = 0; k < n; ++k) largest = std::max(largest, std::abs(d[k]));
+    for (int k = 0; k + 1 < n; ++k) largest = std::max(largest, std::abs(e[k]));
+    const double least = std::numeric_limits<double>::epsilon() * largest;
+    for (int k = 0; k + 1 < n; ++k)
+        if (std::abs(e[k]) < least) e[k] = least;
+}
+
+/// Tridiagonal form, all its eigenvalues, the wanted eigenvectors by inverse iteration.
+int symmetric_few(int n, double* a, int k, double* values, double* vectors, double* work) {
+    const auto length = static_cast<size_t>(n);
+    double *d = work, *e = d + length, *tau = e + length, *spare = tau + length;
+    const lapack_int size = tridiagonal_query(n, k);
+    auto* block = reinterpret_cast<lapack_int*>(spare + size);
+    lapack_int *end = block + n, *integers = end + n, *failed = integers + n;
+    if (LAPACKE_dsytrd_work(layout, 'L', n, a, n, d, e, tau, spare, size) != 0) return 1;
+    couple(n, d, e);
+    std::copy(d, d + n, values);
+    std::copy(e, e + n - 1, spare);
+    if (LAPACKE_dsterf_work(n, values, spare) != 0) return 1;
+    std::fill(block, block + n, 1);
+    *end = n;
+    if (LAPACKE_dstein_work(layout, n, d, e, k, values + n - k, block, end, vectors, n, spare, integers, failed) != 0 ||
+        LAPACKE_dormtr_work(layout, 'L', 'L', 'N', n, k, a, n, tau, vectors, n, spare, size) != 0)
+        return 1;
+    reverse_columns(n, k, vectors);
+    return 0;
+}
+
 /// One call of each kernel, so that OpenBLAS takes its buffers now.
 template <class Real> void touch() {
     Real a[64], b[64] = {}, c[64] = {};
@@ -131,6 +185,31 @@ template <class Real> int svd(int rows, int cols, Real* a, Real* u, Real* s, Rea
     const lapack_int size = svd_query<Real>(rows, cols);
     auto* integers = reinterpret_cast<lapack_int*>(work + size);
     return gesdd(rows, cols, a, s, u, vt, std::min(rows, cols), work, size, integers);
+}
+
+size_t symmetric_work(int n, int k) {
+    const auto length = static_cast<size_t>(n);
+    if (few(n, k)) return 3 * length + static_cast<size_t>(tridiagonal_query(n, k)) + 4 * length;
+    lapack_int integers = 0;
+    const lapack_int size = syevd_query(n, &integers);
+    return static_cast<size_t>(size) + static_cast<size_t>(integers);
+}
+
+int symmetric(int n, double* a, int k, double* values, double* vectors, double* work) {
+    if (few(n, k)) {
+        if (symmetric_few(n, a, k, values, vectors, work) != 0) return 1;
+    } else {
+        lapack_int integers = 0;
+        const lapack_int size = syevd_query(n, &integers);
+        if (LAPACKE_dsyevd_work(layout, 'V', 'L', n, a, n, values, work, size,
+                                reinterpret_cast<lapack_int*>(work + size), integers) != 0)
+            return 1;
+        const size_t from = static_cast<size_t>(n - k) * static_cast<size_t>(n);
+        std::copy(a + from, a + static_cast<size_t>(n) * static_cast<size_t>(n), vectors);
+        reverse_columns(n, k, vectors);
+    }
+    std::reverse(values, values + n);
+    return 0;
 }
 
 template <class Real> size_t eigen_work(int n) { return static_cast<size_t>(eigen_query<Real>(n)); }

@@ -260,7 +260,7 @@ static void wrong_use_is_refused(void) {
     bad.fs_hz = 0;
     TEST_ASSERT_EQUAL(0, okid_identify_memsize(&bad));
     bad = good;
-    bad.n_u = 0;
+    bad.n_u = -1;
     TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_identify_create(&s, &bad, small, sizeof small));
     double* v = rig_record(&rig, N, 0.01, NULL, 1);
     prepare(v, N, 500, OKID_DETREND_MEAN); // an order beyond the Hankel matrix is reduced, and said

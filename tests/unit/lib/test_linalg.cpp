@@ -135,6 +135,68 @@ void test_svd_in_any_unit() {
     check_svd(12, 40, static_cast<real>(1e28));
 }
 
+/// All eigenvalues and the eigenvectors of the k largest; what stands above the diagonal must not matter.
+void check_symmetric(int n, int k, const vec<double>& original, double scale) {
+    vec<double> a = original, values(static_cast<size_t>(n)), v(static_cast<size_t>(n * k)),
+                work(la::symmetric_work(n, k));
+    double trace = 0, sum = 0;
+    for (int j = 0; j < n; ++j) {
+        trace += at(original, n, j, j);
+        for (int i = 0; i < j; ++i) a[static_cast<size_t>(j * n + i)] = 1e30;
+    }
+    TEST_ASSERT_EQUAL(0, la::symmetric(n, a.data(), k, values.data(), v.data(), work.data()));
+    for (int i = 0; i < n; ++i) {
+        sum += values[static_cast<size_t>(i)];
+        TEST_ASSERT_TRUE(i == 0 || values[static_cast<size_t>(i)] <= values[static_cast<size_t>(i - 1)]);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14 * scale * n, trace, sum);
+    const vec<double> image = product(original, v, n, n, k);
+    for (int j = 0; j < k; ++j)
+        for (int i = 0; i < n; ++i)
+            TEST_ASSERT_DOUBLE_WITHIN(1e-14 * scale * n, values[static_cast<size_t>(j)] * at(v, n, i, j),
+                                      at(image, n, i, j));
+    for (int j = 0; j < k; ++j)
+        for (int l = 0; l < k; ++l) {
+            double dot = 0;
+            for (int i = 0; i < n; ++i) dot += at(v, n, i, j) * at(v, n, i, l);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-13 * n, j == l, dot);
+        }
+}
+
+void test_symmetric() {
+    for (const int n : {1, 2, 3, 10, 70})
+        for (const int k : {1, std::max(1, n / 4), n}) {
+            const vec<double> r = random_matrix<double>(n, n, static_cast<std::uint64_t>(n));
+            vec<double> a(static_cast<size_t>(n * n));
+            la::multiply(false, true, n, n, n, 1, r.data(), n, r.data(), n, 0, a.data(), n);
+            check_symmetric(n, k, a, n);
+            for (int j = 0; j < n; ++j)
+                for (int i = 0; i < n; ++i) a[static_cast<size_t>(j * n + i)] = at(r, n, i, j) + at(r, n, j, i);
+            check_symmetric(n, k, a, n); // both signs
+        }
+}
+
+/// Of low rank, reducible, with one eigenvalue many times.
+void test_symmetric_degenerate() {
+    constexpr int n = 30;
+    const vec<double> r = random_matrix<double>(n, 4, 6);
+    vec<double> a(n * n, 0);
+    la::multiply(false, true, n, n, 4, 1, r.data(), n, r.data(), n, 0, a.data(), n);
+    for (const int k : {4, 9, n}) check_symmetric(n, k, a, n);
+    vec<double> many(n * n, 0), graded(n * n, 0), blocks(n * n, 0);
+    for (int i = 0; i < n; ++i) {
+        many[static_cast<size_t>(i * n + i)] = i % 3;
+        graded[static_cast<size_t>(i * n + i)] = std::pow(10.0, -i);
+        for (int j = i / 10 * 10; j < i / 10 * 10 + 10; ++j) // three times the same block
+            blocks[static_cast<size_t>(i * n + j)] = 1.0 / (1 + std::abs(i - j));
+    }
+    for (const int k : {5, n}) {
+        check_symmetric(n, k, many, 2);
+        check_symmetric(n, k, graded, 1);
+        check_symmetric(n, k, blocks, 1);
+    }
+}
+
 void check_eigen(int n, const vec<real>& original) {
     vec<real> a = original, re(static_cast<size_t>(n)), im(static_cast<size_t>(n)), v(static_cast<size_t>(n * n)),
               work(la::eigen_work(n));
@@ -180,6 +242,8 @@ int main() {
     RUN_TEST(test_condition<real>);
     RUN_TEST(test_svd);
     RUN_TEST(test_svd_in_any_unit);
+    RUN_TEST(test_symmetric);
+    RUN_TEST(test_symmetric_degenerate);
     RUN_TEST(test_eigen);
     return UNITY_END();
 }

@@ -147,16 +147,15 @@ static void ambient_records_have_modes_and_a_predictor(void) {
     for (int k = 0; k < METHODS; ++k) {
         okid_identify_config_t config = config_of(methods[k], 0, RIG_NZ);
         config.rows = 60;
-        if (methods[k] < OKID_METHOD_N4SID_MOESP) {
-            TEST_ASSERT_EQUAL(0, okid_identify_memsize(&config));
-            continue;
-        }
         create(&config);
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, y, LONG));
         TEST_ASSERT_EQUAL_MESSAGE(OKID_OK, okid_identify_run(identifier, accumulator, &model), name_of(k, "ambient"));
         expect_modes(1e-2, 0.5, 0.5, name_of(k, "ambient"));
         TEST_ASSERT_EQUAL(0, model.markov_count);
         TEST_ASSERT_EQUAL(0, model.n_u);
+        TEST_ASSERT_EQUAL(60, model.p);
+        TEST_ASSERT_NULL(model.observer);
+        for (int o = 0; o < RIG_NY; ++o) TEST_ASSERT_TRUE(model.innovation[o * (RIG_NY + 1)] > 0);
     }
     free(v);
     free(y);

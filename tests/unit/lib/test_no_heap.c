@@ -108,6 +108,62 @@ static void nothing_after_create(void) {
     free(codes);
 }
 
+static void nothing_for_standard_deviations(void) {
+    rig_t rig;
+    rig_make(&rig);
+    double* v = rig_record(&rig, N, 0.02, NULL, 3);
+    const okid_method_t methods[] = {OKID_METHOD_OKID_ERA, OKID_METHOD_N4SID_MOESP};
+    for (size_t k = 0; k < sizeof methods / sizeof *methods; ++k) {
+        okid_jackknife_config_t config = {.identify = {.n_u = RIG_NU,
+                                                       .n_y = RIG_NY,
+                                                       .p = P,
+                                                       .rows = P,
+                                                       .max_order = 20,
+                                                       .fs_hz = RIG_FS,
+                                                       .method = methods[k]}};
+        config.sums = (okid_accumulator_config_t){
+            .n_u = RIG_NU, .n_y = RIG_NY, .lags = okid_identify_lags(&config.identify), .forgetting = 1, .edges = 1};
+        const okid_replicates_config_t sums = {RIG_NU, RIG_NY, 20, NULL};
+        const size_t bytes[] = {okid_accumulator_memsize(&config.sums), okid_accumulator_memsize(&config.sums),
+                                okid_identify_memsize(&config.identify), okid_jackknife_memsize(&config),
+                                okid_replicates_memsize(&sums)};
+        void* blocks[5];
+        for (int i = 0; i < 5; ++i) blocks[i] = malloc(bytes[i]);
+        okid_accumulator_t *whole, *part;
+        okid_identify_t* s;
+        okid_jackknife_t* jackknife;
+        okid_replicates_t* replicates;
+        okid_identified_t full;
+        okid_uncertainty_t out;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&whole, &config.sums, blocks[0], bytes[0]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&part, &config.sums, blocks[1], bytes[1]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&s, &config.identify, blocks[2], bytes[2]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_jackknife_create(&jackknife, &config, blocks[3], bytes[3]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_replicates_create(&replicates, &sums, blocks[4], bytes[4]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(whole, v, N));
+        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(s, whole, &full));
+        const okid_model_t view = {full.n_u, full.n_y, full.n_z, full.A, full.B, full.C, full.D, NULL};
+        const long before = calls;
+        okid_status_t status = okid_replicates_begin(replicates, &view, full.dt);
+        if (status >= 0) status = okid_jackknife_begin(jackknife, whole, &full);
+        for (int n = 0; status >= 0 && n < 10; ++n) {
+            okid_model_t model;
+            double share;
+            okid_accumulator_reset(part);
+            status = okid_accumulator_add(part, v + (size_t)n * 500 * RIG_M, 500);
+            if (status >= 0) status = okid_jackknife_delete(jackknife, part, 1, &model, &share);
+            if (status >= 0) status = okid_replicates_add(replicates, &model, share);
+        }
+        if (status >= 0) status = okid_replicates_finish(replicates, &out);
+        const long after = calls;
+        TEST_ASSERT_GREATER_OR_EQUAL(0, status);
+        TEST_ASSERT_TRUE(out.frequency_std_hz[0] > 0);
+        TEST_ASSERT_EQUAL_MESSAGE(0, after - before, okid_backend());
+        for (int i = 0; i < 5; ++i) free(blocks[i]);
+    }
+    free(v);
+}
+
 static void nothing_in_the_second_kernel(void) {
     rig_t rig;
     rig_make(&rig);
@@ -182,11 +238,62 @@ static void nothing_in_any_method(void) {
     free(v);
 }
 
+static void nothing_without_inputs_nor_in_other_forms(void) {
+    rig_t rig;
+    rig_make(&rig);
+    double* v = rig_record(&rig, N, 0.02, NULL, 3);
+    for (int form = 0; form < 4; ++form) { // outputs only: ERA, ERA/DC; with inputs: innovations, literal
+        const int n_u = form < 2 ? 0 : RIG_NU;
+        const okid_identify_config_t ident = {.n_u = n_u,
+                                              .n_y = RIG_M - n_u,
+                                              .p = 20,
+                                              .rows = 20,
+                                              .fs_hz = RIG_FS,
+                                              .method = form == 1 ? OKID_METHOD_OKID_ERA_DC : OKID_METHOD_OKID_ERA,
+                                              .hankel = form < 2 ? OKID_HANKEL_SYSTEM : (okid_hankel_t)(form - 1)};
+        const okid_accumulator_config_t sums = {
+            .n_u = n_u, .n_y = RIG_M - n_u, .lags = okid_identify_lags(&ident), .forgetting = 1, .edges = 1};
+        const okid_stabilization_config_t shape = {.n_y = RIG_M - n_u, .max_models = 10, .max_poles = 10};
+        const size_t bytes[] = {okid_identify_memsize(&ident), okid_accumulator_memsize(&sums),
+                                okid_stabilization_memsize(&shape)};
+        void *b1 = malloc(bytes[0]), *b2 = malloc(bytes[1]), *b3 = malloc(bytes[2]);
+        okid_identify_t* s;
+        okid_accumulator_t* a;
+        okid_stabilization_t* diagram;
+        okid_identified_t out;
+        okid_stabilized_t clusters;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&s, &ident, b1, bytes[0]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &sums, b2, bytes[1]));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_stabilization_create(&diagram, &shape, b3, bytes[2]));
+        const long before = calls;
+        const okid_status_t added = okid_accumulator_add(a, v, N), found = okid_identify_run(s, a, &out);
+        okid_status_t scanned = OKID_OK;
+        for (int order = 2; order <= 20 && scanned >= 0; order += 2) {
+            scanned = okid_identify_poles(s, order, &out);
+            if (scanned >= 0) scanned = okid_stabilization_add(diagram, &out);
+        }
+        const okid_status_t gathered = okid_stabilization_find(diagram, &clusters);
+        const long after = calls;
+        TEST_ASSERT_EQUAL(OKID_OK, added);
+        TEST_ASSERT_GREATER_OR_EQUAL(0, found);
+        TEST_ASSERT_GREATER_OR_EQUAL(0, scanned);
+        TEST_ASSERT_EQUAL(OKID_OK, gathered);
+        TEST_ASSERT_GREATER_THAN(0, clusters.cluster_count);
+        TEST_ASSERT_EQUAL_MESSAGE(0, after - before, okid_backend());
+        free(b1);
+        free(b2);
+        free(b3);
+    }
+    free(v);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(the_interposer_counts);
     RUN_TEST(nothing_after_create);
+    RUN_TEST(nothing_for_standard_deviations);
     RUN_TEST(nothing_in_the_second_kernel);
     RUN_TEST(nothing_in_any_method);
+    RUN_TEST(nothing_without_inputs_nor_in_other_forms);
     return UNITY_END();
 }

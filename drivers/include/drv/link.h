@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+/// @file link.h
+/// What the kernel tells of a network interface: is it there, is it up, and what its CAN controller is doing.
+#ifndef DRV_LINK_H
+#define DRV_LINK_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// State of a CAN controller by its error counters; unknown for virtual interfaces.
+typedef enum drv_bus_state_t {
+    DRV_BUS_UNKNOWN,
+    DRV_BUS_ACTIVE,
+    DRV_BUS_WARNING, ///< an error counter is above 95
+    DRV_BUS_PASSIVE, ///< above 127: it no longer marks errors of others
+    DRV_BUS_OFF,     ///< above 255: it neither sends nor receives until it is restarted
+    DRV_BUS_STOPPED,
+    DRV_BUS_SLEEPING
+} drv_bus_state_t;
+
+/// "error-active", "bus-off", … as `ip -details link` writes them. Static text.
+const char* drv_bus_state_name(drv_bus_state_t state);
+
+typedef struct drv_link_t {
+    char name[16];
+    char kind[16];        ///< "can", "vcan", "slcan", …, "" when the driver does not tell
+    int32_t index;        ///< of the interface, 0 = there is none
+    uint8_t is_can;       ///< 1 = a CAN interface, virtual ones included
+    uint8_t up;           ///< 1 = administratively up
+    uint8_t running;      ///< 1 = can carry frames now (0 after bus-off)
+    uint8_t gone;         ///< 1 = this message says that the interface was removed
+    uint8_t has_can_data; ///< 1 = the fields from `state` on were told by the driver
+    int32_t mtu;          ///< 16 classic, 72 FD
+    uint32_t tx_queue;    ///< frames the send queue holds (txqueuelen)
+    drv_bus_state_t state;
+    uint8_t listen_only;
+    uint8_t has_error_counters;
+    uint16_t tx_errors, rx_errors;         ///< error counters of the controller now
+    uint32_t bitrate, dbitrate;            ///< bit/s, 0 = not set
+    uint32_t restart_ms;                   ///< 0 = stays off after bus-off
+    uint32_t bus_off_count, restart_count; ///< since the interface exists
+    uint64_t rx_dropped;                   ///< frames the driver dropped
+    uint64_t rx_over_errors;               ///< times the controller's receive queue overran
+} drv_link_t;
+
+/// Ask the kernel for an interface. @return 0, -ENODEV when there is none, or another -errno
+int drv_link_read(const char* interface, drv_link_t* out);
+
+/// A socket that becomes readable whenever an interface of this machine comes, goes or changes. @return fd or -errno
+int drv_link_watch(void);
+
+/// Empty such a socket. @return 1 when the interface named was told of (or messages were lost), with its newest state in
+/// `out` (out->index = 0 when that is not known: read it), else 0
+int drv_link_changes(int fd, const char* interface, drv_link_t* out);
+
+/// Take one rtnetlink message apart. @return 0, or -1 when it does not describe an interface
+int drv_link_parse(const void* message, size_t bytes, drv_link_t* out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

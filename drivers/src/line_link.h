@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+/// @file line_link.h
+/// A serial line that comes back: read by the sources on it, opened again by its path after it was unplugged.
+#ifndef DRV_LINE_LINK_H
+#define DRV_LINE_LINK_H
+
+#include <drv/serial_port.h>
+
+typedef struct line_link_t {
+    drv_serial_t port;
+    char path[DRV_PATH_BYTES];
+    int32_t baud;
+    int64_t next_try_ns; ///< CLOCK_MONOTONIC
+    uint8_t loss;        ///< DRV_LOSS_… of the next frame
+    drv_serial_errors_t seen;
+    uint64_t overruns_before, errors_before; ///< of the times the line was open before
+} line_link_t;
+
+/// @return 0, or -errno with the source's `error` filled
+int line_link_open(line_link_t* self, drv_source_t* source, const drv_line_config_t* config);
+
+/// What has arrived. A line that hung up is closed; it is tried again at most ten times a second.
+/// @param fresh  out: 1 = the line was opened anew just now
+/// @return bytes, 0 = none now
+int line_link_read(line_link_t* self, drv_source_t* source, uint8_t* bytes, size_t capacity, int* fresh);
+
+/// Bring the counts of the hardware up to date; bytes it lost mark the next frame.
+void line_link_count(line_link_t* self, drv_source_t* source);
+
+/// CLOCK_REALTIME, ns.
+int64_t line_link_now(void);
+
+#endif

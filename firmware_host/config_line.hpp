@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// The keys of a CONFIG.toml that belong to serial lines: [[bus]] of type serial and slcan, [[channel]] with a field.
+#pragma once
+#include "config.hpp"
+#include "config_schema.hpp"
+
+namespace okid_host {
+
+/// Device, baud, framing, counter and registers of `bus`; refuses them on a bus of another type.
+void read_line(const config_place& place, const toml::table& table, bus_config& bus);
+
+/// Frame, layout, sequence and unit of a channel of a serial bus.
+void resolve_field(const config_place& place, const toml::table& table, const bus_config& bus, channel_config& channel);
+
+const char* framing_name(drv_framing_t framing);
+
+} // namespace okid_host

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// Standard deviations of a result from replicate models (okid/uncertainty.h), in memory of the host.
+#pragma once
+#include "mass_matrices.hpp"
+
+#include <okid/uncertainty.h>
+
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+constexpr int fewest_blocks = 8; ///< below, a standard deviation says little
+
+/// One standard deviation of each number; NaN where nothing can be said. Laid out as what they belong to.
+struct deviations {
+    int replicates = 0, models = 0; ///< blocks left out; of these, such that left a model
+    std::vector<double> frequency_hz, damping_ratio, shape_re, shape_im;
+    std::vector<double> M, K, R, R_normal; ///< empty without degrees of freedom
+    double alpha = NAN, beta = NAN;
+};
+
+/// Collects replicates of one model after the other. All memory at the start.
+class replicate_statistics {
+  public:
+    /// @param plan  M, K, R too when it wants them
+    replicate_statistics(int n_u, int n_y, int most_states, const mass_plan& plan, double dt);
+
+    void begin(const okid_model_t& full);
+    void add(const okid_model_t* replicate, double share);
+    deviations finish();
+
+  private:
+    double dt_;
+    std::unique_ptr<mkr_arguments> mkr_;
+    std::unique_ptr<std::byte[]> block_;
+    okid_replicates_t* replicates_ = nullptr;
+};
+
+/// Throws `failure` (exit 3) for an error of the sums behind standard deviations.
+void check_statistics(okid_status_t status);
+
+/// The model alone.
+okid_model_t model_view(const okid_identified_t& model);
+
+/// "±0.00012", or "-" where nothing is known.
+std::string plus_minus(double deviation);
+
+/// The deviations of M, K, R, alpha and beta to where the matrices are.
+void add_deviations(const deviations& found, mass_matrices& to);
+
+} // namespace okid_host

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: MIT
+#include "blocks.hpp"
+
+#include "../error.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <new>
+
+namespace okid_host {
+namespace {
+
+constexpr double remembered = 0.99; // share of a fading memory that the blocks cover
+
+std::unique_ptr<std::byte[]> allocate(std::size_t bytes, int blocks) {
+    std::unique_ptr<std::byte[]> block(bytes > 0 ? new (std::nothrow) std::byte[bytes] : nullptr);
+    if (!block)
+        throw failure(
+            exit_usage,
+            fmt::format("[identification]: the sums of {} blocks for standard deviations need {:.1f} GB each; "
+                        "lower p or rows, or set sigma_blocks = 0",
+                        blocks, static_cast<double>(bytes) / 1e9));
+    return block;
+}
+
+} // namespace
+
+live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks)
+    : whole_(whole), sums_(whole), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),
+      blocks_(static_cast<std::size_t>(blocks)), n_u_(whole.n_u), n_y_(whole.n_y),
+      most_states_(okid_identify_max_order(&identify)), dt_(1 / identify.fs_hz) {
+    if (window()) sums_.block = sums_.slots = sums_.spare_slots = 0;
+    length_ = whole.lags;
+    if (fading()) { // whole slots, so many that all blocks together cover what is remembered
+        const double rows = std::log(1 - remembered) / std::log(whole.forgetting) / (2 * blocks);
+        length_ = std::max<std::int64_t>(1, std::llround(rows / whole.block)) * whole.block;
+    }
+    const std::size_t count = window() ? 2 : fading() ? 2 * blocks_ + 1 : 2 * blocks_;
+    for (std::size_t k = 0; k < count; ++k) parts_.push_back(make());
+    const okid_jackknife_config_t config{identify, sums_};
+    const std::size_t bytes = okid_jackknife_memsize(&config);
+    jackknife_block_ = allocate(bytes, blocks);
+    if (okid_jackknife_create(&jackknife_, &config, jackknife_block_.get(), bytes) != OKID_OK)
+        throw failure(exit_usage, "[identification]: the sums for standard deviations cannot be made");
+    modes_ = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, mass_plan{}, dt_);
+}
+
+live_blocks::part live_blocks::make() const {
+    const std::size_t bytes = okid_accumulator_memsize(&sums_);
+    part out;
+    out.block = allocate(bytes, static_cast<int>(blocks_));
+    if (okid_accumulator_create(&out.sums, &sums_, out.block.get(), bytes) != OKID_OK)
+        throw failure(exit_usage, "[identification]: the sums for standard deviations cannot be made");
+    return out;
+}
+
+void live_blocks::set_units(const std::vector<double>& scale, const std::vector<double>& offset) {
+    for (part& each : parts_) okid_accumulator_set_units(each.sums, scale.data(), offset.data());
+}
+
+std::size_t live_blocks::room(const okid_accumulator_t* whole, std::size_t count) const {
+    if (window()) return count;
+    const std::int64_t left = fading()
+                                  ? whole_.block - okid_accumulator_slot_rows(whole, okid_accumulator_slots(whole) - 1)
+                                  : length_ - okid_accumulator_rows(parts_[open_].sums);
+    return std::min(count, static_cast<std::size_t>(std::max<std::int64_t>(1, left)));
+}
+
+template <class Number>
+void live_blocks::add(const okid_accumulator_t* whole, const Number* samples, std::size_t count) {
+    if (window()) return;
+    check_statistics(add_samples(parts_[open_].sums, samples, count));
+    const std::size_t most = static_cast<std::size_t>(whole_.lags) * m_, numbers = count * m_;
+    const std::size_t kept = numbers >= most ? 0 : std::min(history_.size(), most - numbers);
+    history_.erase(history_.begin(), history_.end() - static_cast<std::ptrdiff_t>(kept));
+    history_.insert(history_.end(), samples + (numbers - std::min(numbers, most)), samples + numbers);
+    turn(whole);
+}
+
+template void live_blocks::add(const okid_accumulator_t*, const std::int16_t*, std::size_t);
+template void live_blocks::add(const okid_accumulator_t*, const double*, std::size_t);
+
+void live_blocks::gap(const okid_accumulator_t* whole, std::int64_t count) {
+    if (window()) return;
+    okid_accumulator_gap(parts_[open_].sums, count);
+    history_.clear();
+    turn(whole);
+}
+
+/// Begin another part when the open one is full; of a fading memory only where a slot of the whole ended.
+void live_blocks::turn(const okid_accumulator_t* whole) {
+    const std::int64_t open_rows = okid_accumulator_slot_rows(whole, okid_accumulator_slots(whole) - 1);
+    if (okid_accumulator_rows(parts_[open_].sums) < length_ || (fading() && open_rows > 0)) return;
+    parts_[open_].closed_at = okid_accumulator_rows(whole) - open_rows;
+    if (++open_ == parts_.size()) {
+        if (fading()) {
+            std::rotate(parts_.begin(), parts_.begin() + 1, parts_.end());
+            --open_;
+        } else {
+            pair_up();
+        }
+    }
+    begin_part();
+}
+
+void live_blocks::begin_part() {
+    okid_accumulator_t* sums = parts_[open_].sums;
+    okid_accumulator_reset(sums);
+    const std::size_t count = history_.size() / m_;
+    if (whole_.sample == OKID_SAMPLE_INT16) {
+        const std::vector<std::int16_t> codes(history_.begin(), history_.end());
+        check_statistics(okid_accumulator_add_i16(sums, codes.data(), count));
+    } else {
+        check_statistics(okid_accumulator_add(sums, history_.data(), count));
+    }
+}
+
+/// All parts are full: neighbours become one, of twice the length.
+void live_blocks::pair_up() {
+    for (std::size_t k = 0; k < blocks_; ++k) {
+        check_statistics(okid_accumulator_merge(parts_[2 * k].sums, parts_[2 * k + 1].sums));
+        std::swap(parts_[k], parts_[2 * k]);
+    }
+    open_ = blocks_;
+    length_ *= 2;
+}
+
+void live_blocks::leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to) {
+    if (okid_accumulator_rows(one) == 0) return;
+    okid_model_t found{};
+    double share = 0;
+    const okid_status_t status = okid_jackknife_delete(jackknife_, one, weight, &found, &share);
+    if (share > 0) to.add(status < 0 ? nullptr : &found, share);
+}
+
+void live_blocks::delete_parts(okid_accumulator_t* whole, replicate_statistics& to) {
+    const std::int64_t closed =
+        okid_accumulator_rows(whole) - okid_accumulator_slot_rows(whole, okid_accumulator_slots(whole) - 1);
+    for (std::size_t k = 0; k <= open_; ++k) {
+        const double age = k < open_ ? static_cast<double>(closed - parts_[k].closed_at) : 0;
+        leave_out(parts_[k].sums, fading() ? std::pow(whole_.forgetting, age) : 1, to);
+    }
+}
+
+/// Groups of consecutive slots with about equal rows.
+void live_blocks::delete_slots(okid_accumulator_t* whole, replicate_statistics& to) {
+    const std::int32_t slots = okid_accumulator_slots(whole);
+    const std::int64_t rows = okid_accumulator_rows(whole);
+    std::int64_t seen = 0;
+    for (std::int32_t first = 0, group = 1; first < slots; ++group) {
+        std::int32_t last = first;
+        do seen += okid_accumulator_slot_rows(whole, last++);
+        while (last < slots && seen * static_cast<std::int64_t>(blocks_) < group * rows);
+        okid_accumulator_reset(parts_[1].sums);
+        if (okid_accumulator_take_slots(parts_[1].sums, whole, first, last - first) == OKID_OK)
+            leave_out(parts_[1].sums, 1, to);
+        first = last;
+    }
+}
+
+std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, const okid_identified_t& model,
+                                             const mass_plan& plan) {
+    okid_accumulator_t* all = whole;
+    if (window()) {
+        all = parts_[0].sums;
+        okid_accumulator_reset(all);
+        if (okid_accumulator_take_slots(all, whole, 0, okid_accumulator_slots(whole)) != OKID_OK) return std::nullopt;
+    }
+    if (okid_jackknife_begin(jackknife_, all, &model) != OKID_OK) return std::nullopt;
+    std::unique_ptr<replicate_statistics> with_mass;
+    if (plan.wanted()) with_mass = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, plan, dt_);
+    replicate_statistics& statistics = with_mass ? *with_mass : *modes_;
+    statistics.begin(model_view(model));
+    if (window())
+        delete_slots(whole, statistics);
+    else
+        delete_parts(whole, statistics);
+    deviations out = statistics.finish();
+    if (out.replicates < fewest_blocks) return std::nullopt;
+    return out;
+}
+
+} // namespace okid_host

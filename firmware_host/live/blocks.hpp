@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// The blocks of a running stream that are left out in turn for standard deviations. A window has them in its slots; for a
+// growing or fading memory each block has an accumulator of its own beside the whole. All memory at the start.
+#pragma once
+#include "../deviations.hpp"
+
+#include <okid/accumulator.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace okid_host {
+
+inline okid_status_t add_samples(okid_accumulator_t* to, const std::int16_t* samples, std::size_t count) {
+    return okid_accumulator_add_i16(to, samples, count);
+}
+inline okid_status_t add_samples(okid_accumulator_t* to, const double* samples, std::size_t count) {
+    return okid_accumulator_add(to, samples, count);
+}
+
+class live_blocks {
+  public:
+    /// @param whole   of the stream
+    /// @param blocks  to leave out: a window has about so many, a growing memory from so many to twice as many, a fading
+    ///                one twice as many, because the young ones weigh most. Throws `failure` (exit 2) when the memory
+    ///                does not suffice
+    live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks);
+
+    void set_units(const std::vector<double>& scale, const std::vector<double>& offset);
+
+    /// How many of `count` samples may go into the whole before the next call of add().
+    std::size_t room(const okid_accumulator_t* whole, std::size_t count) const;
+    /// The same samples that went into the whole just now; likewise what is missing.
+    template <class Number> void add(const okid_accumulator_t* whole, const Number* samples, std::size_t count);
+    void gap(const okid_accumulator_t* whole, std::int64_t count);
+
+    /// Standard deviations of `model`, identified from `whole`; none with too few blocks.
+    std::optional<deviations> sigma(okid_accumulator_t* whole, const okid_identified_t& model, const mass_plan& plan);
+
+  private:
+    struct part {
+        std::unique_ptr<std::byte[]> block;
+        okid_accumulator_t* sums = nullptr;
+        std::int64_t closed_at = 0; ///< rows in closed slots of the whole when it ended
+    };
+    bool window() const { return whole_.slots > 0; }
+    bool fading() const { return whole_.forgetting < 1; }
+    part make() const;
+    void turn(const okid_accumulator_t* whole);
+    void begin_part();
+    void pair_up();
+    void delete_parts(okid_accumulator_t* whole, replicate_statistics& to);
+    void delete_slots(okid_accumulator_t* whole, replicate_statistics& to);
+    void leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to);
+
+    okid_accumulator_config_t whole_, sums_{};
+    std::size_t m_, blocks_;
+    std::int64_t length_ = 0; ///< rows of a part
+    std::vector<part> parts_; ///< parts_[open_] grows; window: all slots together, then one group of them
+    std::size_t open_ = 0;
+    std::vector<double> history_; ///< the last samples of the run, at most `lags`
+    std::unique_ptr<std::byte[]> jackknife_block_;
+    okid_jackknife_t* jackknife_ = nullptr;
+    std::unique_ptr<replicate_statistics> modes_;
+    int n_u_, n_y_, most_states_;
+    double dt_;
+};
+
+} // namespace okid_host

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: MIT
+#include "record_refine.hpp"
+
+#include "record_fit.hpp"
+
+#include <okid/modal.h>
+#include <okid/refine.h>
+#include <okid/skew.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+constexpr int blocks = 20;
+constexpr std::size_t most_runs = 32;
+constexpr double same_percent = 0.01; ///< fits closer than this are the same
+constexpr double lost_percent = 0.5;  ///< a loss of prediction worth a remark
+
+std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
+
+/// Stretches without a missing input, the longest where there are too many, one after the other.
+struct driven_runs {
+    std::vector<std::int32_t> counts;
+    std::vector<double> samples;
+
+    driven_runs(const std::vector<record_data>& records, std::size_t n_u, std::size_t n_y, std::size_t least) {
+        std::vector<std::pair<const record_data*, stretch>> all;
+        for (const record_data& record : records)
+            for (const stretch& piece : stretches_of(record, n_u, least)) all.emplace_back(&record, piece);
+        std::stable_sort(all.begin(), all.end(),
+                         [](const auto& a, const auto& b) { return a.second.count > b.second.count; });
+        all.resize(std::min(all.size(), most_runs));
+        for (const auto& [record, piece] : all) {
+            counts.push_back(static_cast<std::int32_t>(piece.count));
+            const std::size_t first = samples.size();
+            samples.resize(first + piece.count * (n_u + n_y));
+            interleave(*record, n_u, n_y, piece.first, piece.count, samples.data() + first);
+        }
+    }
+};
+
+/// Mean over the outputs; an output that cannot be simulated counts as no fit at all.
+double mean_of(const std::optional<std::vector<double>>& percent) {
+    double sum = 0;
+    for (const double value : percent.value_or(std::vector<double>{})) sum += std::isfinite(value) ? value : -INFINITY;
+    return percent && !percent->empty() ? sum / static_cast<double>(percent->size()) : -INFINITY;
+}
+
+/// The library's refinement and what it made.
+class refiner {
+  public:
+    refiner(const driven_runs& runs, const okid_identified_t& start, bool constants)
+        : n_u_(start.n_u), n_y_(start.n_y), n_z_(start.n_z) {
+        const okid_refine_config_t config{
+            n_u_, n_y_, n_z_, static_cast<std::int32_t>(runs.counts.size()), blocks, 0, constants ? 1 : 0};
+        block_.resize(okid_refine_memsize(&config));
+        status = okid_refine_create(&refine_, &config, block_.data(), block_.size());
+        const okid_model_t model = model_view(start);
+        if (status >= 0) status = okid_refine_run(refine_, &model, runs.counts.data(), runs.samples.data(), &found);
+    }
+
+    std::vector<replicate_model> replicates() {
+        std::vector<replicate_model> out;
+        for (int b = 0; b < blocks; ++b) {
+            replicate_model one;
+            one.share = 1.0 / blocks;
+            one.n_u = n_u_;
+            one.n_y = n_y_;
+            one.A.resize(size_of(n_z_) * size_of(n_z_));
+            one.B.resize(size_of(n_z_) * size_of(n_u_));
+            one.C.resize(size_of(n_y_) * size_of(n_z_));
+            one.D.resize(size_of(n_y_) * size_of(n_u_));
+            if (okid_refine_replicate(refine_, b, one.A.data(), one.B.data(), one.C.data(), one.D.data()) >= 0)
+                one.n_z = n_z_;
+            out.push_back(std::move(one));
+        }
+        return out;
+    }
+
+    okid_status_t status;
+    okid_refined_t found{};
+
+  private:
+    int n_u_, n_y_, n_z_;
+    std::vector<std::byte> block_;
+    okid_refine_t* refine_ = nullptr;
+};
+
+/// D, C B, C A B …
+void find_markov(const okid_model_t& m, int count, std::vector<double>& out) {
+    std::vector<double> u(size_of(m.n_u) * size_of(count)), y(size_of(m.n_y) * size_of(count));
+    std::vector<double> work(okid_model_workspace(&m));
+    const std::size_t block = size_of(m.n_y) * size_of(m.n_u);
+    out.assign(block * size_of(count), 0);
+    for (int c = 0; c < m.n_u; ++c) { // the answer to a unit impulse at each input
+        std::fill(u.begin(), u.end(), 0.0);
+        u[size_of(c)] = 1;
+        if (okid_model_simulate(&m, u.data(), size_of(count), nullptr, y.data(), work.data()) < 0) return;
+        for (std::size_t k = 0; k < size_of(count); ++k)
+            std::copy_n(&y[k * size_of(m.n_y)], m.n_y, &out[k * block + size_of(c) * size_of(m.n_y)]);
+    }
+}
+
+std::complex<double> pole_of(double frequency, double damping) {
+    return std::polar(frequency, std::acos(-std::clamp(damping, -1.0, 1.0)));
+}
+
+/// Modes of the model in `to`; each keeps the EMAC of the nearest pole of `start`. @return false: there are none
+bool find_modes(const okid_identified_t& start, refined_arrays& to, okid_identified_t& model) {
+    const std::size_t most = size_of(model.n_z / 2);
+    for (auto* column : {&to.frequency, &to.damping, &to.mpc, &to.emac}) column->assign(most, 0);
+    for (auto* shape : {&to.shape_re, &to.shape_im}) shape->assign(most * size_of(model.n_y), 0);
+    std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
+    if (okid_modal_analyse(model.n_y, model.n_z, model.dt, model.A, model.C, &model.mode_count, to.frequency.data(),
+                           to.damping.data(), to.mpc.data(), to.shape_re.data(), to.shape_im.data(), nullptr, nullptr,
+                           nullptr, nullptr, &model.model_radius, work.data(), work.size()) < 0)
+        return false;
+    for (std::size_t k = 0; k < size_of(model.mode_count); ++k) {
+        double nearest = INFINITY;
+        for (int j = 0; j < start.mode_count; ++j) {
+            const double distance = std::abs(pole_of(to.frequency[k], to.damping[k]) -
+                                             pole_of(start.frequency_hz[j], start.damping_ratio[j]));
+            if (distance >= nearest) continue;
+            nearest = distance;
+            to.emac[k] = start.emac[j];
+        }
+    }
+    return true;
+}
+
+/// `start` with the refined model in its place, the arrays in `to`.
+bool make_model(const okid_identified_t& start, const okid_refined_t& found, refined_arrays& to,
+                okid_identified_t& model) {
+    const std::size_t n_z = size_of(start.n_z), n_u = size_of(start.n_u), n_y = size_of(start.n_y);
+    to.A.assign(found.A, found.A + n_z * n_z);
+    to.B.assign(found.B, found.B + n_z * n_u);
+    to.C.assign(found.C, found.C + n_y * n_z);
+    to.D.assign(found.D, found.D + n_y * n_u);
+    to.K.assign(n_z * n_y, 0);
+    if (start.K != nullptr) std::copy_n(start.K, to.K.size(), to.K.data());
+    model = start;
+    model.A = to.A.data();
+    model.B = to.B.data();
+    model.C = to.C.data();
+    model.D = to.D.data();
+    model.K = to.K.data();
+    if (!find_modes(start, to, model)) return false;
+    model.frequency_hz = to.frequency.data();
+    model.damping_ratio = to.damping.data();
+    model.mpc = to.mpc.data();
+    model.emac = to.emac.data();
+    model.shape_re = to.shape_re.data();
+    model.shape_im = to.shape_im.data();
+    find_markov(model_view(model), model.markov_count, to.markov);
+    model.markov = to.markov.data();
+    return true;
+}
+
+/// The fits with the Kalman gain of the start, or with none (the model alone) where that predicts better.
+void choose_gain(const std::vector<record_data>& records, double before, refined_arrays& arrays, record_result& trial) {
+    trial.model.warnings &= ~std::uint32_t{OKID_NOTE_PREDICTOR_UNSTABLE};
+    fit_records(records, trial);
+    const double now = mean_of(trial.context.prediction_percent);
+    if (std::isfinite(now) && now >= before - same_percent) return;
+    std::vector<double> gain(arrays.K.size(), 0.0);
+    std::swap(gain, arrays.K);
+    trial.model.K = arrays.K.data();
+    const result_context with_gain = trial.context;
+    fit_records(records, trial);
+    if (mean_of(trial.context.prediction_percent) > now) return;
+    std::swap(gain, arrays.K);
+    trial.model.K = arrays.K.data();
+    trial.context = with_gain;
+}
+
+void remark_on(const refinement& found, double before, double after, remarks& said) {
+    if (!found.converged)
+        said.emplace_back("refine_unconverged",
+                          fmt::format("the refinement did not come to an end in {} steps (log-likelihood {:+.1f}, "
+                                      "{:.2g} left): the best model reached is given. Structure and record do not fit "
+                                      "each other well: try another --order",
+                                      found.iterations, found.gain, found.decrement));
+    if (after < before - lost_percent)
+        said.emplace_back("prediction_lower",
+                          fmt::format("the one-step prediction of the refined model is {:.2f} % on average instead of "
+                                      "{:.2f} %: refinement is about the simulation. For a predictor, identify "
+                                      "without --refine",
+                                      after, before));
+}
+
+refinement report(const okid_refined_t& found, int n_y) {
+    refinement out;
+    out.iterations = found.iterations;
+    out.converged = found.converged != 0;
+    out.samples = found.samples;
+    out.gain = found.gain;
+    out.decrement = found.decrement;
+    out.whiteness = found.whiteness;
+    out.noise_std.assign(found.noise_std, found.noise_std + n_y);
+    return out;
+}
+
+} // namespace
+
+std::vector<replicate_model> refine_model(const std::vector<record_data>& records, bool constants,
+                                          record_result& result) {
+    const okid_identified_t start = result.model;
+    const driven_runs runs(records, size_of(start.n_u), size_of(start.n_y),
+                           std::max<std::size_t>(20, 2 * size_of(start.n_z)));
+    std::string reason = "it simulates the record worse";
+    for (const bool with : {true, false}) {
+        if (with && !constants) continue;
+        refiner one(runs, start, with);
+        if (one.status < 0) {
+            reason = okid_status_text(one.status);
+            break;
+        }
+        record_result trial;
+        auto arrays = std::make_shared<refined_arrays>();
+        if (!make_model(start, one.found, *arrays, trial.model)) continue;
+        const double predicted = mean_of(result.context.prediction_percent);
+        choose_gain(records, predicted, *arrays, trial);
+        if (!(mean_of(trial.context.simulation_percent) >= mean_of(result.context.simulation_percent) - same_percent))
+            continue;
+        result.model = trial.model;
+        result.refined = std::move(arrays);
+        result.context.x0 = std::move(trial.context.x0);
+        result.context.simulation_percent = std::move(trial.context.simulation_percent);
+        result.context.prediction_percent = std::move(trial.context.prediction_percent);
+        result.context.refined = report(one.found, start.n_y);
+        remark_on(*result.context.refined, predicted, mean_of(result.context.prediction_percent),
+                  result.context.warnings);
+        return one.replicates();
+    }
+    result.context.warnings.emplace_back(
+        "refine_failed", fmt::format("the model is as identified, the refinement was of no use: {}", reason));
+    return {};
+}
+
+okid_identified_t without_skew(const std::vector<replicate_model>& replicates, const mass_plan& plan,
+                               record_result& result) {
+    okid_identified_t model = result.model;
+    const mkr_arguments given(plan, model.dt);
+    const okid_skew_config_t config{model.n_u, model.n_y, model.n_z, static_cast<std::int32_t>(replicates.size()),
+                                    &given.config};
+    std::vector<std::byte> block(okid_skew_memsize(&config));
+    okid_skew_t* skew = nullptr;
+    const okid_model_t full = model_view(model);
+    okid_status_t status = okid_skew_create(&skew, &config, block.data(), block.size());
+    if (status >= 0) status = okid_skew_begin(skew, &full);
+    for (std::size_t i = 0; status >= 0 && i < replicates.size(); ++i) {
+        const okid_model_t one = replicates[i].view();
+        status = okid_skew_add(skew, &one);
+    }
+    okid_skew_result_t raw{};
+    if (status >= 0) status = okid_skew_finish(skew, &raw);
+    if (status < 0) return model; // M, K and R say what is wrong with the modes
+    channel_skew found;
+    for (std::int32_t i = 0; i < raw.n_y; ++i) {
+        found.us.push_back(1e6 * raw.delay[i]);
+        found.std_us.push_back(1e6 * raw.std[i]);
+    }
+    found.late.assign(raw.late, raw.late + raw.n_y);
+    found.too_large.assign(raw.too_large, raw.too_large + raw.n_y);
+    found.undetermined = raw.undetermined != 0;
+    found.scatter = raw.scatter;
+    const remarks said = skew_remarks(found, result.context.outputs);
+    result.context.warnings.insert(result.context.warnings.end(), said.begin(), said.end());
+    result.context.skew = std::move(found);
+    if (raw.corrected == 0) return model;
+    refined_arrays& arrays = *result.refined;
+    arrays.C_without_skew.resize(arrays.C.size());
+    arrays.D_without_skew.resize(arrays.D.size());
+    if (okid_skew_correct(skew, arrays.C_without_skew.data(), arrays.D_without_skew.data()) < 0) return model;
+    model.C = arrays.C_without_skew.data();
+    model.D = arrays.D_without_skew.data();
+    return model;
+}
+
+} // namespace okid_host

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+/// @file uncertainty.h
+/// Standard deviations of everything that is printed: frequencies, damping ratios, shapes, M, K, R, alpha, beta, from
+/// models of the same record with one block of it left out (delete-one-block jackknife).
+///
+/// With theta_j the estimate without block j and W_j the share of the information that stood in it,
+///   var theta = sum_j (1 - W_j)^2 (theta_j - c)^2 / sum_j W_j (1 - W_j),  c = sum_j (1 - W_j) theta_j / sum_j (1 - W_j),
+/// which is (g-1)/g sum (theta_j - mean)^2 for g equal blocks and holds for unequal and for fading blocks too. What is
+/// printed is one standard deviation: a 95 % interval is theta +- 1.96 of them. Scatter only: the bias of a finite p is
+/// not seen.
+#ifndef OKID_UNCERTAINTY_H
+#define OKID_UNCERTAINTY_H
+
+#include <okid/identify.h>
+#include <okid/mkr.h>
+#include <okid/model.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// The sums of squared deviations of replicate models from the full one. Private; lives in the caller's block.
+typedef struct okid_replicates okid_replicates_t;
+
+typedef struct okid_replicates_config_t {
+    int32_t n_u, n_y;             ///< >= 0, >= 1
+    int32_t n_z;                  ///< largest order of a model that will come, >= 1
+    const okid_mkr_config_t* mkr; ///< for M, K, R, alpha, beta; NULL: modes only. Used until finish(), not copied
+} okid_replicates_config_t;
+
+/// What finish() found; the arrays live in the object until the next begin(). NaN where nothing can be said: the mode was
+/// missing in replicates that hold more than a quarter of the information, or fewer than three replicates came.
+typedef struct okid_uncertainty_t {
+    int32_t replicates; ///< calls of add()
+    int32_t models;     ///< of these, with a usable model
+    int32_t mode_count; ///< modes of the full model, in the order of okid_modal_analyse()
+    int32_t n_y;
+    int32_t n_x;                         ///< 0 without M, K, R
+    int32_t mkr_used;                    ///< replicates that gave M, K, R
+    const int32_t* used;                 ///< mode_count: replicates in which the mode was found
+    const okid_real_t* frequency_std_hz; ///< mode_count
+    const okid_real_t* damping_ratio_std;
+    const okid_real_t *shape_re_std, *shape_im_std; ///< n_y x mode_count; 0 at the largest entry, which is 1 by scaling
+    const okid_real_t *M_std, *K_std, *R_std, *R_normal_std; ///< n_x x n_x, or NULL
+    double alpha_std, beta_std;                              ///< 1/s, s; NaN without M, K, R
+} okid_uncertainty_t;
+
+/// Bytes okid_replicates_create() needs; 0 when the configuration is invalid.
+OKID_API size_t okid_replicates_memsize(const okid_replicates_config_t* config);
+OKID_NODISCARD OKID_API okid_status_t okid_replicates_create(okid_replicates_t** self,
+                                                             const okid_replicates_config_t* config, void* block,
+                                                             size_t bytes);
+
+/// Start anew from the model that everything is compared with: its modes, and its M, K, R where they are wanted.
+/// @param full  in, A, C, and for M, K, R also B, D (K is not read); n_u, n_y as configured, 1 <= n_z <= configured
+/// @param dt    s
+/// @return OKID_OK; OKID_WARN_MODEL: M, K, R of this model cannot be had, there will be no deviation of them;
+///         OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_NUMERIC (no modes either: add() will only count)
+OKID_NODISCARD OKID_API okid_status_t okid_replicates_begin(okid_replicates_t* self, const okid_model_t* full,
+                                                            double dt);
+
+/// Add a model of the record without one block. Its modes are matched to the full model's one to one, nearest poles and
+/// most alike shapes first (within 10 % of the frequency, MAC at least 0.5), and its shapes turned and scaled alike.
+/// @param replicate  in, any realization of any order <= configured; NULL: there is none (the block was indispensable)
+/// @param share      share of the information in the block that was left out, 0 < share < 1; those of all blocks add
+///                   up to 1 (1/g for g equal blocks)
+/// @return OKID_OK; OKID_WARN_MODEL: a mode, or M, K, R, is missing in this replicate (counted); OKID_ERR_NULL,
+///         OKID_ERR_DIM (also a share out of range). Cost of okid_modal_analyse() and okid_mkr_identify()
+OKID_NODISCARD OKID_API okid_status_t okid_replicates_add(okid_replicates_t* self, const okid_model_t* replicate,
+                                                          double share);
+
+/// Standard deviations of what was added so far; more may be added after it.
+/// @return OKID_OK; OKID_WARN_MODEL: some are NaN; OKID_ERR_NULL
+OKID_NODISCARD OKID_API okid_status_t okid_replicates_finish(okid_replicates_t* self, okid_uncertainty_t* out);
+
+/// Models without one block each, out of sums alone: from an accumulator of the whole record and one of each part. Private;
+/// lives in the caller's block.
+typedef struct okid_jackknife okid_jackknife_t;
+
+typedef struct okid_jackknife_config_t {
+    okid_identify_config_t identify; ///< of the full model; its `order` is not read
+    okid_accumulator_config_t sums;  ///< of the whole: okid_accumulator_config(). edges = 1, slots = 0
+} okid_jackknife_config_t;
+
+/// Bytes okid_jackknife_create() needs, those of an identifier and of an accumulator; 0 when the configuration is invalid.
+OKID_API size_t okid_jackknife_memsize(const okid_jackknife_config_t* config);
+OKID_NODISCARD OKID_API okid_status_t okid_jackknife_create(okid_jackknife_t** self,
+                                                            const okid_jackknife_config_t* config, void* block,
+                                                            size_t bytes);
+
+/// @param whole  the whole record; it must stay as it is until the last okid_jackknife_delete()
+/// @param full   its model, of which the order and the ridge are kept: every replicate has them
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM (order), OKID_ERR_MISMATCH, OKID_ERR_TOO_SHORT
+OKID_NODISCARD OKID_API okid_status_t okid_jackknife_begin(okid_jackknife_t* self, okid_accumulator_t* whole,
+                                                           const okid_identified_t* full);
+
+/// The model of the whole without one part.
+/// @param part    in, the sums of the part; see okid_accumulator_remove(), also for `weight`
+/// @param model   out, valid until the next call (K is NULL)
+/// @param share   out, share of the information in the part: of the energy of the channels, each counting alike, so
+///                that a part with a hammer blow weighs more than one of ringing down
+/// @return OKID_OK; OKID_ERR_NULL, OKID_ERR_MISMATCH; the errors of okid_identify_run(): without this part there is no
+///         model (then `share` is valid, for okid_replicates_add(NULL))
+OKID_NODISCARD OKID_API okid_status_t okid_jackknife_delete(okid_jackknife_t* self, okid_accumulator_t* part,
+                                                            double weight, okid_model_t* model, double* share);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

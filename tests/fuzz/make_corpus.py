@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""Small valid inputs for the fuzzers to start from. usage: make_corpus.py FOLDER (gets one folder a fuzzer)."""
+
+from __future__ import annotations
+
+import random
+import struct
+import sys
+from pathlib import Path
+
+CONFIG = """[acquisition]
+rate_hz = 1000.0
+title = "t"
+[[bus]]
+name = "can0"
+type = "socketcan"
+interface = "vcan0"
+bitrate = 500000
+sync_hz = 100.0
+sync_data = "01"
+start = ["000#0100"]
+[[channel]]
+name = "f"
+role = "force"
+dof = 1
+unit = "N"
+can_id = 256
+start_bit = 0
+length = 16
+signed = true
+scale = 0.01
+sequence = { start_bit = 48, length = 16 }
+[[channel]]
+name = "a"
+role = "acceleration"
+can_id = 0x18F02D00
+extended = true
+start_bit = 7
+length = 32
+byte_order = "big"
+value = "float32"
+[identification]
+method = "okid-era"
+p = 20
+order = "auto"
+window_s = 2.0
+mkr = true
+"""
+LINE_CONFIG = """[acquisition]
+rate_hz = 100
+[[bus]]
+name = "s"
+type = "serial"
+device = "/dev/ttyUSB0"
+baud = 115200
+framing = "ascii"
+[[channel]]
+name = "a"
+role = "acceleration"
+field = 0
+"""
+DBC = """VERSION "1"
+NS_ :
+BS_:
+BU_: A B
+BO_ 256 Shaker: 8 A
+ SG_ Force : 0|16@1- (0.01,0) [-100|100] "N" B
+ SG_ Counter : 48|16@1+ (1,0) [0|65535] "" B
+BO_ 2565877015 Imu: 8 A
+ SG_ Page M : 0|8@1+ (1,0) [0|255] "" B
+ SG_ X m1 : 15|32@0- (1,0) [0|0] "g" B
+SIG_VALTYPE_ 2565877015 X : 1;
+CM_ BO_ 256 "a ; comment";
+VAL_ 256 Counter 0 "zero" 1 "one" ;
+"""
+CSV = [
+    "# fs_hz: 100\ntime_s,acc1 [g],f\n0,1,2\n0.01,-1.5e-3,nan\n0.02,,7\n",
+    '\ufeff"a b";c\r\n1,5;2\r\n',
+    "# sample_rate_hz = 50\na\tb\n1\t2\n",
+]
+LOG = [
+    "(1700000000.123456) can0 123#0011223344556677\n",
+    "(1700000000.123456789) vcan0 18F02D00##3" + "AB" * 64 + "\n(2) can1 123#R4\n",
+    "(1) can0 20000040#0000000000000000 R\n",
+]
+LINES = ["t12380011223344556677\r", "T18F02D008001122334455667701F4\r", "r1238\rz\r", "d1239" + "00" * 12 + "\r"]
+
+
+def signals(count: int) -> list[bytes]:
+    dice = random.Random(1)
+    return [
+        struct.pack("<HBB", dice.randrange(64), dice.randrange(1, 65), dice.randrange(16))
+        + struct.pack("<d", dice.choice([1.0, 0.01, -2.5]))
+        + bytes([128, 8])
+        + dice.randbytes(8)
+        for _ in range(count)
+    ]
+
+
+def main() -> int:
+    top = Path(sys.argv[1])
+    seeds: dict[str, list[bytes]] = {
+        "codec": signals(16),
+        "candump": [text.encode() for text in LOG],
+        "config": [CONFIG.encode(), LINE_CONFIG.encode()],
+        "dbc": [DBC.encode(), DBC.replace("\n", "\r\n").encode()],
+        "csv": [text.encode() for text in CSV],
+        "slcan": [text.encode() for text in LINES],
+        "ascii": [b"\x00\x011.23,4.56\r\n7;8;9\nx:1 y:2\n", b"\x01\x081,2,3\n2,4,5\n"],
+        "witmotion": [b"\x00\x01" + bytes([0x55, 0x51, 1, 0, 2, 0, 3, 0, 4, 0]) + bytes([(0x55 + 0x51 + 10) & 255])],
+    }
+    for name, inputs in seeds.items():
+        folder = top / f"fuzz_{name}"
+        folder.mkdir(parents=True, exist_ok=True)
+        for number, data in enumerate(inputs):
+            (folder / f"seed{number}").write_bytes(data)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+// Messages of rtnetlink: whole, cut at every byte, damaged.
+#include "../../fault/fake_can.h"
+
+#include <drv/link.h>
+
+#include <stdlib.h>
+#include <unity.h>
+
+static _Alignas(8) char message[FAKE_MESSAGE_BYTES];
+static drv_link_t link_state;
+
+void setUp(void) {
+    fake_reset();
+    memset(&link_state, 0xEE, sizeof link_state);
+}
+void tearDown(void) {}
+
+static void test_every_field(void) {
+    fake.state = CAN_STATE_BUS_OFF;
+    fake.restart_ms = 100;
+    fake.rx_dropped = 7;
+    fake.rx_over_errors = 8;
+    TEST_ASSERT_EQUAL_INT(0, drv_link_parse(message, fake_link_message(message, RTM_NEWLINK), &link_state));
+    TEST_ASSERT_EQUAL_STRING("can0", link_state.name);
+    TEST_ASSERT_EQUAL_STRING("can", link_state.kind);
+    TEST_ASSERT_EQUAL_INT(5, link_state.index);
+    TEST_ASSERT_TRUE(link_state.is_can && link_state.up && link_state.running && !link_state.gone);
+    TEST_ASSERT_TRUE(link_state.has_can_data && link_state.listen_only && link_state.has_error_counters);
+    TEST_ASSERT_EQUAL_INT(72, link_state.mtu);
+    TEST_ASSERT_EQUAL_UINT32(10, link_state.tx_queue);
+    TEST_ASSERT_EQUAL_INT(DRV_BUS_OFF, link_state.state);
+    TEST_ASSERT_EQUAL_STRING("bus-off", drv_bus_state_name(link_state.state));
+    TEST_ASSERT_EQUAL_UINT32(12, link_state.tx_errors);
+    TEST_ASSERT_EQUAL_UINT32(34, link_state.rx_errors);
+    TEST_ASSERT_EQUAL_UINT32(500000, link_state.bitrate);
+    TEST_ASSERT_EQUAL_UINT32(2000000, link_state.dbitrate);
+    TEST_ASSERT_EQUAL_UINT32(100, link_state.restart_ms);
+    TEST_ASSERT_EQUAL_UINT64(7, link_state.rx_dropped);
+    TEST_ASSERT_EQUAL_UINT64(8, link_state.rx_over_errors);
+    const struct can_device_stats order = {1, 2, 3, 4, 5, 6};
+    TEST_ASSERT_EQUAL_UINT32(order.bus_off, link_state.bus_off_count);
+    TEST_ASSERT_EQUAL_UINT32(order.restarts, link_state.restart_count);
+}
+
+static void test_states(void) {
+    static const drv_bus_state_t states[] = {DRV_BUS_ACTIVE,  DRV_BUS_WARNING,  DRV_BUS_PASSIVE, DRV_BUS_OFF,
+                                             DRV_BUS_STOPPED, DRV_BUS_SLEEPING, DRV_BUS_UNKNOWN};
+    for (uint32_t i = 0; i < 7; ++i) {
+        fake.state = i;
+        TEST_ASSERT_EQUAL_INT(0, drv_link_parse(message, fake_link_message(message, RTM_NEWLINK), &link_state));
+        TEST_ASSERT_EQUAL_INT(states[i], link_state.state);
+    }
+    TEST_ASSERT_EQUAL_STRING("error-active", drv_bus_state_name(DRV_BUS_ACTIVE));
+    TEST_ASSERT_EQUAL_STRING("unknown", drv_bus_state_name((drv_bus_state_t)99));
+}
+
+static void test_other_kinds_have_no_can_data(void) {
+    fake.kind = "vcan";
+    TEST_ASSERT_EQUAL_INT(0, drv_link_parse(message, fake_link_message(message, RTM_NEWLINK), &link_state));
+    TEST_ASSERT_EQUAL_STRING("vcan", link_state.kind);
+    TEST_ASSERT_FALSE(link_state.has_can_data);
+    TEST_ASSERT_EQUAL_UINT32(0, link_state.bitrate);
+    TEST_ASSERT_EQUAL_INT(0, drv_link_parse(message, fake_link_message(message, RTM_DELLINK), &link_state));
+    TEST_ASSERT_TRUE(link_state.gone && !link_state.up);
+}
+
+/// A copy of just the bytes given, so that a sanitizer sees every step beyond them.
+static int parse_copy(const char* from, size_t bytes) {
+    char* copy = malloc(bytes + 1);
+    memcpy(copy, from, bytes);
+    const int verdict = drv_link_parse(copy, bytes, &link_state);
+    free(copy);
+    return verdict;
+}
+
+static void test_cut_and_damaged_messages(void) {
+    const size_t whole = fake_link_message(message, RTM_NEWLINK);
+    for (size_t bytes = 0; bytes < whole; ++bytes) TEST_ASSERT_EQUAL_INT(-1, parse_copy(message, bytes));
+    for (uint32_t bytes = NLMSG_SPACE(sizeof(struct ifinfomsg)); bytes < whole; ++bytes) {
+        memcpy(message, &bytes, sizeof bytes); // the header admits that it is shorter
+        TEST_ASSERT_EQUAL_INT(0, parse_copy(message, bytes));
+    }
+    srand(3);
+    int understood = 0;
+    for (int i = 0; i < 100000; ++i) {
+        fake_link_message(message, RTM_NEWLINK);
+        for (int k = rand() % 4; k >= 0; --k) message[16 + rand() % (int)(whole - 16)] = (char)rand();
+        understood += parse_copy(message, whole) == 0;
+        TEST_ASSERT_TRUE(memchr(link_state.name, 0, sizeof link_state.name) != NULL);
+        TEST_ASSERT_TRUE(memchr(link_state.kind, 0, sizeof link_state.kind) != NULL);
+    }
+    TEST_ASSERT_EQUAL_INT(100000, understood);
+}
+
+static void test_questions_and_answers(void) {
+    TEST_ASSERT_EQUAL_INT(0, drv_link_read("can0", &link_state));
+    TEST_ASSERT_EQUAL_INT(5, link_state.index);
+    fake.index = 0;
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_read("can0", &link_state));
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_read("a_name_of_16_chr", &link_state));
+    fake.asked = -1;
+    TEST_ASSERT_EQUAL_INT(-EPERM, drv_link_read("can0", &link_state));
+    fake.netlink_error = EMFILE;
+    TEST_ASSERT_EQUAL_INT(-EMFILE, drv_link_read("can0", &link_state));
+    TEST_ASSERT_EQUAL_INT(-EMFILE, drv_link_watch());
+}
+
+static void test_news_of_one_interface(void) {
+    const int fd = drv_link_watch();
+    TEST_ASSERT_TRUE(fd >= 0);
+    TEST_ASSERT_EQUAL_INT(0, drv_link_changes(fd, "can0", &link_state));
+    fake_tell(RTM_NEWLINK);
+    fake.up = 0;
+    fake_tell(RTM_NEWLINK);
+    fake.name = "eth0";
+    fake_tell(RTM_NEWLINK);
+    TEST_ASSERT_EQUAL_INT(1, drv_link_changes(fd, "can0", &link_state));
+    TEST_ASSERT_FALSE(link_state.up); // the newest
+    TEST_ASSERT_EQUAL_STRING("can0", link_state.name);
+    TEST_ASSERT_EQUAL_INT(0, drv_link_changes(fd, "can0", &link_state));
+    fake_tell_error(ENOBUFS);
+    TEST_ASSERT_EQUAL_INT(1, drv_link_changes(fd, "can0", &link_state));
+    TEST_ASSERT_EQUAL_INT(0, link_state.index);
+    close(fd);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_every_field);
+    RUN_TEST(test_states);
+    RUN_TEST(test_other_kinds_have_no_can_data);
+    RUN_TEST(test_cut_and_damaged_messages);
+    RUN_TEST(test_questions_and_answers);
+    RUN_TEST(test_news_of_one_interface);
+    return UNITY_END();
+}

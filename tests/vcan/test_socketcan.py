@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: MIT
+"""The SocketCAN front end under load beside candump and python-can, links that come and go, frames that okid sends.
+
+OKID_SLOW=1 runs the long rows: 60 s at each rate, 200 reconnections.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from test_vcan import OKID, Run, interface, make_record, play, sh  # noqa: F401  (interface is a fixture)
+
+TOOLS = Path(OKID).parent / "tests"
+SLOW = bool(os.environ.get("OKID_SLOW"))
+SECONDS = 60 if SLOW else 3
+PYTHON_CAN = """
+import sys, can
+bus = can.Bus(interface="socketcan", channel="vcan0", fd=True)
+print("listening", flush=True)
+got, wait = 0, 20.0
+while (message := bus.recv(wait)) is not None:
+    got, wait = got + 1, 3.0
+    if got == int(sys.argv[1]): break
+bus.shutdown()
+print(got)
+"""
+
+
+class Receiver:
+    """One program that counts frames; ready when it listens, ends by itself or at a signal."""
+
+    def __init__(self, kind: str, count: int, folder: Path) -> None:
+        self.kind = kind
+        self.log = folder / f"{kind}.out"
+        command = {
+            "okid": [str(TOOLS / "vcan_front_end"), "vcan0", str(count), "5"],
+            "candump": ["candump", "-L", "vcan0"],
+            "python-can": [sys.executable, "-c", PYTHON_CAN, str(count)],
+        }[kind]
+        self.process = subprocess.Popen(command, stdout=self.log.open("w"), stderr=subprocess.STDOUT)
+        for _ in range(1000):
+            ready = Run.listening() if kind == "candump" else "listening" in self.log.read_text()
+            if ready:
+                return
+            assert self.process.poll() is None, self.log.read_text()
+            time.sleep(0.02)
+        raise AssertionError(f"{kind} never listened")
+
+    def received(self) -> int:
+        if self.kind == "candump":
+            size = -1
+            while size != self.log.stat().st_size:  # until nothing more comes
+                size = self.log.stat().st_size
+                time.sleep(1.0)
+            self.process.send_signal(signal.SIGINT)
+        assert self.process.wait(90) in (0, -2, 130)
+        lines = self.log.read_text().splitlines()
+        if self.kind == "candump":
+            return sum(" 123#" in line for line in lines)
+        return json.loads(lines[-1])["received"] if self.kind == "okid" else int(lines[-1])
+
+
+LOADS = [
+    ("classic", 20000, 20000 * SECONDS),
+    ("fd", 8000, 8000 * SECONDS),
+    ("classic", 0, 100000),
+]
+
+
+@pytest.mark.parametrize(("kind", "rate", "count"), LOADS)
+def test_load(kind: str, rate: int, count: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    row = {}
+    for program in ("okid", "candump", "python-can"):
+        receiver = Receiver(program, count, tmp_path)
+        sent = sh(str(TOOLS / "vcan_flood"), "vcan0", str(count), str(rate), kind, seconds=SECONDS * 10 + 60)
+        row[program] = receiver.received()
+        flood = json.loads(sent.stdout)
+    okid = json.loads((tmp_path / "okid.out").read_text().splitlines()[-1])
+    with capfd.disabled():
+        paced = f"{rate}/s" if rate else "flat out"
+        lost = ", ".join(f"{program} {count - got}" for program, got in row.items())
+        print(f"\n{kind} {paced}, {count} frames in {flood['seconds']} s: lost {lost}")
+    assert okid == {
+        "received": count,
+        "missing": 0,
+        "reordered": 0,
+        "socket_overflow": 0,
+        "ring": 0,
+        "link_down": 0,
+        "reopened": 0,
+    }
+
+
+def number_frame(number: int) -> bytes:
+    return struct.pack("=IB3xI4x", 0x123, 8, number)
+
+
+def wait_for_line(path: Path, text: str, count: int, seconds: float = 10) -> str:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        lines = [line for line in path.read_text().splitlines() if line.startswith(text)]
+        if len(lines) >= count:
+            return lines[count - 1]
+        time.sleep(0.01)
+    raise AssertionError(f"{count} lines {text!r} in {path.read_text()}")
+
+
+def test_samples_again_after_the_link_is_back(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Down and up, and deleted and made anew: the first frame after it within 500 ms."""
+    rounds, waits = 200 if SLOW else 10, []
+    receiver = Receiver("okid", 1 << 40, tmp_path)
+    for turn in range(rounds):
+        if turn % 2:
+            sh("ip", "link", "delete", "vcan0")
+            sh("ip", "link", "add", "vcan0", "type", "vcan")
+        else:
+            sh("ip", "link", "set", "vcan0", "down")
+        sh("ip", "link", "set", "vcan0", "up")
+        up = time.clock_gettime_ns(time.CLOCK_MONOTONIC)
+        with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as sender:
+            sender.bind(("vcan0",))
+            for number in range(200):
+                sender.send(number_frame(number))
+                if receiver.log.read_text().count("back ") > turn:
+                    break
+                time.sleep(0.005)
+        back = int(wait_for_line(receiver.log, "back ", turn + 1).split()[1])
+        waits.append((back - up) / 1e6)
+    with capfd.disabled():
+        print(
+            f"\n{rounds} links back: samples again after {max(waits):.0f} ms at most, {sorted(waits)[rounds // 2]:.0f} ms median"
+        )
+    assert max(waits) <= 500
+    assert receiver.process.poll() is None
+    receiver.process.kill()
+    receiver.process.wait(10)
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_record(tmp_path_factory.mktemp("sends"), 6.0)
+
+
+def test_start_frame_and_sync(record: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    text = (record / "a.toml").read_text()
+    keys = 'sync_hz = 50.0\nsync_data = "07"\nstart = ["000#0100"]\n'
+    (record / "s.toml").write_text(re.sub(r'(interface = "vcan0"\n)', r"\1" + keys, text))
+    seen = tmp_path / "seen.log"
+    with seen.open("w") as out:
+        watch = subprocess.Popen(["candump", "-L", "vcan0"], stdout=out)
+        time.sleep(0.5)
+        live = Run(record, config="s.toml")
+        play(record / "a.log")
+        events = live.stop()
+        watch.send_signal(signal.SIGINT)
+        watch.wait(10)
+    lines = [line.split() for line in seen.read_text().splitlines()]
+    assert lines[0][2] == "000#0100"
+    stamps = [float(line[0].strip("()")) for line in lines if line[2] == "080#07"]
+    sync = [e for e in events if e["type"] == "stats"][-1]["bus"]["can0"]["sync"]
+    with capfd.disabled():
+        print(f"\nSYNC: {sync}")
+    assert sync["sent"] == len(stamps) > 250
+    whole = (stamps[-1] - stamps[0]) * 50  # periods: no drift, and what was left out was counted
+    assert abs(whole - (sync["sent"] + sync["missed"] - 1)) < 2
+    assert "SYNC frames sent" in live.messages()
+
+
+def test_bus_off_is_an_event(record: Path) -> None:
+    live = Run(record)
+    play(record / "a.log", "-t")
+    time.sleep(0.3)
+    sh("cansend", "vcan0", "20000040#0000000000000000")
+    sh("cansend", "vcan0", "20000100#0000000000000000")
+    time.sleep(0.5)
+    events = live.stop()
+    told = [(e["event"], e["bus"]) for e in events if e["type"] == "bus"]
+    assert told == [("bus_off", "can0"), ("restarted", "can0")] or told == [
+        ("bus_off", "can0"),
+        ("bus_off", "can0"),
+        ("restarted", "can0"),
+    ]
+    counts = [e for e in events if e["type"] == "stats"][-1]["bus"]["can0"]["errors"]
+    assert (counts["bus_off"], counts["restarted"], counts["messages"]) == (1, 1, 2)
+    assert "bus-off" in live.messages() and "restarted after bus-off" in live.messages()
+
+
+def test_replay_keeps_its_deadlines(record: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    begin = time.monotonic()
+    done = sh(OKID, "replay", str(record / "a.log"), "--to", "vcan0", "--speed", "2")
+    with capfd.disabled():
+        print("\n" + done.stdout.strip())
+    assert re.search(r"6000 frames played onto vcan0; late by \d+ us \(mean\)", done.stdout)
+    assert 2.9 < time.monotonic() - begin < 6
