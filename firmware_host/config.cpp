@@ -220,9 +220,9 @@ void read_identification(const std::string& path, const toml::table& file, live_
     out.update_s = t["update_s"].value_or(out.update_s);
     out.sigma_blocks = static_cast<int>(t["sigma_blocks"].value_or(std::int64_t{out.sigma_blocks}));
     if (out.sigma_blocks > 0 && out.sigma_blocks < fewest_blocks)
-        refuse_key(place, *t.get("sigma_blocks"), "sigma_blocks",
-                   fmt::format("found {}, expected 0 (no standard deviations) or {} to 100", out.sigma_blocks,
-                               fewest_blocks));
+        refuse_key(
+            place, *t.get("sigma_blocks"), "sigma_blocks",
+            fmt::format("found {}, expected 0 (no standard deviations) or {} to 100", out.sigma_blocks, fewest_blocks));
     if (out.window_s && out.forgetting)
         refuse_key(place, *t.get("forgetting"), "forgetting",
                    "window_s is given too; a window and forgetting together are not available, choose one");

@@ -69,7 +69,7 @@ struct identification_config {
     std::optional<double> window_s, forgetting;
     double update_s = 0.5;
     int sigma_blocks = 20; ///< blocks left out for the standard deviations; 0 = none
-    bool mkr = false; ///< M, K and R with the final result
+    bool mkr = false;      ///< M, K and R with the final result
 };
 
 /// A GPIO line as the config names it.

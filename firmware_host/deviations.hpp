@@ -13,7 +13,7 @@
 
 namespace okid_host {
 
-constexpr int fewest_blocks = 8; ///< below, a standard deviation says little
+constexpr int fewest_blocks = 8, most_blocks = 100; ///< below 8, a standard deviation says little
 
 /// One standard deviation of each number; NaN where nothing can be said. Laid out as what they belong to.
 struct deviations {

@@ -208,10 +208,22 @@ void fit_inputs(packed_records& records, std::vector<replicate_model>& replicate
     }
 }
 
+/// M, K, R, of a refined model without the delays of its outputs.
+void find_matrices(const std::vector<replicate_model>& replicates, const record_options& options,
+                   record_result& result) {
+    remarks& said = result.context.warnings;
+    said.insert(said.end(), options.said.begin(), options.said.end());
+    if (!options.mass.wanted()) return;
+    okid_identified_t structure = result.model;
+    if (result.context.refined) structure = without_skew(replicates, options.mass, result);
+    result.context.mass = find_mass_matrices(structure, options.mass, said);
+}
+
 /// Deviations of everything, and what a longer horizon would say.
 void find_deviations(const std::vector<record_data>& records, const okid_identify_config_t& config,
                      const std::vector<replicate_model>& replicates, const record_options& options,
                      record_result& result) {
+    if (options.sigma_blocks == 0) return;
     if (replicates.empty()) {
         result.context.warnings.emplace_back("no_deviation",
                                              "the record is too short to be cut into blocks: no standard deviations");
@@ -262,6 +274,23 @@ result_context describe(const std::vector<record_data>& records, const record_op
                                                   "interpolated; the lags start anew after each gap",
                                                   missing.samples, total, missing.gaps, missing.gaps == 1 ? "" : "s"));
     return context;
+}
+
+/// What the library is asked for, with the horizon that the records bear.
+okid_identify_config_t configure(const std::vector<record_data>& records, const record_options& options,
+                                 const missing_count& missing, long long total, result_context& context) {
+    okid_identify_config_t config{};
+    config.n_u = static_cast<std::int32_t>(options.inputs.size());
+    config.n_y = static_cast<std::int32_t>(options.outputs.size());
+    config.method = method_of(options.method);
+    config.hankel = hankel_of(options.hankel);
+    choose_horizon(options, records, total - missing.samples, missing.samples > 0, config, context);
+    config.order = options.order;
+    config.fs_hz = options.fs_hz;
+    const bool at_rest = options.start == "rest";
+    config.detrend = options.detrend == "mean" && !at_rest ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
+    if (!at_rest) remark_early_hit(records, config.n_u, is_subspace(config.method) ? config.rows : config.p, context);
+    return config;
 }
 
 void tell(const record_options& options, const char* stage) {
@@ -324,18 +353,7 @@ record_result identify_records(std::vector<record_data> records, const record_op
     const bool own_means_first = options.detrend == "mean" && (records.size() > 1 || at_rest);
     if (own_means_first) centre_each(records, options);
 
-    okid_identify_config_t config{};
-    config.n_u = static_cast<std::int32_t>(options.inputs.size());
-    config.n_y = static_cast<std::int32_t>(options.outputs.size());
-    config.method = method_of(options.method);
-    config.hankel = hankel_of(options.hankel);
-    choose_horizon(options, records, total - missing.samples, missing.samples > 0, config, result.context);
-    config.order = options.order;
-    config.fs_hz = options.fs_hz;
-    config.detrend = options.detrend == "mean" && !at_rest ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
-    if (!at_rest)
-        remark_early_hit(records, config.n_u, is_subspace(config.method) ? config.rows : config.p, result.context);
-
+    const okid_identify_config_t config = configure(records, options, missing, total, result.context);
     tell(options, "summing lagged products");
     okid_accumulator_t* accumulator = nullptr;
     const auto sums = accumulate(records, config, at_rest, accumulator);
@@ -352,7 +370,8 @@ record_result identify_records(std::vector<record_data> records, const record_op
         result.context.stable = look_around(records, config, at_rest, identifier, result.model);
     }
     tell(options, "leaving out one block after the other");
-    std::vector<replicate_model> replicates = leave_out_blocks(records, config, at_rest, accumulator, result.model);
+    std::vector<replicate_model> replicates =
+        leave_out_blocks(records, config, at_rest, accumulator, result.model, options.sigma_blocks);
     tell(options, "simulating the model");
     if (options.detrend == "mean" && !own_means_first)
         centre_each(records, options); // the fit is about the record's mean
@@ -368,13 +387,7 @@ record_result identify_records(std::vector<record_data> records, const record_op
         if (!refined.empty()) replicates = std::move(refined);
     }
     check_explains(result.context);
-    remarks& said = result.context.warnings;
-    said.insert(said.end(), options.said.begin(), options.said.end());
-    if (options.mass.wanted()) {
-        okid_identified_t structure = result.model;
-        if (result.context.refined) structure = without_skew(replicates, options.mass, result);
-        result.context.mass = find_mass_matrices(structure, options.mass, said);
-    }
+    find_matrices(replicates, options, result);
     find_deviations(records, config, replicates, options, result);
     return result;
 }

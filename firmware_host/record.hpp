@@ -26,11 +26,12 @@ struct record_options {
     bool p_given = false;
     std::string method = "okid-era", hankel = "system", hold = "zoh", detrend = "mean";
     std::string start =
-        "moving";   ///< "rest": each record begins before the structure was struck, its silent past is used
-    bool refine = false; ///< maximum likelihood after the identification
-    mass_plan mass; ///< where the channels stand, when M, K and R are wanted
-    remarks said;   ///< known before the data are seen
+        "moving";               ///< "rest": each record begins before the structure was struck, its silent past is used
+    bool refine = false;        ///< maximum likelihood after the identification
+    mass_plan mass;             ///< where the channels stand, when M, K and R are wanted
+    remarks said;               ///< known before the data are seen
     bool stabilization = false; ///< look at all orders and some horizons too
+    int sigma_blocks = 20;      ///< blocks left out in turn for the standard deviations; 0 = none
     std::function<void(const char* stage)> stage; ///< told what begins; may be empty
 };
 

@@ -12,8 +12,6 @@
 namespace okid_host {
 namespace {
 
-constexpr std::size_t most_blocks = 20;
-
 struct sums {
     std::unique_ptr<std::byte[]> block;
     okid_accumulator_t* handle = nullptr;
@@ -76,14 +74,14 @@ replicate_model keep(const okid_model_t& model) {
 
 std::vector<replicate_model> leave_out_blocks(const std::vector<record_data>& records,
                                               const okid_identify_config_t& config, bool at_rest,
-                                              okid_accumulator_t* whole, const okid_identified_t& model) {
+                                              okid_accumulator_t* whole, const okid_identified_t& model, int blocks) {
     okid_jackknife_config_t shape{};
     shape.identify = config;
     shape.identify.order = shape.identify.max_order = model.n_z;
     okid_accumulator_config(whole, &shape.sums);
     const auto lags = static_cast<std::size_t>(shape.sums.lags);
     const std::size_t parts =
-        std::min<std::size_t>(most_blocks, static_cast<std::size_t>(okid_accumulator_rows(whole)) / lags);
+        std::min(static_cast<std::size_t>(blocks), static_cast<std::size_t>(okid_accumulator_rows(whole)) / lags);
     std::vector<replicate_model> out;
     const sums part(shape.sums);
     const std::size_t bytes = okid_jackknife_memsize(&shape);

@@ -2,8 +2,8 @@
 // An identified model as people and programs see it: okid.result/1 and the modal table.
 #pragma once
 #include "deviations.hpp"
-#include "refinement.hpp"
 #include "record_stabilization.hpp"
+#include "refinement.hpp"
 
 #include <okid/identify.h>
 

@@ -28,7 +28,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-enum { BATCH = 64, CONTROL_BYTES = 256, DEFAULT_BUFFER = 8 << 20 };
+enum { BATCH = 64, CONTROL_BYTES = 256, DEFAULT_BUFFER = 12 << 20 };
 
 static const int64_t look_ns = 1000000000; // how old the controller's counters may be
 

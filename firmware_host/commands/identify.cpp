@@ -3,6 +3,7 @@
 #include "commands.hpp"
 
 #include "../csv_header.hpp"
+#include "../deviations.hpp"
 #include "../error.hpp"
 #include "../mat_file.hpp"
 #include "../method.hpp"
@@ -26,7 +27,7 @@ struct identify_arguments {
     std::string inputs, outputs, method = "okid-era", hankel = "system", order = "auto", hold = "zoh", detrend = "mean",
                                  start = "moving";
     std::string sensing = "acceleration", input_dofs, output_dofs, range, json, model;
-    std::string fs, p, rows;
+    std::string fs, p, rows, sigma_blocks;
     bool refine = false, stabilization = false, quiet = false;
 };
 
@@ -120,6 +121,11 @@ record_options check_options(const identify_arguments& given) {
             usage(fmt::format("--order: found \"{}\", expected a whole number or auto", printable(given.order)));
         options.order = static_cast<int>(whole_number("--order", given.order, 1, 10000));
     }
+    if (!given.sigma_blocks.empty())
+        options.sigma_blocks = static_cast<int>(whole_number("--sigma-blocks", given.sigma_blocks, 0, most_blocks));
+    if (options.sigma_blocks > 0 && options.sigma_blocks < fewest_blocks)
+        usage(fmt::format("--sigma-blocks: found {}, expected 0 (no standard deviations) or {} to {}",
+                          options.sigma_blocks, fewest_blocks, most_blocks));
     options.stabilization = given.stabilization;
     options.method = given.method;
     options.hankel = given.hankel;
@@ -285,6 +291,10 @@ void add_identify(CLI::App& app) {
     command->add_flag(
         "--stabilization", given->stabilization,
         "look at all orders and three horizons too, and list the modes that hold (JSON: \"stabilization\")");
+    command
+        ->add_option("--sigma-blocks", given->sigma_blocks,
+                     "blocks of the record left out in turn for the standard deviations (default 20), 0 = none")
+        ->type_name("N");
     command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")
         ->type_name("A:B");
     command->add_option("--json", given->json, "write okid.result/1 to FILE, - is stdout")->type_name("FILE");

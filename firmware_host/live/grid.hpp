@@ -80,7 +80,7 @@ class grid {
     };
     struct lane {
         std::uint32_t key = 0, mask = 0; ///< mask: which bits of the identifier are in the key, 0 = all
-        int next = -1; ///< another lane of the same identifier (multiplexing)
+        int next = -1;                   ///< another lane of the same identifier (multiplexing)
         std::size_t bus = 0;
         std::vector<std::size_t> channels;
         std::optional<drv_signal_t> sequence;

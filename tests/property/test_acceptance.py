@@ -36,7 +36,7 @@ def identify(s: systems.Structure, u: Array, y: Array, name: str, method: str, *
     p, rows, i = HORIZON[name]
     reach: dict[str, Any] = {"rows": i} if method.startswith("n4sid") else {"p": p, "rows": rows}
     dofs: dict[str, Any] = {"input_dofs": [d + 1 for d in s.force_dofs], "output_dofs": [d + 1 for d in s.sense_dofs]}
-    result = okid.identify(u, y, fs=s.fs, method=method, detrend="none", **reach, **dofs, **options)
+    result = okid.identify(u, y, fs=s.fs, method=method, detrend="none", sigma_blocks=0, **reach, **dofs, **options)
     assert result.order == 2 * len(s.M), result.table()  # found by itself
     return result
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Maximum-likelihood refinement: the Cramér-Rao bound is reached from every method's start, the deviations hold, channels
-that come late are found and M, K, R freed of them, and measured records are never simulated worse."""
+"""Maximum-likelihood refinement: the Cramér-Rao bound is reached from every method's start, the deviations hold,
+channels that come late are found and M, K, R freed of them, and measured records are never simulated worse."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def modal_truth(s: systems.Structure) -> tuple[Any, Any, Any]:
 def bound(s: systems.Structure, u: Array, sigma: Array) -> tuple[Array, Array]:
     """Cramér-Rao deviations of every f and zeta under white noise of deviation sigma.
 
-    Fisher matrix of poles, gains and initial states, which the outputs share, and of the shapes and feed-through of each;
-    the free scale of every mode is left out by the pseudo-inverse.
+    Fisher matrix of poles, gains and initial states, which the outputs share, and of the shapes and feed-through of
+    each; the free scale of every mode is left out by the pseudo-inverse.
     """
     mu, b, c = modal_truth(s)
     n = len(u)

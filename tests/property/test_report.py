@@ -56,7 +56,8 @@ def test_report_with_record(made: tuple[Path, Path], capsys: pytest.CaptureFixtu
     result = json.loads(made[0].read_text(encoding="utf-8"))
     for mode in result["modes"]:
         assert f"<td>{mode['frequency_hz']:.4f}</td>" in html
-    assert "± σ" not in html
+        assert mode["frequency_std_hz"] is not None
+    assert html.count("<th>± σ [Hz]</th><th>ζ [%]</th><th>± σ [%]</th>") == 1
     assert html.count("<h2>") == 10
 
 

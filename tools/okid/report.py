@@ -137,11 +137,11 @@ def measure(result: Loaded, path: str | Path) -> Measured:
             f"{path}: sampled at {record.fs_hz:g} Hz, but the result is of {result.fs:g} Hz: not the record it is from"
         )
     method = str(raw.get("method", "okid-era"))
-    reach = {} if method.startswith("n4sid") or not raw["inputs"] else {"p": int(raw["p"])}
+    reach: dict[str, Any] = {} if method.startswith("n4sid") or not raw["inputs"] else {"p": int(raw["p"])}
     again = identify(
         u if raw["inputs"] else None, y, fs=result.fs, method=method, **reach, rows=int(raw["rows"]),
         detrend=str(raw.get("detrend", "mean")), start=str(raw.get("start", "moving")), order=int(raw["order"]),
-        max_order=max(int(raw["order"]) + 20, min(80, 3 * int(raw["order"]))),
+        max_order=max(int(raw["order"]) + 20, min(80, 3 * int(raw["order"]))), sigma_blocks=0,
     )  # fmt: skip
     responses, reason = None, ""
     try:
@@ -217,8 +217,8 @@ def _stabilization(result: Loaded, measured: Measured | None) -> str:
     )
     return _page.section(title, _page.picture(drawing, "poles over frequency and model order"), _page.note(
         "A pole holds when the next lower order has one within 1 % in frequency, 5 % in damping and MAC ≥ 0.98. Green "
-        f"lines: modes of this result. Blue bands: {len(measured.rows.modes)} modes found by themselves, from poles that "
-        "come back in at least half of the orders; ring: the pole nearest their medians." + (
+        f"lines: modes of this result. Blue bands: {len(measured.rows.modes)} modes found by themselves, from poles "
+        "that come back in at least half of the orders; ring: the pole nearest their medians." + (
             "" if behind is None
             else " Behind: largest singular value of the measured responses (CMIF), dB, no scale."
         )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Real = NDArray[np.float64]
 Piece = tuple[int, int, int]  # record, first sample, one past the last
-GROUPS, FEWEST = 20, 8  # parts of a record; below the latter a standard deviation says nothing
+GROUPS, FEWEST, MOST = 20, 8, 100  # parts of a record; below 8 a standard deviation says nothing
 
 
 @dataclass(frozen=True)
@@ -179,13 +179,13 @@ class Replicate(NamedTuple):
 
 
 def leave_out_blocks(
-    identifier: Identifier, records: Sequence[Real], whole: Accumulator, rest: bool = False
+    identifier: Identifier, records: Sequence[Real], whole: Accumulator, blocks: int = GROUPS, rest: bool = False
 ) -> list[Replicate]:
-    """Leave out each of some twenty equal blocks in turn. `whole` holds `records`; the identifier's last run was on it.
+    """Leave out each of `blocks` equal blocks in turn. `whole` holds `records`; the identifier's last run was on it.
 
     `rest`: silence stands before each record. Empty: the record is too short.
     """
-    groups = min(GROUPS, whole.rows // whole.lags)
+    groups = min(blocks, whole.rows // whole.lags)
     if groups < FEWEST:
         return []
     out, jackknife = [], Jackknife(identifier, whole)

@@ -52,7 +52,7 @@ typedef struct drv_source_config_t {
     const char* path;              ///< log only
     const drv_filter_t* filters;   ///< socket only; NULL = everything
     int32_t filter_count;
-    int32_t buffer_bytes;   ///< receive buffer asked for, 0 = 8 MiB
+    int32_t buffer_bytes;   ///< receive buffer asked for, 0 = 12 MiB
     drv_line_config_t line; ///< serial and slcan only
 } drv_source_config_t;
 
