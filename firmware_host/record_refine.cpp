@@ -31,8 +31,10 @@ struct driven_runs {
         std::vector<std::pair<const record_data*, stretch>> all;
         for (const record_data& record : records)
             for (const stretch& piece : stretches_of(record, n_u, least)) all.emplace_back(&record, piece);
-        std::stable_sort(all.begin(), all.end(),
-                         [](const auto& a, const auto& b) { return a.second.count > b.second.count; });
+        std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { // longest first, then as they came
+            if (a.second.count != b.second.count) return a.second.count > b.second.count;
+            return a.first != b.first ? a.first < b.first : a.second.first < b.second.first;
+        });
         all.resize(std::min(all.size(), most_runs));
         for (const auto& [record, piece] : all) {
             counts.push_back(static_cast<std::int32_t>(piece.count));

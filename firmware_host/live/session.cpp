@@ -140,11 +140,12 @@ void session::trigger_edge(std::int64_t time_ns) {
 /// have had if it had been known at its time.
 void session::begin(std::int64_t until) {
     const std::int64_t sample = trigger_.sample();
+    const std::int64_t time_us = trigger_.time_ns() / 1000;
     events_.write({{"type", "trigger"},
                    {"t", seconds(sample)},
                    {"source", config_.trigger.source == trigger_source::gpio ? "gpio" : "level"},
                    {"sample", sample},
-                   {"time_s", static_cast<double>(trigger_.time_ns() / 1000) / 1e6}});
+                   {"time_s", static_cast<double>(time_us) / 1e6}});
     trigger_.each_kept([&](std::int64_t first, const double* row, std::int64_t count) {
         if (row)
             identifier_.add(row);
