@@ -21,11 +21,11 @@ from scipy.linalg import expm
 from scipy.signal import lfilter
 from test_measured import data_file
 
+SLOW = os.environ.get("OKID_SLOW") == "1"  # the long tier
 Array = NDArray[np.float64]
 METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
 HORIZON = {"w1": (40, 80, 40), "w2": (40, 80, 30), "w3": (40, 60, 25)}  # p, rows of okid, rows of n4sid
 RECORDS = {"w1": 60, "w2": 40, "w3": 20}
-slow = pytest.mark.skipif(os.environ.get("OKID_SLOW") != "1", reason="long tier: OKID_SLOW=1")
 NEVER = 1.3  # times the bound; rms of 20 records is above it by chance once in 35 quantities, of 60 once in 1700
 
 
@@ -99,7 +99,7 @@ def made(name: str, noise: float, seed: int, samples: int = 10000) -> tuple[Arra
 
 
 @pytest.mark.parametrize("noise", [1.0, 5.0])
-@pytest.mark.parametrize("name", ["w1", "w2", pytest.param("w3", marks=slow)])
+@pytest.mark.parametrize("name", ["w1", "w2", *(["w3"] if SLOW else [])])
 def test_errors_reach_the_cramer_rao_bound(name: str, noise: float) -> None:
     s = getattr(systems, name)()
     ratios = []
@@ -332,13 +332,14 @@ def test_refinement_needs_a_force(tmp_path: Path) -> None:
         ("daisy_cd_player_arm/daisy_cd_player_arm.csv", 2, {"method": "n4sid-moesp", "rows": 15, "order": 8}),
         ("daisy_cd_player_arm/daisy_cd_player_arm.csv", 2, {}),
         ("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"order": 40}),
-        pytest.param(
-            "daisy_flexible_structure/daisy_flexible_structure.csv",
-            2,
-            {"method": "n4sid-moesp", "order": 40},
-            marks=slow,
+        *(
+            [
+                ("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"method": "n4sid-moesp", "order": 40}),
+                ("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"order": 80}),
+            ]
+            if SLOW
+            else []
         ),
-        pytest.param("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"order": 80}, marks=slow),
     ],
     ids=lambda value: value.split("/")[0] if isinstance(value, str) else None,
 )

@@ -84,7 +84,9 @@ def test_the_default_method_covers_the_truth() -> None:
 def test_the_other_methods_cover_the_truth(method: str) -> None:
     """200 records in the slow tier; else few, where only a deviation wrong by a third would show."""
     count = 200 if SLOW else 30
-    found = (identify(u, y, fs=W1.fs, order=6, method=method, **DOFS) for u, y in _records(count, 10000 if SLOW else 5000))
+    found = (
+        identify(u, y, fs=W1.fs, order=6, method=method, **DOFS) for u, y in _records(count, 10000 if SLOW else 5000)
+    )
     pooled = _pooled(found)
     if SLOW:
         _assert_covered(pooled, 90.0, 98.0)
