@@ -31,8 +31,8 @@ typedef struct okid_skew_result_t {
     int32_t corrected;        ///< outputs that okid_skew_correct() puts right
     const double* delay;      ///< n_y, s, > 0: the output shows what was there so much earlier
     const double* std;        ///< n_y, s
-    const int32_t* late;      ///< n_y: 1 = to be corrected: over 3 deviations, at most 0.3 samples, not undetermined
-    const int32_t* too_large; ///< n_y: 1 = over 3 deviations and over 0.3 samples: the hold or a shift is likelier
+    const int32_t* late;      ///< n_y: 1 = to be corrected: over 4 deviations, at most 0.3 samples, not undetermined
+    const int32_t* too_large; ///< n_y: 1 = over 4 deviations and over 0.3 samples: the hold or a shift is likelier
     double scatter; ///< rms of what is left of the angles over its deviations (1e-4 rad at least): 1 is chance
 } okid_skew_result_t;
 

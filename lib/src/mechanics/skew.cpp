@@ -36,7 +36,8 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 constexpr double blurred = 0.3, least_angle = 1e-4; // rad: angles that say nothing; that do no harm
-constexpr double significant = 3, most_scatter = 3, most_samples = 0.3;
+constexpr double significant = 4; // deviations; theirs come from some twenty blocks: beyond it once in a thousand
+constexpr double most_scatter = 3, most_samples = 0.3;
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
