@@ -15,7 +15,10 @@ static uint32_t get(const uint8_t* at, unsigned bytes) {
 
 static double number(const uint8_t* at, drv_stream_format_t format) {
     if (format == DRV_STREAM_INT16) return (int16_t)get(at, 2);
-    if (format == DRV_STREAM_INT24) return (double)((int32_t)(get(at, 3) << 8) / 256);
+    if (format == DRV_STREAM_INT24) {
+        const int32_t code = (int32_t)(get(at, 3) << 8) / 256; // the sign in its place
+        return code;
+    }
     const uint32_t bits = get(at, 4);
     float value;
     memcpy(&value, &bits, sizeof value);

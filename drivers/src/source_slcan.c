@@ -26,6 +26,8 @@ typedef struct slcan_t {
     char bytes[BUFFER_BYTES];
 } slcan_t;
 
+static int is_classic(char letter) { return letter == 't' || letter == 'T' || letter == 'r' || letter == 'R'; }
+
 static int opening_of(const drv_line_config_t* config, char* out, char* error, size_t room) {
     const int length = drv_slcan_opening(out, COMMAND_BYTES, config->bitrate, config->dbitrate, config->btr);
     if (length < 0)
@@ -124,7 +126,7 @@ static int next_frame(drv_source_t* self, slcan_t* state, drv_frame_t* frame) {
             return 0;
         }
         // The letters of classic frames are no hexadecimal digits: the rest of a torn line never begins with one.
-        const int clear = state->joined || (length > 0 && memchr("tTrR", start[0], 4) != NULL);
+        const int clear = state->joined || (length > 0 && is_classic(start[0]));
         const int whole = clear && !state->endless, bell = start[length] == '\a';
         if (state->joined && state->endless) {
             ++self->counts.damaged;
