@@ -28,7 +28,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-enum { BATCH = 64, CONTROL_BYTES = 256, DEFAULT_BUFFER = 12 << 20 };
+enum { BATCH = 64, CONTROL_BYTES = 256 };
 
 static const int64_t look_ns = 1000000000; // how old the controller's counters may be
 
@@ -212,7 +212,7 @@ static int socketcan_open(drv_source_t* self, const drv_source_config_t* config)
     socketcan_t* state = calloc(1, sizeof *state);
     if (!state) return explain(self, ENOMEM, name, "out of memory");
     memcpy(state->interface, name, strlen(name));
-    state->buffer_bytes = config->buffer_bytes > 0 ? config->buffer_bytes : DEFAULT_BUFFER;
+    state->buffer_bytes = config->buffer_bytes > 0 ? config->buffer_bytes : DRV_RECEIVE_BUFFER;
     state->filter_count = config->filters ? config->filter_count : 0;
     for (int i = 0; i < state->filter_count; ++i) {
         int extended = config->filters[i].extended;

@@ -24,7 +24,7 @@
 namespace okid_host {
 namespace {
 
-constexpr long long wanted_buffer = 12 << 20;
+constexpr long long wanted_buffer = DRV_RECEIVE_BUFFER;
 constexpr int cap_net_admin = 12;
 
 /// The findings, one line each; a finding that is missing comes with its remedy.

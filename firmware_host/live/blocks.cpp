@@ -32,6 +32,9 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
       most_states_(okid_identify_max_order(&identify)), dt_(1 / identify.fs_hz) {
     if (window()) sums_.block = sums_.slots = sums_.spare_slots = 0;
     length_ = whole.lags;
+    const std::size_t most = window() ? 0 : static_cast<std::size_t>(whole.lags) * m_;
+    history_.reserve(most);
+    codes_.reserve(whole.sample == OKID_SAMPLE_INT16 ? most : 0);
     if (fading()) { // whole slots, so many that all blocks together cover what is remembered
         const double rows = std::log(1 - remembered) / std::log(whole.forgetting) / (2 * blocks);
         length_ = std::max<std::int64_t>(1, std::llround(rows / whole.block)) * whole.block;
@@ -109,8 +112,8 @@ void live_blocks::begin_part() {
     okid_accumulator_reset(sums);
     const std::size_t count = history_.size() / m_;
     if (whole_.sample == OKID_SAMPLE_INT16) {
-        const std::vector<std::int16_t> codes(history_.begin(), history_.end());
-        check_statistics(okid_accumulator_add_i16(sums, codes.data(), count));
+        codes_.assign(history_.begin(), history_.end());
+        check_statistics(okid_accumulator_add_i16(sums, codes_.data(), count));
     } else {
         check_statistics(okid_accumulator_add(sums, history_.data(), count));
     }

@@ -62,6 +62,7 @@ class live_blocks {
     std::vector<part> parts_; ///< parts_[open_] grows; window: all slots together, then one group of them
     std::size_t open_ = 0;
     std::vector<double> history_; ///< the last samples of the run, at most `lags`
+    std::vector<std::int16_t> codes_; ///< the same as codes, when a part begins
     std::unique_ptr<std::byte[]> jackknife_block_;
     okid_jackknife_t* jackknife_ = nullptr;
     std::unique_ptr<replicate_statistics> modes_;

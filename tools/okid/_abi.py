@@ -51,6 +51,13 @@ def pointer(array: NDArray[np.float64] | None) -> Any:
     return None if array is None else array.ctypes.data_as(doubles)
 
 
+def matrix(pointer: Any, rows: int, columns: int) -> NDArray[np.float64]:
+    """A copy (rows, columns) of a column-major matrix of the library; zeros where it gave none."""
+    if rows * columns == 0 or not pointer:
+        return np.zeros((rows, columns))
+    return np.array(np.ctypeslib.as_array(pointer, (columns, rows)).T, dtype=np.float64, order="C")
+
+
 def block(size: int) -> NDArray[np.uint8]:
     """Zeroed memory of `size` bytes that begins on a 64-byte boundary, so that a copy of it is laid out alike."""
     raw = np.zeros(size + 64, dtype=np.uint8)

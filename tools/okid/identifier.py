@@ -83,19 +83,11 @@ def usable_p(n_u: int, n_y: int, p: int, samples: int) -> int:
     return int(_abi.library().okid_identify_usable_p(n_u, n_y, p, samples))
 
 
-def _matrix(address: Any, rows: int, columns: int) -> Real:
-    """A C-order copy of a column-major matrix of the library."""
-    if rows * columns == 0 or not address:
-        return np.zeros((rows, columns))
-    flat = np.ctypeslib.as_array(address, shape=(rows * columns,))
-    return np.array(flat.reshape(columns, rows).T, dtype=np.float64, order="C")
-
-
 def _copy(raw: _abi.Identified) -> Identified:
     n_u, n_y, n_z, p = int(raw.n_u), int(raw.n_y), int(raw.n_z), int(raw.p)
     modes, blocks = int(raw.mode_count), int(raw.markov_count)
-    markov = _matrix(raw.markov, n_y, n_u * blocks).reshape(n_y, blocks, n_u).transpose(1, 0, 2)
-    shapes = _matrix(raw.shape_re, n_y, modes).T + 1j * _matrix(raw.shape_im, n_y, modes).T
+    markov = _abi.matrix(raw.markov, n_y, n_u * blocks).reshape(n_y, blocks, n_u).transpose(1, 0, 2)
+    shapes = _abi.matrix(raw.shape_re, n_y, modes).T + 1j * _abi.matrix(raw.shape_im, n_y, modes).T
     info = raw.observer_info
     return Identified(
         notes=int(raw.warnings),
@@ -104,21 +96,21 @@ def _copy(raw: _abi.Identified) -> Identified:
         order=n_z,
         regression_rows=int(raw.regression_rows),
         dt=float(raw.dt),
-        A=_matrix(raw.A, n_z, n_z),
-        B=_matrix(raw.B, n_z, n_u),
-        C=_matrix(raw.C, n_y, n_z),
-        D=_matrix(raw.D, n_y, n_u),
-        K=_matrix(raw.K, n_z, n_y),
-        singular_values=_matrix(raw.singular_values, int(raw.singular_count), 1)[:, 0],
+        A=_abi.matrix(raw.A, n_z, n_z),
+        B=_abi.matrix(raw.B, n_z, n_u),
+        C=_abi.matrix(raw.C, n_y, n_z),
+        D=_abi.matrix(raw.D, n_y, n_u),
+        K=_abi.matrix(raw.K, n_z, n_y),
+        singular_values=_abi.matrix(raw.singular_values, int(raw.singular_count), 1)[:, 0],
         markov=np.ascontiguousarray(markov),
-        theta=_matrix(raw.observer, n_y, n_u + p * (n_u + n_y) if raw.observer else 0),
-        innovation=_matrix(raw.innovation, n_y, n_y),
-        mean=_matrix(raw.mean, n_u + n_y, 1)[:, 0],
-        frequency_hz=_matrix(raw.frequency_hz, modes, 1)[:, 0],
-        damping_ratio=_matrix(raw.damping_ratio, modes, 1)[:, 0],
-        mpc=_matrix(raw.mpc, modes, 1)[:, 0],
-        emac=_matrix(raw.emac, modes, 1)[:, 0],
-        cmi=_matrix(raw.cmi, modes, 1)[:, 0],
+        theta=_abi.matrix(raw.observer, n_y, n_u + p * (n_u + n_y) if raw.observer else 0),
+        innovation=_abi.matrix(raw.innovation, n_y, n_y),
+        mean=_abi.matrix(raw.mean, n_u + n_y, 1)[:, 0],
+        frequency_hz=_abi.matrix(raw.frequency_hz, modes, 1)[:, 0],
+        damping_ratio=_abi.matrix(raw.damping_ratio, modes, 1)[:, 0],
+        mpc=_abi.matrix(raw.mpc, modes, 1)[:, 0],
+        emac=_abi.matrix(raw.emac, modes, 1)[:, 0],
+        cmi=_abi.matrix(raw.cmi, modes, 1)[:, 0],
         shapes=shapes,
         model_radius=float(raw.model_radius),
         noise_level=float(raw.noise_level),

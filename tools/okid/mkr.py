@@ -167,7 +167,7 @@ class _Attempt:
 
     def square(self, name: str) -> Real:
         n = int(self.raw.n_x)
-        return np.array(np.ctypeslib.as_array(getattr(self.raw, name), (n, n)).T, order="C")
+        return _abi.matrix(getattr(self.raw, name), n, n)
 
     def column(self, name: str) -> NDArray[Any]:
         return np.array(np.ctypeslib.as_array(getattr(self.raw, name), (int(self.raw.n_x),)))

@@ -90,10 +90,7 @@ def refine(start: Model, records: Sequence[Real], *, offset: bool) -> tuple[Mode
 
     def model(pointers: Sequence[Any]) -> Model:
         sizes = ((n_z, n_z), (n_z, n_u), (n_y, n_z), (n_y, n_u))
-        A, B, C, D = (
-            np.array(np.ctypeslib.as_array(one, size[::-1]).T, order="C")
-            for one, size in zip(pointers, sizes, strict=True)
-        )
+        A, B, C, D = (_abi.matrix(one, *size) for one, size in zip(pointers, sizes, strict=True))
         return Model(A, B, C, D, start.K, start.dt)
 
     result = model([raw.A, raw.B, raw.C, raw.D])

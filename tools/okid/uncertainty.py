@@ -135,14 +135,9 @@ class Jackknife:
         if status < 0:
             return None, share.value
 
-        def matrix(pointer: Any, rows: int, columns: int) -> Real:
-            if rows * columns == 0:
-                return np.zeros((rows, columns))
-            return np.array(np.ctypeslib.as_array(pointer, (columns, rows)).T, order="C")
-
         n_u, n_y, n_z = int(view.n_u), int(view.n_y), int(view.n_z)
-        A, B = matrix(view.A, n_z, n_z), matrix(view.B, n_z, n_u)
-        C, D = matrix(view.C, n_y, n_z), matrix(view.D, n_y, n_u)
+        A, B = _abi.matrix(view.A, n_z, n_z), _abi.matrix(view.B, n_z, n_u)
+        C, D = _abi.matrix(view.C, n_y, n_z), _abi.matrix(view.D, n_y, n_u)
         return Model(A, B, C, D, np.zeros((n_z, n_y)), self._dt), share.value
 
 

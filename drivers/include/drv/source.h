@@ -20,7 +20,8 @@ enum {
     DRV_ERROR_BYTES = 320,
     DRV_ERROR_TEXT_BYTES = 120,
     DRV_MAX_FILTERS = 512,
-    DRV_MAX_BUSES = 32
+    DRV_MAX_BUSES = 32,
+    DRV_RECEIVE_BUFFER = 40 << 20 ///< bytes; the kernel doubles it, and then 100,000 frames of 768 bytes fit
 };
 
 /// read() at the end of a log.
@@ -52,7 +53,7 @@ typedef struct drv_source_config_t {
     const char* path;              ///< log only
     const drv_filter_t* filters;   ///< socket only; NULL = everything
     int32_t filter_count;
-    int32_t buffer_bytes;   ///< receive buffer asked for, 0 = 12 MiB
+    int32_t buffer_bytes;   ///< receive buffer asked for, 0 = DRV_RECEIVE_BUFFER
     drv_line_config_t line; ///< serial and slcan only
 } drv_source_config_t;
 

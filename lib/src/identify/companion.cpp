@@ -150,19 +150,13 @@ bool largest_ritz(const companion& c, companion_work& w, ritz_pair* out) {
     return true;
 }
 
-/// The part of theta that feeds outputs back, in units of 1/scale, or as it is.
-template <class Scale>
-void take_feedback(int n_u, int n_y, int p, const okid_real_t* theta, const Scale* scale, okid_real_t* feedback) {
-    const auto ny = static_cast<size_t>(n_y), m = static_cast<size_t>(n_u) + ny;
-    for (size_t h = 0; h < static_cast<size_t>(p); ++h) {
-        const okid_real_t* own = theta + (static_cast<size_t>(n_u) + h * m + static_cast<size_t>(n_u)) * ny;
-        for (size_t c = 0; c < ny; ++c)
-            for (size_t r = 0; r < ny; ++r) {
-                const double unit =
-                    scale == nullptr ? 1 : static_cast<double>(scale[r]) / static_cast<double>(scale[c]);
-                feedback[(h * ny + c) * ny + r] = own[c * ny + r] * static_cast<okid_real_t>(unit);
-            }
-    }
+/// The companion in units of 1/scale of each output.
+template <class Scale> void rescale(int n_y, int p, const Scale* scale, okid_real_t* feedback) {
+    const auto ny = static_cast<size_t>(n_y);
+    for (size_t column = 0; column < ny * static_cast<size_t>(p); ++column)
+        for (size_t r = 0; r < ny; ++r)
+            feedback[column * ny + r] *=
+                static_cast<okid_real_t>(static_cast<double>(scale[r]) / static_cast<double>(scale[column % ny]));
 }
 
 /// Of a vector that holds everything, over as many samples as the basis has.
@@ -187,14 +181,23 @@ void companion_work::lay_out(int n_y, int p, arena& memory) {
     feedback = memory.take<okid_real_t>(static_cast<size_t>(size) * static_cast<size_t>(n_y));
 }
 
+void take_feedback(int n_u, int n_y, int p, const okid_real_t* theta, okid_real_t* out) {
+    const auto ny = static_cast<size_t>(n_y), m = static_cast<size_t>(n_u) + ny;
+    for (size_t h = 0; h < static_cast<size_t>(p); ++h) {
+        const okid_real_t* own = theta + (static_cast<size_t>(n_u) + h * m + static_cast<size_t>(n_u)) * ny;
+        std::copy(own, own + ny * ny, out + h * ny * ny);
+    }
+}
+
 template <class Scale>
 double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const Scale* scale, companion_work& w) {
     const companion c{n_y, n_y * p, w.feedback};
-    take_feedback(n_u, n_y, p, theta, scale, w.feedback);
+    take_feedback(n_u, n_y, p, theta, w.feedback);
+    rescale(n_y, p, scale, w.feedback);
     if (c.size <= dense_limit) return dense_radius(c, w);
     okid_real_t growth = growth_of(c, w);
     if (!(growth < growth_limit)) {
-        take_feedback<Scale>(n_u, n_y, p, theta, nullptr, w.feedback);
+        take_feedback(n_u, n_y, p, theta, w.feedback);
         growth = std::min(growth, growth_of(c, w));
     }
     if (!(growth < growth_limit)) return growth;

@@ -13,6 +13,9 @@ struct companion_work {
     void lay_out(int n_y, int p, arena& memory);
 };
 
+/// The part of theta that feeds outputs back, [theta^y_1 .. theta^y_p] side by side: n_y x p n_y.
+void take_feedback(int n_u, int n_y, int p, const okid_real_t* theta, okid_real_t* out);
+
 /// Largest |eigenvalue| of y_n = sum_h theta^y_h y_(n-h), theta as okid_observer_solve() gives it, or its growth over 64
 /// samples where that is above 1.0005 both as the outputs are and with each in units of 1/scale, its own size. Companions
 /// of up to 64 states are solved densely, larger ones by restarted Arnoldi until the dominant Ritz pair has a residual

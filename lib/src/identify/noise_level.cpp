@@ -8,6 +8,7 @@
 // WORKSPACE  noise_work; for each draw n_y q^2 + 4 last p n_y^2 n_u + 40 rows^2 n_y n_u flop
 #include "identify/noise_level.hpp"
 
+#include "identify/companion.hpp"
 #include "identify/triangular.hpp"
 #include "linalg/linalg.hpp"
 
@@ -35,15 +36,6 @@ struct signs {
         return (state >> 40 & 1) != 0 ? 1 : -1;
     }
 };
-
-/// The feedback part of theta or of its error: [theta^y_1 .. theta^y_p] side by side.
-void take_feedback(const okid_observer_config_t& c, const okid_real_t* theta, okid_real_t* out) {
-    const int m = c.n_u + c.n_y;
-    for (int h = 1; h <= c.p; ++h) {
-        const okid_real_t* from = theta + area(c.n_u + (h - 1) * m + c.n_u, c.n_y);
-        std::copy(from, from + c.n_y * c.n_y, out + area(h - 1, c.n_y * c.n_y));
-    }
-}
 
 /// d Y_n = d Ybar^I_n + sum_h (d theta^y_h Y_(n-h) + theta^y_h d Y_(n-h)). Blocks of a stack stand one below the other,
 /// the newest on top and p zeros at the bottom, so that each sum is one product.
@@ -125,7 +117,7 @@ double noise_level(const okid_observer_config_t& c, void* observer_work, const o
             const okid_real_t* from = markov + area(n * c.n_u + k, n_y);
             std::copy(from, from + n_y, w.stack + area(k, tall) + (last - n) * n_y);
         }
-    take_feedback(c, theta, w.feedback);
+    take_feedback(c.n_u, n_y, c.p, theta, w.feedback);
     signs sign;
     double sum = 0;
     for (int k = 0; k < draws; ++k) {
@@ -133,7 +125,7 @@ double noise_level(const okid_observer_config_t& c, void* observer_work, const o
         observer_error(c, observer_work, w.draw, w.solve);
         std::transform(w.draw, w.draw + area(n_y, q), w.plain, [](double x) { return static_cast<okid_real_t>(x); });
         multiply(false, false, n_y, q, n_y, 1, w.root, n_y, w.plain, n_y, 0, w.error, n_y);
-        take_feedback(c, w.error, w.feedback_error);
+        take_feedback(c.n_u, n_y, c.p, w.error, w.feedback_error);
         propagate(c, last, w);
         const double norm = hankel_norm(c.n_u, n_y, rows, w.markov, w.left, w.right, sign);
         sum += norm * norm;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    replicate models, each without one block of the record, from sums alone
 // METHOD     sums of the whole less those of the block, identified at the order of the full model by what okid_identify_run()
-//            does, less the scans and checks that no deviation needs
 //            does, less the scans and checks that no deviation needs; ERA starts from the full model (followed_era)
 // REFERENCE  docs/numerics.md, uncertainty
 // NUMERICS   codes: the sums without the block are exact; doubles: a rounding of the whole
