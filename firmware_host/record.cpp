@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <fmt/format.h>
 #include <new>
+#include <optional>
 #include <unistd.h>
 
 namespace okid_host {
@@ -219,8 +220,24 @@ void find_matrices(const std::vector<replicate_model>& replicates, const record_
     result.context.mass = find_mass_matrices(structure, options.mass, said);
 }
 
+/// The same records identified with other settings. Throws `failure` where there is no memory for it.
+identify_again again_with(const std::vector<record_data>& records, bool at_rest) {
+    return [&records, at_rest](const okid_identify_config_t& other,
+                               const std::function<void(okid_identify_t*, okid_identified_t&)>& hand_on) {
+        okid_accumulator_t* accumulator = nullptr;
+        const auto sums = accumulate(records, other, at_rest, accumulator);
+        const std::size_t bytes = okid_identify_memsize(&other);
+        const auto block = library_memory(bytes, other);
+        okid_identify_t* own = nullptr;
+        okid_identified_t found{};
+        if (okid_identify_create(&own, &other, block.get(), bytes) == OKID_OK &&
+            okid_identify_run(own, accumulator, &found) >= 0)
+            hand_on(own, found);
+    };
+}
+
 /// Deviations of everything, and what a longer horizon would say.
-void find_deviations(const std::vector<record_data>& records, const okid_identify_config_t& config,
+void find_deviations(const std::vector<record_data>& records, const okid_identify_config_t& config, long long rows,
                      const std::vector<replicate_model>& replicates, const record_options& options,
                      record_result& result) {
     if (options.sigma_blocks == 0) return;
@@ -232,26 +249,8 @@ void find_deviations(const std::vector<record_data>& records, const okid_identif
     result.context.sigma = deviations_of(result.model, replicates, options.mass);
     if (result.context.mass) add_deviations(*result.context.sigma, *result.context.mass);
     if (!result.context.refined) // the likelihood knows no p
-        remark_finite_p(records, config, options.start == "rest", result.model, *result.context.sigma,
+        remark_finite_p(config, rows, result.model, *result.context.sigma, again_with(records, options.start == "rest"),
                         result.context.warnings);
-}
-
-/// The poles of other orders and horizons of the same records.
-stabilization look_around(const std::vector<record_data>& records, const okid_identify_config_t& config, bool at_rest,
-                          okid_identify_t* identifier, okid_identified_t& model) {
-    return find_stabilization(identifier, config, model,
-                              [&](const okid_identify_config_t& other,
-                                  const std::function<void(okid_identify_t*, okid_identified_t&)>& hand_on) {
-                                  okid_accumulator_t* accumulator = nullptr;
-                                  const auto sums = accumulate(records, other, at_rest, accumulator);
-                                  const std::size_t bytes = okid_identify_memsize(&other);
-                                  const auto block = library_memory(bytes, other);
-                                  okid_identify_t* own = nullptr;
-                                  okid_identified_t found{};
-                                  if (okid_identify_create(&own, &other, block.get(), bytes) == OKID_OK &&
-                                      okid_identify_run(own, accumulator, &found) >= 0)
-                                      hand_on(own, found);
-                              });
 }
 
 result_context describe(const std::vector<record_data>& records, const record_options& options,
@@ -357,6 +356,7 @@ record_result identify_records(std::vector<record_data> records, const record_op
     tell(options, "summing lagged products");
     okid_accumulator_t* accumulator = nullptr;
     const auto sums = accumulate(records, config, at_rest, accumulator);
+    const auto rows = static_cast<long long>(okid_accumulator_rows(accumulator));
     tell(options, "identifying");
     const std::size_t bytes = okid_identify_memsize(&config);
     result.memory = library_memory(bytes, config);
@@ -367,28 +367,36 @@ record_result identify_records(std::vector<record_data> records, const record_op
     if (status < 0) throw_identify_failure(status, result.model, config, result.context);
     if (options.stabilization) {
         tell(options, "looking at other orders and horizons");
-        result.context.stable = look_around(records, config, at_rest, identifier, result.model);
+        result.context.stable = find_stabilization(identifier, config, result.model, again_with(records, at_rest));
     }
-    tell(options, "leaving out one block after the other");
-    std::vector<replicate_model> replicates =
-        leave_out_blocks(records, config, at_rest, accumulator, result.model, options.sigma_blocks);
+    std::vector<replicate_model> replicates;
+    const auto leave_out = [&](okid_accumulator_t* whole) {
+        tell(options, "leaving out one block after the other");
+        replicates = leave_out_blocks(records, config, at_rest, whole, result.model, options.sigma_blocks);
+    };
+    if (!options.refine) leave_out(accumulator);
     tell(options, "simulating the model");
     if (options.detrend == "mean" && !own_means_first)
         centre_each(records, options); // the fit is about the record's mean
+    std::optional<packed_records> packed;
     if (is_subspace(config.method) && config.n_u > 0) {
-        packed_records packed(records, options.inputs.size(), options.outputs.size());
-        fit_inputs(packed, identifier, result);
-        if (options.mass.wanted()) fit_inputs(packed, replicates);
+        packed.emplace(records, options.inputs.size(), options.outputs.size());
+        fit_inputs(*packed, identifier, result);
     }
     fit_records(records, result);
     if (options.refine) {
         tell(options, "refining the model");
-        std::vector<replicate_model> refined = refine_model(records, options.detrend != "none", result);
-        if (!refined.empty()) replicates = std::move(refined);
+        replicates = refine_model(records, options.detrend != "none", result);
+        if (replicates.empty()) { // as without it: blocks of the records as they stand now
+            okid_accumulator_t* centred = nullptr;
+            const auto block = accumulate(records, config, at_rest, centred);
+            leave_out(centred);
+        }
     }
+    if (packed && options.mass.wanted() && !result.context.refined) fit_inputs(*packed, replicates);
     check_explains(result.context);
     find_matrices(replicates, options, result);
-    find_deviations(records, config, replicates, options, result);
+    find_deviations(records, config, rows, replicates, options, result);
     return result;
 }
 

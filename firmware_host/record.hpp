@@ -37,7 +37,7 @@ struct record_options {
 
 /// The memory of a refined model.
 struct refined_arrays {
-    std::vector<double> A, B, C, D, K, markov, frequency, damping, mpc, emac, shape_re, shape_im;
+    std::vector<double> A, B, C, D, K, markov, frequency, damping, mpc, emac, cmi, shape_re, shape_im;
     std::vector<double> C_without_skew, D_without_skew; ///< where outputs come late
 };
 

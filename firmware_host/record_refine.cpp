@@ -114,7 +114,7 @@ std::complex<double> pole_of(double frequency, double damping) {
 /// Modes of the model in `to`; each keeps the EMAC of the nearest pole of `start`. @return false: there are none
 bool find_modes(const okid_identified_t& start, refined_arrays& to, okid_identified_t& model) {
     const std::size_t most = size_of(model.n_z / 2);
-    for (auto* column : {&to.frequency, &to.damping, &to.mpc, &to.emac}) column->assign(most, 0);
+    for (auto* column : {&to.frequency, &to.damping, &to.mpc, &to.emac, &to.cmi}) column->assign(most, 0);
     for (auto* shape : {&to.shape_re, &to.shape_im}) shape->assign(most * size_of(model.n_y), 0);
     std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
     if (okid_modal_analyse(model.n_y, model.n_z, model.dt, model.A, model.C, &model.mode_count, to.frequency.data(),
@@ -130,6 +130,7 @@ bool find_modes(const okid_identified_t& start, refined_arrays& to, okid_identif
             nearest = distance;
             to.emac[k] = start.emac[j];
         }
+        to.cmi[k] = to.emac[k] * to.mpc[k];
     }
     return true;
 }
@@ -155,6 +156,7 @@ bool make_model(const okid_identified_t& start, const okid_refined_t& found, ref
     model.damping_ratio = to.damping.data();
     model.mpc = to.mpc.data();
     model.emac = to.emac.data();
+    model.cmi = to.cmi.data();
     model.shape_re = to.shape_re.data();
     model.shape_im = to.shape_im.data();
     find_markov(model_view(model), model.markov_count, to.markov);

@@ -70,6 +70,24 @@ replicate_model keep(const okid_model_t& model) {
     return out;
 }
 
+/// The modes that stand elsewhere in `other` by more than two deviations, as text.
+std::string moved(const okid_identified_t& model, const okid_identified_t& other, const deviations& sigma) {
+    std::string text;
+    for (int k = 0; k < model.mode_count; ++k) {
+        const auto at = static_cast<std::size_t>(k);
+        const double f = model.frequency_hz[k], zeta = model.damping_ratio[k];
+        if (!(sigma.frequency_hz[at] > 0) || !(sigma.damping_ratio[at] > 0)) continue;
+        int near = 0;
+        for (int i = 1; i < other.mode_count; ++i)
+            if (std::abs(other.frequency_hz[i] - f) < std::abs(other.frequency_hz[near] - f)) near = i;
+        const double df = (other.frequency_hz[near] - f) / sigma.frequency_hz[at];
+        const double dz = (other.damping_ratio[near] - zeta) / sigma.damping_ratio[at];
+        if (std::abs(other.frequency_hz[near] - f) > 0.05 * f || std::max(std::abs(df), std::abs(dz)) <= 2) continue;
+        text += fmt::format("{}mode {} by {:+.1f} σ in f and {:+.1f} σ in ζ", text.empty() ? "" : ", ", k + 1, df, dz);
+    }
+    return text;
+}
+
 } // namespace
 
 std::vector<replicate_model> leave_out_blocks(const std::vector<record_data>& records,
@@ -117,44 +135,18 @@ deviations deviations_of(const okid_identified_t& model, const std::vector<repli
     return statistics.finish();
 }
 
-void remark_finite_p(const std::vector<record_data>& records, const okid_identify_config_t& config, bool at_rest,
-                     const okid_identified_t& model, const deviations& sigma, remarks& said) {
+void remark_finite_p(const okid_identify_config_t& config, long long rows, const okid_identified_t& model,
+                     const deviations& sigma, const identify_again& again, remarks& said) {
     if (config.n_u == 0 || is_subspace(config.method)) return;
     okid_identify_config_t longer = config;
     longer.p = 2 * config.p;
     longer.rows = model.rows;
     longer.order = model.n_z;
-    const long long q = unknowns_of(config.method, config.n_u, config.n_y, longer.p);
-    okid_accumulator_config_t shape{};
-    shape.n_u = config.n_u;
-    shape.n_y = config.n_y;
-    shape.lags = okid_identify_lags(&longer);
-    shape.forgetting = 1;
-    shape.edges = 1;
-    const sums all(shape);
-    const std::size_t bytes = okid_identify_memsize(&longer);
-    const std::unique_ptr<std::byte[]> block(bytes > 0 ? new (std::nothrow) std::byte[bytes] : nullptr);
-    okid_identify_t* identifier = nullptr;
-    const auto lags = static_cast<std::size_t>(shape.lags);
-    if (!all.handle || !block || okid_identify_create(&identifier, &longer, block.get(), bytes) != OKID_OK ||
-        feed(all.handle, records, cut(records, at_rest ? 0 : lags, 1).front(), lags,
-             static_cast<std::size_t>(config.n_u), static_cast<std::size_t>(config.n_y)) < 0 ||
-        okid_accumulator_rows(all.handle) < 10 * q)
-        return;
-    okid_identified_t other{};
-    if (okid_identify_run(identifier, all.handle, &other) < 0) return;
+    if (rows < 10LL * unknowns_of(config.method, config.n_u, config.n_y, longer.p)) return;
     std::string text;
-    for (int k = 0; k < model.mode_count; ++k) {
-        const auto at = static_cast<std::size_t>(k);
-        const double f = model.frequency_hz[k], zeta = model.damping_ratio[k];
-        if (!(sigma.frequency_hz[at] > 0) || !(sigma.damping_ratio[at] > 0)) continue;
-        int near = 0; // of the modes at 2 p
-        for (int i = 1; i < other.mode_count; ++i)
-            if (std::abs(other.frequency_hz[i] - f) < std::abs(other.frequency_hz[near] - f)) near = i;
-        const double df = (other.frequency_hz[near] - f) / sigma.frequency_hz[at];
-        const double dz = (other.damping_ratio[near] - zeta) / sigma.damping_ratio[at];
-        if (std::abs(other.frequency_hz[near] - f) > 0.05 * f || std::max(std::abs(df), std::abs(dz)) <= 2) continue;
-        text += fmt::format("{}mode {} by {:+.1f} σ in f and {:+.1f} σ in ζ", text.empty() ? "" : ", ", k + 1, df, dz);
+    try {
+        again(longer, [&](okid_identify_t*, const okid_identified_t& other) { text = moved(model, other, sigma); });
+    } catch (const failure&) { // no memory for it: no remark
     }
     if (!text.empty())
         said.emplace_back(

@@ -3,6 +3,7 @@
 #pragma once
 #include "deviations.hpp"
 #include "record.hpp"
+#include "record_stabilization.hpp"
 
 #include <okid/accumulator.h>
 
@@ -37,8 +38,8 @@ deviations deviations_of(const okid_identified_t& model, const std::vector<repli
                          const mass_plan& plan);
 
 /// Does a horizon of 2 p say something else than p, by more than two standard deviations? Then a remark names the modes:
-/// the bias of a finite p, which no deviation sees. Nothing when the record is too short for 2 p.
-void remark_finite_p(const std::vector<record_data>& records, const okid_identify_config_t& config, bool at_rest,
-                     const okid_identified_t& model, const deviations& sigma, remarks& said);
+/// the bias of a finite p, which no deviation sees. Nothing when `rows` regression rows are too few for 2 p.
+void remark_finite_p(const okid_identify_config_t& config, long long rows, const okid_identified_t& model,
+                     const deviations& sigma, const identify_again& again, remarks& said);
 
 } // namespace okid_host

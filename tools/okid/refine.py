@@ -147,7 +147,8 @@ def _seen(found: Identified, model: Model, stable_predictor: bool) -> Identified
     now = poles(model.A, model.C, model.dt)
     was = found.frequency_hz * np.exp(1j * np.arccos(-found.damping_ratio))
     at = now.frequency_hz * np.exp(1j * np.arccos(-now.damping_ratio))
-    emac = [float(found.emac[np.argmin(np.abs(was - pole))]) if len(was) else 0.0 for pole in at]
+    emac = np.array([found.emac[np.argmin(np.abs(was - pole))] if len(was) else 0.0 for pole in at])
+    consistency = np.array([mpc(shape) for shape in now.shapes])
     markov, state = [model.D], model.B
     for _ in range(len(found.markov) - 1):
         markov.append(model.C @ state)
@@ -156,7 +157,7 @@ def _seen(found: Identified, model: Model, stable_predictor: bool) -> Identified
         notes=found.notes & ~_abi.NOTE_PREDICTOR_UNSTABLE if stable_predictor else found.notes,
         A=model.A, B=model.B, C=model.C, D=model.D, K=model.K, markov=np.array(markov),
         frequency_hz=now.frequency_hz, damping_ratio=now.damping_ratio, shapes=now.shapes,
-        mpc=np.array([mpc(shape) for shape in now.shapes]), emac=np.array(emac), model_radius=model.radius(),
+        mpc=consistency, emac=emac, cmi=emac * consistency, model_radius=model.radius(),
     )  # fmt: skip
 
 
