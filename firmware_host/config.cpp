@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "config.hpp"
 
+#include "config_alarm.hpp"
 #include "config_channel.hpp"
+#include "config_clock.hpp"
+#include "config_hammer.hpp"
 #include "config_line.hpp"
+#include "config_publish.hpp"
+#include "config_record.hpp"
 #include "config_schema.hpp"
 #include "config_send.hpp"
 #include "config_trigger.hpp"
@@ -32,7 +37,7 @@ namespace {
     refuse_file(place.path, fmt::format("line {}, {}: {}", table.source().begin.line, place.section, text));
 }
 
-toml::table parse(const std::string& path) {
+std::string read_config_text(const std::string& path) {
     std::error_code ignored;
     std::ifstream input(path, std::ios::binary);
     if (!input || std::filesystem::is_directory(path, ignored))
@@ -40,8 +45,12 @@ toml::table parse(const std::string& path) {
                                 : "cannot be read: no such file or no permission");
     std::stringstream text;
     text << input.rdbuf();
+    return text.str();
+}
+
+toml::table parse(const std::string& path, const std::string& text) {
     try {
-        return toml::parse(text.str(), path);
+        return toml::parse(text, path);
     } catch (const toml::parse_error& error) {
         refuse_file(path, fmt::format("line {}, column {}: {}", error.source().begin.line, error.source().begin.column,
                                       error.description()));
@@ -67,7 +76,8 @@ bus_config read_bus(const config_place& place, const toml::table& table) {
     bus.fd = table["fd"].value_or(false);
     bus.bitrate = table["bitrate"].value<double>();
     bus.dbitrate = table["dbitrate"].value<double>();
-    if (const auto dbc = table["dbc"].value<std::string>()) bus.dbc = beside(place.path, *dbc);
+    bus.dbc_name = table["dbc"].value_or(std::string());
+    if (!bus.dbc_name.empty()) bus.dbc = beside(place.path, bus.dbc_name);
     if (const auto file = table["file"].value<std::string>()) bus.file = beside(place.path, *file);
     read_line(place, table, bus);
     read_sending(place, table, bus);
@@ -157,12 +167,23 @@ void share_sequence(const config_place& place, const toml::table& table, live_co
     }
 }
 
-void read_channels(const std::string& path, const toml::table& file, live_config& config) {
+/// Every DBC once, by its path. Those that `texts` does not hold yet are read, when there are files to read.
+std::map<std::string, dbc_file> read_dbcs(const live_config& config, bool from_files, config_texts& texts) {
+    std::map<std::string, dbc_file> out;
+    for (const bus_config& bus : config.buses) {
+        if (bus.dbc.empty() || out.count(bus.dbc)) continue;
+        const auto [text, fresh] = texts.dbcs.try_emplace(bus.dbc_name);
+        if (fresh && !from_files) refuse_file(config.path, fmt::format("\"{}\" is not in it", bus.dbc_name));
+        if (fresh) text->second = read_dbc_text(bus.dbc);
+        out.emplace(bus.dbc, read_dbc(bus.dbc, text->second));
+    }
+    return out;
+}
+
+void read_channels(const std::string& path, const toml::table& file, const std::map<std::string, dbc_file>& dbcs,
+                   live_config& config) {
     const toml::array* entries = file["channel"].as_array();
     if (!entries || entries->empty()) refuse_file(path, "no [[channel]], expected at least one");
-    std::map<std::string, dbc_file> dbcs;
-    for (const bus_config& bus : config.buses)
-        if (!bus.dbc.empty() && !dbcs.count(bus.dbc)) dbcs.emplace(bus.dbc, read_dbc(bus.dbc));
     for (std::size_t i = 0; i < entries->size(); ++i) {
         const toml::table& table = *entries->get_as<toml::table>(i);
         const config_place place{path, entry_name("channel", table, i)};
@@ -237,6 +258,7 @@ void read_identification(const std::string& path, const toml::table& file, live_
         refuse_key(
             place, *t.get("update_s"), "update_s",
             fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
+    out.restart_on_change = t["restart_on_change"].value_or(true);
     out.mkr = t["mkr"].value_or(false);
     if (out.mkr && config.n_u == 0)
         config.warnings.emplace_back(
@@ -247,7 +269,7 @@ void read_identification(const std::string& path, const toml::table& file, live_
 
 /// Sections of later versions: checked, then said to do nothing.
 void note_ignored(const toml::table& file, live_config& config) {
-    for (const char* section : {"alarm", "record", "publish", "geometry"})
+    for (const char* section : {"geometry"})
         if (file.contains(section))
             config.warnings.push_back(fmt::format("[{}] is accepted, but does nothing in this version", section));
     for (const channel_config& channel : config.channels)
@@ -259,20 +281,34 @@ void note_ignored(const toml::table& file, live_config& config) {
 
 } // namespace
 
-live_config load_config(const std::string& path) {
-    toml::table file = parse(path);
-    apply_presets(path, file);
+static live_config make_config(const std::string& path, config_texts texts, bool from_files) {
+    toml::table file = parse(path, texts.config);
+    apply_presets(path, file, texts.presets);
     check_schema(path, file);
     live_config config;
     config.path = path;
     read_acquisition(path, file, config);
     read_buses(path, file, config);
-    read_channels(path, file, config);
+    read_channels(path, file, read_dbcs(config, from_files, texts), config);
+    read_clocks(file, config);
     read_identification(path, file, config);
     read_trigger(file, config);
+    read_hammer(file, config);
+    read_alarm(file, config);
+    read_publish(file, config);
+    read_record(file, config);
     note_ignored(file, config);
+    config.texts = std::move(texts);
     return config;
 }
+
+live_config load_config(const std::string& path) {
+    config_texts texts;
+    texts.config = read_config_text(path);
+    return make_config(path, std::move(texts), true);
+}
+
+live_config load_config(const std::string& path, const config_texts& texts) { return make_config(path, texts, false); }
 
 void require_identifiable(const live_config& config) {
     if (config.n_y == 0)

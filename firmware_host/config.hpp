@@ -9,6 +9,7 @@
 #include <drv/source.h>
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,6 +20,7 @@ namespace okid_host {
 struct bus_config {
     std::string name, type = "socketcan", interface, device, file,
                       dbc; ///< paths already relative to the config's folder; a line has its name for interface
+    std::string dbc_name;  ///< as the config has it
     bool fd = false;
     std::optional<double> bitrate, dbitrate;
     // What okid sends.
@@ -30,7 +32,9 @@ struct bus_config {
     drv_framing_t framing = DRV_FRAMING_COBS;
     std::optional<int> counter_field; ///< of lines of text
     int counter_bits = 32;
-    std::string btr; ///< slcan: bit timing registers
+    bool free_clock = false;       ///< its nodes sample by clocks of their own
+    std::optional<double> rate_hz; ///< of those nodes; that of the grid when not given
+    std::string btr;               ///< slcan: bit timing registers
     bool serial() const { return type == "serial"; }
     bool on_line() const { return serial() || type == "slcan"; }
 };
@@ -68,8 +72,9 @@ struct identification_config {
     int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, n4sid 30, okid without a force p; order 0 = automatic
     std::optional<double> window_s, forgetting;
     double update_s = 0.5;
-    int sigma_blocks = 20; ///< blocks left out for the standard deviations; 0 = none
-    bool mkr = false;      ///< M, K and R with the final result
+    int sigma_blocks = 20;         ///< blocks left out for the standard deviations; 0 = none
+    bool restart_on_change = true; ///< window and forgetting: samples from before a change of the structure are dropped
+    bool mkr = false;              ///< M, K and R with the final result
 };
 
 /// A GPIO line as the config names it.
@@ -92,6 +97,18 @@ struct trigger_config {
     gpio_place place;        ///< gpio
 };
 
+/// A hammer test: blows are waited for, judged and added up.
+struct hammer_config {
+    bool enabled = false;
+    std::size_t channel = 0;    ///< the force, index in live_config::channels
+    double level = 0;           ///< in its unit; negative: a blow is negative
+    int hits = 5;               ///< good ones wanted
+    double length_s = 2;        ///< of a blow's ring-down
+    double pretrigger_s = 0;    ///< at least; as long as the lags in any case
+    double double_percent = 10; ///< of the peak: a second blow this strong is one
+    double spectrum_hz = 0;     ///< the force must reach so far
+};
+
 /// Lines that are active while …
 struct lamps_config {
     std::optional<gpio_place> armed; ///< … the trigger is waited for; without a trigger while okid runs
@@ -99,9 +116,54 @@ struct lamps_config {
     std::optional<gpio_place> alarm; ///< … an alarm stands
 };
 
+/// [alarm]: a tracked mode has left its baseline.
+struct alarm_config {
+    bool enabled = true;
+    double k_sigma = 6;
+    int baseline_updates = 20; ///< settled updates that make the baseline
+    std::string command;       ///< run live at an alarm, already relative to the config's folder; "" = none
+};
+
+/// Where to listen or to send to.
+struct net_address {
+    std::string host = "127.0.0.1";
+    int port = 0;
+    bool loopback() const;
+    std::string text() const;
+};
+
+struct broker_address {
+    net_address at;
+    std::string user, password, prefix = "okid";
+};
+
+/// [publish]: where events and modes go besides the events file and the terminal.
+struct publish_config {
+    std::string socket; ///< path of a unix socket, already relative to the config's folder; "" = none
+    std::optional<net_address> udp, prometheus;
+    std::optional<broker_address> mqtt;
+};
+
+/// [record]: raw frames onto the disk.
+struct record_config {
+    bool wanted = false;
+    std::string directory = "runs"; ///< already relative to the config's folder
+    double segment_mb = 64, max_mb = 4096;
+    double pretrigger_s = 2;           ///< with a trigger: frames this long before it are kept
+    std::size_t pretrigger_frames = 0; ///< room for them; 0 = nothing waits for a trigger
+};
+
+/// The files a config was made of, word for word: a journal keeps them, and a config is read from them again.
+struct config_texts {
+    std::string config;
+    std::map<std::string, std::string> dbcs;    ///< by the name the config has for them
+    std::map<std::string, std::string> presets; ///< those it asks for, by name
+};
+
 struct live_config {
     std::string path;
-    double rate_hz = 0;
+    double rate_hz = 0;                                     ///< of the grid
+    int decimate = 1;                                       ///< the nodes send so many samples for one of the grid
     std::vector<std::pair<std::string, std::string>> notes; ///< title, operator, structure, …
     std::vector<bus_config> buses;
     std::vector<channel_config> channels; ///< inputs first, then outputs, then aux; each in the order of the file
@@ -109,11 +171,22 @@ struct live_config {
     identification_config identification;
     trigger_config trigger;
     lamps_config lamps;
+    hammer_config hammer;
+    alarm_config alarm;
+    publish_config publish;
+    record_config record;
+    config_texts texts;
     std::vector<std::string> warnings; ///< what is accepted but does nothing in this version
 };
 
 /// Read and check. Throws `failure` (exit 2) naming file, line, key, what was found and what was expected.
 live_config load_config(const std::string& path);
+
+/// The same out of texts instead of files. @param path  where they come from, for messages
+live_config load_config(const std::string& path, const config_texts& texts);
+
+/// Are there samples that come out of a filter, no codes of a converter any more?
+bool resampled(const live_config& config);
 
 /// Throws `failure` (exit 2) unless there is at least one response channel.
 void require_identifiable(const live_config& config);

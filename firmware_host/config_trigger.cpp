@@ -49,23 +49,6 @@ void refuse_others(const config_place& place, const toml::table& table, const st
     if (source == "immediate") refuse({"edge", "pretrigger_s"}, "gpio\" or \"level");
 }
 
-std::size_t channel_of(const config_place& place, const toml::table& table, const live_config& config) {
-    std::vector<std::string> names;
-    for (const channel_config& channel : config.channels) names.push_back(channel.name);
-    const toml::node* node = table.get("channel");
-    if (!node) {
-        if (config.n_u > 0) return 0; // the first force
-        missing_key(place, table, "channel", "there is no force, so say which channel triggers");
-    }
-    const std::string name = *node->value<std::string>();
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end())
-        refuse_key(place, *node, "channel",
-                   fmt::format("found \"{}\"{}, expected one of: {}", printable(name), did_you_mean(name, names),
-                               list_names(names)));
-    return static_cast<std::size_t>(found - names.begin());
-}
-
 void read_start(const toml::table& file, live_config& config) {
     const toml::table* table = file["trigger"].as_table();
     if (!table) return;
@@ -92,7 +75,7 @@ void read_start(const toml::table& file, live_config& config) {
                         "the value whose crossing starts the identification, in the "
                         "channel's unit");
         out.level = *(*table)["level"].value<double>();
-        out.channel = channel_of(place, *table, config);
+        out.channel = triggering_channel(place, *table, config);
     }
 }
 
@@ -112,11 +95,26 @@ void read_lamps(const toml::table& file, live_config& config) {
                        fmt::format("{} is used already, by another lamp or the trigger", (*lamp)->text()));
         taken.push_back((*lamp)->text());
     }
-    if (config.lamps.alarm)
-        config.warnings.emplace_back("[lamps] alarm stays inactive: [alarm] does nothing in this version");
 }
 
 } // namespace
+
+std::size_t triggering_channel(const config_place& place, const toml::table& table, const live_config& config) {
+    std::vector<std::string> names;
+    for (const channel_config& channel : config.channels) names.push_back(channel.name);
+    const toml::node* node = table.get("channel");
+    if (!node) {
+        if (config.n_u > 0) return 0; // the first force
+        missing_key(place, table, "channel", "there is no force, so say which channel triggers");
+    }
+    const std::string name = *node->value<std::string>();
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+        refuse_key(place, *node, "channel",
+                   fmt::format("found \"{}\"{}, expected one of: {}", printable(name), did_you_mean(name, names),
+                               list_names(names)));
+    return static_cast<std::size_t>(found - names.begin());
+}
 
 drv_gpio_config_t gpio_place::driver() const {
     drv_gpio_config_t out{};

@@ -6,6 +6,9 @@
 
 namespace okid_host {
 
+/// The channel that the key "channel" names, else the first force. Throws `failure` (exit 2).
+std::size_t triggering_channel(const config_place& place, const toml::table& table, const live_config& config);
+
 /// Fill config.trigger and config.lamps. Throws `failure` (exit 2).
 void read_trigger(const toml::table& file, live_config& config);
 

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
+#include <sstream>
 #include <string_view>
 
 namespace okid_host {
@@ -314,14 +315,23 @@ bool toggles_string(std::string_view text) {
 
 } // namespace
 
-dbc_file read_dbc(const std::string& path) {
-    dbc_file file;
-    file.path = path;
+std::string read_dbc_text(const std::string& path) {
     std::ifstream input(path, std::ios::binary);
     std::error_code ignored;
     if (!input || std::filesystem::is_directory(path, ignored))
         throw failure(exit_usage,
                       fmt::format("{}: cannot be read: {}", path, input ? "it is a folder" : std::strerror(errno)));
+    std::stringstream text;
+    text << input.rdbuf();
+    return text.str();
+}
+
+dbc_file read_dbc(const std::string& path) { return read_dbc(path, read_dbc_text(path)); }
+
+dbc_file read_dbc(const std::string& path, const std::string& text_of_file) {
+    dbc_file file;
+    file.path = path;
+    std::istringstream input(text_of_file);
     std::string whole_line;
     frame_formats formats;
     bool in_string = false, in_message = false, message_kept = false;

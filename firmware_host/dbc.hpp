@@ -38,5 +38,8 @@ struct dbc_file {
 /// Read a DBC. Sections that do not place signals are skipped. Throws `failure` (exit 2) naming file, line, what was
 /// found and what was expected.
 dbc_file read_dbc(const std::string& path);
+/// The two halves of it: the text of the file, and what it says. @param path  for messages
+std::string read_dbc_text(const std::string& path);
+dbc_file read_dbc(const std::string& path, const std::string& text);
 
 } // namespace okid_host

@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     okid_host::add_identify(app);
     okid_host::add_run(app);
+    okid_host::add_record(app);
     okid_host::add_replay(app);
     okid_host::add_simulate(app);
     okid_host::add_convert(app);

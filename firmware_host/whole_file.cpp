@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <utility>
 
 namespace okid_host {
 namespace {
@@ -26,24 +27,7 @@ volatile std::sig_atomic_t writing = 0;
     throw failure(exit_usage, fmt::format("{}: cannot be written: {}", path, std::strerror(reason)));
 }
 
-/// All of the text, in as many writes as it takes; errno or 0.
-int write_all(int fd, const std::string& text) {
-    for (std::size_t at = 0; at < text.size();) {
-        const ssize_t wrote = write(fd, text.data() + at, text.size() - at);
-        if (wrote < 0 && errno != EINTR) return errno;
-        if (wrote > 0) at += static_cast<std::size_t>(wrote);
-    }
-    return 0;
-}
-
-/// Devices and pipes have no other name to be renamed from.
-void write_in_place(const std::string& path, const std::string& text) {
-    const int fd = open(path.c_str(), O_WRONLY | O_CLOEXEC);
-    if (fd < 0) cannot_write(path, errno);
-    const int reason = write_all(fd, text);
-    close(fd);
-    if (reason) cannot_write(path, reason);
-}
+constexpr std::size_t buffer_bytes = std::size_t{1} << 20;
 
 /// The file a symbolic link leads to, so that the link stays.
 std::string resolved(const std::string& path) {
@@ -73,37 +57,79 @@ void check_writable(const std::string& path) {
     if (access(folder.c_str(), W_OK) != 0) cannot_write(path, errno);
 }
 
-void write_whole_file(const std::string& path, const std::string& text) {
-    if (path == "-") {
-        if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
-            cannot_write("stdout", errno);
+whole_file::whole_file(std::string path) : path_(std::move(path)) {
+    if (path_ == "-") {
+        fd_ = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+        if (fd_ < 0) cannot_write("stdout", errno);
         return;
     }
-    if (path.empty()) throw failure(exit_usage, "the name of a file to write is empty");
+    if (path_.empty()) throw failure(exit_usage, "the name of a file to write is empty");
     struct stat status{};
-    const bool exists = stat(path.c_str(), &status) == 0;
-    if (exists && S_ISDIR(status.st_mode)) cannot_write(path, EISDIR);
-    if (exists && !S_ISREG(status.st_mode)) return write_in_place(path, text);
-    if (exists && access(path.c_str(), W_OK) != 0) cannot_write(path, errno);
-    const std::string target = resolved(path);
-    std::string temporary = target + ".XXXXXX";
-    const int fd = mkostemp(temporary.data(), O_CLOEXEC);
-    if (fd < 0) cannot_write(path, errno);
-    if (temporary.size() < sizeof unfinished) {
-        std::memcpy(unfinished, temporary.c_str(), temporary.size() + 1);
+    const bool exists = stat(path_.c_str(), &status) == 0;
+    if (exists && S_ISDIR(status.st_mode)) cannot_write(path_, EISDIR);
+    if (exists && !S_ISREG(status.st_mode)) { // has no other name to be renamed from
+        fd_ = open(path_.c_str(), O_WRONLY | O_CLOEXEC);
+        if (fd_ < 0) cannot_write(path_, errno);
+        return;
+    }
+    if (exists && access(path_.c_str(), W_OK) != 0) cannot_write(path_, errno);
+    target_ = resolved(path_);
+    temporary_ = target_ + ".XXXXXX";
+    fd_ = mkostemp(temporary_.data(), O_CLOEXEC);
+    if (fd_ < 0) cannot_write(path_, errno);
+    if (temporary_.size() < sizeof unfinished) {
+        std::memcpy(unfinished, temporary_.c_str(), temporary_.size() + 1);
         writing = 1;
     }
     const mode_t mask = umask(0);
     umask(mask);
-    int reason = fchmod(fd, exists ? status.st_mode & 07777 : 0666 & ~mask) == 0 ? 0 : errno;
-    if (!reason) reason = write_all(fd, text);
-    if (!reason && fsync(fd) != 0 && errno != EINVAL) reason = errno;
-    if (close(fd) != 0 && !reason) reason = errno;
-    if (!reason && std::rename(temporary.c_str(), target.c_str()) != 0) reason = errno;
+    if (fchmod(fd_, exists ? status.st_mode & 07777 : 0666 & ~mask) != 0) give_up(errno);
+}
+
+whole_file::~whole_file() {
+    if (fd_ < 0) return;
+    close(fd_);
+    if (temporary_.empty()) return;
     writing = 0;
-    if (!reason) return;
-    unlink(temporary.c_str());
-    cannot_write(path, reason);
+    unlink(temporary_.c_str());
+}
+
+void whole_file::give_up(int reason) {
+    if (fd_ >= 0) close(fd_);
+    fd_ = -1;
+    writing = 0;
+    if (!temporary_.empty()) unlink(temporary_.c_str());
+    cannot_write(path_ == "-" ? "stdout" : path_, reason);
+}
+
+void whole_file::flush() {
+    for (std::size_t at = 0; at < buffer_.size();) {
+        const ssize_t wrote = write(fd_, buffer_.data() + at, buffer_.size() - at);
+        if (wrote < 0 && errno != EINTR) give_up(errno);
+        if (wrote > 0) at += static_cast<std::size_t>(wrote);
+    }
+    buffer_.clear();
+}
+
+void whole_file::append(std::string_view bytes) {
+    buffer_.append(bytes);
+    if (buffer_.size() >= buffer_bytes) flush();
+}
+
+void whole_file::commit() {
+    flush();
+    if (!temporary_.empty() && fsync(fd_) != 0 && errno != EINVAL) give_up(errno);
+    const int closed = close(std::exchange(fd_, -1));
+    if (closed != 0) give_up(errno);
+    if (!temporary_.empty() && std::rename(temporary_.c_str(), target_.c_str()) != 0) give_up(errno);
+    writing = 0;
+}
+
+void write_whole_file(const std::string& path, const std::string& text) {
+    if (path == "-") std::fflush(stdout); // what stands before it comes before it
+    whole_file file(path);
+    file.append(text);
+    file.commit();
 }
 
 } // namespace okid_host

@@ -1,12 +1,34 @@
 // SPDX-License-Identifier: MIT
-// Before the work: can the result be written where it is wanted? (write_whole_file() stands in result.hpp.)
+// A file appears under its final name complete or not at all. (write_whole_file(), for one text, stands in result.hpp.)
 #pragma once
+#include <cstddef>
 #include <string>
+#include <string_view>
 
 namespace okid_host {
 
 /// Throws `failure` (exit 2) when `path` is a folder or its folder is missing or not writable.
 void check_writable(const std::string& path);
+
+/// One at a time. A device or a pipe is written in place, "-" is stdout.
+class whole_file {
+  public:
+    /// Throws `failure` (exit 2) when it cannot be written; so do the others.
+    explicit whole_file(std::string path);
+    ~whole_file(); ///< without commit() nothing appears
+    whole_file(const whole_file&) = delete;
+    whole_file& operator=(const whole_file&) = delete;
+
+    void append(std::string_view bytes);
+    void commit();
+
+  private:
+    void flush();
+    [[noreturn]] void give_up(int reason);
+
+    std::string path_, target_, temporary_, buffer_;
+    int fd_ = -1;
+};
 
 /// For a signal handler: remove the temporary of a write in progress. Async-signal-safe.
 void remove_unfinished_file();

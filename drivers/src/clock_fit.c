@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  device clock to host clock: offset and rate with σ, whatever the host's delays
 // METHOD   residuals about the present line are gathered in blocks; a block gives one point: its median, or, where
-//          delays are one-sided, its low quantile carried to the edge (2 q(a) - q(2a)). A line with a prior on its
+//          delays are one-sided, its low quantile carried to the edge: q(a) - (q(2a) - q(a)) / (g - 1), g being the
+//          growth of the quantiles there. A line with a prior on its
 //          rate goes through the last 64 points by Huber weights. A pair far off the line is held back; eight that
 //          agree are a step of the host clock or a restart of the device
 // SOURCE   own; chosen by simulation among minimum, low quantile, carried quantile and median (test_clock_fit.c)
@@ -17,6 +18,7 @@ enum { FIRST_BLOCK = 32, BELIEVED = 8, ROUNDS = 6, KNOWN = 6 };
 static const double block_s = 1.0;         // a block closes after this time with 32 pairs, …
 static const double longest_block_s = 8.0; // … after this with any
 static const double edge = 1.0 / 64;       // the low quantile
+static const double abrupt = 0.5;          // jitters: what the first guess of the edge counts against the blocks
 static const double huber = 2.0;           // in scatters
 static const double rate_wander = 2e-6;    // by which a rate may have moved across a step
 
@@ -30,6 +32,8 @@ int drv_clock_fit_init(drv_clock_fit_t* self, const drv_clock_config_t* config) 
     if (config->jitter_s == 0) self->config.jitter_s = 1e-3;
     if (config->rate_ppm == 0) self->config.rate_ppm = 200;
     self->rate_prior_sigma = 1e-6 * self->config.rate_ppm;
+    self->growth_first = abrupt; // until the blocks tell
+    self->growth_second = 2 * abrupt;
     return 0;
 }
 
@@ -72,6 +76,14 @@ static double median(double* values, int32_t count) {
     return quantile(values, count, 0.5);
 }
 
+/// Near the edge quantiles grow with a power of their fraction: by 2 from one doubling to the next where delays begin
+/// abruptly (exponential), by sqrt(2) where short ones are rare. A block tells it badly, all of them well.
+static void learn_growth(drv_clock_fit_t* self, double first, double second) {
+    self->growth_first += fmax(first, 0) / self->config.jitter_s;
+    self->growth_second += fmax(second, 0) / self->config.jitter_s;
+    self->growth = fmin(2, fmax(sqrt(2), self->growth_second / self->growth_first));
+}
+
 /// Where the block stands above the line. Arrivals that are early and alone are errors, not the least delay.
 static double block_level(drv_clock_fit_t* self) {
     const double* sorted = self->block;
@@ -79,7 +91,9 @@ static double block_level(drv_clock_fit_t* self) {
     qsort(self->block, (size_t)count, sizeof self->block[0], order);
     if (self->config.jitter == DRV_CLOCK_SYMMETRIC) return quantile(sorted, count, 0.5);
     for (; most > 0 && sorted[2] - sorted[0] > self->config.jitter_s; --most) ++sorted, --count;
-    return 2 * quantile(sorted, count, edge) - quantile(sorted, count, 2 * edge);
+    const double low = quantile(sorted, count, edge), next = quantile(sorted, count, 2 * edge);
+    learn_growth(self, next - low, quantile(sorted, count, 4 * edge) - next);
+    return low - (next - low) / (self->growth - 1);
 }
 
 /// Sums of a weighted line fit about self->since, and its solution. σ of a point of weight 1 is `sigma`.

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  a GPIO line as input with time stamps or as output, whichever libgpiod is there
 // METHOD   chip by path, name or label, line by name or number; edges stamped CLOCK_MONOTONIC by the kernel are carried
-//          to CLOCK_REALTIME by the tightest of three paired clock reads
+//          to host time by the tightest of three paired clock reads
 #include "gpio_backend.h"
+
+#include <drv/host_clock.h>
 
 #include <dirent.h>
 #include <errno.h>
@@ -151,23 +153,12 @@ int drv_gpio_open_output(drv_gpio_t* self, const drv_gpio_config_t* config) { re
 
 int drv_gpio_fd(const drv_gpio_t* self) { return self->line ? gpio_backend_fd(self) : -1; }
 
-static int64_t clock_ns(clockid_t which) {
-    struct timespec now;
-    clock_gettime(which, &now);
-    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
-}
-
-/// CLOCK_REALTIME - CLOCK_MONOTONIC; *error bounds it.
-static int64_t realtime_offset_ns(int64_t* error) {
-    int64_t best = 0, least = INT64_MAX;
-    for (int i = 0; i < 3; ++i) {
-        int64_t before = clock_ns(CLOCK_MONOTONIC), real = clock_ns(CLOCK_REALTIME), after = clock_ns(CLOCK_MONOTONIC);
-        if (after - before >= least) continue;
-        least = after - before;
-        best = real - before - least / 2;
-    }
-    *error = least / 2 + 1;
-    return best;
+/// Host time - CLOCK_MONOTONIC; *error bounds it.
+static int64_t host_offset_ns(int64_t* error) {
+    const drv_clock_pair_t pair = drv_clock_pair(CLOCK_MONOTONIC);
+    const int64_t half = (pair.after_ns - pair.before_ns) / 2;
+    *error = half + 1;
+    return drv_host_time_of(pair.before_ns + half) - pair.reference_ns;
 }
 
 int drv_gpio_read(drv_gpio_t* self, drv_gpio_event_t* events, int capacity) {
@@ -176,7 +167,7 @@ int drv_gpio_read(drv_gpio_t* self, drv_gpio_event_t* events, int capacity) {
     int count = gpio_backend_read(self, edges, capacity < GPIO_BATCH ? capacity : GPIO_BATCH);
     if (count == -EAGAIN || count == -EINTR) return 0;
     if (count < 0) return explain(self, -count, "its edges cannot be read: %s", strerror(-count));
-    int64_t offset = realtime_offset_ns(&self->clock_error_ns);
+    int64_t offset = host_offset_ns(&self->clock_error_ns);
     for (int i = 0; i < count; ++i) {
         events[i].monotonic_ns = edges[i].monotonic_ns;
         events[i].time_ns = edges[i].monotonic_ns + offset;

@@ -10,13 +10,11 @@
 
 static const int64_t retry_ns = 100000000;
 
-static int64_t clock_ns(clockid_t which) {
+static int64_t monotonic_ns(void) {
     struct timespec now;
-    clock_gettime(which, &now);
+    clock_gettime(CLOCK_MONOTONIC, &now);
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
-
-int64_t line_link_now(void) { return clock_ns(CLOCK_REALTIME); }
 
 int line_link_open(line_link_t* self, drv_source_t* source, const drv_line_config_t* config) {
     const char* path = config->device ? config->device : "";
@@ -43,11 +41,11 @@ static void lose(line_link_t* self, drv_source_t* source) {
     ++source->counts.link_down;
     source->counts.link_is_down = 1;
     self->loss |= DRV_LOSS_LINK;
-    self->next_try_ns = clock_ns(CLOCK_MONOTONIC) + retry_ns;
+    self->next_try_ns = monotonic_ns() + retry_ns;
 }
 
 static int try_again(line_link_t* self, drv_source_t* source) {
-    const int64_t now = clock_ns(CLOCK_MONOTONIC);
+    const int64_t now = monotonic_ns();
     if (now < self->next_try_ns) return 0;
     self->next_try_ns = now + retry_ns;
     if (drv_serial_open(&self->port, self->path, self->baud) != 0) return 0;

@@ -27,7 +27,4 @@ int line_link_read(line_link_t* self, drv_source_t* source, uint8_t* bytes, size
 /// Bring the counts of the hardware up to date; bytes it lost mark the next frame.
 void line_link_count(line_link_t* self, drv_source_t* source);
 
-/// CLOCK_REALTIME, ns.
-int64_t line_link_now(void);
-
 #endif

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  samples off a serial line as frames, every loss counted and placed
-// METHOD   bytes go straight into the decoder; a packet is handed out frame by frame. The samples of a packet are stamped
-//          back from its arrival at the sample rate; the device's clock, unwrapped, goes along
+// METHOD   bytes go straight into the decoder; a packet is handed out frame by frame. Packets read together are
+//          stamped in their order, microseconds apart (a baud rate may be nominal and tells no more), the samples of a
+//          packet back from its arrival at the sample rate; the device's clock, unwrapped, goes along
 #include "line_link.h"
 
+#include <drv/host_clock.h>
 #include <drv/line_frame.h>
 
 #include <errno.h>
@@ -13,6 +15,8 @@
 #include <string.h>
 
 enum { READS_A_CALL = 4, READS_BETWEEN_COUNTS = 64 };
+
+static const int64_t byte_ns = 250; // apart, so that packets read together differ
 
 typedef struct serial_t {
     line_link_t link;
@@ -86,7 +90,8 @@ static void next_frame(drv_source_t* self, serial_t* state, drv_frame_t* frame) 
     drv_line_frame_fill(
         frame, (packet->first_field + state->field) / together, packet->counted ? packet->sequence + state->sample : 0,
         packet->values + (size_t)state->sample * packet->fields + state->field, left < together ? left : together);
-    frame->time_ns = state->arrived_ns - (int64_t)((double)behind * state->period_ns);
+    const int64_t unread_ns = (int64_t)(state->decoder.end - state->decoder.begin) * byte_ns;
+    frame->time_ns = state->arrived_ns - unread_ns - (int64_t)((double)behind * state->period_ns);
     if (packet->timed) {
         frame->hw_time_ns = (int64_t)(state->device_ns + (uint64_t)((double)state->sample * state->period_ns));
         if (frame->hw_time_ns == 0) frame->hw_time_ns = 1; // 0 means none
@@ -123,7 +128,7 @@ static int fetch(drv_source_t* self, serial_t* state) {
         drv_decoder_restart(&state->decoder);
     }
     if (got <= 0) return 0;
-    state->arrived_ns = line_link_now();
+    state->arrived_ns = drv_host_time_ns();
     drv_decoder_add(&state->decoder, (size_t)got);
     if (++state->reads % READS_BETWEEN_COUNTS == 0) line_link_count(&state->link, self);
     return 1;

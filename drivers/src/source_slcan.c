@@ -4,6 +4,7 @@
 //          frame. The adapter's stamps, milliseconds of a minute, are unwrapped with the host's clock
 #include "line_link.h"
 
+#include <drv/host_clock.h>
 #include <drv/slcan.h>
 
 #include <errno.h>
@@ -155,7 +156,7 @@ static int fetch(drv_source_t* self, slcan_t* state) {
     }
     if (fresh && state->link.port.fd >= 0) (void)send_opening(state);
     if (got <= 0) return 0;
-    state->arrived_ns = line_link_now();
+    state->arrived_ns = drv_host_time_ns();
     state->end += (size_t)got;
     return 1;
 }

@@ -5,6 +5,7 @@
 //          that hears of every change of the interface: one that vanished is bound again as soon as it is back.
 //          The controller's own counters (netlink) are read once a second and whenever it sends an error message.
 #include <drv/can_error.h>
+#include <drv/host_clock.h>
 #include <drv/link.h>
 #include <drv/source.h>
 
@@ -43,7 +44,8 @@ typedef struct socketcan_t {
     uint8_t loss;      ///< DRV_LOSS_… of the next frame
     int64_t looked_ns; ///< CLOCK_MONOTONIC of the last look at the controller
     uint64_t driver_dropped, driver_overran; ///< since open, by the controller's counters
-    drv_link_t link;                         ///< as last read; its counters are the base of the next difference
+    drv_host_clock_t clock;
+    drv_link_t link; ///< as last read; its counters are the base of the next difference
     char interface[DRV_NAME_BYTES];
     struct can_filter filters[DRV_MAX_FILTERS];
     int filter_count;
@@ -200,6 +202,11 @@ static void look_at_controller(drv_source_t* self, socketcan_t* state) {
     if (drv_link_read(state->interface, &link) == 0) take_link(self, state, &link);
 }
 
+static void look_at_clock(socketcan_t* state) {
+    const drv_clock_pair_t real = drv_clock_pair(CLOCK_REALTIME);
+    (void)drv_host_clock_look(&state->clock, &real);
+}
+
 static int socketcan_open(drv_source_t* self, const drv_source_config_t* config) {
     memset(&self->counts, 0, sizeof self->counts);
     self->error[0] = '\0';
@@ -221,6 +228,7 @@ static int socketcan_open(drv_source_t* self, const drv_source_config_t* config)
         state->filters[i].can_mask = (some ? some : all) | CAN_EFF_FLAG | CAN_RTR_FLAG;
     }
     lay_out_batch(state);
+    look_at_clock(state);
     int up = 0;
     state->fd = make_socket(self, state, &up);
     int code = state->fd < 0 ? state->fd : 0;
@@ -337,11 +345,7 @@ static void take_control(drv_source_t* self, socketcan_t* state, struct msghdr* 
         }
     }
     if (frame->hw_time_ns) self->counts.stamp = DRV_STAMP_HARDWARE;
-    if (frame->time_ns == 0) {
-        struct timespec now;
-        clock_gettime(CLOCK_REALTIME, &now);
-        frame->time_ns = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
-    }
+    frame->time_ns = frame->time_ns ? drv_host_clock_carry(&state->clock, frame->time_ns) : drv_host_time_ns();
 }
 
 static void take_error_frame(drv_source_t* self, socketcan_t* state, const struct canfd_frame* raw) {
@@ -416,6 +420,7 @@ static int socketcan_read(drv_source_t* self, drv_frame_t* frames, int capacity)
         got = receive(state, capacity);
         if (got < 0) return socket_failed(self, state, -got);
     }
+    if (got > 0) look_at_clock(state);
     int count = 0;
     for (int i = 0; i < got; ++i) count += take_message(self, state, i, &frames[count]);
     return count;

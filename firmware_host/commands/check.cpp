@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 // okid check: is a CONFIG.toml right? Opens no device.
 #include "../config.hpp"
+#include "../error.hpp"
 #include "../live/identifier.hpp"
 #include "../live/trigger.hpp"
 #include "../method.hpp"
+#include "../presets.hpp"
 #include "../result.hpp"
 #include "commands.hpp"
 
@@ -105,14 +107,23 @@ std::string summary(const live_config& config, bool exact) {
 void add_check(CLI::App& app) {
     struct arguments {
         std::string config;
-        bool json = false;
+        bool json = false, presets = false;
     };
     auto given = std::make_shared<arguments>();
     CLI::App* command = app.add_subcommand("check", "Check a CONFIG.toml and show what it means; opens no device");
-    command->add_option("config", given->config, "the file to check")->required()->type_name("CONFIG.toml");
+    command->add_option("config", given->config, "the file to check")->type_name("CONFIG.toml");
     command->add_flag("--json", given->json, "the channels as they will be decoded, as JSON");
+    command->add_flag("--presets", given->presets, "list what preset = \"…\" can name, and nothing else");
     command->footer("Example:\n  okid check frame.toml");
     command->callback([given] {
+        if (given->presets) {
+            write_whole_file("-", list_presets());
+            return;
+        }
+        if (given->config.empty())
+            throw failure(exit_usage,
+                          "the file to check is missing: okid check CONFIG.toml; okid check --presets lists "
+                          "the presets there are");
         const live_config config = load_config(given->config);
         require_identifiable(config);
         const bool exact = identifier(config).exact(); // its memory is proved here, not in the lab

@@ -8,6 +8,7 @@ namespace okid_host {
 void add_identify(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_run(CLI::App& app);
+void add_record(CLI::App& app);
 void add_replay(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_check(CLI::App& app);

@@ -1,23 +1,28 @@
 // SPDX-License-Identifier: MIT
-// okid convert: a log of frames to a table of samples, and back.
+// okid convert: journals, logs of frames and tables of samples into one another.
 #include "../config.hpp"
 #include "../csv.hpp"
 #include "../csv_header.hpp"
 #include "../error.hpp"
+#include "../live/aligner.hpp"
 #include "../live/frame_maker.hpp"
-#include "../live/grid.hpp"
 #include "../live/playback.hpp"
+#include "../recording/journal_header.hpp"
 #include "../result.hpp"
 #include "../whole_file.hpp"
 #include "commands.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <drv/candump.h>
 #include <filesystem>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <random>
 
 namespace okid_host {
 namespace {
@@ -29,7 +34,7 @@ struct convert_arguments {
 /// Rows of the grid as lines of text, in the units that the identification uses.
 class csv_writer : public grid_sink {
   public:
-    explicit csv_writer(const live_config& config) : config_(config) {
+    csv_writer(const live_config& config, whole_file& out) : config_(config), out_(out) {
         fmt::format_to(std::back_inserter(text_), "# fs_hz: {}\n# units:", config.rate_hz);
         for (const channel_config& channel : config.channels)
             fmt::format_to(std::back_inserter(text_), " {}={}", channel.name,
@@ -51,6 +56,7 @@ class csv_writer : public grid_sink {
                 fmt::format_to(std::back_inserter(text_), "{:.{}g}", value, digits);
         }
         text_ += '\n';
+        write();
     }
     void on_missing(std::int64_t index, std::int64_t count) override {
         if (count > 100000000)
@@ -58,34 +64,42 @@ class csv_writer : public grid_sink {
                                                   count, index));
         std::string row;
         for (std::size_t i = 0; i < config_.channels.size(); ++i) row += i ? ",nan" : "nan";
-        for (; count > 0; --count) text_ += row + '\n';
+        for (; count > 0; --count) {
+            text_ += row + '\n';
+            write();
+        }
     }
     void on_gap(const grid_gap& gap) override { missing_ += gap.count; }
-    const std::string& text() const { return text_; }
     long long missing() const { return missing_; }
 
   private:
     static std::string quoted(const std::string& name) {
         return name.find_first_of(",;\t ") == std::string::npos ? name : '"' + name + '"';
     }
+    void write() {
+        out_.append(text_);
+        text_.clear();
+    }
     const live_config& config_;
+    whole_file& out_;
     std::string text_;
     long long missing_ = 0;
 };
 
-void log_to_csv(const convert_arguments& given, const live_config& config) {
-    log_frames frames(given.from, map_interfaces(given.from, config));
-    csv_writer table(config);
-    grid samples(config, table);
+void frames_to_csv(const convert_arguments& given, const live_config& config) {
+    log_frames frames(given.from, config);
+    whole_file out(given.to);
+    csv_writer table(config, out);
+    aligner samples(config, table);
     while (const drv_frame_t* frame = frames.next()) samples.push(*frame);
     samples.finish();
     if (samples.emitted() == 0)
-        throw failure(exit_no_model, fmt::format("{}: no sample: the log holds no usable frame of the channels of {}",
+        throw failure(exit_no_model, fmt::format("{}: no sample: it holds no usable frame of the channels of {}",
                                                  given.from, config.path));
     for (const std::size_t index : samples.silent_channels())
         std::fprintf(stderr, "okid: channel \"%s\" has no frame in %s: its column is all nan\n",
                      config.channels[index].name.c_str(), given.from.c_str());
-    write_whole_file(given.to, table.text());
+    out.commit();
     fmt::print(stderr, "{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(),
                config.channels.size(), table.missing());
 }
@@ -118,35 +132,160 @@ void csv_to_log(const convert_arguments& given, const live_config& config) {
     fmt::print(stderr, "{}: {} frames of {} samples\n", given.to, maker.frames(), record.count);
 }
 
+/// Name of a bus of a journal as a log can have it.
+std::string log_name(const journal_header& header, std::size_t bus) {
+    if (bus >= header.buses.size()) return fmt::format("can{}", bus);
+    std::string out = header.buses[bus].interface.substr(0, DRV_NAME_BYTES - 1);
+    std::replace_if(out.begin(), out.end(), [](unsigned char c) { return c <= ' ' || c > 126; }, '_');
+    return out.empty() ? fmt::format("can{}", bus) : out;
+}
+
+void journal_to_log(const convert_arguments& given) {
+    const journal_header header = read_journal_header(given.from);
+    log_frames frames(given.from);
+    whole_file out(given.to);
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < DRV_MAX_BUSES; ++i) names.push_back(log_name(header, i));
+    long long count = 0, stamps = 0, losses = 0;
+    char line[DRV_CANDUMP_BYTES + 1];
+    while (const drv_frame_t* frame = frames.next()) {
+        int length = drv_candump_format(line, DRV_CANDUMP_BYTES, names[frame->bus].c_str(), frame);
+        if (length <= 0) continue;
+        line[length++] = '\n';
+        out.append({line, static_cast<std::size_t>(length)});
+        ++count;
+        stamps += frame->hw_time_ns != 0;
+        losses += frame->loss != 0;
+    }
+    out.commit();
+    fmt::print(stderr, "{}: {} frames\n", given.to, count);
+    if (stamps + losses > 0)
+        fmt::print(stderr,
+                   "okid: a log has no place for the stamps of the devices ({}), for marks of losses ({}) and for "
+                   "times below a microsecond; the journal keeps them\n",
+                   stamps, losses);
+    if (!header.texts.config.empty())
+        fmt::print(stderr, "okid: a log holds no config: keep the journal, or CONFIG.toml and its DBC files\n");
+}
+
+/// A journal in memory, handed on chunk by chunk.
+class journal_text {
+  public:
+    explicit journal_text(whole_file& out) : out_(out), writer_(std::make_unique<drv_journal_writer_t>()) {
+        const drv_journal_sink_t sink{append, nullptr, &bytes_};
+        drv_journal_begin(writer_.get(), &sink, std::uint64_t{std::random_device{}()} << 32 | std::random_device{}());
+    }
+    void begin(journal_header header, std::int64_t time_ns) {
+        now_.real_ns = since_ns_ = header.real_ns = time_ns;
+        header.version = OKID_VERSION;
+        header.run = writer_->run;
+        header.started = utc_text(time_ns);
+        check(write_journal_header(*writer_, header, now_));
+    }
+    void add(const drv_frame_t& frame) {
+        constexpr std::int64_t chunk_ns = 250000000;
+        now_.real_ns = frame.time_ns;
+        if (frame.time_ns - since_ns_ < chunk_ns && frame.time_ns >= since_ns_ &&
+            drv_journal_add(writer_.get(), &frame) == 1)
+            return;
+        check(drv_journal_flush(writer_.get(), &now_));
+        since_ns_ = frame.time_ns;
+        (void)drv_journal_add(writer_.get(), &frame);
+    }
+    void end() { check(drv_journal_end(writer_.get(), 0, &now_)); }
+
+  private:
+    static long append(void* to, const std::uint8_t* bytes, std::size_t count) {
+        static_cast<std::string*>(to)->append(reinterpret_cast<const char*>(bytes), count);
+        return static_cast<long>(count);
+    }
+    void check(int code) {
+        if (code != 0)
+            throw failure(exit_usage, fmt::format("a name in the config is too long for a journal: {}", -code));
+        out_.append(bytes_);
+        bytes_.clear();
+    }
+    whole_file& out_;
+    std::string bytes_;
+    std::unique_ptr<drv_journal_writer_t> writer_;
+    drv_journal_time_t now_{};
+    std::int64_t since_ns_ = 0;
+};
+
+void log_to_journal(const convert_arguments& given, const std::optional<live_config>& config) {
+    journal_header header;
+    if (config) {
+        header.config_name = config->path;
+        header.texts = config->texts;
+        header.buses = journal_buses(*config);
+    } else {
+        for (const std::string& name : interfaces_of(given.from)) header.buses.push_back({name, name});
+        if (header.buses.empty()) throw failure(exit_usage, fmt::format("{}: found no frame", given.from));
+        if (header.buses.size() > DRV_MAX_BUSES)
+            throw failure(exit_usage, fmt::format("{}: found {} interfaces, at most {} go into a journal", given.from,
+                                                  header.buses.size(), int{DRV_MAX_BUSES}));
+    }
+    std::vector<std::string> interfaces;
+    for (const journal_header::bus& bus : header.buses) interfaces.push_back(bus.interface);
+    const auto frames = config ? std::make_unique<log_frames>(given.from, *config)
+                               : std::make_unique<log_frames>(given.from, interfaces);
+    whole_file out(given.to);
+    journal_text journal(out);
+    long long count = 0;
+    for (const drv_frame_t* frame; (frame = frames->next()); ++count) {
+        if (count == 0) journal.begin(header, frame->time_ns);
+        journal.add(*frame);
+    }
+    if (count == 0)
+        throw failure(exit_no_model, fmt::format("{}: no frame{}", given.from,
+                                                 config ? fmt::format(" of the buses of {}", config->path) : ""));
+    journal.end();
+    out.commit();
+    fmt::print(stderr, "{}: {} frames{}\n", given.to, count, config ? "" : "; without -c it holds no config");
+}
+
+/// The config given, or that of the journal; none where it is not needed.
+std::optional<live_config> config_for(const convert_arguments& given, bool from_journal) {
+    if (!given.config.empty()) return load_config(given.config);
+    if (!from_journal) return std::nullopt;
+    const journal_header header = read_journal_header(given.from);
+    if (header.texts.config.empty()) return std::nullopt;
+    return load_config(given.from, header.texts);
+}
+
 void convert(const convert_arguments& given) {
     const auto ending = [](const std::string& path) { return std::filesystem::path(path).extension().string(); };
-    const std::string from = ending(given.from), to = ending(given.to);
-    const bool forth = from == ".log" && to == ".csv", back = from == ".csv" && to == ".log";
-    if (!forth && !back)
-        throw failure(
-            exit_usage,
-            fmt::format("\"{}\" to \"{}\" is not available in this version; .log to .csv and .csv to .log are", from,
-                        to));
-    if (given.config.empty())
-        throw failure(exit_usage, "-c CONFIG.toml is missing: it says which bits are which channel");
-    const live_config config = load_config(given.config);
+    const std::string from = ending(given.from), to = ending(given.to), way = from + " to " + to;
+    const char* ways[] = {".okj to .log", ".okj to .csv", ".log to .csv", ".log to .okj", ".csv to .log"};
+    if (std::find(std::begin(ways), std::end(ways), way) == std::end(ways))
+        throw failure(exit_usage, fmt::format("found \"{}\" to \"{}\", expected {}", from, to, fmt::join(ways, ", ")));
     check_writable(given.to);
-    if (forth)
-        log_to_csv(given, config);
+    if (way == ways[0]) return journal_to_log(given);
+    const std::optional<live_config> config = config_for(given, from == ".okj");
+    if (way == ways[3]) return log_to_journal(given, config);
+    if (!config)
+        throw failure(exit_usage, from == ".okj" ? given.from + ": it holds no whole config: say -c CONFIG.toml"
+                                                 : "-c CONFIG.toml is missing: it says which bits are which channel");
+    if (to == ".csv")
+        frames_to_csv(given, *config);
     else
-        csv_to_log(given, config);
+        csv_to_log(given, *config);
 }
 
 } // namespace
 
 void add_convert(CLI::App& app) {
     auto given = std::make_shared<convert_arguments>();
-    CLI::App* command =
-        app.add_subcommand("convert", "Convert between logs of frames and tables of samples, by file name extension");
-    command->add_option("in", given->from, ".log (candump -L) or .csv")->required()->type_name("IN");
-    command->add_option("out", given->to, ".csv or .log")->required()->type_name("OUT");
-    command->add_option("-c,--config", given->config, "which bits are which channel")->type_name("CONFIG.toml");
-    command->footer("Example:\n  okid convert frame.log frame.csv -c frame.toml");
+    CLI::App* command = app.add_subcommand(
+        "convert", "Convert between journals, logs of frames and tables of samples, by file name extension");
+    command->add_option("in", given->from, ".okj (and the segments behind it), .log (candump -L) or .csv")
+        ->required()
+        ->type_name("IN");
+    command->add_option("out", given->to, ".csv, .log or .okj")->required()->type_name("OUT");
+    command->add_option("-c,--config", given->config, "which bits are which channel; a journal holds its own")
+        ->type_name("CONFIG.toml");
+    command->footer("Examples:\n  okid convert frame.log frame.csv -c frame.toml\n  okid convert "
+                    "runs/frame-20261121T120000Z-0001.okj frame.log");
     command->callback([given] { convert(*given); });
 }
 

@@ -18,6 +18,7 @@
 #include <memory>
 #include <optional>
 #include <sstream>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -25,13 +26,18 @@ namespace okid_host {
 namespace {
 
 constexpr long long wanted_buffer = DRV_RECEIVE_BUFFER;
-constexpr int cap_net_admin = 12;
+constexpr int cap_net_admin = 12, cap_sys_nice = 23;
+constexpr rlim_t reader_priority = 10; // as live/reader.cpp asks for
 
 /// The findings, one line each; a finding that is missing comes with its remedy.
 class findings {
   public:
     void well(const std::string& what, const std::string& found) { fmt::print("ok       {:<22} {}\n", what, found); }
-    void note(const std::string& what, const std::string& found) { fmt::print("note     {:<22} {}\n", what, found); }
+    /// Worth knowing; what it costs to leave it is said, and how to mend it.
+    void note(const std::string& what, const std::string& found, const std::string& remedy = "") {
+        fmt::print("note     {:<22} {}\n", what, found);
+        if (!remedy.empty()) fmt::print("         {:<22} -> {}\n", "", remedy);
+    }
     void missing(const std::string& what, const std::string& found, const std::string& remedy) {
         fmt::print("missing  {:<22} {}\n         {:<22} -> {}\n", what, found, "", remedy);
         ++count_;
@@ -58,12 +64,11 @@ bool in_path(const std::string& program) {
     return false;
 }
 
-bool has_net_admin() {
+bool has_capability(int number) {
     std::ifstream input("/proc/self/status");
     std::string line;
     while (std::getline(input, line))
-        if (line.rfind("CapEff:", 0) == 0)
-            return (std::strtoull(line.c_str() + 7, nullptr, 16) >> cap_net_admin & 1) != 0;
+        if (line.rfind("CapEff:", 0) == 0) return (std::strtoull(line.c_str() + 7, nullptr, 16) >> number & 1) != 0;
     return false;
 }
 
@@ -168,7 +173,7 @@ void check_lines(findings& out, const std::optional<live_config>& config) {
 }
 
 void check_buffers(findings& out) {
-    const bool admin = has_net_admin();
+    const bool admin = has_capability(cap_net_admin);
     const long long limit = std::atoll(first_line("/proc/sys/net/core/rmem_max").c_str());
     if (limit >= wanted_buffer)
         out.well("receive buffer", fmt::format("net.core.rmem_max is {} bytes", limit));
@@ -190,13 +195,41 @@ void check_buffers(findings& out) {
 
 void check_clock(findings& out) {
     const std::string clock = first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource");
+    const std::string others = first_line("/sys/devices/system/clocksource/clocksource0/available_clocksource");
     const bool slow = clock == "hpet" || clock == "acpi_pm" || clock == "jiffies";
+    const std::string found = clock + " is slow to read; time stamps of the kernel are coarser than with tsc";
     if (clock.empty())
         out.note("clock", "the kernel does not tell its clock source");
+    else if (slow && (" " + others + " ").find(" tsc ") != std::string::npos)
+        out.note("clock", found,
+                 "echo tsc | sudo tee /sys/devices/system/clocksource/clocksource0/current_clocksource");
     else if (slow)
-        out.note("clock", clock + " is slow to read; time stamps of the kernel are coarser than with tsc");
+        out.note("clock", found + "; the kernel found tsc unstable, dmesg | grep -i tsc tells why");
     else
         out.well("clock", clock);
+}
+
+/// The reader comes before everything that computes, where it may.
+void check_priority(findings& out) {
+    rlimit limit{};
+    const bool allowed = getrlimit(RLIMIT_RTPRIO, &limit) == 0 && limit.rlim_cur >= reader_priority;
+    if (allowed || has_capability(cap_sys_nice))
+        out.well("real-time priority", fmt::format("the reader may run at {}", reader_priority));
+    else
+        out.note("real-time priority",
+                 fmt::format("RLIMIT_RTPRIO is {}, expected {}: under load the reader waits for others", limit.rlim_cur,
+                             reader_priority),
+                 "echo \"$USER - rtprio 20\" | sudo tee /etc/security/limits.d/60-okid.conf, then log in anew (a "
+                 "service: LimitRTPRIO=20)");
+}
+
+void check_governor(findings& out) {
+    const std::string governor = first_line("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+    if (governor == "powersave" && first_line("/sys/devices/system/cpu/cpu0/cpufreq/scaling_driver") != "intel_pstate")
+        out.note("CPU governor", "powersave keeps the processor at its lowest clock",
+                 "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor");
+    else if (!governor.empty())
+        out.well("CPU governor", governor);
 }
 
 } // namespace
@@ -218,7 +251,9 @@ void add_doctor(CLI::App& app) {
         check_buses(out, config, kernel_has_can);
         check_lines(out, config);
         if (wants_can) check_buffers(out);
+        check_priority(out);
         check_clock(out);
+        check_governor(out);
         if (out.count() > 0)
             throw failure(exit_device,
                           fmt::format("{} thing{} missing, see above", out.count(), out.count() == 1 ? "" : "s"));

@@ -2,6 +2,8 @@
 // okid replay: a recorded log through the live path, or onto a bus.
 #include "../error.hpp"
 #include "../live/playback.hpp"
+#include "../live/session.hpp"
+#include "../live/stop_signal.hpp"
 #include "commands.hpp"
 #include "live_options.hpp"
 
@@ -15,10 +17,17 @@ struct replay_arguments : live_arguments {
     std::string log, to, trigger;
 };
 
+/// The one given, or that of the journal.
+live_config config_for(const replay_arguments& given, const std::optional<journal_header>& header) {
+    if (!given.config.empty()) return load_config(given.config);
+    if (!header) throw failure(exit_usage, "-c CONFIG.toml is missing (or --to INTERFACE, to play the log onto a bus)");
+    if (header->texts.config.empty())
+        throw failure(exit_usage, fmt::format("{}: the config in it is {}; say -c CONFIG.toml", given.log,
+                                              header->whole ? "missing" : "damaged"));
+    return load_config(given.log, header->texts);
+}
+
 void replay(const replay_arguments& given) {
-    if (given.log.size() > 4 && given.log.substr(given.log.size() - 4) == ".okj")
-        throw failure(exit_usage,
-                      given.log + ": journals are not available in this version; a candump -L log (.log) is");
     const std::optional<double> speed = parse_speed(given.speed);
     if (!given.to.empty()) {
         if (!given.config.empty() || !given.events.empty() || !given.json.empty() || !given.duration.empty() ||
@@ -30,16 +39,23 @@ void replay(const replay_arguments& given) {
         play_onto_bus(given.log, given.to, given.speed.empty() ? std::optional<double>(1.0) : speed);
         return;
     }
-    if (given.config.empty())
-        throw failure(exit_usage, "-c CONFIG.toml is missing (or --to INTERFACE, to play the log onto a bus)");
-    const live_config config = load_config(given.config);
+    std::optional<journal_header> header;
+    if (is_journal(given.log)) header = read_journal_header(given.log);
+    const live_config config = config_for(given, header);
     session_options options = check_live(given, config);
     options.trigger_ns = parse_stamp("--trigger-at", given.trigger);
     if (options.trigger_ns && config.trigger.source != trigger_source::gpio)
         throw failure(exit_usage, fmt::format("--trigger-at stands for the edge of a GPIO line, but [trigger] of {} "
                                               "has another source",
                                               config.path));
-    play_through_session(given.log, config, options, speed);
+    if (header && config.trigger.source == trigger_source::gpio && !options.trigger_ns)
+        options.trigger_ns = header->trigger_ns;
+    if (header && !options.duration_s) options.duration_s = header->duration_s; // as long as the run was
+    require_edge_time(config, options.trigger_ns.has_value());
+    catch_stop_signals();
+    session played(config, options);
+    play_through(given.log, config, played, speed, std::nullopt);
+    played.finish();
 }
 
 } // namespace
@@ -47,9 +63,14 @@ void replay(const replay_arguments& given) {
 void add_replay(CLI::App& app) {
     auto given = std::make_shared<replay_arguments>();
     CLI::App* command =
-        app.add_subcommand("replay", "Play a recorded candump -L log through the live path, or onto a bus");
-    command->add_option("log", given->log, "a log of candump -L")->required()->type_name("LOG");
-    command->add_option("-c,--config", given->config, "what the frames mean and how to identify")
+        app.add_subcommand("replay", "Play a journal or a candump -L log through the live path, or onto a bus");
+    command
+        ->add_option("log", given->log,
+                     "a journal of okid record (.okj) and the segments behind it, or a log of candump -L")
+        ->required()
+        ->type_name("LOG");
+    command
+        ->add_option("-c,--config", given->config, "what the frames mean and how to identify; a journal holds its own")
         ->type_name("CONFIG.toml");
     command
         ->add_option("--speed", given->speed,
@@ -62,8 +83,9 @@ void add_replay(CLI::App& app) {
                      "when the GPIO edge came, in the log's time (time_s of the trigger event of the live run)")
         ->type_name("SECONDS");
     add_output_options(*command, *given);
-    command->footer("The result is the same at every speed.\n\n"
-                    "Examples:\n  okid replay frame.log -c frame.toml --json result.json\n  okid replay frame.log --to "
+    command->footer("The result is the same at every speed, and that of the run a journal was recorded by.\n\n"
+                    "Examples:\n  okid replay runs/frame-20261121T120000Z-0001.okj\n  okid replay frame.log -c "
+                    "frame.toml --json result.json\n  okid replay frame.log --to "
                     "vcan0 --speed 2");
     command->callback([given] { replay(*given); });
 }

@@ -3,6 +3,8 @@
 #include "../error.hpp"
 #include "../live/capture.hpp"
 #include "../live/playback.hpp"
+#include "../live/session.hpp"
+#include "../live/stop_signal.hpp"
 #include "commands.hpp"
 #include "live_options.hpp"
 
@@ -15,17 +17,23 @@ namespace {
 
 void run(const live_arguments& given) {
     const live_config config = load_config(given.config);
-    const session_options options = check_live(given, config);
+    session_options options = check_live(given, config);
+    std::optional<recorder_options> recording;
+    if (config.record.wanted) recording = recorder_options{options.duration_s};
     const auto replays = std::count_if(config.buses.begin(), config.buses.end(),
                                        [](const bus_config& bus) { return bus.type == "replay"; });
-    if (replays == 0) {
-        capture(config, options);
-        return;
-    }
-    if (config.buses.size() != 1)
+    if (replays > 0 && config.buses.size() != 1)
         throw failure(exit_usage, fmt::format("{}: a bus of type replay stands beside another bus, expected it alone",
                                               config.path));
-    play_through_session(config.buses.front().file, config, options, std::nullopt);
+    if (replays > 0) require_edge_time(config, false);
+    options.live = replays == 0;
+    catch_stop_signals();
+    session live(config, options);
+    if (replays > 0)
+        play_through(config.buses.front().file, config, live, std::nullopt, recording);
+    else
+        capture(config, live, options.duration_s, recording);
+    live.finish();
 }
 
 } // namespace

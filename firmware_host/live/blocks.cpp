@@ -49,6 +49,13 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
     modes_ = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, mass_plan{}, dt_);
 }
 
+void live_blocks::reset() {
+    for (part& each : parts_) okid_accumulator_reset(each.sums);
+    open_ = 0;
+    history_.clear();
+    if (!window() && !fading()) length_ = whole_.lags;
+}
+
 live_blocks::part live_blocks::make() const {
     const std::size_t bytes = okid_accumulator_memsize(&sums_);
     part out;

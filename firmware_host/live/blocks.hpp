@@ -37,6 +37,9 @@ class live_blocks {
     template <class Number> void add(const okid_accumulator_t* whole, const Number* samples, std::size_t count);
     void gap(const okid_accumulator_t* whole, std::int64_t count);
 
+    /// Begin anew, as the whole does.
+    void reset();
+
     /// Standard deviations of `model`, identified from `whole`; none with too few blocks.
     std::optional<deviations> sigma(okid_accumulator_t* whole, const okid_identified_t& model, const mass_plan& plan);
 
@@ -61,7 +64,7 @@ class live_blocks {
     std::int64_t length_ = 0; ///< rows of a part
     std::vector<part> parts_; ///< parts_[open_] grows; window: all slots together, then one group of them
     std::size_t open_ = 0;
-    std::vector<double> history_; ///< the last samples of the run, at most `lags`
+    std::vector<double> history_;     ///< the last samples of the run, at most `lags`
     std::vector<std::int16_t> codes_; ///< the same as codes, when a part begins
     std::unique_ptr<std::byte[]> jackknife_block_;
     okid_jackknife_t* jackknife_ = nullptr;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "capture.hpp"
 
+#include "../recording/recording_link.hpp"
 #include "bus_watch.hpp"
 #include "gpio_lines.hpp"
 #include "reader.hpp"
@@ -38,7 +39,8 @@ struct wake_event {
 
 class pump {
   public:
-    pump(const live_config& config, session& target) : session_(target), lines_(config), frames_(256) {
+    pump(const live_config& config, stream_target& target, const std::optional<recorder_options>& recording)
+        : target_(target), lines_(config), frames_(256) {
         for (std::size_t i = 0; i < config.buses.size(); ++i)
             readers_.push_back(std::make_unique<bus_reader>(config, i, wake_.fd));
         for (const auto& reader : readers_) watches_.emplace_back(reader->interface());
@@ -46,21 +48,27 @@ class pump {
         for (std::size_t i = 0; i < config.buses.size(); ++i)
             if (config.buses[i].sync_hz || !config.buses[i].start_frames.empty())
                 senders_[i] = std::make_unique<sync_sender>(config.buses[i]);
+        recording_.emplace(config, recording); // a file appears only once there is something to record
+        for (std::size_t i = 0; i < config.buses.size() && recording_->get(); ++i)
+            readers_[i]->also_into(recording_->get()->ring(i));
     }
 
     void run(const std::optional<double>& duration_s) {
         for (auto& reader : readers_) reader->start();
         for (auto& sender : senders_)
             if (sender) sender->start();
+        target_.ready();
         const auto begin = clock_type::now();
         auto heard = begin;
         bool hinted = false;
-        while (!session_.done() && !stop_requested()) {
-            wake_.wait(100, session_.triggered() ? -1 : lines_.fd());
-            lines_.serve(session_);
+        while (!target_.done() && !stop_requested()) {
+            wake_.wait(100, target_.triggered() ? -1 : lines_.fd());
+            target_.alive();
+            lines_.serve(target_);
             if (move_frames(true)) heard = clock_type::now();
+            recording_->serve(target_);
             report_buses();
-            if (!session_.heard() && !hinted && seconds_since(begin) > 2) {
+            if (!target_.heard() && !hinted && seconds_since(begin) > 2) {
                 hinted = true;
                 std::fprintf(stderr, "okid: waiting for frames on %s ...\n", readers_.front()->interface().c_str());
             }
@@ -70,8 +78,9 @@ class pump {
         for (auto& sender : senders_)
             if (sender) sender->stop();
         for (auto& reader : readers_) reader->stop();
-        while (!session_.done() && move_frames(false)) {
+        while (!target_.done() && move_frames(false)) {
         }
+        recording_->finish(target_);
         tell_losses();
         report_buses();
         report_sync();
@@ -81,28 +90,29 @@ class pump {
     bool move_frames(bool bounded) {
         bool any = false;
         for (auto& reader : readers_)
-            for (std::size_t count; !session_.done() && !(bounded && stop_requested()) &&
+            for (std::size_t count; !target_.done() && !(bounded && stop_requested()) &&
                                     (count = reader->take(frames_.data(), frames_.size())) > 0;
                  any = true) {
                 tell_losses();
-                lines_.serve(session_);
-                for (std::size_t i = 0; i < count; ++i) session_.frame(frames_[i]);
+                target_.alive();
+                lines_.serve(target_);
+                for (std::size_t i = 0; i < count; ++i) target_.frame(frames_[i]);
             }
         return any;
     }
 
     void tell_losses() {
         for (std::size_t i = 0; i < readers_.size(); ++i)
-            session_.set_losses(i, {readers_[i]->stats().lost_overflow, readers_[i]->ring_overrun()});
+            target_.set_losses(i, {readers_[i]->stats().lost_overflow, readers_[i]->ring_overrun()});
     }
 
     void report_buses() {
         for (std::size_t i = 0; i < readers_.size(); ++i) {
             bus_health health{readers_[i]->stats(), std::nullopt};
             if (senders_[i]) health.sync = senders_[i]->report();
-            session_.set_health(i, health);
+            target_.set_health(i, health);
             for (const bus_event& event : watches_[i].look(health.counts)) {
-                session_.bus_event(i, event.kind, event.text);
+                target_.bus_event(i, event.kind, event.text);
                 if (event.urgent) fmt::print(stderr, "okid: interface {}: {}\n", readers_[i]->interface(), event.text);
             }
         }
@@ -121,8 +131,9 @@ class pump {
     }
 
     wake_event wake_;
-    session& session_;
+    stream_target& target_;
     gpio_lines lines_;
+    std::optional<recording_link> recording_; ///< before the readers, which push into its rings
     std::vector<std::unique_ptr<bus_reader>> readers_;
     std::vector<drv_frame_t> frames_;
     std::vector<bus_watch> watches_;
@@ -131,14 +142,9 @@ class pump {
 
 } // namespace
 
-void capture(const live_config& config, const session_options& options) {
-    catch_stop_signals();
-    session live(config, options);
-    {
-        pump from_buses(config, live);
-        from_buses.run(options.duration_s);
-    }
-    live.finish();
+void capture(const live_config& config, stream_target& target, const std::optional<double>& duration_s,
+             const std::optional<recorder_options>& recording) {
+    pump(config, target, recording).run(duration_s);
 }
 
 } // namespace okid_host

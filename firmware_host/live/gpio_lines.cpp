@@ -56,7 +56,7 @@ gpio_lines::gpio_lines(const live_config& config)
 
 gpio_lines::~gpio_lines() { show({}); }
 
-void gpio_lines::read_edges(session& live) {
+void gpio_lines::read_edges(stream_target& live) {
     drv_gpio_event_t events[16];
     const int count = drv_gpio_read(trigger_.get(), events, 16);
     if (count < 0) throw failure(exit_device, printable(trigger_->error, DRV_ERROR_BYTES));
@@ -73,7 +73,7 @@ void gpio_lines::show(const lamp_state& state) {
     shown_ = state;
 }
 
-void gpio_lines::serve(session& live) {
+void gpio_lines::serve(stream_target& live) {
     if (trigger_ && !live.triggered()) read_edges(live);
     show(live.lamps());
 }

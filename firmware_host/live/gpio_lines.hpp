@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The GPIO lines of a live run: the trigger input and the lamps.
 #pragma once
-#include "session.hpp"
+#include "../config.hpp"
+#include "stream_target.hpp"
 
 #include <drv/gpio.h>
 
@@ -22,11 +23,11 @@ class gpio_lines {
     /// To poll for edges, -1 without a trigger line.
     int fd() const { return trigger_ ? drv_gpio_fd(trigger_.get()) : -1; }
     /// Edges that wait go to the session, its state to the lamps.
-    void serve(session& live);
+    void serve(stream_target& live);
 
   private:
     using line = std::unique_ptr<drv_gpio_t, void (*)(drv_gpio_t*)>;
-    void read_edges(session& live);
+    void read_edges(stream_target& live);
     void show(const lamp_state& state);
 
     line trigger_, armed_, go_, alarm_;

@@ -38,6 +38,7 @@ grid::grid(const live_config& config, grid_sink& sink)
     build_lanes(config);
     window_ = std::clamp<std::int64_t>(std::llround(rate_hz_ / 4), 4 * reorder_, 4096);
     mask_ = power_of_two(2 * window_) - 1;
+    hold_ = window_ / 2;
     const auto rows = static_cast<std::size_t>(mask_ + 1);
     values_.assign(rows * width_, missing);
     present_.assign(rows * lanes_.size(), 0);
@@ -122,6 +123,7 @@ void grid::push(const drv_frame_t& frame) {
     if (frame.loss)
         for (lane& each : lanes_)
             if (each.bus == frame.bus) each.loss |= frame.loss;
+    settle_overdue(frame.time_ns);
     bool known = push_to_lanes(frame, 0); // an exact identifier comes before one that stands for many (a PGN)
     for (const std::uint32_t mask : masks_)
         if (!known && (frame.flags & DRV_FRAME_EXTENDED)) known = push_to_lanes(frame, mask);
@@ -141,7 +143,7 @@ void grid::push_to(lane& l, const drv_frame_t& frame) {
 /// Lay rows out in the ring up to and including `upto`; makes room by letting the oldest go.
 void grid::open_rows(std::int64_t upto) {
     if (upto - next_ > mask_) {
-        while (next_ < opened_ && upto - next_ > window_) emit_front();
+        while (next_ < opened_ && upto - next_ > mask_) emit_front();
         if (next_ == opened_ && upto - next_ > window_) skip_to(upto - window_ / 2);
     }
     for (; opened_ <= upto; ++opened_) {
@@ -184,14 +186,22 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
     drain(false);
 }
 
+/// May the lane still bring the sample that goes out next? One that is silent has `window` samples for it, one that
+/// jumped over it until its newest frames all lie beyond: during an outage they may be few.
+bool grid::may_come(const lane& l) const {
+    const std::int64_t ahead = opened_ - next_;
+    if (!l.heard || l.last < next_) return ahead <= window_;
+    return l.passed <= next_ && ahead <= mask_;
+}
+
 void grid::drain(bool all) {
     const auto lanes = static_cast<std::int64_t>(lanes_.size());
     while (next_ < opened_ && next_ < limit_) {
-        if (slot(next_) < lanes && !all && opened_ - next_ <= window_) {
+        if (slot(next_) < lanes && !all) {
             if (opened_ - next_ <= 1) return;
             const std::uint8_t* have = present(next_);
             for (std::size_t i = 0; i < lanes_.size(); ++i)
-                if (!have[i] && (!lanes_[i].heard || lanes_[i].passed <= next_)) return;
+                if (!have[i] && may_come(lanes_[i])) return;
         }
         emit_front();
     }
@@ -252,7 +262,7 @@ void grid::close_gap(lane& l, bool resumed) {
 void grid::finish() {
     if (!anchored_ && heard_ > 0) anchor();
     for (lane& l : lanes_) {
-        release_late(l);
+        settle(l, 0, true);
         end_suspicion(l);
     }
     const auto lanes = static_cast<std::int64_t>(lanes_.size());

@@ -6,10 +6,11 @@
 // close together at the start; a lane whose counter is unrelated is placed by time once, then counts on. The grid begins
 // with the first sample for which every lane has been heard, so a stream may be joined in the middle. A sample goes out
 // when it is complete, or when the newest nine frames of every lane that lacks it lie beyond it, or when any lane is
-// `window` samples ahead.
+// `window` samples ahead of those that are silent.
 #pragma once
 #include "../config.hpp"
 
+#include <drv/clock_fit.h>
 #include <drv/frame.h>
 
 #include <array>
@@ -41,6 +42,9 @@ class grid_sink {
     virtual void on_missing(std::int64_t index, std::int64_t count) = 0;
     virtual void on_gap(const grid_gap& gap) = 0;
 };
+
+/// A stamp further ahead is no time but an error.
+constexpr double longest_silence_ns = 400 * 86400e9;
 
 /// Counts of one bus. lost: frames missing on the grid, by cause.
 struct grid_bus_counts {
@@ -95,10 +99,16 @@ class grid {
         bool suspected = false;
         std::int64_t suspect_age = 0; ///< frames that came in their places since
         drv_frame_t suspect{};
-        // Cadence: when a frame is late, the next ones tell whether it was lost company or a burst.
-        double phase_ns = 0, least_late = 0;
-        std::array<drv_frame_t, 16> late{};
-        std::size_t late_count = 0;
+        // Without a counter: the line of least delays, when the newest frame was due on it, frames that wait, in the
+        // order of their stamps, and the newest that were placed.
+        drv_clock_fit_t clock{};
+        double phase_ns = 0, beat_ns = 0;
+        double usual = 0;   ///< how late frames were, of late, before which nothing was lost, periods
+        double early = 0;   ///< of the line the earliest was, of late, periods
+        double on_time = 0; ///< of a period; what is later was held up, or a sample before it is missing
+        std::vector<drv_frame_t> late;
+        std::array<drv_frame_t, 9> beats{};
+        std::size_t beat_at = 0;
         // The newest frames: what lies before all of them does not come any more (a frame may be eight places late).
         std::array<std::int64_t, 9> recent{};
         std::size_t recent_at = 0;
@@ -130,13 +140,21 @@ class grid {
     void end_suspicion(lane& l);
     void judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter);
     std::int64_t place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const;
+    void begin_cadence(lane& l, std::int64_t time_ns);
     void place_by_cadence(lane& l, const drv_frame_t& frame);
-    void release_late(lane& l);
+    double lateness(const lane& l, const drv_frame_t& frame, std::size_t before) const;
+    bool is_double(const lane& l, const drv_frame_t& frame, bool early) const;
+    bool overtaken(lane& l, const drv_frame_t& frame);
+    void follow_line(lane& l, const drv_frame_t& frame, std::int64_t expected);
+    void settle_overdue(std::int64_t now_ns);
+    void settle(lane& l, std::int64_t now_ns, bool all);
+    std::size_t place_after_loss(lane& l, std::size_t first, std::size_t last, std::int64_t lost);
     void beat(lane& l, const drv_frame_t& frame, std::int64_t step);
     bool awaited(const lane& l, std::int64_t index) const;
     void note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause);
     void insert(lane& l, std::int64_t index, const drv_frame_t& frame);
 
+    bool may_come(const lane& l) const;
     void drain(bool all);
     void emit_front();
     void skip_to(std::int64_t index);
@@ -161,6 +179,8 @@ class grid {
     std::vector<std::uint32_t> masks_; ///< of identifiers that stand for many, the strictest first
     std::size_t width_ = 0;
     std::int64_t reorder_ = 16, window_ = 0, mask_ = 0;
+    std::int64_t hold_ = 0;      ///< periods a frame without a counter may wait for those that tell its place
+    std::size_t late_lanes_ = 0; ///< lanes with such frames
     std::vector<double> values_, decoded_;
     std::vector<std::uint8_t> present_;
     std::vector<std::int64_t> slots_; ///< how many lanes a row has

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a lane stands on the grid: the first alignment, counters unwrapped, jumps believed or not, cadence.
+// Where a lane stands on the grid: the first alignment, counters unwrapped, jumps believed or not.
 #include "grid.hpp"
 
 #include <algorithm>
@@ -19,9 +19,7 @@ std::int64_t wrapped_step(std::uint64_t from, std::uint64_t to, unsigned bits) {
 /// Two counters this close at the start count the same samples.
 std::int64_t kinship(unsigned bits) { return bits >= 9 ? 64 : std::max<std::int64_t>(1, std::int64_t{1} << bits >> 3); }
 
-constexpr double longest_pause_s = 5;                // beyond it the clock says how often a counter went round
-constexpr double longest_beat_s = 1;                 // a lane without a counter that pauses longer has stalled
-constexpr double longest_silence_ns = 400 * 86400e9; // a stamp further ahead is no time but an error
+constexpr double longest_pause_s = 5; // beyond it the clock says how often a counter went round
 
 } // namespace
 
@@ -56,7 +54,7 @@ bool grid::place_by_kin(const lane& l, std::uint64_t counter, std::int64_t& inde
 /// Give a lane its place from its first frame; lanes heard before are the reference.
 void grid::hear_first(lane& l, const drv_frame_t& frame) {
     l.time_ns = frame.time_ns;
-    l.phase_ns = static_cast<double>(frame.time_ns);
+    if (!l.sequence) begin_cadence(l, frame.time_ns);
     l.loss = 0;
     l.last = 0;
     const bool counted = read_counter(l, frame, l.counter);
@@ -257,58 +255,6 @@ bool grid::awaited(const lane& l, std::int64_t index) const {
     for (std::size_t i = 0; i < l.channels.size(); ++i)
         if (numbers[l.channels[i]] != decoded_[i]) return false;
     return true;
-}
-
-/// A frame at its time is the next sample. A late one waits for those behind it: after a loss all of them stay late,
-/// after a pause of the reader they catch up.
-void grid::place_by_cadence(lane& l, const drv_frame_t& frame) {
-    const double ahead = static_cast<double>(frame.time_ns) - l.phase_ns;
-    if (ahead < -1e9 || ahead > longest_silence_ns) { // the clock was set
-        release_late(l);
-        l.phase_ns = static_cast<double>(frame.time_ns) - period_ns_;
-        decode(l, frame);
-        beat(l, frame, 1);
-        return;
-    }
-    const double late = ahead / period_ns_ - 1 - static_cast<double>(l.late_count);
-    if (l.late_count == 0 && late <= 0.5) {
-        beat(l, frame, 1);
-        return;
-    }
-    l.least_late = l.late_count == 0 ? late : std::min(l.least_late, late);
-    l.late[l.late_count++] = frame;
-    if (late <= 0.5 || l.late_count == l.late.size()) release_late(l);
-}
-
-/// Those that waited are placed; what all of them lacked is lost.
-void grid::release_late(lane& l) {
-    const std::size_t count = l.late_count;
-    if (count == 0) return;
-    const std::array<drv_frame_t, 16> frames = l.late;
-    const std::int64_t lost = std::max<std::int64_t>(0, static_cast<std::int64_t>(std::ceil(l.least_late - 0.5)));
-    l.late_count = 0;
-    if (lost == 0) { // they caught up: no loss among them
-        for (std::size_t i = 0; i < count; ++i) {
-            decode(l, frames[i]);
-            beat(l, frames[i], 1);
-        }
-        return;
-    }
-    decode(l, frames[0]);
-    beat(l, frames[0], 1 + lost);
-    for (std::size_t i = 1; i < count; ++i) { // more may be lost among these
-        decode(l, frames[i]);
-        place_by_cadence(l, frames[i]);
-    }
-}
-
-/// The expected time follows early frames quickly and late ones slowly: it keeps to those that were not held up.
-void grid::beat(lane& l, const drv_frame_t& frame, std::int64_t step) {
-    const bool pause = static_cast<double>(frame.time_ns - l.time_ns) > 1e9 * longest_beat_s;
-    l.phase_ns += static_cast<double>(step) * period_ns_;
-    const double error_ns = static_cast<double>(frame.time_ns) - l.phase_ns;
-    l.phase_ns += (error_ns < 0 ? 0.1 : 0.002) * error_ns;
-    move_on(l, frame, l.last + step, pause);
 }
 
 void grid::note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause) {

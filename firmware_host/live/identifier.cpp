@@ -8,15 +8,19 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <new>
+#include <utility>
 
 namespace okid_host {
 namespace {
 
 constexpr std::size_t chunk = 256; // samples handed over at a time
+constexpr std::int32_t watch_block = 32,
+                       watch_blocks = 3; // samples whose errors are averaged; so many high ones are a change
 
 /// Do the raw numbers of every channel fit int16 as they are?
 bool fits_codes(const live_config& config) {
-    return std::all_of(config.channels.begin(),
+    return !resampled(config) &&
+           std::all_of(config.channels.begin(),
                        config.channels.begin() + static_cast<std::ptrdiff_t>(config.n_u + config.n_y),
                        [](const channel_config& channel) {
                            const drv_signal_t& layout = channel.layout;
@@ -50,6 +54,7 @@ identifier::identifier(const live_config& config) : m_(config.n_u + config.n_y),
         doubles_.resize(chunk * m_);
     create_identifier(config);
     create_accumulator(config);
+    create_watch(config);
 }
 
 /// The window moves in whole blocks: about a twentieth of it, or one update where that is finer.
@@ -107,6 +112,54 @@ void identifier::create_identifier(const live_config& config) {
         throw failure(exit_usage, fmt::format("{}: [identification]: the identification cannot be made", config.path));
 }
 
+/// A growing memory keeps everything, as it was asked for: of a change it only tells.
+void identifier::create_watch(const live_config& config) {
+    const identification_config& wanted = config.identification;
+    restart_on_change_ = wanted.restart_on_change && (wanted.window_s || wanted.forgetting);
+    okid_watch_config_t c{};
+    c.n_u = identify_config_.n_u;
+    c.n_y = identify_config_.n_y;
+    c.max_order = okid_identify_max_order(&identify_config_);
+    c.lead = okid_identify_lags(&identify_config_);
+    c.block = watch_block;
+    c.confirm = watch_blocks;
+    change_samples_ = std::int64_t{c.block} * c.confirm;
+    const std::size_t bytes = okid_watch_memsize(&c);
+    watch_block_ = allocate(config, bytes, "the watch over the model");
+    if (okid_watch_create(&watch_, &c, watch_block_.get(), bytes) != OKID_OK)
+        throw failure(exit_usage, fmt::format("{}: [identification]: the watch cannot be made", config.path));
+    row_.resize(m_);
+}
+
+void identifier::watch_model() {
+    okid_watch_state_t now{};
+    okid_watch_state(watch_, &now);
+    if (now.learning || (now.watching && samples_ < due_)) return;
+    if (okid_watch_set_model(watch_, &model_) != OKID_OK) return; // a model without a predictor is not watched
+    const std::int64_t age = memory_samples_ > 0 ? memory_samples_ : basis();
+    due_ = samples_ + age;
+}
+
+/// The row in engineering units through the watch.
+void identifier::watch(const double* row) {
+    for (std::size_t i = 0; i < m_; ++i) row_[i] = scale_[i] * row[i] + offset_[i];
+    if (!okid_watch_add(watch_, row_.data())) return;
+    change_at_ = samples_ - change_samples_;
+    if (restart_on_change_) restart();
+}
+
+std::optional<std::int64_t> identifier::take_change() {
+    if (!change_at_) return std::nullopt;
+    return samples_ - *std::exchange(change_at_, std::nullopt);
+}
+
+void identifier::restart() {
+    before_ = stats();
+    ++restarts_;
+    okid_accumulator_reset(accumulator_);
+    if (blocks_) blocks_->reset();
+}
+
 /// What waits into the sums, and into those of the blocks beside them.
 template <class Number> void identifier::absorb(const Number* samples) {
     for (std::size_t done = 0; done < pending_;) {
@@ -142,11 +195,15 @@ void identifier::add(const double* row) {
         double* to = doubles_.data() + pending_ * m_;
         std::copy_n(row, m_, to);
     }
+    ++samples_;
     if (++pending_ == chunk) flush();
+    watch(row);
 }
 
 void identifier::add_missing(std::int64_t count) {
     flush();
+    samples_ += count;
+    okid_watch_gap(watch_);
     okid_accumulator_gap(accumulator_, count);
     if (blocks_) blocks_->gap(accumulator_, count);
 }
@@ -162,6 +219,15 @@ std::int64_t identifier::rows() {
 }
 
 okid_accumulator_stats_t identifier::stats() {
+    okid_accumulator_stats_t out = held();
+    out.samples += before_.samples;
+    out.missing += before_.missing;
+    out.gaps += before_.gaps;
+    out.saturated += before_.saturated;
+    return out;
+}
+
+okid_accumulator_stats_t identifier::held() {
     flush();
     okid_accumulator_stats_t out{};
     okid_accumulator_stats(accumulator_, &out);
@@ -169,7 +235,7 @@ okid_accumulator_stats_t identifier::stats() {
 }
 
 std::int64_t identifier::basis() {
-    const okid_accumulator_stats_t counts = stats();
+    const okid_accumulator_stats_t counts = held();
     const std::int64_t all = counts.samples + counts.missing; // as in a file: missing samples are samples of the record
     return memory_samples_ > 0 ? std::min(all, memory_samples_) : all;
 }

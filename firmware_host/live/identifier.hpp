@@ -6,10 +6,12 @@
 
 #include <okid/accumulator.h>
 #include <okid/identify.h>
+#include <okid/watch.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace okid_host {
@@ -32,15 +34,28 @@ class identifier {
         return blocks_ ? blocks_->sigma(accumulator_, model_, plan) : std::nullopt;
     }
     const okid_identify_config_t& config() const { return identify_config_; }
+    int most_modes() const { return okid_identify_max_order(&identify_config_) / 2; }
 
-    bool exact() const { return exact_; }        ///< 16-bit codes, summed exactly
+    /// Compare what comes with the model of the last run(), which is at rest.
+    void watch_model();
+    /// Has the structure changed since the last call? @return how many samples ago that began. A window and a fading memory
+    /// have forgotten then what was before (restart_on_change).
+    std::optional<std::int64_t> take_change();
+    std::int64_t restarts() const { return restarts_; }
+
+    bool exact() const { return exact_; } ///< 16-bit codes, summed exactly
+    std::int64_t lags() const { return okid_identify_lags(&identify_config_); }
     std::int64_t unknowns() const { return q_; } ///< regressors q = n_u + lags m
     std::int64_t rows();                         ///< regression rows now in the sums
     std::int64_t basis();                        ///< samples the model rests on
-    okid_accumulator_stats_t stats();
+    okid_accumulator_stats_t stats();            ///< since the start, restarts or not
 
   private:
     void flush();
+    void create_watch(const live_config& config);
+    void watch(const double* row);
+    void restart();
+    okid_accumulator_stats_t held();
     void create_accumulator(const live_config& config);
     void create_identifier(const live_config& config);
     template <class Number> void absorb(const Number* samples);
@@ -57,6 +72,16 @@ class identifier {
     okid_identify_config_t identify_config_{};
     okid_identified_t model_{};
     std::unique_ptr<live_blocks> blocks_;
+
+    bool restart_on_change_ = false;
+    std::unique_ptr<std::byte[]> watch_block_;
+    okid_watch_t* watch_ = nullptr;
+    std::vector<double> row_;            ///< in engineering units
+    std::int64_t samples_ = 0, due_ = 0; ///< ever; when the watch gets a newer model
+    std::int64_t change_samples_ = 0;    ///< what a change takes to be noticed
+    std::optional<std::int64_t> change_at_;
+    std::int64_t restarts_ = 0;
+    okid_accumulator_stats_t before_{}; ///< counts of what restarts dropped
 };
 
 } // namespace okid_host

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Recorded logs: through a session, or onto a bus, as fast as possible or at a multiple of their own time.
 #pragma once
-#include "session.hpp"
+#include "../recording/recorder.hpp"
+#include "stream_target.hpp"
 
 #include <drv/pacer.h>
 
@@ -26,13 +27,22 @@ class pacer {
     drv_pacer_t timing_{};
 };
 
-/// Which interface of the log feeds which bus: by name; a log with one interface feeds the only CAN bus.
-/// Throws `failure` (exit 2) naming the interfaces of the log when none fits.
-std::vector<std::string> map_interfaces(const std::string& log, const live_config& config);
+/// A name that ends in .okj, in any case of letters.
+bool is_journal(const std::string& path);
 
-/// Frames of a log, one after the other. Throws `failure` (exit 2) at a line that does not parse.
+/// Interfaces of a log, each once, in order of appearance.
+std::vector<std::string> interfaces_of(const std::string& log);
+
+/// Frames of a log or of a journal and the segments behind it, one after the other. Throws `failure` (exit 2) at a line
+/// that does not parse; what is damaged in a journal is told on stderr at its end.
 class log_frames {
   public:
+    /// Every frame; of a journal with the bus it was recorded with, of a log as bus 0.
+    explicit log_frames(const std::string& path);
+    /// Those of the buses of a config: by the name of the bus (journal) or the interface; the only one feeds the only
+    /// one. Throws `failure` (exit 2) naming what is there when none fits.
+    log_frames(const std::string& path, const live_config& config);
+    /// Those of interfaces of a log; the place in the list is the bus of a frame.
     log_frames(const std::string& path, const std::vector<std::string>& interfaces);
     ~log_frames();
     log_frames(const log_frames&) = delete;
@@ -41,15 +51,23 @@ class log_frames {
     const drv_frame_t* next();
 
   private:
+    void open(const std::vector<std::string>& interfaces);
+    void tell_damage();
+
+    std::string path_;
     drv_source_t source_{};
-    bool told_torn_ = false;
+    bool told_ = false;
+    std::vector<int> bus_of_; ///< of each bus of a journal, -1 = not wanted; empty = as it was
     std::vector<drv_frame_t> batch_;
     int at_ = 0, count_ = 0;
 };
 
-/// Play a log through a session and finish it. Throws `failure`.
-void play_through_session(const std::string& log, const live_config& config, const session_options& options,
-                          std::optional<double> speed);
+/// A log holds no edges of a GPIO line: throws `failure` (exit 2) when the config waits for one and none is given.
+void require_edge_time(const live_config& config, bool given);
+
+/// Play a log through a target; finishing it is the caller's. Signals are caught already. Throws `failure`.
+void play_through(const std::string& log, const live_config& config, stream_target& target, std::optional<double> speed,
+                  const std::optional<recorder_options>& recording);
 
 /// Play every frame of a log onto an interface. Throws `failure`: exit 2 for the log, exit 4 for the interface.
 void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed);

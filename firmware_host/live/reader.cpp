@@ -87,6 +87,7 @@ int bus_reader::drain_once() {
     if (count <= 0) return count;
     for (int i = 0; i < count; ++i) batch_[static_cast<std::size_t>(i)].bus = bus_;
     drv_ring_push(ring_, batch_.data(), static_cast<std::size_t>(count));
+    if (second_ring_) drv_ring_push(second_ring_, batch_.data(), static_cast<std::size_t>(count));
     const std::uint64_t one = 1;
     (void)!write(wake_fd_, &one, sizeof one);
     return count;

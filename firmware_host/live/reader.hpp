@@ -25,6 +25,8 @@ class bus_reader {
     bus_reader(const bus_reader&) = delete;
     bus_reader& operator=(const bus_reader&) = delete;
 
+    /// The recorder gets every frame, too.
+    void also_into(drv_ring_t* ring) { second_ring_ = ring; }
     void start();
     /// End the thread; frames still in the socket and in the ring can be taken afterwards.
     void stop();
@@ -45,7 +47,7 @@ class bus_reader {
     int wake_fd_, stop_fd_;
     drv_source_t source_{};
     std::unique_ptr<std::byte[]> block_;
-    drv_ring_t* ring_ = nullptr;
+    drv_ring_t *ring_ = nullptr, *second_ring_ = nullptr;
     std::vector<drv_frame_t> batch_;
     std::thread thread_;
     std::atomic<bool> stopping_{false};

@@ -3,7 +3,9 @@
 
 #include "../error.hpp"
 #include "../method.hpp"
+#include "../publishing/service_notice.hpp"
 #include "serial_line.hpp"
+#include "stop_signal.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -71,10 +73,13 @@ ordered_json clock_json(const drv_clock_fit_t& clock) {
 } // namespace
 
 session::session(const live_config& config, const session_options& options)
-    : config_(config), options_(options), events_(options.events), view_(options.events != "-" && options.json != "-"),
-      grid_(config, *this), identifier_(config), trigger_(config), losses_(config.buses.size()),
+    : config_(config), options_(options),
+      publisher_(config, {options.events, options.events != "-" && options.json != "-", options.live}),
+      grid_(config, *this), identifier_(config), tracks_(static_cast<int>(config.n_y), identifier_.most_modes()),
+      alarm_(config.alarm), trigger_(config), hammer_(config, identifier_.lags()), losses_(config.buses.size()),
       health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)) {
+    if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
     stats_samples_ =
         update_samples_ * std::max<std::int64_t>(1, std::llround(stats_every_s / config.identification.update_s));
     if (options.duration_s) {
@@ -86,12 +91,20 @@ session::session(const live_config& config, const session_options& options)
     for (drv_clock_fit_t& clock : clocks_) (void)drv_clock_fit_init(&clock, &nanoseconds);
 }
 
+void session::tell(ordered_json event) {
+    const double t = event.value("t", 0.0);
+    publisher_.event(std::move(event), static_cast<double>(start_ns_) * 1e-9 + t);
+}
+
+void session::ready() { notify_service("READY=1"); }
+
 void session::start(std::int64_t time_ns) {
     if (started_) return;
     started_ = true;
+    start_ns_ = time_ns;
     ordered_json event{{"type", "start"}, {"t", 0.0}, {"config", config_.path}, {"wall_time", wall_time(time_ns)}};
     for (const auto& [key, text] : config_.notes) event["notes"][key] = text;
-    events_.write(event);
+    tell(event);
 }
 
 /// Time is taken at microseconds, as a log keeps it: live and replayed streams decide alike.
@@ -113,7 +126,9 @@ void session::frame(const drv_frame_t& frame) {
 void session::on_sample(std::int64_t index, const double* row) {
     if (limit_ > 0 && index >= limit_) return;
     now_ = index + 1;
-    if (!trigger_.waiting())
+    if (hammer_.wanted()) {
+        if (hammer_.add(index, row, 1)) strike();
+    } else if (!trigger_.waiting())
         identifier_.add(row);
     else if (trigger_.add(index, row, 1, grid_.time_ns(index)))
         begin(index);
@@ -124,7 +139,9 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
     if (limit_ > 0) count = std::min(count, limit_ - index);
     if (count <= 0) return;
     now_ = index + count;
-    if (!trigger_.waiting())
+    if (hammer_.wanted()) {
+        if (hammer_.add(index, nullptr, count)) strike();
+    } else if (!trigger_.waiting())
         identifier_.add_missing(count);
     else
         (void)trigger_.add(index, nullptr, count, 0);
@@ -141,11 +158,11 @@ void session::trigger_edge(std::int64_t time_ns) {
 void session::begin(std::int64_t until) {
     const std::int64_t sample = trigger_.sample();
     const std::int64_t time_us = trigger_.time_ns() / 1000;
-    events_.write({{"type", "trigger"},
-                   {"t", seconds(sample)},
-                   {"source", config_.trigger.source == trigger_source::gpio ? "gpio" : "level"},
-                   {"sample", sample},
-                   {"time_s", static_cast<double>(time_us) / 1e6}});
+    tell({{"type", "trigger"},
+          {"t", seconds(sample)},
+          {"source", config_.trigger.source == trigger_source::gpio ? "gpio" : "level"},
+          {"sample", sample},
+          {"time_s", static_cast<double>(time_us) / 1e6}});
     trigger_.each_kept([&](std::int64_t first, const double* row, std::int64_t count) {
         if (row)
             identifier_.add(row);
@@ -156,72 +173,52 @@ void session::begin(std::int64_t until) {
     });
 }
 
+/// A blow was judged: a good one goes in as a record of its own.
+void session::strike() {
+    const hit_report& hit = hammer_.report();
+    ordered_json event{
+        {"type", "hit"},          {"t", seconds(now_)},
+        {"number", hit.number},   {"sample", hit.sample},
+        {"accepted", hit.good()}, {"reason", hit.good() ? ordered_json(nullptr) : ordered_json(hit.fault)},
+        {"text", hit.text}};
+    if (hit.duration_s > 0)
+        event.update({{"peak", hit.peak}, {"duration_s", hit.duration_s}, {"force_band_hz", hit.band_hz}});
+    event.update({{"accepted_hits", hit.accepted}, {"left", hit.left}});
+    tell(std::move(event));
+    if (!hit.good()) return;
+    identifier_.add_missing(0);
+    hammer_.each_row([&](const double* row) { identifier_.add(row); });
+    show_modes(now_);
+}
+
 lamp_state session::lamps() const {
     lamp_state out;
+    if (hammer_.wanted()) {
+        out.armed = hammer_.armed();
+        out.go = hammer_.last_good();
+        out.alarm = alarm_.standing();
+        return out;
+    }
     out.armed = trigger_.waiting() || config_.trigger.source == trigger_source::immediate;
     out.go = settled_;
+    out.alarm = alarm_.standing();
     return out;
 }
 
 void session::on_gap(const grid_gap& gap) {
     ++gaps_;
-    events_.write({{"type", "gap"},
-                   {"t", seconds(std::max(now_, gap.last + 1))},
-                   {"channel", config_.channels[gap.channel].name},
-                   {"first", gap.first},
-                   {"last", gap.last},
-                   {"count", gap.count},
-                   {"cause", gap_cause_name(gap.cause)}});
-}
-
-void session::update(std::int64_t samples) {
-    if (trigger_.waiting()) {
-        live_status status;
-        status.t = seconds(samples);
-        status.waiting = "armed, waiting for " + trigger_.awaited();
-        view_.show(status);
-    } else {
-        show_modes(samples);
-    }
-    if (samples % stats_samples_ == 0) write_stats();
-}
-
-/// Modes are shown once there are twice as many equations as unknowns: below that they only repeat the noise.
-void session::show_modes(std::int64_t samples) {
-    live_status status;
-    status.t = seconds(samples);
-    const okid_accumulator_stats_t stats = identifier_.stats();
-    status.samples = stats.samples;
-    status.missing = stats.missing;
-    status.gaps = stats.gaps;
-    const std::int64_t rows = identifier_.rows(), need = 2 * identifier_.unknowns();
-    okid_status_t outcome = OKID_ERR_TOO_SHORT;
-    std::optional<deviations> sigma;
-    if (rows >= need) outcome = identifier_.run();
-    if (outcome >= 0) {
-        sigma = identifier_.sigma({});
-        status.model = &identifier_.model();
-        status.sigma = sigma ? &*sigma : nullptr;
-        status.settled = settling_.add(identifier_.model());
-        const std::int64_t basis = identifier_.basis();
-        events_.write({{"type", "modes"},
-                       {"t", status.t},
-                       {"modes", modes_json(identifier_.model(), sigma ? &*sigma : nullptr)},
-                       {"window_s", seconds(basis)},
-                       {"samples", basis},
-                       {"settled", status.settled}});
-    } else {
-        settling_.reset();
-        status.waiting = rows < need ? fmt::format("waiting for samples, {} of {}", rows, need)
-                                     : fmt::format("no model yet: {}", okid_status_text(outcome));
-    }
-    settled_ = status.settled;
-    view_.show(status);
+    tell({{"type", "gap"},
+          {"t", seconds(std::max(now_, gap.last + 1))},
+          {"channel", config_.channels[gap.channel].name},
+          {"first", gap.first},
+          {"last", gap.last},
+          {"count", gap.count},
+          {"cause", gap_cause_name(gap.cause)}});
 }
 
 /// Frames missing on the grid are booked under what the devices counted first; the rest was lost before it reached us.
 ordered_json session::bus_stats(std::size_t bus) const {
-    const grid_bus_counts& counts = grid_.bus(bus);
+    const grid_bus_counts counts = grid_.bus(bus);
     const auto lost = [&](gap_cause cause) { return counts.lost[static_cast<std::size_t>(cause)]; };
     const auto beyond = [](std::uint64_t seen, std::uint64_t booked) { return seen > booked ? seen - booked : 0; };
     const std::uint64_t overflow = losses_[bus].socket_overflow, driver = losses_[bus].driver;
@@ -247,8 +244,12 @@ ordered_json session::bus_stats(std::size_t bus) const {
 
 void session::bus_event(std::size_t bus, const char* kind, const std::string& text) {
     if (started_)
-        events_.write(
+        tell(
             {{"type", "bus"}, {"t", seconds(now_)}, {"bus", config_.buses[bus].name}, {"event", kind}, {"text", text}});
+}
+
+void session::record_event(const std::string& kind, const std::string& text) {
+    tell({{"type", "record"}, {"t", seconds(now_)}, {"event", kind}, {"text", text}});
 }
 
 void session::write_stats() {
@@ -264,9 +265,12 @@ void session::write_stats() {
                                                       {"missing", counts.expected - counts.received},
                                                       {"completeness_percent", percent}};
     }
+    for (const clock_skew& skew : grid_.skews())
+        event["channel"][config_.channels[skew.channel].name].update(
+            {{"skew_us", skew.us}, {"skew_std_us", skew.std_us}, {"rate_ppm", skew.rate_ppm}});
     const double rate_hz = observed_rate_hz();
     event["rate_hz_by_stamps"] = rate_hz > 0 ? ordered_json(rate_hz) : ordered_json(nullptr);
-    events_.write(event);
+    tell(event);
 }
 
 /// A channel that never spoke is the likeliest reason for no model: say so before the algebra does.
@@ -299,6 +303,10 @@ result_context session::context() {
             fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags start "
                         "anew after each gap",
                         stats.missing, stats.samples + stats.missing, stats.gaps, stats.gaps == 1 ? "" : "s"));
+    if (identifier_.restarts() > 0)
+        out.warnings.emplace_back(
+            "restarted", fmt::format("the structure changed: the result rests on the {} samples after sample {}",
+                                     out.samples, restarted_at_));
     if (stats.saturated > 0)
         out.warnings.emplace_back(
             "saturated",
@@ -330,6 +338,28 @@ void session::remark_rate() const {
         observed_hz, config_.rate_hz, config_.path);
 }
 
+/// Channels on clocks of their own: how well their time is known, and what that is in phase at each mode.
+void session::remark_clocks(result_context& about) const {
+    const okid_identified_t& model = identifier_.model();
+    for (const clock_skew& skew : grid_.skews()) {
+        std::string phases;
+        for (int k = 0; k < model.mode_count; ++k)
+            phases += fmt::format("{}{:.2g}", k ? ", " : "", 360e-6 * skew.std_us * model.frequency_hz[k]);
+        about.warnings.emplace_back(
+            "resampled",
+            fmt::format(
+                "{} has a clock of its own ({:+.1f} ppm): resampled onto the grid, good up to {:.4g} Hz. Its time "
+                "is known to {:.2g} us (σ, beside a constant delay of its bus), in phase {} degrees at the modes",
+                config_.channels[skew.channel].name, skew.rate_ppm, fir_kernel::pass_band * config_.rate_hz,
+                skew.std_us, phases.empty() ? "-" : phases));
+    }
+    if (config_.decimate > 1)
+        about.warnings.emplace_back("decimated",
+                                    fmt::format("one sample of {} is kept, behind the same anti-alias filter for every "
+                                                "channel: good up to {:.4g} Hz",
+                                                config_.decimate, fir_kernel::pass_band * config_.rate_hz));
+}
+
 /// M, K and R where the config asks for them; what stands in their way is no reason to lose the modes.
 void session::add_mass(result_context& about) const {
     const mass_plan plan = live_mass_plan(config_);
@@ -346,24 +376,31 @@ void session::add_mass(result_context& about) const {
 }
 
 void session::finish() {
+    if (options_.live) notify_service("STOPPING=1");
     grid_.finish();
     start(std::int64_t{std::time(nullptr)} * 1000000000); // nothing was heard at all
     const okid_status_t status = identifier_.run();
     write_stats();
-    view_.end();
     check_heard();
     if (trigger_.waiting()) throw failure(exit_no_model, trigger_.missed());
+    if (const std::string lacking = hammer_.shortfall(); !lacking.empty()) {
+        if (hammer_.accepted() == 0) throw failure(exit_no_model, lacking);
+        fmt::print(stderr, "okid: warning: {}\n", lacking);
+    }
     result_context about = context();
     remark_rate();
     if (status < 0) throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
+    remark_clocks(about);
     add_mass(about);
     about.sigma = identifier_.sigma(about.mass ? live_mass_plan(config_) : mass_plan{});
     if (about.mass && about.sigma) add_deviations(*about.sigma, *about.mass);
     const ordered_json result = result_json(identifier_.model(), about);
-    events_.write({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
+    tell({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
+    publisher_.finish();
     if (!options_.json.empty())
         write_whole_file(options_.json, result.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n");
-    if (!events_.on_stdout() && options_.json != "-") write_whole_file("-", result_table(identifier_.model(), about));
+    if (!publisher_.events_on_stdout() && options_.json != "-")
+        write_whole_file("-", result_table(identifier_.model(), about));
 }
 
 } // namespace okid_host

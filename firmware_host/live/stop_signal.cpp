@@ -11,12 +11,26 @@ namespace okid_host {
 namespace {
 
 std::atomic<bool> requested{false};
+std::atomic<int> hangups{0};
 int event_fd = -1;
+
+void wake() {
+    const std::uint64_t one = 1;
+    if (event_fd >= 0) (void)!write(event_fd, &one, sizeof one);
+}
 
 void on_signal(int) {
     if (requested.exchange(true)) _exit(130);
-    const std::uint64_t one = 1;
-    if (event_fd >= 0) (void)!write(event_fd, &one, sizeof one);
+    wake();
+}
+
+void on_hangup(int, siginfo_t* from, void*) {
+    if (from->si_code <= 0) { // sent by a process
+        hangups.fetch_add(1);
+        return;
+    }
+    requested.store(true);
+    wake();
 }
 
 } // namespace
@@ -32,5 +46,16 @@ void catch_stop_signals() {
 
 bool stop_requested() { return requested.load(std::memory_order_relaxed); }
 int stop_fd() { return event_fd; }
+
+void catch_hangups() {
+    struct sigaction action{}, before{};
+    action.sa_sigaction = on_hangup;
+    action.sa_flags = SA_SIGINFO | SA_RESTART;
+    sigemptyset(&action.sa_mask);
+    if (sigaction(SIGHUP, nullptr, &before) == 0 && before.sa_handler == SIG_IGN) return; // nohup
+    sigaction(SIGHUP, &action, nullptr);
+}
+
+int reopen_requests() { return hangups.load(); }
 
 } // namespace okid_host

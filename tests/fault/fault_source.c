@@ -73,10 +73,13 @@ static void disturb_stream(fault_source_t* self) {
         self->pending_error = ENODEV;
         self->pending_reads = 1 + (int)draw(self, 5);
     }
-    if (happens(self, FAULT_CLOCK) && self->sample - self->last_clock_at > CLOCK_APART) {
+    if (happens(self, FAULT_CLOCK) && self->sample - self->last_clock_at > CLOCK_APART &&
+        self->sent - self->last_clock_sent > CLOCK_APART) { // none is on its way any more that was stamped before
         ++self->done[FAULT_CLOCK];
         self->clock_ns += draw(self, 2) ? hour_ns : -hour_ns;
+        self->clock_just_set = 1;
         self->last_clock_at = self->sample;
+        self->last_clock_sent = self->sent;
     }
     if (happens(self, FAULT_STAMP_WRAP)) {
         ++self->done[FAULT_STAMP_WRAP];
@@ -127,7 +130,8 @@ static int damage(fault_source_t* self, drv_frame_t* frame) {
 
 static void produce(fault_source_t* self) {
     const int quiet = self->sample < QUIET_FIRST || self->sample >= self->plan.samples - QUIET_LAST;
-    const int clock_near = self->sample - self->last_clock_at < 4; // a pause and a set clock look alike
+    // In a log a pause and a set clock look alike.
+    const int clock_near = self->plan.raw_stamps && self->sample - self->last_clock_at < 4;
     if (!quiet && self->missing == 0) disturb_stream(self);
     drv_frame_t frame = next_true_frame(self);
     if (quiet) self->missing = 0;
@@ -167,6 +171,19 @@ static int32_t next_due(const fault_source_t* self) {
     return best;
 }
 
+static void look_at_clock(fault_source_t* self) {
+    const int64_t now = begin_ns + (self->sample + 1) * self->plan.period_ns;
+    const drv_clock_pair_t real = {now - 1000, now + self->clock_ns, now + 1000};
+    (void)drv_host_clock_look(&self->clock, &real);
+}
+
+/// As a socket does: the clock may be set after the frames were stamped and before it is looked at.
+static void carry_stamps(fault_source_t* self, drv_frame_t* frames, int count) {
+    look_at_clock(self);
+    for (int i = 0; i < count; ++i)
+        if (frames[i].time_ns) frames[i].time_ns = drv_host_clock_carry(&self->clock, frames[i].time_ns);
+}
+
 static int fault_read(drv_source_t* source, drv_frame_t* frames, int capacity) {
     fault_source_t* self = source->state;
     if (self->pending_reads > 0) {
@@ -197,12 +214,15 @@ static int fault_read(drv_source_t* source, drv_frame_t* frames, int capacity) {
             self->queue[at] = self->queue[--self->queued];
             self->due[at] = self->due[self->queued];
         } else if (self->at_end) {
-            return count > 0 ? count : DRV_END;
+            if (count == 0) return DRV_END;
+            break;
         } else {
             produce(self);
-            if (self->pending_reads > 0) break;
+            if (self->pending_reads > 0 || self->clock_just_set) break;
         }
     }
+    self->clock_just_set = 0;
+    if (!self->plan.raw_stamps) carry_stamps(self, frames, count);
     return count;
 }
 
@@ -223,8 +243,9 @@ void fault_source_make(fault_source_t* self, const fault_plan_t* plan) {
     memset(self, 0, sizeof *self);
     self->plan = *plan;
     self->random = UINT64_C(0x9E3779B97F4A7C15) * (plan->seed + UINT64_C(1));
-    self->last_clock_at = -CLOCK_APART;
+    self->last_clock_at = self->last_clock_sent = -CLOCK_APART;
     self->source.ops = &ops;
     self->source.state = self;
+    look_at_clock(self);
     for (int i = 0; i < 8; ++i) (void)draw(self, 2);
 }

@@ -5,6 +5,7 @@
 #ifndef TESTS_FAULT_FAULT_SOURCE_H
 #define TESTS_FAULT_FAULT_SOURCE_H
 
+#include <drv/host_clock.h>
 #include <drv/source.h>
 
 #ifdef __cplusplus
@@ -45,6 +46,7 @@ typedef struct fault_plan_t {
     int32_t lanes;                   ///< 1..FAULT_LANES, identifiers from 0x100 on
     uint32_t first_counter;          ///< 16 bits at the front of each frame, then the sample as 32 bits at byte 4
     int64_t period_ns;
+    int32_t raw_stamps; ///< 1 = a set clock is seen in the stamps, as in a log; 0 = they are carried to host time
 } fault_plan_t;
 
 typedef struct fault_source_t {
@@ -55,11 +57,12 @@ typedef struct fault_source_t {
     uint64_t good;              ///< frames handed on that the grid can place
     // private
     uint64_t random;
-    int64_t sample, clock_ns, wrap_ns, last_clock_at, last_flip_at;
+    drv_host_clock_t clock;
+    int64_t sample, clock_ns, wrap_ns, last_clock_at, last_clock_sent, last_flip_at;
     int32_t lane, missing;
     fault_kind_t missing_by;
     uint8_t loss;
-    int pending_error, pending_reads;
+    int pending_error, pending_reads, clock_just_set;
     drv_frame_t queue[FAULT_QUEUE]; ///< frames on their way, with the place each is due at
     int64_t due[FAULT_QUEUE], sent;
     int32_t queued;

@@ -6,6 +6,7 @@ from __future__ import annotations
 import random
 import struct
 import sys
+import zlib
 from pathlib import Path
 
 CONFIG = """[acquisition]
@@ -97,6 +98,23 @@ def signals(count: int) -> list[bytes]:
     ]
 
 
+def chunk(kind: int, payload: bytes, sequence: int, frames: int = 0) -> bytes:
+    """Of a journal, docs/journal-format.md."""
+    head = b"\x8fOKJ\r\n\x1a\n" + struct.pack(
+        "<BBHIQIIqqQI", 1, kind, 0, len(payload), 7, sequence, frames, 1, 2, 0, zlib.crc32(payload)
+    )
+    return head + struct.pack("<I", zlib.crc32(head)) + payload
+
+
+def journals() -> list[bytes]:
+    text = struct.pack("<IQQ", 6, 11, 0) + b"config" + b"rate_hz = 1"
+    plain = struct.pack("<BBBBIq", 0, 0, 0, 8, 0x123, 1700000000000000000) + bytes(8)
+    stamped = struct.pack("<BBBBIqq", 1, 0x89, 2, 64, 0x18F02D00, 1700000000000100000, 5) + bytes(64)
+    remote = struct.pack("<BBBBIq", 2, 2, 0, 4, 0x7FF, 1700000000000200000)
+    whole = chunk(1, text, 0) + chunk(2, plain + stamped, 1, 2) + chunk(2, remote, 2, 1) + chunk(3, b"", 3)
+    return [whole, whole[:200], whole[:100] + whole[110:], chunk(2, plain, 9, 2)]
+
+
 def main() -> int:
     top = Path(sys.argv[1])
     seeds: dict[str, list[bytes]] = {
@@ -106,6 +124,7 @@ def main() -> int:
         "dbc": [DBC.encode(), DBC.replace("\n", "\r\n").encode()],
         "csv": [text.encode() for text in CSV],
         "slcan": [text.encode() for text in LINES],
+        "journal": journals(),
         "ascii": [b"\x00\x011.23,4.56\r\n7;8;9\nx:1 y:2\n", b"\x01\x081,2,3\n2,4,5\n"],
         "witmotion": [b"\x00\x01" + bytes([0x55, 0x51, 1, 0, 2, 0, 3, 0, 4, 0]) + bytes([(0x55 + 0x51 + 10) & 255])],
     }

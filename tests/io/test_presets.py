@@ -10,6 +10,7 @@ import binascii
 import math
 import random
 import struct
+import time
 from pathlib import Path
 
 import cantools
@@ -194,3 +195,64 @@ def test_serial_presets_through_a_line(tmp_path: Path, preset: str) -> None:
     assert bus["decode_errors"] == 0 and bus["received"] >= stats["channel"]["z"]["received"]
     assert bus["lost"] == stats["channel"]["z"]["missing"]
     assert events[-1]["result"]["modes"][0]["frequency_hz"] == pytest.approx(7.0, abs=0.1)
+
+
+def test_presets_are_listed() -> None:
+    """A line for each with its channels; every name in it can be asked for."""
+    done = program.okid("check", "--presets")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    names = sorted(path.stem for path in (ROOT / "drivers" / "presets").glob("*.toml"))
+    assert [line.split()[0] for line in lines[::2]] == names
+    assert all(len(line.split(maxsplit=1)[1]) > 15 for line in lines[::2]), done.stdout
+    named = [name for line in lines[1::2] for name in line.partition("channels: ")[2].split(", ")]
+    assert {case[0] for case in CASES} <= set(named)
+    assert any("bus: wt901;" in line for line in lines)
+
+
+def test_unknown_preset_tells_which_there_are(tmp_path: Path) -> None:
+    text = HEAD + '[[channel]]\nname = "c"\nrole = "force"\npreset = "gsv4.5"\n'
+    (tmp_path / "a.toml").write_text(text)
+    done = program.okid("check", tmp_path / "a.toml")
+    assert done.returncode == 2
+    for piece in ("gsv4.1", "imc.int16-1", "did you mean", "okid check --presets"):
+        assert piece in done.stderr, done.stderr
+    done = program.okid("check")
+    assert done.returncode == 2 and "the file to check is missing" in done.stderr
+
+
+@pytest.mark.parametrize("fault", ["none", "lost", "check sum"])
+def test_bursts_of_a_sensor_without_a_counter(tmp_path: Path, fault: str) -> None:
+    """200 Hz in bursts of eight packets every 40 ms: no gap but those of lost packets, and no sample too many."""
+    device, config, rate, count = tmp_path / "sensor", tmp_path / "a.toml", 200, 1600
+    config.write_text(
+        f'[acquisition]\nrate_hz = {rate}\n[[bus]]\nname = "s"\npreset = "wt901"\nbaud = 115200\ndevice = "{device}"\n'
+        '[[channel]]\nname = "x"\npreset = "wt901.x"\ndof = 1\n'
+        '[identification]\nmethod = "n4sid-cva"\nrows = 10\norder = 2\nupdate_s = 1.0\nsigma_blocks = 0\n'
+    )
+    lost = {250, 251, 252, 507, 804, 805, 1100} if fault != "none" else set()
+    draw = random.Random(4)
+    packets = [witmotion(draw.randrange(-9000, 9000), n, 0) for n in range(count)]
+    with line(device) as ours:
+        run = Run(config)
+        begin = time.monotonic() + 0.5
+        for first in range(0, count, 8):
+            time.sleep(max(0.0, begin + (first + 8) / rate - time.monotonic()))
+            burst = b""
+            for n in range(first, first + 8):
+                whole = packets[n]
+                if n in lost:
+                    whole = b"" if fault == "lost" else whole[:4] + bytes([whole[4] ^ 1]) + whole[5:]
+                burst += whole
+            ours.write(burst)
+        time.sleep(0.3)
+        run.stop()
+        events = run.finish()
+    gaps = of_type(events, "gap")
+    marked = {n for gap in gaps for n in range(gap["first"], gap["last"] + 1)}
+    stats = of_type(events, "stats")[-1]["bus"]["s"]
+    assert len(marked) == len(lost), (marked, stats)
+    assert all(min(abs(n - m) for m in lost) < 8 for n in marked)
+    assert stats["duplicate"] == 0 and stats["received"] == count - len(lost)
+    if fault == "check sum":
+        assert marked == lost and {gap["cause"] for gap in gaps} == {"crc"}

@@ -159,7 +159,8 @@ def test_start_frame_and_sync(record: Path, tmp_path: Path, capfd: pytest.Captur
     (record / "s.toml").write_text(re.sub(r'(interface = "vcan0"\n)', r"\1" + keys, text))
     seen = tmp_path / "seen.log"
     with seen.open("w") as out:
-        watch = subprocess.Popen(["candump", "-L", "vcan0"], stdout=out)
+        # Its own buffer holds 333 frames: what it drops would look as if it had not been sent.
+        watch = subprocess.Popen(["candump", "-L", "-r", "4000000", "vcan0"], stdout=out)
         time.sleep(0.5)
         live = Run(record, config="s.toml")
         for _ in range(500):  # candump listens already: only the first SYNC says that okid does

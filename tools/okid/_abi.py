@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from okid._errors import Error, IdentificationError, InputError
 from okid._layout import *  # noqa: F403
-from okid._layout import ERR_DIM, ERR_FORMAT, ERR_MISMATCH, ERR_RANGE, ERR_TOO_SHORT, SIGNATURES, doubles
+from okid._layout import ERR_DIM, ERR_FORMAT, ERR_MISMATCH, ERR_RANGE, ERR_TOO_SHORT, doubles
+from okid._signatures import SIGNATURES
 
 
 def candidates() -> list[Path]:

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The C ABI of libokid as ctypes: structures, constants and signatures exactly as in lib/include/okid/*.h.
+"""The C ABI of libokid as ctypes: structures and constants exactly as in lib/include/okid/*.h; functions: _signatures.
 
 tests/abi/test_struct_layout.py compiles the headers and compares every size, offset, constant and argument.
 """
 
 from __future__ import annotations
 
-from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int16, c_int32, c_int64, c_size_t, c_uint32
-from ctypes import c_void_p as opaque
+from ctypes import POINTER, Structure, c_double, c_float, c_int, c_int16, c_int32, c_int64, c_uint32
 from typing import Any, ClassVar
 
 OK, WARN_MISSING, WARN_SATURATED, WARN_MODEL = 0, 1, 2, 3
@@ -239,6 +238,39 @@ class Stabilized(Structure):
     ]
 
 
+class TrackConfig(Structure):
+    """okid_track_config_t."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("n_y", "max_modes", "max_tracks", "born", "dies")),
+        *((name, c_double) for name in ("frequency", "jump", "mac")),
+    ]
+
+
+class Track(Structure):
+    """okid_track_t."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("number", "hits", "misses")),
+        *((name, c_double) for name in ("frequency_hz", "damping_ratio")),
+    ]
+
+
+class WatchConfig(Structure):
+    """okid_watch_config_t."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("n_u", "n_y", "max_order", "lead", "block", "learn", "confirm")),
+        ("ratio", c_double),
+    ]
+
+
+class WatchState(Structure):
+    """okid_watch_state_t."""
+
+    _fields_ = [*((name, c_int32) for name in ("watching", "learning", "high")), ("ratio", c_double)]
+
+
 class SkewConfig(Structure):
     """okid_skew_config_t."""
 
@@ -298,8 +330,6 @@ class JackknifeConfig(Structure):
     _fields_ = [("identify", IdentifyConfig), ("sums", AccumulatorConfig)]
 
 
-_model = POINTER(ModelView)
-
 STRUCTS: dict[str, type[Structure]] = {
     "okid_accumulator_config_t": AccumulatorConfig,
     "okid_accumulator_stats_t": AccumulatorStats,
@@ -324,150 +354,13 @@ STRUCTS: dict[str, type[Structure]] = {
     "okid_square_root_config_t": SquareRootConfig,
     "okid_stabilization_config_t": StabilizationConfig,
     "okid_stabilized_t": Stabilized,
+    "okid_track_config_t": TrackConfig,
+    "okid_track_t": Track,
+    "okid_watch_config_t": WatchConfig,
+    "okid_watch_state_t": WatchState,
     "okid_subspace_config_t": SubspaceConfig,
     "okid_subspace_info_t": SubspaceInfo,
     "okid_uncertainty_t": Uncertainty,
 }
 
 # name -> (result, arguments); a status is c_int
-SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
-    "okid_status_text": (c_char_p, [c_int]),
-    "okid_version": (c_char_p, []),
-    "okid_backend": (c_char_p, []),
-    "okid_accumulator_memsize": (c_size_t, [POINTER(AccumulatorConfig)]),
-    "okid_accumulator_create": (c_int, [POINTER(opaque), POINTER(AccumulatorConfig), opaque, c_size_t]),
-    "okid_accumulator_reset": (None, [opaque]),
-    "okid_accumulator_set_units": (None, [opaque, doubles, doubles]),
-    "okid_accumulator_add": (c_int, [opaque, doubles, c_size_t]),
-    "okid_accumulator_add_f32": (c_int, [opaque, floats, c_size_t]),
-    "okid_accumulator_add_i16": (c_int, [opaque, int16s, c_size_t]),
-    "okid_accumulator_add_i32": (c_int, [opaque, int32s, c_size_t]),
-    "okid_accumulator_gap": (None, [opaque, c_int64]),
-    "okid_accumulator_merge": (c_int, [opaque, opaque]),
-    "okid_accumulator_remove": (c_int, [opaque, opaque, c_double]),
-    "okid_accumulator_copy": (c_int, [opaque, opaque]),
-    "okid_accumulator_slots": (c_int32, [opaque]),
-    "okid_accumulator_slot_rows": (c_int64, [opaque, c_int32]),
-    "okid_accumulator_take_slots": (c_int, [opaque, opaque, c_int32, c_int32]),
-    "okid_accumulator_energy": (c_int, [opaque, c_int, doubles]),
-    "okid_accumulator_centre": (c_int, [opaque]),
-    "okid_accumulator_run": (c_int, [opaque, c_int] + [doubles] * 5),
-    "okid_accumulator_serialised_size": (c_size_t, [opaque]),
-    "okid_accumulator_serialise": (c_int, [opaque, opaque, c_size_t]),
-    "okid_accumulator_peek": (c_int, [opaque, c_size_t, POINTER(AccumulatorConfig)]),
-    "okid_accumulator_deserialise": (c_int, [opaque, opaque, c_size_t]),
-    "okid_accumulator_stats": (None, [opaque, POINTER(AccumulatorStats)]),
-    "okid_accumulator_config": (None, [opaque, POINTER(AccumulatorConfig)]),
-    "okid_accumulator_rows": (c_int64, [opaque]),
-    "okid_accumulator_gram": (c_int, [opaque, c_int, doubles, doubles]),
-    "okid_observer_memsize": (c_size_t, [POINTER(ObserverConfig)]),
-    "okid_observer_solve": (
-        c_int,
-        [POINTER(ObserverConfig), doubles, c_int64, doubles, doubles, POINTER(ObserverInfo), opaque, c_size_t],
-    ),
-    "okid_square_root_memsize": (c_size_t, [POINTER(SquareRootConfig)]),
-    "okid_square_root_create": (c_int, [POINTER(opaque), POINTER(SquareRootConfig), opaque, c_size_t]),
-    "okid_square_root_reset": (None, [opaque]),
-    "okid_square_root_set_units": (None, [opaque, doubles, doubles]),
-    "okid_square_root_add": (c_int, [opaque, doubles, c_size_t]),
-    "okid_square_root_add_f32": (c_int, [opaque, floats, c_size_t]),
-    "okid_square_root_add_i16": (c_int, [opaque, int16s, c_size_t]),
-    "okid_square_root_add_i32": (c_int, [opaque, int32s, c_size_t]),
-    "okid_square_root_gap": (None, [opaque, c_int64]),
-    "okid_square_root_merge": (c_int, [opaque, opaque]),
-    "okid_square_root_stats": (None, [opaque, POINTER(AccumulatorStats)]),
-    "okid_square_root_config": (None, [opaque, POINTER(SquareRootConfig)]),
-    "okid_square_root_rows": (c_int64, [opaque]),
-    "okid_square_root_gram": (c_int, [opaque, c_int, doubles, doubles]),
-    "okid_square_root_factor": (c_int, [opaque, c_int, doubles, doubles]),
-    "okid_observer_factor_memsize": (c_size_t, [POINTER(ObserverConfig)]),
-    "okid_observer_solve_factor": (
-        c_int,
-        [POINTER(ObserverConfig), doubles, c_int64, doubles, doubles, POINTER(ObserverInfo), opaque, c_size_t],
-    ),
-    "okid_structured_memsize": (c_size_t, [POINTER(ObserverConfig)]),
-    "okid_structured_solve": (
-        c_int,
-        [POINTER(ObserverConfig), c_int, doubles, doubles, doubles, doubles, c_int64, doubles, doubles]
-        + [POINTER(ObserverInfo), opaque, c_size_t],
-    ),
-    "okid_markov_recursion": (c_int, [c_int32, c_int32, c_int32, doubles, c_int32, doubles, doubles]),
-    "okid_era_memsize": (c_size_t, [POINTER(EraConfig)]),
-    "okid_era_create": (c_int, [POINTER(opaque), POINTER(EraConfig), opaque, c_size_t]),
-    "okid_era_decompose": (c_int, [opaque, doubles]),
-    "okid_era_singular_values": (doubles, [opaque, int32s]),
-    "okid_era_max_order": (c_int32, [POINTER(EraConfig)]),
-    "okid_era_markov_last": (c_int32, [POINTER(EraConfig)]),
-    "okid_era_realize": (c_int, [opaque, c_int32, doubles, doubles, doubles, doubles, doubles]),
-    "okid_era_emac": (c_int, [opaque, c_int32, c_int32, doubles, doubles, doubles, doubles, doubles]),
-    "okid_subspace_max_order": (c_int32, [POINTER(SubspaceConfig)]),
-    "okid_subspace_memsize": (c_size_t, [POINTER(SubspaceConfig)]),
-    "okid_subspace_create": (c_int, [POINTER(opaque), POINTER(SubspaceConfig), opaque, c_size_t]),
-    "okid_subspace_decompose": (c_int, [opaque, doubles, c_int64, POINTER(SubspaceInfo)]),
-    "okid_subspace_decompose_factor": (c_int, [opaque, doubles, c_int64, POINTER(SubspaceInfo)]),
-    "okid_subspace_singular_values": (doubles, [opaque, int32s]),
-    "okid_subspace_realize": (c_int, [opaque, c_int32] + [doubles] * 6),
-    "okid_subspace_emac": (c_int, [opaque, c_int32, c_int32] + [doubles] * 6),
-    "okid_subspace_output_error_memsize": (c_size_t, [c_int32] * 4),
-    "okid_subspace_output_error": (
-        c_int,
-        [c_int32] * 3 + [doubles, doubles, c_int32, int32s] + [doubles] * 4 + [opaque, c_size_t],
-    ),
-    "okid_modal_memsize": (c_size_t, [c_int32, c_int32]),
-    "okid_modal_analyse": (
-        c_int,
-        [c_int32, c_int32, c_double, doubles, doubles, int32s] + [doubles] * 10 + [opaque, c_size_t],
-    ),
-    "okid_modal_mac": (c_double, [c_int32, doubles, doubles, doubles, doubles]),
-    "okid_mechanics_inputs": (c_int, [c_int32, c_int32, int32s, doubles, doubles]),
-    "okid_mechanics_outputs": (c_int, [c_int32, c_int32, int32s, doubles, int32s, doubles, doubles, doubles]),
-    "okid_mechanics_memsize": (c_size_t, [c_int32, c_int32]),
-    "okid_mechanics_continuous": (c_int, [POINTER(Mechanics), *[doubles] * 4, opaque, c_size_t]),
-    "okid_mechanics_modes": (c_int, [c_int32, *[doubles] * 3, int32s, *[doubles] * 4, opaque, c_size_t]),
-    "okid_mechanics_hold_memsize": (c_size_t, [c_int32, c_int32, c_int32]),
-    "okid_mechanics_c2d": (c_int, [_model, c_double, c_int32, *[doubles] * 3, opaque, c_size_t]),
-    "okid_mechanics_d2c": (c_int, [_model, c_double, c_int32, *[doubles] * 3, opaque, c_size_t]),
-    "okid_mkr_memsize": (c_size_t, [c_int32, c_int32, c_int32, c_int32]),
-    "okid_mkr_identify": (c_int, [_model, POINTER(MkrConfig), POINTER(Mkr), opaque, c_size_t]),
-    "okid_mkr_note": (c_char_p, [c_uint32]),
-    "okid_pdc_fit": (c_int, [c_int32, doubles, doubles, doubles, POINTER(Pdc)]),
-    "okid_pdc_damping": (c_int, [c_int32, POINTER(Pdc), doubles, doubles, doubles]),
-    "okid_refine_memsize": (c_size_t, [POINTER(RefineConfig)]),
-    "okid_refine_create": (c_int, [POINTER(opaque), POINTER(RefineConfig), opaque, c_size_t]),
-    "okid_refine_run": (c_int, [opaque, _model, int32s, doubles, POINTER(Refined)]),
-    "okid_refine_replicate": (c_int, [opaque, c_int32, *[doubles] * 4]),
-    "okid_skew_memsize": (c_size_t, [POINTER(SkewConfig)]),
-    "okid_skew_create": (c_int, [POINTER(opaque), POINTER(SkewConfig), opaque, c_size_t]),
-    "okid_skew_begin": (c_int, [opaque, _model]),
-    "okid_skew_add": (c_int, [opaque, _model]),
-    "okid_skew_finish": (c_int, [opaque, POINTER(SkewResult)]),
-    "okid_skew_correct": (c_int, [opaque, doubles, doubles]),
-    "okid_model_workspace": (c_size_t, [_model]),
-    "okid_model_simulate": (c_int, [_model, doubles, c_size_t, doubles, doubles, doubles]),
-    "okid_model_predict": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles, doubles]),
-    "okid_model_initial_state": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles]),
-    "okid_warning_code": (c_char_p, [c_uint32]),
-    "okid_identify_usable_p": (c_int32, [c_int32, c_int32, c_int32, c_int64]),
-    "okid_identify_lags": (c_int32, [POINTER(IdentifyConfig)]),
-    "okid_identify_max_order": (c_int32, [POINTER(IdentifyConfig)]),
-    "okid_identify_memsize": (c_size_t, [POINTER(IdentifyConfig)]),
-    "okid_identify_create": (c_int, [POINTER(opaque), POINTER(IdentifyConfig), opaque, c_size_t]),
-    "okid_identify_run": (c_int, [opaque, opaque, POINTER(Identified)]),
-    "okid_identify_run_factor": (c_int, [opaque, opaque, POINTER(Identified)]),
-    "okid_identify_poles": (c_int, [opaque, c_int32, POINTER(Identified)]),
-    "okid_stabilization_memsize": (c_size_t, [POINTER(StabilizationConfig)]),
-    "okid_stabilization_create": (c_int, [POINTER(opaque), POINTER(StabilizationConfig), opaque, c_size_t]),
-    "okid_stabilization_add": (c_int, [opaque, POINTER(Identified)]),
-    "okid_stabilization_find": (c_int, [opaque, POINTER(Stabilized)]),
-    "okid_identify_order": (c_int, [opaque, c_int32, POINTER(Identified)]),
-    "okid_identify_set_inputs": (c_int, [opaque, doubles, doubles, POINTER(Identified)]),
-    "okid_replicates_memsize": (c_size_t, [POINTER(ReplicatesConfig)]),
-    "okid_replicates_create": (c_int, [POINTER(opaque), POINTER(ReplicatesConfig), opaque, c_size_t]),
-    "okid_replicates_begin": (c_int, [opaque, _model, c_double]),
-    "okid_replicates_add": (c_int, [opaque, _model, c_double]),
-    "okid_replicates_finish": (c_int, [opaque, POINTER(Uncertainty)]),
-    "okid_jackknife_memsize": (c_size_t, [POINTER(JackknifeConfig)]),
-    "okid_jackknife_create": (c_int, [POINTER(opaque), POINTER(JackknifeConfig), opaque, c_size_t]),
-    "okid_jackknife_begin": (c_int, [opaque, opaque, POINTER(Identified)]),
-    "okid_jackknife_delete": (c_int, [opaque, opaque, c_double, _model, doubles]),
-}

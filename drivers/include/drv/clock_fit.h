@@ -51,6 +51,7 @@ typedef struct drv_clock_fit_t {
     int32_t block_count;
     double block_first;
     double point_at[DRV_CLOCK_BLOCKS], point[DRV_CLOCK_BLOCKS]; ///< ring of finished blocks
+    double growth_first, growth_second, growth;                 ///< of the low quantiles from doubling to doubling
     double scatter;                                             ///< of the points about the line, s
     int64_t points;
     // Pairs that do not fit, but perhaps fit each other.

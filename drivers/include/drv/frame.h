@@ -30,7 +30,7 @@ enum {
 };
 
 typedef struct drv_frame_t {
-    int64_t time_ns;    ///< CLOCK_REALTIME of arrival (software stamp), or the stamp of the log
+    int64_t time_ns;    ///< host time of arrival (host_clock.h), or the stamp of the log
     int64_t hw_time_ns; ///< the controller's own stamp, 0 = none
     uint32_t id;        ///< 11 or 29 bits, no flags inside
     uint8_t flags;      ///< DRV_FRAME_… bits

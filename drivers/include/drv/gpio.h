@@ -6,9 +6,8 @@
 /// nothing after it does until close. One thread uses a line. After an error `error` holds one sentence that names chip
 /// and line and says what was found; the value returned is -errno.
 ///
-/// The kernel stamps an edge by CLOCK_MONOTONIC in its interrupt. It is carried to CLOCK_REALTIME, the clock of CAN
-/// stamps, by reading both clocks at the time the edge is read; `clock_error_ns` bounds the error of that pairing. A
-/// step of the host clock between edge and read moves the edge with it: read soon.
+/// The kernel stamps an edge by CLOCK_MONOTONIC in its interrupt. It is carried to host time (host_clock.h), the
+/// time of CAN stamps, by reading both clocks when the edge is read; `clock_error_ns` bounds the error of that pairing.
 #ifndef DRV_GPIO_H
 #define DRV_GPIO_H
 
@@ -46,7 +45,7 @@ typedef struct drv_gpio_config_t {
 } drv_gpio_config_t;
 
 typedef struct drv_gpio_event_t {
-    int64_t time_ns;      ///< CLOCK_REALTIME
+    int64_t time_ns;      ///< host time
     int64_t monotonic_ns; ///< CLOCK_MONOTONIC, as the kernel stamped it
     drv_gpio_edge_t edge; ///< DRV_GPIO_RISING or DRV_GPIO_FALLING
     uint32_t lost;        ///< edges known to have been lost just before this one

@@ -113,6 +113,7 @@ struct drv_source_t {
 
 extern const drv_source_ops_t drv_source_socketcan; ///< a CAN_RAW socket, classic and FD
 extern const drv_source_ops_t drv_source_replay;    ///< a `candump -L` text log
+extern const drv_source_ops_t drv_source_journal;   ///< a journal and the segments behind it, journal.h; every bus
 extern const drv_source_ops_t drv_source_serial;    ///< a serial line of samples, line_frame.h
 extern const drv_source_ops_t drv_source_slcan;     ///< a CAN adapter on a serial line
 

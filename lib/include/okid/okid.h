@@ -19,6 +19,8 @@
 #include <okid/stabilization.h>
 #include <okid/structured.h>
 #include <okid/subspace.h>
+#include <okid/track.h>
 #include <okid/types.h>
 #include <okid/uncertainty.h>
+#include <okid/watch.h>
 #endif

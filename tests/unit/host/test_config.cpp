@@ -191,10 +191,49 @@ static void test_syntax_and_files() {
 }
 
 static void test_later_sections_are_checked_and_said_to_sleep() {
-    const live_config config = load(good + "[alarm]\nenabled = true\n[publish]\nudp = \"127.0.0.1:9870\"\n");
-    TEST_ASSERT_EQUAL_INT(2, config.warnings.size());
+    const live_config config = load(good + "[geometry]\nnodes = [[0, 0, 0]]\n");
+    TEST_ASSERT_EQUAL_INT(1, config.warnings.size());
+}
+
+static void test_alarm() {
+    TEST_ASSERT_TRUE(load(good).alarm.enabled);
+    const live_config config = load(good + "[alarm]\nk_sigma = 4\nbaseline_updates = 7\ncommand = \"hook\"\n");
+    TEST_ASSERT_EQUAL_DOUBLE(4, config.alarm.k_sigma);
+    TEST_ASSERT_EQUAL_INT(7, config.alarm.baseline_updates);
+    TEST_ASSERT_EQUAL_STRING((room / "hook").c_str(), config.alarm.command.c_str());
+    TEST_ASSERT_EQUAL_INT(1, config.warnings.size()); // it is not there
     refuse(good + "[alarm]\nk_sigma = -1\n", {"[alarm]", "found -1"});
+    TEST_ASSERT_FALSE(load(good + "[alarm]\nenabled = false\n").alarm.enabled);
+    const std::string blind = good + "sigma_blocks = 0\n";
+    TEST_ASSERT_FALSE(load(blind).alarm.enabled);
+    refuse(blind + "[alarm]\nenabled = true\n", {"[alarm]", "sigma_blocks = 0 leaves none"});
+    const std::string lamp = "[lamps]\nalarm = { chip = \"gpiochip0\", line = 1 }\n";
+    TEST_ASSERT_EQUAL_INT(0, load(good + lamp).warnings.size());
+    TEST_ASSERT_EQUAL_INT(1, load(blind + lamp).warnings.size());
+}
+
+static void test_publish() {
+    const auto publish = [](const std::string& text) { return load(good + "[publish]\n" + text).publish; };
+    TEST_ASSERT_EQUAL_STRING("127.0.0.1:9870", publish("udp = \"9870\"").udp->text().c_str());
+    TEST_ASSERT_EQUAL_STRING("127.0.0.1:9870", publish("udp = \":9870\"").udp->text().c_str());
+    TEST_ASSERT_EQUAL_STRING("[::1]:9870", publish("udp = \"[::1]:9870\"").udp->text().c_str());
+    TEST_ASSERT_TRUE(publish("udp = \"[::1]:9870\"").udp->loopback());
+    TEST_ASSERT_FALSE(publish("udp = \"10.0.0.1:9870\"").udp->loopback());
+    TEST_ASSERT_EQUAL_STRING((room / "live.sock").c_str(), publish("socket = \"live.sock\"").socket.c_str());
+    TEST_ASSERT_EQUAL_INT(0, load(good + "[publish]\nudp = \"9870\"").warnings.size());
+    TEST_ASSERT_EQUAL_INT(1, load(good + "[publish]\nudp = \"10.0.0.1:9870\"").warnings.size());
     refuse(good + "[publish]\nudb = \"x\"\n", {"did you mean \"udp\"?"});
+    for (const char* wrong : {"", "host", "host:0", "host:65536", "host:12x", "[::1:9870", "[::1]9870", "a b:9870"})
+        refuse(good + "[publish]\nudp = \"" + wrong + "\"\n", {"\"udp\""});
+#ifdef OKID_MQTT
+    const broker_address broker = *publish("mqtt = \"mqtt://me:secret@broker:1884/a/b/\"").mqtt;
+    TEST_ASSERT_EQUAL_STRING("broker:1884", broker.at.text().c_str());
+    TEST_ASSERT_EQUAL_STRING("me secret a/b", (broker.user + " " + broker.password + " " + broker.prefix).c_str());
+    TEST_ASSERT_EQUAL_INT(1883, publish("mqtt = \"mqtt://localhost\"").mqtt->at.port);
+    TEST_ASSERT_EQUAL_STRING("okid", publish("mqtt = \"mqtt://localhost/\"").mqtt->prefix.c_str());
+#else
+    refuse(good + "[publish]\nmqtt = \"mqtt://localhost\"\n", {"built without", "libmosquitto-dev"});
+#endif
 }
 
 int main(void) {
@@ -207,5 +246,7 @@ int main(void) {
     RUN_TEST(test_channels);
     RUN_TEST(test_syntax_and_files);
     RUN_TEST(test_later_sections_are_checked_and_said_to_sleep);
+    RUN_TEST(test_alarm);
+    RUN_TEST(test_publish);
     return UNITY_END();
 }

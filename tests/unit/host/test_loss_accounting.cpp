@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::int64_t period_ns = 1000000;
 
-live_config make_config(int lanes) {
+live_config make_config(int lanes, bool counted) {
     live_config config;
     config.rate_hz = 1e9 / static_cast<double>(period_ns);
     config.buses.resize(1);
@@ -38,7 +38,7 @@ live_config make_config(int lanes) {
         counter.length = 16;
         counter.scale = 1;
         drv_signal_prepare(&counter);
-        channel.sequence = counter;
+        if (counted) channel.sequence = counter;
         config.channels.push_back(channel);
     }
     return config;
@@ -80,8 +80,8 @@ struct outcome {
 };
 
 /// One stream. @param stall_per_mille  how often the reader of a small ring falls asleep
-void play(const fault_plan_t& plan, unsigned stall_per_mille, outcome& result) {
-    const live_config config = make_config(plan.lanes);
+void play(const fault_plan_t& plan, unsigned stall_per_mille, outcome& result, bool counted = true) {
+    const live_config config = make_config(plan.lanes, counted);
     grid on(config, result.out);
     result.out.width = config.channels.size();
     fault_source_make(&result.source, &plan);
@@ -126,7 +126,8 @@ fault_plan_t plan_of(std::uint32_t seed) {
 }
 
 unsigned seeds() {
-    return std::getenv("OKID_FAULT_SEEDS") ? static_cast<unsigned>(std::atoi(std::getenv("OKID_FAULT_SEEDS"))) : 1000;
+    if (std::getenv("OKID_FAULT_SEEDS")) return static_cast<unsigned>(std::atoi(std::getenv("OKID_FAULT_SEEDS")));
+    return std::getenv("OKID_SLOW") ? 10000 : 1000;
 }
 
 std::string title(const char* what, const fault_plan_t& plan, const outcome& o) {
@@ -160,11 +161,12 @@ void check_exact(const outcome& o, const fault_plan_t& plan, const std::string& 
 }
 
 /// Alone, with the cause its losses must be booked under.
-void check_kind(fault_kind_t kind, unsigned per_mille, gap_cause cause) {
+void check_kind(fault_kind_t kind, unsigned per_mille, gap_cause cause, bool raw_stamps = false) {
     std::uint64_t made = 0;
     for (unsigned seed = 1; seed <= seeds(); ++seed) {
         fault_plan_t plan = plan_of(seed);
         plan.per_mille[kind] = per_mille;
+        plan.raw_stamps = raw_stamps;
         const auto o = std::make_unique<outcome>();
         play(plan, 0, *o);
         const std::string text = title(fault_name(kind), plan, *o);
@@ -193,7 +195,58 @@ static void test_nothing_yet() { check_kind(FAULT_AGAIN, 200, gap_cause::sequenc
 static void test_failing_reads() { check_kind(FAULT_FAIL, 200, gap_cause::sequence); }
 static void test_short_reads() { check_kind(FAULT_SHORT, 500, gap_cause::sequence); }
 static void test_clock_set_by_an_hour() { check_kind(FAULT_CLOCK, 10, gap_cause::sequence); }
+static void test_clock_set_by_an_hour_in_a_log() { check_kind(FAULT_CLOCK, 10, gap_cause::sequence, true); }
 static void test_stamp_wrap() { check_kind(FAULT_STAMP_WRAP, 10, gap_cause::sequence); }
+
+/// Losses of every kind and a clock that is set by an hour, also in the same moment.
+static void check_mixture(bool counted, unsigned clock_per_mille) {
+    std::uint64_t made = 0, set = 0;
+    for (unsigned seed = 1; seed <= seeds(); ++seed) {
+        fault_plan_t plan = plan_of(seed);
+        for (const fault_kind_t kind : {FAULT_DROP, FAULT_TRUNCATE, FAULT_FOREIGN, FAULT_DUPLICATE, FAULT_REORDER})
+            plan.per_mille[kind] = seed * 31 % 40;
+        for (const fault_kind_t kind : {FAULT_OVERFLOW, FAULT_DOWN, FAULT_GONE}) plan.per_mille[kind] = 3;
+        plan.per_mille[FAULT_CLOCK] = clock_per_mille;
+        const auto o = std::make_unique<outcome>();
+        play(plan, 0, *o, counted);
+        check_exact(*o, plan, title(counted ? "mixture" : "mixture without a counter", plan, *o));
+        made += o->lost();
+        set += o->source.done[FAULT_CLOCK];
+    }
+    TEST_ASSERT_TRUE(made >= seeds() && (clock_per_mille == 0 || set >= seeds()));
+}
+
+static void test_clock_set_among_losses() { check_mixture(true, 30); }
+static void test_losses_without_a_counter() { check_mixture(false, 0); }
+static void test_clock_set_among_losses_without_a_counter() { check_mixture(false, 30); }
+
+/// The only frame between two outages, each shorter than the grid's window and both together longer, comes some places
+/// late: its sample waits for it.
+static void test_a_late_frame_between_two_outages() {
+    const live_config config = make_config(1, true);
+    recorder out;
+    out.width = 1;
+    grid on(config, out);
+    const auto send = [&](std::uint16_t sample, std::uint8_t loss) {
+        drv_frame_t frame{};
+        frame.id = 0x100;
+        frame.len = 8;
+        frame.loss = loss;
+        frame.time_ns = 1700000000000000000 + sample * period_ns;
+        frame.data[0] = frame.data[4] = static_cast<std::uint8_t>(sample);
+        frame.data[1] = frame.data[5] = static_cast<std::uint8_t>(sample >> 8);
+        on.push(frame);
+    };
+    for (std::uint16_t n = 0; n < 30; ++n) send(n, 0);
+    send(396, DRV_LOSS_LINK);
+    for (std::uint16_t n = 397; n < 403; ++n) send(n, 0);
+    send(203, 0);
+    for (std::uint16_t n = 403; n < 500; ++n) send(n, 0);
+    on.finish();
+    TEST_ASSERT_EQUAL_INT64(0, out.strange);
+    TEST_ASSERT_EQUAL_INT64(500, out.at);
+    TEST_ASSERT_EQUAL_INT64(365, out.marked); // 30..202 and 204..395
+}
 
 static void test_reader_asleep() {
     std::uint64_t made = 0;
@@ -236,7 +289,7 @@ static void test_all_together() {
         for (const fault_kind_t kind : {FAULT_DROP, FAULT_TRUNCATE, FAULT_FOREIGN, FAULT_DUPLICATE, FAULT_REORDER,
                                         FAULT_FLIP_DATA, FAULT_OVERSIZE, FAULT_ERROR_FRAME})
             plan.per_mille[kind] = seed * 31 % 40;
-        for (const fault_kind_t kind : {FAULT_OVERFLOW, FAULT_DOWN, FAULT_GONE, FAULT_STAMP_WRAP})
+        for (const fault_kind_t kind : {FAULT_OVERFLOW, FAULT_DOWN, FAULT_GONE, FAULT_STAMP_WRAP, FAULT_CLOCK})
             plan.per_mille[kind] = 2;
         for (const fault_kind_t kind : {FAULT_INTERRUPT, FAULT_AGAIN, FAULT_FAIL, FAULT_SHORT})
             plan.per_mille[kind] = 100;
@@ -266,6 +319,11 @@ int main(void) {
     RUN_TEST(test_failing_reads);
     RUN_TEST(test_short_reads);
     RUN_TEST(test_clock_set_by_an_hour);
+    RUN_TEST(test_clock_set_by_an_hour_in_a_log);
+    RUN_TEST(test_clock_set_among_losses);
+    RUN_TEST(test_losses_without_a_counter);
+    RUN_TEST(test_clock_set_among_losses_without_a_counter);
+    RUN_TEST(test_a_late_frame_between_two_outages);
     RUN_TEST(test_stamp_wrap);
     RUN_TEST(test_reader_asleep);
     RUN_TEST(test_flipped_counters);

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+#include "config_hammer.hpp"
+
+#include "config_trigger.hpp"
+#include "error.hpp"
+
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+constexpr double most_bytes = 1e9;
+
+/// What else stands in the config must be able to go with separate blows.
+void check_company(const config_place& place, const toml::table& table, const toml::table& file,
+                   const live_config& config) {
+    if (config.trigger.source != trigger_source::immediate)
+        refuse_key({config.path, "[trigger]"}, *file["trigger"].as_table()->get("source"), "source",
+                   "[hammer] waits for blows by itself: leave [trigger] out");
+    if (config.identification.window_s || config.identification.forgetting)
+        refuse_key({config.path, "[identification]"},
+                   *file["identification"].as_table()->get(config.identification.window_s ? "window_s" : "forgetting"),
+                   config.identification.window_s ? "window_s" : "forgetting",
+                   "the blows of a [hammer] test are added up: leave it out");
+    if (config.channels[config.hammer.channel].role != channel_role::force)
+        refuse_key(place, *table.get("channel"), "channel",
+                   fmt::format("\"{}\" has not the role force", config.channels[config.hammer.channel].name));
+    if (config.hammer.spectrum_hz > config.rate_hz / 2)
+        refuse_key(place, *table.get("spectrum_hz"), "spectrum_hz",
+                   fmt::format("found {:g} Hz, expected at most half of rate_hz, {:g} Hz", config.hammer.spectrum_hz,
+                               config.rate_hz / 2));
+    const double bytes = (config.hammer.length_s + config.hammer.pretrigger_s) * config.rate_hz * 8 *
+                         static_cast<double>(config.channels.size());
+    if (bytes > most_bytes)
+        refuse_key(place, *table.get("length_s"), "length_s",
+                   fmt::format("a blow of {:g} s would take {:.1f} GB, at most {:g} GB are kept",
+                               config.hammer.length_s, bytes / 1e9, most_bytes / 1e9));
+}
+
+} // namespace
+
+void read_hammer(const toml::table& file, live_config& config) {
+    const toml::table* table = file["hammer"].as_table();
+    if (!table) return;
+    const config_place place{config.path, "[hammer]"};
+    const toml::table& t = *table;
+    hammer_config& out = config.hammer;
+    out.enabled = true;
+    out.channel = triggering_channel(place, t, config);
+    if (!t.contains("level") || *t["level"].value<double>() == 0)
+        throw failure(exit_usage,
+                      fmt::format("{}: line {}, [hammer]: \"level\" {}: the force, in the channel's unit, with which a "
+                                  "blow begins; negative for a hammer that reads negative",
+                                  config.path, t.source().begin.line, t.contains("level") ? "is 0" : "is missing"));
+    out.level = *t["level"].value<double>();
+    out.hits = static_cast<int>(t["hits"].value_or(std::int64_t{out.hits}));
+    out.length_s = t["length_s"].value_or(out.length_s);
+    out.pretrigger_s = t["pretrigger_s"].value_or(out.pretrigger_s);
+    out.double_percent = t["double_percent"].value_or(out.double_percent);
+    out.spectrum_hz = t["spectrum_hz"].value_or(out.spectrum_hz);
+    check_company(place, t, file, config);
+}
+
+} // namespace okid_host

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "config_publish.hpp"
+
+#include "error.hpp"
+#include "nearest_name.hpp"
+
+#include <arpa/inet.h>
+#include <charconv>
+#include <filesystem>
+#include <fmt/format.h>
+#include <sys/un.h>
+
+namespace okid_host {
+namespace {
+
+std::optional<int> port_of(std::string_view text) {
+    int port = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+    if (error != std::errc{} || end != text.data() + text.size() || port < 1 || port > 65535) return std::nullopt;
+    return port;
+}
+
+/// "host:port", "[v6]:port", ":port" or "port"; without a host the loopback. `fallback` 0 = a port must be there.
+std::optional<net_address> address_of(std::string_view text, int fallback) {
+    net_address out;
+    std::string_view host, port = text;
+    if (!text.empty() && text.front() == '[') {
+        const std::size_t close = text.find(']');
+        if (close == std::string_view::npos) return std::nullopt;
+        host = text.substr(1, close - 1);
+        port = text.substr(close + 1);
+        if (!port.empty() && port.front() != ':') return std::nullopt;
+        if (!port.empty()) port.remove_prefix(1);
+    } else if (const std::size_t colon = text.find(':'); colon != std::string_view::npos) {
+        host = text.substr(0, colon);
+        port = text.substr(colon + 1);
+    } else if (fallback != 0) {
+        host = text;
+        port = {};
+    }
+    if (host.find_first_of(" \t/@:") != std::string_view::npos && text.front() != '[') return std::nullopt;
+    if (!host.empty()) out.host = host;
+    const std::optional<int> number = port.empty() && fallback != 0 ? fallback : port_of(port);
+    if (!number) return std::nullopt;
+    out.port = *number;
+    return out;
+}
+
+bool numeric(const std::string& host) {
+    unsigned char bytes[16];
+    return inet_pton(AF_INET, host.c_str(), bytes) == 1 || inet_pton(AF_INET6, host.c_str(), bytes) == 1;
+}
+
+[[noreturn]] void refuse_address(const config_place& place, const toml::node& node, const char* key,
+                                 const char* expected) {
+    refuse_key(place, node, key, fmt::format("found {}, expected {}", found_value(node), expected));
+}
+
+std::string socket_of(const config_place& place, const toml::node& node) {
+    const std::filesystem::path given(*node.value<std::string>());
+    const std::string path =
+        given.is_absolute() ? given.string() : (std::filesystem::path(place.path).parent_path() / given).string();
+    if (path.size() >= sizeof(sockaddr_un{}.sun_path))
+        refuse_key(place, node, "socket",
+                   fmt::format("the path has {} characters, a socket's has at most {}", path.size(),
+                               sizeof(sockaddr_un{}.sun_path) - 1));
+    return path;
+}
+
+/// mqtt://[user:password@]host[:port][/prefix]
+broker_address broker_of(const config_place& place, const toml::node& node) {
+    constexpr const char* expected = "mqtt://host, mqtt://host:1883/prefix or mqtt://user:password@host/prefix";
+    constexpr std::string_view scheme = "mqtt://";
+    std::string text = *node.value<std::string>();
+    if (text.compare(0, scheme.size(), scheme) != 0) refuse_address(place, node, "mqtt", expected);
+    text.erase(0, scheme.size());
+    broker_address out;
+    if (const std::size_t slash = text.find('/'); slash != std::string::npos) {
+        if (slash + 1 < text.size()) out.prefix = text.substr(slash + 1);
+        text.resize(slash);
+    }
+    while (!out.prefix.empty() && out.prefix.back() == '/') out.prefix.pop_back();
+    if (const std::size_t at = text.rfind('@'); at != std::string::npos) {
+        const std::size_t colon = std::min(text.find(':'), at);
+        out.user = text.substr(0, colon);
+        if (colon < at) out.password = text.substr(colon + 1, at - colon - 1);
+        text.erase(0, at + 1);
+    }
+    const std::optional<net_address> address = text.empty() ? std::nullopt : address_of(text, 1883);
+    if (!address || out.prefix.find_first_of("#+") != std::string::npos || out.prefix.size() > 200)
+        refuse_address(place, node, "mqtt", expected);
+    out.at = *address;
+    return out;
+}
+
+/// What a build may leave out.
+void require_built(const config_place& place, const toml::table& table, const char* key, bool built,
+                   const char* package) {
+    if (table.contains(key) && !built)
+        refuse_key(place, *table.get(key), key,
+                   fmt::format("this okid was built without it: install {} and build it again, or leave the key out",
+                               package));
+}
+
+} // namespace
+
+bool net_address::loopback() const { return host == "localhost" || host.compare(0, 4, "127.") == 0 || host == "::1"; }
+
+std::string net_address::text() const {
+    return fmt::format(host.find(':') == std::string::npos ? "{}:{}" : "[{}]:{}", host, port);
+}
+
+void read_publish(const toml::table& file, live_config& config) {
+    const toml::table* table = file["publish"].as_table();
+    if (!table) return;
+    const config_place place{config.path, "[publish]"};
+#ifdef OKID_PROMETHEUS
+    constexpr bool prometheus = true;
+#else
+    constexpr bool prometheus = false;
+#endif
+#ifdef OKID_MQTT
+    constexpr bool mqtt = true;
+#else
+    constexpr bool mqtt = false;
+#endif
+    require_built(place, *table, "prometheus", prometheus, "prometheus-cpp-dev");
+    require_built(place, *table, "mqtt", mqtt, "libmosquitto-dev");
+    publish_config& out = config.publish;
+    if (const toml::node* node = table->get("socket")) out.socket = socket_of(place, *node);
+    if (const toml::node* node = table->get("udp")) {
+        out.udp = address_of(*node->value<std::string>(), 0);
+        if (!out.udp) refuse_address(place, *node, "udp", "an address and a port, such as 127.0.0.1:9870");
+    }
+    if (const toml::node* node = table->get("prometheus")) {
+        out.prometheus = address_of(*node->value<std::string>(), 0);
+        if (out.prometheus && out.prometheus->host == "localhost") out.prometheus->host = "127.0.0.1";
+        if (!out.prometheus || !numeric(out.prometheus->host))
+            refuse_address(place, *node, "prometheus", "a numeric address and a port, such as 127.0.0.1:9273");
+        if (!out.prometheus->loopback())
+            config.warnings.push_back(
+                fmt::format("[publish] prometheus listens on {}: whoever reaches that address can read the modes",
+                            out.prometheus->text()));
+    }
+    if (const toml::node* node = table->get("mqtt")) out.mqtt = broker_of(place, *node);
+    for (const auto& [what, address] :
+         {std::pair{"udp", out.udp}, std::pair{"mqtt", out.mqtt ? std::optional(out.mqtt->at) : std::nullopt}})
+        if (address && !address->loopback())
+            config.warnings.push_back(
+                fmt::format("[publish] {} sends to {}, beyond this computer, and unencrypted", what, address->text()));
+}
+
+} // namespace okid_host

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+#include "fir_kernel.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace okid_host {
+namespace {
+
+constexpr std::size_t phases = 512; // linear between two of them errs by (pi / 512)^2 / 8 = 5e-6
+constexpr double zero_crossings = 32;
+constexpr double shape = 10.06; // 0.1102 (100 dB - 8.7)
+constexpr double pi = 3.14159265358979323846;
+
+double sinc(double x) { return x == 0 ? 1 : std::sin(pi * x) / (pi * x); }
+
+double kaiser(double x) {
+    return std::abs(x) >= 1 ? 0 : std::cyl_bessel_i(0.0, shape * std::sqrt(1 - x * x)) / std::cyl_bessel_i(0.0, shape);
+}
+
+} // namespace
+
+fir_kernel::fir_kernel(double ratio)
+    : half_(static_cast<std::size_t>(std::ceil(zero_crossings * std::max(1.0, ratio)))) {
+    const double band = 1 / std::max(1.0, ratio);
+    const std::size_t taps = 2 * half_;
+    table_.resize((phases + 1) * taps);
+    for (std::size_t phase = 0; phase <= phases; ++phase) {
+        double* row = &table_[phase * taps];
+        double sum = 0;
+        for (std::size_t i = 0; i < taps; ++i) {
+            const double t = static_cast<double>(i) + 1 - static_cast<double>(half_) -
+                             static_cast<double>(phase) / static_cast<double>(phases);
+            row[i] = sinc(band * t) * kaiser(t / static_cast<double>(half_));
+            sum += row[i];
+        }
+        for (std::size_t i = 0; i < taps; ++i) row[i] /= sum;
+    }
+}
+
+void fir_kernel::weights(double fraction, double* out) const {
+    const double at = fraction * static_cast<double>(phases);
+    const auto low = std::min(static_cast<std::size_t>(at), phases - 1);
+    const double between = at - static_cast<double>(low);
+    const double *a = &table_[low * 2 * half_], *b = a + 2 * half_;
+    for (std::size_t i = 0; i < 2 * half_; ++i) out[i] = a[i] + between * (b[i] - a[i]);
+}
+
+} // namespace okid_host

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+// The assistant of a hammer test: waits for a blow, keeps the samples from before it to the end of the ring-down, and judges
+// whether they are worth adding to the others.
+//
+// A blow begins where the force crosses `level`. Before it at least as many quiet samples are kept as the identification
+// has lags, so that all of it counts. It is refused, with the reason, when samples are missing, a channel stood at full scale,
+// the structure still moved, the force is hardly above its noise, there was a second blow, or its spectrum ends too early.
+// No exponential window is put on the response: a model needs none, and it would add damping.
+#pragma once
+#include "../config.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace okid_host {
+
+/// What became of a blow.
+struct hit_report {
+    int number = 0;             ///< of the blows heard, 1 = the first
+    std::int64_t sample = 0;    ///< with which the force crossed the level
+    std::string fault, text;    ///< fault "" = accepted; text is for people
+    double peak = 0;            ///< in the channel's unit, with its sign
+    double duration_s = 0;      ///< above 10 % of the peak
+    double band_hz = 0;         ///< up to here the force has a tenth of its greatest spectral amplitude
+    int accepted = 0, left = 0; ///< of all so far
+    bool good() const { return fault.empty(); }
+};
+
+class hammer {
+  public:
+    /// @param lags  of the identification
+    hammer(const live_config& config, std::int64_t lags);
+
+    bool wanted() const { return wanted_.enabled; }
+    bool done() const { return wanted() && left_ == 0; }
+    bool armed() const { return wanted() && !capturing_ && kept_ >= before_; }
+    bool last_good() const { return report_.number > 0 && report_.good(); }
+    /// The next samples; NULL = `count` missing ones. No heap. @return true: a blow was judged
+    bool add(std::int64_t index, const double* row, std::int64_t count);
+    const hit_report& report() const { return report_; }
+    /// The rows of the blow just judged, oldest first.
+    template <class Visit> void each_row(Visit&& visit) const {
+        for (std::size_t i = 0; i < rows(); ++i) visit(at(i));
+    }
+    /// What is waited for, for people.
+    std::string awaited() const;
+    /// How many blows lack at the end, and what became of the others; "" when all are there.
+    std::string shortfall() const;
+    int accepted() const { return accepted_; }
+
+  private:
+    std::size_t rows() const { return static_cast<std::size_t>(before_ + after_); }
+    const double* at(std::size_t i) const {
+        return rows_.data() + (static_cast<std::size_t>(next_) + i) % rows() * width_;
+    }
+    double force(std::size_t i) const { return offset_ + scale_ * at(i)[wanted_.channel]; }
+    void keep(const double* row);
+    bool crosses(const double* row);
+    void judge();
+    bool find_missing();
+    bool find_overload();
+    bool find_motion();
+    void measure();
+    bool find_second_blow();
+    void find_band();
+    bool refuse(const char* fault, std::string text);
+
+    hammer_config wanted_;
+    std::vector<channel_config> channels_;
+    std::string unit_;
+    double scale_ = 1, offset_ = 0, rate_hz_;
+    std::size_t width_, identified_;
+    std::int64_t before_ = 0, after_ = 0;
+    std::vector<double> rows_; ///< a ring of before_ + after_ rows
+    std::int64_t next_ = 0, kept_ = 0, to_come_ = 0;
+    bool capturing_ = false, early_ = false, have_last_ = false;
+    double last_ = 0, least_ = 0, most_ = 0; ///< of the force, so far
+    // Of the blow that is judged.
+    double base_ = 0, noise_ = 0;
+    std::size_t top_ = 0, begin_ = 0,
+                end_ = 0; ///< rows of the peak, and of the first and behind the last above 10 % of it
+    int heard_ = 0, left_ = 0, accepted_ = 0;
+    hit_report report_;
+    std::vector<std::pair<std::string, int>> refused_; ///< how often, by fault
+};
+
+} // namespace okid_host

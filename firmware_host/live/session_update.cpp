@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// An update of a session: identify, follow the modes, tell.
+#include "session.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json departure_json(const departure& from) {
+    return {{"mode", from.track},
+            {"frequency_hz", from.frequency_hz},
+            {"baseline_hz", from.baseline_hz},
+            {"sigma_hz", from.sigma_hz}};
+}
+
+} // namespace
+
+void session::update(std::int64_t samples) {
+    if (trigger_.waiting() || hammer_.wanted()) {
+        table_state state;
+        state.t = seconds(samples);
+        state.waiting = hammer_.wanted() ? hammer_.awaited() : "armed, waiting for " + trigger_.awaited();
+        publisher_.table(state);
+    } else {
+        const auto begun = std::chrono::steady_clock::now();
+        show_modes(samples);
+        publisher_.update_took(std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
+    }
+    if (samples % stats_samples_ == 0) write_stats();
+}
+
+table_state session::table(std::int64_t samples) {
+    const okid_accumulator_stats_t stats = identifier_.stats();
+    table_state out;
+    out.t = seconds(samples);
+    out.samples = stats.samples;
+    out.missing = stats.missing;
+    out.gaps = stats.gaps;
+    return out;
+}
+
+/// Modes are shown once there are twice as many equations as unknowns: below that they only repeat the noise.
+void session::show_modes(std::int64_t samples) {
+    tell_change(samples);
+    table_state state = table(samples);
+    const std::int64_t rows = identifier_.rows(), need = 2 * identifier_.unknowns();
+    okid_status_t outcome = OKID_ERR_TOO_SHORT;
+    if (rows >= need) outcome = identifier_.run();
+    if (outcome >= 0) {
+        const std::optional<deviations> sigma = identifier_.sigma({});
+        follow(samples, sigma ? &*sigma : nullptr, state);
+    } else {
+        settling_.reset();
+        state.alarm = alarm_.standing();
+        state.waiting = rows < need ? fmt::format("waiting for samples, {} of {}", rows, need)
+                                    : fmt::format("no model yet: {}", okid_status_text(outcome));
+    }
+    settled_ = state.settled;
+    publisher_.table(state);
+}
+
+void session::tell_change(std::int64_t samples) {
+    const std::optional<std::int64_t> ago = identifier_.take_change();
+    if (!ago) return;
+    const bool restarted = identifier_.restarts() > restarts_told_;
+    restarts_told_ = identifier_.restarts();
+    if (restarted) {
+        restarted_at_ = samples - identifier_.basis();
+        tracks_.jump();
+        settling_.reset();
+    }
+    tell({{"type", "change"}, {"t", seconds(samples)}, {"sample", samples - *ago}, {"restarted", restarted}});
+}
+
+/// The modes of a new model: which they are, whether they rest, whether one has left its baseline.
+void session::follow(std::int64_t samples, const deviations* sigma, table_state& state) {
+    const okid_identified_t& model = identifier_.model();
+    static const std::vector<double> unknown;
+    const std::vector<double>& sigma_hz = sigma ? sigma->frequency_hz : unknown;
+    const std::vector<int>& tracks = tracks_.update(model);
+    state.settled = settling_.add(model, tracks, sigma_hz);
+    if (state.settled) identifier_.watch_model();
+    observed_.clear();
+    for (std::size_t k = 0; k < tracks.size(); ++k)
+        observed_.push_back({tracks[k], model.frequency_hz[k], sigma ? sigma_hz[k] : NAN, settling_.at_rest(k)});
+    const bool turned = alarm_.update(observed_, samples - identifier_.basis(), samples);
+    state.alarm = alarm_.standing();
+    for (std::size_t k = 0; k < tracks.size(); ++k) {
+        mode_row& row = state.modes.emplace_back();
+        row.track = tracks[k];
+        row.frequency_hz = model.frequency_hz[k];
+        row.damping_ratio = model.damping_ratio[k];
+        row.mpc = model.mpc[k];
+        row.emac = model.emac[k];
+        row.alarm = alarm_.is_away(row.track);
+        if (!sigma) continue;
+        row.frequency_std_hz = sigma->frequency_hz[k];
+        row.damping_ratio_std = sigma->damping_ratio[k];
+    }
+    tell_modes(state, sigma);
+    if (turned) tell_alarm(state.t);
+}
+
+void session::tell_modes(const table_state& state, const deviations* sigma) {
+    ordered_json modes = modes_json(identifier_.model(), sigma);
+    for (std::size_t k = 0; k < state.modes.size(); ++k) {
+        modes[k]["track"] = state.modes[k].track > 0 ? ordered_json(state.modes[k].track) : ordered_json(nullptr);
+        modes[k]["alarm"] = state.modes[k].alarm;
+    }
+    const std::int64_t basis = identifier_.basis();
+    tell({{"type", "modes"},
+          {"t", state.t},
+          {"modes", std::move(modes)},
+          {"window_s", seconds(basis)},
+          {"samples", basis},
+          {"settled", state.settled}});
+}
+
+/// One alarm as long as any mode is away: the farthest has its name on it, the others stand in "modes".
+void session::tell_alarm(double t) {
+    ordered_json event{{"type", alarm_.standing() ? "alarm" : "alarm_over"}, {"t", t}};
+    if (alarm_.standing()) {
+        event.update(departure_json(alarm_.away().front()));
+        event["modes"] = ordered_json::array();
+        for (const departure& each : alarm_.away()) event["modes"].push_back(departure_json(each));
+    }
+    tell(std::move(event));
+}
+
+} // namespace okid_host

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    modes followed from update to update
+// METHOD     distance of every mode from every track in frequency and MAC; optimal assignment by shortest augmenting paths,
+//            in which staying alone costs 1; candidates become tracks after consecutive hits
+// REFERENCE  Jonker, Volgenant (1987), the assignment; MAC: Pappa, Elliott, Schenk (1993)
+// NUMERICS   only ratios of frequencies and MACs enter: nothing depends on units. A track is where it was last seen, so a
+//            slow drift of any size is followed; ties go to the older track
+// WORKSPACE  tracks (2 n_y + 8 numbers each) and a table of (modes + tracks) x tracks distances; n^3 flop at worst
+#include <okid/modal.h>
+#include <okid/track.h>
+
+#include "linalg/arena.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+using std::size_t;
+
+struct okid_tracks {
+    okid_track_config_t config;
+    int32_t count, born, jumping;
+    okid_track_t* track;
+    okid_real_t *shape_re, *shape_im; // n_y x max_tracks, when last seen
+    int32_t *streak, *mode;           // consecutive hits; which mode it is in the newest update, -1 none
+    // Of one update: rows are modes, columns tracks, then one private column a mode for staying alone.
+    double *cost, *row_price, *column_price, *slack;
+    int32_t *owner, *way, *of_mode; // mode of a column, column before it on the path; track of a mode; -1 none
+    uint8_t* reached;
+};
+
+namespace {
+
+constexpr double alone = 1; // the cost of a mode without a track
+
+size_t lay_out(okid_tracks& s, okid::arena& memory) {
+    const auto tracks = static_cast<size_t>(s.config.max_tracks), modes = static_cast<size_t>(s.config.max_modes);
+    const size_t shapes = tracks * static_cast<size_t>(s.config.n_y), columns = tracks + modes + 1;
+    s.track = memory.take<okid_track_t>(tracks);
+    s.shape_re = memory.take<okid_real_t>(shapes);
+    s.shape_im = memory.take<okid_real_t>(shapes);
+    for (int32_t** each : {&s.streak, &s.mode}) *each = memory.take<int32_t>(tracks);
+    s.cost = memory.take<double>(modes * tracks);
+    s.row_price = memory.take<double>(modes + 1);
+    for (double** each : {&s.column_price, &s.slack}) *each = memory.take<double>(columns);
+    for (int32_t** each : {&s.owner, &s.way}) *each = memory.take<int32_t>(columns);
+    s.of_mode = memory.take<int32_t>(modes);
+    s.reached = memory.take<uint8_t>(columns);
+    return memory.bytes();
+}
+
+bool valid(const okid_track_config_t& c) {
+    const auto within = [](double x, double most) { return x >= 0 && x < most; };
+    return c.n_y >= 1 && c.n_y <= 4096 && c.max_modes >= 1 && c.max_modes <= 4096 && c.max_tracks >= 1 &&
+           c.max_tracks <= 4096 && c.born >= 0 && c.dies >= 0 && within(c.frequency, 1) && within(c.jump, 1) &&
+           within(c.mac, 1);
+}
+
+okid_tracks plan(const okid_track_config_t& c) {
+    okid_tracks s{};
+    s.config = c;
+    if (c.born == 0) s.config.born = 3;
+    if (c.dies == 0) s.config.dies = 100;
+    if (c.frequency == 0) s.config.frequency = 0.05;
+    if (c.jump == 0) s.config.jump = 0.3;
+    if (c.mac == 0) s.config.mac = 0.5;
+    return s;
+}
+
+struct mode_view {
+    const okid_real_t *frequency_hz, *damping_ratio, *shape_re, *shape_im;
+};
+
+size_t column_of(const okid_tracks& s, int k) { return static_cast<size_t>(s.config.n_y) * static_cast<size_t>(k); }
+
+/// @param far  from where the track was lost
+double distance(const okid_tracks& s, const mode_view& to, int mode, int track, bool far) {
+    const double f = s.track[track].frequency_hz;
+    const double reach = far ? s.config.jump : s.config.frequency;
+    const double mac = far ? 0.5 + 0.5 * s.config.mac : s.config.mac;
+    const double apart = (to.frequency_hz[mode] - f) / (reach * f);
+    if (std::abs(apart) >= 1) return 2 * alone;
+    const size_t a = column_of(s, track), b = column_of(s, mode);
+    const double like = okid_modal_mac(s.config.n_y, s.shape_re + a, s.shape_im + a, to.shape_re + b, to.shape_im + b);
+    const double unlike = (1 - std::min(1.0, like)) / (1 - mac);
+    return apart * apart + unlike * unlike;
+}
+
+/// Columns 1 … tracks, then 1 a mode; column 0 is where a path begins. Pairs that cost more than being alone are never taken.
+double cost(const okid_tracks& s, int mode, int column) {
+    if (column > s.count) return column - s.count - 1 == mode ? alone : 1e9;
+    const double value =
+        s.cost[static_cast<size_t>(mode) * static_cast<size_t>(s.count) + static_cast<size_t>(column - 1)];
+    return value < alone ? value : 1e9;
+}
+
+/// Extend the tree of shortest paths by its nearest column. @return that column
+int grow(okid_tracks& s, int columns, int at) {
+    const int mode = s.owner[at];
+    double least = std::numeric_limits<double>::infinity();
+    int next = 0;
+    for (int j = 1; j <= columns; ++j) {
+        if (s.reached[j] != 0) continue;
+        const double reduced = cost(s, mode, j) - s.row_price[mode] - s.column_price[j];
+        if (reduced < s.slack[j]) s.slack[j] = reduced, s.way[j] = at;
+        if (s.slack[j] < least) least = s.slack[j], next = j;
+    }
+    for (int j = 0; j <= columns; ++j)
+        if (s.reached[j] != 0)
+            s.row_price[s.owner[j]] += least, s.column_price[j] -= least;
+        else
+            s.slack[j] -= least;
+    return next;
+}
+
+/// of_mode <- the pairing of least total cost.
+void assign(okid_tracks& s, int modes) {
+    const int columns = s.count + modes;
+    std::fill(s.owner, s.owner + columns + 1, -1);
+    std::fill(s.column_price, s.column_price + columns + 1, 0.0);
+    std::fill(s.row_price, s.row_price + modes, 0.0);
+    for (int mode = 0; mode < modes; ++mode) {
+        std::fill(s.slack, s.slack + columns + 1, std::numeric_limits<double>::infinity());
+        std::fill(s.reached, s.reached + columns + 1, uint8_t{0});
+        s.owner[0] = mode;
+        int at = 0;
+        do {
+            s.reached[at] = 1;
+            at = grow(s, columns, at);
+        } while (s.owner[at] >= 0);
+        for (; at != 0; at = s.way[at]) s.owner[at] = s.owner[s.way[at]];
+    }
+    std::fill(s.of_mode, s.of_mode + modes, -1);
+    for (int j = 1; j <= s.count; ++j)
+        if (s.owner[j] >= 0) s.of_mode[s.owner[j]] = j - 1;
+}
+
+void see(okid_tracks& s, int k, const mode_view& modes, int mode) {
+    okid_track_t& track = s.track[k];
+    track.frequency_hz = modes.frequency_hz[mode];
+    track.damping_ratio = modes.damping_ratio[mode];
+    track.misses = 0;
+    ++track.hits;
+    ++s.streak[k];
+    s.mode[k] = mode;
+    const size_t from = column_of(s, mode), to = column_of(s, k), n = static_cast<size_t>(s.config.n_y);
+    std::copy(modes.shape_re + from, modes.shape_re + from + n, s.shape_re + to);
+    std::copy(modes.shape_im + from, modes.shape_im + from + n, s.shape_im + to);
+}
+
+/// The lost track that candidate k, seen for `born` updates, goes on with: the nearest of those not seen since it appeared
+/// (then they may have shared an update, of old and new samples mixed).
+int lost_track(const okid_tracks& s, int k) {
+    const auto frequency = static_cast<okid_real_t>(s.track[k].frequency_hz);
+    const mode_view one{&frequency, nullptr, s.shape_re + column_of(s, k), s.shape_im + column_of(s, k)};
+    int best = -1;
+    double least = alone;
+    for (int j = 0; j < s.count; ++j) {
+        if (s.track[j].number == 0 || s.track[j].misses < s.config.born - 1) continue;
+        const double d = distance(s, one, 0, j, true);
+        if (d < least) least = d, best = j;
+    }
+    return best;
+}
+
+void remove(okid_tracks& s, int k) {
+    const int last = --s.count;
+    if (k == last) return;
+    s.track[k] = s.track[last];
+    s.streak[k] = s.streak[last];
+    s.mode[k] = s.mode[last];
+    const size_t from = column_of(s, last), to = column_of(s, k), n = static_cast<size_t>(s.config.n_y);
+    std::copy(s.shape_re + from, s.shape_re + from + n, s.shape_re + to);
+    std::copy(s.shape_im + from, s.shape_im + from + n, s.shape_im + to);
+}
+
+/// Candidates live on hits alone, tracks survive misses.
+void age(okid_tracks& s) {
+    for (int k = s.count - 1; k >= 0; --k) {
+        if (s.track[k].misses == 0) continue;
+        s.streak[k] = 0;
+        if (s.track[k].number == 0 || s.track[k].misses >= s.config.dies) remove(s, k);
+    }
+}
+
+int holder(const okid_tracks& s, int mode) {
+    return static_cast<int>(std::find(s.mode, s.mode + s.count, mode) - s.mode);
+}
+
+/// Candidates seen often enough become tracks, in the order of their frequencies, or go on with one.
+void give_birth(okid_tracks& s, int modes) {
+    for (int mode = 0; mode < modes; ++mode) {
+        const int k = holder(s, mode);
+        if (k == s.count || s.track[k].number != 0 || s.streak[k] < s.config.born) continue;
+        const int lost = lost_track(s, k);
+        s.track[k].number = lost >= 0 ? s.track[lost].number : ++s.born;
+        if (lost < 0) continue;
+        s.track[k].hits += s.track[lost].hits;
+        remove(s, lost);
+    }
+}
+
+} // namespace
+
+size_t okid_track_memsize(const okid_track_config_t* config) {
+    if (config == nullptr || !valid(*config)) return 0;
+    okid_tracks s = plan(*config);
+    okid::arena memory;
+    memory.take<okid_tracks>(1);
+    return lay_out(s, memory);
+}
+
+okid_status_t okid_track_create(okid_tracks_t** self, const okid_track_config_t* config, void* block, size_t bytes) {
+    if (self == nullptr || config == nullptr || block == nullptr) return OKID_ERR_NULL;
+    if (!valid(*config)) return OKID_ERR_DIM;
+    if (bytes < okid_track_memsize(config)) return OKID_ERR_MEMORY;
+    okid::arena memory(block);
+    *self = memory.take<okid_tracks>(1);
+    **self = plan(*config);
+    lay_out(**self, memory);
+    return OKID_OK;
+}
+
+okid_status_t okid_track_update(okid_tracks_t* self, int32_t count, const okid_real_t* frequency_hz,
+                                const okid_real_t* damping_ratio, const okid_real_t* shape_re,
+                                const okid_real_t* shape_im, int32_t* number) {
+    if (self == nullptr || (count > 0 && (frequency_hz == nullptr || damping_ratio == nullptr || shape_re == nullptr ||
+                                          shape_im == nullptr || number == nullptr)))
+        return OKID_ERR_NULL;
+    okid_tracks& s = *self;
+    if (count < 0 || count > s.config.max_modes ||
+        !std::all_of(frequency_hz, frequency_hz + count, [](okid_real_t f) { return f > 0 && std::isfinite(f); }))
+        return OKID_ERR_DIM;
+    const mode_view modes{frequency_hz, damping_ratio, shape_re, shape_im};
+    const auto tracks = static_cast<size_t>(s.count);
+    for (int m = 0; m < count; ++m)
+        for (int k = 0; k < s.count; ++k)
+            s.cost[static_cast<size_t>(m) * tracks + static_cast<size_t>(k)] = distance(s, modes, m, k, s.jumping != 0);
+    assign(s, count);
+    s.jumping = 0;
+    for (int k = 0; k < s.count; ++k) ++s.track[k].misses, s.mode[k] = -1;
+    for (int m = 0; m < count; ++m)
+        if (s.of_mode[m] >= 0) see(s, s.of_mode[m], modes, m);
+    age(s);
+    for (int m = 0; m < count && s.count < s.config.max_tracks; ++m) {
+        if (s.of_mode[m] >= 0) continue;
+        const int k = s.count++;
+        s.track[k] = {};
+        s.streak[k] = 0;
+        see(s, k, modes, m);
+    }
+    give_birth(s, count);
+    std::fill(number, number + count, 0);
+    for (int k = 0; k < s.count; ++k)
+        if (s.mode[k] >= 0) number[s.mode[k]] = s.track[k].number;
+    return OKID_OK;
+}
+
+void okid_track_jump(okid_tracks_t* self) {
+    for (int k = self->count - 1; k >= 0; --k)
+        if (self->track[k].number == 0) remove(*self, k);
+    self->jumping = 1;
+}
+
+int32_t okid_track_count(const okid_tracks_t* self) { return self != nullptr ? self->count : 0; }
+
+okid_status_t okid_track_get(const okid_tracks_t* self, int32_t k, okid_track_t* out) {
+    if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
+    if (k < 0 || k >= self->count) return OKID_ERR_DIM;
+    *out = self->track[k];
+    return OKID_OK;
+}

@@ -1,0 +1,481 @@
+# SPDX-License-Identifier: MIT
+"""[publish]: what subscribers, plotters, monitors and brokers get; slow, dead and hostile ones disturb nobody."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pathlib
+import pty
+import shutil
+import signal
+import socket
+import stat
+import struct
+import subprocess
+import termios
+import threading
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from program import PROGRAM, okid
+
+RIG = """
+rate_hz = 250.0
+duration_s = 60.0
+seed = 3
+masses = [1.0, 0.8]
+springs = [3e4, 2e4]
+zeta = [0.02, 0.02]
+force_dofs = [1]
+sense_dofs = [1, 2]
+sensing = "acceleration"
+excitation = "white"
+noise_percent = 1.0
+bits = 16
+"""
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("publish")
+    (folder / "rig.toml").write_text(RIG)
+    names = {"--log": "a.log", "--truth": "t.json", "--dbc": "a.dbc", "--config": "a.toml"}
+    options = [part for option, name in names.items() for part in (option, folder / name)]
+    done = okid("simulate", folder / "rig.toml", *options)
+    assert done.returncode == 0, done.stderr
+    text = (folder / "a.toml").read_text().replace("p = 40\nrows = 80", "p = 12\nrows = 24")
+    text = text.replace('title = "virtual rig"', 'title = "Frame 7/b"').replace("update_s = 1.0", "update_s = 0.5")
+    assert 'title = "Frame' in text and "update_s = 0.5" in text
+    (folder / "a.toml").write_text(text)
+    return folder
+
+
+def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextlib.contextmanager
+def replaying(rig: pathlib.Path, section: str, *options: object, **how: Any) -> Iterator[subprocess.Popen[str]]:
+    (rig / "b.toml").write_text((rig / "a.toml").read_text() + f"\n[publish]\n{section}\n")
+    (rig / "e.jsonl").unlink(missing_ok=True)
+    command = [PROGRAM, "replay", rig / "a.log", "-c", rig / "b.toml", "--events", rig / "e.jsonl", *map(str, options)]
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE} | how
+    with subprocess.Popen(command, text=True, **pipes) as run:
+        try:
+            yield run
+        finally:
+            run.kill()
+
+
+def until(what: Callable[[], Any], seconds: float = 20) -> Any:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        found = what()
+        if found:
+            return found
+        time.sleep(0.01)
+    raise AssertionError("it did not come in time")
+
+
+def connected(path: pathlib.Path) -> socket.socket:
+    """A subscriber, as soon as somebody listens."""
+
+    def attempt() -> socket.socket | None:
+        one = socket.socket(socket.AF_UNIX)
+        try:
+            one.connect(str(path))
+        except OSError:
+            one.close()
+            return None
+        return one
+
+    one: socket.socket = until(attempt)
+    return one
+
+
+def lines_of(one: socket.socket) -> list[str]:
+    with one.makefile("r", encoding="utf-8") as file:
+        return file.read().splitlines()
+
+
+def file_lines(rig: pathlib.Path) -> list[str]:
+    return (rig / "e.jsonl").read_text().splitlines()
+
+
+def numbers(events: list[str], kind: str) -> list[dict[str, Any]]:
+    return [event for event in map(json.loads, events) if event["type"] == kind]
+
+
+def test_subscribers_of_every_kind(rig: pathlib.Path) -> None:
+    """60 s of stream at ten times its speed: readers get every line, one that never reads harms nobody, one dies, one
+    talks, a seventeenth is turned away."""
+    path = rig / "live.sock"
+    with replaying(rig, 'socket = "live.sock"', "--speed", "10") as run:
+        readers = [connected(path) for _ in range(3)]
+        assert stat.S_IMODE(path.stat().st_mode) == 0o660 and stat.S_ISSOCK(path.stat().st_mode)
+        got: list[list[str]] = [[] for _ in readers]
+        threads = [
+            threading.Thread(target=lambda k=k: got[k].extend(lines_of(readers[k]))) for k in range(len(readers))
+        ]
+        for thread in threads:
+            thread.start()
+        mute = connected(path)
+        mute.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+        dead = connected(path)
+        talker = connected(path)
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            for _ in range(100):
+                talker.sendall(b'{"type":"stop"}\n' * 1000)
+        more = [connected(path) for _ in range(10)]
+        late = socket.socket(socket.AF_UNIX)
+        late.connect(str(path))
+        late.settimeout(20)
+        assert late.recv(1) == b""
+        dead.close()
+        assert run.wait(60) == 0, run.stderr
+        for thread in threads:
+            thread.join(20)
+        for one in [mute, talker, *more]:
+            one.close()
+    whole = file_lines(rig)
+    for lines in got:
+        assert lines[0] == whole[0] and json.loads(lines[0])["type"] == "start"
+        assert lines == [whole[0], *whole[whole.index(lines[1]) :]]  # nothing lost from when it came
+        assert json.loads(lines[-1])["type"] == "result"
+    assert numbers(whole, "stats")[-1]["bus"]["can0"]["lost"] == 0
+    assert len(numbers(whole, "modes")) >= 110
+    assert not path.exists()
+
+
+def test_a_slow_one_loses_whole_lines_and_is_told(rig: pathlib.Path) -> None:
+    text = (rig / "a.toml").read_text()
+    (rig / "a.toml").write_text(text.replace("update_s = 0.5", "update_s = 0.02"))  # 3,000 updates
+    try:
+        with replaying(rig, 'socket = "live.sock"', "--speed", "20") as run:
+            one = connected(rig / "live.sock")
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            until(lambda: len(file_lines(rig)) > 2500 if (rig / "e.jsonl").exists() else False, 60)
+            lines = lines_of(one)
+            assert run.wait(60) == 0
+    finally:
+        (rig / "a.toml").write_text(text)
+    events = [json.loads(line) for line in lines]  # every line is whole
+    lost = sum(event["count"] for event in events if event["type"] == "lost")
+    assert lost > 0
+    kept = [line for line, event in zip(lines, events, strict=True) if event["type"] != "lost"]
+    whole = file_lines(rig)
+    assert lost + len(kept) == len(whole) - whole.index(kept[1]) + 1
+    assert events[-1]["type"] == "result"
+
+
+def test_socket_files_of_others(rig: pathlib.Path) -> None:
+    path = rig / "live.sock"
+    stale = socket.socket(socket.AF_UNIX)
+    stale.bind(str(path))
+    stale.close()  # a process that died leaves it like this
+    with replaying(rig, 'socket = "live.sock"') as run:
+        assert run.wait(60) == 0
+    used = socket.socket(socket.AF_UNIX)
+    used.bind(str(path))
+    used.listen(1)
+    with replaying(rig, 'socket = "live.sock"') as run:
+        assert run.wait(60) == 4
+        assert run.stderr is not None and "another program listens there" in run.stderr.read()
+    used.close()
+    path.unlink()
+    path.write_text("precious")
+    with replaying(rig, 'socket = "live.sock"') as run:
+        assert run.wait(60) == 2
+        assert run.stderr is not None and "found another file there" in run.stderr.read()
+    assert path.read_text() == "precious" and not (rig / "e.jsonl").exists()
+    path.unlink()
+
+
+def test_datagrams(rig: pathlib.Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as plotter:
+        plotter.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+        plotter.bind(("127.0.0.1", 0))
+        plotter.settimeout(20)
+        with replaying(rig, f'udp = "127.0.0.1:{plotter.getsockname()[1]}"', "--speed", "30") as run:
+            got = []
+            while not got or got[-1]["t"] < 59.9:
+                got.append(json.loads(plotter.recv(65536)))
+            assert run.wait(60) == 0
+    modes = numbers(file_lines(rig), "modes")
+    assert [one["t"] for one in got] == [event["t"] for event in modes]
+    last, event = got[-1], modes[-1]
+    assert all(isinstance(value, int | float) for value in last.values())
+    assert last["timestamp"] == pytest.approx(1700000000 + event["t"], abs=1e-3)
+    for mode in event["modes"]:
+        assert last[f"mode{mode['track']}_frequency_hz"] == mode["frequency_hz"]
+        assert last[f"mode{mode['track']}_damping_ratio"] == mode["damping_ratio"]
+        assert last[f"mode{mode['track']}_frequency_std_hz"] == mode["frequency_std_hz"]
+    assert last["can0_received"] > 20000 and last["can0_lost"] == 0 and last["settled"] == 1 and last["alarm"] == 0
+
+
+def scrape(port: int) -> dict[str, float]:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=5) as reply:
+        text = reply.read().decode()
+    return {line.rpartition(" ")[0]: float(line.rpartition(" ")[2]) for line in text.splitlines() if line[0] != "#"}
+
+
+def test_prometheus(rig: pathlib.Path) -> None:
+    port = free_port()
+    with replaying(rig, f'prometheus = "127.0.0.1:{port}"', "--speed", "10") as run:
+
+        def settled() -> dict[str, float] | None:
+            with contextlib.suppress(OSError):
+                page = scrape(port)
+                if page.get("okid_settled") == 1 and 'okid_frames_received_total{bus="can0"}' in page:
+                    return page
+            return None
+
+        page = until(settled)
+        hostile = socket.create_connection(("127.0.0.1", port))
+        with contextlib.suppress(OSError):
+            hostile.sendall(b"GET /" + b"x" * 1000000)
+        idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(5)]
+        assert run.wait(60) == 0
+        for one in [hostile, *idle]:
+            one.close()
+    assert page['okid_frames_lost_total{bus="can0",cause="sequence"}'] == 0
+    assert page['okid_channel_completeness_percent{channel="acc1"}'] == 100
+    truth = json.loads((rig / "t.json").read_text())["frequency_hz"]
+    for k, f in enumerate(truth, 1):
+        assert page[f'okid_mode_frequency_hz{{mode="{k}"}}'] == pytest.approx(f, rel=1e-2)
+        assert page[f'okid_mode_frequency_std_hz{{mode="{k}"}}'] > 0
+        assert page[f'okid_mode_damping_ratio{{mode="{k}"}}'] == pytest.approx(0.02, rel=0.2)
+    assert page["okid_resident_bytes"] > 1e6 and page["okid_update_seconds"] > 0 and page["okid_updates_total"] > 3
+    assert len(numbers(file_lines(rig), "modes")) >= 110  # the hostile ones disturbed nothing
+
+
+def test_a_port_that_is_taken(rig: pathlib.Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen(1)
+        with replaying(rig, f'prometheus = "127.0.0.1:{taken.getsockname()[1]}"') as run:
+            assert run.wait(60) == 4
+            assert run.stderr is not None and "is the port taken" in run.stderr.read()
+
+
+def test_what_listens_beyond_this_computer_is_said(rig: pathlib.Path) -> None:
+    with replaying(rig, f'prometheus = "0.0.0.0:{free_port()}"\nudp = "192.0.2.1:9870"') as run:
+        assert run.wait(60) == 0
+        assert run.stderr is not None
+        text = run.stderr.read()
+        assert "whoever reaches that address" in text and "beyond this computer" in text
+    with replaying(rig, f'prometheus = "127.0.0.1:{free_port()}"\nudp = "127.0.0.1:9"') as run:
+        assert run.wait(60) == 0
+        assert run.stderr is not None and run.stderr.read() == ""
+
+
+class Packets:
+    """MQTT 3.1.1 as far as a subscriber of everything needs it."""
+
+    def __init__(self, port: int) -> None:
+        self.wire = socket.create_connection(("127.0.0.1", port))
+        self.wire.settimeout(20)
+        self.send(0x10, b"\0\4MQTT\4\2\0\x3c" + b"\0\4test")
+        assert self.read()[0] == 0x20
+        self.send(0x82, b"\0\1\0\1#\0")
+        assert self.read()[0] == 0x90
+
+    def send(self, kind: int, body: bytes) -> None:
+        assert len(body) < 128
+        self.wire.sendall(bytes([kind, len(body)]) + body)
+
+    def exactly(self, count: int) -> bytes:
+        data = b""
+        while len(data) < count:
+            more = self.wire.recv(count - len(data))
+            assert more
+            data += more
+        return data
+
+    def read(self) -> tuple[int, bytes]:
+        kind, size, shift = self.exactly(1)[0], 0, 0
+        while True:
+            byte = self.exactly(1)[0]
+            size |= (byte & 127) << shift
+            shift += 7
+            if not byte & 128:
+                return kind, self.exactly(size)
+
+    def message(self) -> tuple[str, str]:
+        body = self.read()[1]
+        (length,) = struct.unpack_from(">H", body)
+        return body[2 : 2 + length].decode(), body[2 + length :].decode()
+
+
+@contextlib.contextmanager
+def broker(port: int, folder: pathlib.Path) -> Iterator[None]:
+    (folder / "broker.conf").write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
+    program = shutil.which("mosquitto") or "/usr/sbin/mosquitto"
+    with subprocess.Popen([program, "-c", folder / "broker.conf"], stderr=subprocess.DEVNULL) as run:
+        try:
+            until(lambda: port_is_open(port))
+            yield
+        finally:
+            run.terminate()
+
+
+def port_is_open(port: int) -> bool:
+    with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+        return True
+    return False
+
+
+def test_mqtt(rig: pathlib.Path) -> None:
+    port = free_port()
+    with broker(port, rig):
+        everything = Packets(port)
+        with replaying(rig, f'mqtt = "mqtt://127.0.0.1:{port}/lab"', "--speed", "20") as run:
+            got = []
+            while not got or got[-1][0] != "lab/Frame_7_b/result":
+                got.append(everything.message())
+            assert run.wait(60) == 0
+    whole = file_lines(rig)
+    kinds = {topic.rpartition("/")[2] for topic, _ in got}
+    assert {"modes", "stats", "result"} <= kinds
+    at = whole.index(got[0][1])  # it takes a moment to connect; from then on nothing is missing
+    assert at < 20 and [text for _, text in got] == whole[at:]
+    assert all(topic == f"lab/Frame_7_b/{json.loads(text)['type']}" for topic, text in got)
+
+
+def test_a_broker_that_is_away_and_comes(rig: pathlib.Path) -> None:
+    port = free_port()
+    with replaying(rig, f'mqtt = "mqtt://127.0.0.1:{port}"', "--speed", "6") as run:
+        until(lambda: len(file_lines(rig)) > 5 if (rig / "e.jsonl").exists() else False)
+        with broker(port, rig):
+            assert json.loads(Packets(port).message()[1])["type"]
+        assert run.wait(60) == 0
+        assert run.stderr is not None and run.stderr.read().count("trying again") == 1
+    assert len(numbers(file_lines(rig), "modes")) >= 110
+
+
+@pytest.mark.parametrize(
+    ("section", "texts"),
+    [
+        ('udp = "9870 "', ["[publish]", '"udp"', "127.0.0.1:9870"]),
+        ('udp = "127.0.0.1"', ['"udp"', "an address and a port"]),
+        ('udp = "127.0.0.1:70000"', ['"udp"']),
+        ('prometheus = "host.example:9273"', ['"prometheus"', "numeric"]),
+        ('mqtt = "localhost"', ['"mqtt"', "mqtt://host"]),
+        ('mqtt = "mqtt://"', ['"mqtt"']),
+        ('mqtt = "mqtt://localhost/a/#"', ['"mqtt"']),
+        (f'socket = "{"x" * 120}"', ['"socket"', "at most 107"]),
+        ("socket = 7", ['"socket"', "found 7"]),
+    ],
+)
+def test_wrong_addresses(rig: pathlib.Path, section: str, texts: list[str]) -> None:
+    (rig / "c.toml").write_text((rig / "a.toml").read_text() + f"\n[publish]\n{section}\n")
+    done = okid("check", rig / "c.toml")
+    assert done.returncode == 2
+    for text in texts:
+        assert text in done.stderr, done.stderr
+
+
+def test_hang_up_opens_the_events_file_again(rig: pathlib.Path) -> None:
+    events, old = rig / "e.jsonl", rig / "e.jsonl.1"
+    old.unlink(missing_ok=True)
+    with replaying(rig, 'udp = "9870"', "--speed", "20") as run:
+        until(lambda: len(file_lines(rig)) > 5 if events.exists() else False)
+        events.rename(old)
+        run.send_signal(signal.SIGHUP)
+        until(events.exists)
+        assert run.wait(60) == 0
+    first, second = old.read_text().splitlines(), file_lines(rig)
+    assert json.loads(first[0])["type"] == "start" and json.loads(second[-1])["type"] == "result"
+    with replaying(rig, 'udp = "9870"') as run:
+        assert run.wait(60) == 0
+    assert first + second == file_lines(rig)
+
+
+def screen_of(data: str, width: int, height: int) -> list[str]:
+    """What a terminal of that size shows: lines, wrapping, cursor up, erase below."""
+    rows: list[list[str]] = [[]]
+    row = column = 0
+    at = 0
+    while at < len(data):
+        c = data[at]
+        at += 1
+        if c == "\x1b":
+            end = at + 1
+            while not data[end].isalpha():
+                end += 1
+            count = data[at + 1 : end]
+            if data[end] == "A":
+                row = max(max(0, len(rows) - height), row - int(count))
+            elif data[end] == "J":
+                rows[row] = rows[row][:column]
+                del rows[row + 1 :]
+            else:
+                assert data[end] == "m"
+            at = end + 1
+        elif c == "\r":
+            column = 0
+        elif c == "\n":
+            row += 1
+            if row == len(rows):
+                rows.append([])
+        else:
+            if column == width:
+                column, row = 0, row + 1
+                if row == len(rows):
+                    rows.append([])
+            line = rows[row]
+            line.extend(" " * (column + 1 - len(line)))
+            line[column] = c
+            column += 1
+    return ["".join(line).rstrip() for line in rows]
+
+
+def on_terminal(rig: pathlib.Path, width: int, height: int, **environment: str) -> tuple[str, list[str]]:
+    near, far = pty.openpty()
+    termios.tcsetwinsize(far, (height, width))
+    variables = {key: value for key, value in os.environ.items() if key != "NO_COLOR"} | {"TERM": "xterm"} | environment
+    data = b""
+    with replaying(rig, 'udp = "9870"', "--speed", "15", stdout=far, env=variables) as run:
+        os.close(far)
+        with contextlib.suppress(OSError):
+            while chunk := os.read(near, 65536):
+                data += chunk
+        assert run.wait(60) == 0
+    os.close(near)
+    text = data.decode()
+    return text, screen_of(text, width, height)
+
+
+def test_table_in_place(rig: pathlib.Path) -> None:
+    text, screen = on_terminal(rig, 90, 30)
+    assert text.count("f [Hz]") > 10  # drawn many times …
+    assert sum("f [Hz]" in line for line in screen) == 2  # … and stands there once, the result's own below
+    assert "\x1b[32m" in text and max(map(len, screen)) <= 90
+    narrow, screen = on_terminal(rig, 40, 30, NO_COLOR="1")
+    assert "\x1b[3" not in narrow
+    assert sum(line.startswith("track") for line in screen) == 1
+
+
+def test_a_stopped_terminal_stops_nothing(rig: pathlib.Path) -> None:
+    """Nobody reads the terminal, as after Ctrl-S: events, subscribers and the end of the run do not wait for it."""
+    near, far = pty.openpty()
+    termios.tcflow(far, termios.TCOOFF)
+    with replaying(rig, 'socket = "live.sock"', "--speed", "20", "--json", rig / "r.json", stdout=far) as run:
+        one = connected(rig / "live.sock")
+        assert json.loads(lines_of(one)[-1])["type"] == "result"
+        until(lambda: json.loads(file_lines(rig)[-1])["type"] == "result")
+        termios.tcflow(far, termios.TCOON)  # the result's table is printed to the end, as ever
+        os.close(far)
+        with contextlib.suppress(OSError):
+            while os.read(near, 65536):
+                pass
+        assert run.wait(60) == 0
+    os.close(near)
