@@ -39,7 +39,9 @@ test-embedded: ## the library on other processors, cross-compiled and run in an 
 
 bench: build ## speed of the kernels and of whole identifications as ratios within one run
 	@tools/setup.sh bench || echo "bench: going on without SLICOT"
+	@tools/setup.sh test
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --save build/bench.json
+	@PYTHONPATH=tests/property:tests/io OPENBLAS_NUM_THREADS=1 $(PYTHON) tests/bench/live_latency.py
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
 	@$(PYTHON) tools/bench_check.py build/bench.json

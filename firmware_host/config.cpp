@@ -7,6 +7,7 @@
 #include "config_hammer.hpp"
 #include "config_line.hpp"
 #include "config_publish.hpp"
+#include "config_realtime.hpp"
 #include "config_record.hpp"
 #include "config_schema.hpp"
 #include "config_send.hpp"
@@ -297,6 +298,7 @@ static live_config make_config(const std::string& path, config_texts texts, bool
     read_alarm(file, config);
     read_publish(file, config);
     read_record(file, config);
+    read_realtime(file, config);
     note_ignored(file, config);
     config.texts = std::move(texts);
     return config;

@@ -153,6 +153,14 @@ struct record_config {
     std::size_t pretrigger_frames = 0; ///< room for them; 0 = nothing waits for a trigger
 };
 
+/// [realtime]: what the threads that serve devices and disk claim of the computer.
+struct realtime_config {
+    int priority = 10;           ///< SCHED_FIFO of the threads that read and send; half of it for the recorder; 0 = none
+    bool priority_asked = false; ///< the config has the key
+    bool lock_memory = false;    ///< mlockall
+    std::vector<int> cpus;       ///< those threads stay on these; empty = anywhere
+};
+
 /// The files a config was made of, word for word: a journal keeps them, and a config is read from them again.
 struct config_texts {
     std::string config;
@@ -175,6 +183,7 @@ struct live_config {
     alarm_config alarm;
     publish_config publish;
     record_config record;
+    realtime_config realtime;
     config_texts texts;
     std::vector<std::string> warnings; ///< what is accepted but does nothing in this version
 };

@@ -140,6 +140,7 @@ const std::vector<section_rule> schema = {
       {"max_mb", kind::positive, 0, 1e9},
       {"pretrigger_s", kind::number, 0, 1e5}}},
     {"publish", false, {{"socket", kind::text}, {"udp", kind::text}, {"prometheus", kind::text}, {"mqtt", kind::text}}},
+    {"realtime", false, {{"priority", kind::whole, 0, 99}, {"lock_memory", kind::flag}, {"cpus", kind::array}}},
     {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
 
 void check_number(const config_place& place, const toml::node& node, const key_rule& rule) {

@@ -27,7 +27,7 @@ namespace {
 
 constexpr long long wanted_buffer = DRV_RECEIVE_BUFFER;
 constexpr int cap_net_admin = 12, cap_sys_nice = 23;
-constexpr rlim_t reader_priority = 10; // as live/reader.cpp asks for
+constexpr int cap_ipc_lock = 14;
 
 /// The findings, one line each; a finding that is missing comes with its remedy.
 class findings {
@@ -210,7 +210,9 @@ void check_clock(findings& out) {
 }
 
 /// The reader comes before everything that computes, where it may.
-void check_priority(findings& out) {
+void check_priority(findings& out, const realtime_config& wanted) {
+    const auto reader_priority = static_cast<rlim_t>(wanted.priority);
+    if (reader_priority == 0) return;
     rlimit limit{};
     const bool allowed = getrlimit(RLIMIT_RTPRIO, &limit) == 0 && limit.rlim_cur >= reader_priority;
     if (allowed || has_capability(cap_sys_nice))
@@ -221,6 +223,19 @@ void check_priority(findings& out) {
                              reader_priority),
                  "echo \"$USER - rtprio 20\" | sudo tee /etc/security/limits.d/60-okid.conf, then log in anew (a "
                  "service: LimitRTPRIO=20)");
+}
+
+/// As much memory may be locked as [realtime] lock_memory asks for.
+void check_memory(findings& out, const realtime_config& wanted) {
+    if (!wanted.lock_memory) return;
+    rlimit limit{};
+    const bool allowed = getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
+    if (allowed || has_capability(cap_ipc_lock))
+        out.well("locked memory", "without limit");
+    else
+        out.missing("locked memory", fmt::format("RLIMIT_MEMLOCK is {} bytes, expected no limit", limit.rlim_cur),
+                    "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/60-okid.conf, then log in "
+                    "anew (a service: LimitMEMLOCK=infinity)");
 }
 
 void check_governor(findings& out) {
@@ -251,7 +266,9 @@ void add_doctor(CLI::App& app) {
         check_buses(out, config, kernel_has_can);
         check_lines(out, config);
         if (wants_can) check_buffers(out);
-        check_priority(out);
+        const realtime_config realtime = config ? config->realtime : realtime_config{};
+        check_priority(out, realtime);
+        check_memory(out, realtime);
         check_clock(out);
         check_governor(out);
         if (out.count() > 0)

@@ -5,8 +5,10 @@
 #include "bus_watch.hpp"
 #include "gpio_lines.hpp"
 #include "reader.hpp"
+#include "ring_merge.hpp"
 #include "sender.hpp"
 #include "stop_signal.hpp"
+#include "threads.hpp"
 
 #include <chrono>
 #include <cstdio>
@@ -40,10 +42,13 @@ struct wake_event {
 class pump {
   public:
     pump(const live_config& config, stream_target& target, const std::optional<recorder_options>& recording)
-        : target_(target), lines_(config), frames_(256) {
+        : target_(target), realtime_(config.realtime), lines_(config), frames_(256) {
         for (std::size_t i = 0; i < config.buses.size(); ++i)
             readers_.push_back(std::make_unique<bus_reader>(config, i, wake_.fd));
-        for (const auto& reader : readers_) watches_.emplace_back(reader->interface());
+        for (const auto& reader : readers_) {
+            watches_.emplace_back(reader->interface());
+            merge_.add(reader->ring());
+        }
         senders_.resize(readers_.size());
         for (std::size_t i = 0; i < config.buses.size(); ++i)
             if (config.buses[i].sync_hz || !config.buses[i].start_frames.empty())
@@ -51,12 +56,13 @@ class pump {
         recording_.emplace(config, recording); // a file appears only once there is something to record
         for (std::size_t i = 0; i < config.buses.size() && recording_->get(); ++i)
             readers_[i]->also_into(recording_->get()->ring(i));
+        lock_memory(realtime_);
     }
 
     void run(const std::optional<double>& duration_s) {
-        for (auto& reader : readers_) reader->start();
+        for (auto& reader : readers_) reader->start(realtime_);
         for (auto& sender : senders_)
-            if (sender) sender->start();
+            if (sender) sender->start(realtime_);
         target_.ready();
         const auto begin = clock_type::now();
         auto heard = begin;
@@ -89,15 +95,14 @@ class pump {
   private:
     bool move_frames(bool bounded) {
         bool any = false;
-        for (auto& reader : readers_)
-            for (std::size_t count; !target_.done() && !(bounded && stop_requested()) &&
-                                    (count = reader->take(frames_.data(), frames_.size())) > 0;
-                 any = true) {
-                tell_losses();
-                target_.alive();
-                lines_.serve(target_);
-                for (std::size_t i = 0; i < count; ++i) target_.frame(frames_[i]);
-            }
+        for (std::size_t count; !target_.done() && !(bounded && stop_requested()) &&
+                                (count = merge_.take(frames_.data(), frames_.size())) > 0;
+             any = true) {
+            tell_losses();
+            target_.alive();
+            lines_.serve(target_);
+            for (std::size_t i = 0; i < count; ++i) target_.frame(frames_[i]);
+        }
         return any;
     }
 
@@ -132,9 +137,11 @@ class pump {
 
     wake_event wake_;
     stream_target& target_;
+    const realtime_config& realtime_;
     gpio_lines lines_;
     std::optional<recording_link> recording_; ///< before the readers, which push into its rings
     std::vector<std::unique_ptr<bus_reader>> readers_;
+    ring_merge merge_;
     std::vector<drv_frame_t> frames_;
     std::vector<bus_watch> watches_;
     std::vector<std::unique_ptr<sync_sender>> senders_;

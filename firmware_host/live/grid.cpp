@@ -37,7 +37,8 @@ grid::grid(const live_config& config, grid_sink& sink)
       width_(config.channels.size()), buses_(config.buses.size()) {
     build_lanes(config);
     window_ = std::clamp<std::int64_t>(std::llround(rate_hz_ / 4), 4 * reorder_, 4096);
-    mask_ = power_of_two(2 * window_) - 1;
+    lag_ = std::clamp<std::int64_t>(std::llround(rate_hz_), window_, 16384);
+    mask_ = power_of_two(2 * lag_) - 1;
     hold_ = window_ / 2;
     const auto rows = static_cast<std::size_t>(mask_ + 1);
     values_.assign(rows * width_, missing);
@@ -186,11 +187,11 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
     drain(false);
 }
 
-/// May the lane still bring the sample that goes out next? One that is silent has `window` samples for it, one that
+/// May the lane still bring the sample that goes out next? One that is silent has `lag` samples for it, one that
 /// jumped over it until its newest frames all lie beyond: during an outage they may be few.
 bool grid::may_come(const lane& l) const {
     const std::int64_t ahead = opened_ - next_;
-    if (!l.heard || l.last < next_) return ahead <= window_;
+    if (!l.heard || l.last < next_) return ahead <= lag_;
     return l.passed <= next_ && ahead <= mask_;
 }
 

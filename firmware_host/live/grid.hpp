@@ -5,8 +5,8 @@
 // Frames of one message (and multiplexor value) are a lane. Counters of all lanes count the same samples when they stand
 // close together at the start; a lane whose counter is unrelated is placed by time once, then counts on. The grid begins
 // with the first sample for which every lane has been heard, so a stream may be joined in the middle. A sample goes out
-// when it is complete, or when the newest nine frames of every lane that lacks it lie beyond it, or when any lane is
-// `window` samples ahead of those that are silent.
+// when it is complete, or when the newest nine frames of every lane that lacks it lie beyond it, or when any lane is a
+// second ahead of those that are silent: for so long an adapter may hold its frames back, and nothing is lost.
 #pragma once
 #include "../config.hpp"
 
@@ -179,6 +179,7 @@ class grid {
     std::vector<std::uint32_t> masks_; ///< of identifiers that stand for many, the strictest first
     std::size_t width_ = 0;
     std::int64_t reorder_ = 16, window_ = 0, mask_ = 0;
+    std::int64_t lag_ = 0;       ///< samples by which a silent lane may be behind: a second
     std::int64_t hold_ = 0;      ///< periods a frame without a counter may wait for those that tell its place
     std::size_t late_lanes_ = 0; ///< lanes with such frames
     std::vector<double> values_, decoded_;

@@ -5,16 +5,15 @@
 #include "../nearest_name.hpp"
 
 #include "serial_line.hpp"
+#include "threads.hpp"
 
 #include <algorithm>
 #include <cerrno>
-#include <csignal>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
 #include <net/if_arp.h>
 #include <poll.h>
-#include <pthread.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -24,7 +23,6 @@ namespace {
 constexpr std::size_t ring_frames = 1 << 17; // 6 s of a saturated FD bus, 15 s of a classic one
 constexpr int look_ms = 100;                 // how often counters and a vanished interface are looked at
 constexpr int batches_between_looks = 64;
-constexpr int reader_priority = 10; // SCHED_FIFO
 
 } // namespace
 
@@ -32,7 +30,7 @@ bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, int wa
     : interface_(config_of_all.buses[bus].on_line() ? config_of_all.buses[bus].device
                                                     : config_of_all.buses[bus].interface),
       bus_(static_cast<std::uint8_t>(bus)), wake_fd_(wake_fd), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
-      block_(new std::byte[drv_ring_memsize(ring_frames)]), batch_(64) {
+      block_(new std::byte[drv_ring_memsize(ring_frames)]()), batch_(64) {
     ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));
     const bus_config& mine = config_of_all.buses[bus];
     const std::vector<drv_filter_t> frames = wanted_frames(config_of_all, bus);
@@ -61,16 +59,9 @@ bus_reader::~bus_reader() {
     close(stop_fd_);
 }
 
-void bus_reader::start() {
-    sigset_t all, before; // signals are the main thread's
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    thread_ = std::thread([this] { run(); });
-    // Before everything that computes, where the system lets us (root, or LimitRTPRIO).
-    sched_param first{};
-    first.sched_priority = reader_priority;
-    (void)pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &first);
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+void bus_reader::start(const realtime_config& realtime) {
+    thread_ = quiet_thread([this] { run(); });
+    put_first(thread_, realtime);
 }
 
 void bus_reader::stop() {

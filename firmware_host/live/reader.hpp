@@ -27,10 +27,10 @@ class bus_reader {
 
     /// The recorder gets every frame, too.
     void also_into(drv_ring_t* ring) { second_ring_ = ring; }
-    void start();
+    void start(const realtime_config& realtime);
     /// End the thread; frames still in the socket and in the ring can be taken afterwards.
     void stop();
-    std::size_t take(drv_frame_t* frames, std::size_t capacity) { return drv_ring_pop(ring_, frames, capacity); }
+    drv_ring_t* ring() { return ring_; }
 
     /// Counts of the source and of the ring, as of the last time the thread looked (at most 0.1 s ago).
     drv_stats_t stats() const;

@@ -3,11 +3,11 @@
 
 #include "../error.hpp"
 #include "reader.hpp"
+#include "threads.hpp"
 
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <csignal>
 #include <fmt/format.h>
 
 namespace okid_host {
@@ -30,17 +30,14 @@ sync_sender::~sync_sender() {
     drv_sink_close(&sink_);
 }
 
-void sync_sender::start() {
+void sync_sender::start(const realtime_config& realtime) {
     for (const drv_frame_t& frame : bus_.start_frames)
         if (!send(frame, start_patience_ms))
             throw failure(exit_device,
                           fmt::format("interface {}: start frame {:#x}: {}", bus_.interface, frame.id, report_.error));
     if (!bus_.sync_hz) return;
-    sigset_t all, before; // signals are the main thread's
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    thread_ = std::thread([this] { run(); });
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    thread_ = quiet_thread([this] { run(); });
+    put_first(thread_, realtime);
 }
 
 void sync_sender::stop() {

@@ -28,7 +28,7 @@ class sync_sender {
     sync_sender& operator=(const sync_sender&) = delete;
 
     /// Send the start frames, then begin with SYNC. Throws `failure` (exit 4) when a start frame cannot be sent.
-    void start();
+    void start(const realtime_config& realtime);
     void stop();
     sync_report report() const;
 

@@ -22,7 +22,7 @@ ordered_json departure_json(const departure& from) {
 
 void session::update(std::int64_t samples) {
     if (trigger_.waiting() || hammer_.wanted()) {
-        table_state state;
+        table_state state = shown_; // the modes of the blows so far stay
         state.t = seconds(samples);
         state.waiting = hammer_.wanted() ? hammer_.awaited() : "armed, waiting for " + trigger_.awaited();
         publisher_.table(state);
@@ -62,6 +62,7 @@ void session::show_modes(std::int64_t samples) {
     }
     settled_ = state.settled;
     publisher_.table(state);
+    if (hammer_.wanted()) shown_ = std::move(state);
 }
 
 void session::tell_change(std::int64_t samples) {

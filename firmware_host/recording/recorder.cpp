@@ -2,6 +2,7 @@
 #include "recorder.hpp"
 
 #include "../error.hpp"
+#include "../live/threads.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -13,7 +14,6 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <limits>
-#include <pthread.h>
 #include <random>
 
 namespace okid_host {
@@ -22,7 +22,6 @@ namespace {
 constexpr std::size_t ring_frames = 1 << 16; // 8 s of 8,000 frames a second
 constexpr auto look_every = std::chrono::milliseconds(20);
 constexpr std::int64_t chunk_ns = 100000000; // a chunk is written so long after its first frame came
-constexpr int recorder_priority = 5;         // SCHED_FIFO, behind the readers
 constexpr int last_segment = 9999;
 constexpr std::uint64_t megabyte = 1000000;
 constexpr std::int64_t no_trigger = std::numeric_limits<std::int64_t>::min();
@@ -34,16 +33,6 @@ std::int64_t clock_ns(clockid_t clock) {
 }
 
 drv_journal_time_t time_now() { return {clock_ns(CLOCK_REALTIME), clock_ns(CLOCK_MONOTONIC)}; }
-
-/// Signals are the main thread's.
-template <class Run> std::thread quiet_thread(Run&& run) {
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    std::thread out(std::forward<Run>(run));
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    return out;
-}
 
 std::uint64_t random_run() {
     std::random_device device;
@@ -107,7 +96,7 @@ void background_sync::run() {
 }
 
 recorder::recorder(const live_config& config, const recorder_options& options)
-    : wanted_(config.record), stem_(name_stem(title_of(config))), missed_(config.buses.size(), 0), batch_(256),
+    : wanted_(config.record), realtime_(config.realtime), stem_(name_stem(title_of(config))), missed_(config.buses.size(), 0), batch_(256),
       waits_(config.trigger.source != trigger_source::immediate), trigger_ns_(no_trigger),
       writer_(std::make_unique<drv_journal_writer_t>()) {
     prepare_folder(wanted_.directory);
@@ -115,6 +104,7 @@ recorder::recorder(const live_config& config, const recorder_options& options)
     for (std::size_t i = 0; i < config.buses.size(); ++i) {
         blocks_.emplace_back(new std::byte[drv_ring_memsize(ring_frames)]());
         rings_.push_back(drv_ring_create(ring_frames, blocks_.back().get(), drv_ring_memsize(ring_frames)));
+        merge_.add(rings_.back());
     }
     if (waits_) waiting_.resize(config.record.pretrigger_frames);
     header_.version = OKID_VERSION;
@@ -133,10 +123,7 @@ recorder::~recorder() { stop(); }
 
 void recorder::start() {
     thread_ = quiet_thread([this] { run(); });
-    // Before what computes, where the system lets us: it needs little, but a quarter of a second is all it may lose.
-    sched_param before{};
-    before.sched_priority = recorder_priority;
-    (void)pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &before);
+    put_first(thread_, realtime_, 0.5); // it needs little, but a quarter of a second is all it may lose
 }
 
 void recorder::trigger(std::int64_t time_ns) { trigger_ns_ = time_ns; }
@@ -292,17 +279,18 @@ void recorder::begin_late() {
 /// What the rings hold. @return false when they were empty
 bool recorder::serve(bool last) {
     bool any = false;
-    for (std::size_t bus = 0; bus < rings_.size(); ++bus)
-        for (bool more = true; more && !failed_;) { // the other buses, too
-            if (waits_ && trigger_ns_ != no_trigger) begin_late();
-            const std::size_t count = drv_ring_pop(rings_[bus], batch_.data(), batch_.size());
+    while (!failed_) {
+        if (waits_ && trigger_ns_ != no_trigger) begin_late();
+        const std::size_t count = merge_.take(batch_.data(), batch_.size());
+        for (std::size_t bus = 0; bus < rings_.size(); ++bus) {
             const std::uint64_t missed = drv_ring_missed(rings_[bus]);
             if (missed != missed_[bus] && !waits_) note_lost(missed - missed_[bus]);
             missed_[bus] = missed;
-            for (std::size_t i = 0; i < count; ++i) waits_ ? wait_for_trigger(batch_[i]) : take(batch_[i]);
-            any |= count > 0;
-            more = count == batch_.size();
         }
+        for (std::size_t i = 0; i < count; ++i) waits_ ? wait_for_trigger(batch_[i]) : take(batch_[i]);
+        any |= count > 0;
+        if (count == 0) break;
+    }
     if (waits_ || failed_) return any;
     if (last || clock_ns(CLOCK_MONOTONIC) - chunk_since_ns_ >= chunk_ns) flush();
     if (const int reason = sync_.error()) fail(reason, file_->path());

@@ -3,6 +3,7 @@
 // disk that stalls costs nothing for as long as the ring lasts, then the oldest frames, which the journal says. A
 // second thread asks for every chunk to be put onto the disk, so that a slow disk does not hold up the first one.
 #pragma once
+#include "../live/ring_merge.hpp"
 #include "journal_header.hpp"
 #include "segment_file.hpp"
 
@@ -95,10 +96,12 @@ class recorder {
     void tell(const char* kind, const std::string& text, bool urgent);
 
     record_config wanted_;
+    realtime_config realtime_;
     journal_header header_;
     std::string stem_, base_;
     std::vector<std::unique_ptr<std::byte[]>> blocks_;
     std::vector<drv_ring_t*> rings_;
+    ring_merge merge_;
     std::vector<std::uint64_t> missed_; ///< of each ring, as far as it is written
     std::vector<drv_frame_t> batch_;
     // Frames that wait for the trigger.

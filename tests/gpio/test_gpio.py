@@ -180,6 +180,28 @@ def test_no_edge_no_result(rig: Path, sim: Sim) -> None:
     assert sim.value(4) == 0
 
 
+def test_doctor_names_who_stands_in_the_way(rig: Path, sim: Sim) -> None:
+    """A chip we may not open, and a line that another program has."""
+    ask = [OKID, "doctor", str(rig / "a.toml")]
+    device = Path("/dev") / sim.chip
+    mode = device.stat().st_mode
+    device.chmod(0)
+    poor = ["setpriv", "--bounding-set=-dac_override,-dac_read_search", "--inh-caps=-all"]
+    denied = subprocess.run([*poor, *ask], capture_output=True, text=True, check=False)
+    device.chmod(mode)
+    assert denied.returncode == 4 and "missing  trigger line" in denied.stdout, denied.stdout
+    assert "sudo usermod -aG gpio $USER" in denied.stdout
+    with subprocess.Popen(
+        [OKID, "run", str(rig / "a.toml")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as run:
+        sim.wait_for(4, 1)
+        busy = subprocess.run(ask, capture_output=True, text=True, check=False)
+        run.terminate()
+        run.wait(60)
+    assert busy.returncode == 4 and "missing  trigger line" in busy.stdout, busy.stdout
+    assert "end the program that has it" in busy.stdout
+
+
 def test_lines_that_cannot_be_had(rig: Path, sim: Sim) -> None:
     text = (rig / "a.toml").read_text()
     doctor = subprocess.run([OKID, "doctor", str(rig / "a.toml")], capture_output=True, text=True, check=False)

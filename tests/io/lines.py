@@ -75,6 +75,19 @@ def unpack(stream: bytes) -> list[tuple[int, int, list[list[int]]]]:
     return out
 
 
+def node_config(
+    folder: Path, more: str = "", rate_hz: float = 100, roles: tuple[str, ...] = ("force", "acceleration")
+) -> Path:
+    """A config of one serial node at folder/tty with a channel for each role."""
+    text = f'[acquisition]\nrate_hz = {rate_hz}\n[[bus]]\nname = "node"\ntype = "serial"\nframing = "cobs"\n'
+    text += f'device = "{folder}/tty"\n'
+    for field, role in enumerate(roles):
+        text += f'[[channel]]\nname = "c{field}"\nrole = "{role}"\nfield = {field}\n'
+    path = folder / "node.toml"
+    path.write_text(text + more)
+    return path
+
+
 class Run:
     """`okid run` in the background; result() waits for its end and gives what it told."""
 

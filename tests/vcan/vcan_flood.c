@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Numbered frames onto a CAN interface in batches, at absolute deadlines or as fast as it takes them.
-// usage: vcan_flood INTERFACE COUNT FRAMES_PER_SECOND(0 = flat out) classic|fd
+// Frames onto CAN interfaces in batches, at absolute deadlines or as fast as they take them: numbered ones, or those of a
+// file for each interface (struct can_frame one behind the other).
+// usage: vcan_flood INTERFACE[,INTERFACE] COUNT FRAMES_PER_SECOND(0 = flat out) classic|fd|FILE[,FILE]
+// COUNT and FRAMES_PER_SECOND are those of one interface.
 #include <drv/pacer.h>
 
 #include <errno.h>
@@ -16,7 +18,15 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-enum { BATCH = 64 };
+enum { BATCH = 64, MOST = 2 };
+
+typedef struct stream_t {
+    int fd;
+    FILE* recorded; ///< NULL: numbered frames
+    struct canfd_frame frames[BATCH];
+    struct iovec pieces[BATCH];
+    struct mmsghdr messages[BATCH];
+} stream_t;
 
 static int open_socket(const char* interface) {
     struct sockaddr_can address;
@@ -45,40 +55,61 @@ static int send_batch(int fd, struct mmsghdr* messages, unsigned count) {
     return 0;
 }
 
+/// @return 0, or -1 when the interface or the file cannot be opened
+static int begin(stream_t* self, const char* interface, const char* kind) {
+    const int is_fd = strcmp(kind, "fd") == 0, numbered = is_fd || strcmp(kind, "classic") == 0;
+    self->fd = open_socket(interface);
+    self->recorded = numbered ? NULL : fopen(kind, "rb");
+    for (int i = 0; i < BATCH; ++i) {
+        self->frames[i].can_id = 0x123;
+        self->frames[i].len = is_fd ? 64 : 8;
+        self->pieces[i].iov_base = &self->frames[i];
+        self->pieces[i].iov_len = is_fd ? CANFD_MTU : CAN_MTU;
+        self->messages[i].msg_hdr.msg_iov = &self->pieces[i];
+        self->messages[i].msg_hdr.msg_iovlen = 1;
+    }
+    return self->fd < 0 || (!numbered && !self->recorded) ? -1 : 0;
+}
+
+static int send_next(stream_t* self, long first, unsigned count) {
+    for (unsigned i = 0; i < count; ++i) {
+        const uint32_t number = (uint32_t)(first + i);
+        if (!self->recorded)
+            memcpy(self->frames[i].data, &number, sizeof number);
+        else if (fread(&self->frames[i], CAN_MTU, 1, self->recorded) != 1)
+            return -1;
+    }
+    return send_batch(self->fd, self->messages, count);
+}
+
 int main(int argc, char** argv) {
+    static stream_t streams[MOST];
     if (argc != 5) return 2;
     const long count = atol(argv[2]);
     const double rate = atof(argv[3]);
-    const int is_fd = strcmp(argv[4], "fd") == 0;
-    const int fd = open_socket(argv[1]);
-    if (fd < 0) {
-        perror(argv[1]);
-        return 4;
-    }
-    static struct canfd_frame frames[BATCH];
-    static struct iovec pieces[BATCH];
-    static struct mmsghdr messages[BATCH];
-    for (int i = 0; i < BATCH; ++i) {
-        frames[i].can_id = 0x123;
-        frames[i].len = is_fd ? 64 : 8;
-        pieces[i].iov_base = &frames[i];
-        pieces[i].iov_len = is_fd ? CANFD_MTU : CAN_MTU;
-        messages[i].msg_hdr.msg_iov = &pieces[i];
-        messages[i].msg_hdr.msg_iovlen = 1;
+    int used = 0;
+    char *rest_of_names = NULL, *rest_of_kinds = NULL;
+    const char* name = strtok_r(argv[1], ",", &rest_of_names);
+    const char* kind = strtok_r(argv[4], ",", &rest_of_kinds);
+    for (; name && kind && used < MOST; ++used) {
+        if (begin(&streams[used], name, kind) != 0) {
+            perror(name);
+            return 4;
+        }
+        name = strtok_r(NULL, ",", &rest_of_names);
+        kind = strtok_r(NULL, ",", &rest_of_kinds);
     }
     drv_pacer_t pacer;
     drv_pacer_start(&pacer, 1000000);
     for (long next = 0; next < count;) {
-        unsigned batch = 0;
-        for (; batch < BATCH && next < count; ++batch, ++next) {
-            const uint32_t number = (uint32_t)next;
-            memcpy(frames[batch].data, &number, sizeof number);
-        }
-        if (rate > 0) (void)drv_pacer_wait(&pacer, (int64_t)((double)(next - batch) * 1e9 / rate), NULL, NULL);
-        if (send_batch(fd, messages, batch) != 0) {
-            perror("sendmmsg");
-            return 4;
-        }
+        const unsigned batch = (unsigned)(count - next < BATCH ? count - next : BATCH);
+        if (rate > 0) (void)drv_pacer_wait(&pacer, (int64_t)((double)next * 1e9 / rate), NULL, NULL);
+        for (int i = 0; i < used; ++i)
+            if (send_next(&streams[i], next, batch) != 0) {
+                perror("sendmmsg");
+                return 4;
+            }
+        next += batch;
     }
     printf("{\"sent\": %ld, \"seconds\": %.3f}\n", count, (double)drv_pacer_now(&pacer) / 1e9);
     return 0;

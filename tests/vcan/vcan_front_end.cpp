@@ -32,7 +32,7 @@ int main(int argc, char** argv) try {
     const double quiet_s = std::atof(argv[3]);
     const int wake_fd = eventfd(0, EFD_NONBLOCK);
     okid_host::bus_reader reader(config, 0, wake_fd);
-    reader.start();
+    reader.start(config.realtime);
     std::printf("listening\n");
     std::fflush(stdout);
     std::vector<drv_frame_t> frames(512);
@@ -42,7 +42,7 @@ int main(int argc, char** argv) try {
         (void)poll(&wait, 1, 50);
         std::uint64_t count = 0;
         (void)!read(wake_fd, &count, sizeof count);
-        for (std::size_t got; (got = reader.take(frames.data(), frames.size())) > 0; heard_ns = now_ns())
+        for (std::size_t got; (got = drv_ring_pop(reader.ring(), frames.data(), frames.size())) > 0; heard_ns = now_ns())
             for (std::size_t i = 0; i < got; ++i) {
                 std::uint32_t number = 0;
                 std::memcpy(&number, frames[i].data, sizeof number);
