@@ -155,7 +155,7 @@ int drv_gpio_fd(const drv_gpio_t* self) { return self->line ? gpio_backend_fd(se
 
 /// Host time - CLOCK_MONOTONIC; *error bounds it.
 static int64_t host_offset_ns(int64_t* error) {
-    const drv_clock_pair_t pair = drv_clock_pair(CLOCK_MONOTONIC);
+    const drv_clock_pair_t pair = drv_clock_pair(CLOCK_MONOTONIC, 3);
     const int64_t half = (pair.after_ns - pair.before_ns) / 2;
     *error = half + 1;
     return drv_host_time_of(pair.before_ns + half) - pair.reference_ns;

@@ -15,9 +15,9 @@ static int64_t clock_ns(clockid_t which) {
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-drv_clock_pair_t drv_clock_pair(int reference) {
+drv_clock_pair_t drv_clock_pair(int reference, int tries) {
     drv_clock_pair_t best = {0, 0, INT64_MAX};
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < tries; ++i) {
         drv_clock_pair_t pair;
         pair.before_ns = clock_ns(CLOCK_BOOTTIME);
         pair.reference_ns = clock_ns(reference);
@@ -26,6 +26,8 @@ drv_clock_pair_t drv_clock_pair(int reference) {
     }
     return best;
 }
+
+enum { EXACT = 3 }; // tries for a distance that is kept
 
 static int64_t middle(const drv_clock_pair_t* pair) {
     return pair->reference_ns - pair->before_ns - (pair->after_ns - pair->before_ns) / 2;
@@ -36,7 +38,7 @@ static int64_t origin_ns(void) {
     static _Atomic int64_t origin;
     int64_t known = atomic_load(&origin);
     if (known != 0) return known;
-    const drv_clock_pair_t pair = drv_clock_pair(CLOCK_REALTIME);
+    const drv_clock_pair_t pair = drv_clock_pair(CLOCK_REALTIME, EXACT);
     const int64_t found = middle(&pair) ? middle(&pair) : 1;
     return atomic_compare_exchange_strong(&origin, &known, found) ? found : known;
 }
@@ -44,6 +46,12 @@ static int64_t origin_ns(void) {
 int64_t drv_host_time_of(int64_t boottime_ns) { return boottime_ns + origin_ns(); }
 
 int64_t drv_host_time_ns(void) { return drv_host_time_of(clock_ns(CLOCK_BOOTTIME)); }
+
+/// The distance known is within what the pair says.
+static int fits(const drv_host_clock_t* self, const drv_clock_pair_t* real) {
+    return self->apart_ns >= real->reference_ns - real->after_ns - least_set_ns &&
+           self->apart_ns <= real->reference_ns - real->before_ns + least_set_ns;
+}
 
 int drv_host_clock_look(drv_host_clock_t* self, const drv_clock_pair_t* real) {
     const int64_t most = real->reference_ns - real->before_ns, least = real->reference_ns - real->after_ns;
@@ -56,11 +64,17 @@ int drv_host_clock_look(drv_host_clock_t* self, const drv_clock_pair_t* real) {
         self->last_ns = real->before_ns;
         return 0;
     }
-    if (self->apart_ns >= least - least_set_ns && self->apart_ns <= most + least_set_ns) return 0;
+    if (fits(self, real)) return 0;
     self->before_ns = self->apart_ns;
     self->apart_ns = middle(real);
     ++self->sets;
     return 1;
+}
+
+int drv_host_clock_look_now(drv_host_clock_t* self) {
+    drv_clock_pair_t real = drv_clock_pair(CLOCK_REALTIME, 1);
+    if (!self->started || !fits(self, &real)) real = drv_clock_pair(CLOCK_REALTIME, EXACT);
+    return drv_host_clock_look(self, &real);
 }
 
 /// How far a moment lies outside of what is possible: not before the stamp carried last, not after now.

@@ -202,11 +202,6 @@ static void look_at_controller(drv_source_t* self, socketcan_t* state) {
     if (drv_link_read(state->interface, &link) == 0) take_link(self, state, &link);
 }
 
-static void look_at_clock(socketcan_t* state) {
-    const drv_clock_pair_t real = drv_clock_pair(CLOCK_REALTIME);
-    (void)drv_host_clock_look(&state->clock, &real);
-}
-
 static int socketcan_open(drv_source_t* self, const drv_source_config_t* config) {
     memset(&self->counts, 0, sizeof self->counts);
     self->error[0] = '\0';
@@ -228,7 +223,7 @@ static int socketcan_open(drv_source_t* self, const drv_source_config_t* config)
         state->filters[i].can_mask = (some ? some : all) | CAN_EFF_FLAG | CAN_RTR_FLAG;
     }
     lay_out_batch(state);
-    look_at_clock(state);
+    (void)drv_host_clock_look_now(&state->clock);
     int up = 0;
     state->fd = make_socket(self, state, &up);
     int code = state->fd < 0 ? state->fd : 0;
@@ -420,7 +415,7 @@ static int socketcan_read(drv_source_t* self, drv_frame_t* frames, int capacity)
         got = receive(state, capacity);
         if (got < 0) return socket_failed(self, state, -got);
     }
-    if (got > 0) look_at_clock(state);
+    if (got > 0) (void)drv_host_clock_look_now(&state->clock);
     int count = 0;
     for (int i = 0; i < got; ++i) count += take_message(self, state, i, &frames[count]);
     return count;

@@ -14,9 +14,6 @@
 #include <cstdio>
 #include <fmt/format.h>
 #include <memory>
-#include <poll.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 namespace okid_host {
 namespace {
@@ -27,24 +24,12 @@ double seconds_since(clock_type::time_point then) {
     return std::chrono::duration<double>(clock_type::now() - then).count();
 }
 
-/// Owns the eventfd the readers write to.
-struct wake_event {
-    int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    ~wake_event() { close(fd); }
-    void wait(int timeout_ms, int other_fd) const {
-        pollfd waits[3] = {{fd, POLLIN, 0}, {stop_fd(), POLLIN, 0}, {other_fd, POLLIN, 0}};
-        (void)poll(waits, 3, timeout_ms);
-        std::uint64_t count = 0;
-        (void)!read(fd, &count, sizeof count);
-    }
-};
-
 class pump {
   public:
     pump(const live_config& config, stream_target& target, const std::optional<recorder_options>& recording)
         : target_(target), realtime_(config.realtime), lines_(config), frames_(256) {
         for (std::size_t i = 0; i < config.buses.size(); ++i)
-            readers_.push_back(std::make_unique<bus_reader>(config, i, wake_.fd));
+            readers_.push_back(std::make_unique<bus_reader>(config, i, wake_));
         for (const auto& reader : readers_) {
             watches_.emplace_back(reader->interface());
             merge_.add(reader->ring());
@@ -68,7 +53,7 @@ class pump {
         auto heard = begin;
         bool hinted = false;
         while (!target_.done() && !stop_requested()) {
-            wake_.wait(100, target_.triggered() ? -1 : lines_.fd());
+            wake_.wait(100, stop_fd(), target_.triggered() ? -1 : lines_.fd());
             target_.alive();
             lines_.serve(target_);
             if (move_frames(true)) heard = clock_type::now();

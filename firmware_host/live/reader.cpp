@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
@@ -21,15 +22,17 @@ namespace okid_host {
 namespace {
 
 constexpr std::size_t ring_frames = 1 << 17; // 6 s of a saturated FD bus, 15 s of a classic one
-constexpr int look_ms = 100;                 // how often counters and a vanished interface are looked at
+constexpr int look_ms = 100;                 // how often a vanished interface is looked for
+constexpr auto busy = std::chrono::milliseconds(2), rest = std::chrono::milliseconds(1);
+constexpr auto publish_every = std::chrono::milliseconds(20);
 constexpr int batches_between_looks = 64;
 
 } // namespace
 
-bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, int wake_fd)
+bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_event& wake)
     : interface_(config_of_all.buses[bus].on_line() ? config_of_all.buses[bus].device
                                                     : config_of_all.buses[bus].interface),
-      bus_(static_cast<std::uint8_t>(bus)), wake_fd_(wake_fd), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      bus_(static_cast<std::uint8_t>(bus)), wake_(wake), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       block_(new std::byte[drv_ring_memsize(ring_frames)]()), batch_(64) {
     ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));
     const bus_config& mine = config_of_all.buses[bus];
@@ -79,8 +82,7 @@ int bus_reader::drain_once() {
     for (int i = 0; i < count; ++i) batch_[static_cast<std::size_t>(i)].bus = bus_;
     drv_ring_push(ring_, batch_.data(), static_cast<std::size_t>(count));
     if (second_ring_) drv_ring_push(second_ring_, batch_.data(), static_cast<std::size_t>(count));
-    const std::uint64_t one = 1;
-    (void)!write(wake_fd_, &one, sizeof one);
+    wake_.signal();
     return count;
 }
 
@@ -97,14 +99,25 @@ drv_stats_t bus_reader::stats() const {
 }
 
 void bus_reader::run() {
+    using clock = std::chrono::steady_clock;
+    const int whole = static_cast<int>(batch_.size());
+    // The kernel stamps CAN frames: on a busy bus many are taken at once instead of one at a time. A line is stamped here.
+    const bool may_rest = source_.ops == &drv_source_socketcan;
     int moved = 0;
+    auto published = clock::now(), before = published;
     while (!stopping_) {
         pollfd waits[2] = {{stop_fd_, POLLIN, 0}, {source_.ops->fd(&source_), POLLIN, 0}};
         // A negative fd is left out, and so is a source that fails: then only the time runs.
         (void)poll(waits, moved < 0 ? 1 : 2, look_ms);
         for (int i = 0; i < batches_between_looks && !stopping_; ++i)
-            if ((moved = drain_once()) <= 0) break;
-        publish_stats();
+            if ((moved = drain_once()) < whole) break;
+        const auto now = clock::now();
+        if (now - published >= publish_every) {
+            published = now;
+            publish_stats();
+        }
+        if (may_rest && moved > 0 && now - before < busy) std::this_thread::sleep_for(rest);
+        before = now;
     }
     for (int i = 0; i < 1 << 14 && drain_once() > 0; ++i) {
     } // what had arrived before the end

@@ -2,6 +2,7 @@
 // One thread a bus that does nothing but empty the socket into a ring, so that no identification can make it overflow.
 #pragma once
 #include "../config.hpp"
+#include "wake_event.hpp"
 
 #include <drv/ring.h>
 #include <drv/source.h>
@@ -19,8 +20,8 @@ namespace okid_host {
 class bus_reader {
   public:
     /// Opens the interface or the serial line. Throws `failure` (exit 4) that says what is there and what to do.
-    /// @param bus  number given to every frame; @param wake_fd  an eventfd written when frames wait
-    bus_reader(const live_config& config, std::size_t bus, int wake_fd);
+    /// @param bus  number given to every frame; @param wake  signalled when frames wait
+    bus_reader(const live_config& config, std::size_t bus, wake_event& wake);
     ~bus_reader();
     bus_reader(const bus_reader&) = delete;
     bus_reader& operator=(const bus_reader&) = delete;
@@ -44,7 +45,8 @@ class bus_reader {
 
     std::string interface_;
     std::uint8_t bus_;
-    int wake_fd_, stop_fd_;
+    wake_event& wake_;
+    int stop_fd_;
     drv_source_t source_{};
     std::unique_ptr<std::byte[]> block_;
     drv_ring_t *ring_ = nullptr, *second_ring_ = nullptr;

@@ -8,9 +8,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <poll.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 namespace {
 
@@ -30,18 +27,15 @@ int main(int argc, char** argv) try {
     config.buses[0].interface = argv[1];
     const long long wanted = std::atoll(argv[2]);
     const double quiet_s = std::atof(argv[3]);
-    const int wake_fd = eventfd(0, EFD_NONBLOCK);
-    okid_host::bus_reader reader(config, 0, wake_fd);
+    okid_host::wake_event wake;
+    okid_host::bus_reader reader(config, 0, wake);
     reader.start(config.realtime);
     std::printf("listening\n");
     std::fflush(stdout);
     std::vector<drv_frame_t> frames(512);
     long long received = 0, missing = 0, reordered = 0, next = 0, heard_ns = now_ns();
     while (received < wanted && static_cast<double>(now_ns() - heard_ns) < quiet_s * 1e9) {
-        pollfd wait{wake_fd, POLLIN, 0};
-        (void)poll(&wait, 1, 50);
-        std::uint64_t count = 0;
-        (void)!read(wake_fd, &count, sizeof count);
+        wake.wait(50);
         for (std::size_t got; (got = drv_ring_pop(reader.ring(), frames.data(), frames.size())) > 0; heard_ns = now_ns())
             for (std::size_t i = 0; i < got; ++i) {
                 std::uint32_t number = 0;

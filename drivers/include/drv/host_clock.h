@@ -17,8 +17,8 @@ typedef struct drv_clock_pair_t {
     int64_t before_ns, reference_ns, after_ns;
 } drv_clock_pair_t;
 
-/// @param reference  CLOCK_REALTIME, CLOCK_MONOTONIC, …; the tightest of three tries
-drv_clock_pair_t drv_clock_pair(int reference);
+/// @param reference  CLOCK_REALTIME, CLOCK_MONOTONIC, …; @param tries  the tightest of so many
+drv_clock_pair_t drv_clock_pair(int reference, int tries);
 
 /// Host time now. Any thread.
 int64_t drv_host_time_ns(void);
@@ -35,6 +35,8 @@ typedef struct drv_host_clock_t {
 
 /// Just after frames were read, before their stamps are carried: was the clock set? @return 1 when it was
 int drv_host_clock_look(drv_host_clock_t* self, const drv_clock_pair_t* real);
+/// The same with the clocks of this computer, as they are now.
+int drv_host_clock_look_now(drv_host_clock_t* self);
 
 /// Host time of a stamp. When the clock was set while frames waited, a stamp of before is told from one of after by
 /// which is nearer to what is possible: not before the stamp carried last, and not after the last look.

@@ -28,7 +28,7 @@ static void test_host_time_is_the_real_time_and_goes_on(void) {
     TEST_ASSERT_TRUE(first - real < second && real - first < second);
     TEST_ASSERT_TRUE(next >= first);
     drv_host_clock_t clock = {0};
-    drv_clock_pair_t pair = drv_clock_pair(CLOCK_REALTIME);
+    drv_clock_pair_t pair = drv_clock_pair(CLOCK_REALTIME, 3);
     TEST_ASSERT_TRUE(pair.before_ns <= pair.after_ns);
     TEST_ASSERT_EQUAL_INT(0, drv_host_clock_look(&clock, &pair));
     int64_t apart = drv_host_clock_carry(&clock, pair.reference_ns) - pair.reference_ns;
