@@ -2,7 +2,6 @@
 #include "config_clock.hpp"
 
 #include "config_schema.hpp"
-#include "live/aligner.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +36,33 @@ void check_reference(const config_place& place, const toml::table& table, double
                            *bus.rate_hz, grid_hz, config.channels[first].name));
 }
 
+/// Do two channels come in the same frames?
+bool together(const channel_config& a, const channel_config& b) {
+    return a.bus == b.bus && a.frame.id == b.frame.id && a.frame.extended == b.frame.extended &&
+           a.frame.mask == b.frame.mask;
+}
+
 } // namespace
+
+std::vector<std::vector<std::size_t>> clock_domains(const live_config& config) {
+    std::vector<std::vector<std::size_t>> out(1); // the counted channels first
+    for (std::size_t c = 0; c < config.channels.size(); ++c) {
+        const channel_config& channel = config.channels[c];
+        if (!config.buses[channel.bus].free_clock) {
+            out.front().push_back(c);
+            continue;
+        }
+        const auto same = std::find_if(out.begin() + 1, out.end(), [&](const std::vector<std::size_t>& node) {
+            return together(config.channels[node.front()], channel);
+        });
+        if (same != out.end())
+            same->push_back(c);
+        else
+            out.push_back({c});
+    }
+    if (out.front().empty()) out.erase(out.begin());
+    return out;
+}
 
 void read_clocks(const toml::table& file, live_config& config) {
     config.decimate = static_cast<int>(file["acquisition"]["decimate"].value_or(std::int64_t{1}));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "aligner.hpp"
 
+#include "../config_clock.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -27,33 +29,7 @@ live_config part_of(const live_config& config, const std::vector<std::size_t>& c
     return out;
 }
 
-/// Do two channels come in the same frames?
-bool together(const channel_config& a, const channel_config& b) {
-    return a.bus == b.bus && a.frame.id == b.frame.id && a.frame.extended == b.frame.extended &&
-           a.frame.mask == b.frame.mask;
-}
-
 } // namespace
-
-std::vector<std::vector<std::size_t>> clock_domains(const live_config& config) {
-    std::vector<std::vector<std::size_t>> out(1); // the counted channels first
-    for (std::size_t c = 0; c < config.channels.size(); ++c) {
-        const channel_config& channel = config.channels[c];
-        if (!config.buses[channel.bus].free_clock) {
-            out.front().push_back(c);
-            continue;
-        }
-        const auto same = std::find_if(out.begin() + 1, out.end(), [&](const std::vector<std::size_t>& node) {
-            return together(config.channels[node.front()], channel);
-        });
-        if (same != out.end())
-            same->push_back(c);
-        else
-            out.push_back({c});
-    }
-    if (out.front().empty()) out.erase(out.begin());
-    return out;
-}
 
 aligner::aligner(const live_config& config, grid_sink& sink)
     : sink_(sink), width_(config.channels.size()), clock_(inner_rate(config)),
@@ -64,7 +40,7 @@ aligner::aligner(const live_config& config, grid_sink& sink)
     if (config.decimate > 1) decimator_ = std::make_unique<decimator>(width_, config.decimate, sink);
     reference_.reset(new grid(part_of(config, counted_, rate_hz), *this)); // make_unique cannot see the base
     if (domains.size() == 1) return;
-    const double ahead_s = std::max(0.25, 64 / rate_hz);
+    const double ahead_s = std::max(1.25, 64 / rate_hz); // the reference may wait a second for a silent channel
     double filter_s = 0;
     for (std::size_t d = 1; d < domains.size(); ++d) {
         const double own_hz = rate_of(config, domains[d]);

@@ -77,7 +77,4 @@ class aligner : private grid_sink, private cause_source {
     cause_memory causes_;
 };
 
-/// The parts of a configuration whose samples come by one clock: first the reference. Channel numbers, in ascending order.
-std::vector<std::vector<std::size_t>> clock_domains(const live_config& config);
-
 } // namespace okid_host
