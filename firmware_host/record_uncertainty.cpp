@@ -146,7 +146,8 @@ void remark_finite_p(const okid_identify_config_t& config, long long rows, const
     std::string text;
     try {
         again(longer, [&](okid_identify_t*, const okid_identified_t& other) { text = moved(model, other, sigma); });
-    } catch (const failure&) { // no memory for it: no remark
+    } catch (const failure&) {
+        return; // no memory for it: no remark
     }
     if (!text.empty())
         said.emplace_back(

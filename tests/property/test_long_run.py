@@ -58,7 +58,7 @@ def config(folder: Path, kind: Kind, memory: str) -> Path:
         text += f'[[channel]]\nname = "{name}"\nrole = "{role}"\ncan_id = 256\nstart_bit = {16 + kind.bits * i}\n'
         text += f"length = {kind.bits}\n{kind.toml}\nsequence = {{ start_bit = 0, length = 16 }}\n"
     text += f'[identification]\np = {P}\ndetrend = "none"\nsigma_blocks = 8\n'
-    text += f"update_s = {60 if SLOW else 10}.0\n{memory}\n"
+    text += f"update_s = 10.0\n{memory}\n"
     path = folder / "a.toml"
     path.write_text(text)
     return path
