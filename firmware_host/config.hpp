@@ -155,7 +155,7 @@ struct record_config {
 
 /// [realtime]: what the threads that serve devices and disk claim of the computer.
 struct realtime_config {
-    int priority = 10;           ///< SCHED_FIFO of the threads that read and send; half of it for the recorder; 0 = none
+    int priority = 10; ///< SCHED_FIFO of the threads that read and send; half of it for the recorder; 0 = none
     bool priority_asked = false; ///< the config has the key
     bool lock_memory = false;    ///< mlockall
     std::vector<int> cpus;       ///< those threads stay on these; empty = anywhere

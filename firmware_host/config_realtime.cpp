@@ -21,9 +21,9 @@ void read_realtime(const toml::table& file, live_config& config) {
     for (const toml::node& node : *cpus->as_array()) {
         const auto cpu = node.value_exact<std::int64_t>();
         if (!cpu || *cpu < 0 || *cpu >= CPU_SETSIZE)
-            refuse_key(place, *cpus, "cpus",
-                       fmt::format("found {}, expected numbers of processors, such as [1] or [2, 3]",
-                                   found_value(node)));
+            refuse_key(
+                place, *cpus, "cpus",
+                fmt::format("found {}, expected numbers of processors, such as [1] or [2, 3]", found_value(node)));
         out.cpus.push_back(static_cast<int>(*cpu));
     }
     if (out.cpus.empty())

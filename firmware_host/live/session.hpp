@@ -96,7 +96,7 @@ class session : public stream_target, private grid_sink {
     std::int64_t start_ns_ = 0;               ///< what t counts from
     std::int64_t gaps_ = 0, restarted_at_ = 0, restarts_told_ = 0;
     std::vector<observed_mode> observed_; ///< of the newest update
-    table_state shown_; ///< hammer test: after the newest blow
+    table_state shown_;                   ///< hammer test: after the newest blow
     bool started_ = false, settled_ = false;
 };
 

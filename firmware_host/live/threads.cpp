@@ -36,7 +36,8 @@ void put_first(std::thread& thread, const realtime_config& wanted, double share)
     for (const int cpu : wanted.cpus) CPU_SET(static_cast<std::size_t>(cpu), &set);
     const int reason = pthread_setaffinity_np(thread.native_handle(), sizeof set, &set);
     if (reason)
-        complain(told_cpus, reason, "cpus", "expected processors that this computer has and that okid may use: see nproc");
+        complain(told_cpus, reason, "cpus",
+                 "expected processors that this computer has and that okid may use: see nproc");
 }
 
 void lock_memory(const realtime_config& wanted) {

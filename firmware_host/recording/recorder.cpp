@@ -96,9 +96,9 @@ void background_sync::run() {
 }
 
 recorder::recorder(const live_config& config, const recorder_options& options)
-    : wanted_(config.record), realtime_(config.realtime), stem_(name_stem(title_of(config))), missed_(config.buses.size(), 0), batch_(256),
-      waits_(config.trigger.source != trigger_source::immediate), trigger_ns_(no_trigger),
-      writer_(std::make_unique<drv_journal_writer_t>()) {
+    : wanted_(config.record), realtime_(config.realtime), stem_(name_stem(title_of(config))),
+      missed_(config.buses.size(), 0), batch_(256), waits_(config.trigger.source != trigger_source::immediate),
+      trigger_ns_(no_trigger), writer_(std::make_unique<drv_journal_writer_t>()) {
     prepare_folder(wanted_.directory);
     std::signal(SIGXFSZ, SIG_IGN); // a file beyond its limit is an error of write(), not the end of the program
     for (std::size_t i = 0; i < config.buses.size(); ++i) {

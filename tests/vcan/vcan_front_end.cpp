@@ -36,7 +36,8 @@ int main(int argc, char** argv) try {
     long long received = 0, missing = 0, reordered = 0, next = 0, heard_ns = now_ns();
     while (received < wanted && static_cast<double>(now_ns() - heard_ns) < quiet_s * 1e9) {
         wake.wait(50);
-        for (std::size_t got; (got = drv_ring_pop(reader.ring(), frames.data(), frames.size())) > 0; heard_ns = now_ns())
+        for (std::size_t got; (got = drv_ring_pop(reader.ring(), frames.data(), frames.size())) > 0;
+             heard_ns = now_ns())
             for (std::size_t i = 0; i < got; ++i) {
                 std::uint32_t number = 0;
                 std::memcpy(&number, frames[i].data, sizeof number);
