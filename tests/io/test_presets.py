@@ -231,8 +231,11 @@ def test_bursts_of_a_sensor_without_a_counter(tmp_path: Path, fault: str) -> Non
         '[identification]\nmethod = "n4sid-cva"\nrows = 10\norder = 2\nupdate_s = 1.0\nsigma_blocks = 0\n'
     )
     lost = {250, 251, 252, 507, 804, 805, 1100} if fault != "none" else set()
-    draw = random.Random(4)
-    packets = [witmotion(draw.randrange(-9000, 9000), n, 0) for n in range(count)]
+    draw, motion = random.Random(4), [0.0, 0.0]
+    packets = []
+    for n in range(count):
+        motion = [1.6 * motion[0] - 0.96 * motion[1] + draw.gauss(0, 800), motion[0]]
+        packets.append(witmotion(round(motion[0]), n, 0))
     with line(device) as ours:
         run = Run(config)
         begin = time.monotonic() + 0.5
