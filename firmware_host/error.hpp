@@ -2,8 +2,11 @@
 // What a command may end with: one clear message and the exit code of docs (0 done, 2 usage/input, 3 no honest model,
 // 4 device, 130 interrupted).
 #pragma once
+#include <cstdio>
+#include <fmt/format.h>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace okid_host {
 
@@ -14,5 +17,11 @@ struct failure : std::runtime_error {
     failure(int exit_status, const std::string& what) : std::runtime_error(what), code(exit_status) {}
     int code;
 };
+
+/// A line for people on stderr. One that cannot be written (a full disk, a terminal that hung up) ends nothing.
+template <class... Parts> void say(fmt::format_string<Parts...> text, Parts&&... parts) {
+    const std::string line = fmt::format(text, std::forward<Parts>(parts)...);
+    (void)std::fwrite(line.data(), 1, line.size(), stderr);
+}
 
 } // namespace okid_host

@@ -21,7 +21,7 @@ void drv_journal_reader_continue(drv_journal_reader_t* self, drv_journal_read_t 
     self->context = context;
     self->begin = self->end = 0;
     self->lost_sync = 0;
-    self->at_end = self->ended = 0;
+    self->at_end = self->ended = self->more = 0;
 }
 
 int drv_journal_magic(const uint8_t* bytes) { return memcmp(bytes, CHUNK_MAGIC, DRV_JOURNAL_MAGIC) == 0; }
@@ -118,6 +118,7 @@ static int place(drv_journal_reader_t* self, drv_journal_chunk_t* chunk) {
     self->missing += chunk->sequence - self->expected;
     self->expected = chunk->sequence + 1;
     self->ended = chunk->kind == DRV_JOURNAL_END;
+    self->more = self->ended && chunk->more;
     ++self->chunks;
     return 1;
 }

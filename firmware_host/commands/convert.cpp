@@ -100,8 +100,8 @@ void frames_to_csv(const convert_arguments& given, const live_config& config) {
         std::fprintf(stderr, "okid: channel \"%s\" has no frame in %s: its column is all nan\n",
                      config.channels[index].name.c_str(), given.from.c_str());
     out.commit();
-    fmt::print(stderr, "{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(),
-               config.channels.size(), table.missing());
+    say("{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(), config.channels.size(),
+        table.missing());
 }
 
 /// What the comment lines of the table say about its rate must agree with the config.
@@ -128,8 +128,8 @@ void csv_to_log(const convert_arguments& given, const live_config& config) {
         maker.append_sample(static_cast<std::int64_t>(n), record.samples.data() + n * request.columns.size(), text);
     write_whole_file(given.to, text);
     if (maker.saturated() > 0)
-        fmt::print(stderr, "okid: {} values did not fit their signal and stand at its limit\n", maker.saturated());
-    fmt::print(stderr, "{}: {} frames of {} samples\n", given.to, maker.frames(), record.count);
+        say("okid: {} values did not fit their signal and stand at its limit\n", maker.saturated());
+    say("{}: {} frames of {} samples\n", given.to, maker.frames(), record.count);
 }
 
 /// Name of a bus of a journal as a log can have it.
@@ -158,14 +158,13 @@ void journal_to_log(const convert_arguments& given) {
         losses += frame->loss != 0;
     }
     out.commit();
-    fmt::print(stderr, "{}: {} frames\n", given.to, count);
+    say("{}: {} frames\n", given.to, count);
     if (stamps + losses > 0)
-        fmt::print(stderr,
-                   "okid: a log has no place for the stamps of the devices ({}), for marks of losses ({}) and for "
-                   "times below a microsecond; the journal keeps them\n",
-                   stamps, losses);
+        say("okid: a log has no place for the stamps of the devices ({}), for marks of losses ({}) and for "
+            "times below a microsecond; the journal keeps them\n",
+            stamps, losses);
     if (!header.texts.config.empty())
-        fmt::print(stderr, "okid: a log holds no config: keep the journal, or CONFIG.toml and its DBC files\n");
+        say("okid: a log holds no config: keep the journal, or CONFIG.toml and its DBC files\n");
 }
 
 /// A journal in memory, handed on chunk by chunk.
@@ -241,7 +240,7 @@ void log_to_journal(const convert_arguments& given, const std::optional<live_con
                                                  config ? fmt::format(" of the buses of {}", config->path) : ""));
     journal.end();
     out.commit();
-    fmt::print(stderr, "{}: {} frames{}\n", given.to, count, config ? "" : "; without -c it holds no config");
+    say("{}: {} frames{}\n", given.to, count, config ? "" : "; without -c it holds no config");
 }
 
 /// The config given, or that of the journal; none where it is not needed.

@@ -34,6 +34,7 @@ void record(const record_arguments& given) {
                                               config.path));
     if (replays > 0) require_edge_time(config, false);
     catch_stop_signals();
+    catch_hangups();
     record_watch watch(config, duration_s);
     if (replays > 0)
         play_through(config.buses.front().file, config, watch, std::nullopt, recording);

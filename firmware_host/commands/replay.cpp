@@ -24,7 +24,9 @@ live_config config_for(const replay_arguments& given, const std::optional<journa
     if (header->texts.config.empty())
         throw failure(exit_usage, fmt::format("{}: the config in it is {}; say -c CONFIG.toml", given.log,
                                               header->whole ? "missing" : "damaged"));
-    return load_config(given.log, header->texts);
+    live_config config = load_config(given.log, header->texts);
+    config.publish = {}; // the run's listeners were for the run; a journal of somebody else opens nothing here
+    return config;
 }
 
 void replay(const replay_arguments& given) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "capture.hpp"
 
+#include "../error.hpp"
 #include "../recording/recording_link.hpp"
 #include "bus_watch.hpp"
 #include "gpio_lines.hpp"
@@ -103,7 +104,7 @@ class pump {
             target_.set_health(i, health);
             for (const bus_event& event : watches_[i].look(health.counts)) {
                 target_.bus_event(i, event.kind, event.text);
-                if (event.urgent) fmt::print(stderr, "okid: interface {}: {}\n", readers_[i]->interface(), event.text);
+                if (event.urgent) say("okid: interface {}: {}\n", readers_[i]->interface(), event.text);
             }
         }
     }
@@ -112,11 +113,10 @@ class pump {
         for (std::size_t i = 0; i < senders_.size(); ++i) {
             const sync_report sync = senders_[i] ? senders_[i]->report() : sync_report{};
             if (sync.sent + sync.missed == 0) continue;
-            fmt::print(stderr,
-                       "okid: interface {}: {} SYNC frames sent, late by {:.0f} us (mean), {:.0f} us (sd), {:.0f} us "
-                       "(worst); {} left out{}\n",
-                       readers_[i]->interface(), sync.sent, sync.late_mean_us, sync.late_sd_us, sync.late_worst_us,
-                       sync.missed, sync.error.empty() ? "" : "; " + sync.error);
+            say("okid: interface {}: {} SYNC frames sent, late by {:.0f} us (mean), {:.0f} us (sd), {:.0f} us "
+                "(worst); {} left out{}\n",
+                readers_[i]->interface(), sync.sent, sync.late_mean_us, sync.late_sd_us, sync.late_worst_us,
+                sync.missed, sync.error.empty() ? "" : "; " + sync.error);
         }
     }
 

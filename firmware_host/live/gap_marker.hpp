@@ -30,6 +30,12 @@ class gap_marker {
         }
         ++rows_;
     }
+    /// So many rows without any number.
+    void missing(std::int64_t count) {
+        for (std::int64_t& first : first_)
+            if (first < 0) first = rows_;
+        rows_ += count;
+    }
     /// The stream ends: gaps that are open are told.
     void finish(const cause_source& causes, grid_sink& sink) {
         for (std::size_t c = 0; c < first_.size(); ++c) close(c, causes, sink);

@@ -123,29 +123,26 @@ void log_frames::tell_damage() {
     source_.ops->stats(&source_, &counts);
     const drv_journal_reader_t* reader = is_journal(path_) ? drv_source_journal_reader(&source_) : nullptr;
     if (!reader) {
-        if (counts.torn)
-            fmt::print(stderr, "okid: warning: the last line of the log is torn (its writer was killed?): left out\n");
+        if (counts.torn) say("okid: warning: the last line of the log is torn (its writer was killed?): left out\n");
         return;
     }
     if (const int segments = drv_source_journal_segments(&source_); segments > 1)
-        fmt::print(stderr, "okid: {} and the {} segment{} behind it\n", path_, segments - 1, segments > 2 ? "s" : "");
+        say("okid: {} and the {} segment{} behind it\n", path_, segments - 1, segments > 2 ? "s" : "");
     if (reader->missing + reader->damaged > 0)
-        fmt::print(
-            stderr,
-            "okid: warning: the journal is damaged in {} place{}: {} chunks are missing, {} bytes were left out; "
+        say("okid: warning: the journal is damaged in {} place{}: {} chunks are missing, {} bytes were left out; "
             "every whole chunk was taken, the gaps are marked\n",
             reader->damaged, reader->damaged == 1 ? "" : "s", reader->missing, reader->skipped_bytes);
     if (reader->foreign > 0)
-        fmt::print(stderr, "okid: warning: {} chunks belong to another recording or stand twice: left out\n",
-                   reader->foreign);
+        say("okid: warning: {} chunks belong to another recording or stand twice: left out\n", reader->foreign);
     if (counts.lost_driver > 0)
-        fmt::print(stderr, "okid: warning: {} frames were lost when this was recorded: the disk was too slow\n",
-                   counts.lost_driver);
+        say("okid: warning: {} frames were lost when this was recorded: the disk was too slow\n", counts.lost_driver);
+    if (reader->more)
+        say("okid: warning: the run went on, but the segment behind the last one read is not there: this is not all of "
+            "it\n");
     if (!reader->ended)
-        fmt::print(stderr,
-                   "okid: warning: the journal was not closed (its writer was killed, or the disk was full): it "
-                   "ends with its last whole chunk{}\n",
-                   reader->torn_bytes ? fmt::format(", {} bytes behind it were left out", reader->torn_bytes) : "");
+        say("okid: warning: the journal was not closed (its writer was killed, or the disk was full): it "
+            "ends with its last whole chunk{}\n",
+            reader->torn_bytes ? fmt::format(", {} bytes behind it were left out", reader->torn_bytes) : "");
 }
 
 const drv_frame_t* log_frames::next() {

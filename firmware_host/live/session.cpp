@@ -132,7 +132,12 @@ void session::on_sample(std::int64_t index, const double* row) {
         identifier_.add(row);
     else if (trigger_.add(index, row, 1, grid_.time_ns(index)))
         begin(index);
-    if (now_ % update_samples_ == 0) update(now_);
+    // While nothing comes there is nothing to update: one is enough, when the next sample is there.
+    due_ = due_ || now_ % update_samples_ == 0;
+    const double* const end = row + config_.n_u + config_.n_y;
+    if (!due_ || std::all_of(row, end, [](double x) { return std::isnan(x); })) return;
+    due_ = false;
+    update(now_);
 }
 
 void session::on_missing(std::int64_t index, std::int64_t count) {
@@ -145,7 +150,9 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
         identifier_.add_missing(count);
     else
         (void)trigger_.add(index, nullptr, count, 0);
-    if (now_ / update_samples_ > index / update_samples_) update(now_);
+    if (now_ / update_samples_ == index / update_samples_) return;
+    due_ = false;
+    update(now_);
 }
 
 void session::trigger_edge(std::int64_t time_ns) {
@@ -185,7 +192,10 @@ void session::strike() {
         event.update({{"peak", hit.peak}, {"duration_s", hit.duration_s}, {"force_band_hz", hit.band_hz}});
     event.update({{"accepted_hits", hit.accepted}, {"left", hit.left}});
     tell(std::move(event));
-    if (!hit.good()) return;
+    if (!hit.good()) {
+        await(now_);
+        return;
+    }
     identifier_.add_missing(0);
     hammer_.each_row([&](const double* row) { identifier_.add(row); });
     show_modes(now_);
@@ -307,6 +317,11 @@ result_context session::context() {
         out.warnings.emplace_back(
             "restarted", fmt::format("the structure changed: the result rests on the {} samples after sample {}",
                                      out.samples, restarted_at_));
+    if (identifier_.restarts() == 0 && changed_at_ > 0)
+        out.warnings.emplace_back(
+            "changed", fmt::format("the structure changed near t = {:.4g} s, and the result mixes what was before with "
+                                   "what came after: set window_s or forgetting",
+                                   seconds(changed_at_)));
     if (stats.saturated > 0)
         out.warnings.emplace_back(
             "saturated",
@@ -331,9 +346,7 @@ void session::remark_rate() const {
     const double observed_hz = observed_rate_hz();
     if (observed_hz == 0) return;
     if (std::abs(observed_hz / config_.rate_hz - 1) <= tolerance + 2.0 / static_cast<double>(now_)) return;
-    fmt::print(
-        stderr,
-        "okid: warning: by the time stamps {:.4g} samples came a second, but rate_hz is {:.10g}: every frequency "
+    say("okid: warning: by the time stamps {:.4g} samples came a second, but rate_hz is {:.10g}: every frequency "
         "scales with it. Mend rate_hz in {}, unless the frames were played at another speed\n",
         observed_hz, config_.rate_hz, config_.path);
 }
@@ -385,7 +398,7 @@ void session::finish() {
     if (trigger_.waiting()) throw failure(exit_no_model, trigger_.missed());
     if (const std::string lacking = hammer_.shortfall(); !lacking.empty()) {
         if (hammer_.accepted() == 0) throw failure(exit_no_model, lacking);
-        fmt::print(stderr, "okid: warning: {}\n", lacking);
+        say("okid: warning: {}\n", lacking);
     }
     result_context about = context();
     remark_rate();
@@ -396,9 +409,11 @@ void session::finish() {
     if (about.mass && about.sigma) add_deviations(*about.sigma, *about.mass);
     const ordered_json result = result_json(identifier_.model(), about);
     tell({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
+    const std::string text = result.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+    const bool to_file = !options_.json.empty() && options_.json != "-";
+    if (to_file) write_whole_file(options_.json, text); // first: whoever reads the events may hold up the end of them
     publisher_.finish();
-    if (!options_.json.empty())
-        write_whole_file(options_.json, result.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n");
+    if (!options_.json.empty() && !to_file) write_whole_file("-", text);
     if (!publisher_.events_on_stdout() && options_.json != "-")
         write_whole_file("-", result_table(identifier_.model(), about));
 }

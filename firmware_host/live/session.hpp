@@ -61,6 +61,7 @@ class session : public stream_target, private grid_sink {
     void begin(std::int64_t until);
     void strike();
     void update(std::int64_t samples);
+    void await(std::int64_t samples);
     void show_modes(std::int64_t samples);
     table_state table(std::int64_t samples);
     void follow(std::int64_t samples, const deviations* sigma, table_state& state);
@@ -97,7 +98,8 @@ class session : public stream_target, private grid_sink {
     std::int64_t gaps_ = 0, restarted_at_ = 0, restarts_told_ = 0;
     std::vector<observed_mode> observed_; ///< of the newest update
     table_state shown_;                   ///< hammer test: after the newest blow
-    bool started_ = false, settled_ = false;
+    std::int64_t stats_told_ = 0, changed_at_ = 0;
+    bool started_ = false, settled_ = false, due_ = false;
 };
 
 } // namespace okid_host

@@ -22,16 +22,23 @@ ordered_json departure_json(const departure& from) {
 
 void session::update(std::int64_t samples) {
     if (trigger_.waiting() || hammer_.wanted()) {
-        table_state state = shown_; // the modes of the blows so far stay
-        state.t = seconds(samples);
-        state.waiting = hammer_.wanted() ? hammer_.awaited() : "armed, waiting for " + trigger_.awaited();
-        publisher_.table(state);
+        await(samples);
     } else {
         const auto begun = std::chrono::steady_clock::now();
         show_modes(samples);
         publisher_.update_took(std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
     }
-    if (samples % stats_samples_ == 0) write_stats();
+    if (samples / stats_samples_ == stats_told_) return;
+    stats_told_ = samples / stats_samples_;
+    write_stats();
+}
+
+/// What is waited for, above the modes of the blows so far.
+void session::await(std::int64_t samples) {
+    table_state state = shown_;
+    state.t = seconds(samples);
+    state.waiting = hammer_.wanted() ? hammer_.awaited() : "armed, waiting for " + trigger_.awaited();
+    publisher_.table(state);
 }
 
 table_state session::table(std::int64_t samples) {
@@ -61,8 +68,11 @@ void session::show_modes(std::int64_t samples) {
                                     : fmt::format("no model yet: {}", okid_status_text(outcome));
     }
     settled_ = state.settled;
+    if (hammer_.wanted()) {
+        if (!state.modes.empty()) state.waiting = hammer_.awaited();
+        shown_ = state;
+    }
     publisher_.table(state);
-    if (hammer_.wanted()) shown_ = std::move(state);
 }
 
 void session::tell_change(std::int64_t samples) {
@@ -70,6 +80,7 @@ void session::tell_change(std::int64_t samples) {
     if (!ago) return;
     const bool restarted = identifier_.restarts() > restarts_told_;
     restarts_told_ = identifier_.restarts();
+    changed_at_ = samples - *ago;
     if (restarted) {
         restarted_at_ = samples - identifier_.basis();
         tracks_.jump();

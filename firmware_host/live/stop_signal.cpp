@@ -10,7 +10,7 @@
 namespace okid_host {
 namespace {
 
-std::atomic<bool> requested{false};
+std::atomic<bool> requested{false}, interrupted{false};
 std::atomic<int> hangups{0};
 int event_fd = -1;
 
@@ -20,7 +20,8 @@ void wake() {
 }
 
 void on_signal(int) {
-    if (requested.exchange(true)) _exit(130);
+    if (interrupted.exchange(true)) _exit(130);
+    requested.store(true);
     wake();
 }
 
@@ -42,6 +43,8 @@ void catch_stop_signals() {
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
+    std::signal(SIGPIPE, SIG_IGN); // who no longer reads stdout or a socket ends no measurement
+    std::signal(SIGCHLD, SIG_DFL); // else the end of an alarm command could not be waited for
 }
 
 bool stop_requested() { return requested.load(std::memory_order_relaxed); }

@@ -5,6 +5,7 @@
 namespace okid_host {
 
 /// From now on the two signals set a flag instead of ending the process; a second one ends it at once.
+/// A pipe or socket whose reader is gone is an error of write(), not the end of the process.
 void catch_stop_signals();
 bool stop_requested();
 /// Becomes readable when a stop is asked for; for poll().

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "threads.hpp"
 
+#include "../error.hpp"
+
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
@@ -15,7 +17,7 @@ namespace {
 
 void complain(std::atomic<bool>& told, int reason, const char* key, const char* remedy) {
     if (told.exchange(true)) return;
-    fmt::print(stderr, "okid: [realtime] {}: {}; the run goes on without; {}\n", key, std::strerror(reason), remedy);
+    say("okid: [realtime] {}: {}; the run goes on without; {}\n", key, std::strerror(reason), remedy);
 }
 
 } // namespace

@@ -27,9 +27,10 @@ class wake_event {
     void wait(int timeout_ms, int other = -1, int another = -1) {
         std::array<pollfd, 3> waits{{{fd_, POLLIN, 0}, {other, POLLIN, 0}, {another, POLLIN, 0}}};
         (void)poll(waits.data(), waits.size(), timeout_ms);
-        if (!told_.exchange(false, std::memory_order_acq_rel)) return;
         std::uint64_t count = 0;
         (void)!read(fd_, &count, sizeof count);
+        (void)told_.exchange(false,
+                             std::memory_order_acq_rel); // last: a signal before it needs no write, one after it writes
     }
 
   private:

@@ -58,7 +58,7 @@ void alarm_command::start(const std::string& text) {
     close(ends[1]);
     if (status != 0) {
         child_ = 0;
-        fmt::print(stderr, "okid: [alarm] command {}: {}\n", path_, std::strerror(status));
+        say("okid: [alarm] command {}: {}\n", path_, std::strerror(status));
         return;
     }
     ended_ = false;
@@ -67,14 +67,15 @@ void alarm_command::start(const std::string& text) {
 
 void alarm_command::tick() {
     int status = 0;
-    if (child_ > 0 && waitpid(child_, &status, WNOHANG) == child_) {
-        if (WIFEXITED(status) && WEXITSTATUS(status) != 0)
-            fmt::print(stderr, "okid: [alarm] command {}: ended with exit code {}\n", path_, WEXITSTATUS(status));
+    const pid_t ended = child_ > 0 ? waitpid(child_, &status, WNOHANG) : 0;
+    if (ended != 0) { // -1: somebody else has waited for it
+        if (ended > 0 && WIFEXITED(status) && WEXITSTATUS(status) != 0)
+            say("okid: [alarm] command {}: ended with exit code {}\n", path_, WEXITSTATUS(status));
         child_ = 0;
     }
     const std::chrono::duration<double> ran = std::chrono::steady_clock::now() - started_;
     if (child_ > 0 && !ended_ && ran.count() > limit_s) {
-        fmt::print(stderr, "okid: [alarm] command {}: killed after {:g} s\n", path_, limit_s);
+        say("okid: [alarm] command {}: killed after {:g} s\n", path_, limit_s);
         kill(-child_, SIGKILL);
         ended_ = true;
     }

@@ -95,7 +95,7 @@ class connection {
     /// Once is enough.
     void complain(const char* why) {
         if (told_.exchange(true)) return;
-        fmt::print(stderr, "okid: [publish] mqtt {}: {}; trying again, the run goes on\n", to_.at.text(), why);
+        say("okid: [publish] mqtt {}: {}; trying again, the run goes on\n", to_.at.text(), why);
     }
 
     broker_address to_;

@@ -3,6 +3,7 @@
 
 #include "../error.hpp"
 #include "../live/stop_signal.hpp"
+#include "service_notice.hpp"
 
 #include <cerrno>
 #include <chrono>
@@ -26,7 +27,7 @@ int open_file(const std::string& path, int how) {
 
 line_writer::line_writer(std::string what, const std::string& path, bool patient)
     : what_(std::move(what)), path_(path), patient_(patient), reopened_(reopen_requests()) {
-    fd_ = path == "-" ? STDOUT_FILENO : open_file(path, O_TRUNC);
+    fd_ = path == "-" ? STDOUT_FILENO : open_file(path, service_notice::wanted() ? O_APPEND : O_TRUNC);
     if (fd_ < 0) throw failure(exit_usage, fmt::format("{}: cannot be written: {}", what_, std::strerror(errno)));
     thread_ = std::thread([this] { run(); });
 }
@@ -76,7 +77,7 @@ void line_writer::run() {
     for (;;) {
         changed_.wait_for(lock, std::chrono::milliseconds(200), [&] { return !lines_.empty() || ending_; });
         if (lines_.empty() && ending_) return;
-        const std::uint64_t lost = std::exchange(lost_, 0);
+        const std::uint64_t lost = lines_.empty() ? 0 : std::exchange(lost_, 0); // told with the next line
         const std::shared_ptr<const std::string> line = lines_.empty() ? nullptr : lines_.front();
         if (line) {
             bytes_ -= line->size();
@@ -86,13 +87,16 @@ void line_writer::run() {
         const bool broken = !error_.empty();
         lock.unlock();
         reopen();
-        if (!broken && lost > 0) write(fmt::format("{{\"type\":\"lost\",\"count\":{}}}\n", lost));
-        if (!broken && line) write(*line);
+        const bool told = !broken && (lost == 0 || write(fmt::format("{{\"type\":\"lost\",\"count\":{}}}\n", lost)));
+        if (told && line) (void)write(*line);
         lock.lock();
+        if (!told && line) lost_ += lost; // and the line itself was counted by give_up()
     }
 }
 
-void line_writer::write(const std::string& text) {
+/// A line that was cut ends before the next one begins.
+bool line_writer::write(const std::string& line) {
+    const std::string text = torn_ ? "\n" + line : line;
     for (std::size_t done = 0; done < text.size();) {
         const ssize_t count = ::write(fd_, text.data() + done, text.size() - done);
         if (count < 0 && errno == EINTR) continue;
@@ -101,14 +105,24 @@ void line_writer::write(const std::string& text) {
             continue;
         }
         if (count <= 0) {
-            const std::string why = std::strerror(count < 0 ? errno : EIO);
-            const std::lock_guard<std::mutex> lock(mutex_);
-            error_ = fmt::format("{}: cannot be written: {}", what_, why);
-            changed_.notify_all();
-            return;
+            torn_ = done > 0 || torn_;
+            give_up(std::strerror(count < 0 ? errno : EIO));
+            return false;
         }
         done += static_cast<std::size_t>(count);
     }
+    torn_ = false;
+    return true;
+}
+
+/// A replay ends; a measurement goes on, and tries again with the next line.
+void line_writer::give_up(const char* why) {
+    const std::string text = fmt::format("{}: cannot be written: {}", what_, why);
+    if (!patient_ && !std::exchange(told_, true)) say("okid: {}; the run goes on, these lines are lost\n", text);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++lost_;
+    if (patient_) error_ = text;
+    changed_.notify_all();
 }
 
 /// After SIGHUP: the file of the name, whatever became of the one before.
@@ -118,8 +132,7 @@ void line_writer::reopen() {
     reopened_ = requests;
     const int fresh = open_file(path_, O_APPEND);
     if (fresh < 0) {
-        fmt::print(stderr, "okid: {}: cannot be opened again, going on with the old file: {}\n", what_,
-                   std::strerror(errno));
+        say("okid: {}: cannot be opened again, going on with the old file: {}\n", what_, std::strerror(errno));
         return;
     }
     close(fd_);

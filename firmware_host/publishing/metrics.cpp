@@ -2,16 +2,15 @@
 #include "metrics.hpp"
 
 #include "../error.hpp"
+#include "http_page.hpp"
 
 #include <fmt/format.h>
 
 #ifdef OKID_PROMETHEUS
 #include <cmath>
 #include <cstdio>
-#include <mutex>
-#include <prometheus/collectable.h>
-#include <prometheus/exposer.h>
 #include <prometheus/metric_family.h>
+#include <prometheus/text_serializer.h>
 #include <unistd.h>
 #endif
 
@@ -88,59 +87,39 @@ void add_modes(page& to, const live_numbers& now) {
     add("okid_mode_damping_ratio_std", "Its standard deviation", &live_numbers::mode::damping_ratio_std);
 }
 
-class collector : public prometheus::Collectable {
-  public:
-    explicit collector(std::function<publisher_figures()> figures) : figures_(std::move(figures)) {}
-    void take(const publication& one) {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        numbers_.take(one);
-    }
-    std::vector<MetricFamily> Collect() const override {
-        page out;
-        const publisher_figures figures = figures_();
-        const std::lock_guard<std::mutex> lock(mutex_);
-        out.gauge("okid_stream_seconds", "Stream time of the newest modes", numbers_.t);
-        out.gauge("okid_settled", "1 = the modal table has come to rest", numbers_.settled);
-        out.gauge("okid_alarm", "1 = a tracked mode is away from its baseline", numbers_.alarm);
-        out.counter("okid_alarms_total", "Alarms raised", numbers_.alarms);
-        out.counter("okid_changes_total", "Changes of the structure that restarted the identification",
-                    numbers_.changes);
-        out.counter("okid_gaps_total", "Gaps in the samples", numbers_.gaps);
-        out.counter("okid_updates_total", "Updates computed", figures.updates);
-        out.gauge("okid_update_seconds", "How long the newest update took to compute", figures.update_s);
-        out.gauge("okid_update_worst_seconds", "How long the longest update took", figures.update_worst_s);
-        out.counter("okid_events_dropped_total", "Events that publishing was too slow for", figures.dropped);
-        out.gauge("okid_resident_bytes", "Resident memory of okid", resident_bytes());
-        add_buses(out, numbers_);
-        add_modes(out, numbers_);
-        return std::move(out.families);
-    }
-
-  private:
-    std::function<publisher_figures()> figures_;
-    mutable std::mutex mutex_;
-    live_numbers numbers_;
-};
+std::vector<MetricFamily> collect(const live_numbers& now, const publisher_figures& figures) {
+    page out;
+    out.gauge("okid_stream_seconds", "Stream time of the newest modes", now.t);
+    out.gauge("okid_settled", "1 = the modal table has come to rest", now.settled);
+    out.gauge("okid_alarm", "1 = a tracked mode is away from its baseline", now.alarm);
+    out.counter("okid_alarms_total", "Alarms raised", now.alarms);
+    out.counter("okid_changes_total", "Changes of the structure that restarted the identification", now.changes);
+    out.counter("okid_gaps_total", "Gaps in the samples", now.gaps);
+    out.counter("okid_updates_total", "Updates computed", figures.updates);
+    out.gauge("okid_update_seconds", "How long the newest update took to compute", figures.update_s);
+    out.gauge("okid_update_worst_seconds", "How long the longest update took", figures.update_worst_s);
+    out.counter("okid_events_dropped_total", "Events that publishing was too slow for", figures.dropped);
+    out.gauge("okid_resident_bytes", "Resident memory of okid", resident_bytes());
+    add_buses(out, now);
+    add_modes(out, now);
+    return std::move(out.families);
+}
 
 class metrics : public event_sink {
   public:
     metrics(const net_address& at, std::function<publisher_figures()> figures)
-        : collector_(std::make_shared<collector>(std::move(figures))) {
-        try {
-            exposer_ = std::make_unique<prometheus::Exposer>(std::vector<std::string>{
-                "listening_ports", at.text(), "num_threads", "2", "request_timeout_ms", "5000"});
-        } catch (const std::exception& why) {
-            throw failure(exit_device, fmt::format("[publish] prometheus {}: cannot listen there ({}); is the port "
-                                                   "taken, and is the address one of this computer?",
-                                                   at.text(), why.what()));
-        }
-        exposer_->RegisterCollectable(collector_);
-    }
-    void take(const publication& one) override { collector_->take(one); }
+        : figures_(std::move(figures)), page_("[publish] prometheus", at, "/metrics",
+                                              "text/plain; version=0.0.4; charset=utf-8", [this] { return text(); }) {}
+    void take(const publication& one) override { numbers_.take(one); }
+    void add_polls(std::vector<pollfd>& polls) const override { page_.add_polls(polls); }
+    void tick() override { page_.serve(); }
 
   private:
-    std::shared_ptr<collector> collector_;
-    std::unique_ptr<prometheus::Exposer> exposer_;
+    std::string text() const { return prometheus::TextSerializer().Serialize(collect(numbers_, figures_())); }
+
+    std::function<publisher_figures()> figures_;
+    live_numbers numbers_;
+    http_page page_;
 };
 
 } // namespace

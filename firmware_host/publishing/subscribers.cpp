@@ -4,6 +4,7 @@
 #include "../error.hpp"
 #include "../nearest_name.hpp"
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fmt/format.h>
@@ -80,7 +81,6 @@ void subscribers::welcome() {
             close(fd);
             continue;
         }
-        shutdown(fd, SHUT_RD); // it may write as much as it likes: to nobody
         subscriber& fresh = all_.emplace_back();
         fresh.fd = fd;
         if (start_) append(fresh, start_);
@@ -111,7 +111,9 @@ bool subscribers::send(subscriber& to) {
 }
 
 void subscribers::send_all() {
+    std::array<char, 16384> unread{};
     for (auto each = all_.begin(); each != all_.end();) {
+        (void)recv(each->fd, unread.data(), unread.size(), MSG_DONTWAIT); // it may say what it likes: to nobody
         pollfd gone{each->fd, 0, 0}; // an idle one that hung up is told by poll alone
         if (send(*each) && !(poll(&gone, 1, 0) > 0 && (gone.revents & (POLLHUP | POLLERR)))) {
             ++each;

@@ -40,6 +40,12 @@ std::string cut(const std::string& text, std::size_t width) {
     return text.substr(0, at);
 }
 
+/// The terminal once more, so that it can be written to without waiting. @return -1 when it cannot be opened
+int open_terminal(int fd) {
+    char name[128];
+    return ttyname_r(fd, name, sizeof name) == 0 ? open(name, O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC) : -1;
+}
+
 std::string row_text(const mode_row& row) {
     return fmt::format("{:>5} {:>12.5f} {:>9} {:>9.4f} {:>9} {:>7.4f} {:>7.4f}",
                        row.track > 0 ? std::to_string(row.track) : "-", row.frequency_hz,
@@ -61,8 +67,7 @@ std::string table_line(const table_state& state) {
 }
 
 terminal_table::terminal_table(int fd) {
-    char name[128];
-    fd_ = ttyname_r(fd, name, sizeof name) == 0 ? open(name, O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC) : -1;
+    fd_ = open_terminal(fd);
     const char* no_colour = std::getenv("NO_COLOR");
     colour_ = !(no_colour && *no_colour);
 }
@@ -73,7 +78,10 @@ terminal_table::~terminal_table() {
 
 bool terminal_table::fits(int fd) {
     const char* kind = std::getenv("TERM");
-    return isatty(fd) && !(kind && std::strcmp(kind, "dumb") == 0);
+    if (!isatty(fd) || (kind && std::strcmp(kind, "dumb") == 0)) return false;
+    const int own = open_terminal(fd); // not so for the terminal of another user, or in a container
+    if (own >= 0) close(own);
+    return own >= 0;
 }
 
 std::vector<std::string> terminal_table::render(const table_state& state, bool colour, std::size_t width,

@@ -43,8 +43,8 @@ void record_watch::show_progress() {
     const double now = now_s();
     if (now - shown_at_ < redraw_s) return;
     shown_at_ = now;
-    fmt::print(stderr, "\r{}{:.1f} s, {} frames ", trigger_.waiting() ? "armed, " : "",
-               static_cast<double>(last_ns_ - first_ns_) * 1e-9, frames_);
+    say("\r{}{:.1f} s, {} frames ", trigger_.waiting() ? "armed, " : "",
+        static_cast<double>(last_ns_ - first_ns_) * 1e-9, frames_);
 }
 
 void record_watch::on_sample(std::int64_t index, const double* row) {
@@ -75,7 +75,7 @@ bool record_watch::done() const {
 }
 
 void record_watch::finish() {
-    if (terminal_ && shown_at_ > 0) fmt::print(stderr, "\n");
+    if (terminal_ && shown_at_ > 0) say("\n");
     if (stopped_) throw failure(exit_device, ""); // said when it happened
     if (!heard())
         throw failure(exit_no_model, fmt::format("no frame was received: are the sensors on, and are the buses of {} "
@@ -83,20 +83,22 @@ void record_watch::finish() {
                                                  config_.path));
     if (trigger_.waiting()) throw failure(exit_no_model, trigger_.missed());
     grid_.finish();
+    std::string report;
     for (std::size_t i = 0; i < config_.buses.size(); ++i) {
         const auto& lost = grid_.bus(i).lost;
         const std::uint64_t missing = std::accumulate(lost.begin(), lost.end(), std::uint64_t{0});
-        fmt::print("bus {}: {} frames of the channels, {} missing ({} dropped by the socket, {} by the driver)\n",
-                   config_.buses[i].name, grid_.bus(i).received, missing, losses_[i].socket_overflow,
-                   losses_[i].driver);
+        report += fmt::format(
+            "bus {}: {} frames of the channels, {} missing ({} dropped by the socket, {} by the driver)\n",
+            config_.buses[i].name, grid_.bus(i).received, missing, losses_[i].socket_overflow, losses_[i].driver);
     }
     for (std::size_t i = 0; i < config_.channels.size(); ++i) {
         const grid_channel_counts counts = grid_.channel(i);
         const double percent =
             counts.expected ? 100.0 * static_cast<double>(counts.received) / static_cast<double>(counts.expected) : 0;
-        fmt::print("channel {}: {} of {} samples, {:.4g} %\n", config_.channels[i].name, counts.received,
-                   counts.expected, percent);
+        report += fmt::format("channel {}: {} of {} samples, {:.4g} %\n", config_.channels[i].name, counts.received,
+                              counts.expected, percent);
     }
+    (void)std::fwrite(report.data(), 1, report.size(), stdout);
 }
 
 } // namespace okid_host

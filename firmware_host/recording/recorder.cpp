@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 #include <limits>
 #include <random>
+#include <regex>
 
 namespace okid_host {
 namespace {
@@ -37,6 +38,12 @@ drv_journal_time_t time_now() { return {clock_ns(CLOCK_REALTIME), clock_ns(CLOCK
 std::uint64_t random_run() {
     std::random_device device;
     return std::uint64_t{device()} << 32 | device();
+}
+
+/// Journals are handed on; who may talk to the broker is nobody's business there.
+std::string without_passwords(const std::string& config) {
+    static const std::regex user("(mqtt://)[^@/\"'\\n]*@");
+    return std::regex_replace(config, user, "$1");
 }
 
 std::string title_of(const live_config& config) {
@@ -113,6 +120,7 @@ recorder::recorder(const live_config& config, const recorder_options& options)
     header_.buses = journal_buses(config);
     if (!waits_) header_.duration_s = options.duration_s;
     header_.texts = config.texts;
+    header_.texts.config = without_passwords(header_.texts.config);
     if (waits_) return;
     if (const int reason = open_segment())
         throw failure(exit_usage,
@@ -150,7 +158,7 @@ std::vector<recording_news> recorder::news() {
 }
 
 void recorder::tell(const char* kind, const std::string& text, bool urgent) {
-    if (urgent) fmt::print(stderr, "okid: {}\n", text);
+    if (urgent) say("okid: {}\n", text);
     const std::lock_guard<std::mutex> hold(mutex_);
     news_.push_back({kind, text});
 }
@@ -297,7 +305,7 @@ bool recorder::serve(bool last) {
     return any;
 }
 
-void recorder::run() {
+void recorder::run() try {
     for (bool stopping = false; !failed_ && !stopping;) {
         {
             std::unique_lock<std::mutex> hold(mutex_);
@@ -322,6 +330,9 @@ void recorder::run() {
                          static_cast<double>(counts_.bytes) / 1e6,
                          counts_.lost ? fmt::format("; {} lost because the disk was too slow", counts_.lost) : ""),
              true);
+} catch (const std::exception& why) { // no memory, or a folder that fails while it is listed
+    failed_ = true;
+    tell("stopped", fmt::format("recording stopped: {}", why.what()), true);
 }
 
 } // namespace okid_host

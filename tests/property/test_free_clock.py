@@ -173,6 +173,19 @@ def test_decimation(tmp_path: Path, motion) -> None:
     assert any(w["code"] == "decimated" for w in result["warnings"])
 
 
+def test_a_long_pause_is_no_work(tmp_path: Path, motion) -> None:
+    """An hour without a frame: one update behind it, and every missing sample counted."""
+    write_log(tmp_path / "a.log", motion, 0.0, 2000.0)
+    lines = (tmp_path / "a.log").read_text().splitlines()
+    hour = [f"({float(line[1:18]) + 3600:.6f}) {line[20:]}" for line in lines]
+    (tmp_path / "a.log").write_text("\n".join(lines + hour) + "\n")
+    result, events = identify(tmp_path, "", decimate=4)
+    assert result["samples"] > 3500 * RATE
+    assert len([event for event in events if event["type"] == "modes"]) < 200
+    stats = [event for event in events if event["type"] == "stats"][-1]
+    assert all(3560 * RATE < channel["missing"] < 3580 * RATE for channel in stats["channel"].values())
+
+
 @pytest.mark.parametrize(
     ("clock", "expected"),
     [

@@ -7,6 +7,7 @@ import json
 import os
 import resource
 import shutil
+import socket
 import subprocess
 import tomllib
 from pathlib import Path
@@ -171,13 +172,28 @@ def test_segments(rig: Path) -> None:
     again, _, errors = replay(mine[0])
     assert again == result
     assert f"and the {len(mine) - 1} segments behind it" in errors
+    assert "not there" not in errors
     mine[1].unlink()
-    (only,) = {json.loads(replay(mine[0])[0])["samples"]}
-    assert only < 10 * SAMPLES
+    part, _, errors = replay(mine[0])
+    assert json.loads(part)["samples"] < 10 * SAMPLES
+    assert "the segment behind the last one read is not there" in errors
     with (rig / "whole.okj").open("wb") as out:
         for path in kept:
             out.write(path.read_bytes())
     assert replay(rig / "whole.okj")[1][-1]["type"] == "result"
+
+
+def test_a_journal_tells_no_password_and_opens_nothing(rig: Path) -> None:
+    section = '[record]\n[publish]\nsocket = "live.sock"\nmqtt = "mqtt://me:secret@127.0.0.1:1/rig"\n'
+    run(rig, section)
+    (path,) = journals(rig)
+    inside = journal.texts(path)["config"].decode()
+    assert "secret" not in path.read_bytes().decode("latin-1") and 'mqtt = "mqtt://127.0.0.1:1/rig"' in inside
+    taken = socket.socket(socket.AF_UNIX)
+    taken.bind(str(path.parent / "live.sock"))
+    taken.listen(1)
+    assert "mqtt" not in replay(path)[2]
+    taken.close()
 
 
 def test_two_runs_in_one_second_do_not_share_a_file(rig: Path) -> None:

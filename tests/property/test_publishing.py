@@ -257,6 +257,64 @@ def test_prometheus(rig: pathlib.Path) -> None:
     assert len(numbers(file_lines(rig), "modes")) >= 110  # the hostile ones disturbed nothing
 
 
+def ask(port: int, request: bytes) -> bytes:
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as wire:
+        wire.sendall(request)
+        return b"".join(iter(lambda: wire.recv(65536), b""))
+
+
+def test_other_requests_get_an_answer_and_harm_nothing(rig: pathlib.Path) -> None:
+    port = free_port()
+    with replaying(rig, f'prometheus = "127.0.0.1:{port}"', "--speed", "10") as run:
+
+        def page() -> bytes | None:
+            with contextlib.suppress(OSError):
+                return ask(port, b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n")
+            return None
+
+        whole = until(page)
+        head, _, body = whole.partition(b"\r\n\r\n")
+        assert head.startswith(b"HTTP/1.1 200 OK") and f"Content-Length: {len(body)}".encode() in head
+        assert b"# TYPE okid_settled gauge" in body
+        for request, status in [
+            (b"GET / HTTP/1.1\r\n\r\n", b"404"),
+            (b"GET /favicon.ico HTTP/1.0\r\n\r\n", b"404"),
+            (b"POST /metrics HTTP/1.1\r\nContent-Length: 3\r\n\r\nabc", b"405"),
+            (b"HEAD / HTTP/1.1\r\n\r\n", b"404"),
+            (b"\xff\x00\r\n\r\n", b"400"),
+            (b"GET /metrics?a=b HTTP/1.1\r\n\r\n", b"200"),
+            (b"GET /" + b"x" * 5000, b"431"),
+        ]:
+            assert ask(port, request).split()[1] == status, request
+        bare = ask(port, b"HEAD /metrics HTTP/1.1\r\n\r\n")
+        assert bare.startswith(b"HTTP/1.1 200 OK") and bare.endswith(b"\r\n\r\n")
+        run.send_signal(signal.SIGTERM)
+        asked = time.monotonic()
+        assert run.wait(60) in (0, 3)  # whether there is a model by then does not matter here
+        assert time.monotonic() - asked < 10
+
+
+@pytest.mark.parametrize("stdout", ["closed", "full"])
+def test_nobody_reads_what_is_said(rig: pathlib.Path, stdout: str) -> None:
+    """A pipe whose reader has gone, a disk that is full under stderr: the result is there, the journal closed."""
+    text = (rig / "a.toml").read_text().replace('type = "socketcan"', 'type = "replay"\nfile = "a.log"')
+    (rig / "q.toml").write_text(text + f'[record]\ndirectory = "quiet-{stdout}"\n')
+    (rig / "q.json").unlink(missing_ok=True)
+    reader, writer = os.pipe()
+    os.close(reader)
+    full = os.open("/dev/full", os.O_WRONLY)
+    out = writer if stdout == "closed" else full
+    command = [PROGRAM, "run", rig / "q.toml", "--json", rig / "q.json"]
+    restored = {"restore_signals": True}  # SIGPIPE as a shell gives it
+    subprocess.run(command, stdout=out, stderr=full, stdin=subprocess.DEVNULL, timeout=120, check=False, **restored)
+    os.close(writer)
+    os.close(full)
+    assert json.loads((rig / "q.json").read_text())["modes"]
+    (path,) = (rig / f"quiet-{stdout}").glob("*.okj")
+    done = okid("replay", path)
+    assert done.returncode == 0 and "not closed" not in done.stderr, done.stderr
+
+
 def test_a_port_that_is_taken(rig: pathlib.Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

@@ -110,6 +110,7 @@ typedef struct drv_journal_reader_t {
     uint64_t foreign;       ///< valid chunks of another run, or older than those before them: left out
     unsigned newer;         ///< version of chunks that a later okid wrote, 0 = none
     int ended;              ///< the last chunk says that the file was closed in order
+    int more;               ///< and that the run goes on in another file
     // private
     drv_journal_read_t read;
     void* context;
