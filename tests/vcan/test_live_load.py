@@ -86,7 +86,7 @@ def completion(disk: Path, samples: int) -> NDArray[np.float64]:
     number, last = np.zeros((2, FRAMES), int), np.zeros(samples)
     lines = 0
     for path in sorted(disk.glob("*.okj")):
-        for frame in journal.frames(path):
+        for frame in (frame for chunk in journal.read(path)[0] for frame in chunk.frames()):
             if frame.bus == 2:
                 lines += 1
                 continue
