@@ -18,6 +18,8 @@ mount -t tmpfs run /run
 mount -t configfs config /sys/kernel/config 2>/dev/null
 ln -sf /proc/self/fd /dev/fd
 ip link set lo up
+# One slow processor for senders and receivers: what vcan hands on must not be dropped before a socket sees it.
+echo 100000 >/proc/sys/net/core/netdev_max_backlog
 
 modules=/usr/lib/uml/modules/$(uname -r)/kernel
 for module in net/can/can net/can/can-raw net/can/can-bcm net/can/can-gw drivers/net/can/dev/can-dev drivers/net/can/vcan \
