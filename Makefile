@@ -6,7 +6,8 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo test test-slow test-embedded bench bench-check fuzz lint format sanitize clean
+.PHONY: help setup build demo test test-slow test-wheel test-embedded test-package package docs bench bench-check bench-peers \
+	fuzz lint format sanitize sanitize-all coverage sbom clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 22
@@ -15,14 +16,16 @@ setup: ## install what is missing (Debian packages, .venv); silent when nothing 
 	@tools/setup.sh build
 
 build: setup ## build/okid, build/libokid.so, build/libokid.a, .venv with `import okid`
+	@[ -e build/okid ] || echo "build: compiling, some minutes the first time"
 	@cmake --preset release -DOKID_BUILD_TESTS=OFF --log-level=WARNING >/dev/null
 	@cmake --build build -j$(JOBS) -- --quiet
 
-demo: build ## play a recorded shaker test through the front end, identify it while it plays, write a report
+demo: build ## play a simulated shaker test, frame by frame, through the front end, identify it while it plays, write a report
 	@tools/demo.sh
 
 test: ## everything that proves the product, real vcan included
 	@tools/setup.sh test
+	@[ -e build/okid ] || echo "build: compiling, some minutes the first time"
 	@cmake --preset release -DOKID_BUILD_TESTS=ON --log-level=WARNING >/dev/null
 	@cmake --build build -j$(JOBS) -- --quiet
 	@tests/run
@@ -32,8 +35,13 @@ test-slow: ## the long tiers: more seeds, more frames
 	@cmake --preset release -DOKID_BUILD_TESTS=ON --log-level=WARNING >/dev/null
 	@cmake --build build -j$(JOBS) -- --quiet
 	@OKID_SLOW=1 tests/run
+	@$(MAKE) --no-print-directory sanitize-all test-package
 
-test-embedded: ## the library on other processors, cross-compiled and run in an emulator
+test-wheel: ## the Python package as a stranger installs it: source distribution, wheel, fresh environments
+	@tools/setup.sh test
+	@tests/wheel/run
+
+test-embedded: ## firmware on Cortex-M in QEMU, the library on Arm boards, the installed package
 	@tools/setup.sh embedded
 	@tests/embedded/run
 
@@ -41,10 +49,16 @@ bench: build ## speed of the kernels and of whole identifications as ratios with
 	@tools/setup.sh bench || echo "bench: going on without SLICOT"
 	@tools/setup.sh test
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --save build/bench.json
+	@$(PYTHON) tests/bench/python_call.py build/bench.json
+	@$(PYTHON) tests/bench/campaign.py 1000 5 build/bench.json
 	@PYTHONPATH=tests/property:tests/io OPENBLAS_NUM_THREADS=1 $(PYTHON) tests/bench/live_latency.py
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
 	@$(PYTHON) tools/bench_check.py build/bench.json
+
+bench-peers: build ## other programs on the same data, into build/peers.json
+	@tools/setup.sh bench || echo "bench-peers: going on without SLICOT"
+	@tests/bench/peers/run
 
 sanitize: ## unit tests under AddressSanitizer and UndefinedBehaviourSanitizer
 	@tools/setup.sh test
@@ -52,11 +66,35 @@ sanitize: ## unit tests under AddressSanitizer and UndefinedBehaviourSanitizer
 	@cmake --build build-sanitize -j$(JOBS) -- --quiet
 	@ctest --test-dir build-sanitize --output-on-failure -j$(JOBS) --no-tests=error
 
+sanitize-all: ## every tier under AddressSanitizer, threads under ThreadSanitizer
+	@tools/setup.sh test
+	@tests/sanitize/run
+
+coverage: ## lines of lib and drivers that their tests run, as a table; below 95 % is an error
+	@tools/setup.sh dev
+	@tools/coverage.sh
+
+sbom: build ## bill of materials: build/sbom.cdx.json and docs/reference/dependencies.md
+	@tools/setup.sh docs
+	@$(PYTHON) tools/sbom.py
+
 fuzz: ## fuzzers of every decoder and file reader, SECONDS=60 for all of them together
 	@tools/setup.sh fuzz
 	@tests/fuzz/run $(or $(SECONDS),60)
 
-lint: ## format, clang-tidy, ruff, mypy
+package: ## Debian packages in build/package/packages
+	@tools/setup.sh package
+	@packaging/build
+
+test-package: ## packages and wheel in clean systems: installed, used, purged (root)
+	@tools/setup.sh package
+	@tests/package/run
+
+docs: ## the documentation as web pages in build/docs; every warning is an error
+	@tools/setup.sh docs
+	@tools/docs.sh
+
+lint: ## format, clang-tidy, cppcheck, warnings of two compilers, ruff, mypy
 	@tools/setup.sh dev
 	@tools/lint.sh
 
@@ -66,4 +104,4 @@ format: ## rewrite C, C++ and Python in the house style
 	@.venv/bin/ruff format --config tools/pyproject.toml -q tools tests
 
 clean: ## remove build folders (not .venv)
-	@rm -rf build build-sanitize build-coverage build-float build-aarch64 build-fuzz
+	@rm -rf build build-sanitize build-coverage build-float build-embedded build-fuzz build-thread

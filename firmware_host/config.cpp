@@ -4,6 +4,7 @@
 #include "config_alarm.hpp"
 #include "config_channel.hpp"
 #include "config_clock.hpp"
+#include "config_geometry.hpp"
 #include "config_hammer.hpp"
 #include "config_line.hpp"
 #include "config_publish.hpp"
@@ -14,12 +15,14 @@
 #include "config_trigger.hpp"
 #include "deviations.hpp"
 #include "error.hpp"
+#include "file_kind.hpp"
 #include "method.hpp"
 #include "nearest_name.hpp"
 #include "presets.hpp"
 #include "units.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
@@ -53,6 +56,11 @@ toml::table parse(const std::string& path, const std::string& text) {
     try {
         return toml::parse(text, path);
     } catch (const toml::parse_error& error) {
+        const file_kind kind = kind_of_text(text);
+        if (kind != file_kind::unknown && kind != file_kind::toml)
+            refuse_file(path, fmt::format("it looks like {}, expected a CONFIG.toml (see okid COMMAND --help for the "
+                                          "order of the files)",
+                                          file_kind_name(kind)));
         refuse_file(path, fmt::format("line {}, column {}: {}", error.source().begin.line, error.source().begin.column,
                                       error.description()));
     }
@@ -79,7 +87,12 @@ bus_config read_bus(const config_place& place, const toml::table& table) {
     bus.dbitrate = table["dbitrate"].value<double>();
     bus.dbc_name = table["dbc"].value_or(std::string());
     if (!bus.dbc_name.empty()) bus.dbc = beside(place.path, bus.dbc_name);
-    if (const auto file = table["file"].value<std::string>()) bus.file = beside(place.path, *file);
+    if (const auto file = table["file"].value<std::string>()) {
+        if (bus.type != "replay")
+            refuse_key(place, *table.get("file"), "file",
+                       fmt::format("only a bus of type replay reads a file, this one is of type {}", bus.type));
+        bus.file = beside(place.path, *file);
+    }
     read_line(place, table, bus);
     read_sending(place, table, bus);
     if (bus.type == "socketcan")
@@ -124,11 +137,11 @@ void read_buses(const std::string& path, const toml::table& file, live_config& c
     }
 }
 
+constexpr std::array<const char*, 5> role_names{"force", "acceleration", "velocity", "displacement", "aux"};
+
 channel_role role_of(const std::string& text) {
-    if (text == "force") return channel_role::force;
-    if (text == "acceleration") return channel_role::acceleration;
-    if (text == "velocity") return channel_role::velocity;
-    return text == "displacement" ? channel_role::displacement : channel_role::aux;
+    const auto at = std::find(role_names.begin(), role_names.end(), text);
+    return at == role_names.end() ? channel_role::aux : static_cast<channel_role>(at - role_names.begin());
 }
 
 std::size_t bus_of(const config_place& place, const toml::table& table, const live_config& config) {
@@ -168,6 +181,17 @@ void share_sequence(const config_place& place, const toml::table& table, live_co
     }
 }
 
+std::string dbc_text_of(const std::string& config, const bus_config& bus) {
+    try {
+        return read_dbc_text(bus.dbc);
+    } catch (const failure& fault) {
+        throw failure(fault.code,
+                      fmt::format("{}: [[bus]] \"{}\", key \"dbc\": {} (a relative name counts from the folder of "
+                                  "the config)",
+                                  config, bus.name, fault.what()));
+    }
+}
+
 /// Every DBC once, by its path. Those that `texts` does not hold yet are read, when there are files to read.
 std::map<std::string, dbc_file> read_dbcs(const live_config& config, bool from_files, config_texts& texts) {
     std::map<std::string, dbc_file> out;
@@ -175,7 +199,7 @@ std::map<std::string, dbc_file> read_dbcs(const live_config& config, bool from_f
         if (bus.dbc.empty() || out.count(bus.dbc)) continue;
         const auto [text, fresh] = texts.dbcs.try_emplace(bus.dbc_name);
         if (fresh && !from_files) refuse_file(config.path, fmt::format("\"{}\" is not in it", bus.dbc_name));
-        if (fresh) text->second = read_dbc_text(bus.dbc);
+        if (fresh) text->second = dbc_text_of(config.path, bus);
         out.emplace(bus.dbc, read_dbc(bus.dbc, text->second));
     }
     return out;
@@ -250,6 +274,11 @@ void read_identification(const std::string& path, const toml::table& file, live_
                    "window_s is given too; a window and forgetting together are not available, choose one");
     const okid_method_t method = method_of(out.method);
     const bool by_rows = looks_back_rows(method, config.n_u);
+    if (by_rows && t.contains("p") && (is_subspace(method) || out.rows > 0))
+        config.warnings.push_back(
+            fmt::format("[identification] p belongs to the observer of the okid methods: {} looks back {} block rows "
+                        "here",
+                        out.method, rows_used(method, config.n_u, out.p, out.rows)));
     const int least = 2 * (by_rows ? rows_used(method, config.n_u, out.p, out.rows) : out.p);
     if (out.window_s && *out.window_s * config.rate_hz < least)
         refuse_key(place, *t.get("window_s"), "window_s",
@@ -268,22 +297,67 @@ void read_identification(const std::string& path, const toml::table& file, live_
     if (!fault.empty()) refuse_key(place, *t.get("mkr"), "mkr", fault + ". The key \"dof\" of [[channel]] says where");
 }
 
-/// Sections of later versions: checked, then said to do nothing.
-void note_ignored(const toml::table& file, live_config& config) {
-    for (const char* section : {"geometry"})
-        if (file.contains(section))
-            config.warnings.push_back(fmt::format("[{}] is accepted, but does nothing in this version", section));
+/// A unit of something else than what the role says: M, K and R of it would be nonsense, modes are not.
+void check_measures(live_config& config, const channel_config& channel, const std::string& si) {
+    static const std::array<const char*, 4> measured{"N", "m/s^2", "m/s", "m"}; // as channel_role
+    const auto found = static_cast<std::size_t>(std::find(measured.begin(), measured.end(), si) - measured.begin());
+    const auto role = static_cast<std::size_t>(channel.role);
+    if (role >= measured.size() || found == measured.size() || found == role) return;
+    const std::string text = fmt::format(
+        "[[channel]] \"{}\": \"{}\" is a unit of {}, but its role is {}; expected one like \"{}\", or another role",
+        channel.name, channel.unit, role_names[found], role_names[role], measured[role]);
+    if (config.identification.mkr && channel.dof != 0) refuse_file(config.path, text);
+    config.unit_remarks.emplace_back("unit_doubtful", text);
+}
+
+/// The DBC and the config name two units: one of them is wrong, or a scale is meant.
+void compare_units(live_config& config, const channel_config& channel) {
+    const unit_rule *own = find_unit(channel.unit), *dbc = find_unit(channel.dbc_unit);
+    if (!own || !dbc || channel.dbc_unit.empty() || channel.unit.empty()) return;
+    if (std::string(own->si) == dbc->si && own->factor == dbc->factor) return;
+    config.unit_remarks.emplace_back(
+        "unit_doubtful",
+        fmt::format("[[channel]] \"{}\": its unit is \"{}\", but signal {} of the dbc is in \"{}\"; the one of the "
+                    "channel is taken. Leave the key out to take that of the dbc",
+                    channel.name, channel.unit, channel.signal, channel.dbc_unit));
+}
+
+/// Two channels that read the same number are one sensor taken twice.
+void check_same_bits(live_config& config) {
+    for (std::size_t i = 0; i < config.channels.size(); ++i)
+        for (std::size_t k = 0; k < i; ++k) {
+            const channel_config &a = config.channels[k], &b = config.channels[i];
+            if (a.bus != b.bus || a.field != b.field || !same_frames(a.frame, b.frame) ||
+                !same_bits(a.layout, b.layout) || a.selectors != b.selectors)
+                continue;
+            config.warnings.push_back(fmt::format(
+                "[[channel]] \"{}\" reads the same bits as \"{}\": is its signal or start_bit right?", b.name, a.name));
+        }
+}
+
+void check_units(live_config& config) {
+    for (const channel_config& channel : config.channels) compare_units(config, channel);
     for (const channel_config& channel : config.channels)
-        if (!find_unit(channel.unit))
-            config.warnings.push_back(
+        if (const unit_rule* rule = find_unit(channel.unit))
+            check_measures(config, channel, rule->si);
+        else
+            config.unit_remarks.emplace_back(
+                "unit_unknown",
                 fmt::format("channel \"{}\": the unit \"{}\" is not known, its numbers are taken as they are",
                             channel.name, channel.unit));
+    for (const auto& [code, text] : config.unit_remarks) config.warnings.push_back(text);
 }
 
 } // namespace
 
+// cppcheck-suppress CastIntegerToAddressAtReturn ; the array holds texts
+const char* channel_role_name(channel_role role) { return role_names[static_cast<std::size_t>(role)]; }
+
 static live_config make_config(const std::string& path, config_texts texts, bool from_files) {
     toml::table file = parse(path, texts.config);
+    if (file.contains("masses") || file.contains("springs") || file.contains("sense_dofs"))
+        refuse_file(
+            path, "it looks like a RIG.toml, expected a CONFIG.toml: okid simulate RIG.toml makes one (--config FILE)");
     apply_presets(path, file, texts.presets);
     check_schema(path, file);
     live_config config;
@@ -299,7 +373,9 @@ static live_config make_config(const std::string& path, config_texts texts, bool
     read_publish(file, config);
     read_record(file, config);
     read_realtime(file, config);
-    note_ignored(file, config);
+    check_geometry(file, config);
+    check_units(config);
+    check_same_bits(config);
     config.texts = std::move(texts);
     return config;
 }
@@ -339,9 +415,8 @@ std::vector<drv_filter_t> wanted_frames(const live_config& config, std::size_t b
     std::vector<drv_filter_t> out;
     for (const channel_config& channel : config.channels) {
         if (channel.bus != bus) continue;
-        const bool known = std::any_of(out.begin(), out.end(), [&](const drv_filter_t& f) {
-            return f.id == channel.frame.id && f.extended == channel.frame.extended && f.mask == channel.frame.mask;
-        });
+        const bool known =
+            std::any_of(out.begin(), out.end(), [&](const drv_filter_t& f) { return same_frames(f, channel.frame); });
         if (!known) out.push_back(channel.frame);
     }
     return out;

@@ -40,6 +40,12 @@ struct bus_config {
 };
 
 enum class channel_role { force, acceleration, velocity, displacement, aux };
+const char* channel_role_name(channel_role role);
+
+/// Do two channels come in the same frames?
+bool same_frames(const drv_filter_t& a, const drv_filter_t& b);
+/// Do two signals stand at the same bits?
+bool same_bits(const drv_signal_t& a, const drv_signal_t& b);
 
 /// A signal that says what a frame carries, and the values, ends included, for which it carries the one asked for.
 struct multiplexor {
@@ -53,8 +59,9 @@ struct multiplexor {
 struct channel_config {
     std::string name;
     channel_role role = channel_role::aux;
-    int dof = 0;      ///< 0 = not given
-    std::string unit; ///< as measured
+    int dof = 0;          ///< 0 = not given
+    std::string unit;     ///< as measured
+    std::string dbc_unit; ///< what the DBC says of the signal, "" = nothing
     std::size_t bus = 0;
     std::string message, signal;          ///< names out of the DBC, "" without one
     drv_filter_t frame{};                 ///< identifier, or those alike (a PGN)
@@ -142,6 +149,7 @@ struct publish_config {
     std::string socket; ///< path of a unix socket, already relative to the config's folder; "" = none
     std::optional<net_address> udp, prometheus;
     std::optional<broker_address> mqtt;
+    bool samples = false; ///< the signals too go to the unix socket
 };
 
 /// [record]: raw frames onto the disk.
@@ -185,7 +193,8 @@ struct live_config {
     record_config record;
     realtime_config realtime;
     config_texts texts;
-    std::vector<std::string> warnings; ///< what is accepted but does nothing in this version
+    std::vector<std::string> warnings; ///< what is accepted, and worth a remark
+    remarks unit_remarks;              ///< of them those that bear on the numbers of the result
 };
 
 /// Read and check. Throws `failure` (exit 2) naming file, line, key, what was found and what was expected.

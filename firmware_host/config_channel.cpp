@@ -161,6 +161,7 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
                                dbc->path));
     channel.length = message.length;
     channel.layout = signal.layout;
+    channel.dbc_unit = signal.unit;
     if (channel.unit.empty()) channel.unit = signal.unit;
     resolve_selectors(place, *signal_node, *dbc, message, signal, channel);
     resolve_sequence(place, table, dbc, &message, channel);
@@ -221,9 +222,28 @@ bool multiplexor::holds(const drv_frame_t& frame) const {
                        [&](const auto& range) { return value >= range.first && value <= range.second; });
 }
 
+bool same_frames(const drv_filter_t& a, const drv_filter_t& b) {
+    return a.id == b.id && a.extended == b.extended && a.mask == b.mask;
+}
+
+bool same_bits(const drv_signal_t& a, const drv_signal_t& b) {
+    return a.start_bit == b.start_bit && a.length == b.length && a.big_endian == b.big_endian;
+}
+
 bool multiplexor::operator==(const multiplexor& other) const {
-    return layout.start_bit == other.layout.start_bit && layout.length == other.layout.length &&
-           layout.big_endian == other.layout.big_endian && values == other.values;
+    return same_bits(layout, other.layout) && values == other.values;
+}
+
+/// A classic frame has eight bytes; what lies beyond comes in FD frames, which a bus has to be opened for.
+static void check_length(const config_place& place, const toml::table& table, const bus_config& bus,
+                         const channel_config& channel) {
+    const std::size_t bytes = std::max<std::size_t>(channel.length, drv_signal_bytes(&channel.layout));
+    if (bytes <= 8 || bus.fd || (bus.type != "socketcan" && bus.type != "slcan")) return;
+    refuse_table(
+        place, table,
+        fmt::format("its frame has {} bytes or more, which only CAN FD has: write fd = true in [[bus]] \"{}\", or "
+                    "mend the bits of the channel",
+                    bytes, bus.name));
 }
 
 void resolve_channel(const config_place& place, const toml::table& table, const bus_config& bus, const dbc_file* dbc,
@@ -237,6 +257,7 @@ void resolve_channel(const config_place& place, const toml::table& table, const 
         resolve_by_name(place, table, bus, dbc, channel);
     else
         resolve_by_bits(place, table, channel);
+    check_length(place, table, bus, channel);
     if (const toml::node* node = table.get("scale")) { // by hand, or to correct what the dbc says
         channel.layout.scale = *node->value<double>();
         if (channel.layout.scale == 0) refuse_key(place, *node, "scale", "found 0, expected another number");

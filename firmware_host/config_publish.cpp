@@ -128,6 +128,12 @@ void read_publish(const toml::table& file, live_config& config) {
     require_built(place, *table, "mqtt", mqtt, "libmosquitto-dev");
     publish_config& out = config.publish;
     if (const toml::node* node = table->get("socket")) out.socket = socket_of(place, *node);
+    if (const toml::node* node = table->get("samples")) {
+        out.samples = *node->value<bool>();
+        if (out.samples && out.socket.empty())
+            refuse_key(place, *node, "samples",
+                       "found true, expected socket = \"okid.sock\" beside it: that is where they go");
+    }
     if (const toml::node* node = table->get("udp")) {
         out.udp = address_of(*node->value<std::string>(), 0);
         if (!out.udp) refuse_address(place, *node, "udp", "an address and a port, such as 127.0.0.1:9870");

@@ -139,7 +139,13 @@ const std::vector<section_rule> schema = {
       {"segment_mb", kind::positive, 0, 1e6},
       {"max_mb", kind::positive, 0, 1e9},
       {"pretrigger_s", kind::number, 0, 1e5}}},
-    {"publish", false, {{"socket", kind::text}, {"udp", kind::text}, {"prometheus", kind::text}, {"mqtt", kind::text}}},
+    {"publish",
+     false,
+     {{"socket", kind::text},
+      {"samples", kind::flag},
+      {"udp", kind::text},
+      {"prometheus", kind::text},
+      {"mqtt", kind::text}}},
     {"realtime", false, {{"priority", kind::whole, 0, 99}, {"lock_memory", kind::flag}, {"cpus", kind::array}}},
     {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
 

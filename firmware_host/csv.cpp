@@ -7,6 +7,7 @@
 #include "nearest_name.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -96,8 +97,11 @@ void row_parser::ragged(std::size_t number, std::string_view line) const {
     const char* const begin = line.data();
     const char* const end = begin + line.size();
     for (const char* at = end_of_field(begin, end); at < end; at = end_of_field(at + 1, end)) ++cells;
-    throw failure(exit_usage, fmt::format("{}, line {}: found {} cell{}, expected {} as in the header (line {})", path_,
-                                          number, cells, cells == 1 ? "" : "s", header_.names.size(), header_.line));
+    const bool halves = header_.separator == ',' && header_.names.size() > 1 && cells == 2 * header_.names.size();
+    throw failure(exit_usage,
+                  fmt::format("{}, line {}: found {} cell{}, expected {} as in the header (line {}){}", path_, number,
+                              cells, cells == 1 ? "" : "s", header_.names.size(), header_.line,
+                              halves ? ". Decimal commas need semicolons between the cells" : ""));
 }
 
 /// A cell that is not simply a number: blanks, quotes, empty, nan, decimal comma; anything else is an error.
@@ -194,8 +198,8 @@ double row_parser::rate_of_time() const {
         throw failure(
             exit_usage,
             fmt::format("{}, line {}, column {} (time_s): found a step of {:.6g} s, expected {:.6g} s as on average: "
-                        "the samples are not evenly spaced, or rows are missing, or the stamps are rounded; resample "
-                        "the record, or give --fs HZ if they were evenly spaced",
+                        "the samples are not evenly spaced, or rows are missing, or the stamps are rounded. Put a row "
+                        "of empty cells where a sample is missing; give --fs HZ if the samples were evenly spaced",
                         path_, out_.first_line + i, time_column_ + 1, found, step));
     }
     return std::strtod(fmt::format("{:.9g}", 1.0 / step).c_str(), nullptr); // stamps carry no more digits than that
@@ -253,6 +257,17 @@ std::vector<std::string> read_csv_columns(const std::string& path) {
     return read_head(reader, path).names;
 }
 
+/// A column of another name that may be meant as the time.
+static std::string time_like(const std::vector<std::string>& names) {
+    for (const std::string& name : names) {
+        std::string small;
+        for (const char c : name) small += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        if (small == "t" || small.rfind("time", 0) == 0)
+            return fmt::format(" (is \"{}\" the time in seconds? Then call it time_s)", printable(name));
+    }
+    return "";
+}
+
 csv_record read_csv(const std::string& path, const csv_request& request) {
     line_reader reader(path);
     const csv_header header = read_head(reader, path);
@@ -265,14 +280,16 @@ csv_record read_csv(const std::string& path, const csv_request& request) {
     if (use_time) rows.want_time(static_cast<std::size_t>(time - header.names.begin()));
     if (!request.fs_hz && !header.fs_hz && !use_time)
         throw failure(exit_usage,
-                      fmt::format("{}: no sample rate{}; expected --fs HZ, a line \"# fs_hz: 1024\" above the column "
+                      fmt::format("{}: no sample rate{}{}; expected --fs HZ, a line \"# fs_hz: 1024\" above the column "
                                   "names, or a column time_s",
-                                  path, header.fs_remark.empty() ? "" : " (" + header.fs_remark + ")"));
+                                  path, header.fs_remark.empty() ? "" : " (" + header.fs_remark + ")",
+                                  time_like(header.names)));
     read_rows(reader, rows, out, request);
     if (out.count == 0)
         throw failure(exit_usage,
                       fmt::format("{}: no rows after the column names (line {}), expected samples", path, header.line));
     rows.check_columns();
+    out.said_fs_hz = header.fs_hz;
     out.fs_hz = request.fs_hz ? *request.fs_hz : header.fs_hz ? *header.fs_hz : rows.rate_of_time();
     return out;
 }

@@ -19,9 +19,10 @@ struct csv_record {
     std::string path;
     std::vector<std::string> columns, units; ///< as asked for; unit "" when the header names none
     double fs_hz = 0;
-    std::size_t count = 0;       ///< samples
-    std::vector<double> samples; ///< columns x count, column-major: one sample after the other
-    std::size_t first_line = 0;  ///< line number of the first sample
+    std::optional<double> said_fs_hz; ///< what the file itself says above its column names
+    std::size_t count = 0;            ///< samples
+    std::vector<double> samples;      ///< columns x count, column-major: one sample after the other
+    std::size_t first_line = 0;       ///< line number of the first sample
 };
 
 /// Read a record. Throws `failure` (exit 2) naming file, line, column, what was found and what was expected.

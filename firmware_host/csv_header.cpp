@@ -2,6 +2,7 @@
 #include "csv_header.hpp"
 
 #include "error.hpp"
+#include "file_kind.hpp"
 #include "nearest_name.hpp"
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <charconv>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unordered_set>
 
 namespace okid_host {
@@ -149,7 +151,18 @@ std::size_t find_csv_column(const std::string& path, const csv_header& header, c
     if (by_base.size() == 1) return by_base[0];
     std::string text = fmt::format("{}, line {}: no column \"{}\"{}; the columns are: {}", path, header.line,
                                    printable(name), did_you_mean(name, header.names), list_names(header.names));
-    if (header.looks_like_numbers) text += ". That line holds numbers: the file needs a line of column names first";
+    const file_kind kind = kind_of_text(fmt::format("{}", fmt::join(header.names, ",")));
+    if (kind == file_kind::can_log)
+        text = fmt::format(
+            "{}: it looks like a log of CAN frames, expected a CSV: okid convert {} FILE.csv -c CONFIG.toml "
+            "makes one, okid replay identifies the log itself",
+            path, path);
+    else if (kind != file_kind::unknown && kind != file_kind::csv)
+        text =
+            fmt::format("{}: it looks like {}, expected a CSV: comment lines with #, a line of column names, numbers",
+                        path, file_kind_name(kind));
+    else if (header.looks_like_numbers)
+        text += ". That line holds numbers: the file needs a line of column names first";
     throw failure(exit_usage, text);
 }
 

@@ -19,6 +19,17 @@ std::string channel_name(int channel, const result_context& context) {
     return fmt::format("channel {}", channel + 1);
 }
 
+/// What to try where no mode was found.
+std::string advice(const okid_identify_config_t& config, const std::string& option) {
+    const bool subspace = is_subspace(config.method);
+    if (config.n_u == 0)
+        return fmt::format("{}Otherwise the record shows no vibration that lasts: try another {} or an --order",
+                           subspace ? "" : "A free decay (ring-down) wants method n4sid-cva or n4sid-moesp. ", option);
+    return fmt::format("Is the record long enough, do the outputs answer the inputs, are the two not exchanged? Try {}"
+                       "another {} or an --order",
+                       subspace ? "" : "method n4sid-moesp, which needs fewer samples, ", option);
+}
+
 std::string reason(okid_status_t status, const okid_identified_t& model, const okid_identify_config_t& config,
                    const result_context& context) {
     const okid_observer_info_t& info = model.observer_info;
@@ -54,10 +65,8 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
             "Try --detrend linear, a smaller --p, or a record without drift",
             info.radius_plain);
     case OKID_ERR_NO_MODES:
-        return fmt::format(
-            "no mode that holds (underdamped, below {:g} Hz, EMAC above 0.5) was found: the record shows no vibration "
-            "that {}. Try another {} or an --order, and check that inputs and outputs are not exchanged",
-            context.fs_hz / 2, config.n_u > 0 ? "answers the inputs" : "lasts", option);
+        return fmt::format("no mode that holds (underdamped, below {:g} Hz, EMAC above 0.5) was found. {}",
+                           context.fs_hz / 2, advice(config, option));
     case OKID_ERR_NUMERIC:
         return fmt::format("a factorisation did not converge. Check the record for extreme values; try a smaller {}",
                            option);
@@ -69,6 +78,8 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
 
 void throw_identify_failure(okid_status_t status, const okid_identified_t& model, const okid_identify_config_t& config,
                             const result_context& context) {
+    for (const auto& [code, text] : context.warnings) // what was adapted to the record is a likely reason
+        if (code == "p_reduced" || code == "rows_reduced") say("okid: warning: {}\n", text);
     throw failure(exit_no_model, "no model: " + reason(status, model, config, context));
 }
 

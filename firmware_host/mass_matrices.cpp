@@ -245,7 +245,9 @@ mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan
     mass_matrices found = take(tried.result, plan);
     const remarks notes = mass_remarks(found);
     said.insert(said.end(), notes.begin(), notes.end());
-    if (!(found.notes & doubts)) return found;
+    const bool misread =
+        std::any_of(said.begin(), said.end(), [](const auto& each) { return each.first == "code_jumps"; });
+    if (!(found.notes & doubts) || misread) return found; // misread numbers are the cause, and no guess finds it
     const std::string cause = likely_cause(model, plan);
     if (!cause.empty()) said.emplace_back("mkr_likely_cause", fmt::format("every check passes with {}", cause));
     return found;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Mass, stiffness and damping matrices as JSON and as words.
 #include "deviations.hpp"
+#include "json_number.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,13 +15,11 @@ using nlohmann::ordered_json;
 constexpr int widest = 12;                                           // columns that stand side by side on a screen
 constexpr double not_proportional = 0.2, cannot_be_told_apart = 1e3; // of okid_pdc_t residual and condition
 
-ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
-
 ordered_json square_json(const std::vector<double>& values, int n) {
     ordered_json out = ordered_json::array();
     for (int i = 0; i < n; ++i) {
         ordered_json row = ordered_json::array();
-        for (int j = 0; j < n; ++j) row.push_back(number(values[static_cast<std::size_t>(j * n + i)]));
+        for (int j = 0; j < n; ++j) row.push_back(number_json(values[static_cast<std::size_t>(j * n + i)]));
         out.push_back(std::move(row));
     }
     return out;
@@ -33,13 +32,13 @@ ordered_json checks_json(const mass_matrices& found) {
     out["m_positive_definite"] = clear_of(found, OKID_MKR_POLARITY | OKID_MKR_MASS);
     out["k_positive_definite"] = clear_of(found, OKID_MKR_STIFFNESS);
     out["r_positive_definite"] = clear_of(found, OKID_MKR_DAMPING);
-    out["ww_residual"] = number(found.residual);
-    out["feedthrough_misfit"] = number(found.feedthrough);
+    out["ww_residual"] = number_json(found.residual);
+    out["feedthrough_misfit"] = number_json(found.feedthrough);
     out["feedthrough_output"] =
         found.feedthrough_output.empty() ? ordered_json(nullptr) : ordered_json(found.feedthrough_output);
-    out["feedthrough_gain"] = found.gain != 0 ? number(found.gain) : ordered_json(nullptr);
-    out["selection_margin"] = found.margin > 0 ? number(found.margin) : ordered_json(nullptr);
-    out["eigenvector_condition"] = number(found.condition);
+    out["feedthrough_gain"] = found.gain != 0 ? number_json(found.gain) : ordered_json(nullptr);
+    out["selection_margin"] = found.margin > 0 ? number_json(found.margin) : ordered_json(nullptr);
+    out["eigenvector_condition"] = number_json(found.condition);
     out["admissible_modes"] = found.admissible;
     out["collocated_pairs"] = found.pairs;
     out["modes_used"] = ordered_json::array();
@@ -165,19 +164,19 @@ void put_mass_json(const mass_matrices& found, ordered_json& result) {
     mkr["modes"] = ordered_json::array();
     for (const mass_mode& mode : found.modes)
         mkr["modes"].push_back({{"mode", mode.number},
-                                {"frequency_hz", number(mode.frequency_hz)},
-                                {"damping_ratio", number(mode.damping_ratio)},
-                                {"strength", number(mode.strength)},
-                                {"mpc", number(mode.mpc)},
-                                {"phase_rad", number(mode.phase)},
-                                {"pair_spread", number(mode.pair_spread)}});
-    pdc["alpha"] = number(found.pdc.alpha);
-    pdc["beta"] = number(found.pdc.beta);
+                                {"frequency_hz", number_json(mode.frequency_hz)},
+                                {"damping_ratio", number_json(mode.damping_ratio)},
+                                {"strength", number_json(mode.strength)},
+                                {"mpc", number_json(mode.mpc)},
+                                {"phase_rad", number_json(mode.phase)},
+                                {"pair_spread", number_json(mode.pair_spread)}});
+    pdc["alpha"] = number_json(found.pdc.alpha);
+    pdc["beta"] = number_json(found.pdc.beta);
     pdc["R"] = square_json(found.R_pdc, n);
-    pdc["alpha_std"] = number(found.alpha_std);
-    pdc["beta_std"] = number(found.beta_std);
-    pdc["residual"] = number(found.pdc.residual);
-    pdc["condition"] = number(found.pdc.condition);
+    pdc["alpha_std"] = number_json(found.alpha_std);
+    pdc["beta_std"] = number_json(found.beta_std);
+    pdc["residual"] = number_json(found.pdc.residual);
+    pdc["condition"] = number_json(found.pdc.condition);
     result["mkr"] = std::move(mkr);
     result["pdc"] = std::move(pdc);
 }

@@ -395,6 +395,9 @@ record_result identify_records(std::vector<record_data> records, const record_op
     }
     if (packed && options.mass.wanted() && !result.context.refined) fit_inputs(*packed, replicates);
     check_explains(result.context);
+    const bool simulated = result.context.simulation_percent.has_value();
+    const auto& percent = simulated ? result.context.simulation_percent : result.context.prediction_percent;
+    if (percent) remark_low_fit(*percent, simulated, result.context);
     find_matrices(replicates, options, result);
     find_deviations(records, config, rows, replicates, options, result);
     return result;

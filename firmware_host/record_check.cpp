@@ -2,6 +2,7 @@
 #include "record_check.hpp"
 
 #include "error.hpp"
+#include "units.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -133,6 +134,40 @@ void check_explains(const result_context& context) {
             "no model: the best one explains {:.1f} % of an output: the outputs do not answer these inputs, or a "
             "sensor was overloaded. Check wiring, ranges and column names",
             std::max(best, 0.0)));
+}
+
+void remark_low_fit(const std::vector<double>& percent, bool simulated, result_context& context) {
+    const double low_percent = simulated ? 30 : 10;
+    std::string names;
+    for (std::size_t k = 0; k < percent.size() && k < context.outputs.size(); ++k)
+        if (percent[k] < low_percent)
+            names += fmt::format("{}{:.0f} % of \"{}\"", names.empty() ? "" : ", ", std::max(percent[k], 0.0),
+                                 context.outputs[k]);
+    if (names.empty()) return;
+    context.warnings.emplace_back(
+        "fit_low",
+        fmt::format("{} the model explains only {}: noise, an overloaded or dead sensor{}",
+                    simulated ? "simulated from the inputs" : "one sample ahead", names,
+                    simulated ? ", a force that is not measured, columns exchanged, or an order too low" : ""));
+}
+
+void remark_exchanged(const std::vector<std::string>& units, const record_options& options, remarks& said) {
+    const auto is_force = [&](std::size_t column, const std::string& name) {
+        const unit_rule* rule = column < units.size() && !units[column].empty() ? find_unit(units[column]) : nullptr;
+        if (rule) return std::string(rule->si) == "N";
+        return name.rfind("force", 0) == 0 || name.rfind("Force", 0) == 0;
+    };
+    for (std::size_t k = 0; k < options.outputs.size(); ++k) {
+        if (!is_force(options.inputs.size() + k, options.outputs[k])) continue;
+        for (std::size_t i = 0; i < options.inputs.size(); ++i) {
+            if (is_force(i, options.inputs[i])) continue;
+            said.emplace_back("exchanged",
+                              fmt::format("output \"{}\" is a force by its name or unit, input \"{}\" is not: are "
+                                          "--inputs and --outputs exchanged?",
+                                          options.outputs[k], options.inputs[i]));
+            return;
+        }
+    }
 }
 
 void remark_early_hit(const std::vector<record_data>& records, int n_u, int p, result_context& context) {

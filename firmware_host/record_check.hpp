@@ -22,6 +22,12 @@ void check_not_a_line(const record_data& record, const record_data& before, cons
 /// A model that neither simulates nor predicts a twentieth of any output says nothing about the structure.
 void check_explains(const result_context& context);
 
+/// Outputs that the model hardly follows, simulated or predicted one sample ahead: adds the remark fit_low.
+void remark_low_fit(const std::vector<double>& percent, bool simulated, result_context& context);
+
+/// A force among the outputs and another quantity among the inputs, by unit or name: adds the remark exchanged.
+void remark_exchanged(const std::vector<std::string>& units, const record_options& options, remarks& said);
+
 /// A hit within the first p samples of every record serves as history only, and is lost: adds the remark hit_at_start.
 void remark_early_hit(const std::vector<record_data>& records, int n_u, int p, result_context& context);
 

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "refinement.hpp"
 
+#include "json_number.hpp"
+
 #include <cmath>
 #include <fmt/format.h>
 
 namespace okid_host {
 namespace {
-
-nlohmann::ordered_json number(double value) {
-    return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
-}
 
 /// "acc1 +12.3 ± 0.4, acc3 …" of the outputs chosen.
 std::string delays_text(const channel_skew& found, const std::vector<std::string>& outputs,
@@ -29,11 +27,11 @@ nlohmann::ordered_json refinement_json(const refinement& found, const std::vecto
     out["iterations"] = found.iterations;
     out["converged"] = found.converged;
     out["samples"] = found.samples;
-    out["log_likelihood_gain"] = number(found.gain);
-    out["log_likelihood_left"] = number(found.decrement);
-    out["whiteness"] = number(found.whiteness);
+    out["log_likelihood_gain"] = number_json(found.gain);
+    out["log_likelihood_left"] = number_json(found.decrement);
+    out["whiteness"] = number_json(found.whiteness);
     out["noise_std"] = nlohmann::ordered_json::object();
-    for (std::size_t i = 0; i < outputs.size(); ++i) out["noise_std"][outputs[i]] = number(found.noise_std[i]);
+    for (std::size_t i = 0; i < outputs.size(); ++i) out["noise_std"][outputs[i]] = number_json(found.noise_std[i]);
     return out;
 }
 
@@ -53,14 +51,14 @@ nlohmann::ordered_json skew_json(const channel_skew& found, const std::vector<st
     out["corrected"] = false;
     out["outputs_corrected"] = nlohmann::ordered_json::array();
     for (std::size_t i = 0; i < outputs.size(); ++i) {
-        out["us"][outputs[i]] = number(found.us[i]);
-        out["std_us"][outputs[i]] = number(found.std_us[i]);
+        out["us"][outputs[i]] = number_json(found.us[i]);
+        out["std_us"][outputs[i]] = number_json(found.std_us[i]);
         if (found.late[i] == 0) continue;
         out["corrected"] = true;
         out["outputs_corrected"].push_back(outputs[i]);
     }
     out["undetermined"] = found.undetermined;
-    out["scatter"] = number(found.scatter);
+    out["scatter"] = number_json(found.scatter);
     return out;
 }
 

@@ -2,6 +2,7 @@
 #include "result.hpp"
 
 #include "error.hpp"
+#include "json_number.hpp"
 #include "method.hpp"
 
 #include <algorithm>
@@ -13,11 +14,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
-
 ordered_json vector_json(const double* values, int count) {
     ordered_json out = ordered_json::array();
-    for (int i = 0; i < count; ++i) out.push_back(number(values[i]));
+    for (int i = 0; i < count; ++i) out.push_back(number_json(values[i]));
     return out;
 }
 
@@ -27,7 +26,7 @@ ordered_json matrix_json(const double* values, int rows, int columns) {
     ordered_json out = ordered_json::array();
     for (int i = 0; i < rows; ++i) {
         ordered_json row = ordered_json::array();
-        for (int j = 0; j < columns; ++j) row.push_back(number(values[i + static_cast<std::ptrdiff_t>(j) * rows]));
+        for (int j = 0; j < columns; ++j) row.push_back(number_json(values[i + static_cast<std::ptrdiff_t>(j) * rows]));
         out.push_back(std::move(row));
     }
     return out;
@@ -36,7 +35,7 @@ ordered_json matrix_json(const double* values, int rows, int columns) {
 ordered_json model_json(const okid_identified_t& model, const result_context& context) {
     const int n_u = model.n_u, n_y = model.n_y, n_z = model.n_z;
     ordered_json out;
-    out["dt"] = number(model.dt);
+    out["dt"] = number_json(model.dt);
     out["A"] = matrix_json(model.A, n_z, n_z);
     out["B"] = matrix_json(model.B, n_z, n_u);
     out["C"] = matrix_json(model.C, n_y, n_z);
@@ -53,7 +52,8 @@ ordered_json model_json(const okid_identified_t& model, const result_context& co
 ordered_json percent_json(const std::optional<std::vector<double>>& percent, const std::vector<std::string>& outputs) {
     if (!percent) return nullptr;
     ordered_json out = ordered_json::object();
-    for (std::size_t i = 0; i < outputs.size() && i < percent->size(); ++i) out[outputs[i]] = number((*percent)[i]);
+    for (std::size_t i = 0; i < outputs.size() && i < percent->size(); ++i)
+        out[outputs[i]] = number_json((*percent)[i]);
     return out;
 }
 
@@ -96,8 +96,11 @@ std::string note_text(const okid_identified_t& model, std::uint32_t bit) {
     case OKID_NOTE_ORDER_UNCLEAR:
         return fmt::format(
             "no clear gap in the singular values: {} is the smallest order that keeps every mode that holds over the "
-            "orders; it holds noise modes too (EMAC below 0.5). Compare a few orders with --order N",
-            model.n_z);
+            "orders{}. Compare a few orders with --order N",
+            model.n_z,
+            std::any_of(model.emac, model.emac + model.mode_count, [](auto emac) { return emac < doubtful_emac; })
+                ? "; it holds noise modes too (EMAC below 0.5)"
+                : "");
     case OKID_NOTE_WEAK_EXCITATION:
         return fmt::format("the inputs hardly excite some directions (smallest over largest {:.1e}): modes there are "
                            "uncertain. Use a broader-band force",
@@ -125,7 +128,6 @@ std::string fit_text(const result_context& context) {
     return out;
 }
 
-constexpr double doubtful_emac = 0.5; // below this a mode seldom belongs to the structure
 constexpr int most_shape_columns = 6; // more would not stand side by side on a screen
 
 std::string mode_rows(const okid_identified_t& model, const result_context& context) {
@@ -164,7 +166,7 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
 nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma) {
     ordered_json out = ordered_json::array();
     const auto deviation = [&](std::vector<double> deviations::* of, int k) {
-        return sigma ? number((sigma->*of)[static_cast<std::size_t>(k)]) : ordered_json(nullptr);
+        return sigma ? number_json((sigma->*of)[static_cast<std::size_t>(k)]) : ordered_json(nullptr);
     };
     const auto of_shape = [&](std::vector<double> deviations::* of, std::ptrdiff_t at) {
         return sigma ? vector_json((sigma->*of).data() + at, model.n_y) : ordered_json(nullptr);
@@ -172,17 +174,17 @@ nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviatio
     for (int k = 0; k < model.mode_count; ++k) {
         const auto at = static_cast<std::ptrdiff_t>(k) * model.n_y;
         ordered_json mode;
-        mode["frequency_hz"] = number(model.frequency_hz[k]);
-        mode["damping_ratio"] = number(model.damping_ratio[k]);
+        mode["frequency_hz"] = number_json(model.frequency_hz[k]);
+        mode["damping_ratio"] = number_json(model.damping_ratio[k]);
         mode["shape_re"] = vector_json(model.shape_re + at, model.n_y);
         mode["shape_im"] = vector_json(model.shape_im + at, model.n_y);
         mode["frequency_std_hz"] = deviation(&deviations::frequency_hz, k);
         mode["damping_ratio_std"] = deviation(&deviations::damping_ratio, k);
         mode["shape_re_std"] = of_shape(&deviations::shape_re, at);
         mode["shape_im_std"] = of_shape(&deviations::shape_im, at);
-        mode["mpc"] = number(model.mpc[k]);
-        mode["emac"] = number(model.emac[k]);
-        mode["cmi"] = number(model.cmi[k]);
+        mode["mpc"] = number_json(model.mpc[k]);
+        mode["emac"] = number_json(model.emac[k]);
+        mode["cmi"] = number_json(model.cmi[k]);
         out.push_back(std::move(mode));
     }
     return out;
@@ -193,7 +195,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["schema"] = "okid.result/1";
     out["version"] = okid_version();
     out["method"] = context.method;
-    out["fs_hz"] = number(context.fs_hz);
+    out["fs_hz"] = number_json(context.fs_hz);
     out["samples"] = context.samples;
     out["records"] = context.records;
     out["gaps"] = context.gaps;
@@ -207,7 +209,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["detrend"] = context.detrend;
     out["start"] = context.start;
     out["singular_values"] = vector_json(model.singular_values, model.singular_count);
-    out["singular_noise"] = number(model.noise_level);
+    out["singular_noise"] = number_json(model.noise_level);
     out["model"] = model_json(model, context);
     ordered_json blocks = ordered_json::array();
     const std::ptrdiff_t block = static_cast<std::ptrdiff_t>(model.n_y) * model.n_u;

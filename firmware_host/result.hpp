@@ -14,6 +14,8 @@
 
 namespace okid_host {
 
+constexpr double doubtful_emac = 0.5; ///< below this a mode seldom belongs to the structure
+
 /// What the library does not know about a result.
 struct result_context {
     std::string method = "okid-era";

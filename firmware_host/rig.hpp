@@ -21,6 +21,7 @@ struct rig_change {
 };
 
 struct rig {
+    std::string title = "virtual rig";
     double rate_hz = 0, duration_s = 0;
     std::uint64_t seed = 1;
     structure body;

@@ -76,6 +76,15 @@ class table_reader {
         return *value;
     }
 
+    std::string text(const char* key, const std::string& fallback) const {
+        if (!has(key)) return fallback;
+        const auto value = node(key)->value_exact<std::string>();
+        const auto control = [](unsigned char c) { return c < 0x20 || c == 0x7f; };
+        if (!value || value->empty() || std::any_of(value->begin(), value->end(), control))
+            bad(*node(key), key, "one line of text");
+        return *value;
+    }
+
     std::string choice(const char* key, const std::string& fallback, const std::vector<std::string>& choices) const {
         if (!has(key)) return fallback;
         const auto value = node(key)->value_exact<std::string>();
@@ -219,14 +228,15 @@ void add_warnings(rig& out) {
 
 rig read_rig(const std::string& path, const toml::table& file) {
     const table_reader reader(path, file,
-                              {"rate_hz", "duration_s", "seed", "masses", "M", "springs", "K", "zeta", "R",
+                              {"title", "rate_hz", "duration_s", "seed", "masses", "M", "springs", "K", "zeta", "R",
                                "force_dofs", "sense_dofs", "sensing", "excitation", "force_rms", "hold",
                                "noise_percent", "bits", "change"});
     rig out;
+    out.title = reader.text("title", out.title);
     if (!reader.has("rate_hz")) reader.missing("rate_hz = samples per second");
     if (!reader.has("duration_s")) reader.missing("duration_s = seconds");
     out.rate_hz = reader.number("rate_hz", 0, 1e-6, 1e7, "a sample rate in Hz above 0");
-    out.duration_s = reader.number("duration_s", 0, 1e-6, 1e9, "a duration in s above 0");
+    out.duration_s = reader.number("duration_s", 0, 1e-6, 1e100, "a duration in s above 0");
     if (out.rate_hz * out.duration_s < 2 || out.rate_hz * out.duration_s > 2e8)
         reader.bad(*reader.node("duration_s"), "duration_s", "a duration of 2 to 200 million samples");
     if (reader.has("seed"))

@@ -66,16 +66,21 @@ bool mass_is_seen(const rig& rig) {
     return pair;
 }
 
-std::string config_head(const rig_run& run) {
+std::string config_head(const rig& rig, const rig_run& run) {
     // TOML takes a whole number for a rate as well; "250." it does not take
-    return fmt::format("# written by okid simulate\n[acquisition]\nrate_hz = {}\ntitle = \"virtual rig\"\n\n",
-                       run.rate_hz);
+    std::string title;
+    for (char c : rig.title) title += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
+    return fmt::format("# written by okid simulate\n[acquisition]\nrate_hz = {}\ntitle = \"{}\"\n\n", run.rate_hz,
+                       title);
 }
 
 std::string config_tail(const rig& rig) {
-    return fmt::format("\n[identification]\nmethod = \"okid-era\"\np = 40\nrows = 80\norder = \"auto\"\nhold = "
-                       "\"{}\"\ndetrend = \"mean\"\nupdate_s = 1.0\nmkr = {}\n",
-                       rig.hold, mass_is_seen(rig));
+    // A free decay has no forces: nothing for an observer to learn from, the canonical weighting finds its modes.
+    const char* method =
+        rig.force_dofs.empty() ? "method = \"n4sid-cva\"\nrows = 30" : "method = \"okid-era\"\np = 40\nrows = 80";
+    return fmt::format("\n[identification]\n{}\norder = \"auto\"\nhold = \"{}\"\ndetrend = \"mean\"\n"
+                       "update_s = 1.0\nmkr = {}\n",
+                       method, rig.hold, mass_is_seen(rig));
 }
 
 } // namespace
@@ -118,7 +123,7 @@ std::string rig_csv(const rig_run& run) {
 }
 
 std::string rig_config(const rig& rig, const rig_run& run, const std::string& dbc) {
-    std::string out = config_head(run);
+    std::string out = config_head(rig, run);
     auto text = std::back_inserter(out);
     fmt::format_to(text,
                    "[[bus]]\nname = \"can0\"\ntype = \"socketcan\"\ninterface = \"{}\"\nbitrate = 1000000\ndbc = {}\n",
@@ -137,7 +142,7 @@ std::string rig_config(const rig& rig, const rig_run& run, const std::string& db
 }
 
 std::string rig_line_config(const rig& rig, const rig_run& run, const std::string& device, int baud) {
-    std::string out = config_head(run);
+    std::string out = config_head(rig, run);
     auto text = std::back_inserter(out);
     fmt::format_to(text,
                    "[[bus]]\nname = \"node\"\ntype = \"serial\"\n"

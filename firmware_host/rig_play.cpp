@@ -58,8 +58,9 @@ class can_sender {
     void open_socket() {
         fd_ = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
         if (fd_ < 0)
-            stop(errno == EAFNOSUPPORT ? "this kernel has no CAN (AF_CAN); try `modprobe can_raw vcan`"
-                                       : std::strerror(errno));
+            stop(errno == EAFNOSUPPORT
+                     ? "this kernel has no CAN (AF_CAN); load the modules: sudo modprobe -a can can-raw vcan"
+                     : std::strerror(errno));
         const can_filter none{};
         setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FILTER, &none, 0); // sends only
         sockaddr_can address{};

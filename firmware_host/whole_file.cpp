@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
+#include <filesystem>
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -55,6 +56,12 @@ void check_writable(const std::string& path) {
         if (!S_ISREG(status.st_mode)) return;
     }
     if (access(folder.c_str(), W_OK) != 0) cannot_write(path, errno);
+}
+
+void check_other_file(const std::string& target, const std::string& input) {
+    std::error_code ignored;
+    if (std::filesystem::equivalent(target, input, ignored))
+        throw failure(exit_usage, fmt::format("{}: is a file to be read, a result is not written over it", target));
 }
 
 whole_file::whole_file(std::string path) : path_(std::move(path)) {

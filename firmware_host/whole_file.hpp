@@ -10,6 +10,9 @@ namespace okid_host {
 /// Throws `failure` (exit 2) when `path` is a folder or its folder is missing or not writable.
 void check_writable(const std::string& path);
 
+/// Throws `failure` (exit 2) when the target is the same file as `input`, by whatever name.
+void check_other_file(const std::string& target, const std::string& input);
+
 /// One at a time. A device or a pipe is written in place, "-" is stdout.
 class whole_file {
   public:

@@ -21,6 +21,7 @@ PROMISES = {
     "dgemm_over_direct_W3_p40": (0.5, "of the rate of OpenBLAS dgemm on the same product"),
     "dgemm_blocks_over_fft_W2_p60": (5.0, "whole record: times faster than OpenBLAS on blocks of 4096"),
     "dgemm_blocks_over_fft_W3_p50": (5.0, "whole record: times faster than OpenBLAS on blocks of 4096"),
+    "campaign_two_workers": (1.6, "1,000 records: times faster on two workers than on one"),
 }
 # ratio -> (largest allowed, what it says); 5 % is what one run of a shared machine cannot tell apart
 LIMITS = {
@@ -28,6 +29,11 @@ LIMITS = {
     for case in ("W1", "W2", "W3")
     for p in (20, 40)
 }
+LIMITS |= {
+    f"python_call_us_{kind}": (2.0, "us that a call from Python costs beside the work") for kind in ("i16", "f64")
+}
+LIMITS |= {f"python_share_{kind}": (0.05, "of the C time of 4,096 samples") for kind in ("i16", "f64")}
+LIMITS["campaign_worker_mb"] = (500.0, "MB of a worker, whatever the number of records")
 # Whole identifications by n4sid-moesp, times faster than SLICOT's MOESP with Cholesky at the same block rows and order.
 SLICOT = {f"slicot_moesp_over_n4sid-moesp_{size}": 3.0 for size in ("W1_s10", "W2_s15", "W3_s22")}
 STATE = 1.1  # state of an unbroken record of doubles over 8 [m (q + n_y) + 2 p m] bytes

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Installs what okid needs: Debian packages from tools/packages/*.txt and Python packages into .venv.
-# usage: tools/setup.sh [build|bench|test|dev|embedded|fuzz]   (bench and test include build, the others test)
+# usage: tools/setup.sh [build|bench|test|dev|docs|embedded|fuzz|package]   (bench and test include build, the others test)
 # Idempotent; silent when nothing is missing. Needs root or sudo only when a Debian package is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -13,10 +13,10 @@ if [ "$tier" = bench ]; then
   tier=build # Python needs nothing more
 fi
 [ "$tier" = build ] || lists+=(tools/packages/debian-test.txt)
-if [ "$tier" = embedded ] || [ "$tier" = fuzz ]; then
-  lists+=("tools/packages/debian-$tier.txt")
-  tier=test # Python needs nothing more
-fi
+case $tier in
+  embedded|fuzz|package) lists+=("tools/packages/debian-$tier.txt") tier=test ;; # Python needs nothing more
+  dev|docs) lists+=(tools/packages/debian-fuzz.txt tools/packages/debian-dev.txt) tier=dev ;;
+esac
 
 installed() { [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null)" = installed ]; }
 
@@ -69,14 +69,14 @@ case $tier in
   build) covers="build test dev" ;;
   test) covers="test dev" ;;
   dev) covers="dev" ;;
-  *) echo "setup: no tier '$tier' (build, bench, test, dev, embedded, fuzz)" >&2; exit 2 ;;
+  *) echo "setup: no tier '$tier' (build, bench, test, dev, docs, embedded, fuzz, package)" >&2; exit 2 ;;
 esac
 for one in $covers; do
   if cmp -s tools/pyproject.toml ".venv/.okid-$one"; then exit 0; fi
 done
 [ -x .venv/bin/python ] || python3 -m venv .venv || {
   echo "setup: python3 -m venv failed. Install python3-venv, or remove a half-made .venv, and try again." >&2; exit 4; }
-echo "setup: installing Python packages ($tier) into .venv"
+echo "setup: installing Python packages ($tier) into .venv, some minutes the first time"
 list=$(mktemp)
 .venv/bin/python tools/requirements.py "$tier" >"$list"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$list" || {
@@ -89,7 +89,9 @@ pathlib.Path(sysconfig.get_paths()["purelib"], "okid-source.pth").write_text(str
 for name, target in tomllib.loads(pathlib.Path("tools/pyproject.toml").read_text())["project"]["scripts"].items():
     module, function = target.split(":")
     command = pathlib.Path(sys.executable).parent / name
-    command.write_text(f"#!{sys.executable}\nimport sys\nfrom {module} import {function}\nsys.exit({function}())\n")
+    # As pip makes them: what a worker process of a campaign imports must not be the command again.
+    command.write_text(f"#!{sys.executable}\nimport sys\nfrom {module} import {function}\n"
+                       f'if __name__ == "__main__":\n    sys.exit({function}())\n')
     command.chmod(0o755)
 PY
 cp tools/pyproject.toml ".venv/.okid-$tier"

@@ -42,7 +42,7 @@ static int hex_digit(int c) {
 }
 
 static int parse_time(cursor_t* self, int64_t* time_ns) {
-    if (peek(self) != '(') return refuse(self, "'(' and a time in seconds");
+    if (peek(self) != '(') return refuse(self, "'(' and a time in seconds, as candump -L and -l write");
     ++self->at;
     int64_t seconds = 0, fraction = 0, unit = 1000000000;
     size_t begin = self->at;

@@ -118,7 +118,7 @@ static void solve_line(drv_clock_fit_t* self, const double* weight, int32_t coun
 /// The line through the points by Huber weights, its scale from the median of what is left. It begins from the line as it
 /// was: after a pause that one is uncertain where the new points lie, and so much they may be off it.
 static void fit(drv_clock_fit_t* self) {
-    double weight[DRV_CLOCK_BLOCKS], left[DRV_CLOCK_BLOCKS];
+    double weight[DRV_CLOCK_BLOCKS], left[DRV_CLOCK_BLOCKS] = {0};
     int32_t count = self->points < DRV_CLOCK_BLOCKS ? (int32_t)self->points : DRV_CLOCK_BLOCKS;
     double least = 1e-9 + 0.1 / self->config.tick_hz;                  // a stamp is not finer than its tick
     if (count < KNOWN) least = fmax(least, self->config.jitter_s / 4); // few points tell no scatter

@@ -72,7 +72,7 @@ static long look(drv_journal_reader_t* self, drv_journal_chunk_t* chunk) {
         get_number(header + CHUNK_HEADER_CRC, 4) != drv_crc32(0, header, CHUNK_HEADER_CRC))
         return 0;
     if (header[CHUNK_VERSION] > DRV_JOURNAL_VERSION) self->newer = header[CHUNK_VERSION];
-    chunk->bytes = get_number(header + CHUNK_BYTES, 4);
+    chunk->bytes = (size_t)get_number(header + CHUNK_BYTES, 4);
     if (header[CHUNK_VERSION] != DRV_JOURNAL_VERSION || chunk->bytes > DRV_JOURNAL_PAYLOAD) return 0;
     code = fill(self, DRV_JOURNAL_HEADER + chunk->bytes);
     if (code) return code;
@@ -163,7 +163,7 @@ int drv_journal_frame(const drv_journal_chunk_t* chunk, size_t* at, drv_frame_t*
 
 int drv_journal_text_of(const drv_journal_chunk_t* chunk, drv_journal_text_t* out) {
     if (chunk->kind != DRV_JOURNAL_TEXT || chunk->bytes < TEXT_PREFIX) return 0;
-    out->name_bytes = get_number(chunk->payload, 4);
+    out->name_bytes = (size_t)get_number(chunk->payload, 4);
     out->total = get_number(chunk->payload + 4, 8);
     out->offset = get_number(chunk->payload + 12, 8);
     if (out->name_bytes == 0 || out->name_bytes > DRV_JOURNAL_NAME_BYTES ||

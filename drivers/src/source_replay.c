@@ -129,7 +129,7 @@ static int replay_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
         if (got <= 0) return count > 0 ? count : got == 0 ? DRV_END : got;
         if (length == 0 || (length == 1 && line[0] == '\r')) continue;
         char interface[DRV_NAME_BYTES];
-        drv_candump_error_t why;
+        drv_candump_error_t why = {0};
         drv_frame_t* frame = &frames[count];
         if (drv_candump_parse(line, length, frame, interface, &why)) {
             if (state->torn) { // the writer was killed within its last line

@@ -84,7 +84,7 @@ static int64_t unwrap_stamp(slcan_t* state, int stamp_ms) {
         const int64_t before = (state->device_ms - 1) % DRV_SLCAN_STAMP_MS;
         const int64_t step = (stamp_ms - before + DRV_SLCAN_STAMP_MS) % DRV_SLCAN_STAMP_MS;
         const double pause_ms = (double)(state->arrived_ns - state->device_seen_ns) * 1e-6;
-        const double rounds = round((pause_ms - (double)step) / DRV_SLCAN_STAMP_MS);
+        const double rounds = round((pause_ms - (double)step) / (double)DRV_SLCAN_STAMP_MS);
         state->device_ms += step + (rounds > 0 && rounds < 1e6 ? (int64_t)rounds * DRV_SLCAN_STAMP_MS : 0);
     }
     state->stamped = 1;

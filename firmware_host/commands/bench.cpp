@@ -286,12 +286,13 @@ void run_bench(const bench_options& options) {
 
 void add_bench(CLI::App& app) {
     auto options = std::make_shared<bench_options>();
-    CLI::App* command =
-        app.add_subcommand("bench", "what a sample and a whole identification cost, beside others in the same run");
+    CLI::App* command = app.add_subcommand(
+        "bench", "Measure what a sample and a whole identification cost, beside others in the same run");
     command->add_flag("--json", options->json, "print okid.bench/1 instead of a table");
-    command->add_option("--save", options->save, "also write okid.bench/1 to this file");
+    command->add_option("--save", options->save, "also write okid.bench/1 to this file")->type_name("FILE.json");
     command->add_option("--only", options->only, "leave the other half out")
-        ->check(CLI::IsMember({"kernels", "identifications"}));
+        ->type_name("kernels|identifications")
+        ->check(CLI::IsMember({"kernels", "identifications"}).description(""));
     command->footer("Example:\n  okid bench --json > bench.json\n  okid bench --only identifications");
     command->callback([options] { run_bench(*options); });
 }

@@ -14,5 +14,6 @@ void add_convert(CLI::App& app);
 void add_check(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_bench(CLI::App& app);
+void add_completion(CLI::App& app);
 
 } // namespace okid_host

@@ -4,6 +4,7 @@
 #include "../csv.hpp"
 #include "../csv_header.hpp"
 #include "../error.hpp"
+#include "../host_time.hpp"
 #include "../live/aligner.hpp"
 #include "../live/frame_maker.hpp"
 #include "../live/playback.hpp"
@@ -253,11 +254,15 @@ std::optional<live_config> config_for(const convert_arguments& given, bool from_
 }
 
 void convert(const convert_arguments& given) {
-    const auto ending = [](const std::string& path) { return std::filesystem::path(path).extension().string(); };
-    const std::string from = ending(given.from), to = ending(given.to), way = from + " to " + to;
+    const auto extension_of = [](const std::string& path) { return std::filesystem::path(path).extension().string(); };
+    const std::string from = extension_of(given.from), to = extension_of(given.to), way = from + " to " + to;
     const char* ways[] = {".okj to .log", ".okj to .csv", ".log to .csv", ".log to .okj", ".csv to .log"};
     if (std::find(std::begin(ways), std::end(ways), way) == std::end(ways))
-        throw failure(exit_usage, fmt::format("found \"{}\" to \"{}\", expected {}", from, to, fmt::join(ways, ", ")));
+        throw failure(
+            exit_usage,
+            fmt::format("{} to {}: found \"{}\" to \"{}\", expected {}. Files of other programs (MDF4, UFF, HDF5, "
+                        ".mat, BLF, ASC) are the matter of okid-convert, which comes with the Python package",
+                        given.from, given.to, from, to, fmt::join(ways, ", ")));
     check_writable(given.to);
     if (way == ways[0]) return journal_to_log(given);
     const std::optional<live_config> config = config_for(given, from == ".okj");
@@ -277,14 +282,18 @@ void add_convert(CLI::App& app) {
     auto given = std::make_shared<convert_arguments>();
     CLI::App* command = app.add_subcommand(
         "convert", "Convert between journals, logs of frames and tables of samples, by file name extension");
-    command->add_option("in", given->from, ".okj (and the segments behind it), .log (candump -L) or .csv")
+    command
+        ->add_option("in", given->from,
+                     "a journal and the segments behind it, a log of candump -L, or a table of samples")
         ->required()
-        ->type_name("IN");
-    command->add_option("out", given->to, ".csv, .log or .okj")->required()->type_name("OUT");
+        ->type_name("IN.okj|IN.log|IN.csv");
+    command->add_option("out", given->to, "what to make of it")->required()->type_name("OUT.csv|OUT.log|OUT.okj");
     command->add_option("-c,--config", given->config, "which bits are which channel; a journal holds its own")
         ->type_name("CONFIG.toml");
-    command->footer("Examples:\n  okid convert frame.log frame.csv -c frame.toml\n  okid convert "
-                    "runs/frame-20261121T120000Z-0001.okj frame.log");
+    command->footer(
+        "Files of other programs (MDF4, UFF, HDF5, .mat, BLF, ASC): okid-convert, of the Python package.\n\n"
+        "Examples:\n  okid convert frame.log frame.csv -c frame.toml\n  okid convert "
+        "runs/frame-20261121T120000Z-0001.okj frame.log");
     command->callback([given] { convert(*given); });
 }
 

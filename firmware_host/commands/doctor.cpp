@@ -8,6 +8,7 @@
 #include "../live/serial_line.hpp"
 #include "../nearest_name.hpp"
 #include "commands.hpp"
+#include "findings.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -28,25 +29,6 @@ namespace {
 constexpr long long wanted_buffer = DRV_RECEIVE_BUFFER;
 constexpr int cap_net_admin = 12, cap_sys_nice = 23;
 constexpr int cap_ipc_lock = 14;
-
-/// The findings, one line each; a finding that is missing comes with its remedy.
-class findings {
-  public:
-    void well(const std::string& what, const std::string& found) { fmt::print("ok       {:<22} {}\n", what, found); }
-    /// Worth knowing; what it costs to leave it is said, and how to mend it.
-    void note(const std::string& what, const std::string& found, const std::string& remedy = "") {
-        fmt::print("note     {:<22} {}\n", what, found);
-        if (!remedy.empty()) fmt::print("         {:<22} -> {}\n", "", remedy);
-    }
-    void missing(const std::string& what, const std::string& found, const std::string& remedy) {
-        fmt::print("missing  {:<22} {}\n         {:<22} -> {}\n", what, found, "", remedy);
-        ++count_;
-    }
-    int count() const { return count_; }
-
-  private:
-    int count_ = 0;
-};
 
 std::string first_line(const std::string& path) {
     std::ifstream input(path);
@@ -84,7 +66,7 @@ bool check_kernel(findings& out) {
         return false;
     }
     out.missing("CAN in the kernel", fmt::format("no CAN sockets ({})", std::strerror(errno)),
-                "sudo modprobe can can-raw vcan (Debian: they are in linux-image; Ubuntu: apt-get install "
+                "sudo modprobe -a can can-raw vcan (Debian: they are in linux-image; Ubuntu: apt-get install "
                 "linux-modules-extra-$(uname -r)); "
                 "without CAN: okid replay LOG -c CONFIG.toml");
     return false;
@@ -268,7 +250,9 @@ void add_doctor(CLI::App& app) {
         if (wants_can) check_buffers(out);
         const realtime_config realtime = config ? config->realtime : realtime_config{};
         check_priority(out, realtime);
+        check_processors(out, realtime);
         check_memory(out, realtime);
+        if (config) check_outputs(out, *config);
         check_clock(out);
         check_governor(out);
         if (out.count() > 0)

@@ -10,13 +10,14 @@
 #include "../nearest_name.hpp"
 #include "../progress.hpp"
 #include "../record.hpp"
+#include "../record_check.hpp"
 #include "../whole_file.hpp"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace okid_host {
 namespace {
@@ -171,11 +172,7 @@ void check_targets(const identify_arguments& given) {
     for (const std::string& target : {given.json, given.model}) {
         if (target.empty()) continue;
         check_writable(target);
-        for (const std::string& record : given.records) {
-            std::error_code ignored;
-            if (std::filesystem::equivalent(target, record, ignored))
-                usage(fmt::format("{}: is a record to be read, a result is not written over it", target));
-        }
+        for (const std::string& record : given.records) check_other_file(target, record);
     }
     if (!given.json.empty() && given.json == given.model)
         usage(fmt::format("--json and --model both name {}, expected two files", given.json));
@@ -196,8 +193,14 @@ std::vector<record_data> read_records(const identify_arguments& given, record_op
         if (records.empty()) {
             options.fs_hz = record.fs_hz;
             units = record.units;
+            remark_exchanged(units, options, options.said);
             if (options.mass.wanted()) take_units(units, options.mass, options.said);
         }
+        if (request.fs_hz && record.said_fs_hz && std::abs(*record.said_fs_hz / *request.fs_hz - 1) > 1e-9)
+            options.said.emplace_back("fs_overrides_file",
+                                      fmt::format("--fs {:g} is used, {} says {:g} Hz: every frequency "
+                                                  "scales with it",
+                                                  *request.fs_hz, path, *record.said_fs_hz));
         if (options.mass.wanted() && record.units != units)
             usage(fmt::format("{}: the units in the header are not those of {}, expected the same for M, K and R", path,
                               given.records.front()));
@@ -249,10 +252,8 @@ void add_identify(CLI::App& app) {
         ->type_name("NAMES");
     command->add_option("--outputs", given->outputs, "response columns, with commas between")->type_name("NAMES");
     command->add_option("--fs", given->fs, "sample rate; default: what the file says")->type_name("HZ");
-    command
-        ->add_option("--method", given->method,
-                     "okid-era (default), okid-era-dc, n4sid-moesp, n4sid-cva or n4sid-ssarx")
-        ->type_name("NAME");
+    command->add_option("--method", given->method, "how the model is found (default okid-era)")
+        ->type_name(fmt::format("{}", fmt::join(method_names(), "|")));
     command->add_option("--p", given->p, "observer order in samples (default 40; not for n4sid)")->type_name("N");
     command
         ->add_option("--rows", given->rows,
@@ -262,20 +263,22 @@ void add_identify(CLI::App& app) {
         ->add_option("--hankel", given->hankel,
                      "what the Hankel matrix of the okid methods holds: system (default), innovations (those too, "
                      "weighted: free of units) or literal (eq. 42 as printed, for comparison only)")
-        ->type_name("KIND");
-    command->add_option("--order", given->order, "number of states, or auto (default)")->type_name("N");
-    command->add_option("--hold", given->hold, "force between samples: zoh (default) or foh")->type_name("KIND");
-    command->add_option("--detrend", given->detrend, "none, mean (default) or linear")->type_name("KIND");
+        ->type_name(fmt::format("{}", fmt::join(hankel_names(), "|")));
+    command->add_option("--order", given->order, "number of states, or auto (default)")->type_name("N|auto");
+    command->add_option("--hold", given->hold, "force between samples: held (zoh, default) or linear (foh)")
+        ->type_name("zoh|foh");
+    command->add_option("--detrend", given->detrend, "what is taken out of every channel first (default mean)")
+        ->type_name("none|mean|linear");
     command
         ->add_option(
             "--start", given->start,
             "moving (default): nothing is known before the record; rest: every record begins with the structure "
             "at rest, as a hammer test with a short pre-trigger does")
-        ->type_name("STATE");
+        ->type_name("moving|rest");
     command
         ->add_option("--sensing", given->sensing,
-                     "acceleration (default), velocity, displacement; one, or one per output")
-        ->type_name("KIND");
+                     "what the outputs measure (default acceleration): one kind, or one per output with commas between")
+        ->type_name("acceleration|velocity|displacement");
     command
         ->add_option("--input-dofs", given->input_dofs,
                      "where each force acts: numbers of degrees of freedom from 1 (-3: at 3, polarity reversed). With "
@@ -297,7 +300,7 @@ void add_identify(CLI::App& app) {
         ->type_name("N");
     command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")
         ->type_name("A:B");
-    command->add_option("--json", given->json, "write okid.result/1 to FILE, - is stdout")->type_name("FILE");
+    command->add_option("--json", given->json, "write okid.result/1 to this file, - is stdout")->type_name("FILE.json");
     command->add_option("--model", given->model, "write A, B, C, D, K, dt as a MAT file for scipy")
         ->type_name("FILE.mat");
     command->add_flag("--quiet", given->quiet, "no table, no progress");

@@ -2,9 +2,11 @@
 #include "live_options.hpp"
 
 #include "../error.hpp"
+#include "../live/playback.hpp"
 #include "../nearest_name.hpp"
 #include "../whole_file.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -25,9 +27,11 @@ std::optional<double> positive(const std::string& text) {
 
 void add_output_options(CLI::App& command, live_arguments& given) {
     command.add_option("--duration", given.duration, "end after this much stream time")->type_name("SECONDS");
-    command.add_option("--events", given.events, "write events as JSON lines to FILE, - is stdout (then no table)")
-        ->type_name("FILE");
-    command.add_option("--json", given.json, "write the final okid.result/1 to FILE, - is stdout")->type_name("FILE");
+    command
+        .add_option("--events", given.events, "write events as JSON lines to this file, - is stdout (then no table)")
+        ->type_name("FILE.jsonl");
+    command.add_option("--json", given.json, "write the final okid.result/1 to this file, - is stdout")
+        ->type_name("FILE.json");
 }
 
 std::optional<double> parse_seconds(const char* option, const std::string& text) {
@@ -57,7 +61,18 @@ std::optional<double> parse_speed(const std::string& text) {
     return value;
 }
 
-session_options check_live(const live_arguments& given, const live_config& config) {
+bool plays_a_log(const live_config& config) {
+    const auto replays = std::count_if(config.buses.begin(), config.buses.end(),
+                                       [](const bus_config& bus) { return bus.type == "replay"; });
+    if (replays == 0) return false;
+    if (config.buses.size() != 1)
+        throw failure(exit_usage, fmt::format("{}: a bus of type replay stands beside another bus, expected it alone",
+                                              config.path));
+    require_edge_time(config, false);
+    return true;
+}
+
+session_options check_live(const live_arguments& given, const live_config& config, const std::string& log) {
     require_identifiable(config);
     session_options options;
     options.duration_s = parse_seconds("--duration", given.duration);
@@ -67,8 +82,12 @@ session_options check_live(const live_arguments& given, const live_config& confi
         throw failure(exit_usage, "--events - and --json - both want stdout, expected a file for one of them");
     if (!given.events.empty() && given.events == given.json && given.json != "-")
         throw failure(exit_usage, fmt::format("--events and --json name the same file \"{}\"", printable(given.json)));
-    for (const std::string& target : {given.events, given.json})
-        if (!target.empty() && target != "-") check_writable(target);
+    for (const std::string& target : {given.events, given.json}) {
+        if (target.empty() || target == "-") continue;
+        check_writable(target);
+        check_other_file(target, config.path);
+        check_other_file(target, log);
+    }
     for (const std::string& text : config.warnings)
         std::fprintf(stderr, "okid: %s: %s\n", config.path.c_str(), text.c_str());
     return options;

@@ -23,7 +23,10 @@ std::optional<std::int64_t> parse_stamp(const char* option, const std::string& t
 /// "max" or a factor above 0; nothing = as fast as possible.
 std::optional<double> parse_speed(const std::string& text);
 
-/// Everything checked before any device is opened; the remarks of the config go to stderr.
-session_options check_live(const live_arguments& given, const live_config& config);
+/// Does the config play a log instead of devices? Throws `failure` (exit 2) when it does both, or lacks a trigger's time.
+bool plays_a_log(const live_config& config);
+
+/// Everything checked before any device is opened; the remarks of the config go to stderr. @param log  that is read, or ""
+session_options check_live(const live_arguments& given, const live_config& config, const std::string& log);
 
 } // namespace okid_host

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // okid record: raw frames onto the disk, nothing else.
-#include "../error.hpp"
 #include "../live/capture.hpp"
 #include "../live/playback.hpp"
 #include "../live/stop_signal.hpp"
@@ -8,9 +7,7 @@
 #include "commands.hpp"
 #include "live_options.hpp"
 
-#include <algorithm>
 #include <cstdio>
-#include <fmt/format.h>
 #include <memory>
 
 namespace okid_host {
@@ -27,16 +24,11 @@ void record(const record_arguments& given) {
     for (const std::string& text : config.warnings)
         std::fprintf(stderr, "okid: %s: %s\n", config.path.c_str(), text.c_str());
     const recorder_options recording{duration_s};
-    const auto replays = std::count_if(config.buses.begin(), config.buses.end(),
-                                       [](const bus_config& bus) { return bus.type == "replay"; });
-    if (replays > 0 && config.buses.size() != 1)
-        throw failure(exit_usage, fmt::format("{}: a bus of type replay stands beside another bus, expected it alone",
-                                              config.path));
-    if (replays > 0) require_edge_time(config, false);
+    const bool from_log = plays_a_log(config);
     catch_stop_signals();
     catch_hangups();
     record_watch watch(config, duration_s);
-    if (replays > 0)
+    if (from_log)
         play_through(config.buses.front().file, config, watch, std::nullopt, recording);
     else
         capture(config, watch, duration_s, recording);

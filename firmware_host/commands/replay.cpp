@@ -44,7 +44,7 @@ void replay(const replay_arguments& given) {
     std::optional<journal_header> header;
     if (is_journal(given.log)) header = read_journal_header(given.log);
     const live_config config = config_for(given, header);
-    session_options options = check_live(given, config);
+    session_options options = check_live(given, config, given.log);
     options.trigger_ns = parse_stamp("--trigger-at", given.trigger);
     if (options.trigger_ns && config.trigger.source != trigger_source::gpio)
         throw failure(exit_usage, fmt::format("--trigger-at stands for the edge of a GPIO line, but [trigger] of {} "
@@ -70,16 +70,16 @@ void add_replay(CLI::App& app) {
         ->add_option("log", given->log,
                      "a journal of okid record (.okj) and the segments behind it, or a log of candump -L")
         ->required()
-        ->type_name("LOG");
+        ->type_name("LOG.okj|LOG.log");
     command
         ->add_option("-c,--config", given->config, "what the frames mean and how to identify; a journal holds its own")
         ->type_name("CONFIG.toml");
     command
         ->add_option("--speed", given->speed,
                      "max (default), or a multiple of the log's own time (default with --to: 1)")
-        ->type_name("N");
+        ->type_name("N|max");
     command->add_option("--to", given->to, "play onto this interface or slcan adapter instead")
-        ->type_name("vcan0|/dev/ttyACM0");
+        ->type_name("INTERFACE|DEVICE");
     command
         ->add_option("--trigger-at", given->trigger,
                      "when the GPIO edge came, in the log's time (time_s of the trigger event of the live run)")

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // okid run: acquire, identify and show while it happens.
-#include "../error.hpp"
 #include "../live/capture.hpp"
 #include "../live/playback.hpp"
 #include "../live/session.hpp"
@@ -8,8 +7,6 @@
 #include "commands.hpp"
 #include "live_options.hpp"
 
-#include <algorithm>
-#include <fmt/format.h>
 #include <memory>
 
 namespace okid_host {
@@ -17,19 +14,14 @@ namespace {
 
 void run(const live_arguments& given) {
     const live_config config = load_config(given.config);
-    session_options options = check_live(given, config);
+    const bool from_log = plays_a_log(config);
+    session_options options = check_live(given, config, from_log ? config.buses.front().file : "");
     std::optional<recorder_options> recording;
     if (config.record.wanted) recording = recorder_options{options.duration_s};
-    const auto replays = std::count_if(config.buses.begin(), config.buses.end(),
-                                       [](const bus_config& bus) { return bus.type == "replay"; });
-    if (replays > 0 && config.buses.size() != 1)
-        throw failure(exit_usage, fmt::format("{}: a bus of type replay stands beside another bus, expected it alone",
-                                              config.path));
-    if (replays > 0) require_edge_time(config, false);
-    options.live = replays == 0;
+    options.live = !from_log;
     catch_stop_signals();
     session live(config, options);
-    if (replays > 0)
+    if (from_log)
         play_through(config.buses.front().file, config, live, std::nullopt, recording);
     else
         capture(config, live, options.duration_s, recording);

@@ -133,21 +133,22 @@ void simulate(const simulate_arguments& given) {
 void add_simulate(CLI::App& app) {
     auto given = std::make_shared<simulate_arguments>();
     CLI::App* command = app.add_subcommand("simulate", "Play a virtual rig with known mass, stiffness and damping");
-    command->add_option("rig", given->rig, "the rig")->required()->type_name("RIG.toml");
-    command->add_option("--log", given->log, "CAN frames in the format of candump -L")->type_name("FILE");
+    command->add_option("rig", given->rig, "the masses, springs, sensors and forces of the rig")
+        ->required()
+        ->type_name("RIG.toml");
+    command->add_option("--log", given->log, "CAN frames in the format of candump -L")->type_name("FILE.log");
     command->add_option("--truth", given->truth, "true modes and matrices, okid.truth/1")->type_name("FILE.json");
-    command->add_option("--csv", given->csv, "the same samples in engineering units")->type_name("FILE");
-    command->add_option("--dbc", given->dbc, "description of the frames")->type_name("FILE");
+    command->add_option("--csv", given->csv, "the same samples in engineering units")->type_name("FILE.csv");
+    command->add_option("--dbc", given->dbc, "description of the frames")->type_name("FILE.dbc");
     command
         ->add_option("--config", given->config, "CONFIG.toml for okid run and okid replay (writes the DBC beside it)")
-        ->type_name("FILE");
+        ->type_name("FILE.toml");
     command
         ->add_option("--to", given->to, "send in real time: frames on a CAN interface, or packets on a serial device")
-        ->type_name("vcan0|/dev/pts/N");
-    command->add_option("--baud", given->baud, "of the serial device")
+        ->type_name("INTERFACE|DEVICE");
+    command->add_option("--baud", given->baud, "baud rate of the serial device, 50 to 20000000 (default 921600)")
         ->type_name("N")
-        ->check(CLI::Range(50, 20000000))
-        ->capture_default_str();
+        ->check(CLI::Range(50, 20000000).description(""));
     command->add_flag("--quiet", given->quiet, "no summary, no warnings");
     command->footer("Example:\n  okid simulate rig.toml --log rig.log --truth truth.json --config rig-config.toml\n"
                     "  okid replay rig.log -c rig-config.toml\n"

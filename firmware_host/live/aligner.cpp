@@ -2,6 +2,8 @@
 #include "aligner.hpp"
 
 #include "../config_clock.hpp"
+#include "missing.hpp"
+#include "ring_mask.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +12,6 @@
 namespace okid_host {
 namespace {
 
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 constexpr double begin_patience_s = 30; // a node that is not heard by then is left out
 
 double inner_rate(const live_config& config) { return config.rate_hz * config.decimate; }
@@ -50,11 +51,11 @@ aligner::aligner(const live_config& config, grid_sink& sink)
     }
     wait_ = std::llround((ahead_s + filter_s) * rate_hz);
     patience_ = std::llround(begin_patience_s * rate_hz);
-    while (static_cast<std::int64_t>(mask_) < 2 * wait_) mask_ = 2 * mask_ + 1;
-    waiting_.assign((mask_ + 1) * counted_.size(), missing);
+    mask_ = ring_mask(2 * static_cast<double>(wait_) + 1);
+    waiting_.assign((mask_ + 1) * counted_.size(), missing_sample);
     stamps_.assign(mask_ + 1, 0);
-    row_.assign(width_, missing);
-    part_.assign(width_, missing);
+    row_.assign(width_, missing_sample);
+    part_.assign(width_, missing_sample);
 }
 
 void aligner::push(const drv_frame_t& frame) {
@@ -93,7 +94,7 @@ void aligner::on_gap(const grid_gap& gap) {
 
 /// To whoever comes next: the filter of the decimation, or the session.
 void aligner::hand_on(std::int64_t index, const double* row, std::int64_t count) {
-    grid_sink& to = decimator_ ? *decimator_ : sink_;
+    grid_sink& to = decimator_ ? static_cast<grid_sink&>(*decimator_) : sink_;
     if (row)
         to.on_sample(index, row);
     else
@@ -108,7 +109,7 @@ void aligner::take(std::int64_t index, const double* row, std::int64_t stamp) {
     if (row)
         std::copy_n(row, counted_.size(), to);
     else
-        std::fill_n(to, counted_.size(), missing);
+        std::fill_n(to, counted_.size(), missing_sample);
     stamps_[slot(index)] = stamp;
     taken_ = index + 1;
 }
@@ -132,7 +133,7 @@ void aligner::drain() {
 bool aligner::emit(bool force) {
     const std::int64_t number = next_ - origin_;
     if (number >= limit_) return false;
-    std::fill(row_.begin(), row_.end(), missing);
+    std::fill(row_.begin(), row_.end(), missing_sample);
     const bool known = clock_.settled(); // not so for a moment after the host's clock was set
     if (!known && !force) return false;
     const std::int64_t time = known ? clock_.time_ns(next_, nullptr) : 0;

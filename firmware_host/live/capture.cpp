@@ -3,6 +3,7 @@
 
 #include "../error.hpp"
 #include "../recording/recording_link.hpp"
+#include "bus_listener.hpp"
 #include "bus_watch.hpp"
 #include "gpio_lines.hpp"
 #include "reader.hpp"
@@ -12,7 +13,6 @@
 #include "threads.hpp"
 
 #include <chrono>
-#include <cstdio>
 #include <fmt/format.h>
 #include <memory>
 
@@ -28,7 +28,7 @@ double seconds_since(clock_type::time_point then) {
 class pump {
   public:
     pump(const live_config& config, stream_target& target, const std::optional<recorder_options>& recording)
-        : target_(target), realtime_(config.realtime), lines_(config), frames_(256) {
+        : target_(target), config_(config), lines_(config), frames_(256) {
         for (std::size_t i = 0; i < config.buses.size(); ++i)
             readers_.push_back(std::make_unique<bus_reader>(config, i, wake_));
         for (const auto& reader : readers_) {
@@ -42,17 +42,16 @@ class pump {
         recording_.emplace(config, recording); // a file appears only once there is something to record
         for (std::size_t i = 0; i < config.buses.size() && recording_->get(); ++i)
             readers_[i]->also_into(recording_->get()->ring(i));
-        lock_memory(realtime_);
+        lock_memory(config_.realtime);
     }
 
     void run(const std::optional<double>& duration_s) {
-        for (auto& reader : readers_) reader->start(realtime_);
+        for (auto& reader : readers_) reader->start(config_.realtime);
         for (auto& sender : senders_)
-            if (sender) sender->start(realtime_);
+            if (sender) sender->start(config_.realtime);
         target_.ready();
         const auto begin = clock_type::now();
         auto heard = begin;
-        bool hinted = false;
         while (!target_.done() && !stop_requested()) {
             wake_.wait(100, stop_fd(), target_.triggered() ? -1 : lines_.fd());
             target_.alive();
@@ -60,10 +59,7 @@ class pump {
             if (move_frames(true)) heard = clock_type::now();
             recording_->serve(target_);
             report_buses();
-            if (!target_.heard() && !hinted && seconds_since(begin) > 2) {
-                hinted = true;
-                std::fprintf(stderr, "okid: waiting for frames on %s ...\n", readers_.front()->interface().c_str());
-            }
+            look_for_unheard(seconds_since(begin));
             // Stream seconds cannot end on a silent bus: then the clock ends it.
             if (duration_s && seconds_since(heard) > 2 && seconds_since(begin) > *duration_s + 2) break;
         }
@@ -109,6 +105,32 @@ class pump {
         }
     }
 
+    /// Two seconds without a frame that is asked for: for one more second everything on its bus is heard, then told.
+    void look_for_unheard(double passed_s) {
+        for (auto& listener : listeners_) listener->take(target_.check());
+        if (listening_ == 0 && passed_s > 2) {
+            listening_ = 1;
+            if (!target_.heard()) say("okid: waiting for frames on {} ...\n", readers_.front()->interface());
+            for (std::size_t i = 0; i < readers_.size(); ++i)
+                if (readers_[i]->filtered() && !target_.check().unheard(i).empty())
+                    listeners_.push_back(std::make_unique<bus_listener>(readers_[i]->interface(), i));
+        } else if (listening_ == 1 && passed_s > 3) {
+            listening_ = 2;
+            listeners_.clear();
+            for (std::size_t i = 0; i < readers_.size(); ++i) tell_unheard(i);
+        }
+    }
+
+    void tell_unheard(std::size_t bus) {
+        const std::string unheard = target_.check().unheard(bus), others = target_.check().others(bus);
+        if (config_.buses[bus].serial() || unheard.empty()) return; // a line tells of bytes it cannot read
+        if (others.empty() && !target_.heard()) return;             // nothing at all: that is being said
+        const std::string text = fmt::format("no frame of {} so far; {}", unheard,
+                                             others.empty() ? "is the sensor on?" : "the bus carries " + others);
+        target_.bus_event(bus, "unheard", text);
+        say("okid: interface {}: {}\n", readers_[bus]->interface(), text);
+    }
+
     void report_sync() const {
         for (std::size_t i = 0; i < senders_.size(); ++i) {
             const sync_report sync = senders_[i] ? senders_[i]->report() : sync_report{};
@@ -122,7 +144,7 @@ class pump {
 
     wake_event wake_;
     stream_target& target_;
-    const realtime_config& realtime_;
+    const live_config& config_;
     gpio_lines lines_;
     std::optional<recording_link> recording_; ///< before the readers, which push into its rings
     std::vector<std::unique_ptr<bus_reader>> readers_;
@@ -130,6 +152,8 @@ class pump {
     std::vector<drv_frame_t> frames_;
     std::vector<bus_watch> watches_;
     std::vector<std::unique_ptr<sync_sender>> senders_;
+    std::vector<std::unique_ptr<bus_listener>> listeners_;
+    int listening_ = 0; ///< 0 not yet, 1 at it, 2 told
 };
 
 } // namespace

@@ -1,27 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "decimator.hpp"
 
+#include "missing.hpp"
+#include "ring_mask.hpp"
+
 #include <algorithm>
 #include <limits>
 
 namespace okid_host {
-namespace {
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-
-std::size_t ring_mask(std::size_t least) {
-    std::size_t size = 1;
-    while (size < least) size *= 2;
-    return size - 1;
-}
-
-} // namespace
-
 decimator::decimator(std::size_t channels, int factor, grid_sink& to)
     : to_(to), kernel_(factor), factor_(factor), half_(static_cast<std::int64_t>(kernel_.half())),
-      limit_(std::numeric_limits<std::int64_t>::max()), width_(channels), mask_(ring_mask(4 * kernel_.half())),
-      weights_(2 * kernel_.half()), rows_((mask_ + 1) * channels, 0.0), out_(channels), nothing_(channels, missing),
-      times_(mask_ + 1, 0), gaps_(channels) {
+      limit_(std::numeric_limits<std::int64_t>::max()), width_(channels),
+      mask_(ring_mask(4 * static_cast<double>(kernel_.half()))), weights_(2 * kernel_.half()),
+      rows_((mask_ + 1) * channels, 0.0), out_(channels), nothing_(channels, missing_sample), times_(mask_ + 1, 0),
+      gaps_(channels) {
     kernel_.weights(0, weights_.data());
 }
 
@@ -34,7 +26,7 @@ void decimator::on_missing(std::int64_t index, std::int64_t count) {
     const std::int64_t first = (empty - 2 * half_ + factor_ - 1) / factor_;
     const std::int64_t behind = std::min(limit_, (end - 1 - 2 * half_) / factor_ + 1);
     for (std::int64_t i = std::max(empty, end - static_cast<std::int64_t>(mask_) - 1); i < end; ++i)
-        std::fill_n(&rows_[slot(i) * width_], width_, missing);
+        std::fill_n(&rows_[slot(i) * width_], width_, missing_sample);
     if (behind <= first) return;
     gaps_.missing(behind - first);
     to_.on_missing(first, behind - first);

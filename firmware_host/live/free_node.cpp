@@ -1,26 +1,21 @@
 // SPDX-License-Identifier: MIT
 #include "free_node.hpp"
 
+#include "missing.hpp"
+#include "ring_mask.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace okid_host {
 namespace {
 
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t ticks_a_sample = 1000; // so that the fit's unit, the tick, is nothing beside a sample
 constexpr double off_ppm = 20000;             // cheap sensors run 1 % off their nominal rate
 constexpr double good_enough = 0.02;          // of a sample
 constexpr double patience_s = 10;
 constexpr double smooth_s = 2; // the place follows the fit in this time
 constexpr double jump = 0.25;  // of a sample: further off than this, the place is set anew
-
-std::size_t ring_mask(double least) {
-    std::size_t size = 64;
-    while (static_cast<double>(size) < least) size *= 2;
-    return size - 1;
-}
 
 } // namespace
 
@@ -70,7 +65,7 @@ free_node::free_node(const live_config& part, std::vector<std::size_t> channels,
     : grid_(part, *this), channels_(std::move(channels)), clock_(part.rate_hz), kernel_(part.rate_hz / rate_hz),
       half_(static_cast<std::int64_t>(kernel_.half())), width_(channels_.size()),
       mask_(ring_mask(4 * ahead_s * part.rate_hz + 4 * static_cast<double>(half_))),
-      rows_((mask_ + 1) * width_, missing), weights_(2 * kernel_.half()) {}
+      rows_((mask_ + 1) * width_, missing_sample), weights_(2 * kernel_.half()) {}
 
 void free_node::on_sample(std::int64_t index, const double* row) {
     std::copy_n(row, width_, &rows_[slot(index) * width_]);
@@ -81,7 +76,7 @@ void free_node::on_sample(std::int64_t index, const double* row) {
 void free_node::on_missing(std::int64_t index, std::int64_t count) {
     known_ = index + count;
     const std::int64_t first = std::max(index, known_ - static_cast<std::int64_t>(mask_) - 1);
-    for (std::int64_t i = first; i < known_; ++i) std::fill_n(&rows_[slot(i) * width_], width_, missing);
+    for (std::int64_t i = first; i < known_; ++i) std::fill_n(&rows_[slot(i) * width_], width_, missing_sample);
 }
 
 /// Move on by one wanted sample. @return false: the place had to be set anew, signals are torn here
@@ -103,7 +98,7 @@ bool free_node::follow(std::int64_t time_ns, double period_s) {
 
 free_node::verdict free_node::sample(std::int64_t number, std::int64_t time_ns, double period_s, bool force,
                                      double* out) {
-    std::fill_n(out, width_, missing);
+    std::fill_n(out, width_, missing_sample);
     if (!clock_.settled()) return force ? verdict::missing : verdict::wait;
     if (number != placed_) jumped_ = !follow(time_ns, period_s);
     placed_ = number;

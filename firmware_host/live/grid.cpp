@@ -2,15 +2,14 @@
 // Places frames on the grid and lets samples out; where a lane stands is decided in grid_lane.cpp.
 #include "grid.hpp"
 
+#include "missing.hpp"
+
 #include <algorithm>
 #include <bitset>
 #include <cmath>
-#include <limits>
 
 namespace okid_host {
 namespace {
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 std::uint32_t lane_key(std::size_t bus, std::uint32_t id, bool extended) {
     return static_cast<std::uint32_t>(bus) << 30 ^ static_cast<std::uint32_t>(bus >> 2) << 11 ^ id ^
@@ -41,7 +40,7 @@ grid::grid(const live_config& config, grid_sink& sink)
     mask_ = power_of_two(2 * lag_) - 1;
     hold_ = window_ / 2;
     const auto rows = static_cast<std::size_t>(mask_ + 1);
-    values_.assign(rows * width_, missing);
+    values_.assign(rows * width_, missing_sample);
     present_.assign(rows * lanes_.size(), 0);
     slots_.assign(rows, 0);
     times_.assign(rows, 0);
@@ -148,7 +147,7 @@ void grid::open_rows(std::int64_t upto) {
         if (next_ == opened_ && upto - next_ > window_) skip_to(upto - window_ / 2);
     }
     for (; opened_ <= upto; ++opened_) {
-        std::fill_n(row(opened_), width_, missing);
+        std::fill_n(row(opened_), width_, missing_sample);
         std::fill_n(present(opened_), lanes_.size(), std::uint8_t{0});
         slot(opened_) = 0;
         times_[static_cast<std::size_t>(opened_ & mask_)] = 0;

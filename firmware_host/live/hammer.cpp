@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "hammer.hpp"
 
+#include "missing.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <fmt/format.h>
-#include <limits>
 
 namespace okid_host {
 namespace {
 
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 constexpr double pulse_share = 0.1; // of the peak: what belongs to a pulse
 constexpr double least_peak = 20;   // in deviations of the force before the blow
 constexpr double most_motion = 0.1; // rms before the blow, of that after it
@@ -30,7 +30,7 @@ hammer::hammer(const live_config& config, std::int64_t lags)
     offset_ = channel.layout.offset;
     before_ = std::max<std::int64_t>(std::llround(wanted_.pretrigger_s * rate_hz_), lags + lags / 8 + 4);
     after_ = std::max<std::int64_t>(std::llround(wanted_.length_s * rate_hz_), 16);
-    rows_.assign(rows() * width_, missing);
+    rows_.assign(rows() * width_, missing_sample);
 }
 
 void hammer::keep(const double* row) {
@@ -38,12 +38,12 @@ void hammer::keep(const double* row) {
     if (row)
         std::copy_n(row, width_, to);
     else
-        std::fill_n(to, width_, missing);
+        std::fill_n(to, width_, missing_sample);
     next_ = (next_ + 1) % static_cast<std::int64_t>(rows());
 }
 
 bool hammer::crosses(const double* row) {
-    const double now = row ? offset_ + scale_ * row[wanted_.channel] : missing;
+    const double now = row ? offset_ + scale_ * row[wanted_.channel] : missing_sample;
     if (std::isnan(now)) return false;
     const bool up = wanted_.level > 0, before = have_last_ && (up ? last_ < wanted_.level : last_ > wanted_.level);
     last_ = now;

@@ -153,6 +153,19 @@ std::optional<std::int64_t> identifier::take_change() {
     return samples_ - *std::exchange(change_at_, std::nullopt);
 }
 
+std::vector<double> identifier::predicted_percent() {
+    const std::size_t size = m_ * static_cast<std::size_t>(lags() + 1), n_u = m_ - static_cast<std::size_t>(model_.n_y);
+    std::vector<double> gram(size * size), out;
+    const std::int64_t rows = okid_accumulator_rows(accumulator_);
+    if (okid_accumulator_gram(accumulator_, identify_config_.detrend, gram.data(), nullptr) < 0) return out;
+    for (std::size_t i = 0; i < m_ - n_u; ++i) {
+        const double variance = gram[(n_u + i) * (size + 1)] / static_cast<double>(rows);
+        const auto innovation = static_cast<double>(model_.innovation[i * (m_ - n_u + 1)]);
+        out.push_back(100 * (1 - std::sqrt(std::max(innovation, 0.0) / variance)));
+    }
+    return out;
+}
+
 void identifier::restart() {
     before_ = stats();
     ++restarts_;

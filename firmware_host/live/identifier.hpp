@@ -33,6 +33,8 @@ class identifier {
     std::optional<deviations> sigma(const mass_plan& plan) {
         return blocks_ ? blocks_->sigma(accumulator_, model_, plan) : std::nullopt;
     }
+    /// Of each output 100 (1 - innovation / spread), both RMS: what the model of the last run() says of the next sample.
+    std::vector<double> predicted_percent();
     const okid_identify_config_t& config() const { return identify_config_; }
     int most_modes() const { return okid_identify_max_order(&identify_config_) / 2; }
 

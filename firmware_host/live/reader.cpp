@@ -46,6 +46,7 @@ bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_e
     if (frames.size() <= DRV_MAX_FILTERS && !mine.bitrate) {
         config.filters = frames.data();
         config.filter_count = static_cast<std::int32_t>(frames.size());
+        filtered_ = !mine.on_line();
     }
     const int code = source_.ops->open(&source_, &config);
     if (code != 0) {
@@ -139,8 +140,9 @@ std::vector<std::string> can_interfaces() {
 void throw_interface_failure(int code, const std::string& interface, const std::string& reason) {
     const std::string text = printable(reason, 300);
     if (code == EAFNOSUPPORT)
-        throw failure(exit_device, text + ". Load the modules: sudo modprobe can can-raw vcan; without them use `okid "
-                                          "replay LOG -c CONFIG.toml`");
+        throw failure(exit_device, text +
+                                       ". Load the modules: sudo modprobe -a can can-raw vcan; without them use `okid "
+                                       "replay LOG -c CONFIG.toml`");
     if (code == ENETDOWN)
         throw failure(
             exit_device,

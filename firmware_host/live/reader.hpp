@@ -37,6 +37,7 @@ class bus_reader {
     drv_stats_t stats() const;
     std::uint64_t ring_overrun() const { return drv_ring_overrun(ring_); }
     const std::string& interface() const { return interface_; } ///< or the device of a line
+    bool filtered() const { return filtered_; } ///< the kernel lets nothing pass that no channel asks for
 
   private:
     void run();
@@ -45,6 +46,7 @@ class bus_reader {
 
     std::string interface_;
     std::uint8_t bus_;
+    bool filtered_ = false;
     wake_event& wake_;
     int stop_fd_;
     drv_source_t source_{};

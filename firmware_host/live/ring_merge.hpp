@@ -16,7 +16,6 @@ class ring_merge {
     void add(drv_ring_t* ring);
     /// The next frames; those of one ring stay in their order. No heap. @return 0 when every ring is empty
     std::size_t take(drv_frame_t* frames, std::size_t capacity);
-    std::size_t rings() const { return inputs_.size(); }
 
   private:
     struct input {

@@ -2,8 +2,10 @@
 #include "session.hpp"
 
 #include "../error.hpp"
+#include "../host_time.hpp"
 #include "../method.hpp"
 #include "../publishing/service_notice.hpp"
+#include "../record_check.hpp"
 #include "serial_line.hpp"
 #include "stop_signal.hpp"
 
@@ -19,15 +21,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr double stats_every_s = 5;
-
-/// UTC at microseconds: 2026-11-21T12:00:00.000000Z
-std::string wall_time(std::int64_t time_ns) {
-    const std::time_t seconds = time_ns / 1000000000;
-    std::tm utc{};
-    gmtime_r(&seconds, &utc);
-    return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday,
-                       utc.tm_hour, utc.tm_min, utc.tm_sec, time_ns / 1000 % 1000000);
-}
 
 std::int64_t samples_of(double seconds, double rate_hz) {
     return std::max<std::int64_t>(1, std::llround(seconds * rate_hz));
@@ -75,11 +68,13 @@ ordered_json clock_json(const drv_clock_fit_t& clock) {
 session::session(const live_config& config, const session_options& options)
     : config_(config), options_(options),
       publisher_(config, {options.events, options.events != "-" && options.json != "-", options.live}),
-      grid_(config, *this), identifier_(config), tracks_(static_cast<int>(config.n_y), identifier_.most_modes()),
-      alarm_(config.alarm), trigger_(config), hammer_(config, identifier_.lags()), losses_(config.buses.size()),
-      health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
+      grid_(config, *this), check_(config), identifier_(config),
+      tracks_(static_cast<int>(config.n_y), identifier_.most_modes()), alarm_(config.alarm), trigger_(config),
+      hammer_(config, identifier_.lags()), losses_(config.buses.size()), health_(config.buses.size()),
+      clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)) {
     if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
+    if (config.publish.samples) feed_.emplace(config);
     stats_samples_ =
         update_samples_ * std::max<std::int64_t>(1, std::llround(stats_every_s / config.identification.update_s));
     if (options.duration_s) {
@@ -96,13 +91,23 @@ void session::tell(ordered_json event) {
     publisher_.event(std::move(event), static_cast<double>(start_ns_) * 1e-9 + t);
 }
 
+void session::send_samples(const json_line& block) {
+    if (block) publisher_.samples(block);
+}
+
 void session::ready() { notify_service("READY=1"); }
 
 void session::start(std::int64_t time_ns) {
     if (started_) return;
     started_ = true;
     start_ns_ = time_ns;
-    ordered_json event{{"type", "start"}, {"t", 0.0}, {"config", config_.path}, {"wall_time", wall_time(time_ns)}};
+    ordered_json event{{"type", "start"}, {"t", 0.0}, {"config", config_.path}, {"wall_time", utc_text(time_ns)}};
+    event["rate_hz"] = config_.rate_hz;
+    for (const channel_config& channel : config_.channels)
+        event["channels"].push_back({{"name", channel.name},
+                                     {"role", channel_role_name(channel.role)},
+                                     {"unit", channel.unit.empty() ? "" : channel.si_unit()},
+                                     {"dof", channel.dof == 0 ? ordered_json(nullptr) : ordered_json(channel.dof)}});
     for (const auto& [key, text] : config_.notes) event["notes"][key] = text;
     tell(event);
 }
@@ -113,19 +118,22 @@ void session::frame(const drv_frame_t& frame) {
     drv_frame_t stamped = frame;
     stamped.time_ns = frame.time_ns / 1000 * 1000;
     start(stamped.time_ns);
-    if (first_ns_ == 0) first_ns_ = stamped.time_ns;
-    last_ns_ = stamped.time_ns;
     if (frame.bus < busy_s_.size() && config_.buses[frame.bus].bitrate)
         busy_s_[frame.bus] +=
             drv_wire_seconds(&frame, *config_.buses[frame.bus].bitrate, config_.buses[frame.bus].dbitrate.value_or(0));
     if (frame.hw_time_ns != 0 && frame.bus < clocks_.size())
         (void)drv_clock_fit_add(&clocks_[frame.bus], static_cast<std::uint64_t>(frame.hw_time_ns), frame.time_ns);
+    check_.add(stamped);
+    if (options_.live && !remarked_ && check_.judged()) tell_remarks();
     grid_.push(stamped);
 }
 
 void session::on_sample(std::int64_t index, const double* row) {
     if (limit_ > 0 && index >= limit_) return;
     now_ = index + 1;
+    last_ = {index, grid_.time_ns(index)};
+    if (first_.ns == 0) first_ = last_;
+    if (feed_) send_samples(feed_->add(index, row));
     if (hammer_.wanted()) {
         if (hammer_.add(index, row, 1)) strike();
     } else if (!trigger_.waiting())
@@ -144,6 +152,7 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
     if (limit_ > 0) count = std::min(count, limit_ - index);
     if (count <= 0) return;
     now_ = index + count;
+    if (feed_) send_samples(feed_->end_block());
     if (hammer_.wanted()) {
         if (hammer_.add(index, nullptr, count)) strike();
     } else if (!trigger_.waiting())
@@ -283,22 +292,35 @@ void session::write_stats() {
     tell(event);
 }
 
+/// Why nothing of a channel is on the grid, though the stream is.
+std::string session::silence(std::size_t index) const {
+    const channel_config& channel = config_.channels[index];
+    const std::string others = check_.others(channel.bus);
+    if (check_.frames_of(index) > 0 && !channel.field)
+        return fmt::format("frames of it came, but none {}; are its bits in {} right?",
+                           channel.selectors.empty()
+                               ? "is long enough for the signal"
+                               : "carries the signal (its multiplexor has other values, or the frames are short)",
+                           config_.path);
+    return fmt::format("{}is the sensor on, and are {} and bus right in {}?",
+                       others.empty() ? "" : "it carries " + others + "; ", channel.field ? "field" : "identifier",
+                       config_.path);
+}
+
 /// A channel that never spoke is the likeliest reason for no model: say so before the algebra does.
 void session::check_heard() const {
     for (const std::size_t index : grid_.silent_channels()) {
         const channel_config& channel = config_.channels[index];
         if (channel.role == channel_role::aux) continue;
-        throw failure(exit_no_model,
-                      fmt::format("no usable {} of channel \"{}\" was received ({}, bus \"{}\"): is the sensor on, and "
-                                  "are {} and bus right in {}?",
-                                  channel.field ? "sample" : "frame", channel.name, place_text(channel),
-                                  config_.buses[channel.bus].name, channel.field ? "field" : "identifier",
-                                  config_.path));
+        throw failure(exit_no_model, fmt::format("no usable {} of channel \"{}\" was received ({}, bus \"{}\"): {}",
+                                                 channel.field ? "sample" : "frame", channel.name, place_text(channel),
+                                                 config_.buses[channel.bus].name, silence(index)));
     }
 }
 
 result_context session::context() {
     result_context out;
+    out.warnings = config_.unit_remarks;
     out.method = config_.identification.method;
     if (!looks_back_rows(method_of(out.method), config_.n_u)) out.hankel = config_.identification.hankel;
     out.fs_hz = config_.rate_hz;
@@ -328,6 +350,7 @@ result_context session::context() {
             fmt::format("{} codes stood at full scale: taken as they are, but a clipped signal bends every mode; lower "
                         "the gain or the force",
                         stats.saturated));
+    for (auto& remark : check_.doubts()) out.warnings.push_back(std::move(remark));
     for (std::size_t i = 0; i < config_.n_u + config_.n_y; ++i)
         (i < config_.n_u ? out.inputs : out.outputs).push_back(config_.channels[i].name);
     return out;
@@ -335,8 +358,8 @@ result_context session::context() {
 
 /// Samples a second by the time stamps; 0 before it can be told. Counters say how many came, stamps in what time.
 double session::observed_rate_hz() const {
-    const double span_s = static_cast<double>(last_ns_ - first_ns_) * 1e-9;
-    return now_ >= 100 && span_s > 0 ? static_cast<double>(now_) / span_s : 0;
+    const double span_s = static_cast<double>(last_.ns - first_.ns) * 1e-9;
+    return now_ >= 100 && span_s > 0 ? static_cast<double>(last_.index - first_.index) / span_s : 0;
 }
 
 /// A rate_hz that is not that of the stamps scales every frequency. Not part of the result, which is the same for every
@@ -349,6 +372,13 @@ void session::remark_rate() const {
     say("okid: warning: by the time stamps {:.4g} samples came a second, but rate_hz is {:.10g}: every frequency "
         "scales with it. Mend rate_hz in {}, unless the frames were played at another speed\n",
         observed_hz, config_.rate_hz, config_.path);
+}
+
+/// What does not fit the configuration is told as soon as it is known, and again where it is the likely reason for no
+/// model; a result has it among its warnings.
+void session::tell_remarks() {
+    remarked_ = true;
+    for (const auto& [code, text] : check_.doubts()) say("okid: warning: {}\n", text);
 }
 
 /// Channels on clocks of their own: how well their time is known, and what that is in phase at each mode.
@@ -391,6 +421,7 @@ void session::add_mass(result_context& about) const {
 void session::finish() {
     if (options_.live) notify_service("STOPPING=1");
     grid_.finish();
+    if (feed_) send_samples(feed_->end_block());
     start(std::int64_t{std::time(nullptr)} * 1000000000); // nothing was heard at all
     const okid_status_t status = identifier_.run();
     write_stats();
@@ -402,7 +433,11 @@ void session::finish() {
     }
     result_context about = context();
     remark_rate();
-    if (status < 0) throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
+    if (status < 0) {
+        tell_remarks();
+        throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
+    }
+    remark_low_fit(identifier_.predicted_percent(), false, about);
     remark_clocks(about);
     add_mass(about);
     about.sigma = identifier_.sigma(about.mass ? live_mass_plan(config_) : mass_plan{});

@@ -4,6 +4,7 @@
 #pragma once
 #include "../config.hpp"
 #include "../publishing/publisher.hpp"
+#include "../publishing/sample_feed.hpp"
 #include "../result.hpp"
 #include "alarm.hpp"
 #include "aligner.hpp"
@@ -45,6 +46,7 @@ class session : public stream_target, private grid_sink {
     bool done() const override { return (limit_ > 0 && grid_.emitted() >= limit_) || hammer_.done(); }
     double stream_s() const { return static_cast<double>(grid_.emitted()) / config_.rate_hz; }
     bool heard() const override { return started_; }
+    stream_check& check() override { return check_; }
     void ready() override;
     void alive() override { publisher_.beat(); }
 
@@ -68,20 +70,25 @@ class session : public stream_target, private grid_sink {
     void tell_change(std::int64_t samples);
     void tell_modes(const table_state& state, const deviations* sigma);
     void tell_alarm(double t);
+    void send_samples(const json_line& block);
     void write_stats();
+    std::string silence(std::size_t index) const;
     void check_heard() const;
     nlohmann::ordered_json bus_stats(std::size_t bus) const;
     result_context context();
     void add_mass(result_context& about) const;
     double observed_rate_hz() const;
     void remark_rate() const;
+    void tell_remarks();
     void remark_clocks(result_context& about) const;
     double seconds(std::int64_t samples) const { return static_cast<double>(samples) / config_.rate_hz; }
 
     const live_config& config_;
     session_options options_;
     publisher publisher_;
+    std::optional<sample_feed> feed_;
     aligner grid_;
+    stream_check check_;
     identifier identifier_;
     settling settling_;
     mode_tracks tracks_;
@@ -93,13 +100,15 @@ class session : public stream_target, private grid_sink {
     std::vector<drv_clock_fit_t> clocks_; ///< of the devices that stamp frames themselves
     std::vector<double> busy_s_;          ///< time on the wire of each bus, 0 without a bitrate
     std::int64_t update_samples_, stats_samples_, limit_ = 0, now_ = 0;
-    std::int64_t first_ns_ = 0, last_ns_ = 0; ///< time stamps of the stream
-    std::int64_t start_ns_ = 0;               ///< what t counts from
+    struct stamped_sample {
+        std::int64_t index = 0, ns = 0;
+    } first_, last_;            ///< samples that came, and their time stamps
+    std::int64_t start_ns_ = 0; ///< what t counts from
     std::int64_t gaps_ = 0, restarted_at_ = 0, restarts_told_ = 0;
     std::vector<observed_mode> observed_; ///< of the newest update
     table_state shown_;                   ///< hammer test: after the newest blow
     std::int64_t stats_told_ = 0, changed_at_ = 0;
-    bool started_ = false, settled_ = false, due_ = false;
+    bool started_ = false, settled_ = false, due_ = false, remarked_ = false;
 };
 
 } // namespace okid_host

@@ -2,6 +2,7 @@
 // What frames of live buses go to: a session that identifies, or one that only records.
 #pragma once
 #include "sender.hpp"
+#include "stream_check.hpp"
 
 #include <drv/frame.h>
 #include <drv/source.h>
@@ -39,13 +40,14 @@ class stream_target {
     virtual void bus_event(std::size_t bus, const char* kind, const std::string& text) = 0;
     /// Something happened to the recording.
     virtual void record_event(const std::string& kind, const std::string& text) = 0;
-    /// An edge of the trigger line, CLOCK_REALTIME. Nothing comes of it when none is waited for.
+    /// An edge of the trigger line, host time (drv/host_clock.h). Nothing comes of it when none is waited for.
     virtual void trigger_edge(std::int64_t time_ns) = 0;
     virtual bool triggered() const = 0;
     virtual std::int64_t trigger_ns() const = 0; ///< when, once it has come; 0 without a trigger
     virtual lamp_state lamps() const = 0;
     virtual bool done() const = 0;
-    virtual bool heard() const = 0; ///< the stream has begun
+    virtual bool heard() const = 0;    ///< the stream has begun
+    virtual stream_check& check() = 0; ///< what speaks against the configuration
     /// Every device is open; and, from then on at least every second: the thread that reads is at work. For a service manager.
     virtual void ready() {}
     virtual void alive() {}

@@ -20,7 +20,7 @@ class trigger {
     explicit trigger(const live_config& config);
 
     bool waiting() const { return waiting_; }
-    /// An edge of the GPIO line, CLOCK_REALTIME. The first one counts.
+    /// An edge of the GPIO line, host time (drv/host_clock.h). The first one counts.
     void edge(std::int64_t time_ns);
     /// A sample while waiting; NULL = `count` missing ones. @return true when the trigger has come
     bool add(std::int64_t index, const double* row, std::int64_t count, std::int64_t time_ns);

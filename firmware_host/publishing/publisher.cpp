@@ -2,6 +2,7 @@
 #include "publisher.hpp"
 
 #include "../error.hpp"
+#include "../host_time.hpp"
 #include "alarm_command.hpp"
 #include "broker.hpp"
 #include "datagrams.hpp"
@@ -9,17 +10,14 @@
 #include "subscribers.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
 namespace okid_host {
 namespace {
 
-constexpr double redraw_s = 0.1;   // a replay at full speed updates faster than an eye
-constexpr double farewell_s = 1.0; // for subscribers that still read
-
-double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+constexpr double redraw_every_s = 0.1; // a replay at full speed updates faster than an eye
+constexpr double farewell_s = 1.0;     // for subscribers that still read
 
 } // namespace
 
@@ -75,7 +73,16 @@ void publisher::event(nlohmann::ordered_json event, double wall_s) {
         event.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
     one.event = std::make_shared<const nlohmann::ordered_json>(std::move(event));
     if (events_) events_->put(one.line);
-    if (sinks_.empty()) return;
+    if (!sinks_.empty()) hand_over(std::move(one));
+}
+
+void publisher::samples(json_line block) {
+    publication one;
+    one.line = std::move(block);
+    hand_over(std::move(one));
+}
+
+void publisher::hand_over(publication one) {
     {
         std::unique_lock<std::mutex> lock(mutex_);
         if (!options_.live) room_.wait(lock, [&] { return waiting_.size() < most_waiting; });
@@ -118,19 +125,23 @@ void publisher::take_all() {
     }
     room_.notify_all();
     for (const publication& one : fresh)
-        for (const auto& each : sinks_) each->take(one);
+        for (const auto& each : sinks_)
+            if (one.event)
+                each->take(one);
+            else
+                each->take_samples(one.line);
     for (const auto& each : sinks_) each->tick();
 }
 
 void publisher::draw() {
-    if (!terminal_ || now_s() - drawn_at_ < redraw_s) return;
+    if (!terminal_ || steady_s() - drawn_at_ < redraw_every_s) return;
     std::optional<table_state> state;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
         state.swap(to_draw_);
     }
     if (!state) return;
-    drawn_at_ = now_s();
+    drawn_at_ = steady_s();
     if (terminal_->draw(*state)) return;
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!to_draw_) to_draw_ = std::move(state);
@@ -150,7 +161,7 @@ void publisher::run() {
     drawn_at_ = 0;
     draw();
     if (terminal_) terminal_->end();
-    for (const double until = now_s() + farewell_s; now_s() < until;) {
+    for (const double until = steady_s() + farewell_s; steady_s() < until;) {
         bool all = true;
         for (const auto& each : sinks_) all = each->finished() && all;
         if (all) break;

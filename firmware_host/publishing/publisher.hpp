@@ -37,6 +37,8 @@ class publisher {
 
     /// @param wall_s  time of the event as seconds since 1970. Throws `failure` (exit 4) when the events file is broken
     void event(nlohmann::ordered_json event, double wall_s);
+    /// A block of the signals, for subscribers of the unix socket.
+    void samples(json_line block);
     void table(const table_state& state);
     void update_took(double seconds);
     /// The session lives; for the watchdog.
@@ -48,6 +50,7 @@ class publisher {
 
   private:
     static constexpr std::size_t most_waiting = 1024;
+    void hand_over(publication one);
     void open_sinks(const live_config& config);
     void run();
     void wait_for_work();

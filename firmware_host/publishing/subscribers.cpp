@@ -59,19 +59,29 @@ subscribers::~subscribers() {
     unlink(path_.c_str());
 }
 
-void subscribers::append(subscriber& to, const std::shared_ptr<const std::string>& line) {
-    while (!to.lines.empty() && (to.lines.size() >= most_lines || to.bytes + line->size() > most_bytes)) {
+void subscribers::append(subscriber& to, const json_line& fresh) {
+    while (!to.lines.empty() && (to.lines.size() >= most_lines || to.bytes + fresh->size() > most_bytes)) {
         to.bytes -= to.lines.front()->size();
         to.lines.pop_front();
         ++to.lost;
     }
-    to.bytes += line->size();
-    to.lines.push_back(line);
+    to.bytes += fresh->size();
+    to.lines.push_back(fresh);
 }
 
 void subscribers::take(const publication& one) {
     if (one.type == "start") start_ = one.line;
     for (subscriber& each : all_) append(each, one.line);
+    send_all();
+}
+
+/// Signals never push an event out: who is behind goes without them.
+void subscribers::take_samples(const json_line& block) {
+    for (subscriber& each : all_)
+        if (each.lines.size() < most_lines / 2 && each.bytes + block->size() < most_bytes / 2)
+            append(each, block);
+        else
+            ++each.lost;
     send_all();
 }
 

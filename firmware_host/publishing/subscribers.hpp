@@ -22,6 +22,7 @@ class subscribers : public event_sink {
     subscribers& operator=(const subscribers&) = delete;
 
     void take(const publication& one) override;
+    void take_samples(const json_line& block) override;
     void add_polls(std::vector<pollfd>& polls) const override;
     void tick() override;
     bool finished() override;
@@ -29,21 +30,21 @@ class subscribers : public event_sink {
   private:
     struct subscriber {
         int fd = -1;
-        std::shared_ptr<const std::string> now; ///< on its way, never given up half-way
-        std::size_t sent = 0;                   ///< of it
-        std::deque<std::shared_ptr<const std::string>> lines;
+        json_line now;        ///< on its way, never given up half-way
+        std::size_t sent = 0; ///< of it
+        std::deque<json_line> lines;
         std::size_t bytes = 0; ///< of those
         std::uint64_t lost = 0;
         bool idle() const { return !now && lines.empty(); }
     };
     void welcome();
-    static void append(subscriber& to, const std::shared_ptr<const std::string>& line);
+    static void append(subscriber& to, const json_line& fresh);
     static bool send(subscriber& to);
     void send_all();
 
     std::string path_;
     int fd_ = -1;
-    std::shared_ptr<const std::string> start_;
+    json_line start_;
     std::list<subscriber> all_;
 };
 

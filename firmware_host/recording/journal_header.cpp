@@ -7,7 +7,6 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <ctime>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <memory>
@@ -20,13 +19,6 @@ namespace {
 constexpr std::size_t most_text_bytes = std::size_t{64} << 20; // of all texts together: a hostile file holds no more
 constexpr const char *header_name = "journal", *config_text_name = "config",
                      *dbc_prefix = "dbc:", *preset_prefix = "preset:";
-
-std::tm utc(std::int64_t time_ns) {
-    const std::time_t seconds = time_ns / 1000000000;
-    std::tm out{};
-    gmtime_r(&seconds, &out);
-    return out;
-}
 
 toml::table header_table(const journal_header& header) {
     toml::table out{{"okid", header.version},
@@ -114,18 +106,6 @@ struct text_collector {
 };
 
 } // namespace
-
-std::string utc_compact(std::int64_t time_ns) {
-    const std::tm t = utc(time_ns);
-    return fmt::format("{:04}{:02}{:02}T{:02}{:02}{:02}Z", t.tm_year + 1900, t.tm_mon + 1, t.tm_mday, t.tm_hour,
-                       t.tm_min, t.tm_sec);
-}
-
-std::string utc_text(std::int64_t time_ns) {
-    const std::tm t = utc(time_ns);
-    return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", t.tm_year + 1900, t.tm_mon + 1, t.tm_mday,
-                       t.tm_hour, t.tm_min, t.tm_sec, time_ns / 1000 % 1000000);
-}
 
 std::vector<journal_header::bus> journal_buses(const live_config& config) {
     std::vector<journal_header::bus> out;

@@ -38,8 +38,4 @@ int write_journal_header(drv_journal_writer_t& writer, const journal_header& hea
 /// the file is no journal.
 journal_header read_journal_header(const std::string& path);
 
-/// UTC of a time: 20261121T120000Z, or 2026-11-21T12:00:00.000000Z.
-std::string utc_compact(std::int64_t time_ns);
-std::string utc_text(std::int64_t time_ns);
-
 } // namespace okid_host

@@ -2,9 +2,9 @@
 #include "record_watch.hpp"
 
 #include "../error.hpp"
+#include "../host_time.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fmt/format.h>
@@ -17,13 +17,11 @@ namespace {
 constexpr double redraw_s = 0.5;
 constexpr double patience_s = 2; // beyond the duration, when the channels do not come
 
-double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
 } // namespace
 
 record_watch::record_watch(const live_config& config, const std::optional<double>& duration_s)
-    : config_(config), duration_s_(duration_s), grid_(config, *this), trigger_(config), losses_(config.buses.size()),
-      terminal_(isatty(STDERR_FILENO) == 1) {
+    : config_(config), duration_s_(duration_s), grid_(config, *this), check_(config), trigger_(config),
+      losses_(config.buses.size()), terminal_(isatty(STDERR_FILENO) == 1) {
     if (!duration_s) return;
     limit_ = std::max<std::int64_t>(1, std::llround(*duration_s * config.rate_hz));
     grid_.set_limit(limit_);
@@ -35,12 +33,13 @@ void record_watch::frame(const drv_frame_t& frame) {
     if (first_ns_ == 0) first_ns_ = stamped.time_ns;
     last_ns_ = stamped.time_ns;
     ++frames_;
+    check_.add(stamped);
     grid_.push(stamped);
     if (terminal_ && frames_ % 64 == 0) show_progress();
 }
 
 void record_watch::show_progress() {
-    const double now = now_s();
+    const double now = steady_s();
     if (now - shown_at_ < redraw_s) return;
     shown_at_ = now;
     say("\r{}{:.1f} s, {} frames ", trigger_.waiting() ? "armed, " : "",
@@ -99,6 +98,11 @@ void record_watch::finish() {
                               counts.expected, percent);
     }
     (void)std::fwrite(report.data(), 1, report.size(), stdout);
+    for (std::size_t i = 0; i < config_.buses.size(); ++i)
+        if (const std::string unheard = check_.unheard(i), others = check_.others(i); !unheard.empty())
+            say("okid: warning: bus {}: no frame of {}{}\n", config_.buses[i].name, unheard,
+                others.empty() ? "" : "; it carries " + others);
+    for (const auto& [code, text] : check_.doubts()) say("okid: warning: {}\n", text);
 }
 
 } // namespace okid_host

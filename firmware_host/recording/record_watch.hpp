@@ -28,6 +28,7 @@ class record_watch : public stream_target, private grid_sink {
     lamp_state lamps() const override;
     bool done() const override;
     bool heard() const override { return first_ns_ != 0; }
+    stream_check& check() override { return check_; }
     /// What was recorded, for people. Throws `failure`: exit 3 when nothing was, exit 4 when the disk ended it.
     void finish() override;
 
@@ -40,6 +41,7 @@ class record_watch : public stream_target, private grid_sink {
     const live_config& config_;
     std::optional<double> duration_s_;
     aligner grid_;
+    stream_check check_;
     trigger trigger_;
     std::vector<device_losses> losses_;
     std::int64_t limit_ = 0, first_ns_ = 0, last_ns_ = 0;

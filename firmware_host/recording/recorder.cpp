@@ -2,6 +2,7 @@
 #include "recorder.hpp"
 
 #include "../error.hpp"
+#include "../host_time.hpp"
 #include "../live/threads.hpp"
 
 #include <algorithm>

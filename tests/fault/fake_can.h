@@ -19,9 +19,11 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <string.h>
+#include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 enum { FAKE_QUEUE = 1024, FAKE_MESSAGES = 32, FAKE_MESSAGE_BYTES = 1024 };
@@ -45,6 +47,8 @@ static struct {
     const char* kind;
     // what fails
     int socket_error, bind_error, netlink_error, no_stamps, no_force;
+    int listen_error, flags_error, poll_set_error, poll_add_error; ///< bind() of netlink, SIOCGIFFLAGS, epoll_...
+    int late_answers;                                              ///< EAGAIN so often before a question is answered
     // sockets
     int can_fd, watch_fd, query_fd, can_sockets;
     int filters, buffer;
@@ -177,6 +181,7 @@ int socket(int domain, int type, int protocol) {
 int bind(int fd, const struct sockaddr* address, socklen_t length) {
     (void)length;
     if (address->sa_family != AF_NETLINK) return fake.bind_error ? fake_fault(fake.bind_error) : 0;
+    if (fake.listen_error) return fake_fault(fake.listen_error);
     struct sockaddr_nl netlink;
     memcpy(&netlink, address, sizeof netlink);
     if (netlink.nl_groups) fake.watch_fd = fd;
@@ -221,9 +226,18 @@ int ioctl(int fd, unsigned long request, ...) {
     struct ifreq* about = va_arg(list, struct ifreq*);
     va_end(list);
     if (!fake.index || strcmp(about->ifr_name, fake.name) != 0) return fake_fault(ENODEV);
+    if (request == SIOCGIFFLAGS && fake.flags_error) return fake_fault(fake.flags_error);
     if (request == SIOCGIFHWADDR) about->ifr_hwaddr.sa_family = (sa_family_t)fake.type;
     if (request == SIOCGIFFLAGS) about->ifr_flags = fake.up ? IFF_UP : 0;
     return 0;
+}
+
+int epoll_create1(int flags) {
+    return fake.poll_set_error ? fake_fault(fake.poll_set_error) : (int)syscall(SYS_epoll_create1, flags);
+}
+
+int epoll_ctl(int set, int what, int fd, struct epoll_event* event) {
+    return fake.poll_add_error ? fake_fault(fake.poll_add_error) : (int)syscall(SYS_epoll_ctl, set, what, fd, event);
 }
 
 unsigned if_nametoindex(const char* name) { return strcmp(name, fake.name) == 0 ? (unsigned)fake.index : 0; }
@@ -287,6 +301,7 @@ ssize_t send(int fd, const void* request, size_t bytes, int flags) {
 ssize_t recv(int fd, void* buffer, size_t bytes, int flags) {
     (void)bytes;
     (void)flags;
+    if (fd != fake.watch_fd && fake.late_answers-- > 0) return fake_fault(EAGAIN);
     if (fd != fake.watch_fd) { // the answer to a question
         if (fake.index) return (ssize_t)fake_link_message(buffer, RTM_NEWLINK);
         struct {

@@ -99,7 +99,7 @@ def signals(count: int) -> list[bytes]:
 
 
 def chunk(kind: int, payload: bytes, sequence: int, frames: int = 0) -> bytes:
-    """Of a journal, docs/journal-format.md."""
+    """Of a journal, docs/reference/journal-format.md."""
     head = b"\x8fOKJ\r\n\x1a\n" + struct.pack(
         "<BBHIQIIqqQI", 1, kind, 0, len(payload), 7, sequence, frames, 1, 2, 0, zlib.crc32(payload)
     )

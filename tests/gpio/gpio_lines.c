@@ -37,6 +37,22 @@ static int64_t now_ns(clockid_t clock) {
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
+/// Both clocks at one moment: CLOCK_REALTIME, and the CLOCK_MONOTONIC before and after it (the host may pause us between).
+typedef struct moment_t {
+    int64_t before, real, after;
+} moment_t;
+
+static moment_t moment_now(void) {
+    moment_t best = {0, 0, INT64_MAX};
+    for (int i = 0; i < 5; ++i) {
+        moment_t one = {.before = now_ns(CLOCK_MONOTONIC)};
+        one.real = now_ns(CLOCK_REALTIME);
+        one.after = now_ns(CLOCK_MONOTONIC);
+        if (one.after - one.before < best.after - best.before) best = one;
+    }
+    return best;
+}
+
 /// Wait until `count` edges came, a second at most. @return how many came
 static int collect(drv_gpio_event_t* events, int count) {
     int have = 0;
@@ -57,11 +73,13 @@ static void test_rising_edges(void) {
     TEST_ASSERT_TRUE(drv_gpio_fd(&line) >= 0);
     drv_gpio_event_t events[12];
     TEST_ASSERT_EQUAL_INT(0, drv_gpio_read(&line, events, 12));
-    int64_t real[10], steady[10];
+    moment_t pulled[10];
+    int64_t seen[10];
     for (int i = 0; i < 10; ++i) {
-        real[i] = now_ns(CLOCK_REALTIME), steady[i] = now_ns(CLOCK_MONOTONIC);
+        pulled[i] = moment_now();
         TEST_ASSERT_EQUAL_INT(0, sim_pull(&sim, 2, 1));
         sim_pause(20);
+        seen[i] = now_ns(CLOCK_MONOTONIC);
         TEST_ASSERT_EQUAL_INT(0, sim_pull(&sim, 2, 0));
         sim_pause(20);
     }
@@ -69,12 +87,12 @@ static void test_rising_edges(void) {
     for (int i = 0; i < 10; ++i) {
         TEST_ASSERT_EQUAL_INT(DRV_GPIO_RISING, events[i].edge);
         TEST_ASSERT_EQUAL_UINT32(0, events[i].lost);
-        int64_t late = events[i].monotonic_ns - steady[i];
-        TEST_ASSERT_TRUE(late >= 0 && late < 20 * ms);
-        int64_t apart = events[i].time_ns - real[i] - late; // the carrying to CLOCK_REALTIME
-        TEST_ASSERT_TRUE(llabs(apart) <= line.clock_error_ns + ms);
+        TEST_ASSERT_TRUE(events[i].monotonic_ns >= pulled[i].before && events[i].monotonic_ns <= seen[i]);
+        const int64_t middle = pulled[i].before + (pulled[i].after - pulled[i].before) / 2;
+        const int64_t carried = events[i].time_ns - events[i].monotonic_ns, apart = carried - (pulled[i].real - middle);
+        TEST_ASSERT_TRUE(llabs(apart) <= line.clock_error_ns + (pulled[i].after - pulled[i].before) + 2 * ms);
     }
-    TEST_ASSERT_TRUE(line.clock_error_ns > 0 && line.clock_error_ns < ms);
+    TEST_ASSERT_TRUE(line.clock_error_ns > 0);
     TEST_ASSERT_EQUAL_INT(0, drv_gpio_read(&line, events, 12));
     TEST_ASSERT_EQUAL_UINT64(10, line.events);
     TEST_ASSERT_EQUAL_UINT64(0, line.lost);

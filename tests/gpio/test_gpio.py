@@ -16,23 +16,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from two_masses import rig_text
 
 BUILD = Path(os.environ.get("OKID_BUILD", str(Path(__file__).parents[2] / "build")))
 OKID = os.environ.get("OKID_PROGRAM", str(BUILD / "okid"))
-RIG = """
-rate_hz = 100.0
-duration_s = 12.0
-seed = 5
-masses = [1.0, 0.8]
-springs = [3e3, 2e3]
-zeta = [0.02, 0.02]
-force_dofs = [1]
-sense_dofs = [1, 2]
-sensing = "acceleration"
-excitation = "white"
-noise_percent = 1.0
-bits = 16
-"""
 
 
 APIS = [1, 2] if (BUILD / "gpio" / "gpio_lines_1").exists() else [2]  # where the system has 2.x, that alone
@@ -89,7 +76,7 @@ def sim() -> Iterator[Sim]:
 
 @pytest.fixture
 def rig(tmp_path: Path, sim: Sim) -> Path:
-    (tmp_path / "rig.toml").write_text(RIG)
+    (tmp_path / "rig.toml").write_text(rig_text(12.0, 100.0, 5, "[3e3, 2e3]"))
     names = {"--log": "a.log", "--truth": "t.json", "--dbc": "a.dbc", "--config": "a.toml"}
     options = [str(part) for option, name in names.items() for part in (option, tmp_path / name)]
     subprocess.run([OKID, "simulate", str(tmp_path / "rig.toml"), *options], check=True, capture_output=True)

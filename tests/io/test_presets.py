@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import binascii
 import math
+import os
 import random
 import struct
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import cantools
@@ -221,6 +224,41 @@ def test_unknown_preset_tells_which_there_are(tmp_path: Path) -> None:
     assert done.returncode == 2 and "the file to check is missing" in done.stderr
 
 
+@contextmanager
+def punctual() -> Iterator[None]:
+    """This thread before all others, where we may ask for it: a sensor is not late because a computer is busy."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    with suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(5))
+    yield
+    with suppress(PermissionError):
+        os.sched_setscheduler(0, *before)
+
+
+def send_bursts(
+    device: Path, config: Path, packets: list[bytes], rate: int, lost: set[int], fault: str
+) -> tuple[list[dict], float]:
+    """Eight packets at once, in real time. @return the events of the run, and how late we were at worst [s]"""
+    late_s = 0.0
+    with line(device) as ours, punctual():
+        run = Run(config)
+        begin = time.monotonic() + 0.5
+        for first in range(0, len(packets), 8):
+            due = begin + (first + 8) / rate
+            time.sleep(max(0.0, due - time.monotonic()))
+            late_s = max(late_s, time.monotonic() - due)
+            burst = b""
+            for n in range(first, first + 8):
+                whole = packets[n]
+                if n in lost:
+                    whole = b"" if fault == "lost" else whole[:4] + bytes([whole[4] ^ 1]) + whole[5:]
+                burst += whole
+            ours.write(burst)
+        time.sleep(0.3)
+        run.stop()
+        return run.finish(), late_s
+
+
 @pytest.mark.parametrize("fault", ["none", "lost", "check sum"])
 def test_bursts_of_a_sensor_without_a_counter(tmp_path: Path, fault: str) -> None:
     """200 Hz in bursts of eight packets every 40 ms: no gap but those of lost packets, and no sample too many."""
@@ -236,21 +274,10 @@ def test_bursts_of_a_sensor_without_a_counter(tmp_path: Path, fault: str) -> Non
     for n in range(count):
         motion = [1.6 * motion[0] - 0.96 * motion[1] + draw.gauss(0, 800), motion[0]]
         packets.append(witmotion(round(motion[0]), n, 0))
-    with line(device) as ours:
-        run = Run(config)
-        begin = time.monotonic() + 0.5
-        for first in range(0, count, 8):
-            time.sleep(max(0.0, begin + (first + 8) / rate - time.monotonic()))
-            burst = b""
-            for n in range(first, first + 8):
-                whole = packets[n]
-                if n in lost:
-                    whole = b"" if fault == "lost" else whole[:4] + bytes([whole[4] ^ 1]) + whole[5:]
-                burst += whole
-            ours.write(burst)
-        time.sleep(0.3)
-        run.stop()
-        events = run.finish()
+    for _ in range(4):  # where the machine let us be late the bursts were not those of the sensor
+        events, late_s = send_bursts(device, config, packets, rate, lost, fault)
+        if late_s < 0.015:
+            break
     gaps = of_type(events, "gap")
     marked = {n for gap in gaps for n in range(gap["first"], gap["last"] + 1)}
     stats = of_type(events, "stats")[-1]["bus"]["s"]

@@ -19,26 +19,17 @@ from typing import Any
 import program
 import pytest
 from lines import Line, line, packet
+from two_masses import rig_text
 
 ROOT = Path(__file__).resolve().parents[2]
 RATE_HZ = 250
-RIG = """
-rate_hz = 250.0
-duration_s = 120.0
-seed = 5
-masses = [1.0, 0.8]
-springs = [3e4, 2e4]
-zeta = [0.02, 0.02]
-force_dofs = [1]
-sense_dofs = [1, 2]
-sensing = "acceleration"
-excitation = "white"
-noise_percent = 1.0
-bits = 16
-[[change]]
+RIG = (
+    rig_text(120.0, seed=5)
+    + """[[change]]
 at_s = 60.0
 springs = [3e4, 1.8e4]
 """
+)
 
 
 def until(what: Callable[[], Any], seconds: float = 30) -> Any:

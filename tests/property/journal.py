@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A reader and a writer of journals made from docs/journal-format.md alone, not from our code."""
+"""A reader and a writer of journals made from docs/reference/journal-format.md alone, not from our code."""
 
 from __future__ import annotations
 

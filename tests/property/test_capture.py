@@ -210,7 +210,7 @@ def test_refusals(
 
 
 def test_usage_and_help(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments, code in ((["can"], 2), ([], 2), (["--help"], 0), (["can", "--help"], 0)):
+    for arguments, code in (([], 2), (["--help"], 0), (["can", "--help"], 0)):
         with pytest.raises(SystemExit) as ended:
             capture.main(arguments)
         assert ended.value.code == code

@@ -7,6 +7,7 @@ import json
 import math
 import random
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -553,6 +554,16 @@ def test_simulated_rig_is_identified(tmp_path: Path, seed: int) -> None:
     for mode, frequency, damping in zip(result["modes"], truth["frequency_hz"], truth["damping_ratio"], strict=True):
         assert mode["frequency_hz"] == pytest.approx(frequency, rel=5e-4)
         assert mode["damping_ratio"] == pytest.approx(damping, rel=0.05)
+
+
+def test_title_of_a_rig_reaches_the_config(tmp_path: Path) -> None:
+    rig, config = tmp_path / "rig.toml", tmp_path / "c.toml"
+    rig.write_text("title = 'a \"tall\" frame \\ σ'\n" + rig_text().rsplit("\ntitle", 1)[0])
+    assert okid("simulate", rig, "--config", config).returncode == 0
+    assert tomllib.loads(config.read_text("utf-8"))["acquisition"]["title"] == 'a "tall" frame \\ σ'
+    rig.write_text('title = "two\\nlines"\n' + rig_text().rsplit("\ntitle", 1)[0])
+    done = okid("simulate", rig, "--config", config)
+    assert done.returncode == 2 and "title" in done.stderr and "expected one line of text" in done.stderr
 
 
 def test_truth_file(tmp_path: Path) -> None:

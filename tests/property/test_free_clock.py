@@ -109,6 +109,7 @@ def identify(folder: Path, clock: str, hold: str = "foh", decimate: int = 1) -> 
     (folder / "a.toml").write_text(CONFIG.format(clock=clock, hold=hold, rate=RATE, decimate=decimate))
     done = okid("replay", folder / "a.log", "-c", folder / "a.toml", "--events", folder / "e", "--json", folder / "r")
     assert done.returncode == 0, done.stderr
+    assert "scales with it" not in done.stderr  # the rate by the stamps is the rate, wherever the grid begins
     return json.loads((folder / "r").read_text()), [json.loads(x) for x in (folder / "e").read_text().splitlines()]
 
 
@@ -137,7 +138,9 @@ def test_a_free_node_is_as_good_as_a_counted_one(tmp_path: Path, motion) -> None
     print(f"errors of f, M, K: same rate {together}, 150 ppm {apart}, clock not told {ignored}")
     assert apart[0] < 2e-3 and apart[1] < 0.03 and apart[2] < 0.03
     assert ignored[2] > 3 * apart[2]
-    stats = [event for event in events if event["type"] == "stats"][-1]["channel"]
+    last = [event for event in events if event["type"] == "stats"][-1]
+    assert last["rate_hz_by_stamps"] == pytest.approx(RATE, rel=1e-4)
+    stats = last["channel"]
     assert stats["acc2"]["rate_ppm"] == pytest.approx(-150, abs=1)
     assert stats["acc2"]["skew_std_us"] < 5 and abs(stats["acc2"]["skew_us"]) < 5
     assert "skew_us" not in stats["acc1"]

@@ -300,14 +300,14 @@ def test_scipy_and_control(result: okid.Result, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_table_pickle_and_repr(result: okid.Result) -> None:
-    text = result.table()
+    text = str(result.table())
     assert f"{result.modes[0].frequency_hz:.5f}" in text
     assert "order 6" in text
     assert text.splitlines()[3].count("±") == 2
     bare = [mode._replace(frequency_std_hz=None, damping_ratio_std=None) for mode in result.modes]
-    assert "±" not in dataclasses.replace(result, modes=bare).table()
+    assert "±" not in str(dataclasses.replace(result, modes=bare).table())
     known = dataclasses.replace(result, modes=[bare[0]._replace(frequency_std_hz=0.00123), *bare[1:]])
-    lines = known.table().splitlines()
+    lines = str(known.table()).splitlines()
     assert lines[3].count("±") == 1
     assert "0.0012" in lines[4]
     assert len({len(line) for line in lines[3:7]}) == 1

@@ -16,32 +16,15 @@ from typing import Any
 import journal
 import pytest
 from program import PROGRAM, okid
+from two_masses import rig_text, simulate_rig
 
-RIG = """
-rate_hz = 250.0
-duration_s = 8.0
-seed = 3
-masses = [1.0, 0.8]
-springs = [3e4, 2e4]
-zeta = [0.02, 0.02]
-force_dofs = [1]
-sense_dofs = [1, 2]
-sensing = "acceleration"
-excitation = "white"
-noise_percent = 1.0
-bits = 16
-"""
 SAMPLES, FRAMES = 2000, 4000
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("rig")
-    (folder / "rig.toml").write_text(RIG)
-    names = {"--log": "a.log", "--truth": "t.json", "--csv": "a.csv", "--dbc": "a.dbc", "--config": "a.toml"}
-    done = okid("simulate", folder / "rig.toml", *[p for o, n in names.items() for p in (o, folder / n)])
-    assert done.returncode == 0, done.stderr
-    text = (folder / "a.toml").read_text().replace("p = 40\nrows = 80", "p = 12\nrows = 24")
+    folder = simulate_rig(tmp_path_factory.mktemp("rig"), rig_text(8.0))
+    text = (folder / "a.toml").read_text()
     (folder / "a.toml").write_text(text.replace("update_s = 1.0", "update_s = 4.0\nsigma_blocks = 0"))
     return folder
 

@@ -23,32 +23,13 @@ from typing import Any
 
 import pytest
 from program import PROGRAM, okid
-
-RIG = """
-rate_hz = 250.0
-duration_s = 60.0
-seed = 3
-masses = [1.0, 0.8]
-springs = [3e4, 2e4]
-zeta = [0.02, 0.02]
-force_dofs = [1]
-sense_dofs = [1, 2]
-sensing = "acceleration"
-excitation = "white"
-noise_percent = 1.0
-bits = 16
-"""
+from two_masses import rig_text, simulate_rig
 
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
-    folder = tmp_path_factory.mktemp("publish")
-    (folder / "rig.toml").write_text(RIG)
-    names = {"--log": "a.log", "--truth": "t.json", "--dbc": "a.dbc", "--config": "a.toml"}
-    options = [part for option, name in names.items() for part in (option, folder / name)]
-    done = okid("simulate", folder / "rig.toml", *options)
-    assert done.returncode == 0, done.stderr
-    text = (folder / "a.toml").read_text().replace("p = 40\nrows = 80", "p = 12\nrows = 24")
+    folder = simulate_rig(tmp_path_factory.mktemp("publish"), rig_text(60.0))
+    text = (folder / "a.toml").read_text()
     text = text.replace('title = "virtual rig"', 'title = "Frame 7/b"').replace("update_s = 1.0", "update_s = 0.5")
     assert 'title = "Frame' in text and "update_s = 0.5" in text
     (folder / "a.toml").write_text(text)
@@ -177,22 +158,22 @@ def test_a_slow_one_loses_whole_lines_and_is_told(rig: pathlib.Path) -> None:
 
 
 def test_socket_files_of_others(rig: pathlib.Path) -> None:
-    path = rig / "live.sock"
+    path = rig / "others.sock"
     stale = socket.socket(socket.AF_UNIX)
     stale.bind(str(path))
     stale.close()  # a process that died leaves it like this
-    with replaying(rig, 'socket = "live.sock"') as run:
+    with replaying(rig, 'socket = "others.sock"') as run:
         assert run.wait(60) == 0
     used = socket.socket(socket.AF_UNIX)
     used.bind(str(path))
     used.listen(1)
-    with replaying(rig, 'socket = "live.sock"') as run:
+    with replaying(rig, 'socket = "others.sock"') as run:
         assert run.wait(60) == 4
         assert run.stderr is not None and "another program listens there" in run.stderr.read()
     used.close()
     path.unlink()
     path.write_text("precious")
-    with replaying(rig, 'socket = "live.sock"') as run:
+    with replaying(rig, 'socket = "others.sock"') as run:
         assert run.wait(60) == 2
         assert run.stderr is not None and "found another file there" in run.stderr.read()
     assert path.read_text() == "precious" and not (rig / "e.jsonl").exists()
@@ -537,3 +518,39 @@ def test_a_stopped_terminal_stops_nothing(rig: pathlib.Path) -> None:
                 pass
         assert run.wait(60) == 0
     os.close(near)
+
+
+def test_signals_for_those_who_ask(rig: pathlib.Path) -> None:
+    """[publish] samples: every sample of every channel in engineering units on the socket, none in the events file; one
+    who reads too slowly loses signals before it loses events."""
+    with replaying(rig, 'socket = "live.sock"\nsamples = true', "--speed", "10") as run:
+        reader, slow = connected(rig / "live.sock"), connected(rig / "live.sock")
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+        whole = lines_of(reader)
+        assert run.wait(20) == 0
+    start = json.loads(whole[0])
+    assert start["rate_hz"] == 250.0
+    assert start["channels"] == [
+        {"name": "force1", "role": "force", "unit": "N", "dof": 1},
+        {"name": "acc1", "role": "acceleration", "unit": "m/s^2", "dof": 1},
+        {"name": "acc2", "role": "acceleration", "unit": "m/s^2", "dof": 2},
+    ]
+    blocks = numbers(whole, "samples")
+    names = [channel["name"] for channel in start["channels"]]
+    header, *rows = [line for line in (rig / "a.csv").read_text().splitlines() if not line.startswith("#")]
+    columns = {name: k for k, name in enumerate(header.split(","))}
+    truth = [[float(row.split(",")[columns[name]]) for name in names] for row in rows]
+    assert [b["first"] for b in blocks] == list(range(blocks[0]["first"], len(truth), blocks[0]["count"]))
+    assert all(len(values) == block["count"] for block in blocks for values in block["values"])
+    seen = [list(row) for block in blocks for row in zip(*block["values"], strict=True)]
+    first = blocks[0]["first"]
+    worst = max(abs(a - b) for x, y in zip(seen, truth[first:], strict=True) for a, b in zip(x, y, strict=True))
+    assert worst < 2e-3, worst  # one step of the 16-bit codes
+    assert blocks[-1]["t"] == pytest.approx(60.0) and 11 <= blocks[0]["count"] <= 13
+    assert [line for line in whole if '"type":"samples"' not in line] == file_lines(rig)
+
+
+def test_signals_need_a_socket(rig: pathlib.Path) -> None:
+    (rig / "c.toml").write_text((rig / "a.toml").read_text() + "\n[publish]\nsamples = true\n")
+    done = okid("check", rig / "c.toml")
+    assert done.returncode == 2 and '[publish], key "samples": found true, expected socket' in done.stderr, done.stderr

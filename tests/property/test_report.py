@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import base64
+import hashlib
 import json
 import re
 import subprocess
@@ -32,11 +32,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def pictures(html: str) -> dict[str, str]:
-    """Alternative text -> SVG of every picture; each must be whole XML."""
-    found = re.findall(r'<img alt="([^"]+)" src="data:image/svg\+xml;base64,([^"]+)">', html)
-    out = {alt: base64.b64decode(code).decode() for alt, code in found}
+    """Label -> SVG of every picture; each must be whole XML, in the colours of the page, with names of its own."""
+    found = re.findall(r'(<svg [^>]*aria-label="([^"]+)"[^>]*>.*?</svg>)', html, re.DOTALL)
+    out = {label: svg for svg, label in found}
     for svg in out.values():
         ElementTree.fromstring(svg)
+        assert not re.findall(r"#[0-9a-f]{6}\b", svg)
+    names = re.findall(r' id="([^"]+)"', html)
+    assert len(names) == len(set(names))
+    assert {name for name in re.findall(r'(?:url\(|href=")#([^)"]+)', html)} <= set(names)
     return out
 
 
@@ -51,25 +55,40 @@ def test_report_with_record(made: tuple[Path, Path], capsys: pytest.CaptureFixtu
     assert "<title>A &amp; B</title>" in html
     assert "shaker &lt;B&gt;" in html
     assert "<B>" not in html
-    outside = re.sub(r"base64,[^\"]+", "", html)
-    assert not re.findall(r"(?:https?:)?//\w|@import|<script|<link|url\(", outside)
+    assert not re.findall(r"(?:https?:)?//\w|@import|<script|<link|<img|url\((?!#)", html)
     result = json.loads(made[0].read_text(encoding="utf-8"))
     for mode in result["modes"]:
         assert f"<td>{mode['frequency_hz']:.4f}</td>" in html
         assert mode["frequency_std_hz"] is not None
     assert html.count("<th>± σ [Hz]</th><th>ζ [%]</th><th>± σ [%]</th>") == 1
-    assert html.count("<h2>") == 10
+    assert html.count("<h2>") == 13
+    assert "Nothing speaks against it" in html
+    for kind, path in (("result", made[0]), ("record", made[1])):
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        assert f"<td>{kind}</td><td>{path}</td><td>{path.stat().st_size}</td><td>{digest}</td>" in html
 
 
 def test_report_without_record_says_what_is_missing(made: tuple[Path, Path]) -> None:
     html = report.build(report.load_result(made[0]))
-    assert html.count("--record") == 2
+    assert html.count("--record") == 3
     assert len(pictures(html)) == 7
 
 
 def test_the_same_result_gives_the_same_bytes(made: tuple[Path, Path]) -> None:
     first = report.build(report.load_result(made[0]), made[1])
     assert report.build(report.load_result(made[0]), made[1]) == first
+
+
+def test_only_one_line_tells_the_time(made: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pages = []
+    for k, epoch in enumerate((0, 86400)):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", str(epoch))
+        assert report.main([str(made[0]), "--out", str(tmp_path / f"{k}.html")]) == 0
+        pages.append((tmp_path / f"{k}.html").read_text(encoding="utf-8").splitlines())
+    different = [(a, b) for a, b in zip(*pages, strict=True) if a != b]
+    assert len(different) == 1
+    assert "1970-01-01 00:00:00 UTC" in different[0][0]
+    assert "1970-01-02 00:00:00 UTC" in different[0][1]
 
 
 def test_uncertainties_fill_their_columns(made: tuple[Path, Path], tmp_path: Path) -> None:
@@ -103,7 +122,9 @@ def test_live_results_without_fit_and_modes(made: tuple[Path, Path], tmp_path: P
     assert "holds no fit" not in html
     assert "<h2>Fit, computed by this report</h2>" in html
     assert f"Computed by this report from {made[1]}" in html
-    assert "Computed by this report" not in report.build(own, made[1])
+    assert f"Computed by this report from {made[1]}: the result itself has none" in html
+    assert f"Computed by this report from {made[1]}; the result itself says 99.0 %" in report.build(own, made[1])
+    assert "omputed by this report" not in report.build(own)
     computed = report.measure(live, made[1]).fit
     assert computed is not None
     for key in ("simulation_percent", "prediction_percent"):

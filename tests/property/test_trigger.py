@@ -9,36 +9,15 @@ import pathlib
 import numpy as np
 import pytest
 from program import okid
+from two_masses import rig_text, simulate_rig
 
-RIG = """
-rate_hz = 250.0
-duration_s = 8.0
-seed = 3
-masses = [1.0, 0.8]
-springs = [3e4, 2e4]
-zeta = [0.02, 0.02]
-force_dofs = [1]
-sense_dofs = [1, 2]
-sensing = "acceleration"
-excitation = "white"
-noise_percent = 1.0
-bits = 16
-"""
 SAMPLES = 2000
 EPOCH_S = 1700000000  # of the simulated log
 
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
-    folder = tmp_path_factory.mktemp("trigger")
-    (folder / "rig.toml").write_text(RIG)
-    names = {"--log": "a.log", "--truth": "t.json", "--csv": "a.csv", "--dbc": "a.dbc", "--config": "a.toml"}
-    options = [part for option, name in names.items() for part in (option, folder / name)]
-    done = okid("simulate", folder / "rig.toml", *options)
-    assert done.returncode == 0, done.stderr
-    text = (folder / "a.toml").read_text().replace("p = 40\nrows = 80", "p = 12\nrows = 24")
-    (folder / "a.toml").write_text(text)
-    return folder
+    return simulate_rig(tmp_path_factory.mktemp("trigger"), rig_text(8.0))
 
 
 def columns(rig: pathlib.Path) -> np.ndarray:

@@ -12,22 +12,9 @@ import time
 from pathlib import Path
 
 import pytest
+from two_masses import rig_text, simulate_rig
 
 OKID = os.environ.get("OKID_PROGRAM", str(Path(__file__).parents[2] / "build" / "okid"))
-RIG = """
-rate_hz = 500.0
-duration_s = {duration}
-seed = 3
-masses = [1.0, 0.8]
-springs = [3e4, 2e4]
-zeta = [0.02, 0.02]
-force_dofs = [1]
-sense_dofs = [1, 2]
-sensing = "acceleration"
-excitation = "white"
-noise_percent = 1.0
-bits = 16
-"""
 
 
 def sh(*args: str, check: bool = True, seconds: float = 60) -> subprocess.CompletedProcess[str]:
@@ -38,24 +25,7 @@ def sh(*args: str, check: bool = True, seconds: float = 60) -> subprocess.Comple
 
 
 def make_record(folder: Path, duration: float) -> Path:
-    (folder / "rig.toml").write_text(RIG.format(duration=duration))
-    sh(
-        OKID,
-        "simulate",
-        str(folder / "rig.toml"),
-        "--log",
-        str(folder / "a.log"),
-        "--truth",
-        str(folder / "t.json"),
-        "--dbc",
-        str(folder / "a.dbc"),
-        "--config",
-        str(folder / "a.toml"),
-    )
-    text = (folder / "a.toml").read_text()
-    text = re.sub(r"(?m)^(p|rows) = .*\n", "", text).replace("[identification]", "[identification]\np = 20\nrows = 40")
-    (folder / "a.toml").write_text(text)
-    return folder
+    return simulate_rig(folder, rig_text(duration, 500.0), lags=20)
 
 
 @pytest.fixture(scope="module")
@@ -307,6 +277,23 @@ def test_no_frames_no_result(short: Path) -> None:
     assert "no usable frame of channel" in live.messages()
     assert [e["type"] for e in live.events()] == ["start", "stats"]
     assert not (short / "r.json").exists()
+
+
+@pytest.mark.parametrize("filtered", [True, False])
+def test_what_comes_instead_is_named(short: Path, filtered: bool) -> None:
+    """While it runs: with a filter in the kernel, and with all frames let in for the load of the bus."""
+    text = (short / "a.toml").read_text()
+    assert "bitrate" in text
+    (short / "b.toml").write_text(re.sub(r"bitrate = .*\n", "", text) if filtered else text)
+    log = (short / "a.log").read_text()
+    (short / "b.log").write_text(log.replace(" 101#", " 155#"))
+    live = Run(short, config="b.toml")
+    play(short / "b.log")
+    events = live.stop(status=3)
+    said = [event["text"] for event in events if event["type"] == "bus" and event["event"] == "unheard"]
+    assert len(said) == 1 and said[0] in live.messages()
+    assert re.fullmatch(r"no frame of 0x101 \(.*\) so far; the bus carries 0x155 \(\d+ frames\)", said[0]), said
+    assert "it carries 0x155" in live.messages()
 
 
 def test_wrong_interfaces(short: Path) -> None:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """okid: from measured forces and vibrations to modes and a state-space model.
 
-okid.identify(u, y, fs=...) does a whole record; okid.Accumulator and okid.Identifier do it while samples arrive.
+okid.identify(u, y, fs=...) does a whole record; okid.Session does it while samples arrive,
+and okid.Accumulator and okid.Identifier are what both are made of.
 """
 
 from importlib import import_module
@@ -10,15 +11,18 @@ from typing import Any
 from okid import frf, modal
 from okid._errors import Error, IdentificationError, InputError
 from okid.accumulator import Accumulator
-from okid.demo import demo
+from okid.demo import demo, demo_frame, demo_record
 from okid.identifier import Identified, Identifier, usable_p
 from okid.identify import identify
 from okid.mkr import MassMatrices, ProportionalDamping
+from okid.modal_table import ModalTable
 from okid.model import Model
-from okid.records import read_csv
+from okid.records import Record, read_csv
 from okid.result import Fit, Mode, Result
+from okid.session import Session
 from okid.square_root import SquareRoot
 from okid.stabilization import Cluster, Criteria, OrderPoles, Stabilization, stabilization
+from okid.structure import Structure
 from okid.sums import Stats
 
 __all__ = [
@@ -32,15 +36,21 @@ __all__ = [
     "Identifier",
     "InputError",
     "MassMatrices",
+    "ModalTable",
     "Mode",
     "Model",
     "OrderPoles",
     "ProportionalDamping",
+    "Record",
     "Result",
+    "Session",
     "SquareRoot",
     "Stabilization",
     "Stats",
+    "Structure",
     "demo",
+    "demo_frame",
+    "demo_record",
     "frf",
     "identify",
     "library_version",
@@ -51,8 +61,13 @@ __all__ = [
 ]
 
 
+# Of okid.formats, in both directions: read_uff, write_uff ..
+_FORMATS = ("csv", "hdf5", "mat", "mdf4", "parquet", "record", "uff")
+
+
 def __getattr__(name: str) -> Any:
-    """okid.capture and okid.report load when they are first used: they bring python-can and matplotlib with them.
+    """Packages that bring other libraries with them load when they are first used: capture (python-can), report
+    (matplotlib), formats (read_uff, write_mdf4 .. are its functions), live, campaign (dask).
 
     okid.__version__ is asked of the C library.
     """
@@ -60,8 +75,11 @@ def __getattr__(name: str) -> Any:
         from okid._abi import library
 
         return library().okid_version().decode()
-    if name in ("capture", "report"):
+    if name in ("campaign", "capture", "formats", "live", "report"):
         return import_module(f"okid.{name}")
+    verb, _, kind = name.partition("_")
+    if (verb in ("read", "write") and kind in _FORMATS) or name == "write_result":
+        return getattr(import_module("okid.formats"), name)
     raise AttributeError(f"module 'okid' has no attribute {name!r}")
 
 

@@ -47,6 +47,13 @@ def library() -> Any:
     return loaded
 
 
+def direct(name: str) -> Any:
+    """A function of the library (handle, samples, count) that takes any buffer as samples: the path of every block."""
+    function = library()[name]
+    function.restype, function.argtypes = ctypes.c_int, (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
+    return function
+
+
 def pointer(array: NDArray[np.float64] | None) -> Any:
     """double* of a float64 array (None stays NULL). The caller keeps the array alive."""
     return None if array is None else array.ctypes.data_as(doubles)

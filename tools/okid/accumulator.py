@@ -29,6 +29,17 @@ class Accumulator(Sums):
     makes their sample missing (both count them); `buffer` samples wait for the kernel (0 = 256).
     Raises InputError for sizes outside the documented range.
     Source: lib/include/okid/accumulator.h, paper eq. 36-38.
+
+    Two halves of a record of ADC codes add to the sums of both, bit for bit, wherever they were made:
+
+    >>> import numpy as np, okid
+    >>> codes = np.random.default_rng(1).integers(-1000, 1000, (5000, 4), dtype=np.int16)
+    >>> first, second = (okid.Accumulator(1, 3, 10, codes=16) for _ in range(2))
+    >>> first.add(codes[:2000]), second.add(codes[2000:])
+    (0, 0)
+    >>> first.merge(second)
+    >>> first.rows, first.gram()[0].shape
+    (4980, (44, 44))
     """
 
     kernel = "okid_accumulator"
@@ -66,12 +77,18 @@ class Accumulator(Sums):
         """Bits of the ADC codes it takes; 0 = real numbers."""
         return next(bits for bits, sample in _SAMPLE.items() if sample == self._config.sample)
 
+    def _takes(self, kind: np.dtype[Any]) -> bool:
+        return (kind.kind == "f") if not self.codes else kind == np.dtype(np.int16 if self.codes == 16 else np.int32)
+
     def add(self, samples: ArrayLike) -> int:
         """Absorb samples (N, m), inputs first. Any real dtype; codes only as int16 (16 bits) or int32.
 
         Returns the status of the library: 0, or a warning > 0 (missing samples, saturated codes).
         Raises InputError for a wrong shape or type; the state is then unchanged. The array is never modified.
         """
+        status = self._add_direct(samples)
+        if status is not None:
+            return status
         given = self._samples(samples)
         if not self.codes:
             return _abi.check(self._add_real(given), "add")
@@ -143,7 +160,9 @@ class Accumulator(Sums):
         """Go back to a state of to_bytes() of an accumulator of the same configuration, else InputError."""
         _abi.check(self._call("deserialise", self.handle, data, len(data)), "restore")
 
-    def _arguments(self) -> dict[str, Any]:
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What it was made with, for another of the same kind."""
         c = self._config
         return {
             "n_u": c.n_u,
@@ -162,12 +181,12 @@ class Accumulator(Sums):
 
     def copy(self) -> Accumulator:
         """An independent accumulator with the same state."""
-        twin = Accumulator(**self._arguments())
+        twin = Accumulator(**self.arguments)
         twin.restore(self.to_bytes())
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"arguments": self._arguments(), "state": self.to_bytes()}
+        return {"arguments": self.arguments, "state": self.to_bytes()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(**state["arguments"])  # type: ignore[misc]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frequency response functions: H1 with multiple coherence from records, and synthesised from a model."""
+"""Frequency responses: H1 with multiple coherence, output spectra of ambient records, and both from a model."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import get_window
 
 from okid._errors import InputError
+from okid.arguments import positive
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -31,6 +31,14 @@ class Frf(NamedTuple):
     resolution_hz: float
 
 
+class Spectra(NamedTuple):
+    """Measured spectra of outputs: frequency_hz (F,), power (F, n_y, n_y) one-sided, unit^2/Hz, averages used."""
+
+    frequency_hz: Real
+    power: Complex
+    averages: int
+
+
 def is_hit(u: ArrayLike, fraction: float = 0.05) -> bool:
     """True when 99 % of the energy of the inputs u (N, n_u) lies within `fraction` of the record: a hammer blow."""
     drive = np.nan_to_num(np.asarray(u, dtype=np.float64).reshape(len(np.asarray(u)), -1))
@@ -41,6 +49,16 @@ def is_hit(u: ArrayLike, fraction: float = 0.05) -> bool:
     width = max(1, int(fraction * len(power)))
     run = np.convolve(power, np.ones(width), mode="valid")
     return bool(np.max(run) > 0.99 * total)
+
+
+def _window(name: str, length: int) -> Real:
+    """A window of scipy.signal, which takes a second to load: only where one is wanted."""
+    from scipy.signal import get_window
+
+    try:
+        return np.asarray(get_window(name, length), dtype=np.float64)
+    except (TypeError, ValueError) as fault:
+        raise InputError(f"window is {name!r}, expected one of scipy.signal.get_window: {fault}") from None
 
 
 def _runs(data: Real) -> list[tuple[int, int]]:
@@ -97,6 +115,7 @@ def h1(
     """
     from okid.records import paired  # records imports nothing of this module
 
+    fs = positive("fs", fs, "a sample rate in Hz")
     inputs, outputs = paired(u, y)
     n_u = inputs[0].shape[1]
     hit = all(is_hit(one) for one in inputs)
@@ -108,7 +127,7 @@ def h1(
             raise InputError(f"only {nperseg} unbroken samples around a blow, a response function takes {SHORTEST}")
     elif nperseg is None:
         nperseg = _segment_length(records)
-    shape = get_window(window or ("boxcar" if hit else "hann"), nperseg)
+    shape = _window(window or ("boxcar" if hit else "hann"), nperseg)
     n_y, lines, count = outputs[0].shape[1], nperseg // 2 + 1, 0
     guu, gyu = np.zeros((lines, n_u, n_u), np.complex128), np.zeros((lines, n_y, n_u), np.complex128)
     gyy = np.zeros((lines, n_y))
@@ -146,3 +165,39 @@ def synthesise(A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike, dt: float
 def cmif(response: Complex) -> Real:
     """Complex mode indicator: the largest singular value of the response matrix at each line, (F,)."""
     return np.asarray(np.linalg.svd(response, compute_uv=False)[:, 0], dtype=np.float64)
+
+
+def spectra(y: ArrayLike | Sequence[ArrayLike], fs: float) -> Spectra:
+    """One-sided cross spectra of the outputs y (N, n_y) by Welch's method: Hann windows, half overlap, ~ten averages.
+
+    NaN = missing, segments avoid it. Raises InputError when no stretch of 64 samples is complete.
+    Source: Bendat and Piersol, Random Data.
+    """
+    from okid.records import paired  # records imports nothing of this module
+
+    _, outputs = paired(None, y)
+    nperseg = _segment_length(outputs)
+    window = _window("hann", nperseg)
+    power = np.zeros((nperseg // 2 + 1, outputs[0].shape[1], outputs[0].shape[1]), np.complex128)
+    count = 0
+    for data in outputs:
+        for piece in _segments(data, nperseg, max(1, nperseg // 2)):
+            spectrum = np.fft.rfft((piece - piece.mean(axis=0)) * window[:, None], axis=0)
+            power += spectrum[:, :, None] * spectrum[:, None, :].conj()
+            count += 1
+    if count == 0:
+        raise InputError(f"no {nperseg} consecutive complete samples for a spectrum")
+    power *= 2.0 / (fs * float(np.sum(window**2)) * count)
+    return Spectra(np.arange(len(power), dtype=np.float64) * (fs / nperseg), power, count)
+
+
+def synthesise_spectra(
+    A: ArrayLike, K: ArrayLike, C: ArrayLike, covariance: ArrayLike, dt: float, frequency_hz: ArrayLike
+) -> Complex:
+    """One-sided output spectra (F, n_y, n_y) of the innovation model x+ = A x + K e, y = C x + e, E e e^T = covariance.
+
+    2 dt H covariance H^H with H = C (z I - A)^-1 K + I at z = exp(2 pi i f dt).
+    """
+    noise = np.asarray(covariance, dtype=np.float64)
+    h = synthesise(A, K, C, np.eye(len(noise)), dt, frequency_hz)
+    return np.asarray(2.0 * dt * (h @ noise @ h.conj().transpose(0, 2, 1)), dtype=np.complex128)

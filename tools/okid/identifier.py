@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from okid import _abi
 from okid._errors import IdentificationError, InputError
 from okid.accumulator import Accumulator
+from okid.arguments import choice, positive, whole
+from okid.model import Model
 from okid.square_root import SquareRoot
 
 Real = NDArray[np.float64]
@@ -76,6 +78,10 @@ class Identified(NamedTuple):
     model_radius: float
     noise_level: float
     observer: Observer
+
+    def model(self) -> Model:
+        """A .. K as a model at work."""
+        return Model(self.A, self.B, self.C, self.D, self.K, self.dt)
 
 
 def usable_p(n_u: int, n_y: int, p: int, samples: int) -> int:
@@ -145,12 +151,13 @@ class Identifier:
         method: str = "okid-era",
         hankel: str = "system",
     ) -> None:
-        if method not in METHODS:
-            raise InputError(f"method is {method!r}, expected one of {', '.join(map(repr, METHODS))}")
-        if solver not in _SOLVER:
-            raise InputError(f"solver is {solver!r}, expected 'dense' or 'structured'")
-        if hankel not in HANKEL:
-            raise InputError(f"hankel is {hankel!r}, expected one of {', '.join(map(repr, HANKEL))}")
+        choice("method", method, list(METHODS))
+        choice("solver", solver, list(_SOLVER))
+        choice("hankel", hankel, list(HANKEL))
+        for name, value, least in (("n_u", n_u, 0), ("n_y (outputs)", n_y, 1), ("p", p, 1), ("rows", rows, 0),
+                                   ("order", order, 0), ("max_order", max_order, 0)):  # fmt: skip
+            whole(name, value, least)
+        positive("fs", fs, "a sample rate in Hz")
         mode = _abi.DETREND_MEAN if detrend == "mean" else _abi.DETREND_NONE
         self.config = _abi.IdentifyConfig(
             n_u, n_y, p, rows, order, max_order, fs, METHODS[method], mode, _SOLVER[solver], HANKEL[hankel]
@@ -159,7 +166,8 @@ class Identifier:
         if size == 0:
             raise InputError(
                 f"method={method}, n_u={n_u}, n_y={n_y}, fs={fs}, p={p}, rows={rows}, order={order}, "
-                f"max_order={max_order}, hankel={hankel}: outside what the library takes, see okid/identify.h",
+                f"max_order={max_order}, hankel={hankel}: these do not go together: at most 256 channels and p = 4096, "
+                "n4sid needs rows >= 2, an order is at most what rows and p carry",
                 _abi.ERR_DIM,
             )
         self._block = _abi.block(size)

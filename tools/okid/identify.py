@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from okid import _abi
 from okid._errors import Error, IdentificationError, InputError
 from okid.accumulator import Accumulator
+from okid.arguments import choice, frame_names, names, positive, whole, with_name
 from okid.identifier import HANKEL, METHODS, Identified, Identifier, usable_p
 from okid.mkr import MassMatrices, Plan, ProportionalDamping, make_plan, mass_matrices
 from okid.model import Model
@@ -20,6 +21,7 @@ from okid.output_error import fit_inputs, refitted
 from okid.record_fit import detrended, fit_records
 from okid.records import paired
 from okid.refine import refined
+from okid.remarks import remarks_of
 from okid.result import Fit, Mode, Remark, Result, modes_of, put_deviations, with_deviations
 from okid.skew import without_skew
 from okid.square_root import SquareRoot
@@ -27,24 +29,6 @@ from okid.uncertainty import FEWEST, GROUPS, MOST, Piece, Replicate, deviations,
 
 Real = NDArray[np.float64]
 Sums = TypeVar("Sums", Accumulator, SquareRoot)
-
-
-def _choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise InputError(f"{name} is {value!r}, expected one of {', '.join(map(repr, allowed))}")
-
-
-def _whole(name: str, value: object, smallest: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or int(value) < smallest:
-        raise InputError(f"{name} is {value!r}, expected a whole number >= {smallest}")
-    return int(value)
-
-
-def _names(given: Sequence[str] | None, letter: str, count: int) -> list[str]:
-    names = [f"{letter}{k + 1}" for k in range(count)] if given is None else [str(name) for name in given]
-    if len(names) != count or len(set(names)) != count:
-        raise InputError(f"{count} different names are needed for the channels of {letter}, got {names}")
-    return names
 
 
 def _check_moving(records: list[Real], names: list[str], n_u: int) -> None:
@@ -126,42 +110,6 @@ def _refitting(own: list[Real], n_u: int) -> Callable[[Model, list[Piece]], Mode
         return Model(model.A, B, model.C, D, model.K, model.dt)
 
     return refit
-
-
-def _unknowns(found: Identified) -> int:
-    """Regressors of an output: q of the observer, or the past and the future inputs of a subspace method."""
-    n_y, n_u = found.D.shape
-    return int(found.theta.shape[1]) or found.rows * (n_y + 2 * n_u)
-
-
-def _note_text(found: Identified, code: str) -> str:
-    o = found.observer
-    texts = {
-        "arx_stabilised": f"plain least squares gave an unstable observer (radius {o.radius_plain:.6g}); a ridge of "
-        f"{o.ridge:.1e} brought it to {o.radius:.6g}. Damping may come out slightly high",
-        "ill_conditioned": f"the regression is ill-conditioned ({o.condition:.1e}): nearly noise-free data, or "
-        "channels that repeat each other",
-        "few_rows": f"{found.regression_rows} usable rows for {_unknowns(found)} unknowns an output: much scatter",
-        "model_unstable": f"the model has a pole outside the unit circle (radius {found.model_radius:.6g})",
-        "predictor_unstable": "the predictor A - K C is unstable: no prediction fit is given",
-        "order_reduced": f"the order asked for is more than the data can carry; {found.order} is used",
-        "order_unclear": f"no clear gap in the singular values: order {found.order} keeps the consistent modes. "
-        "Compare a few orders, see stabilization()",
-        "literal_hankel": "the Hankel matrix holds [Y_k Y0_k] unscaled (eq. 42 as printed): the result depends on the "
-        "units of the inputs, and the observer's own modes mix into the structure's: damping can be wrong by half",
-        "weak_excitation": f"the inputs hardly excite some directions (smallest over largest {o.input_excitation:.1e})",
-    }
-    return texts.get(code, code)
-
-
-def _remarks(found: Identified) -> list[Remark]:
-    out = []
-    for bit in range(32):
-        if found.notes >> bit & 1:
-            name = _abi.library().okid_warning_code(1 << bit)
-            code = name.decode() if name else f"note_{bit}"
-            out.append(Remark(code, _note_text(found, code)))
-    return out
 
 
 def _unbroken(records: list[Real]) -> NDArray[np.int64]:
@@ -279,6 +227,20 @@ def _check_explains(fit: Fit) -> None:
         )
 
 
+def _low_fit(fit: Fit) -> list[Remark]:
+    """The outputs that the model hardly follows, simulated or else predicted, as a remark."""
+    simulated = any(x is not None for x in fit.simulation_percent.values())
+    known = fit.simulation_percent if simulated else fit.prediction_percent
+    least = 30.0 if simulated else 10.0
+    low = [f'{max(x, 0.0):.0f} % of "{name}"' for name, x in known.items() if x is not None and x < least]
+    text = (
+        f"{'simulated from the inputs' if simulated else 'one sample ahead'} the model explains only {', '.join(low)}: "
+        "noise, an overloaded or dead sensor"
+    )
+    more = ", a force that is not measured, columns exchanged, or an order too low" if simulated else ""
+    return [Remark("fit_low", text + more)] if low else []
+
+
 def _record_remarks(records: list[Real], n_u: int, p: int, start: str, counts: tuple[int, int, int]) -> list[Remark]:
     missing, gaps, samples = counts
     out = []
@@ -323,9 +285,10 @@ def identify(
     """Identify a structure from measured inputs and outputs.
 
     u (N, n_u) or (N,), y (N, n_y) or (N,) at `fs` Hz, or lists of such arrays: several records, merged exactly, each
-    centred by itself. NaN = missing sample: the regression leaves it out and re-arms, nothing is interpolated; the fits
-    and model.x0 are those of the record less its own mean (or line) and start anew after missing inputs. The
-    arrays are never modified. `method` "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx".
+    centred by itself. Frames of pandas give the channels their names. NaN (or masked) = missing sample: the regression
+    leaves it out and re-arms, nothing is interpolated; the fits and model.x0 are those of the record less its own mean
+    (or line) and start anew after missing inputs. The arrays are never modified.
+    `method` "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx".
     u None = no measured force (ambient): modes and predictor only, there is no simulation fit; the okid methods then
     realize the covariances of the outputs.
     `p` ARX horizon of the okid methods (default 40), reduced with a warning when there are fewer than 10 samples an
@@ -348,25 +311,33 @@ def identify(
     cost some 3 (okid-era) to 20 identifications.
 
     Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
+
+    >>> import okid
+    >>> force, acceleration = okid.demo_record()
+    >>> result = okid.identify(force, acceleration, fs=1000.0, input_dofs=[1], output_dofs=[1, 2, 3])
+    >>> [f"{mode.frequency_hz:.2f} Hz {100 * mode.damping_ratio:.2f} %" for mode in result.modes]
+    ['10.96 Hz 0.90 %', '31.84 Hz 0.75 %', '45.66 Hz 0.89 %']
+    >>> result.mkr.M.diagonal().round(2).tolist()  # kg
+    [1.0, 0.8, 1.2]
     """
-    _choice("method", method, tuple(METHODS))
-    _choice("detrend", detrend, ("none", "mean", "linear"))
-    _choice("hold", hold, ("zoh", "foh"))
-    _choice("start", start, ("moving", "rest"))
-    if not (isinstance(fs, int | float | np.number) and math.isfinite(float(fs)) and float(fs) > 0.0):
-        raise InputError(f"fs is {fs!r}, expected a sample rate in Hz > 0")
-    asked_p, asked_rows = (None if x is None else _whole(name, x, least) for name, x, least in
-                           (("p", p, 1), ("rows", rows, 2 if method.startswith("n4sid") else 1)))  # fmt: skip
-    wanted = 0 if order == "auto" else _whole("order", order, 1)
-    _choice("hankel", hankel, tuple(HANKEL))
-    if _whole("sigma_blocks", sigma_blocks, 0) != 0 and not FEWEST <= sigma_blocks <= MOST:
+    choice("method", method, tuple(METHODS))
+    choice("detrend", detrend, ("none", "mean", "linear"))
+    choice("hold", hold, ("zoh", "foh"))
+    choice("start", start, ("moving", "rest"))
+    fs = positive("fs", fs, "a sample rate in Hz")
+    asked_p, asked_rows = (None if x is None else whole(name, x, least) for name, x, least in
+                           (("p", p, 1), ("rows", rows, 2)))  # fmt: skip
+    wanted = 0 if order == "auto" else whole("order", order, 1)
+    choice("hankel", hankel, tuple(HANKEL))
+    if whole("sigma_blocks", sigma_blocks, 0) != 0 and not FEWEST <= sigma_blocks <= MOST:
         raise InputError(f"sigma_blocks is {sigma_blocks}, expected 0 (no standard deviations) or {FEWEST} to {MOST}")
     inputs, outputs = paired(u, y)
     n_u, n_y = inputs[0].shape[1], outputs[0].shape[1]
     by_observer = n_u > 0 and not method.startswith("n4sid")
     if hankel != "system" and not by_observer:
         raise InputError(f"hankel={hankel!r} is for okid-era and okid-era-dc with a measured force")
-    in_names, out_names = _names(input_names, "u", n_u), _names(output_names, "y", n_y)
+    in_names = names(frame_names(u) if input_names is None else input_names, "u", n_u)
+    out_names = names(frame_names(y) if output_names is None else output_names, "y", n_y)
     if refine and n_u == 0:
         raise InputError("refine needs a measured force: without inputs (ambient) there is nothing to simulate")
     plan = make_plan(input_dofs, output_dofs, sensing, hold, (n_u, n_y))
@@ -380,19 +351,25 @@ def identify(
     records, centre = _centred(records, detrend, start)
     identifier = Identifier(
         n_u, n_y, fs=float(fs), p=horizon, rows=block_rows, order=wanted, method=method, hankel=hankel,
-        max_order=0 if max_order is None else _whole("max_order", max_order, 1), detrend=centre,
+        max_order=0 if max_order is None else whole("max_order", max_order, 1), detrend=centre,
     )  # fmt: skip
-    found, by_factor, replicates = _identify(identifier, records, n_u, start == "rest", 0 if refine else sigma_blocks)
+    try:
+        found, by_factor, replicates = _identify(
+            identifier, records, n_u, start == "rest", 0 if refine else sigma_blocks
+        )
+    except IdentificationError as fault:
+        raise with_name(fault, in_names, out_names) from None
     if method.startswith("n4sid"):
         found, by_subspace = _with_inputs(identifier, found, own, n_u)
         remarks += by_subspace
-    model = Model(found.A, found.B, found.C, found.D, found.K, found.dt)
+    model = found.model()
     fit, model.x0 = fit_records(model, own, out_names, predict=not found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
     refinement = None
     if refine:
         found, model, fit, refinement, of_refinement = refined(found, model, fit, own, out_names, detrend != "none")
         remarks += of_refinement
     _check_explains(fit)
+    remarks += _low_fit(fit)
     structure, skew = model, None
     if plan is not None and refinement is not None:
         structure, skew, of_skew = without_skew(model, refinement.replicates, plan, out_names)
@@ -414,7 +391,7 @@ def identify(
     return Result(
         method, float(fs), samples, len(records), gaps, in_names, out_names, found.p, found.rows, found.order, hold,
         detrend, start, found.singular_values, model, found.markov, modes, fit,
-        _remarks(found) + by_factor + remarks + [Remark(*one) for one in said], found.observer,
+        remarks_of(found) + by_factor + remarks + [Remark(*one) for one in said], found.observer,
         identifier, mkr, pdc, hankel=hankel if by_observer else None,
         singular_noise=found.noise_level if math.isfinite(found.noise_level) else None, refinement=refinement,
         skew=skew,

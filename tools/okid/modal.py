@@ -29,7 +29,12 @@ def mac_matrix(a: ArrayLike, b: ArrayLike | None = None) -> Real:
 
 
 def mac(a: ArrayLike, b: ArrayLike) -> float:
-    """Modal assurance criterion of two shapes of n_y entries."""
+    """Modal assurance criterion of two shapes of n_y entries.
+
+    >>> from okid import modal
+    >>> round(modal.mac([1.0, 0.5, 0.2], [2.0, 1.0, 0.4]), 6), round(modal.mac([1.0, 0.0], [0.0, 1.0]), 6)
+    (1.0, 0.0)
+    """
     return float(mac_matrix(a, b)[0, 0])
 
 

@@ -63,7 +63,14 @@ class Model:
         return given
 
     def simulate(self, u: ArrayLike, x0: ArrayLike | None = None) -> Real:
-        """y (N, n_y) from u (N, n_u), without a look at measured outputs; x0 defaults to rest. Eq. 13, 15."""
+        """y (N, n_y) from u (N, n_u), without a look at measured outputs; x0 defaults to rest. Eq. 13, 15.
+
+        >>> import numpy as np, okid
+        >>> model = okid.demo_frame().model(1000.0, force_dofs=[1], sense_dofs=[3], sensing="displacement")
+        >>> steady = model.simulate(np.ones((60000, 1)))[-1, 0]  # 1 N for a minute
+        >>> round(1.0 / steady)  # N/m: the lowest column alone carries it
+        30000
+        """
         drive, start = self._signal(u, self.B.shape[1], "u"), self._state(x0)
         view, _kept = self._view()
         out = np.empty((len(drive), len(self.C)))

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from okid import _abi
 from okid._errors import Error
 from okid.mkr import MassMatrices, ProportionalDamping, mass_table
+from okid.modal_table import ModalTable, known
 from okid.model import Model
 from okid.stabilization import Criteria, Stabilization, of_identifiers
+from okid.whole_file import whole_file
 
 if TYPE_CHECKING:
     from okid.identifier import Identified, Identifier, Observer
@@ -75,8 +77,8 @@ def with_deviations(modes: list[Mode], sigma: Uncertainty) -> list[Mode]:
     """The same modes with their standard deviations."""
     return [
         mode._replace(
-            frequency_std_hz=_number(float(sigma.frequency_hz[k])),
-            damping_ratio_std=_number(float(sigma.damping_ratio[k])),
+            frequency_std_hz=known(float(sigma.frequency_hz[k])),
+            damping_ratio_std=known(float(sigma.damping_ratio[k])),
             shape_re_std=sigma.shape_re[k],
             shape_im_std=sigma.shape_im[k],
         )
@@ -90,26 +92,22 @@ def put_deviations(sigma: Uncertainty, mkr: MassMatrices | None, pdc: Proportion
         mkr.M_std, mkr.K_std, mkr.R_std = sigma.M, sigma.K, sigma.R
         mkr.R_normal_modes_std = sigma.R_normal_modes
     if pdc is not None:
-        pdc.alpha_std, pdc.beta_std = _number(sigma.alpha), _number(sigma.beta)
-
-
-def _number(value: float | None) -> float | None:
-    return float(value) if value is not None and math.isfinite(value) else None
+        pdc.alpha_std, pdc.beta_std = known(sigma.alpha), known(sigma.beta)
 
 
 def _spread(value: float | None, factor: float) -> str:
     """One cell of a column of standard deviations."""
-    known = _number(value)
-    return f" {'-' if known is None else format(factor * known, '.2g'):>9}"
+    number = known(value)
+    return f" {'-' if number is None else format(factor * number, '.2g'):>9}"
 
 
 def _nested(array: Real) -> Any:
     if array.ndim == 1:
-        return [_number(x) for x in array.tolist()]
+        return [known(x) for x in array.tolist()]
     return [_nested(row) for row in array]
 
 
-@dataclass
+@dataclass(repr=False)
 class Result:
     """What identify() returns. singular_values (s,) of H(0), the correlations (ERA/DC) or the projection (n4sid);
     markov (count, n_y, n_u) Y_0 .. by eq. 40, n4sid of the model.
@@ -169,7 +167,7 @@ class Result:
             "detrend": self.detrend,
             "start": self.start,
             "singular_values": _nested(self.singular_values),
-            "singular_noise": _number(self.singular_noise),
+            "singular_noise": known(self.singular_noise),
             "model": {
                 "dt": m.dt,
                 **{name: _nested(getattr(m, name)) for name in "ABCDK"},
@@ -182,13 +180,13 @@ class Result:
                     "damping_ratio": mode.damping_ratio,
                     "shape_re": _nested(mode.shape.real),
                     "shape_im": _nested(mode.shape.imag),
-                    "frequency_std_hz": _number(mode.frequency_std_hz),
-                    "damping_ratio_std": _number(mode.damping_ratio_std),
+                    "frequency_std_hz": known(mode.frequency_std_hz),
+                    "damping_ratio_std": known(mode.damping_ratio_std),
                     "shape_re_std": None if mode.shape_re_std is None else _nested(mode.shape_re_std),
                     "shape_im_std": None if mode.shape_im_std is None else _nested(mode.shape_im_std),
-                    "mpc": _number(mode.mpc),
-                    "emac": _number(mode.emac),
-                    "cmi": _number(mode.cmi),
+                    "mpc": known(mode.mpc),
+                    "emac": known(mode.emac),
+                    "cmi": known(mode.cmi),
                 }
                 for mode in self.modes
             ],
@@ -204,11 +202,9 @@ class Result:
         }
 
     def save(self, path: str | Path) -> None:
-        """Write okid.result/1 as JSON, whole or not at all (temporary file, then rename)."""
-        target = Path(path)
-        part = target.with_name(target.name + ".part")
-        part.write_text(json.dumps(self.to_dict(), allow_nan=False) + "\n", encoding="utf-8")
-        part.replace(target)
+        """Write okid.result/1 as JSON, whole or not at all (temporary file, then rename), else InputError."""
+        with whole_file(path) as part:
+            part.write_text(json.dumps(self.to_dict(), allow_nan=False) + "\n", encoding="utf-8")
 
     def to_scipy(self) -> Any:
         """scipy.signal.StateSpace with dt."""
@@ -218,10 +214,26 @@ class Result:
         """control.StateSpace with dt; ImportError says how to install python-control."""
         return self.model.to_control()
 
-    def table(self) -> str:
-        """The modal table, fits and remarks as text for a person."""
-        f_std = any(_number(mode.frequency_std_hz) is not None for mode in self.modes)
-        z_std = any(_number(mode.damping_ratio_std) is not None for mode in self.modes)
+    def table(self) -> ModalTable:
+        """The modes as rows (pandas.DataFrame(result.table())); str() of it: with fits and remarks, for a person."""
+        return ModalTable(self.modes, self._text(), [f"{w.code}: {w.text}" for w in self.warnings])
+
+    def _head(self) -> str:
+        return (
+            f"{self.method}: {self.samples} samples at {self.fs_hz:g} Hz, order {self.order}, "
+            f"{len(self.inputs)} input(s), {len(self.outputs)} output(s)"
+        )
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{mode.frequency_hz:.4g}" for mode in self.modes[:12])
+        return f"<Result of {self._head()}, modes at {found}{' ..' * (len(self.modes) > 12)} Hz>"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(self._head())}</p>" + self.table()._repr_html_()
+
+    def _text(self) -> str:
+        f_std = any(known(mode.frequency_std_hz) is not None for mode in self.modes)
+        z_std = any(known(mode.damping_ratio_std) is not None for mode in self.modes)
         lines = [
             f"{self.method}: {self.samples} samples at {self.fs_hz:g} Hz, {self.records} record(s), {self.gaps} gap(s)",
             f"p {self.p}, {self.rows} block rows, order {self.order}, detrend {self.detrend}, start {self.start}",

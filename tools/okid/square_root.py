@@ -62,6 +62,9 @@ class SquareRoot(Sums):
         Returns the status of the library: 0, or a warning > 0 (missing samples, saturated codes).
         Raises InputError for a wrong shape or type; the state is then unchanged. The array is never modified.
         """
+        status = self._add_direct(samples)
+        if status is not None:
+            return status
         given = self._samples(samples)
         codes = given.dtype in (np.int16, np.int32)
         return _abi.check(self._add_codes(given) if codes else self._add_real(given), "add")

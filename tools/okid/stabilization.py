@@ -80,6 +80,10 @@ class Stabilization(Sequence[OrderPoles]):
     def __init__(self, rows: list[OrderPoles], clusters: list[Cluster], criteria: Criteria) -> None:
         self.rows, self.clusters, self.criteria = rows, clusters, criteria
 
+    def __repr__(self) -> str:
+        found = ", ".join(f"{mode.frequency_hz:.4g}" for mode in self.modes)
+        return f"<Stabilization of {len(self.rows)} models, modes at {found} Hz>"
+
     def __len__(self) -> int:
         return len(self.rows)
 
@@ -212,6 +216,11 @@ def stabilization(
     `horizons`: values of p, or of the block rows for methods without observer (default: a half, three quarters and all
     of what okid.identify() would take); `orders` default: all even ones the data carry. Other arguments are those of
     okid.identify(), u and y too. Result: `modes`, `clusters`, and the rows of the diagram.
+
+    >>> import okid
+    >>> found = okid.stabilization(*okid.demo_record(), fs=1000.0)
+    >>> [round(mode.frequency_hz, 1) for mode in found.modes]
+    [11.0, 31.8, 45.7]
     """
     from okid.identify import identify
 

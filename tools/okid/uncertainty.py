@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -211,6 +211,26 @@ def deviations(
         except Error:
             sums.add(None, share)
     return sums.finish()
+
+
+def without_each(
+    identifier: Identifier,
+    whole: Accumulator,
+    parts: Iterable[tuple[Accumulator, float]],
+    full: Model,
+    plan: Plan | None = None,
+) -> Uncertainty | None:
+    """Standard deviations of `full`, the identifier's last model, which was of `whole`: each of the parts (sums and the
+    weight they have in it) left out in turn. Parts without equations say nothing; None when fewer than 8 others remain.
+    """
+    jackknife, statistics = Jackknife(identifier, whole), Replicates(full, plan)
+    for part, weight in parts:
+        if part.rows > 0:
+            model, share = jackknife.delete(part, weight)
+            if share > 0.0:
+                statistics.add(model, share)
+    found = statistics.finish()
+    return found if found.replicates >= FEWEST else None
 
 
 def finite_p_bias(config: Any, records: Sequence[Real], rest: bool, modes: Sequence[Mode], order: int) -> str | None:

@@ -20,7 +20,7 @@ typedef struct drv_candump_error_t {
     char found[24];       ///< the characters there, "end of line" when there are none
 } drv_candump_error_t;
 
-/// Parse one line without its line end; a trailing '\r', blanks and a direction letter are tolerated.
+/// Parse one line without its line end; a trailing carriage return, blanks and a direction letter are tolerated.
 /// @param interface  out, DRV_NAME_BYTES characters, NUL-terminated
 /// @return 0, or -1 with `error` filled (may be NULL)
 int drv_candump_parse(const char* line, size_t length, drv_frame_t* frame, char* interface, drv_candump_error_t* error);

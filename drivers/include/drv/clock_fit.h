@@ -19,10 +19,16 @@
 extern "C" {
 #endif
 
+/// Pairs of a block, blocks that are kept.
 enum { DRV_CLOCK_BLOCK = 256, DRV_CLOCK_BLOCKS = 64 };
 
-typedef enum drv_clock_jitter_t { DRV_CLOCK_LATE, DRV_CLOCK_SYMMETRIC } drv_clock_jitter_t;
+/// How host stamps scatter: see above.
+typedef enum drv_clock_jitter_t {
+    DRV_CLOCK_LATE,     ///< never early
+    DRV_CLOCK_SYMMETRIC ///< both ways
+} drv_clock_jitter_t;
 
+/// What is known of a device and its stamps.
 typedef struct drv_clock_config_t {
     double tick_hz;            ///< ticks of the device clock a second, > 0
     int32_t stamp_bits;        ///< width of the stamp, 8..64; a round must take at least one second
@@ -33,13 +39,15 @@ typedef struct drv_clock_config_t {
 
 /// What drv_clock_fit_add() made of a pair.
 typedef enum drv_clock_verdict_t {
-    DRV_CLOCK_USED = 0,
+    DRV_CLOCK_USED = 0,      ///< it went into the fit
     DRV_CLOCK_OUTLIER = 1,   ///< left out; when the next ones agree with it, it was one of the two below
     DRV_CLOCK_HOST_STEP = 2, ///< the host clock was set: the fit goes on from here with the rate it had
     DRV_CLOCK_RESTART = 3    ///< the device clock began anew: likewise
 } drv_clock_verdict_t;
 
+/// The clock of one device. Private but for its counts; lives where the caller puts it.
 typedef struct drv_clock_fit_t {
+    /// @cond private
     drv_clock_config_t config;
     int32_t started, block_target;
     int64_t host0_ns, device0; ///< origin; `device0` in ticks
@@ -58,7 +66,11 @@ typedef struct drv_clock_fit_t {
     int32_t suspects, suspect_is_restart;
     double suspect;
     int64_t suspect_device;
-    uint64_t used, outliers, host_steps, restarts;
+    /// @endcond
+    uint64_t used;       ///< pairs in the fit
+    uint64_t outliers;   ///< pairs left out
+    uint64_t host_steps; ///< times the host clock was set
+    uint64_t restarts;   ///< times the device clock began anew
 } drv_clock_fit_t;
 
 /// @return 0 or -EINVAL

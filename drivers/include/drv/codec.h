@@ -14,21 +14,27 @@
 extern "C" {
 #endif
 
-typedef enum drv_value_t { DRV_VALUE_INTEGER, DRV_VALUE_FLOAT32, DRV_VALUE_FLOAT64 } drv_value_t;
+/// What the bits of a signal are.
+typedef enum drv_value_t {
+    DRV_VALUE_INTEGER, ///< a whole number
+    DRV_VALUE_FLOAT32, ///< IEEE 754, 32 bits
+    DRV_VALUE_FLOAT64  ///< IEEE 754, 64 bits
+} drv_value_t;
 
+/// Where a number stands in a frame.
 typedef struct drv_signal_t {
-    uint16_t start_bit;
+    uint16_t start_bit; ///< see above
     uint16_t length;    ///< 1..64 bits; 32 and 64 for the float types
     uint8_t big_endian; ///< 1 = Motorola
-    uint8_t is_signed;
-    drv_value_t value;
-    double scale; ///< physical = raw * scale + offset
-    double offset;
+    uint8_t is_signed;  ///< 1 = two's complement
+    drv_value_t value;  ///< what the bits are
+    double scale;       ///< physical = raw * scale + offset
+    double offset;      ///< in physical units
     // Filled by drv_signal_prepare():
     uint8_t first; ///< first byte touched
     uint8_t bytes; ///< bytes touched, 1..9
     uint8_t shift; ///< bits below the signal in those bytes
-    uint64_t mask;
+    uint64_t mask; ///< of the bits of the signal
 } drv_signal_t;
 
 /// Check the layout and work out the fast path. @return NULL, or a static sentence that says what is wrong

@@ -29,6 +29,7 @@ enum {
     DRV_LOSS_CRC = 1 << 3       ///< serial: bytes arrived that made no valid packet
 };
 
+/// A frame with its times.
 typedef struct drv_frame_t {
     int64_t time_ns;    ///< host time of arrival (host_clock.h), or the stamp of the log
     int64_t hw_time_ns; ///< the controller's own stamp, 0 = none
@@ -37,7 +38,7 @@ typedef struct drv_frame_t {
     uint8_t loss;       ///< DRV_LOSS_… bits
     uint8_t bus;        ///< which interface of the source, 0 first
     uint8_t len;        ///< bytes in data, 0..64; of a remote frame the length asked for
-    uint8_t data[64];
+    uint8_t data[64];   ///< the first `len` count
 } drv_frame_t;
 
 #ifdef __cplusplus

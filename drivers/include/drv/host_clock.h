@@ -14,10 +14,12 @@ extern "C" {
 
 /// Two clocks read together: `reference_ns` was taken between two reads of CLOCK_BOOTTIME.
 typedef struct drv_clock_pair_t {
-    int64_t before_ns, reference_ns, after_ns;
+    int64_t before_ns;    ///< CLOCK_BOOTTIME
+    int64_t reference_ns; ///< the other clock
+    int64_t after_ns;     ///< CLOCK_BOOTTIME again
 } drv_clock_pair_t;
 
-/// @param reference  CLOCK_REALTIME, CLOCK_MONOTONIC, …; @param tries  the tightest of so many
+/// Read two clocks. @param reference  CLOCK_REALTIME, CLOCK_MONOTONIC, …; @param tries  the tightest of so many
 drv_clock_pair_t drv_clock_pair(int reference, int tries);
 
 /// Host time now. Any thread.
@@ -27,10 +29,12 @@ int64_t drv_host_time_of(int64_t boottime_ns);
 
 /// Stamps of CLOCK_REALTIME, in the order of their queue, to host time. One object a source.
 typedef struct drv_host_clock_t {
+    /// @cond private
     int64_t apart_ns, before_ns; ///< CLOCK_REALTIME - CLOCK_BOOTTIME now, and before the clock was set last
     int64_t last_ns, now_ns;     ///< CLOCK_BOOTTIME of the newest stamp carried, and of the last look
     uint32_t sets;               ///< times the clock was found set
     int32_t started;
+    /// @endcond
 } drv_host_clock_t;
 
 /// Just after frames were read, before their stamps are carried: was the clock set? @return 1 when it was

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// @file journal.h
 /// A journal of frames (.okj): an append-only file of chunks that can be cut anywhere and still be read. The bytes are
-/// in docs/journal-format.md. Writer and reader have fixed buffers, no heap, no clock and no file of their own: bytes
+/// in docs/reference/journal-format.md. Writer and reader have fixed buffers, no heap, no clock and no file of their own: bytes
 /// go out and come in through functions, so that a test can cut the power after every one of them.
 #ifndef DRV_JOURNAL_H
 #define DRV_JOURNAL_H
@@ -13,8 +13,9 @@
 extern "C" {
 #endif
 
+/// Of the format.
 enum {
-    DRV_JOURNAL_VERSION = 1,
+    DRV_JOURNAL_VERSION = 1,       ///< of what is written
     DRV_JOURNAL_MAGIC = 8,         ///< bytes that begin every chunk
     DRV_JOURNAL_HEADER = 64,       ///< bytes before the payload of a chunk
     DRV_JOURNAL_PAYLOAD = 1 << 16, ///< most bytes behind them
@@ -41,21 +42,23 @@ typedef struct drv_journal_sink_t {
     long (*write)(void* context, const uint8_t* bytes, size_t count);
     /// Cut the file off at `size`, after a write that did not get through. @return 0 or -errno
     int (*truncate)(void* context, uint64_t size);
-    void* context;
+    void* context; ///< handed to both
 } drv_journal_sink_t;
 
+/// A journal that is written.
 typedef struct drv_journal_writer_t {
-    drv_journal_sink_t sink;
-    uint64_t run;      ///< random: tells the chunks of one run from what else may stand on a disk
-    uint32_t sequence; ///< of the next chunk; goes on through all segments of a run
-    uint64_t bytes;    ///< of the file so far, whole chunks only
-    uint64_t chunks;   ///< written since begin
-    int error;         ///< 0, or the -errno that ended it
-    // private
+    drv_journal_sink_t sink; ///< where the bytes go
+    uint64_t run;            ///< random: tells the chunks of one run from what else may stand on a disk
+    uint32_t sequence;       ///< of the next chunk; goes on through all segments of a run
+    uint64_t bytes;          ///< of the file so far, whole chunks only
+    uint64_t chunks;         ///< written since begin
+    int error;               ///< 0, or the -errno that ended it
+    /// @cond private
     uint64_t lost;
     uint32_t frames;
     size_t used;
     uint8_t buffer[DRV_JOURNAL_HEADER + DRV_JOURNAL_PAYLOAD];
+    /// @endcond
 } drv_journal_writer_t;
 
 /// A new file, the next segment of the run; only while no frame waits. What was lost meanwhile is kept for its first
@@ -90,16 +93,18 @@ typedef long (*drv_journal_read_t)(void* context, uint8_t* bytes, size_t count);
 /// A whole and valid chunk.
 typedef struct drv_journal_chunk_t {
     drv_journal_kind_t kind; ///< or another number: of a later version, to be passed over
-    uint32_t sequence, frames;
-    uint64_t run;
-    drv_journal_time_t time;
-    uint64_t lost; ///< frames the recorder itself lost just before this chunk
-    int gap;       ///< 1 = chunks or bytes that should stand before this one are missing
-    int more;      ///< DRV_JOURNAL_END: the run goes on in the next segment
-    const uint8_t* payload;
-    size_t bytes;
+    uint32_t sequence;       ///< number of the chunk in the run
+    uint32_t frames;         ///< in the payload
+    uint64_t run;            ///< which run it belongs to
+    drv_journal_time_t time; ///< when it was written
+    uint64_t lost;           ///< frames the recorder itself lost just before this chunk
+    int gap;                 ///< 1 = chunks or bytes that should stand before this one are missing
+    int more;                ///< DRV_JOURNAL_END: the run goes on in the next segment
+    const uint8_t* payload;  ///< what it holds
+    size_t bytes;            ///< of the payload
 } drv_journal_chunk_t;
 
+/// A journal that is read.
 typedef struct drv_journal_reader_t {
     uint64_t run;           ///< of the first valid chunk
     uint64_t chunks;        ///< valid ones given
@@ -111,7 +116,7 @@ typedef struct drv_journal_reader_t {
     unsigned newer;         ///< version of chunks that a later okid wrote, 0 = none
     int ended;              ///< the last chunk says that the file was closed in order
     int more;               ///< and that the run goes on in another file
-    // private
+    /// @cond private
     drv_journal_read_t read;
     void* context;
     int started, at_end, broken;
@@ -119,8 +124,10 @@ typedef struct drv_journal_reader_t {
     size_t begin, end;
     uint64_t lost_sync;
     uint8_t buffer[2 * (DRV_JOURNAL_HEADER + DRV_JOURNAL_PAYLOAD)];
+    /// @endcond
 } drv_journal_reader_t;
 
+/// Begin with a file.
 void drv_journal_reader_begin(drv_journal_reader_t* self, drv_journal_read_t read, void* context);
 /// The same run goes on in another file.
 void drv_journal_reader_continue(drv_journal_reader_t* self, drv_journal_read_t read, void* context);
@@ -134,12 +141,15 @@ int drv_journal_frame(const drv_journal_chunk_t* chunk, size_t* at, drv_frame_t*
 
 /// A piece of a text; points into the payload, nothing is terminated by 0.
 typedef struct drv_journal_text_t {
-    const char *name, *piece;
-    size_t name_bytes, piece_bytes;
-    uint64_t offset, total; ///< where in the text the piece stands, and how long the text is
+    const char* name;   ///< of the text
+    const char* piece;  ///< a piece of it
+    size_t name_bytes;  ///< characters of the name
+    size_t piece_bytes; ///< characters of the piece
+    uint64_t offset;    ///< where in the text the piece stands
+    uint64_t total;     ///< how long the text is
 } drv_journal_text_t;
 
-/// @return 1, or 0 when the payload of a DRV_JOURNAL_TEXT chunk is none
+/// Take a DRV_JOURNAL_TEXT chunk apart. @return 1, or 0 when its payload is none
 int drv_journal_text_of(const drv_journal_chunk_t* chunk, drv_journal_text_t* out);
 
 /// Name of the segment behind `path`: NAME-0001.okj -> NAME-0002.okj. @return 1, 0 when the name has no number or `out`

@@ -13,38 +13,42 @@ extern "C" {
 
 /// State of a CAN controller by its error counters; unknown for virtual interfaces.
 typedef enum drv_bus_state_t {
-    DRV_BUS_UNKNOWN,
-    DRV_BUS_ACTIVE,
+    DRV_BUS_UNKNOWN, ///< not told
+    DRV_BUS_ACTIVE,  ///< all well
     DRV_BUS_WARNING, ///< an error counter is above 95
     DRV_BUS_PASSIVE, ///< above 127: it no longer marks errors of others
     DRV_BUS_OFF,     ///< above 255: it neither sends nor receives until it is restarted
-    DRV_BUS_STOPPED,
-    DRV_BUS_SLEEPING
+    DRV_BUS_STOPPED, ///< switched off
+    DRV_BUS_SLEEPING ///< in sleep mode
 } drv_bus_state_t;
 
 /// "error-active", "bus-off", … as `ip -details link` writes them. Static text.
 const char* drv_bus_state_name(drv_bus_state_t state);
 
+/// A network interface.
 typedef struct drv_link_t {
-    char name[16];
-    char kind[16];        ///< "can", "vcan", "slcan", …, "" when the driver does not tell
-    int32_t index;        ///< of the interface, 0 = there is none
-    uint8_t is_can;       ///< 1 = a CAN interface, virtual ones included
-    uint8_t up;           ///< 1 = administratively up
-    uint8_t running;      ///< 1 = can carry frames now (0 after bus-off)
-    uint8_t gone;         ///< 1 = this message says that the interface was removed
-    uint8_t has_can_data; ///< 1 = the fields from `state` on were told by the driver
-    int32_t mtu;          ///< 16 classic, 72 FD
-    uint32_t tx_queue;    ///< frames the send queue holds (txqueuelen)
-    drv_bus_state_t state;
-    uint8_t listen_only;
-    uint8_t has_error_counters;
-    uint16_t tx_errors, rx_errors;         ///< error counters of the controller now
-    uint32_t bitrate, dbitrate;            ///< bit/s, 0 = not set
-    uint32_t restart_ms;                   ///< 0 = stays off after bus-off
-    uint32_t bus_off_count, restart_count; ///< since the interface exists
-    uint64_t rx_dropped;                   ///< frames the driver dropped
-    uint64_t rx_over_errors;               ///< times the controller's receive queue overran
+    char name[16];              ///< "can0"
+    char kind[16];              ///< "can", "vcan", "slcan", …, "" when the driver does not tell
+    int32_t index;              ///< of the interface, 0 = there is none
+    uint8_t is_can;             ///< 1 = a CAN interface, virtual ones included
+    uint8_t up;                 ///< 1 = administratively up
+    uint8_t running;            ///< 1 = can carry frames now (0 after bus-off)
+    uint8_t gone;               ///< 1 = this message says that the interface was removed
+    uint8_t has_can_data;       ///< 1 = the fields from `state` on were told by the driver
+    int32_t mtu;                ///< 16 classic, 72 FD
+    uint32_t tx_queue;          ///< frames the send queue holds (txqueuelen)
+    drv_bus_state_t state;      ///< of the controller
+    uint8_t listen_only;        ///< 1 = sends nothing, not even acknowledgements
+    uint8_t has_error_counters; ///< 1 = the next two were told
+    uint16_t tx_errors;         ///< error counter of the controller now
+    uint16_t rx_errors;         ///< error counter of the controller now
+    uint32_t bitrate;           ///< bit/s, 0 = not set
+    uint32_t dbitrate;          ///< bit/s, 0 = not set
+    uint32_t restart_ms;        ///< 0 = stays off after bus-off
+    uint32_t bus_off_count;     ///< since the interface exists
+    uint32_t restart_count;     ///< since the interface exists
+    uint64_t rx_dropped;        ///< frames the driver dropped
+    uint64_t rx_over_errors;    ///< times the controller's receive queue overran
 } drv_link_t;
 
 /// Ask the kernel for an interface. @return 0, -ENODEV when there is none, or another -errno

@@ -16,7 +16,7 @@ typedef struct drv_pacer_t {
     uint64_t count;   ///< deadlines waited for
     double mean_ns;   ///< late by, mean
     double square_ns; ///< sum of squared deviations from the mean
-    int64_t worst_ns;
+    int64_t worst_ns; ///< late by, at most
 } drv_pacer_t;
 
 /// Offset 0 is now + lead_ns. Also asks the kernel to wake this thread without slack (default 50 microseconds).

@@ -11,6 +11,7 @@
 extern "C" {
 #endif
 
+/// Private; lives in the caller's block.
 typedef struct drv_ring_t drv_ring_t;
 
 /// Bytes drv_ring_create() needs; 0 when capacity is not a power of two in 2..2^24.

@@ -10,23 +10,25 @@
 extern "C" {
 #endif
 
+/// Longest path of a device, with its closing 0.
 enum { DRV_PATH_BYTES = 256 };
 
 /// What the line's hardware refused, since it was opened.
 typedef struct drv_serial_errors_t {
     uint32_t overrun; ///< bytes lost because nobody fetched them in time, in the hardware or in the kernel
     uint32_t frame;   ///< bytes without a stop bit: a wrong baud rate, or a break
-    uint32_t parity;
+    uint32_t parity;  ///< bytes with a wrong parity
 } drv_serial_errors_t;
 
+/// A line that is open, or was.
 typedef struct drv_serial_t {
-    int fd;              ///< -1 = closed
-    int32_t baud;        ///< as the device took it
-    int low_latency;     ///< 1 = the kernel was asked to hand bytes over at once, and agreed
-    int latency_ms;      ///< of a USB adapter that tells it (16 is the usual default), -1 = tells none
-    int counts_errors;   ///< 1 = the device counts what drv_serial_errors_t holds
-    uint32_t counted[4]; ///< its counters at open
-    char error[DRV_ERROR_BYTES];
+    int fd;                      ///< -1 = closed
+    int32_t baud;                ///< as the device took it
+    int low_latency;             ///< 1 = the kernel was asked to hand bytes over at once, and agreed
+    int latency_ms;              ///< of a USB adapter that tells it (16 is the usual default), -1 = tells none
+    int counts_errors;           ///< 1 = the device counts what drv_serial_errors_t holds
+    uint32_t counted[4];         ///< its counters at open
+    char error[DRV_ERROR_BYTES]; ///< one sentence, "" = none
 } drv_serial_t;
 
 /// Open a device such as /dev/serial/by-id/…: locked against others (flock and TIOCEXCL), USB latency at its least.
@@ -34,7 +36,7 @@ typedef struct drv_serial_t {
 ///         device, -EINVAL a baud rate that the device cannot make
 int drv_serial_open(drv_serial_t* self, const char* path, int32_t baud);
 
-/// @return bytes read, 0 = none now, -ENODEV when the device is gone (unplugged): close it then
+/// Bytes that wait. @return bytes read, 0 = none now, -ENODEV when the device is gone (unplugged): close it then
 int drv_serial_read(drv_serial_t* self, uint8_t* bytes, size_t capacity);
 
 /// Write everything; a full queue is waited for, `patience_ms` in all. @return 0, or -errno with `error` filled

@@ -27,14 +27,16 @@ int drv_slcan_opening(char* out, size_t capacity, int32_t bitrate, int32_t dbitr
 
 /// Frames onto a bus behind an adapter.
 typedef struct drv_slcan_sink_t {
-    drv_serial_t port;
-    uint64_t sent;
-    char error[DRV_ERROR_BYTES];
+    drv_serial_t port;           ///< the line
+    uint64_t sent;               ///< frames
+    char error[DRV_ERROR_BYTES]; ///< one sentence, "" = none
 } drv_slcan_sink_t;
 
-/// @return 0, or -errno with `error` filled
+/// Open the line and the channel behind it. @return 0, or -errno with `error` filled
 int drv_slcan_sink_open(drv_slcan_sink_t* self, const drv_line_config_t* config);
+/// Send one frame, as drv_sink_write().
 int drv_slcan_sink_write(drv_slcan_sink_t* self, const drv_frame_t* frame, int patience_ms);
+/// Closes the channel too. Safe when closed already.
 void drv_slcan_sink_close(drv_slcan_sink_t* self);
 
 #ifdef __cplusplus

@@ -15,12 +15,13 @@
 extern "C" {
 #endif
 
+/// Sizes.
 enum {
-    DRV_NAME_BYTES = 16,
-    DRV_ERROR_BYTES = 320,
-    DRV_ERROR_TEXT_BYTES = 120,
-    DRV_MAX_FILTERS = 512,
-    DRV_MAX_BUSES = 32,
+    DRV_NAME_BYTES = 16,          ///< longest name of an interface, with its closing 0
+    DRV_ERROR_BYTES = 320,        ///< longest sentence about an error
+    DRV_ERROR_TEXT_BYTES = 120,   ///< longest text of an error message of a controller
+    DRV_MAX_FILTERS = 512,        ///< identifiers a source can be asked for
+    DRV_MAX_BUSES = 32,           ///< interfaces of a source
     DRV_RECEIVE_BUFFER = 40 << 20 ///< bytes; the kernel doubles it, and then 100,000 frames of 768 bytes fit
 };
 
@@ -29,15 +30,15 @@ enum {
 
 /// One identifier wanted, or many alike; nothing else passes the kernel.
 typedef struct drv_filter_t {
-    uint32_t id;
-    uint8_t extended;
-    uint32_t mask; ///< bits of the identifier that must agree with `id`; 0 = all of them
+    uint32_t id;      ///< 11 or 29 bits
+    uint8_t extended; ///< 1 = 29 bits
+    uint32_t mask;    ///< bits of the identifier that must agree with `id`; 0 = all of them
 } drv_filter_t;
 
 /// Of a serial line.
 typedef struct drv_line_config_t {
-    const char* device; ///< best of /dev/serial/by-id/: that name finds the device again after it was unplugged
-    int32_t baud;
+    const char* device;    ///< best of /dev/serial/by-id/: that name finds the device again after it was unplugged
+    int32_t baud;          ///< bit/s of the line
     drv_framing_t framing; ///< serial
     int32_t counter;       ///< serial, lines of text: 1 + the field that counts samples, 0 = none
     double rate_hz;        ///< serial: of the samples, for the stamps of those that share a packet
@@ -46,19 +47,25 @@ typedef struct drv_line_config_t {
     const char* btr;       ///< slcan: bit timing registers as the adapter wants them (command s), instead of bitrate
 } drv_line_config_t;
 
+/// What to open.
 typedef struct drv_source_config_t {
     const char*
         interfaces[DRV_MAX_BUSES]; ///< socket: the first one; log: those to deliver, frame.bus is the index here
     int32_t interface_count;       ///< log: 0 = deliver every interface as bus 0
     const char* path;              ///< log only
     const drv_filter_t* filters;   ///< socket only; NULL = everything
-    int32_t filter_count;
-    int32_t buffer_bytes;   ///< receive buffer asked for, 0 = DRV_RECEIVE_BUFFER
-    drv_line_config_t line; ///< serial and slcan only
+    int32_t filter_count;          ///< of them
+    int32_t buffer_bytes;          ///< receive buffer asked for, 0 = DRV_RECEIVE_BUFFER
+    drv_line_config_t line;        ///< serial and slcan only
 } drv_source_config_t;
 
-/// How frames were stamped, best first.
-typedef enum drv_stamp_t { DRV_STAMP_NONE, DRV_STAMP_US, DRV_STAMP_NS, DRV_STAMP_HARDWARE } drv_stamp_t;
+/// How frames were stamped, best last.
+typedef enum drv_stamp_t {
+    DRV_STAMP_NONE,    ///< not told
+    DRV_STAMP_US,      ///< by the kernel, microseconds
+    DRV_STAMP_NS,      ///< by the kernel, nanoseconds
+    DRV_STAMP_HARDWARE ///< by the controller
+} drv_stamp_t;
 
 /// Counts since open().
 typedef struct drv_stats_t {
@@ -66,10 +73,10 @@ typedef struct drv_stats_t {
     uint64_t lost_overflow; ///< frames the kernel dropped because the receive buffer was full
     uint64_t lost_driver;   ///< frames the driver dropped, and times the controller's own queue overran
     uint64_t error_frames;  ///< error messages of the controller; the next seven count those of one class
-    uint64_t bus_off;
-    uint64_t restarts; ///< after bus-off
-    uint64_t no_ack;   ///< sent, and nobody acknowledged
-    uint64_t tx_timeouts;
+    uint64_t bus_off;       ///< entered bus-off
+    uint64_t restarts;      ///< after bus-off
+    uint64_t no_ack;        ///< sent, and nobody acknowledged
+    uint64_t tx_timeouts;   ///< sending gave up
     uint64_t rx_overflows;  ///< the controller's receive queue overran
     uint64_t error_passive; ///< entered the error-passive state
     uint64_t bus_errors;    ///< bit, stuff, form, CRC errors on the wire
@@ -87,15 +94,17 @@ typedef struct drv_stats_t {
     uint64_t refused;       ///< slcan: commands and frames the adapter answered with an error (bell)
     uint64_t line_overruns; ///< serial line: bytes lost in the hardware or the kernel, in lost_driver too
     uint64_t line_errors;   ///< serial line: bytes with a framing or parity error, as from a wrong baud rate
-    drv_stamp_t stamp;
-    drv_bus_state_t state;                 ///< of the controller, as last told
-    uint32_t restart_ms;                   ///< of the interface; 0 = it stays off after bus-off, or is virtual
-    uint32_t bitrate;                      ///< of the interface, bit/s; 0 = virtual
+    drv_stamp_t stamp;      ///< how frames were stamped
+    drv_bus_state_t state;  ///< of the controller, as last told
+    uint32_t restart_ms;    ///< of the interface; 0 = it stays off after bus-off, or is virtual
+    uint32_t bitrate;       ///< of the interface, bit/s; 0 = virtual
     char last_error[DRV_ERROR_TEXT_BYTES]; ///< what the newest error message said, "" = there was none
 } drv_stats_t;
 
+/// One source; open() begins it.
 typedef struct drv_source_t drv_source_t;
 
+/// What every kind of source can do.
 typedef struct drv_source_ops_t {
     int (*open)(drv_source_t* self, const drv_source_config_t* config); ///< 0 or -errno
     int (*fd)(const drv_source_t* self);                                ///< to poll for reading, -1 = none just now
@@ -104,11 +113,12 @@ typedef struct drv_source_ops_t {
     void (*close)(drv_source_t* self); ///< safe after a failed open; stats stay readable
 } drv_source_ops_t;
 
+/// A source that is open, or was.
 struct drv_source_t {
-    const drv_source_ops_t* ops;
-    void* state; ///< of the implementation, between open and close
-    drv_stats_t counts;
-    char error[DRV_ERROR_BYTES];
+    const drv_source_ops_t* ops; ///< its kind
+    void* state;                 ///< of the implementation, between open and close
+    drv_stats_t counts;          ///< since open()
+    char error[DRV_ERROR_BYTES]; ///< one sentence, "" = none
 };
 
 extern const drv_source_ops_t drv_source_socketcan; ///< a CAN_RAW socket, classic and FD

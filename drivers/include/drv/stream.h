@@ -14,8 +14,9 @@
 extern "C" {
 #endif
 
+/// Of the format.
 enum {
-    DRV_STREAM_VERSION = 1,
+    DRV_STREAM_VERSION = 1,                                       ///< in the first byte
     DRV_STREAM_HEADER = 12,                                       ///< bytes before the samples
     DRV_STREAM_OVERHEAD = 16,                                     ///< header and CRC
     DRV_STREAM_MAX_BYTES = 1024,                                  ///< header, samples and CRC together
@@ -23,14 +24,19 @@ enum {
 };
 
 /// How a number stands in the packet; little-endian, two's complement.
-typedef enum drv_stream_format_t { DRV_STREAM_INT16, DRV_STREAM_INT24, DRV_STREAM_FLOAT32 } drv_stream_format_t;
+typedef enum drv_stream_format_t {
+    DRV_STREAM_INT16,  ///< 2 bytes
+    DRV_STREAM_INT24,  ///< 3 bytes
+    DRV_STREAM_FLOAT32 ///< 4 bytes
+} drv_stream_format_t;
 
+/// What stands before the numbers.
 typedef struct drv_stream_header_t {
-    drv_stream_format_t format;
-    uint8_t channels;  ///< >= 1
-    uint8_t samples;   ///< of each channel, >= 1
-    uint32_t sequence; ///< number of the first sample since the node started; wraps
-    uint32_t time_us;  ///< the node's clock at the first sample; wraps
+    drv_stream_format_t format; ///< of the numbers
+    uint8_t channels;           ///< >= 1
+    uint8_t samples;            ///< of each channel, >= 1
+    uint32_t sequence;          ///< number of the first sample since the node started; wraps
+    uint32_t time_us;           ///< the node's clock at the first sample; wraps
 } drv_stream_header_t;
 
 /// Bytes that the packet may need on the wire, its closing 0 included; 0 when it would be longer than a packet may be.

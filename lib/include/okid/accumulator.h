@@ -44,6 +44,7 @@ typedef enum okid_sample_t {
 /// pointers: a memcpy of the block is a snapshot, also for another process of the same library version.
 typedef struct okid_accumulator okid_accumulator_t;
 
+/// What an accumulator is made for: see above.
 typedef struct okid_accumulator_config_t {
     int32_t n_u;          ///< inputs, >= 0
     int32_t n_y;          ///< outputs, >= 1; n_u + n_y <= 256
@@ -79,12 +80,14 @@ typedef struct okid_accumulator_stats_t {
           4 * ((size_t)(n_u) + (n_y))) +                                                                               \
      320)
 
-/// The same for 16 or 24-bit codes, whose sums take two planes of 64-bit words, and one more where the kernel sums in double.
+/// Planes of 64-bit words beside the first: one more where the kernel sums in double.
 #ifdef OKID_INTEGER_KERNEL
 #define OKID_ACCUMULATOR_PLANES 1
 #else
 #define OKID_ACCUMULATOR_PLANES 2
 #endif
+/// OKID_ACCUMULATOR_BYTES() for 16 or 24-bit codes, whose sums take two planes of 64-bit words, and one more where the kernel
+/// sums in double.
 #define OKID_ACCUMULATOR_CODES_BYTES(n_u, n_y, p)                                                                      \
     (OKID_ACCUMULATOR_BYTES(n_u, n_y, p) +                                                                             \
      8 * OKID_ACCUMULATOR_PLANES * ((size_t)(n_u) + (n_y)) * ((size_t)(n_u) + (n_y)) * ((size_t)(p) + 1))
@@ -166,7 +169,9 @@ OKID_NODISCARD OKID_API okid_status_t okid_accumulator_take_slots(okid_accumulat
 /// Needs edges = 1, slots = 0, forgetting = 1. Cost O((m p)^2). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_RANGE
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_centre(okid_accumulator_t* self);
 
+/// Counts since create or reset. @param out  out
 OKID_API void okid_accumulator_stats(const okid_accumulator_t* self, okid_accumulator_stats_t* out);
+/// What it was created for. @param out  out
 OKID_API void okid_accumulator_config(const okid_accumulator_t* self, okid_accumulator_config_t* out);
 
 /// Regression rows now in the sums (stats.rows, cheaper).

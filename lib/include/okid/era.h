@@ -12,8 +12,10 @@
 extern "C" {
 #endif
 
+/// Sizes of the Hankel matrix, and of the correlations of ERA/DC.
 typedef struct okid_era_config_t {
-    int32_t n_u, n_y;
+    int32_t n_u;  ///< inputs, >= 1
+    int32_t n_y;  ///< outputs, >= 1
     int32_t rows; ///< r, block rows of H(0)
     int32_t cols; ///< c, block columns
     int32_t xi;   ///< ERA/DC: xi + 1 block rows of correlations, 0..64; ERA: 0
@@ -27,7 +29,23 @@ OKID_API int32_t okid_era_markov_last(const okid_era_config_t* config);
 /// One decomposition, many orders. Private; lives in the caller's block.
 typedef struct okid_era okid_era_t;
 
+/// Bytes of the block with the Eigen backend and tau = 0 (ERA), for static arrays: never less than okid_era_memsize(), and
+/// at most 1.2 KiB more where cols n_u >= n_y.
+#define OKID_ERA_BYTES(n_u, n_y, rows, cols)                                                                           \
+    (1024 + sizeof(okid_real_t) *                                                                                      \
+                OKID_ERA_NUMBERS_((size_t)(rows) * (n_y), (size_t)(cols) * (n_u), (size_t)(n_u), (size_t)(n_y)))
+/// @cond
+#define OKID_ERA_NUMBERS_(height, breadth, n_u, n_y)                                                                   \
+    ((height) < (breadth) ? OKID_ERA_ORDERED_(height, breadth, height, breadth, n_u, n_y)                              \
+                          : OKID_ERA_ORDERED_(height, breadth, breadth, height, n_u, n_y))
+#define OKID_ERA_ORDERED_(height, breadth, k, tall, n_u, n_y)                                                          \
+    ((height) * (breadth) + ((height) + (breadth)) * (k) + (tall) * (k) + 3 * (k) * (k) + 3 * (k) +                    \
+     ((n_y) > (k) ? (height) * ((n_y) - (k)) : 0) + (k) * ((n_u) > (n_y) ? (n_u) : (n_y)))
+/// @endcond
+
+/// Bytes okid_era_create() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_era_memsize(const okid_era_config_t* config);
+/// Lay one out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_era_create(okid_era_t** self, const okid_era_config_t* config, void* block,
                                                       size_t bytes);
 

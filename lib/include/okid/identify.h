@@ -12,13 +12,14 @@
 extern "C" {
 #endif
 
+/// How a model is found.
 typedef enum okid_method_t {
     OKID_METHOD_OKID_ERA = 0,    ///< observer least squares, Markov recursion, ERA. Without inputs: ERA on the
                                  ///< covariances of the outputs, which stand in the place of the Markov parameters
     OKID_METHOD_OKID_ERA_DC = 1, ///< the same Markov parameters, ERA with data correlations (xi = zeta = 2, tau = 1)
     OKID_METHOD_N4SID_MOESP = 2, ///< subspace methods, okid/subspace.h; with and without inputs
-    OKID_METHOD_N4SID_CVA = 3,
-    OKID_METHOD_N4SID_SSARX = 4
+    OKID_METHOD_N4SID_CVA = 3,   ///< canonical weighting
+    OKID_METHOD_N4SID_SSARX = 4  ///< the future corrected by an ARX model
 } okid_method_t;
 
 /// What a block of the Hankel matrix of okid-era and okid-era-dc holds (records with inputs). In all three the gain K
@@ -51,47 +52,63 @@ enum {
 /// Name of a single bit as in okid.result/1 ("arx_stabilised", ...), NULL for an unknown one.
 OKID_API const char* okid_warning_code(uint32_t bit);
 
+/// What is to be identified, and how; zeros are defaults.
 typedef struct okid_identify_config_t {
-    int32_t n_u, n_y; ///< n_u = 0 (ambient): modes and predictor only
-    int32_t p;        ///< observer (ARX) order; n4sid: not used; okid without inputs: only the default of rows
+    int32_t n_u;   ///< inputs, >= 0; 0 (ambient): modes and predictor only
+    int32_t n_y;   ///< outputs, >= 1
+    int32_t p;     ///< observer (ARX) order; n4sid: not used; okid without inputs: only the default of rows
     int32_t rows;  ///< block rows (okid: and columns) of the Hankel matrices; 0 = 2 p, n4sid 30, okid without inputs p
     int32_t order; ///< n_z; 0 = automatic
     int32_t max_order; ///< bound of the automatic order and of the memory; 0 = min(128, what the Hankel matrix carries)
     double fs_hz;      ///< sample rate
-    okid_method_t method;
-    okid_detrend_t detrend;
-    okid_solver_t solver; ///< n4sid, and okid without inputs: dense
-    okid_hankel_t hankel; ///< n4sid, and okid without inputs: system
+    okid_method_t method;   ///< 0 = okid-era
+    okid_detrend_t detrend; ///< 0 = none
+    okid_solver_t solver;   ///< n4sid, and okid without inputs: dense
+    okid_hankel_t hankel;   ///< n4sid, and okid without inputs: system
 } okid_identify_config_t;
 
 /// An identified model. Every pointer looks into the identifier's block and stays valid until the next run. Of an n4sid
 /// method, and of an okid method without inputs, p is rows (the past it looks back on), `observer` is NULL,
 /// observer_info.radius and radius_plain are 0.
 typedef struct okid_identified_t {
-    uint32_t warnings; ///< OKID_NOTE_… bits
-    int32_t n_u, n_y, n_z, p, rows;
-    int32_t singular_count, markov_count, mode_count; ///< numbers in the arrays below
-    int64_t regression_rows;
-    double dt;                            ///< s
-    const okid_real_t *A, *B, *C, *D, *K; ///< column-major; K Kalman gain n_z x n_y
+    uint32_t warnings;       ///< OKID_NOTE_… bits
+    int32_t n_u;             ///< inputs
+    int32_t n_y;             ///< outputs
+    int32_t n_z;             ///< states
+    int32_t p;               ///< lags
+    int32_t rows;            ///< block rows of the Hankel matrix
+    int32_t singular_count;  ///< numbers in singular_values
+    int32_t markov_count;    ///< blocks in markov
+    int32_t mode_count;      ///< modes in the arrays below
+    int64_t regression_rows; ///< rows behind the least squares
+    double dt;               ///< s
+    const okid_real_t* A;    ///< n_z x n_z, column-major as the next four
+    const okid_real_t* B;    ///< n_z x n_u
+    const okid_real_t* C;    ///< n_y x n_z
+    const okid_real_t* D;    ///< n_y x n_u
+    const okid_real_t* K;    ///< n_z x n_y, Kalman gain
     /// Descending. okid-era: of H(0) (without inputs: of covariances of outputs scaled to unit variance); okid-era-dc: of
     /// the matrix of correlations; n4sid: okid_subspace_singular_values()
     const okid_real_t* singular_values;
     /// Y_0 .. Y_(markov_count-1), n_y x n_u blocks, at least 2 rows + 1 (none when n_u = 0). okid: by eq. (40) from the
     /// observer, n4sid: of the model
     const okid_real_t* markov;
-    const okid_real_t* observer;   ///< theta, n_y x q, or NULL
-    const okid_real_t* innovation; ///< n_y x n_y
-    const double* mean;            ///< m channel means that were removed (zeros for detrend none)
-    const okid_real_t *frequency_hz, *damping_ratio, *mpc, *emac; ///< mode_count each
-    const okid_real_t* cmi; ///< mode_count; consistent-mode indicator EMAC x MPC (Pappa, Elliott, Schenk 1993)
-    const okid_real_t *shape_re, *shape_im; ///< n_y x mode_count
-    double model_radius;                    ///< spectral radius of A
+    const okid_real_t* observer;      ///< theta, n_y x q, or NULL
+    const okid_real_t* innovation;    ///< n_y x n_y
+    const double* mean;               ///< m channel means that were removed (zeros for detrend none)
+    const okid_real_t* frequency_hz;  ///< mode_count
+    const okid_real_t* damping_ratio; ///< mode_count
+    const okid_real_t* mpc;           ///< mode_count; modal phase collinearity, 0..1
+    const okid_real_t* emac;          ///< mode_count; consistency over the horizon, 0..1
+    const okid_real_t* cmi;      ///< mode_count; consistent-mode indicator EMAC x MPC (Pappa, Elliott, Schenk 1993)
+    const okid_real_t* shape_re; ///< n_y x mode_count, the largest entry of each is 1
+    const okid_real_t* shape_im; ///< n_y x mode_count
+    double model_radius;         ///< spectral radius of A
     /// Singular values up to this can come from the errors of the observer alone (okid-era with inputs and automatic order,
     /// Hankel matrix of the system, dense solver; else NaN). One above it need not be a mode: drift, hum and a finite p
     /// leave more than least squares knows of
     double noise_level;
-    okid_observer_info_t observer_info;
+    okid_observer_info_t observer_info; ///< what the least squares found
 } okid_identified_t;
 
 /// Holds workspace and result. Private; lives in the caller's block.
@@ -106,6 +123,7 @@ OKID_API int32_t okid_identify_lags(const okid_identify_config_t* config);
 
 /// Bytes okid_identify_create() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_identify_memsize(const okid_identify_config_t* config);
+/// Lay an identifier out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_identify_create(okid_identify_t** self, const okid_identify_config_t* config,
                                                            void* block, size_t bytes);
 

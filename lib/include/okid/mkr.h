@@ -14,6 +14,7 @@
 extern "C" {
 #endif
 
+/// Where the channels stand, and what they show.
 typedef struct okid_mkr_config_t {
     int32_t n_x;                    ///< degrees of freedom = modes to use, >= 1
     int32_t hold;                   ///< okid_hold_t: what the forces do between samples; the wrong one ruins M, K and R

@@ -10,6 +10,10 @@
 extern "C" {
 #endif
 
+/// Bytes of work with the Eigen backend, for static arrays: never less than okid_modal_memsize(), and at most 0.7 KiB more.
+#define OKID_MODAL_BYTES(n_z)                                                                                          \
+    (640 + (size_t)(n_z) * (sizeof(okid_real_t) * (3 * (size_t)(n_z) + 5) + sizeof(double) + sizeof(int)))
+
 /// Bytes of work for a model of n_z states and n_y outputs.
 OKID_API size_t okid_modal_memsize(int32_t n_y, int32_t n_z);
 

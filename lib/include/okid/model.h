@@ -12,7 +12,9 @@ extern "C" {
 
 /// Views of a model; column-major. K may be NULL.
 typedef struct okid_model_t {
-    int32_t n_u, n_y, n_z;
+    int32_t n_u;          ///< inputs
+    int32_t n_y;          ///< outputs
+    int32_t n_z;          ///< states
     const okid_real_t* A; ///< n_z x n_z
     const okid_real_t* B; ///< n_z x n_u
     const okid_real_t* C; ///< n_y x n_z

@@ -10,6 +10,7 @@
 extern "C" {
 #endif
 
+/// Sizes, and what is done about an ill-conditioned or unstable solution.
 typedef struct okid_observer_config_t {
     int32_t n_u;      ///< inputs, >= 1
     int32_t n_y;      ///< outputs, >= 1
@@ -31,6 +32,7 @@ typedef struct okid_observer_info_t {
     int32_t channel;         ///< the channel an error speaks of, else -1
 } okid_observer_info_t;
 
+/// Bytes of work okid_observer_solve() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_observer_memsize(const okid_observer_config_t* config);
 
 /// Solve y_n = theta [u_n; v_(n-1); ..; v_(n-p)] in the least-squares sense.

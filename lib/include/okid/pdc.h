@@ -10,6 +10,7 @@
 extern "C" {
 #endif
 
+/// R = alpha M + beta K, and how well that fits.
 typedef struct okid_pdc_t {
     okid_real_t alpha; ///< 1/s, of M
     okid_real_t beta;  ///< s, of K

@@ -16,6 +16,7 @@
 extern "C" {
 #endif
 
+/// Sizes of the model and of the record.
 typedef struct okid_refine_config_t {
     int32_t n_u;        ///< inputs, >= 1: without a measured input there is nothing to simulate
     int32_t n_y;        ///< outputs, >= 1
@@ -28,15 +29,18 @@ typedef struct okid_refine_config_t {
 
 /// The result; the arrays live in the block until the next run.
 typedef struct okid_refined_t {
-    int32_t iterations; ///< steps taken
-    int32_t converged;  ///< 1: what a further step promises is nothing beside the noise. 0: the best point reached
-    int64_t samples;    ///< used: those with all outputs
-    double gain;        ///< of the log-likelihood over the start (with the best initial states), >= 0
-    double decrement;   ///< log-likelihood that one more step promises
-    double whiteness;   ///< mean of N r^2 over the autocorrelations of the residuals at lags 1..20: 1 when white
-    const okid_real_t *A, *B, *C, *D; ///< in the states of the start: its Kalman gain goes with them
-    const okid_real_t* x0;            ///< n_z x runs, at the first sample of each
-    const okid_real_t* noise_std;     ///< n_y, of the residuals, their degrees of freedom counted
+    int32_t iterations;    ///< steps taken
+    int32_t converged;     ///< 1: what a further step promises is nothing beside the noise. 0: the best point reached
+    int64_t samples;       ///< used: those with all outputs
+    double gain;           ///< of the log-likelihood over the start (with the best initial states), >= 0
+    double decrement;      ///< log-likelihood that one more step promises
+    double whiteness;      ///< mean of N r^2 over the autocorrelations of the residuals at lags 1..20: 1 when white
+    const okid_real_t* A;  ///< n_z x n_z, in the states of the start: its Kalman gain goes with them
+    const okid_real_t* B;  ///< n_z x n_u
+    const okid_real_t* C;  ///< n_y x n_z
+    const okid_real_t* D;  ///< n_y x n_u
+    const okid_real_t* x0; ///< n_z x runs, at the first sample of each
+    const okid_real_t* noise_std; ///< n_y, of the residuals, their degrees of freedom counted
 } okid_refined_t;
 
 /// Holds workspace and result. Private; lives in the caller's block.
@@ -45,6 +49,7 @@ typedef struct okid_refine okid_refine_t;
 /// Bytes okid_refine_create() needs; 0 when the configuration is invalid. Some 5 (n_z (n_u + runs + 1) + n_u + runs)^2
 /// doubles; does not grow with the number of samples.
 OKID_API size_t okid_refine_memsize(const okid_refine_config_t* config);
+/// Lay one out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_refine_create(okid_refine_t** self, const okid_refine_config_t* config,
                                                          void* block, size_t bytes);
 

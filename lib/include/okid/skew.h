@@ -18,15 +18,18 @@ extern "C" {
 /// Sums over a model and its replicates. Private; lives in the caller's block.
 typedef struct okid_skew okid_skew_t;
 
+/// Sizes of the models, and where the channels stand.
 typedef struct okid_skew_config_t {
-    int32_t n_u, n_y, n_z;        ///< of the models, >= 1
+    int32_t n_u;                  ///< inputs of the models, >= 1
+    int32_t n_y;                  ///< outputs, >= 1
+    int32_t n_z;                  ///< states, >= 1
     int32_t replicates;           ///< room for so many, 2..64
     const okid_mkr_config_t* mkr; ///< where the channels stand; used until the last call, not copied
 } okid_skew_config_t;
 
 /// The delays; the arrays live in the object.
 typedef struct okid_skew_result_t {
-    int32_t n_y;
+    int32_t n_y;              ///< outputs
     int32_t undetermined;     ///< 1: the angles scatter more than their deviations explain (scatter > 3)
     int32_t corrected;        ///< outputs that okid_skew_correct() puts right
     const double* delay;      ///< n_y, s, > 0: the output shows what was there so much earlier
@@ -38,6 +41,7 @@ typedef struct okid_skew_result_t {
 
 /// Bytes okid_skew_create() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_skew_memsize(const okid_skew_config_t* config);
+/// Lay one out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_skew_create(okid_skew_t** self, const okid_skew_config_t* config,
                                                        void* block, size_t bytes);
 

@@ -32,6 +32,7 @@ extern "C" {
 /// pointers: a memcpy of the block is a snapshot, also for another process of the same library version.
 typedef struct okid_square_root okid_square_root_t;
 
+/// What a factor is made for; the words are those of okid_accumulator_config_t.
 typedef struct okid_square_root_config_t {
     int32_t n_u;         ///< inputs, >= 0
     int32_t n_y;         ///< outputs, >= 1; n_u + n_y <= 256
@@ -66,12 +67,14 @@ OKID_API void okid_square_root_set_units(okid_square_root_t* self, const double*
 /// @return OKID_OK, OKID_WARN_MISSING, OKID_ERR_NULL
 OKID_NODISCARD OKID_API okid_status_t okid_square_root_add(okid_square_root_t* self, const double* samples,
                                                            size_t count);
+/// The same for single-precision samples.
 OKID_NODISCARD OKID_API okid_status_t okid_square_root_add_f32(okid_square_root_t* self, const float* samples,
                                                                size_t count);
 
 /// The same for ADC codes. @return OKID_OK, OKID_WARN_SATURATED (codes at the full scale of the type), OKID_ERR_NULL
 OKID_NODISCARD OKID_API okid_status_t okid_square_root_add_i16(okid_square_root_t* self, const int16_t* codes,
                                                                size_t count);
+/// The same for 24-bit or 32-bit codes in int32 words.
 OKID_NODISCARD OKID_API okid_status_t okid_square_root_add_i32(okid_square_root_t* self, const int32_t* codes,
                                                                size_t count);
 
@@ -83,7 +86,9 @@ OKID_API void okid_square_root_gap(okid_square_root_t* self, int64_t count);
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH
 OKID_NODISCARD OKID_API okid_status_t okid_square_root_merge(okid_square_root_t* self, okid_square_root_t* other);
 
+/// Counts since create or reset. @param out  out
 OKID_API void okid_square_root_stats(const okid_square_root_t* self, okid_accumulator_stats_t* out);
+/// What it was created for. @param out  out
 OKID_API void okid_square_root_config(const okid_square_root_t* self, okid_square_root_config_t* out);
 
 /// Regression rows now in the factor (stats.rows, cheaper).
@@ -104,6 +109,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_square_root_gram(okid_square_root_t* 
 OKID_NODISCARD OKID_API okid_status_t okid_square_root_factor(okid_square_root_t* self, okid_detrend_t detrend,
                                                               okid_real_t* factor, double* mean);
 
+/// Bytes of work okid_observer_solve_factor() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_observer_factor_memsize(const okid_observer_config_t* config);
 
 /// okid_observer_solve() from the factor: the condition of the data is not squared. The ridge is never below eps^(3/2) of

@@ -12,6 +12,7 @@
 extern "C" {
 #endif
 
+/// Room, and what counts as stable; a criterion of 0 is its default.
 typedef struct okid_stabilization_config_t {
     int32_t n_y;        ///< outputs
     int32_t max_models; ///< models that will be added, >= 1; max_models * max_poles <= 2^20
@@ -23,30 +24,43 @@ typedef struct okid_stabilization_config_t {
 } okid_stabilization_config_t;
 
 /// What of a pole agrees with the order before, at the same horizon.
-enum { OKID_HOLDS_FREQUENCY = 1 << 0, OKID_HOLDS_DAMPING = 1 << 1, OKID_HOLDS_SHAPE = 1 << 2 };
+enum {
+    OKID_HOLDS_FREQUENCY = 1 << 0, ///< its frequency
+    OKID_HOLDS_DAMPING = 1 << 1,   ///< its damping ratio
+    OKID_HOLDS_SHAPE = 1 << 2      ///< its shape, by the MAC
+};
 
+/// A mode of one of the models.
 typedef struct okid_pole_t {
-    double frequency_hz, damping_ratio, mpc, emac;
-    int32_t horizon, order; ///< p (or rows) and n_z of its model
-    int32_t holds;          ///< OKID_HOLDS_… bits
-    int32_t cluster;        ///< index, -1 = none
+    double frequency_hz;  ///< Hz
+    double damping_ratio; ///< 0..1
+    double mpc;           ///< modal phase collinearity, 0..1
+    double emac;          ///< consistency over the horizon, 0..1
+    int32_t horizon;      ///< p (or rows) of its model
+    int32_t order;        ///< n_z of its model
+    int32_t holds;        ///< OKID_HOLDS_… bits
+    int32_t cluster;      ///< index, -1 = none
 } okid_pole_t;
 
 /// Poles that belong together, at most one of each model.
 typedef struct okid_cluster_t {
-    double frequency_hz, damping_ratio; ///< medians
-    double frequency_spread_hz,
-        damping_ratio_spread; ///< 1.4826 median absolute deviations over the models: how well the
-                              ///< choice of order is without influence, not an error of measurement
-    double mpc;               ///< median
-    int32_t hits;             ///< models it was found in
-    int32_t pole;             ///< index of the pole nearest the medians
-    int32_t physical;         ///< 1 = hits reach the share
+    double frequency_hz;  ///< median, Hz
+    double damping_ratio; ///< median
+    /// 1.4826 median absolute deviations over the models: how well the choice of order is without influence, not an
+    /// error of measurement
+    double frequency_spread_hz;
+    double damping_ratio_spread; ///< the same of the damping ratio
+    double mpc;                  ///< median
+    int32_t hits;                ///< models it was found in
+    int32_t pole;                ///< index of the pole nearest the medians
+    int32_t physical;            ///< 1 = hits reach the share
 } okid_cluster_t;
 
 /// Looks into the object's block, valid until the next call.
 typedef struct okid_stabilized_t {
-    int32_t model_count, pole_count, cluster_count;
+    int32_t model_count;            ///< models added
+    int32_t pole_count;             ///< poles of all of them
+    int32_t cluster_count;          ///< clusters found
     const okid_pole_t* poles;       ///< in the order they were added
     const okid_cluster_t* clusters; ///< ascending in frequency; found in a fifth of the models, or more
 } okid_stabilized_t;
@@ -54,7 +68,9 @@ typedef struct okid_stabilized_t {
 /// Private; lives in the caller's block.
 typedef struct okid_stabilization okid_stabilization_t;
 
+/// Bytes okid_stabilization_create() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_stabilization_memsize(const okid_stabilization_config_t* config);
+/// Lay a collector out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_stabilization_create(okid_stabilization_t** self,
                                                                 const okid_stabilization_config_t* config, void* block,
                                                                 size_t bytes);

@@ -12,9 +12,27 @@
 extern "C" {
 #endif
 
+/// Bytes of the work block with the Eigen backend, for static arrays: never less than okid_structured_memsize(), and at
+/// most 1.2 KiB more.
+#define OKID_STRUCTURED_BYTES(n_u, n_y, p)                                                                             \
+    (8 * OKID_STRUCTURED_SUMS_((size_t)(n_u) + (n_y), (size_t)(p)) + 1088 +                                            \
+     (OKID_STRUCTURED_SOLVER_((size_t)(n_u) + (n_y), (size_t)(n_y), (size_t)(p)) >                                     \
+              OKID_STRUCTURED_RADIUS_((size_t)(n_y), (size_t)(p))                                                      \
+          ? OKID_STRUCTURED_SOLVER_((size_t)(n_u) + (n_y), (size_t)(n_y), (size_t)(p))                                 \
+          : OKID_STRUCTURED_RADIUS_((size_t)(n_y), (size_t)(p))))
+/// @cond
+#define OKID_STRUCTURED_SUMS_(m, p) ((m) * ((p) + 3))
+#define OKID_STRUCTURED_SOLVER_(m, n_y, p)                                                                             \
+    (8 * (2 * ((m) + 2) * (m) * ((p) + 2) + ((m) + 2) + (m) * (m) + (n_y) * (n_y) +                                    \
+          ((n_y) < 4 ? (n_y) : 4) * (3 * (m) * ((p) + 1) + 2 * ((m) + 2) + (n_y))))
+#define OKID_STRUCTURED_RADIUS_(n_y, p)                                                                                \
+    (sizeof(okid_real_t) *                                                                                             \
+     ((n_y) * (n_y) * (p) + ((n_y) * (p) > 64 ? 65 * (n_y) * (p) + 12608 : (n_y) * (p) * ((n_y) * (p) + 5))))
+/// @endcond
+
 /// Bytes of the work block, 0 when config is NULL or a size is below 1. With n = m(p+1) the larger of two parts beside
-/// n + 2 m doubles: the solver, 2 (m+2)(n+m) + 3 min(4, n_y) n + O(m^2) doubles, and the companion radius after it,
-/// (k+1) p n_y + p n_y^2 + O(k^2) doubles with k = min(64, p n_y).
+/// n + 2 m doubles: the solver, 2 (m+2)(n+m) + 3 min(4, n_y) n + O(m^2) doubles, and the companion radius after it, of
+/// k = p n_y states: k^2 + p n_y^2 + 5 k doubles up to k = 64, 65 k + p n_y^2 + O(64^2) beyond.
 OKID_API size_t okid_structured_memsize(const okid_observer_config_t* config);
 
 /// Solve y_n = theta [u_n; v_(n-1); ..; v_(n-p)] in the least-squares sense: the problem, the ridge rule, the numbers in

@@ -26,6 +26,7 @@ typedef enum okid_subspace_method_t {
     OKID_SUBSPACE_SSARX = 2  ///< canonical correlations of the past with the future corrected by an ARX model of i lags
 } okid_subspace_method_t;
 
+/// Sizes, the method, and the ridge.
 typedef struct okid_subspace_config_t {
     int32_t n_u;       ///< inputs, >= 0; 0 = output-only
     int32_t n_y;       ///< outputs, >= 1
@@ -52,6 +53,7 @@ OKID_API int32_t okid_subspace_max_order(const okid_subspace_config_t* config);
 /// Bytes okid_subspace_create() needs; 0 when the configuration is invalid. Some 10 (SSARX: 13) (i m)^2 doubles, more
 /// when max_order comes near i n_y.
 OKID_API size_t okid_subspace_memsize(const okid_subspace_config_t* config);
+/// Lay one out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_subspace_create(okid_subspace_t** self, const okid_subspace_config_t* config,
                                                            void* block, size_t bytes);
 

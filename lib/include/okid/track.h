@@ -12,6 +12,7 @@
 extern "C" {
 #endif
 
+/// Room, and what belongs together; 0 is the default of a criterion.
 typedef struct okid_track_config_t {
     int32_t n_y;        ///< outputs, entries of a shape
     int32_t max_modes;  ///< of one update, >= 1
@@ -25,10 +26,11 @@ typedef struct okid_track_config_t {
 
 /// What is known of a track.
 typedef struct okid_track_t {
-    int32_t number;                     ///< from 1 in the order of birth; 0 = a candidate
-    int32_t hits;                       ///< updates it was seen in
-    int32_t misses;                     ///< updates since, 0 = in the newest one
-    double frequency_hz, damping_ratio; ///< when last seen
+    int32_t number;       ///< from 1 in the order of birth; 0 = a candidate
+    int32_t hits;         ///< updates it was seen in
+    int32_t misses;       ///< updates since, 0 = in the newest one
+    double frequency_hz;  ///< when last seen, Hz
+    double damping_ratio; ///< when last seen
 } okid_track_t;
 
 /// Private; lives in the caller's block.
@@ -36,6 +38,7 @@ typedef struct okid_tracks okid_tracks_t;
 
 /// Bytes okid_track_create() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_track_memsize(const okid_track_config_t* config);
+/// Lay an object without tracks out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_track_create(okid_tracks_t** self, const okid_track_config_t* config,
                                                         void* block, size_t bytes);
 
@@ -57,8 +60,9 @@ OKID_NODISCARD OKID_API okid_status_t okid_track_update(okid_tracks_t* self, int
 /// are forgotten: they come of old and new samples mixed.
 OKID_API void okid_track_jump(okid_tracks_t* self);
 
-/// Tracks and candidates now; k-th of them in no particular order. @return 0 for one that does not exist
+/// How many tracks and candidates there are now.
 OKID_API int32_t okid_track_count(const okid_tracks_t* self);
+/// The k-th of them, in no particular order. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM (there is none)
 OKID_API okid_status_t okid_track_get(const okid_tracks_t* self, int32_t k, okid_track_t* out);
 
 #ifdef __cplusplus

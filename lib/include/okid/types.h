@@ -12,11 +12,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/// What a program that links with the library may call.
 #if defined(_WIN32)
 #define OKID_API
 #else
 #define OKID_API __attribute__((visibility("default")))
 #endif
+/// The compiler warns when the status is not looked at.
 #define OKID_NODISCARD __attribute__((warn_unused_result))
 
 #ifdef __cplusplus
@@ -33,6 +35,7 @@ extern "C" {
 #ifndef OKID_REAL
 #define OKID_REAL double
 #endif
+/// The number type of results: OKID_REAL.
 typedef OKID_REAL okid_real_t;
 
 /// 0 ok; < 0 error and nothing changed; > 0 warning with a valid result.

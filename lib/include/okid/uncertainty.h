@@ -22,8 +22,10 @@ extern "C" {
 /// The sums of squared deviations of replicate models from the full one. Private; lives in the caller's block.
 typedef struct okid_replicates okid_replicates_t;
 
+/// Sizes, and whether M, K and R are wanted.
 typedef struct okid_replicates_config_t {
-    int32_t n_u, n_y;             ///< >= 0, >= 1
+    int32_t n_u;                  ///< inputs, >= 0
+    int32_t n_y;                  ///< outputs, >= 1
     int32_t n_z;                  ///< largest order of a model that will come, >= 1
     const okid_mkr_config_t* mkr; ///< for M, K, R, alpha, beta; NULL: modes only. Used until finish(), not copied
 } okid_replicates_config_t;
@@ -31,22 +33,28 @@ typedef struct okid_replicates_config_t {
 /// What finish() found; the arrays live in the object until the next begin(). NaN where nothing can be said: the mode was
 /// missing in replicates that hold more than a quarter of the information, or fewer than three replicates came.
 typedef struct okid_uncertainty_t {
-    int32_t replicates; ///< calls of add()
-    int32_t models;     ///< of these, with a usable model
-    int32_t mode_count; ///< modes of the full model, in the order of okid_modal_analyse()
-    int32_t n_y;
-    int32_t n_x;                         ///< 0 without M, K, R
-    int32_t mkr_used;                    ///< replicates that gave M, K, R
-    const int32_t* used;                 ///< mode_count: replicates in which the mode was found
-    const okid_real_t* frequency_std_hz; ///< mode_count
-    const okid_real_t* damping_ratio_std;
-    const okid_real_t *shape_re_std, *shape_im_std; ///< n_y x mode_count; 0 at the largest entry, which is 1 by scaling
-    const okid_real_t *M_std, *K_std, *R_std, *R_normal_std; ///< n_x x n_x, or NULL
-    double alpha_std, beta_std;                              ///< 1/s, s; NaN without M, K, R
+    int32_t replicates;                   ///< calls of add()
+    int32_t models;                       ///< of these, with a usable model
+    int32_t mode_count;                   ///< modes of the full model, in the order of okid_modal_analyse()
+    int32_t n_y;                          ///< outputs
+    int32_t n_x;                          ///< 0 without M, K, R
+    int32_t mkr_used;                     ///< replicates that gave M, K, R
+    const int32_t* used;                  ///< mode_count: replicates in which the mode was found
+    const okid_real_t* frequency_std_hz;  ///< mode_count
+    const okid_real_t* damping_ratio_std; ///< mode_count
+    const okid_real_t* shape_re_std;      ///< n_y x mode_count; 0 at the largest entry, which is 1 by scaling
+    const okid_real_t* shape_im_std;      ///< n_y x mode_count
+    const okid_real_t* M_std;             ///< n_x x n_x, or NULL
+    const okid_real_t* K_std;             ///< n_x x n_x, or NULL
+    const okid_real_t* R_std;             ///< n_x x n_x, or NULL
+    const okid_real_t* R_normal_std;      ///< n_x x n_x, or NULL
+    double alpha_std;                     ///< 1/s; NaN without M, K, R
+    double beta_std;                      ///< s; NaN without M, K, R
 } okid_uncertainty_t;
 
 /// Bytes okid_replicates_create() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_replicates_memsize(const okid_replicates_config_t* config);
+/// Lay one out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_replicates_create(okid_replicates_t** self,
                                                              const okid_replicates_config_t* config, void* block,
                                                              size_t bytes);
@@ -77,6 +85,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_replicates_finish(okid_replicates_t* 
 /// lives in the caller's block.
 typedef struct okid_jackknife okid_jackknife_t;
 
+/// What the models and the sums look like.
 typedef struct okid_jackknife_config_t {
     okid_identify_config_t identify; ///< of the full model; its `order` is not read
     okid_accumulator_config_t sums;  ///< of the whole: okid_accumulator_config(). edges = 1, slots = 0
@@ -84,6 +93,7 @@ typedef struct okid_jackknife_config_t {
 
 /// Bytes okid_jackknife_create() needs, those of an identifier and of an accumulator; 0 when the configuration is invalid.
 OKID_API size_t okid_jackknife_memsize(const okid_jackknife_config_t* config);
+/// Lay one out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_jackknife_create(okid_jackknife_t** self,
                                                             const okid_jackknife_config_t* config, void* block,
                                                             size_t bytes);

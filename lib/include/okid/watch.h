@@ -12,8 +12,10 @@
 extern "C" {
 #endif
 
+/// Sizes, and what counts as a change; 0 is the default of a criterion.
 typedef struct okid_watch_config_t {
-    int32_t n_u, n_y;
+    int32_t n_u;       ///< inputs
+    int32_t n_y;       ///< outputs
     int32_t max_order; ///< states of a model, at most
     int32_t lead;      ///< samples until a predictor has found its state, >= 0: the lags of the observer
     int32_t block;     ///< samples judged together; 0 = 32
@@ -22,6 +24,7 @@ typedef struct okid_watch_config_t {
     double ratio;      ///< high is this many times the usual; 0 = 3
 } okid_watch_config_t;
 
+/// What it is doing.
 typedef struct okid_watch_state_t {
     int32_t watching; ///< 1: a model is at work whose usual errors are known
     int32_t learning; ///< 1: another one is being learned about, and takes over then
@@ -34,6 +37,7 @@ typedef struct okid_watch okid_watch_t;
 
 /// Bytes okid_watch_create() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_watch_memsize(const okid_watch_config_t* config);
+/// Lay one without a model out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY
 OKID_NODISCARD OKID_API okid_status_t okid_watch_create(okid_watch_t** self, const okid_watch_config_t* config,
                                                         void* block, size_t bytes);
 
@@ -54,6 +58,7 @@ OKID_API void okid_watch_gap(okid_watch_t* self);
 /// No model any more.
 OKID_API void okid_watch_reset(okid_watch_t* self);
 
+/// What it is doing now. @param out  out
 OKID_API void okid_watch_state(const okid_watch_t* self, okid_watch_state_t* out);
 
 #ifdef __cplusplus

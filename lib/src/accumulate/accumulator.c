@@ -11,7 +11,7 @@ enum { ALIGN = 16 };
 static int valid(const okid_accumulator_config_t* c) {
     if (c->n_u < 0 || c->n_y < 1 || c->n_u > 256 || c->n_y > 256 || c->n_u + c->n_y > 256) return 0;
     if (c->lags < 1 || c->lags > 4096) return 0;
-    if ((int)c->sample < OKID_SAMPLE_DOUBLE || (int)c->sample > OKID_SAMPLE_INT32) return 0;
+    if ((unsigned)c->sample > OKID_SAMPLE_INT32) return 0;
     if (c->block < 0 || c->slots < 0 || c->spare_slots < 0 || c->slots > 65536 || c->spare_slots > 65536) return 0;
     if (!(c->forgetting > 0 && c->forgetting <= 1)) return 0;
     if (c->slots > 0 && (c->block == 0 || c->forgetting < 1)) return 0;

@@ -8,7 +8,7 @@
 // REFERENCE  Saad, Numerical Methods for Large Eigenvalue Problems (2011), ch. 6
 // NUMERICS   the growth is well determined: rounding in theta moves it as little. The radius is wanted to ~1e-6: lightly damped
 //            structures live there (float comes to 2e-5)
-// WORKSPACE  (k+1) p n_y + O(k^2) numbers, k <= 64; each step 2 p n_y^2 flop
+// WORKSPACE  p n_y^2 numbers, with n = p n_y > 64 (n+1) 64 + O(64^2) more, else n^2 + 5 n; each step 2 p n_y^2 flop
 #include "identify/companion.hpp"
 
 #include "linalg/linalg.hpp"
@@ -100,9 +100,10 @@ void restart(const companion& c, companion_work& w, int k) {
     okid_real_t weights[dense_limit] = {};
     bool taken[dense_limit] = {};
     for (int count = 0; count < std::min(leading, k); ++count) {
-        int best = -1;
-        for (int i = 0; i < k; ++i)
-            if (!taken[i] && (best < 0 || std::hypot(w.re[i], w.im[i]) > std::hypot(w.re[best], w.im[best]))) best = i;
+        int best = 0;
+        while (taken[best]) ++best;
+        for (int i = best + 1; i < k; ++i)
+            if (!taken[i] && std::hypot(w.re[i], w.im[i]) > std::hypot(w.re[best], w.im[best])) best = i;
         taken[best] = true;
         for (int i = 0; i < k; ++i) weights[i] += w.vectors[best * k + i];
     }
@@ -133,20 +134,22 @@ struct ritz_pair {
 };
 
 /// Arnoldi from basis column 0 (any length); the largest of its eigenvalues. False when those do not converge.
-bool largest_ritz(const companion& c, companion_work& w, ritz_pair* out) {
+/// @param vectors  where the Ritz vectors go; null: neither they nor the residual are wanted, at a third of the time
+bool largest_ritz(const companion& c, companion_work& w, okid_real_t* vectors, ritz_pair* out) {
     scale(w.basis, c.size, 1 / norm(w.basis, c.size));
     okid_real_t beyond = 0;
     const int k = arnoldi(c, w, &beyond);
     for (int j = 0; j < k && k < w.dimension; ++j) // repack when it ended early
         std::copy(w.hessenberg + j * w.dimension, w.hessenberg + j * w.dimension + k, w.hessenberg + j * k);
-    if (linalg::eigen(k, w.hessenberg, w.re, w.im, w.vectors, w.eigen) != 0) return false;
+    if (linalg::eigen(k, w.hessenberg, w.re, w.im, vectors, w.eigen) != 0) return false;
     int best = 0;
     for (int i = 1; i < k; ++i)
         if (std::hypot(w.re[i], w.im[i]) > std::hypot(w.re[best], w.im[best])) best = i;
-    const int partner = w.im[best] == 0 ? best : w.im[best] > 0 ? best + 1 : best - 1;
     out->size = std::hypot(w.re[best], w.im[best]);
-    out->residual = beyond * std::hypot(w.vectors[best * k + k - 1], w.vectors[partner * k + k - 1]);
     out->dimension = k;
+    if (!vectors) return true;
+    const int partner = w.im[best] == 0 ? best : w.im[best] > 0 ? best + 1 : best - 1;
+    out->residual = beyond * std::hypot(vectors[best * k + k - 1], vectors[partner * k + k - 1]);
     return true;
 }
 
@@ -163,7 +166,7 @@ template <class Scale> void rescale(int n_y, int p, const Scale* scale, okid_rea
 okid_real_t growth_of(const companion& c, companion_work& w) {
     ritz_pair pair;
     start_vector(w.basis, c.size);
-    return largest_ritz(c, w, &pair) ? pair.size : HUGE_VAL;
+    return largest_ritz(c, w, nullptr, &pair) ? pair.size : std::numeric_limits<okid_real_t>::infinity();
 }
 
 } // namespace
@@ -172,12 +175,13 @@ void companion_work::lay_out(int n_y, int p, arena& memory) {
     const int size = n_y * p;
     dimension = std::min(size, dense_limit);
     const auto k = static_cast<size_t>(dimension);
-    basis = memory.take<okid_real_t>((k + 1) * static_cast<size_t>(size));
+    const bool arnoldi = size > dense_limit; // a dense radius needs eigenvalues of one matrix and nothing else
+    basis = memory.take<okid_real_t>(arnoldi ? (k + 1) * static_cast<size_t>(size) : 0);
     hessenberg = memory.take<okid_real_t>(k * k);
-    vectors = memory.take<okid_real_t>(k * k);
+    vectors = memory.take<okid_real_t>(arnoldi ? k * k : 0);
     re = memory.take<okid_real_t>(k);
     im = memory.take<okid_real_t>(k);
-    eigen = memory.take<okid_real_t>(linalg::eigen_work(dimension));
+    eigen = memory.take<okid_real_t>(linalg::eigen_work(dimension, arnoldi));
     feedback = memory.take<okid_real_t>(static_cast<size_t>(size) * static_cast<size_t>(n_y));
 }
 
@@ -205,7 +209,7 @@ double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const
     power_steps(c, w.basis, w.basis + c.size, warm_steps);
     ritz_pair pair;
     for (int round = 0; round < restarts; ++round) {
-        if (!largest_ritz(c, w, &pair)) return HUGE_VAL;
+        if (!largest_ritz(c, w, w.vectors, &pair)) return HUGE_VAL;
         if (pair.residual <= tolerance * pair.size) break;
         restart(c, w, pair.dimension);
     }

@@ -5,7 +5,7 @@
 // REFERENCE  paper eq. (43)-(54); Juang and Pappa (1985); ERA/DC: Juang, Cooper, Wright (1988); EMAC: Pappa, Elliott,
 //            Schenk (1993)
 // NUMERICS   the columns of H hold Y_k only: with Y0_k the truncation mixes noise modes in (trap 1)
-// WORKSPACE  2 H-sized matrices, the factors and LAPACK's; an SVD of (r n_y) x (c n_u) and 2 r n_y c n_u k flop
+// WORKSPACE  H, the factors and what the SVD asks for; an SVD of (r n_y) x (c n_u) and 2 r n_y c n_u k flop
 #include <okid/era.h>
 
 #include "identify/era_correlation.hpp"
@@ -34,8 +34,9 @@ size_t lay_out(okid_era& e, okid::arena& memory) {
     e.left = memory.take<okid_real_t>(height * rank);
     e.values = memory.take<okid_real_t>(rank);
     e.right = memory.take<okid_real_t>(rank * breadth);
-    e.work = memory.take<okid_real_t>(okid::linalg::svd_work(e.height, e.breadth));
-    e.product = memory.take<okid_real_t>(height * std::max(rank, static_cast<size_t>(e.config.n_y)));
+    // The products begin when the SVD is done: one memory for both.
+    e.work = e.product = memory.take<okid_real_t>(std::max(okid::linalg::svd_work(e.height, e.breadth),
+                                                           height * std::max(rank, static_cast<size_t>(e.config.n_y))));
     e.core = memory.take<okid_real_t>(rank * rank);
     e.rotated = memory.take<okid_real_t>(rank * static_cast<size_t>(std::max(e.config.n_y, e.config.n_u)));
     if (correlated(e)) e.correlation.lay_out(e.rank, memory);
@@ -62,7 +63,7 @@ okid_era plan(const okid_era_config_t& c) {
     return e;
 }
 
-int largest_order(const okid_era& e) { return std::min(e.rank, e.config.rows * e.config.n_y); }
+int largest_order(const okid_era& e) { return std::min<int>(e.rank, e.config.rows * e.config.n_y); }
 
 /// The matrix to decompose (shift 0), or the one a sample later (shift 1).
 void fill(okid_era& e, const okid_real_t* markov, int shift) {

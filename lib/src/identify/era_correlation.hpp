@@ -12,10 +12,11 @@ void fill_hankel(int n_u, int n_y, int rows, int cols, const okid_real_t* first,
 
 struct correlation {
     okid_era_config_t config;
-    int rows, cols, rank;                        ///< block rows and columns of the tall Hankel matrix; columns of basis
-    okid_real_t *hankel, *shifts, *basis;        ///< tall Hankel matrix; F and its left factor, cols n_u x rank
-    okid_real_t *values, *right, *work;          ///< of the decomposition of F
-    okid_real_t *input, *square, *root, *repeat; ///< first columns of H(0); normal equations; weight of a block row
+    int rows, cols, rank;                       ///< block rows and columns of the tall Hankel matrix; columns of basis
+    okid_real_t *hankel{}, *shifts{}, *basis{}; ///< tall Hankel matrix; F and its left factor, cols n_u x rank
+    okid_real_t *values{}, *right{}, *work{};   ///< of the decomposition of F
+    okid_real_t *input{}, *repeat{};            ///< first columns of H(0); weight of a block row
+    okid_real_t *square{}, *root{};             ///< normal equations
 
     correlation() : correlation(okid_era_config_t{}) {}
     explicit correlation(const okid_era_config_t& c);

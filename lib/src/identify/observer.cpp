@@ -33,7 +33,7 @@ size_t lay_out(const okid_observer_config_t& c, arena& memory, observer_work* wo
     const auto m = static_cast<size_t>(c.n_u + c.n_y), n = m * static_cast<size_t>(c.p + 1),
                ny = static_cast<size_t>(c.n_y);
     const size_t q = n - ny;
-    observer_work w;
+    observer_work w{};
     w.factor = memory.take<double>(q * q);
     w.scale = memory.take<double>(n);
     w.x = memory.take<double>(q * ny);

@@ -37,7 +37,7 @@ struct factor_work {
 size_t lay_out(const okid_observer_config_t& c, arena& memory, factor_work* work) {
     const auto n_u = static_cast<size_t>(c.n_u), n_y = static_cast<size_t>(c.n_y), lags = static_cast<size_t>(c.p) + 1;
     const size_t n = (n_u + n_y) * lags, stride = okid_triangle_stride(n);
-    factor_work w;
+    factor_work w{};
     w.scale = memory.take<real>(n);
     w.triangle = memory.take<real>(okid_triangle_size(stride));
     w.rows = memory.take<real>(batch * stride);

@@ -96,8 +96,7 @@ double refine_pass::score(const refine_parameters& p, const refine_records& reco
     const int n = l.of_run(), total = l.total();
     std::fill(correlation, correlation + area(l.n_y, lags), 0.0);
     std::fill(products, products + lags, 0LL);
-    for (int b = 0; b < blocks; ++b)
-        std::fill(scores + b * area(total, l.n_y), scores + (b + 1) * area(total, l.n_y), 0.0);
+    std::fill(scores, scores + area(total, l.n_y) * static_cast<std::size_t>(blocks), 0.0);
     long long first = 0; // used samples before the batch
     for (int r = 0; r < l.runs; ++r)
         walk(p, records, r, [&] {

@@ -23,7 +23,7 @@ constexpr double converged = 1e-13;
 
 struct doubling {
     int n;
-    double *a, *g, *h, *root, *t, *z, *ha, *v, *az, *spare, *solve;
+    double *a{}, *g{}, *h{}, *root{}, *t{}, *z{}, *ha{}, *v{}, *az{}, *spare{}, *solve{};
 
     doubling(int states, arena& memory) : n(states) {
         const size_t square = static_cast<size_t>(n) * static_cast<size_t>(n);

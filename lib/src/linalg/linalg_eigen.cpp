@@ -243,8 +243,7 @@ template <class Real> int svd(int rows, int cols, Real* a, Real* u, Real* s, Rea
     // Jacobi on R^T converges faster than on R: R^T = V' S U'^T
     matrix<Real> G = view(g, k, k, k), V = view(v, k, k, k);
     G.setZero();
-    for (int j = 0; j < k; ++j)
-        for (int i = 0; i <= j; ++i) G(j, i) = q[static_cast<size_t>(j) * static_cast<size_t>(tall) + i];
+    for (int j = 0; j < k; ++j) G.row(j).head(j + 1) = view(q, tall, k, tall).col(j).head(j + 1).transpose();
     if (!jacobi(G, V)) return 1;
     sort_columns(G, V, s);
     for (int j = 0; j < k; ++j) s[j] = std::ldexp(s[j], exponent);
@@ -266,9 +265,9 @@ template <class Real> int svd(int rows, int cols, Real* a, Real* u, Real* s, Rea
 
 // ---- eigenvalues of a general real matrix ------------------------------------------------------------------------------
 
-template <class Real> size_t eigen_work(int n) {
+template <class Real> size_t eigen_work(int n, bool with_vectors) {
     const auto size = static_cast<size_t>(n);
-    return size * size + 3 * size;
+    return (with_vectors ? size * size : 0) + 3 * size;
 }
 
 namespace {
@@ -426,8 +425,8 @@ template <class Real> void back_substitute(const schur<Real>& s, int k, Real re,
 } // namespace
 
 template <class Real> int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work) {
-    Real *z = vectors != nullptr ? work : nullptr, *x = work + static_cast<size_t>(n) * static_cast<size_t>(n),
-         *y = x + n;
+    Real *z = vectors != nullptr ? work : nullptr,
+         *x = vectors != nullptr ? work + static_cast<size_t>(n) * static_cast<size_t>(n) : work, *y = x + n;
     if (z != nullptr) view(z, n, n, n).setIdentity();
     const schur<Real> s{n, a, z};
     s.to_hessenberg(x);
@@ -468,7 +467,7 @@ template double cholesky_condition(int, const double*, int, double, double*);
 template void multiply(bool, bool, int, int, int, double, const double*, int, const double*, int, double, double*, int);
 template size_t svd_work<okid_real_t>(int, int);
 template int svd(int, int, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*);
-template size_t eigen_work<okid_real_t>(int);
+template size_t eigen_work<okid_real_t>(int, bool);
 template int eigen(int, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*);
 
 // Where okid_real_t is float the first four exist for it too.

@@ -212,7 +212,7 @@ int symmetric(int n, double* a, int k, double* values, double* vectors, double* 
     return 0;
 }
 
-template <class Real> size_t eigen_work(int n) { return static_cast<size_t>(eigen_query<Real>(n)); }
+template <class Real> size_t eigen_work(int n, bool) { return static_cast<size_t>(eigen_query<Real>(n)); }
 
 template <class Real> int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work) {
     return geev(vectors != nullptr ? 'V' : 'N', n, a, re, im, vectors, work, eigen_query<Real>(n));
@@ -224,7 +224,7 @@ template double cholesky_condition(int, const double*, int, double, double*);
 template void multiply(bool, bool, int, int, int, double, const double*, int, const double*, int, double, double*, int);
 template size_t svd_work<double>(int, int);
 template int svd(int, int, double*, double*, double*, double*, double*);
-template size_t eigen_work<double>(int);
+template size_t eigen_work<double>(int, bool);
 template int eigen(int, double*, double*, double*, double*, double*);
 
 template int cholesky(int, float*, int);
@@ -233,7 +233,7 @@ template float cholesky_condition(int, const float*, int, float, float*);
 template void multiply(bool, bool, int, int, int, float, const float*, int, const float*, int, float, float*, int);
 template size_t svd_work<float>(int, int);
 template int svd(int, int, float*, float*, float*, float*, float*);
-template size_t eigen_work<float>(int);
+template size_t eigen_work<float>(int, bool);
 template int eigen(int, float*, float*, float*, float*, float*);
 
 } // namespace okid::linalg

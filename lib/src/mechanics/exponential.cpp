@@ -26,8 +26,9 @@ constexpr real gain_worth_it = real(0.95);
 real norm1(int n, const real* a) {
     real largest = 0;
     for (int j = 0; j < n; ++j) {
+        const real* column = a + static_cast<size_t>(j) * static_cast<size_t>(n);
         real sum = 0;
-        for (int i = 0; i < n; ++i) sum += std::abs(a[static_cast<size_t>(j) * static_cast<size_t>(n) + i]);
+        for (int i = 0; i < n; ++i) sum += std::abs(column[i]);
         if (!(sum <= largest)) largest = sum; // a NaN is kept
     }
     return largest;

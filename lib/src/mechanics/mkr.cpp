@@ -109,7 +109,7 @@ double choose(mkr_work& w, int found) {
     const auto place = [&](int i) { // how many are stronger; the earlier one wins a tie
         int stronger = 0;
         for (int j = 0; j < found; ++j)
-            stronger += w.share[j] > w.share[i] || (w.share[j] == w.share[i] && j < i) ? 1 : 0;
+            stronger += w.share[j] > w.share[i] || (j < i && w.share[j] == w.share[i]) ? 1 : 0;
         return stronger;
     };
     double weakest = 1, left = 0;

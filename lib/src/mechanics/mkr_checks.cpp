@@ -123,7 +123,10 @@ void check_feedthrough(const mkr_work& w, const okid_model_t& m, const okid_mkr_
 
 void check_mkr(mkr_work& w, const okid_model_t& model, const okid_mkr_config_t& config, okid_mkr_t& result) {
     uint32_t notes = 0;
-    if (!definite(w, w.M, 1)) notes |= definite(w, w.M, -1) ? OKID_MKR_POLARITY : OKID_MKR_MASS;
+    if (definite(w, w.M, -1))
+        notes |= OKID_MKR_POLARITY;
+    else if (!definite(w, w.M, 1))
+        notes |= OKID_MKR_MASS;
     if (!definite(w, w.K, 1)) notes |= OKID_MKR_STIFFNESS;
     if (!definite(w, w.R, 1)) notes |= OKID_MKR_DAMPING;
     scale_rows(w);

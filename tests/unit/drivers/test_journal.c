@@ -436,7 +436,7 @@ static void test_hostile_chunks(void) {
     TEST_ASSERT_EQUAL_UINT(2, reader.newer);
 }
 
-/// The example of docs/journal-format.md, byte for byte.
+/// The example of docs/reference/journal-format.md, byte for byte.
 static void test_the_bytes(void) {
     static const uint8_t expected[] = {
         0x8F, 'O',  'K',  'J',  0x0D, 0x0A, 0x1A, 0x0A,                                     // magic

@@ -99,6 +99,13 @@ static void test_questions_and_answers(void) {
     fake.index = 0;
     TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_read("can0", &link_state));
     TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_read("a_name_of_16_chr", &link_state));
+    fake.index = 5;
+    fake.late_answers = 3; // the question is waited for, but not for ever
+    TEST_ASSERT_EQUAL_INT(0, drv_link_read("can0", &link_state));
+    fake.late_answers = 4;
+    TEST_ASSERT_EQUAL_INT(-ETIMEDOUT, drv_link_read("can0", &link_state));
+    fake.listen_error = EPERM;
+    TEST_ASSERT_EQUAL_INT(-EPERM, drv_link_watch());
     fake.asked = -1;
     TEST_ASSERT_EQUAL_INT(-EPERM, drv_link_read("can0", &link_state));
     fake.netlink_error = EMFILE;

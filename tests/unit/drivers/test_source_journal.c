@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Journals as files: segments, gaps, what is no journal.
+#include <drv/crc.h>
 #include <drv/journal.h>
 #include <drv/source.h>
 
@@ -168,6 +169,25 @@ static void test_what_is_no_journal(void) {
     TEST_ASSERT_EQUAL_INT(-1, source.ops->fd(&source));
 }
 
+static void test_a_journal_of_a_later_version_is_named(void) {
+    uint8_t header[DRV_JOURNAL_HEADER];
+    segment(0, 0, 2, 0);
+    file = open(name(0), O_RDWR);
+    for (int at = 0; pread(file, header, sizeof header, at) == (ssize_t)sizeof header;) { // its number in every chunk
+        uint32_t bytes = 0;
+        memcpy(&bytes, header + 12, sizeof bytes);
+        header[8] = DRV_JOURNAL_VERSION + 1;
+        const uint32_t seal = drv_crc32(0, header, 60);
+        memcpy(header + 60, &seal, sizeof seal);
+        TEST_ASSERT_EQUAL_INT(sizeof header, pwrite(file, header, sizeof header, at));
+        at += (int)(DRV_JOURNAL_HEADER + bytes);
+    }
+    close(file);
+    TEST_ASSERT_EQUAL_INT(-EBADMSG, start(name(0)));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source.error, "a journal of version 2, expected at most version 1"),
+                                 source.error);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_segments_in_a_row);
@@ -176,5 +196,6 @@ int main(void) {
     RUN_TEST(test_frames_the_recorder_lost);
     RUN_TEST(test_names);
     RUN_TEST(test_what_is_no_journal);
+    RUN_TEST(test_a_journal_of_a_later_version_is_named);
     return UNITY_END();
 }

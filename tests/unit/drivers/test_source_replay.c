@@ -58,6 +58,18 @@ static void test_a_bad_line_names_itself_after_the_good_ones(void) {
     TEST_ASSERT_NOT_NULL(strstr(source.error, "line 2, column 12: found \"0X1#00\", expected an identifier"));
 }
 
+static void test_what_cannot_be_read(void) {
+    TEST_ASSERT_EQUAL_INT(-1, source.ops->fd(&source));
+    drv_source_config_t config = {.path = "/tmp"};
+    TEST_ASSERT_EQUAL_INT(-EISDIR, source.ops->open(&source, &config));
+    TEST_ASSERT_EQUAL_STRING("/tmp: cannot be read: Is a directory", source.error);
+    config.path = "/proc/self/mem"; // opens, but nothing is mapped at its beginning
+    TEST_ASSERT_EQUAL_INT(0, source.ops->open(&source, &config));
+    TEST_ASSERT_TRUE(source.ops->fd(&source) >= 0);
+    TEST_ASSERT_EQUAL_INT(-EIO, source.ops->read(&source, frames, 64));
+    TEST_ASSERT_EQUAL_STRING("/proc/self/mem: cannot be read: Input/output error", source.error);
+}
+
 static void test_a_file_without_lines(void) {
     size_t length = 1 << 20;
     char* text = malloc(length);
@@ -114,6 +126,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_two_interfaces_are_told_apart);
     RUN_TEST(test_a_bad_line_names_itself_after_the_good_ones);
+    RUN_TEST(test_what_cannot_be_read);
     RUN_TEST(test_a_file_without_lines);
     RUN_TEST(test_many_lines);
     RUN_TEST(test_what_cannot_be_opened);

@@ -177,7 +177,19 @@ static void test_what_cannot_be_opened(void) {
     close(open(plain, O_CREAT | O_WRONLY, 0600));
     TEST_ASSERT_EQUAL_INT(-ENOTTY, drv_serial_open(&port, plain, 9600));
     unlink(plain);
-    const drv_source_config_t config = settings(DRV_FRAMING_ASCII);
+    drv_source_config_t config = settings(DRV_FRAMING_ASCII);
+    source.ops = &drv_source_serial;
+    config.line.rate_hz = 0;
+    TEST_ASSERT_EQUAL_INT(-EINVAL, source.ops->open(&source, &config));
+    TEST_ASSERT_NOT_NULL(strstr(source.error, "needs a framing and a sample rate above 0"));
+    config = settings(DRV_FRAMINGS);
+    TEST_ASSERT_EQUAL_INT(-EINVAL, source.ops->open(&source, &config));
+    config = settings(DRV_FRAMING_ASCII);
+    config.line.device = "/dev/serial/by-id/none";
+    TEST_ASSERT_EQUAL_INT(-ENOENT, source.ops->open(&source, &config));
+    TEST_ASSERT_EQUAL_STRING("/dev/serial/by-id/none: there is no such device", source.error);
+    TEST_ASSERT_EQUAL_INT(-1, source.ops->fd(&source));
+    config = settings(DRV_FRAMING_ASCII);
     start(&drv_source_serial, &config);
     TEST_ASSERT_EQUAL_INT(-EBUSY, drv_serial_open(&port, device, 9600)); // ours alone
     TEST_ASSERT_NOT_NULL(strstr(port.error, "another program"));

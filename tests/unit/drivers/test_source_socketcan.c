@@ -291,6 +291,31 @@ static void test_back_without_netlink(void) {
     TEST_ASSERT_EQUAL_INT(0, stats().link_is_down);
 }
 
+static void test_what_the_system_has_no_room_for(void) {
+    fake.flags_error = EIO;
+    TEST_ASSERT_EQUAL_INT(-EIO, open_source());
+    fake.flags_error = 0;
+    fake.poll_set_error = EMFILE;
+    TEST_ASSERT_EQUAL_INT(-EMFILE, open_source());
+    TEST_ASSERT_EQUAL_STRING("interface can0: Too many open files", source.error);
+    TEST_ASSERT_EQUAL_INT(-1, source.ops->fd(&source));
+    fake.poll_set_error = 0;
+    fake.poll_add_error = ENOSPC;
+    TEST_ASSERT_EQUAL_INT(-ENOSPC, open_source());
+    fake.poll_add_error = 0;
+    TEST_ASSERT_EQUAL_INT(0, open_source());
+    fake_fail(ENXIO);
+    fake.index = 0;
+    TEST_ASSERT_EQUAL_INT(0, read_some());
+    fake.index = 6;
+    fake.poll_add_error = ENOSPC; // it is back, but cannot be waited for: tried again with the next call
+    TEST_ASSERT_EQUAL_INT(0, read_some());
+    TEST_ASSERT_EQUAL_UINT64(0, stats().reopened);
+    fake.poll_add_error = 0;
+    TEST_ASSERT_EQUAL_INT(0, read_some());
+    TEST_ASSERT_EQUAL_UINT64(1, stats().reopened);
+}
+
 static void test_another_device_takes_the_name(void) {
     TEST_ASSERT_EQUAL_INT(0, open_source());
     fake.index = 17;
@@ -383,6 +408,7 @@ int main(void) {
     RUN_TEST(test_link_down_and_up);
     RUN_TEST(test_unplugged_and_back);
     RUN_TEST(test_back_without_netlink);
+    RUN_TEST(test_what_the_system_has_no_room_for);
     RUN_TEST(test_another_device_takes_the_name);
     RUN_TEST(test_lost_news_are_looked_up);
     RUN_TEST(test_error_messages_are_counted_not_delivered);

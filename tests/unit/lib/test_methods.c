@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 // All five methods through okid_identify_run(): the same three modes, and what belongs to one family only.
-#include "modal_rig.h"
+#include "identify_bench.h"
 #include "tolerance.h"
-
-#include <okid/okid.h>
-#include <unity.h>
 
 enum { P = 20, N = 6000 };
 
@@ -15,43 +12,10 @@ static const okid_method_t methods[] = {OKID_METHOD_OKID_ERA, OKID_METHOD_OKID_E
                                         OKID_METHOD_N4SID_CVA, OKID_METHOD_N4SID_SSARX};
 enum { METHODS = sizeof methods / sizeof *methods };
 
-static rig_t rig;
-static void* blocks[3];
-static okid_accumulator_t* accumulator;
-static okid_square_root_t* square_root;
-static okid_identify_t* identifier;
-static okid_identified_t model;
-
-void setUp(void) { rig_make(&rig); }
-
-void tearDown(void) {
-    for (int k = 0; k < 3; ++k) {
-        free(blocks[k]);
-        blocks[k] = NULL;
-    }
-}
-
 static okid_identify_config_t config_of(okid_method_t method, int n_u, int order) {
     const okid_identify_config_t c = {
         .n_u = n_u, .n_y = RIG_NY, .p = P, .rows = 30, .order = order, .fs_hz = RIG_FS, .method = method};
     return c;
-}
-
-static void create(const okid_identify_config_t* config) {
-    const int lags = okid_identify_lags(config);
-    const okid_accumulator_config_t a = {
-        .n_u = config->n_u, .n_y = config->n_y, .lags = lags, .forgetting = 1, .edges = 1};
-    const okid_square_root_config_t q = {.n_u = config->n_u, .n_y = config->n_y, .lags = lags, .forgetting = 1};
-    const size_t bytes[3] = {okid_accumulator_memsize(&a), okid_identify_memsize(config), okid_square_root_memsize(&q)};
-    tearDown();
-    for (int k = 0; k < 3; ++k) {
-        TEST_ASSERT_GREATER_THAN(0, bytes[k]);
-        blocks[k] = malloc(bytes[k]);
-    }
-    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&accumulator, &a, blocks[0], bytes[0]));
-    TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_identify_create(&identifier, config, blocks[1], bytes[1] - 1));
-    TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&identifier, config, blocks[1], bytes[1]));
-    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&square_root, &q, blocks[2], bytes[2]));
 }
 
 static void expect_modes(double frequency_error, double damping_error, double emac, const char* what) {

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// What okid doctor found: one line each on stdout, and how many things are missing.
+#pragma once
+#include "../config.hpp"
+
+#include <fmt/format.h>
+#include <string>
+
+namespace okid_host {
+
+/// The findings, one line each; a finding that is missing comes with its remedy.
+class findings {
+  public:
+    void well(const std::string& what, const std::string& found) { fmt::print("ok       {:<22} {}\n", what, found); }
+    /// Worth knowing; what it costs to leave it is said, and how to mend it.
+    void note(const std::string& what, const std::string& found, const std::string& remedy = "") {
+        fmt::print("note     {:<22} {}\n", what, found);
+        if (!remedy.empty()) fmt::print("         {:<22} -> {}\n", "", remedy);
+    }
+    void missing(const std::string& what, const std::string& found, const std::string& remedy) {
+        fmt::print("missing  {:<22} {}\n         {:<22} -> {}\n", what, found, "", remedy);
+        ++count_;
+    }
+    int count() const { return count_; }
+
+  private:
+    int count_ = 0;
+};
+
+/// Where a run writes and what it starts: the folder of [record], the program of [alarm], the socket of [publish].
+void check_outputs(findings& out, const live_config& config);
+
+/// The processors of [realtime] are there and okid may use them.
+void check_processors(findings& out, const realtime_config& wanted);
+
+} // namespace okid_host

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: MIT
+"""okid-capture serial: packets and lines by pyserial over ptys, sockets and loop://, kept as bytes and identified."""
+
+from __future__ import annotations
+
+import io
+import json
+import socket
+import threading
+import time
+import tomllib
+import zlib
+from pathlib import Path
+
+import lines
+import numpy as np
+import okid
+import pytest
+import serial
+from captured import assert_same_result, assert_truth, edited
+from cobs import cobs
+from hypothesis import given
+from hypothesis import strategies as st
+from okid import capture
+from okid.capture.cobs_packets import stuff, unstuff
+from okid.capture.framing import Framing, Lines, parse_line
+
+
+@pytest.fixture(scope="session")
+def line(rig: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
+    """The rig on a serial line: its config and the bytes of its packets."""
+    config = capture.load_config(rig / "a.toml")
+    folder = tmp_path_factory.mktemp("line")
+    (folder / "line.toml").write_text(capture.line_config(config, "/dev/ttyUSB9", 921600))
+    packets = capture.packets_of(capture.messages_for(rig / "a.log", config), config)
+    return folder / "line.toml", b"".join(data for _, data in packets)
+
+
+def run(*arguments: object) -> int:
+    return capture.main([str(argument) for argument in arguments])
+
+
+@given(st.binary(max_size=1024))
+def test_stuffing_is_cobs(plain: bytes) -> None:
+    assert stuff(plain) == cobs.encode(plain)
+    assert unstuff(stuff(plain)) == plain
+
+
+@pytest.mark.parametrize("count", [253, 254, 255, 508, 509, 1000])
+def test_stuffing_of_long_runs(count: int) -> None:
+    for plain in (b"\1" * count, b"\1" * count + b"\0", b"\0" + b"\1" * count):
+        assert stuff(plain) == cobs.encode(plain)
+        assert unstuff(cobs.encode(plain)) == plain
+
+
+def test_the_packet_of_the_documentation() -> None:
+    wire = bytes.fromhex("02 01 04 02 01 07 01 01 03 58 1B 01 02 64 07 9C FF EB 44 1B AD 00")
+    packet = capture.decode_packet(wire[:-1])
+    assert packet is not None
+    assert (packet.sequence, packet.time_us, packet.rows.tolist()) == (7, 7000, [[100.0, -100.0]])
+    assert capture.encode_packet(packet, 0) == wire
+
+
+@pytest.mark.parametrize("number_format", [0, 1, 2])
+def test_packets_of_every_format(number_format: int) -> None:
+    rows = np.random.default_rng(1).integers(-(2 ** [15, 23, 20][number_format]), 2**15, (7, 5)).astype(float)
+    data = capture.encode_packet(capture.Packet(2**32 - 3, 2**32 - 1, rows), number_format)
+    packet = capture.decode_packet(data[:-1])
+    assert packet is not None
+    assert (packet.sequence, packet.time_us) == (2**32 - 3, 2**32 - 1)
+    assert np.array_equal(packet.rows, rows)
+    for at in range(len(data) - 1):
+        assert capture.decode_packet(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 : -1]) is None
+    plain = cobs.decode(data[:-1])[:-4]
+    wrong = bytes([9]) + plain[1:]  # another version, with its right sum
+    assert capture.decode_packet(cobs.encode(wrong + zlib.crc32(wrong).to_bytes(4, "little"))) is None
+
+
+@given(st.lists(st.binary(max_size=300), max_size=6), st.integers(1, 50))
+def test_any_bytes_in_any_pieces(pieces: list[bytes], cut: int) -> None:
+    """Nothing raises, memory stays bounded, and the cut into reads changes nothing."""
+    stream = b"".join([*pieces, lines.packet(5, [[1, 2]]), *pieces, lines.packet(6, [[3, 4]])])
+    for make in (Framing, lambda: Lines(None)):
+        whole, parts = make(), make()
+        at_once = list(whole.add(stream))
+        piecewise = [rows for k in range(0, len(stream), cut) for rows in parts.add(stream[k : k + cut])]
+        assert [str(r.rows) for r in at_once] == [str(r.rows) for r in piecewise]
+        assert (whole.damaged, whole.skipped) == (parts.damaged, parts.skipped)
+        assert len(parts._bytes) <= parts.longest
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("1.5,2,-3e2", [1.5, 2.0, -300.0]),
+        ("1.5 2\t3", [1.5, 2.0, 3.0]),
+        ("ax:1.5 ay:2 az= 3", [1.5, 2.0, 3.0]),
+        ("1;;3;", [1.0, None, 3.0]),
+        ("1,nan,inf", [1.0, None, None]),
+        ("1,x", None),
+        ("0x10,1", None),
+        ("1_0", None),
+        (",,", None),
+        ("ax:", None),
+        ("1,\u00b5", None),
+    ],
+)
+def test_lines_of_text(text: str, values: list[float | None] | None) -> None:
+    found = parse_line(text.encode())
+    assert values == (None if found is None else [None if x != x else x for x in found])
+
+
+def test_torn_lines_and_another_width_are_refused() -> None:
+    framing = Lines(counter_field=0)
+    text = b"7,1\n8,1.0\n9,2.0\n10\n11,3.0\n1.5,2\n12,4,5\n13,4,5\n14,4,5\n"
+    got = list(framing.add(text))
+    assert [rows.sequence for rows in got] == [8, 9, 11, 14]  # the first may be torn; three alike make a new width
+    assert [rows.broken for rows in got] == [False, False, True, True]
+    assert framing.damaged == 4
+
+
+def test_recorded_bytes_give_the_result_of_the_can_bus(
+    rig: Path, line: tuple[Path, bytes], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, stream = line
+    (tmp_path / "run.bin").write_bytes(stream)
+    assert run("serial", "--from", tmp_path / "run.bin", "--config", config, "--json", tmp_path / "r.json") == 0
+    assert_same_result(json.loads((tmp_path / "r.json").read_text()), json.loads((rig / "replay.json").read_text()))
+    assert "node: 1500 received, 0 lost" in capsys.readouterr().out
+
+
+def test_losses_by_cause(line: tuple[Path, bytes], tmp_path: Path) -> None:
+    config, stream = line
+    packets = [piece + b"\0" for piece in stream.split(b"\0")[:-1]]
+    packets[100] = packets[100][:8] + bytes([packets[100][8] ^ 0xFF or 1]) + packets[100][9:]  # damaged
+    del packets[200:203]  # never came
+    packets.insert(300, packets[300])  # came twice
+    loaded = capture.load_config(config)
+    kept = capture.SerialSamples(loaded, loaded.bus("serial"))
+    blocks = capture.serial_blocks(io.BytesIO(b"".join(packets)), loaded, samples=kept)
+    rows = np.vstack(list(blocks))
+    in_packet = len(rows) // (len(packets) - 1 + 3)
+    assert kept.counts.lost == {"crc": in_packet, "sequence": 3 * in_packet}
+    assert kept.counts.duplicate == in_packet
+    assert kept.damaged == 1
+    assert int(np.isnan(rows).all(axis=1).sum()) == 4 * in_packet
+
+
+def test_a_line_that_is_unplugged_keeps_everything(
+    line: tuple[Path, bytes], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, stream = line
+    half = stream[: stream.index(b"\0", 2 * len(stream) // 3) + 1]
+
+    def play_then_unplug(tty: lines.Line) -> None:
+        wait_for_file(tmp_path / "run.bin")
+        tty.write(half)
+        wait_for_file(tmp_path / "run.bin", len(half))
+        tty.unplug()
+
+    with lines.line(tmp_path / "tty") as tty:
+        thread = threading.Thread(target=play_then_unplug, args=(tty,), daemon=True)
+        thread.start()
+        outputs = ("--out", tmp_path / "run.bin", "--json", tmp_path / "r.json")
+        assert run("serial", "--port", tmp_path / "tty", "--config", config, *outputs) == 4
+        thread.join()
+        tty.plug_in()
+    assert "what came before is in the result" in capsys.readouterr().err
+    assert (tmp_path / "run.bin").read_bytes() == half
+    assert json.loads((tmp_path / "r.json").read_text())["samples"] >= 900
+
+
+def wait_for_file(path: Path, size: int = 0) -> None:
+    for _ in range(6000):
+        if path.exists() and path.stat().st_size >= size:
+            return
+        time.sleep(0.01)
+    raise AssertionError(f"{path}: never had {size} bytes")
+
+
+def test_a_socket_and_a_duration(rig: Path, line: tuple[Path, bytes], tmp_path: Path) -> None:
+    config, stream = line
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            peer, _ = server.accept()
+            with peer:
+                wait_for_file(tmp_path / "run.bin")  # pyserial drops what comes before the port is open
+                peer.sendall(stream)
+                peer.recv(1)  # until the other end closes
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        url = f"socket://127.0.0.1:{server.getsockname()[1]}"
+        outputs = ("--duration", 4, "--json", tmp_path / "r.json", "--out", tmp_path / "run.bin", "--quiet")
+        assert run("serial", "--port", url, "--config", config, *outputs) == 0
+        thread.join()
+    result = json.loads((tmp_path / "r.json").read_text())
+    assert result["samples"] == 1000
+    assert_truth(result, rig / "t.json")
+    kept = (tmp_path / "run.bin").read_bytes()
+    assert stream.startswith(kept)
+
+
+def test_loop_and_a_script(rig: Path, line: tuple[Path, bytes]) -> None:
+    config, stream = line
+    with capture.open_port("loop://") as port, okid.Session.from_config(config) as session:
+        writer = threading.Thread(target=port.write, args=(stream,), daemon=True)
+        writer.start()
+        for block in capture.serial_blocks(port, config, stop=lambda: session.samples >= 1500):
+            session.feed(block)
+        writer.join()
+        assert_truth(session.identify().to_dict(), rig / "t.json")
+
+
+def test_lines_of_text_are_placed_by_their_counter(rig: Path, line: tuple[Path, bytes], tmp_path: Path) -> None:
+    def to_text(text: str) -> str:
+        text = text.replace('framing = "cobs"', 'framing = "ascii"\ncounter_field = 0\ncounter_bits = 8')
+        for field in (2, 1, 0):
+            text = text.replace(f"field = {field}\n", f"field = {field + 1}\n").replace(
+                "counter_field = 1", "counter_field = 0"
+            )
+        return text
+
+    config = edited(line[0], tmp_path / "a.toml", to_text)
+    fields = [channel["field"] for channel in tomllib.loads(config.read_text())["channel"]]
+    assert fields == [1, 2, 3]
+    rows = [packet.rows for piece in line[1].split(b"\0")[:-1] if (packet := capture.decode_packet(piece))]
+    codes = np.vstack(rows).astype(int)
+    text = "".join(f"{k & 255},{u},{a},{b}\r\n" for k, (u, a, b) in enumerate(codes.tolist()) if k not in (500, 501))
+    (tmp_path / "run.txt").write_text("torn,1\n" + text)
+    assert run("serial", "--from", tmp_path / "run.txt", "--config", config, "--json", tmp_path / "r.json") == 0
+    result = json.loads((tmp_path / "r.json").read_text())
+    assert (result["samples"], result["gaps"]) == (1500, 1)
+    assert_truth(result, rig / "t.json")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--port", "/nowhere/tty"], 4, "cannot open /nowhere/tty"),
+        (["--port", "nosuch://x"], 4, "nosuch"),
+        (["--port", "loop://", "--from", "x"], 2, "--from is read instead of a port"),
+        (["--from", "/nowhere/run.bin"], 2, "/nowhere/run.bin"),
+        (["--port", "loop://", "--out", "/nowhere/run.bin"], 2, "/nowhere/run.bin"),
+        (["--port", "loop://", "--duration", "0"], 2, "--duration"),
+        (["--port", "loop://", "--baud", "1"], 2, "--baud"),
+        (["--port", "loop://", "--duration", "0.01"], 3, "no usable frame of channel force1, acc1, acc2"),
+    ],
+)
+def test_refusals(
+    line: tuple[Path, bytes], capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, words: str
+) -> None:
+    assert run("serial", "--config", line[0], *arguments) == code
+    shown = capsys.readouterr().err
+    assert words in shown
+    assert shown.startswith("okid-capture: ") and shown.count("\n") == 1
+
+
+def test_a_can_config_is_refused(rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("serial", "--config", rig / "a.toml", "--port", "loop://") == 2
+    assert "expected a serial bus" in capsys.readouterr().err
+
+
+def test_serial_exceptions_are_what_the_scripts_expect() -> None:
+    assert issubclass(serial.SerialException, OSError)

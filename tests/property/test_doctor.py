@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""okid doctor on what a run writes to and starts; of devices: tests/vcan, tests/gpio and tests/io."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from program import okid
+from two_masses import rig_text, simulate_rig
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The config reads its own log, so that no bus is missing."""
+    folder = simulate_rig(tmp_path_factory.mktemp("doctor"), rig_text(2.0))
+    text = (folder / "a.toml").read_text()
+    text = text.replace('type = "socketcan"', 'type = "replay"\nfile = "a.log"').replace("bitrate = 1000000\n", "")
+    (folder / "a.toml").write_text(text)
+    return folder
+
+
+def doctor(rig: Path, sections: str) -> tuple[int, str]:
+    (rig / "d.toml").write_text((rig / "a.toml").read_text() + sections)
+    done = okid("doctor", rig / "d.toml")
+    return done.returncode, done.stdout
+
+
+def test_recording(rig: Path) -> None:
+    code, text = doctor(rig, '[record]\ndirectory = "runs/a/b"\nsegment_mb = 1\nmax_mb = 4\n')
+    assert code == 0 and "ok       recording" in text and "give way at 4 MB" in text, text
+    assert not (rig / "runs").exists()
+    code, text = doctor(rig, '[record]\ndirectory = "runs"\nsegment_mb = 64\nmax_mb = 1e9\n')
+    assert code == 0 and "note     recording" in text and "lower [record] max_mb" in text, text
+    code, text = doctor(rig, '[record]\ndirectory = "a.log"\n')
+    assert code == 4 and "missing  recording" in text and "a.log is no folder" in text, text
+
+
+def test_alarm_command(rig: Path) -> None:
+    command = rig / "call.sh"
+    command.write_text("#!/bin/sh\n")
+    command.chmod(0o644)
+    code, text = doctor(rig, '[alarm]\ncommand = "call.sh"\n')
+    assert code == 4 and "missing  alarm command" in text and f"chmod +x {command}" in text, text
+    command.chmod(0o755)
+    code, text = doctor(rig, '[alarm]\ncommand = "call.sh"\n')
+    assert code == 0 and f"ok       alarm command          {command}" in text, text
+
+
+def test_publish_socket(rig: Path) -> None:
+    code, text = doctor(rig, '[publish]\nsocket = "okid.sock"\n')
+    assert code == 0 and "ok       publish socket" in text, text
+    code, text = doctor(rig, '[publish]\nsocket = "none/okid.sock"\n')
+    assert code == 4 and "No such file or directory" in text and f"mkdir -p {rig / 'none'}" in text, text
+    code, text = doctor(rig, '[publish]\nsocket = "a.log"\n')
+    assert code == 4 and "another file has this name" in text, text
+
+
+def test_processors(rig: Path) -> None:
+    mine = min(os.sched_getaffinity(0))
+    code, text = doctor(rig, f"[realtime]\ncpus = [{mine}]\n")
+    assert code == 0 and "ok       processors" in text, text
+    code, text = doctor(rig, f"[realtime]\ncpus = [{mine}, 1000]\n")
+    assert code == 4 and "missing  processors" in text and "cpus: 1000 not here" in text, text
+
+
+@pytest.mark.parametrize("option", ["--json", "--events", "--speed"])
+def test_an_empty_value_is_refused(rig: Path, option: str) -> None:
+    """A variable of a script that was not set."""
+    done = okid("replay", rig / "a.log", "-c", rig / "a.toml", option, "")
+    assert done.returncode == 2
+    assert f"{option}: found an empty value" in done.stderr, done.stderr

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""Arguments of a caller, looked at before anything is done with them: InputError says what was found and expected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from okid._errors import IdentificationError, InputError
+
+
+def choice(name: str, value: str, allowed: Sequence[str]) -> str:
+    """One of the words in `allowed`."""
+    if value not in allowed:
+        raise InputError(f"{name} is {value!r}, expected one of {', '.join(map(repr, allowed))}")
+    return value
+
+
+def whole(name: str, value: object, smallest: int) -> int:
+    """A whole number >= `smallest`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or int(value) < smallest:
+        raise InputError(f"{name} is {value!r}, expected a whole number >= {smallest}")
+    return int(value)
+
+
+def positive(name: str, value: object, what: str) -> float:
+    """A finite number > 0; `what` it is: "a sample rate in Hz"."""
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not number or not math.isfinite(float(value)) or not float(value) > 0.0:  # type: ignore[arg-type]
+        raise InputError(f"{name} is {value!r}, expected {what} > 0")
+    return float(value)  # type: ignore[arg-type]
+
+
+def names(given: Sequence[str] | None, letter: str, count: int) -> list[str]:
+    """Different names for `count` channels; None: u1, u2 .."""
+    if isinstance(given, str):
+        raise InputError(f"names are given as {given!r}, expected a list, such as [{given!r}]")
+    out = [f"{letter}{k + 1}" for k in range(count)] if given is None else [str(name) for name in given]
+    if len(out) != count or len(set(out)) != count:
+        raise InputError(f"{count} different names are needed for the channels of {letter}, got {out}")
+    return out
+
+
+def with_name(fault: IdentificationError, inputs: Sequence[str], outputs: Sequence[str]) -> IdentificationError:
+    """The same fault with the name of the channel it lies in, where the library says which."""
+    channel = getattr(fault, "channel", -1)
+    if channel < 0:
+        return fault
+    kind, name = ("input", inputs[channel]) if channel < len(inputs) else ("output", outputs[channel - len(inputs)])
+    out = IdentificationError(f"{str(fault).split(' (channel ')[0]} ({kind} {name!r})", fault.status)
+    out.channel = channel  # type: ignore[attr-defined]
+    return out
+
+
+def frame_names(values: Any) -> list[str] | None:
+    """Column names of a pandas frame (or of the first of several), None where there are none that say something."""
+    first = values[0] if isinstance(values, list | tuple) and values else values
+    columns = getattr(first, "columns", None)
+    if columns is None:
+        return None
+    found = list(columns)
+    return found if all(isinstance(name, str) for name in found) and len(set(found)) == len(found) else None

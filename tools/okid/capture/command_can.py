@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: MIT
+"""okid-capture can: record a CAN bus, identify it, or both."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import errno
+import socket
+import threading
+from collections.abc import Iterable
+from itertools import chain
+from typing import Any
+
+import can
+
+from okid._errors import InputError
+from okid.capture.can_samples import CanSamples, can_blocks
+from okid.capture.config import BusConfig, CaptureConfig
+from okid.capture.dbc import read_dbc
+from okid.capture.frame_log import log_messages, messages_for
+from okid.capture.outcome import (
+    EXIT_DEVICE,
+    EXIT_DONE,
+    EXIT_USAGE,
+    Run,
+    check_target,
+    complain,
+    count_lines,
+    read_config,
+)
+from okid.capture.output_files import check_log_target, check_outputs
+from okid.capture.recording import Recorder, record_bus
+
+_SO_RCVBUFFORCE = 33
+_ROOM = 8 << 20  # bytes of a socket: some 13,000 frames
+
+
+def open_bus(interface: str, channel: str, *, fd: bool = False, bitrate: int | None = None) -> can.BusABC:
+    """A python-can bus; a socket gets room for seconds of frames. Raises OSError that names the bus.
+
+    InputError for an interface that python-can does not have.
+    """
+    if interface not in can.VALID_INTERFACES:
+        raise InputError(
+            f"no python-can interface {interface!r}; there are {', '.join(sorted(can.VALID_INTERFACES))}, and file"
+        )
+    options: dict[str, Any] = {"fd": True} if fd else {}
+    if bitrate is not None:
+        options["bitrate"] = bitrate
+    try:
+        bus = can.Bus(interface=interface, channel=channel, **options)
+    except (can.CanError, OSError, ImportError, ValueError, TypeError) as refused:
+        raise OSError(f"cannot open {interface} {channel}: {refused}{_without_socketcan(interface, refused)}") from None
+    line = getattr(bus, "socket", None)
+    if isinstance(line, socket.socket):
+        try:
+            line.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _ROOM)
+        except OSError:  # without rights: as much as the system lets
+            with contextlib.suppress(OSError):
+                line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _ROOM)
+    return bus
+
+
+def _without_socketcan(interface: str, refused: Exception) -> str:
+    """What to do where the kernel has no CAN sockets; else nothing."""
+    none = (errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT)
+    if interface != "socketcan" or getattr(refused, "errno", None) not in none:
+        return ""
+    return "; this kernel has no SocketCAN (see `okid doctor`): the interfaces udp_multicast and virtual need none"
+
+
+def _check(args: argparse.Namespace) -> None:
+    if args.interface == "file":
+        args.log, args.interface = args.log or args.channel, None
+    if args.log is not None and args.interface is not None:
+        raise InputError("--log is read instead of a bus: leave --interface out")
+    if args.interface is not None and args.channel is None:
+        raise InputError(f"--interface {args.interface} needs --channel beside it")
+    if args.log is None and args.config is None and args.interface is None:
+        raise InputError("--interface and --channel are needed, or --log FILE")
+    if args.interface is not None and args.interface not in can.VALID_INTERFACES:
+        known = ", ".join(sorted(can.VALID_INTERFACES))
+        raise InputError(f"no python-can interface {args.interface!r}; there are {known}, and file")
+    if args.out is None and args.config is None:
+        raise InputError("nothing to do: give --out FILE.log, --config CONFIG.toml, or both")
+    if args.duration is not None and not 0.0 < args.duration < float("inf"):
+        raise InputError(f"--duration is {args.duration}, expected seconds > 0")
+    if args.frames is not None and args.frames < 1:
+        raise InputError(f"--frames is {args.frames}, expected a whole number >= 1")
+    if (args.dbc is None) != (args.csv is None):
+        raise InputError("--dbc and --csv belong together")
+    if args.csv is not None and args.out is None:
+        raise InputError("--csv is written beside --out FILE.log")
+    if args.json is not None and args.config is None:
+        raise InputError("--json needs --config CONFIG.toml")
+    check_target(args.json)
+    inputs = {"--log": args.log, "--config": args.config, "--dbc": args.dbc}
+    check_outputs(inputs, {"--out": args.out, "--csv": args.csv, "--json": args.json})
+
+
+def _tell_appended(path: str | None) -> None:
+    said = None if path is None else check_log_target(path)
+    if said is not None:
+        complain(said)
+
+
+def run_can(args: argparse.Namespace, stop: threading.Event) -> int:
+    """Exit code of `okid-capture can`. Raises InputError."""
+    _check(args)
+    database = None if args.dbc is None else read_dbc(args.dbc)
+    config = None if args.config is None else read_config(args.config)
+    for dbc in () if config is None else config.dbcs:
+        check_outputs({"the DBC of --config": dbc}, {"--out": args.out, "--csv": args.csv, "--json": args.json})
+    source = None if config is None or args.log is not None else config.bus("can", args.bus)
+    _tell_appended(args.out)
+    run = None if config is None else Run(config, args.json, args.quiet)
+    if args.log is not None:
+        remarks: list[str] = []
+        messages = log_messages(args.log, remarks) if config is None else messages_for(args.log, config, remarks)
+        code = (
+            _copy(args, messages, database, stop)
+            if run is None
+            else _identify(args, run, messages, None, database, stop)
+        )
+        for remark in remarks:
+            complain(f"{args.log}: {remark}")
+        return code
+    _place_of(args, source)
+    try:
+        bus = open_bus(args.interface, args.channel, fd=args.fd or bool(source and source.fd), bitrate=args.bitrate)
+    except OSError as refused:
+        complain(refused)
+        return EXIT_DEVICE
+    try:
+        if run is None:
+            return _record(args, bus, database, stop)
+        return _identify(args, run, bus, source, database, stop)
+    finally:
+        bus.shutdown()
+
+
+def _place_of(args: argparse.Namespace, source: BusConfig | None) -> None:
+    """Interface and channel out of the config where the command line has none."""
+    if args.interface is not None or source is None:
+        return
+    slcan = source.type == "slcan"
+    args.interface = "slcan" if slcan else "socketcan"
+    args.channel = args.channel or (source.device if slcan else source.interface)
+    args.bitrate = args.bitrate or (source.bitrate if slcan else None)
+    if source.type == "replay":
+        raise InputError(f"bus {source.name!r} of the config is a log: name it with --log FILE")
+
+
+def _channel_name(args: argparse.Namespace, source: BusConfig | None = None) -> str:
+    """What a log calls the bus: as the config does, so that `okid replay` finds it."""
+    if source is not None:
+        return source.interface
+    return str(args.channel or "can0").rsplit("/", 1)[-1]
+
+
+def _record(args: argparse.Namespace, bus: can.BusABC, database: Any, stop: threading.Event) -> int:
+    try:
+        summary = record_bus(
+            bus, args.out, channel=_channel_name(args), duration=args.duration, frames=args.frames,
+            database=database, csv_path=args.csv, stop=stop.is_set,
+        )  # fmt: skip
+    except OSError as full:
+        complain(f"{full.filename or args.out}: {full.strerror or full}")
+        return EXIT_USAGE
+    print(summary.text())
+    if summary.fault is not None:
+        complain(f"{args.channel}: {summary.fault}; what came before is in {args.out}")
+        return EXIT_DEVICE
+    return EXIT_DONE
+
+
+def _copy(args: argparse.Namespace, messages: Iterable[can.Message], database: Any, stop: threading.Event) -> int:
+    """A log into another one, which is not made when the first frame cannot be read."""
+    rest = iter(messages)
+    messages = chain([next(rest)], rest)  # a log without a frame is refused by who reads it
+    try:
+        with Recorder(args.out, channel=_channel_name(args), database=database, csv_path=args.csv) as recorder:
+            for message in messages:
+                if stop.is_set() or recorder.summary.frames == args.frames:
+                    break
+                recorder.add(message)
+    except OSError as full:
+        complain(f"{full.filename or args.out}: {full.strerror or full}")
+        return EXIT_USAGE
+    print(recorder.summary.text())
+    return EXIT_DONE
+
+
+class _Tap:
+    """Every frame on its way: recorded where it is wanted, counted; when the disk is full the measurement goes on."""
+
+    def __init__(self, recorder: Recorder | None, frames: int | None) -> None:
+        self._recorder, self._left = recorder, frames
+        self.fault: str | None = None
+
+    @property
+    def done(self) -> bool:
+        """So many frames as were asked for."""
+        return self._left is not None and self._left <= 0
+
+    def add(self, message: can.Message) -> None:
+        if self._left is not None:
+            self._left -= 1
+        self._keep(message)
+
+    def idle(self) -> None:
+        self._keep(None)
+
+    def close(self) -> None:
+        """The recorder, with what it still holds."""
+        if self._recorder is None:
+            return
+        try:
+            self._recorder.close()
+        except OSError as full:
+            if self.fault is None:
+                self.fault = f"{self._recorder.summary.path}: {full.strerror or full}"
+                complain(self.fault)
+
+    def _keep(self, message: can.Message | None) -> None:
+        if self._recorder is None or self.fault is not None:
+            return
+        try:
+            if message is None:
+                self._recorder.tick()
+            else:
+                self._recorder.add(message)
+        except OSError as full:
+            self.fault = f"{self._recorder.summary.path}: {full.strerror or full}: no longer recorded"
+            complain(self.fault)
+
+
+def _identify(
+    args: argparse.Namespace, run: Run, source: Any, bus: BusConfig | None, database: Any, stop: threading.Event
+) -> int:
+    config: CaptureConfig = run.config
+    limit = None if args.duration is None else max(1, round(args.duration * config.rate_hz))
+    samples = CanSamples(config, limit=limit)
+    if bus is not None:
+        samples.use_bus(bus)
+    fault = None
+    with contextlib.ExitStack() as kept:
+        recorder = None
+        if args.out is not None:
+            try:
+                recorder = Recorder(args.out, channel=_channel_name(args, bus), database=database, csv_path=args.csv)
+            except OSError as full:
+                raise InputError(f"{full.filename or args.out}: {full.strerror or full}") from None
+        tap = _Tap(recorder, args.frames)
+        kept.callback(tap.close)
+        duration = None if args.log is not None else args.duration
+        blocks = can_blocks(
+            source, config, samples=samples, duration=duration, stop=lambda: stop.is_set() or tap.done,
+            tap=tap.add, idle=tap.idle,
+        )  # fmt: skip
+        try:
+            run.watch.follow(blocks)
+        except (can.CanError, OSError) as failed:
+            fault = f"{args.channel}: {str(failed) or type(failed).__name__}"
+    if recorder is not None:
+        run.say(recorder.summary.text())
+    lines = [line for name, one in samples.counts.items() for line in count_lines(name, one, {})]
+    if samples.error_frames:
+        lines.append(f"{samples.error_frames} error frames")
+    code = run.end(lines, samples.silent, fault, samples.others_text())
+    return EXIT_USAGE if code == EXIT_DONE and tap.fault is not None else code

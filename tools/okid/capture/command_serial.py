@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""okid-capture serial: keep the bytes of a serial line and identify what they carry."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import threading
+from typing import Any
+
+from okid._errors import InputError
+from okid.capture.outcome import (
+    EXIT_DEVICE,
+    EXIT_DONE,
+    EXIT_USAGE,
+    Run,
+    check_target,
+    complain,
+    count_lines,
+    read_config,
+)
+from okid.capture.output_files import check_outputs, raw_target
+from okid.capture.serial_samples import RawFile, SerialSamples, serial_blocks
+
+
+def open_port(url: str, baud: int = 115200) -> Any:
+    """A pyserial port, for this program alone where the system knows that. Raises OSError that names it."""
+    import serial
+
+    exclusive = {} if "://" in url else {"exclusive": True}
+    try:
+        return serial.serial_for_url(url, baudrate=baud, timeout=0.1, **exclusive)
+    except (OSError, ValueError, OverflowError) as refused:
+        raise OSError(f"cannot open {url}: {refused}") from None
+
+
+def _check(args: argparse.Namespace) -> None:
+    if args.port is not None and args.recorded is not None:
+        raise InputError("--from is read instead of a port: leave --port out")
+    if args.recorded is not None and args.out is not None:
+        raise InputError("--from is recorded already: leave --out out")
+    if args.duration is not None and not 0.0 < args.duration < float("inf"):
+        raise InputError(f"--duration is {args.duration}, expected seconds > 0")
+    if args.baud is not None and args.baud < 50:
+        raise InputError(f"--baud is {args.baud}, expected a whole number >= 50")
+    check_target(args.json)
+    inputs = {"--from": args.recorded, "--config": args.config}
+    check_outputs(inputs, {"--out": args.out, "--json": args.json})
+
+
+class _Tap:
+    """Bytes on their way into the file, in the thread that reads; when the disk is full the measurement goes on."""
+
+    def __init__(self, file: RawFile | None) -> None:
+        self._file = file
+        self.fault: str | None = None
+
+    def add(self, data: bytes) -> None:
+        if self._file is None or self.fault is not None:
+            return
+        try:
+            self._file.add(data)
+        except OSError as full:
+            self.fault = f"{self._file.path}: {full.strerror or full}: no longer recorded"
+            complain(self.fault)
+
+
+def run_serial(args: argparse.Namespace, stop: threading.Event) -> int:
+    """Exit code of `okid-capture serial`. Raises InputError."""
+    _check(args)
+    config = read_config(args.config)
+    bus = config.bus("serial", args.bus)
+    run = Run(config, args.json, args.quiet)
+    limit = None if args.duration is None else max(1, round(args.duration * config.rate_hz))
+    samples = SerialSamples(config, bus, limit=limit)
+    name = args.recorded or args.port or bus.device or ""
+    fault = None
+    with contextlib.ExitStack() as kept:
+        try:
+            if args.recorded is not None:
+                port: Any = kept.enter_context(open(args.recorded, "rb"))
+            else:
+                port = kept.enter_context(open_port(name, args.baud or bus.baud))
+        except OSError as refused:
+            if args.recorded is not None:
+                raise InputError(f"{name}: {refused.strerror or refused}") from None
+            complain(refused)
+            return EXIT_DEVICE
+        try:
+            said = None if args.out is None else raw_target(args.out)
+            file = None if args.out is None else kept.enter_context(RawFile(args.out))
+        except OSError as full:
+            raise InputError(f"{args.out}: {full.strerror or full}") from None
+        if said is not None:
+            complain(said)
+        tap = _Tap(file)
+        duration = None if args.recorded is not None else args.duration
+        try:
+            run.watch.follow(
+                serial_blocks(port, config, samples=samples, duration=duration, stop=stop.is_set, tap=tap.add)
+            )
+        except OSError as failed:
+            fault = f"{name}: {str(failed) or type(failed).__name__}"
+    more = {"damaged": samples.damaged, "bytes skipped": samples.skipped}
+    lines = count_lines(bus.name, samples.counts, more)
+    if file is not None:
+        lines.append(f"{file.path}: {file.bytes} bytes added")
+    code = run.end(lines, samples.silent, fault)
+    return EXIT_USAGE if code == EXIT_DONE and tap.fault is not None else code

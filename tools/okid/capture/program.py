@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""The program `okid`, where there is one: it checks a config with line and column, and simulates rigs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+from okid._errors import InputError
+
+
+def find_program() -> str | None:
+    """$OKID_PROGRAM, else `okid` on the path, else that of the source tree's build; None when there is none."""
+    given = os.environ.get("OKID_PROGRAM")
+    if given:
+        return given
+    built = Path(__file__).resolve().parents[3] / "build" / "okid"
+    return shutil.which("okid") or (str(built) if os.access(built, os.X_OK) else None)
+
+
+def run_program(*arguments: str | Path) -> str:
+    """Standard output of `okid ARGUMENTS`. Raises InputError with its own message, or when there is no program."""
+    program = find_program()
+    if program is None:
+        raise InputError("the program `okid` is needed and was not found: put it on the path, or set OKID_PROGRAM")
+    try:
+        done = subprocess.run(
+            [program, *map(str, arguments)], capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False
+        )
+    except OSError as fault:
+        raise InputError(f"{program}: cannot be run: {fault.strerror or fault}") from None
+    if done.returncode != 0:
+        lines = [line for line in done.stderr.strip().splitlines() if line] or [f"it ended with {done.returncode}"]
+        raise InputError(lines[-1].removeprefix("okid: "))
+    return done.stdout
+
+
+def check_config(path: str | Path) -> None:
+    """`okid check` where there is a program: InputError says what is wrong, by file, line and key."""
+    if find_program() is not None:
+        run_program("check", path)

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""Records, results and CAN logs in the formats of other programs; docs/reference/formats.md tells what each one keeps.
+
+read_record() and write_record() go by the file name's extension. Libraries of a format are loaded when it is used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from okid.formats.by_name import read_record, write_record, write_result
+    from okid.formats.can_log import convert_log, read_log, write_log
+    from okid.formats.csv_file import write_csv
+    from okid.formats.hdf5 import read_hdf5, write_hdf5
+    from okid.formats.mat import read_mat, write_mat
+    from okid.formats.mdf4 import read_mdf4, write_mdf4
+    from okid.formats.parquet import read_parquet, write_parquet
+    from okid.formats.uff import UffFile, read_uff, write_uff
+    from okid.formats.uff_function import UffFunction
+    from okid.formats.uff_model import UffMode
+    from okid.geometry import Geometry, read_geometry
+    from okid.records import Record, read_csv
+
+__all__ = [
+    "Geometry",
+    "Record",
+    "UffFile",
+    "UffFunction",
+    "UffMode",
+    "convert_log",
+    "read_csv",
+    "read_geometry",
+    "read_hdf5",
+    "read_log",
+    "read_mat",
+    "read_mdf4",
+    "read_parquet",
+    "read_record",
+    "read_uff",
+    "write_csv",
+    "write_hdf5",
+    "write_log",
+    "write_mat",
+    "write_mdf4",
+    "write_parquet",
+    "write_record",
+    "write_result",
+    "write_uff",
+]
+
+_NAMES = {
+    "okid.formats.by_name": "read_record, write_record, write_result",
+    "okid.formats.csv_file": "write_csv",
+    "okid.formats.can_log": "convert_log, read_log, write_log",
+    "okid.formats.hdf5": "read_hdf5, write_hdf5",
+    "okid.formats.mat": "read_mat, write_mat",
+    "okid.formats.mdf4": "read_mdf4, write_mdf4",
+    "okid.formats.parquet": "read_parquet, write_parquet",
+    "okid.formats.uff": "UffFile, read_uff, write_uff",
+    "okid.formats.uff_function": "UffFunction",
+    "okid.formats.uff_model": "UffMode",
+    "okid.geometry": "Geometry, read_geometry",
+    "okid.records": "Record, read_csv",
+}  # of the modules; they load when they are first used: some bring scipy or python-can with them
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _NAMES.items():
+        if name in names.split(", "):
+            return getattr(import_module(module), name)
+    raise AttributeError(f"module 'okid.formats' has no attribute {name!r}")

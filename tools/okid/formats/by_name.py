@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Records and results read and written by the extension of the file name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from okid._errors import InputError
+from okid.formats.csv_file import write_csv
+from okid.formats.foreign_library import reading
+from okid.formats.hdf5 import read_hdf5, write_hdf5
+from okid.formats.mat import read_mat, write_mat
+from okid.formats.mdf4 import read_mdf4, write_mdf4
+from okid.formats.parquet import read_parquet, write_parquet
+from okid.formats.uff import read_uff, write_uff
+from okid.geometry import Geometry
+from okid.records import Record, read_csv
+from okid.result import Result
+
+Part = int | str | None
+EXTENSIONS = (".csv", ".uff", ".unv", ".mf4", ".h5", ".hdf5", ".mat", ".parquet")
+RESULT_EXTENSIONS = (".uff", ".unv", ".h5", ".hdf5", ".mat")
+
+
+def _only_part(path: str | Path, group: Part) -> None:
+    if group is not None:
+        raise InputError(f"{path}: group {group!r} asked for, but this format has no groups")
+
+
+def _read_csv(path: str | Path, group: Part) -> Record:
+    _only_part(path, group)
+    return read_csv(path)
+
+
+def _read_parquet(path: str | Path, group: Part) -> Record:
+    _only_part(path, group)
+    return read_parquet(path)
+
+
+def _read_uff(path: str | Path, group: Part) -> Record:
+    uff = read_uff(path)
+    with reading(path, "UFF"):
+        return uff.record(group)
+
+
+_READERS: dict[str, Callable[[str | Path, Part], Record]] = {
+    ".csv": _read_csv,
+    ".uff": _read_uff,
+    ".unv": _read_uff,
+    ".mf4": read_mdf4,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".mat": read_mat,
+    ".parquet": _read_parquet,
+}
+_WRITERS: dict[str, Callable[[str | Path, Record], None]] = {
+    ".csv": write_csv,
+    ".uff": write_uff,
+    ".unv": write_uff,
+    ".mf4": write_mdf4,
+    ".h5": write_hdf5,
+    ".hdf5": write_hdf5,
+    ".mat": write_mat,
+    ".parquet": write_parquet,
+}
+
+
+def _ending(path: str | Path, known: tuple[str, ...]) -> str:
+    ending = Path(path).suffix.lower()
+    if ending not in known:
+        raise InputError(f"{path}: the extension is {ending!r}, expected one of {', '.join(known)}")
+    return ending
+
+
+def read_record(path: str | Path, *, group: Part = None, fs: float | None = None) -> Record:
+    """Read measured samples from .csv, .uff, .unv, .mf4, .h5, .hdf5, .mat or .parquet.
+
+    group: which part, where a file holds several of different length or rate: the number that the error message
+    lists (UFF, MDF4), the path inside the file (HDF5), variable names with commas (.mat). fs: Hz, overrides what the
+    file says. InputError of one line names the file and what is wrong with it.
+    """
+    record = _READERS[_ending(path, EXTENSIONS)](path, group)
+    if fs is not None:
+        if not 0.0 < fs < float("inf"):
+            raise InputError(f"sample rate is {fs}, expected Hz above 0")
+        record.fs_hz = float(fs)
+    return record
+
+
+def write_record(path: str | Path, record: Record) -> None:
+    """Write measured samples as .csv, .uff, .unv, .mf4, .h5, .hdf5, .mat or .parquet, whole or not at all.
+
+    InputError names what the format cannot hold (UFF and MDF4 want a sample rate) or why the file cannot be written.
+    """
+    _WRITERS[_ending(path, EXTENSIONS)](path, record)
+
+
+def write_result(path: str | Path, result: Result | Mapping[str, Any], geometry: Geometry | None = None) -> None:
+    """Write an identified model (a Result or an okid.result/1 dictionary) as .uff, .unv, .h5, .hdf5 or .mat.
+
+    geometry: nodes and lines for UFF; the other formats take none.
+    """
+    ending = _ending(path, RESULT_EXTENSIONS)
+    if ending in (".uff", ".unv"):
+        write_uff(path, result, geometry=geometry)
+    elif ending == ".mat":
+        write_mat(path, result)
+    else:
+        write_hdf5(path, result)

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: MIT
+"""Logs of CAN frames: every format that python-can reads and writes, and `candump -L` text as okid replays it."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import re
+import sqlite3
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import can
+
+from okid._errors import InputError
+from okid.capture.recording import log_line
+from okid.formats.bus_mdf4 import bus_number, write_bus_mdf4
+from okid.formats.foreign_library import library, reading, writing
+from okid.formats.log_names import FRAME_CSV_HEAD, LOG_EXTENSIONS, is_frame_csv
+from okid.formats.mdf4 import quiet_asammdf
+
+_LINE = re.compile(
+    r"\((?P<time>\d+(?:\.\d+)?)\)[ \t]+(?P<bus>[!-~]+)[ \t]+(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#"
+    r"(?:#(?P<flags>[0-9A-Fa-f])(?P<fd>(?:[0-9A-Fa-f]{2})*)|(?P<remote>[Rr])(?P<dlc>[0-8])?|"
+    r"(?P<data>(?:[0-9A-Fa-f]{2}){0,8}))(?:_[0-9A-Fa-f])?(?:[ \t]+(?P<way>[RT]))?"
+)
+_FORMS = "(seconds) interface ID#data, ID##flags data or ID#R, as candump -L writes it"
+
+
+def _cannot_hold(extension: str, frame: can.Message) -> str | None:
+    """The kind of this frame if python-can's writer of the format drops or changes it."""
+    if frame.is_fd and (extension in (".csv", ".db", ".trc") or (extension == ".asc" and not frame.data)):
+        return "a CAN FD frame" if extension != ".asc" else "a CAN FD frame without data"
+    if extension == ".trc" and (frame.is_remote_frame or frame.is_error_frame):
+        return "a remote frame" if frame.is_remote_frame else "an error frame"
+    return None
+
+
+@dataclass
+class LogSummary:
+    """What convert_log() did. remarks: what the new format does not keep, in words."""
+
+    frames: int = 0
+    first_s: float | None = None
+    last_s: float | None = None
+    buses: dict[str, int] = field(default_factory=dict)
+    errors: int = 0
+    remarks: list[str] = field(default_factory=list)
+
+    def take(self, frame: can.Message) -> None:
+        """Count one frame."""
+        self.frames += 1
+        self.first_s = frame.timestamp if self.first_s is None else self.first_s
+        self.last_s = frame.timestamp
+        self.errors += bool(frame.is_error_frame)
+        bus = str(frame.channel)
+        self.buses[bus] = self.buses.get(bus, 0) + 1
+
+
+def _extension(path: str | Path) -> str:
+    ending = Path(path).suffix.lower()
+    if ending not in LOG_EXTENSIONS:
+        raise InputError(f"{path}: the extension is {ending!r}, expected one of {', '.join(LOG_EXTENSIONS)}")
+    return ending
+
+
+def _candump_frame(found: re.Match[str]) -> can.Message:
+    number = int(found["id"], 16)
+    error = len(found["id"]) == 8 and bool(number & 0x20000000)
+    given: dict[str, Any] = {"data": bytes.fromhex(found["data"] or "")}
+    if found["flags"] is not None:
+        flags = int(found["flags"], 16)
+        given = {"data": bytes.fromhex(found["fd"]), "is_fd": True}
+        given |= {"bitrate_switch": bool(flags & 1), "error_state_indicator": bool(flags & 2)}
+    elif found["remote"]:
+        given = {"is_remote_frame": True, "dlc": int(found["dlc"] or 0)}
+    return can.Message(
+        timestamp=float(found["time"]), arbitration_id=number & 0x1FFFFFFF, is_extended_id=len(found["id"]) == 8,
+        is_error_frame=error, channel=found["bus"], is_rx=found["way"] != "T", **given,
+    )  # fmt: skip
+
+
+def _candump(path: str | Path) -> Iterator[can.Message]:
+    """python-can's own reader takes error frames of candump for data frames and drops the length of remote ones."""
+    with open(path, encoding="utf-8", newline="") as file:
+        for number, line in enumerate(file, 1):
+            text = line.rstrip("\r\n ")
+            found = _LINE.fullmatch(text)
+            if found is not None:
+                yield _candump_frame(found)
+            elif text:
+                raise InputError(f"{path}:{number}: found {text[:60]!r}, expected {_FORMS}")
+
+
+def _bus_name(extension: str, channel: Any) -> str:
+    """The interface of a frame: python-can gives names, numbers from 0 (from 1 in .trc), or nothing."""
+    if isinstance(channel, str) and channel and not channel.isdigit():
+        return re.sub(r"[^!-~]", "_", channel)[:15]
+    number = int(channel) if channel is not None and str(channel).isdigit() else 0
+    return f"can{max(number - 1, 0) if extension == '.trc' else number}"
+
+
+def _whole(frame: can.Message, number: int) -> can.Message:
+    """The frame if it holds as many bytes as it says."""
+    if not frame.is_remote_frame and not frame.is_error_frame:
+        if len(frame.data) < frame.dlc:
+            raise InputError(
+                f"frame {number} holds {len(frame.data)} of {frame.dlc} bytes: the file is cut off or damaged"
+            )
+        frame.is_fd = frame.is_fd or len(frame.data) > 8  # .csv and .db do not mark them
+    return frame
+
+
+class _Complaints(logging.Handler):
+    """What python-can has to say about lines that it skips."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+        self.count = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.count += 1
+        if self.count == 1:
+            self.texts.append(" ".join(record.getMessage().split())[:120])
+
+    def remark(self) -> list[str]:
+        lines = "line was" if self.count == 1 else "lines were"
+        return [f"{self.count} {lines} not understood and left out ({self.texts[0]})"] if self.count else []
+
+
+@contextlib.contextmanager
+def _listening() -> Iterator[_Complaints]:
+    log, ear = logging.getLogger("can"), _Complaints()
+    spread = log.propagate
+    log.addHandler(ear)
+    log.propagate = False
+    try:
+        yield ear
+    finally:
+        log.removeHandler(ear)
+        log.propagate = spread
+
+
+def read_log(path: str | Path, remarks: list[str] | None = None) -> Iterator[can.Message]:
+    """The frames of a log in the file's order: .log (candump -L), .asc, .blf, .trc, .db, .mf4, .csv of python-can.
+
+    Times in s since 1970 where the format has them; `channel` is always an interface name ("can0" where the file has
+    a number or nothing). remarks: gets what python-can could not read and left out. InputError of one line names the
+    file and the line or frame that is wrong, or says that there is no frame at all.
+    """
+    extension = _extension(path)
+    if extension == ".mf4":
+        library("asammdf", "MDF")
+    with reading(path, f"a {extension} log of CAN frames"), quiet_asammdf(), _listening() as complaints:
+        if extension == ".csv" and not is_frame_csv(path):
+            raise InputError(f"is no table of frames of python-can, expected the header {FRAME_CSV_HEAD}")
+        count = 0
+        for frame in _candump(path) if extension == ".log" else _library_frames(path, extension):
+            count += 1
+            frame.channel = _bus_name(extension, frame.channel)
+            yield _whole(frame, count)
+        if remarks is not None:
+            remarks += complaints.remark()
+        if count == 0:
+            raise InputError(f"holds no CAN frame, expected a {extension} log")
+
+
+def _library_frames(path: str | Path, extension: str) -> Iterator[can.Message]:
+    options: dict[str, Any] = {"relative_timestamp": False} if extension == ".asc" else {}
+    with can.LogReader(path, **options) as reader:
+        stated = getattr(reader, "file_size", None)
+        if extension == ".blf" and isinstance(stated, int) and stated > Path(path).stat().st_size:
+            raise InputError(f"has {Path(path).stat().st_size} bytes, its header says {stated}: the file is cut off")
+        yield from reader
+
+
+def _put_candump(part: Path, frames: Iterable[can.Message]) -> None:
+    with part.open("w", encoding="utf-8", newline="\n") as out:
+        for frame in frames:
+            out.write(log_line(frame, str(frame.channel or "can0")))
+
+
+def _put_db(part: Path, frames: Iterable[can.Message]) -> None:
+    """The table of python-can's SqliteWriter, which itself loses what waits in its queue when it is stopped."""
+    columns = "ts REAL, arbitration_id INTEGER, extended INTEGER, remote INTEGER, error INTEGER, dlc INTEGER, data BLOB"
+    with contextlib.closing(sqlite3.connect(part)) as base, base:
+        base.execute(f"CREATE TABLE messages ({columns})")
+        base.executemany(
+            "INSERT INTO messages VALUES (?, ?, ?, ?, ?, ?, ?)",
+            (
+                (f.timestamp, f.arbitration_id, f.is_extended_id, f.is_remote_frame, f.is_error_frame, f.dlc, f.data)
+                for f in frames
+            ),
+        )
+
+
+def _held(extension: str, frames: Iterable[can.Message]) -> Iterator[can.Message]:
+    """The frames, as long as the format can hold them."""
+    for number, frame in enumerate(frames, 1):
+        kind = _cannot_hold(extension, frame)
+        if kind is not None:
+            raise InputError(
+                f"frame {number} at {frame.timestamp:.6f} s is {kind}, which {extension} does not hold as python-can "
+                "writes it: choose .log, .blf or .mf4"
+            )
+        yield frame
+
+
+def _put(part: Path, extension: str, frames: Iterable[can.Message]) -> None:
+    if extension == ".log":
+        return _put_candump(part, frames)
+    if extension == ".db":
+        return _put_db(part, frames)
+    if extension == ".mf4":
+        return write_bus_mdf4(part, frames)
+    with can.Logger(str(part)) as writer:
+        for frame in frames:
+            writer.on_message_received(frame)
+    return None
+
+
+def write_log(path: str | Path, frames: Iterable[can.Message]) -> None:
+    """Write frames as .log (candump -L), .asc, .blf, .trc, .db, .mf4 or .csv, whole or not at all.
+
+    InputError when a frame is of a kind that the format drops (CAN FD in .csv, .db, .trc; remote and error frames in
+    .trc), or the file cannot be written. About 20 us a frame; .mf4 holds all frames in memory, 130 bytes each.
+    """
+    extension = _extension(path)
+    with writing(path) as part:
+        _put(part, extension, _held(extension, frames))
+
+
+def _changes(extension: str, summary: LogSummary) -> list[str]:
+    """What the new file does not say any more."""
+    out = []
+    if extension in (".csv", ".db"):
+        out = ["the interface names are not kept"] if set(summary.buses) != {"can0"} else []
+    elif extension != ".log" and any(not re.fullmatch(r"can\d+", bus) for bus in summary.buses):
+        name = next(bus for bus in summary.buses if not re.fullmatch(r"can\d+", bus))
+        out = [f"of the interface names only the numbers are kept: {name} reads back as can{bus_number(name)}"]
+    if extension == ".asc" and summary.errors:
+        out.append(f"identifier and data of {summary.errors} error frames are not kept")
+    return out
+
+
+def convert_log(source: str | Path, target: str | Path, progress: Callable[[int], None] | None = None) -> LogSummary:
+    """Convert a log of CAN frames by the extensions of both names; frames stay in their order, none is dropped.
+
+    progress: called every 10,000 frames. InputError as read_log() and write_log().
+    """
+    summary = LogSummary()
+
+    def counted() -> Iterator[can.Message]:
+        for frame in read_log(source, summary.remarks):
+            summary.take(frame)
+            if progress is not None and summary.frames % 10000 == 0:
+                progress(summary.frames)
+            yield frame
+
+    write_log(target, counted())
+    summary.remarks += _changes(_extension(target), summary)
+    return summary

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""What okid-convert does: records, results and logs of CAN frames from one file format into another."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from okid._errors import Error, InputError
+from okid.formats.by_name import EXTENSIONS, RESULT_EXTENSIONS, read_record, write_record, write_result
+from okid.formats.log_names import LOG_EXTENSIONS, is_frame_csv
+from okid.formats.mdf4 import holds_frames
+from okid.formats.result_tree import load_result
+from okid.formats.uff import uff_losses
+from okid.geometry import read_geometry
+from okid.interrupt import EXIT_INTERRUPTED
+
+EXIT_DONE, EXIT_USAGE = 0, 2
+_FRAMES_ONLY = (".log", ".asc", ".blf", ".trc", ".db")
+
+
+def _kind(path: Path, read: bool) -> str:
+    """ "frames", "record", "result" or "either" by the name, for files to read by a look at .csv and .mf4 too."""
+    ending = path.suffix.lower()
+    if ending == ".okj":
+        raise InputError(f"{path}: a journal is read and written by the program: okid convert {path} OUT.log")
+    if ending == ".json" and read:
+        return "result"
+    if (
+        ending in _FRAMES_ONLY
+        or path.name.lower().endswith(".can.csv")
+        or (read and ending == ".csv" and is_frame_csv(path))
+    ):
+        return "frames"
+    if ending == ".mf4":
+        return "either" if not read else "frames" if holds_frames(path) else "record"
+    if ending in EXTENSIONS:
+        return "record"
+    known = sorted({*EXTENSIONS, *LOG_EXTENSIONS, *([".json"] if read else [])})
+    raise InputError(f"{path}: the extension is {ending!r}, expected one of {', '.join(known)}")
+
+
+def _check_pair(source: Path, target: Path, given: str, wanted: str) -> None:
+    if given == "frames" and wanted == "record":
+        log = source if source.suffix.lower() == ".log" else source.with_suffix(".log")
+        first = "" if log == source else f"okid-convert {source} {log}, then "
+        raise InputError(
+            f"{source} holds CAN frames and {target} would hold samples: which bits are which channel stands in a "
+            f"CONFIG.toml, so {first}okid convert {log} OUT.csv -c CONFIG.toml (a table of frames: OUT.can.csv)"
+        )
+    if given == "record" and wanted == "frames":
+        raise InputError(
+            f"{source} holds samples and {target} would hold CAN frames: which bits are which channel stands in a "
+            "CONFIG.toml, so okid convert IN.csv OUT.log -c CONFIG.toml"
+        )
+    if given == "result" and target.suffix.lower() not in RESULT_EXTENSIONS:
+        raise InputError(f"{target}: an identified model is written as one of {', '.join(RESULT_EXTENSIONS)}")
+
+
+def _convert_frames(args: argparse.Namespace, source: Path, target: Path) -> str:
+    for option, value in (("--fs", args.fs), ("--channels", args.channels), ("--group", args.group)):
+        if value is not None:
+            raise InputError(f"{option} is for samples, {source} holds CAN frames")
+    from okid.formats.can_log import convert_log  # python-can: only when it is needed
+
+    summary = convert_log(source, target)
+    _note(summary.remarks)
+    span = (summary.last_s or 0.0) - (summary.first_s or 0.0)
+    return f"{target}: {summary.frames} frames over {span:.3f} s"
+
+
+def _convert_record(args: argparse.Namespace, source: Path, target: Path) -> str:
+    record = read_record(source, group=args.group, fs=args.fs)
+    if args.channels is not None:
+        record = record.select([name.strip() for name in args.channels.split(",")], str(source))
+    with source.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    record.notes = {"source": source.name, "source_sha256": digest, **record.notes}
+    write_record(target, record)
+    lost = uff_losses(record) if target.suffix.lower() in (".uff", ".unv") else []
+    lost = [one for one in lost if one not in ("note 'source'", "note 'source_sha256'")]
+    _note(record.remarks + ([f"not kept in a universal file: {', '.join(lost)}"] if lost else []))
+    rate = "no sample rate known" if record.fs_hz is None else f"{record.fs_hz:.9g} Hz"
+    count = f"{len(record.names)} channel{'s' * (len(record.names) != 1)}"
+    return f"{target}: {len(record.samples)} samples x {count}, {rate}"
+
+
+def _convert_result(args: argparse.Namespace, source: Path, target: Path) -> str:
+    for option, value in (("--fs", args.fs), ("--channels", args.channels), ("--group", args.group)):
+        if value is not None:
+            raise InputError(f"{option} is for samples, {source} is an identified model")
+    raw = load_result(source)
+    write_result(target, raw, None if args.geometry is None else read_geometry(args.geometry))
+    return f"{target}: {len(raw['modes'])} modes of {len(raw['outputs'])} outputs"
+
+
+def _note(remarks: Sequence[str]) -> None:
+    for remark in remarks:
+        print(f"okid-convert: note: {remark}", file=sys.stderr)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="okid-convert",
+        description="Convert measured samples, identified models or logs of CAN frames by file name extension. "
+        f"Samples: {', '.join(EXTENSIONS)}. Models: .json (okid.result/1) to {', '.join(RESULT_EXTENSIONS)}. "
+        "Logs: .log (candump -L), .asc, .blf, .trc, .db, .mf4, .can.csv.",
+        epilog="examples: okid-convert run.mf4 run.csv --channels force,a1,a2; "
+        "okid-convert result.json modes.uff --geometry frame.toml; okid-convert trace.blf trace.log",
+    )
+    parser.add_argument("source", metavar="IN", help="file to read")
+    parser.add_argument("target", metavar="OUT", help="file to write, whole or not at all")
+    parser.add_argument("--fs", type=float, metavar="HZ", help="sample rate, over what the file says")
+    parser.add_argument("--channels", metavar="a,b", help="only these channels, in this order")
+    parser.add_argument(
+        "--group", metavar="G", help="part of IN when it holds several rasters: its error message lists them"
+    )
+    parser.add_argument(
+        "--geometry", metavar="CONFIG.toml", help="its [geometry] gives a model's nodes and lines in .uff"
+    )
+    parser.add_argument("--force", action="store_true", help="replace OUT when it is there")
+    return parser
+
+
+def _run(args: argparse.Namespace) -> str:
+    source, target = Path(args.source), Path(args.target)
+    if not source.exists():
+        raise InputError(f"{source}: No such file or directory")
+    given, wanted = _kind(source, True), _kind(target, False)
+    _check_pair(source, target, given, wanted)
+    if args.geometry is not None and (given != "result" or target.suffix.lower() not in (".uff", ".unv")):
+        raise InputError("--geometry is for an identified model written as .uff or .unv")
+    if target.exists() and target.samefile(source):
+        raise InputError(f"{target}: IN and OUT are the same file: name another OUT")
+    if target.exists() and (target.is_dir() or not args.force):
+        remedy = "" if target.is_dir() else ": give --force to replace it"
+        raise InputError(f"{target}: is there already{remedy}")
+    if given == "frames":
+        return _convert_frames(args, source, target)
+    return _convert_result(args, source, target) if given == "result" else _convert_record(args, source, target)
+
+
+def convert(arguments: Sequence[str] | None = None) -> int:
+    """The command with its arguments (None = those of the process); exit code 0, 2 or 130 (interrupted)."""
+    args = _parser().parse_args(arguments)
+    try:
+        print(_run(args))
+    except Error as fault:
+        print(f"okid-convert: {fault}", file=sys.stderr)
+        return EXIT_USAGE
+    except OSError as fault:
+        print(f"okid-convert: {fault.filename or args.source}: {fault.strerror or fault}", file=sys.stderr)
+        return EXIT_USAGE
+    except KeyboardInterrupt:
+        print("okid-convert: interrupted, nothing was written", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    return EXIT_DONE

@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: MIT
+"""Universal files (.uff, .unv): time histories, FRFs, mode shapes, nodes and lines, in and out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from okid import _abi, frf
+from okid._errors import InputError
+from okid.formats.foreign_library import reading
+from okid.formats.result_tree import mode_arrays, result_dict, result_tree
+from okid.formats.uff_blocks import read_blocks
+from okid.formats.uff_function import FRF, ROLE_CODES, TIME, UffFunction, function_bytes, read_function
+from okid.formats.uff_model import (
+    UffMode,
+    header_text,
+    lines_text,
+    mode_text,
+    nodes_text,
+    read_header,
+    read_lines,
+    read_mode,
+    read_nodes,
+    read_units,
+    units_text,
+)
+from okid.geometry import Geometry
+from okid.records import Record, even_rate
+from okid.result import Result
+from okid.whole_file import whole_file
+
+FRF_LINES = 1025
+_SENSING = {"acceleration": (12, "m/s^2"), "velocity": (11, "m/s"), "displacement": (8, "m")}
+
+
+@dataclass
+class UffFile:
+    """What a universal file holds. nodes: coordinates by number; lines: pairs of nodes; others: data sets left out."""
+
+    functions: list[UffFunction] = field(default_factory=list)
+    modes: list[UffMode] = field(default_factory=list)
+    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    lines: list[tuple[int, int]] = field(default_factory=list)
+    header: dict[str, str] = field(default_factory=dict)
+    others: list[int] = field(default_factory=list)
+
+    @property
+    def frfs(self) -> list[UffFunction]:
+        """The frequency response functions."""
+        return [one for one in self.functions if one.kind == FRF]
+
+    def record(self, group: int | str | None = None) -> Record:
+        """The time histories as one record.
+
+        Functions of different length, rate or start are different records: an InputError lists them with numbers,
+        `group` chooses one. Nothing is resampled: an uneven abscissa is an InputError.
+        """
+        groups: list[list[UffFunction]] = []
+        keys: list[tuple[Any, ...]] = []
+        for one in self.functions:
+            if one.kind in (0, TIME) and not np.iscomplexobj(one.values) and len(one.values):
+                key = (len(one.values), _rate(one), round(one.start / (one.step or 1.0), 3))
+                if key not in keys:
+                    keys.append(key)
+                    groups.append([])
+                groups[keys.index(key)].append(one)
+        return _record(_choose(groups, group))
+
+
+def _rate(one: UffFunction) -> float | str:
+    return even_rate(one.abscissa) if one.abscissa is not None else one.rate_hz
+
+
+def _listed(groups: list[list[UffFunction]]) -> str:
+    texts = []
+    for number, group in enumerate(groups, 1):
+        rate = _rate(group[0])
+        grid = f"{rate:g} Hz" if isinstance(rate, float) else "uneven"
+        shown = ", ".join(one.name for one in group[:6]) + (" .." if len(group) > 6 else "")
+        texts.append(f"{number}: {shown} ({len(group[0].values)} samples, {grid}, from {group[0].start:g} s)")
+    return "; ".join(texts)
+
+
+def _choose(groups: list[list[UffFunction]], group: int | str | None) -> list[UffFunction]:
+    if not groups:
+        raise InputError("holds no time history (data set 58, function type 1)")
+    if group is None:
+        if len(groups) > 1:
+            raise InputError(
+                f"time histories on {len(groups)} grids, okid does not resample: "
+                f"choose with group= or --group ({_listed(groups)})"
+            )
+        return groups[0]
+    if not str(group).isdigit() or not 1 <= int(group) <= len(groups):
+        raise InputError(f"group is {group!r}, expected one of {_listed(groups)}")
+    return groups[int(group) - 1]
+
+
+def _unique(names: list[str]) -> list[str]:
+    """Names that stand twice get their position: "a", "a (2)"."""
+    out: list[str] = []
+    for name in names:
+        clean = "".join(c if c.isprintable() else " " for c in name).strip() or "function"
+        again = clean
+        while again in out:
+            again = f"{clean} ({len(out) + 1})"
+        out.append(again)
+    return out
+
+
+def _record(group: list[UffFunction]) -> Record:
+    first = group[0]
+    rate = _rate(first)
+    if isinstance(rate, str):
+        raise InputError(f"{first.name}: {rate}; an even abscissa is required, okid does not resample")
+    start = first.known.get("start_time")
+    notes = {} if start or first.date == "NONE" else {"date": first.date}
+    dofs = [one.known["dof"] if isinstance(one.known.get("dof"), int) else None for one in group]
+    return Record(
+        _unique([one.name for one in group]), np.column_stack([one.values for one in group]), rate,
+        [one.unit for one in group], first.title, datetime.fromisoformat(start) if start else None,
+        [one.role for one in group], dofs, notes,
+    )  # fmt: skip
+
+
+def read_uff(path: str | Path) -> UffFile:
+    """Read a universal file, ASCII or binary: data sets 15, 55, 58, 58b, 82, 151, 164 and 2411; the rest is counted.
+
+    About 1 s for 10^6 samples in ASCII, far less in binary. InputError of one line names the file, the data set and
+    the line that is wrong or cut off.
+    """
+    out, units = UffFile(), dict[int, str]()
+    with reading(path, "a universal file"):
+        for block in read_blocks(path):
+            if block.kind == 58:
+                out.functions.append(read_function(block, len(out.functions) + 1))
+            elif block.kind == 55 and (mode := read_mode(block)) is not None:
+                out.modes.append(mode)
+            elif block.kind in (15, 2411):
+                out.nodes.update(read_nodes(block))
+            elif block.kind == 82:
+                out.lines += read_lines(block)
+            elif block.kind == 151:
+                out.header = read_header(block)
+            elif block.kind == 164:
+                units = read_units(block)
+            else:
+                out.others.append(block.kind)
+    for one in out.functions:
+        if not one.unit and one.role in ROLE_CODES and not one.known:
+            one.unit = units.get(ROLE_CODES[one.role], "")
+    return out
+
+
+def _record_bytes(record: Record, binary: bool) -> list[bytes]:
+    if record.fs_hz is None:
+        raise InputError("a universal file needs a sample rate and the record has none: give fs_hz (okid-convert --fs)")
+    names, units = record.labels()
+    start = record.start_time
+    date = "NONE" if start is None else f"{start.astimezone(UTC):%d-%b-%y %H:%M:%S}"
+    out = []
+    for k, column in enumerate(record.samples.T):
+        role, dof = record.roles[k], record.dofs[k]
+        known: dict[str, Any] = {"fs_hz": float(record.fs_hz), "role": role, "dof": dof}
+        if start is not None:
+            known["start_time"] = start.astimezone(UTC).isoformat()
+        one = UffFunction(
+            names[k], TIME, column, 0.0, 1.0 / record.fs_hz, None, units[k], "", (dof or k + 1, 0), (0, 0), role,
+            record.title, date, known=known,
+        )  # fmt: skip
+        out.append(function_bytes(one, ROLE_CODES.get(role or "aux", 0), 0, binary))
+    return out
+
+
+def _place(name: str, number: int, geometry: Geometry | None) -> tuple[int, int, int]:
+    return (number, 0, 1) if geometry is None else geometry.place(name, number)
+
+
+def _mode_bytes(raw: dict[str, Any], geometry: Geometry | None, sensing: str) -> list[bytes]:
+    """The modes as data sets 55; without a geometry output k moves node k along x."""
+    arrays = mode_arrays(raw)
+    places = [_place(name, k, geometry) for k, name in enumerate(raw["outputs"], 1)]
+    nodes = sorted({node for node, _, _ in places})
+    out = []
+    for k in range(len(raw["modes"])):
+        shape = np.zeros((len(nodes), 3), dtype=np.complex128)
+        for value, (node, axis, sign) in zip(arrays["shapes"][:, k], places, strict=True):
+            shape[nodes.index(node), axis] = sign * value
+        f, z = float(arrays["frequency_hz"][k]), float(arrays["damping_ratio"][k])
+        remark = f"okid mode {k + 1}: {f!r} Hz, damping ratio {z!r}"
+        mode = UffMode(k + 1, f, z, nodes, shape, f"{raw.get('title') or 'okid'} {raw.get('method', '')}".strip())
+        out.append(mode_text(mode, _SENSING[sensing][0], remark).encode())
+    return out
+
+
+def _frf_bytes(raw: dict[str, Any], geometry: Geometry | None, binary: bool, sensing: str) -> list[bytes]:
+    """The responses of the model at FRF_LINES even lines from 0 Hz to Nyquist, output over input."""
+    model, inputs = result_tree(raw)["model"], list(raw["inputs"])
+    step = float(raw["fs_hz"]) / 2.0 / (FRF_LINES - 1)
+    response = frf.synthesise(model["A"], model["B"], model["C"], model["D"], model["dt"], step * np.arange(FRF_LINES))
+    code, unit = _SENSING[sensing]
+    out = []
+    for o, name in enumerate(raw["outputs"]):
+        for i, other in enumerate(inputs):
+            ends = []
+            for channel, number in ((name, o + 1), (other, i + 1)):
+                node, axis, sign = _place(channel, number, geometry)
+                ends.append((node, sign * (axis + 1)))
+            one = UffFunction(
+                f"{name} / {other}", FRF, response[:, o, i], 0.0, step, None, unit, "N", ends[0], ends[1],
+                title=str(raw.get("title") or ""), known={"df_hz": step},
+            )  # fmt: skip
+            out.append(function_bytes(one, code, 13, binary))
+    return out
+
+
+def write_uff(
+    path: str | Path,
+    what: Record | Result | Mapping[str, Any],
+    *,
+    geometry: Geometry | None = None,
+    binary: bool = True,
+    sensing: str = "acceleration",
+) -> None:
+    """Write a record, or a result (Result or okid.result/1 dictionary), as a universal file.
+
+    Both begin with data sets 151 (header) and 164 (SI). Record: a time history (58) a channel; NaN stays NaN.
+    Result: 55 for each mode, 58 for each modelled FRF, and 15 and 82 of `geometry`. binary: samples exact (58b), else
+    ASCII with 12 digits. sensing: what the outputs of the result are. InputError when a name or unit is too long,
+    the rate is not known, a channel has no place in the geometry, or the file cannot be written.
+    """
+    if sensing not in _SENSING:
+        raise InputError(f"sensing is {sensing!r}, expected {', '.join(_SENSING)}")
+    version = _abi.library().okid_version().decode()
+    title = what.title if isinstance(what, Record) else ""
+    parts = [header_text(title, version, datetime.now(UTC)).encode(), units_text().encode()]
+    try:
+        if isinstance(what, Record):
+            parts += _record_bytes(what, binary)
+        else:
+            raw = result_dict(what)
+            if geometry is not None:
+                parts += [nodes_text(geometry.nodes).encode(), lines_text(geometry.lines).encode()]
+            parts += _mode_bytes(raw, geometry, sensing) + _frf_bytes(raw, geometry, binary, sensing)
+    except InputError as fault:
+        raise InputError(f"{path}: {fault}") from None
+    with whole_file(path) as part, part.open("wb") as out:
+        out.writelines(parts)
+
+
+def uff_losses(record: Record) -> list[str]:
+    """What a universal file cannot keep of this record, in words; empty when it keeps everything."""
+    lost = [f"note {key!r}" for key in record.notes]
+    return lost + (["the title beyond 80 characters"] if len(record.title) > 80 else [])

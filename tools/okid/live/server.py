@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""The web server of the page: a fixed list of files, the stream of events, the spectra; nothing can be sent to it."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import json
+import socket
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from okid._errors import Error
+from okid.live.assets import Assets
+from okid.live.session import Session
+
+# Styles in the page and data: pictures are plotly.js's own; nothing that came from okid ever becomes markup.
+POLICY = (
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'; object-src 'none'"
+)
+HEADERS = {
+    "Content-Security-Policy": POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+REQUEST_S, STALLED_S, HEARTBEAT_S = 10.0, 20.0, 5.0
+MOST_SPECTRA = 8
+
+
+def is_loopback(host: str) -> bool:
+    """Does that address (or localhost) stay on this computer?"""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def host_of(header: str) -> str:
+    """The name in a Host header, without port and brackets, in small letters."""
+    name = header.strip().lower()
+    if name.startswith("["):
+        return name[1:].partition("]")[0]
+    return name.partition(":")[0]
+
+
+class PageServer(ThreadingHTTPServer):
+    """Serves the page of one Session on an address. Raises OSError when the address cannot be had."""
+
+    daemon_threads = True
+    block_on_close = False
+    request_queue_size = 32
+
+    def __init__(self, session: Session, host: str, port: int) -> None:
+        self.session, self.host, self.assets = session, host, Assets()
+        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+        self.address_family = family
+        self.allowed = {"127.0.0.1", "localhost", "::1", host.lower()}
+        super().__init__(address[:2], _Handler)
+
+    def server_bind(self) -> None:
+        """Bind; the name of this computer is not looked up, that can take long."""
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self.socket.bind(self.server_address)
+        self.server_address = self.socket.getsockname()
+        self.server_name, self.server_port = self.host, self.server_address[1]
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://{f'[{self.host}]' if ':' in self.host else self.host}:{self.server_port}/"
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that goes away in the middle is no news."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: PageServer
+    server_version, sys_version = "okid-live", ""
+    timeout = REQUEST_S
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Requests are not logged."""
+
+    def _refuse(self) -> None:
+        self._answer(HTTPStatus.METHOD_NOT_ALLOWED, b"only GET\n", "text/plain", {"Allow": "GET"})
+
+    do_HEAD = do_POST = do_PUT = do_DELETE = do_PATCH = do_OPTIONS = do_TRACE = do_CONNECT = _refuse
+
+    def do_GET(self) -> None:
+        """Files, /events, /spectra."""
+        if not self._meant_for_us():
+            self._answer(HTTPStatus.FORBIDDEN, b"this name does not belong to okid-live\n", "text/plain")
+            return
+        asked = urlsplit(self.path)
+        if asked.path == "/events":
+            self._send_events()
+        elif asked.path == "/spectra":
+            self._send_spectra(asked.query)
+        else:
+            self._send_file(asked.path)
+
+    def _meant_for_us(self) -> bool:
+        """A page of another site whose name was turned to this address (DNS rebinding) sends that name."""
+        given = self.headers.get_all("Host") or []
+        if len(given) != 1:
+            return False
+        name = host_of(given[0])
+        return name in self.server.allowed or name == self.connection.getsockname()[0].lower()
+
+    def _answer(
+        self, status: HTTPStatus, data: bytes, kind: str, more: dict[str, str] | None = None, last: bool = False
+    ) -> None:
+        self.send_response(status)
+        kept = "max-age=86400" if last else "no-store"
+        own = {"Content-Type": kind, "Content-Length": str(len(data)), "Cache-Control": kept}
+        for name, value in {**HEADERS, **own, **(more or {})}.items():
+            self.send_header(name, value)
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(data)
+
+    def _send_file(self, path: str) -> None:
+        asset = self.server.assets.get(path)
+        if asset is None:
+            self._answer(HTTPStatus.NOT_FOUND, b"nothing here\n", "text/plain")
+            return
+        more = {"Content-Encoding": "gzip"} if asset.gzip else {}
+        self._answer(HTTPStatus.OK, asset.data, asset.kind, more, last=asset.lasting)
+
+    def _send_spectra(self, query: str) -> None:
+        fields = parse_qs(query[:2000])
+        try:
+            numbers = {key: [int(n) for n in ",".join(fields.get(key, [])).split(",") if n] for key in
+                       ("channels", "output", "input")}  # fmt: skip
+            first = {key: (numbers[key] or [0])[0] for key in ("output", "input")}
+            found = self.server.session.spectra(numbers["channels"][:MOST_SPECTRA], first["output"], first["input"])
+        except (Error, ValueError) as fault:
+            self._answer(HTTPStatus.BAD_REQUEST, f"{fault}\n".encode(), "text/plain; charset=utf-8")
+            return
+        self._answer(HTTPStatus.OK, json.dumps(found, allow_nan=False).encode(), "application/json")
+
+    def _send_events(self) -> None:
+        session = self.server.session
+        outbox = session.open_page()
+        if outbox is None:
+            self._answer(HTTPStatus.SERVICE_UNAVAILABLE, b"too many pages are open\n", "text/plain")
+            return
+        try:
+            self.send_response(HTTPStatus.OK)
+            for name, value in {**HEADERS, "Content-Type": "text/event-stream", "Cache-Control": "no-store"}.items():
+                self.send_header(name, value)
+            self.end_headers()
+            self.connection.settimeout(STALLED_S)
+            self.wfile.write(b"retry: 1000\n\n")
+            while not outbox.closed:
+                waiting = outbox.take(HEARTBEAT_S)
+                for data in waiting or [b": here\n\n"]:
+                    self.wfile.write(data)
+        except OSError:
+            pass  # the browser has gone, or took nothing for STALLED_S
+        finally:
+            with contextlib.suppress(ValueError):
+                session.hub.leave(outbox)

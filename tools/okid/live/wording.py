@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""What an event is called in the page's log."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def _number(value: Any, form: str = ".6g") -> str:
+    return format(value, form) if isinstance(value, int | float) else "?"
+
+
+def _gap(event: dict[str, Any]) -> tuple[str, str]:
+    span = f"samples {event.get('first')} to {event.get('last')}"
+    return "bad", f"{event.get('channel')}: {event.get('count')} missing, {span} ({event.get('cause')})"
+
+
+def _alarm(event: dict[str, Any]) -> tuple[str, str]:
+    now, was = _number(event.get("frequency_hz")), _number(event.get("baseline_hz"))
+    sigma = _number(event.get("sigma_hz"), ".2g")
+    others = len(event.get("modes") or []) - 1
+    more = f", {others} more away" if others > 0 else ""
+    return "bad", f"alarm: mode {event.get('mode')} at {now} Hz, baseline {was} Hz, σ {sigma} Hz{more}"
+
+
+def _hit(event: dict[str, Any]) -> tuple[str, str]:
+    verdict = "good" if event.get("accepted") else f"refused ({event.get('reason')})"
+    return ("good" if event.get("accepted") else "warn"), f"blow {event.get('number')} {verdict}: {event.get('text')}"
+
+
+def _change(event: dict[str, Any]) -> tuple[str, str]:
+    done = "what was before is forgotten" if event.get("restarted") else "old samples stay in"
+    return "warn", f"the structure changed at sample {event.get('sample')}; {done}"
+
+
+def _result(event: dict[str, Any]) -> tuple[str, str]:
+    result = event.get("result") or {}
+    return "good", f"result: order {result.get('order')}, {len(result.get('modes') or [])} modes"
+
+
+def describe(event: dict[str, Any]) -> tuple[str, str] | None:
+    """Weight ("plain", "good", "warn", "bad") and text of an event; None for those that are no news (modes, stats)."""
+    kind = event["type"]
+    if kind in ("modes", "stats", "samples"):
+        return None
+    words = {"gap": _gap, "alarm": _alarm, "hit": _hit, "change": _change, "result": _result}
+    if kind in words:
+        return words[kind](event)
+    if kind == "start":
+        return "plain", f"start of {event.get('config')}, {event.get('wall_time')}"
+    if kind == "trigger":
+        return "plain", f"trigger ({event.get('source')}) at sample {event.get('sample')}"
+    if kind == "alarm_over":
+        return "good", "alarm over: every mode is back at its baseline"
+    if kind == "lost":
+        return "warn", f"{event.get('count')} lines of okid did not reach this page"
+    if kind in ("bus", "record"):
+        who = f"{event.get('bus')}: " if kind == "bus" else "recording: "
+        return "plain", f"{who}{event.get('event')} {event.get('text') or ''}".rstrip()
+    return "plain", f"event {kind!r}"

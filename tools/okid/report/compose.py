@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""From a result and what belongs to it to one HTML page, as text or as a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import matplotlib
+
+from okid import figures
+from okid._errors import InputError
+from okid.records import Record
+from okid.report import page
+from okid.report.agreement import fit_section, history_section, residual_section
+from okid.report.events import read_events
+from okid.report.geometry import read_geometry
+from okid.report.loaded import Loaded, load_result, loaded_from
+from okid.report.mass import mass_section
+from okid.report.material import Material
+from okid.report.measured import measure, measured_from
+from okid.report.modes import shape_sections, table_section
+from okid.report.other_kinds import check_kind
+from okid.report.page import count_of
+from okid.report.provenance import provenance_section, source_of
+from okid.report.responses import frf_section, markov_section, singular_section, spectra_section, stabilization_section
+from okid.report.summary import summary_section
+from okid.report.targets import check_place, check_target, write_whole
+from okid.report.tracking import tracking_section
+from okid.result import Result
+from okid.toml_file import read_toml
+
+Place = str | Path
+
+
+def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]:
+    yield summary_section(m)
+    yield table_section(m)
+    yield from shape_sections(m)
+    yield from mass_section(m)
+    yield tracking_section(m)
+    yield stabilization_section(m)
+    yield singular_section(m)
+    pairs: list[tuple[int, int]] = []
+    if m.result.inputs:
+        responses, pairs = frf_section(m)
+        yield responses
+        yield markov_section(m, pairs)
+    else:
+        yield spectra_section(m)
+    yield fit_section(m)
+    yield history_section(m, pairs)
+    yield residual_section(m)
+    yield provenance_section(m, written)
+
+
+def _placed(m: Material, geometry: Place | None, config: Place | None) -> None:
+    """Geometry and texts of the configurations: [geometry] of `geometry`, else of `config` when it has one."""
+    live = {} if m.events is None else m.events.channels
+    if geometry is not None:
+        m.geometry = read_geometry(geometry, m.result.outputs, live)
+        if m.geometry is None:
+            raise InputError(f"{geometry}: no section [geometry], expected nodes, dofs and lines")
+    elif config is not None:
+        m.geometry = read_geometry(config, m.result.outputs, live)
+    for place in dict.fromkeys(str(one) for one in (config, geometry) if one is not None):
+        m.texts.append((place, read_toml(place)[1]))
+
+
+def build(
+    result: Loaded,
+    record: Place | Record | None = None,
+    title: str | None = None,
+    *,
+    events: Place | None = None,
+    geometry: Place | None = None,
+    config: Place | None = None,
+    source: Place | None = None,
+    written: str | None = None,
+) -> str:
+    """The report as one HTML string; the same arguments and files give the same string.
+
+    `record`: a file, or what read_csv returns; `events`: JSON lines of the run; `geometry`, `config`: CONFIG.toml;
+    `source`: the file of the result, named in the provenance; `written`: when and by what, None = not told.
+    Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
+    """
+    m = Material(result)
+    named = record if isinstance(record, str | Path) else None
+    places = {"result": source, "record": named, "events": events, "geometry": geometry, "config": config}
+    for kind, path in places.items():
+        if path is not None:
+            check_kind(path, "config" if kind == "geometry" else kind)
+            m.sources.append(source_of(kind, path))
+    m.events = None if events is None else read_events(events)
+    _placed(m, geometry, config)
+    if named is not None:
+        m.measured = measure(result, named)
+    elif isinstance(record, Record):
+        m.measured = measured_from(result, record, "the record given")
+    elif record is not None:
+        raise InputError(f"record is {record!r:.60}, expected the name of a file or what okid.read_csv() returns")
+    with matplotlib.rc_context(cast(Any, figures.STYLE)):
+        sections = [one for one in _sections(m, written) if one is not None]
+    raw = result.raw
+    subtitle = f"{count_of(len(raw['modes']), 'mode')}, {count_of(len(result.inputs), 'input')}, "
+    subtitle += count_of(len(result.outputs), "output")
+    foot = f"okid {raw.get('version', '')}, schema {raw['schema']}. SI units unless the channel names say otherwise."
+    known = m.events.notes.get("title") if m.events is not None else None
+    return page.page(title or str(raw.get("title") or known or "Modal identification"), subtitle, sections, foot)
+
+
+def _loaded(result: object) -> Loaded:
+    """A Result, its to_dict(), a file or what load_result() returns. InputError for anything else."""
+    if isinstance(result, Loaded):
+        return result
+    if isinstance(result, str | Path):
+        return load_result(result)
+    if isinstance(result, Result):
+        return loaded_from(result.to_dict(), "the result")
+    if isinstance(result, dict):
+        return loaded_from(result, "the result")
+    raise InputError(
+        f"result is {result!r:.60}, expected what okid.identify() returns, its to_dict(), or the name of an "
+        "okid.result/1 file"
+    )
+
+
+def write_report(
+    result: Result | Loaded | dict[str, Any] | Place,
+    path: Place,
+    record: Place | Record | None = None,
+    *,
+    title: str | None = None,
+    events: Place | None = None,
+    geometry: Place | None = None,
+    config: Place | None = None,
+    written: str | None = None,
+) -> int:
+    """Write the report of a Result (its to_dict(), or a result file) to `path` as one HTML file; returns its bytes.
+
+    Arguments as of build(). Raises InputError with one line for what cannot be read, and when `path` is one of the
+    files that are read or an existing file that is not HTML; OSError when `path` cannot be written.
+    """
+    if not isinstance(path, str | Path):
+        raise InputError(f"path is {path!r:.60}, expected the name of the HTML file to write")
+    source = result if isinstance(result, str | Path) else None
+    named = record if isinstance(record, str | Path) else None
+    check_target(
+        path, {"result": source, "record": named, "events": events, "geometry": geometry, "config": config}
+    )  # fmt: skip
+    check_place(path, "path")
+    text = build(
+        _loaded(result), record, title, events=events, geometry=geometry, config=config, source=source, written=written
+    )  # fmt: skip
+    write_whole(path, text)
+    return len(text.encode("utf-8"))

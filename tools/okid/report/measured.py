@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: MIT
+"""What the record adds to a result: responses, poles over all orders, fit, time histories, residuals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from okid._errors import Error, IdentificationError, InputError
+from okid.frf import Frf, Spectra, h1, is_hit, spectra
+from okid.identify import identify
+from okid.model import Model
+from okid.record_fit import detrended, fit_records, stretches
+from okid.records import Record, read_csv
+from okid.report.loaded import Loaded, known_fit
+from okid.report.residual import Whiteness, whiteness
+from okid.report.scale import Agreement, agreement
+from okid.result import Fit
+from okid.stabilization import Stabilization
+
+Real = NDArray[np.float64]
+SHORTEST_LAGS, LONGEST_LAGS = 25, 60
+
+
+class Excerpt(NamedTuple):
+    """A stretch of the record and the model's answer to it: time_s (n,), measured and modelled (n, n_y).
+
+    `simulated`: from the inputs alone; else predicted one step ahead. `hit`: it begins before the hardest blow.
+    """
+
+    time_s: Real
+    measured: Real
+    modelled: Real
+    simulated: bool
+    hit: bool
+
+
+@dataclass
+class Measured:
+    """frf None: `no_frf` says why; fit: of the model to this record; spectra: of an ambient record only.
+
+    missing (channels,): samples of the record that are missing, inputs first; samples: rows of the record; part: which
+    of them everything else is made of, "" = all; record: the whole record, its channels as the model has them;
+    factor (n_y,): simulation over record, NaN = not comparable; converted: what was said of units that were made SI.
+    """
+
+    frf: Frf | None
+    no_frf: str
+    rows: Stabilization
+    fit: Fit
+    source: str
+    spectra: Spectra | None = None
+    innovation: Real | None = None
+    excerpt: Excerpt | None = None
+    whiteness: Whiteness | None = None
+    missing: NDArray[np.int64] | None = None
+    samples: int = 0
+    part: str = ""
+    record: Record | None = None
+    factor: Real | None = None
+    converted: list[str] = field(default_factory=list)
+
+
+def open_record(path: str | Path) -> Record:
+    """A record of any format the package reads, by the extension of its name."""
+    if Path(path).suffix.lower() == ".csv":
+        return read_csv(path)
+    from okid.formats import read_record  # brings the libraries of the formats with it
+
+    return read_record(path)
+
+
+def _channels(result: Loaded, record: Record, source: str) -> Record:
+    """The channels of the result in its order, inputs first. InputError when a name is missing or the rate another."""
+    own = record.select(result.inputs + result.outputs, source)
+    if record.fs_hz is not None and abs(record.fs_hz - result.fs) > 1e-3 * result.fs:
+        raise InputError(
+            f"{source}: sampled at {record.fs_hz:g} Hz, but the result is of {result.fs:g} Hz: "
+            "not the record it is from"
+        )
+    return own
+
+
+def _poles(result: Loaded, u: Real, y: Real, source: str) -> Stabilization:
+    """The poles over all orders, identified anew with the settings of the result. Errors name `source` and channel."""
+    raw = result.raw
+    method = str(raw.get("method", "okid-era"))
+    reach: dict[str, Any] = {} if method.startswith("n4sid") or not result.inputs else {"p": int(raw["p"])}
+    reach.update({"input_names": result.inputs} if result.inputs else {})
+    try:
+        return identify(
+            u if result.inputs else None, y, fs=result.fs, method=method, **reach, rows=int(raw["rows"]),
+            output_names=result.outputs,
+            detrend=str(raw.get("detrend", "mean")), start=str(raw.get("start", "moving")), order=int(raw["order"]),
+            max_order=max(int(raw["order"]) + 20, min(80, 3 * int(raw["order"]))), sigma_blocks=0,
+        ).stabilization()  # fmt: skip
+    except Error as fault:
+        raise type(fault)(f"{source}: {fault}", fault.status) from None
+
+
+class _Answer(NamedTuple):
+    """One stretch of the record without a missing input, and what the model makes of it."""
+
+    first: int
+    u: Real
+    y: Real
+    simulated: Real | None
+    predicted: Real | None
+
+
+def _answers(model: Model, predict: bool, data: Real, n_u: int) -> list[_Answer]:
+    """Every stretch of at least max(20, 2 order) samples, simulated (with inputs) and predicted (stable predictor)."""
+    out = []
+    for piece in stretches(data[:, :n_u], max(20, 2 * model.order)) if n_u else [slice(0, len(data))]:
+        u, y = data[piece, :n_u], data[piece, n_u:]
+        x0, simulated = None, None
+        if n_u:
+            radius = model.radius()
+            informed = math.log(1e-16) / math.log(radius) if 0.0 < radius < 1.0 else math.inf
+            used = max(1, int(min(len(u), informed)))
+            try:
+                x0 = model.initial_state(u[:used], y[:used])
+            except IdentificationError:
+                x0 = np.zeros(model.order)
+            simulated = model.simulate(u, x0)
+        out.append(_Answer(int(piece.start), u, y, simulated, model.predict(u, y, x0) if predict else None))
+    return out
+
+
+def _excerpt(result: Loaded, answers: list[_Answer]) -> Excerpt | None:
+    """About twelve periods of the lowest mode, 120 to 600 samples, where the responses are largest."""
+    usable = [one for one in answers if one.simulated is not None or one.predicted is not None]
+    if not usable:
+        return None
+    lowest = float(np.min(result.frequency_hz, initial=result.fs / 20.0))
+    wanted = int(np.clip(12.0 * result.fs / lowest, 120, 600))
+    best, place, most = usable[0], 0, -1.0
+    scale = np.sqrt(np.nanmean(np.vstack([one.y for one in usable]) ** 2, axis=0))
+    for one in usable:
+        power = np.sum(np.nan_to_num(one.y / np.where(scale > 0.0, scale, 1.0)) ** 2, axis=1)
+        summed = np.convolve(power, np.ones(min(wanted, len(power))), mode="valid")
+        if float(np.max(summed)) > most:
+            best, place, most = one, int(np.argmax(summed)), float(np.max(summed))
+    hit = bool(result.inputs) and is_hit(best.u)
+    if hit:
+        place = max(0, int(np.argmax(np.sum((best.u - np.median(best.u, axis=0)) ** 2, axis=1))) - wanted // 20)
+    part = slice(place, min(place + wanted, len(best.y)))
+    modelled = best.simulated if best.simulated is not None else best.predicted
+    assert modelled is not None
+    if not np.all(np.isfinite(modelled[part])):
+        return None  # an unstable model runs away
+    time = (best.first + np.arange(part.start, part.stop)) / result.fs
+    return Excerpt(time, best.y[part], modelled[part], best.simulated is not None, hit)
+
+
+def _residual(result: Loaded, answers: list[_Answer]) -> tuple[Whiteness | None, Real | None]:
+    """Correlations of the innovation, and its covariance (n_y, n_y); the predictor settles first."""
+    settle = 5 * len(result.matrices["A"])
+    pieces = []
+    for one in answers:
+        skip = min(settle, len(one.y) // 4)
+        if one.predicted is not None:
+            pieces.append((one.y[skip:] - one.predicted[skip:], one.u[skip:]))
+    if not pieces:
+        return None, None
+    e = np.vstack([error for error, _ in pieces])
+    whole = e[np.all(np.isfinite(e), axis=1)]
+    covariance = np.atleast_2d(np.cov(whole, rowvar=False)) if len(whole) > e.shape[1] + 1 else None
+    lags = int(min(max(SHORTEST_LAGS, int(result.raw["p"])), LONGEST_LAGS, len(e) // 10))
+    return whiteness(pieces, lags), covariance
+
+
+def measure(result: Loaded, path: str | Path) -> Measured:
+    """Everything above from the record at `path`. InputError or IdentificationError when it does not fit."""
+    return measured_from(result, open_record(path), str(path))
+
+
+def _used_rows(result: Loaded, rows: int) -> tuple[slice, str]:
+    """The rows that the result rests on, and that in words, "" = all: the end of the run for a live one's window."""
+    unknown = all(value is None for key in ("simulation_percent", "prediction_percent")
+                  for value in known_fit(result.raw, key))  # fmt: skip
+    used = int(result.raw["samples"])
+    if unknown and 0 < used < rows:
+        return slice(rows - used, rows), f"the last {used} of {rows} samples, which the result rests on"
+    return slice(0, rows), ""
+
+
+def _answering(result: Loaded, u: Real, y: Real) -> tuple[Frf | None, Spectra | None, str]:
+    """Responses, or spectra of an ambient record, or why there are none."""
+    try:
+        return (h1(u, y, result.fs), None, "") if result.inputs else (None, spectra(y, result.fs), "")
+    except InputError as fault:
+        return None, None, str(fault)
+
+
+def measured_from(result: Loaded, record: Record, source: str) -> Measured:
+    """The same from a record that is already read."""
+    own = _channels(result, record, source)
+    missing, rows = np.sum(~np.isfinite(own.samples), axis=0), len(own.samples)
+    used, part = _used_rows(result, rows)
+    n_u, detrend = len(result.inputs), str(result.raw.get("detrend", "mean"))
+    model, predict = result.model()
+    poles = _poles(result, own.samples[used, :n_u], own.samples[used, n_u:], source)
+    agreed: Agreement = agreement(model, own, n_u, detrend, used)
+    own = agreed.record
+    u, y = own.samples[used, :n_u], own.samples[used, n_u:]
+    responses, own_spectra, reason = _answering(result, u, y)
+    data = detrended(np.hstack([u, y]), detrend)
+    fit = fit_records(model, [data], result.outputs, predict)[0]
+    answers = _answers(model, predict, data, n_u)
+    white, covariance = _residual(result, answers)
+    excerpt = _excerpt(result, answers)
+    if excerpt is not None:
+        excerpt = excerpt._replace(time_s=excerpt.time_s + used.start / result.fs)
+    return Measured(
+        responses, reason, poles, fit, source, own_spectra, covariance, excerpt, white,
+        missing, rows, part, own, agreed.factor, agreed.said,
+    )  # fmt: skip

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""The sections on modes: table, shapes as sticks or on a geometry, complexity, AutoMAC."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from okid import figures
+from okid.report import drawings, page
+from okid.report.material import Material
+
+MOST_SHAPES, MOST_SQUARES = 16, 60
+
+
+def plain(value: Any, digits: str, factor: float = 1.0) -> str:
+    """A number, or a dash."""
+    return "–" if value is None else format(float(value) * factor, digits)
+
+
+def table_section(m: Material) -> page.Section:
+    """Frequencies, damping ratios, their deviations and the indicators."""
+    modes = m.result.raw["modes"]
+    if not modes:
+        return page.section("Modes", page.absent("The result holds no underdamped mode."))
+    f_std = any(one.get("frequency_std_hz") is not None for one in modes)
+    z_std = any(one.get("damping_ratio_std") is not None for one in modes)
+    head = ["mode", "f [Hz]", *(["± σ [Hz]"] if f_std else []), "ζ [%]", *(["± σ [%]"] if z_std else [])]
+    rows = []
+    for k, one in enumerate(modes, 1):
+        row = [str(k), plain(one["frequency_hz"], ".4f")]
+        row += [plain(one.get("frequency_std_hz"), ".2g")] if f_std else []
+        row.append(plain(one["damping_ratio"], ".4f", 100.0))
+        row += [plain(one.get("damping_ratio_std"), ".2g", 100.0)] if z_std else []
+        both = one.get("mpc") is not None and one.get("emac") is not None
+        cmi = one.get("cmi", float(one["mpc"]) * float(one["emac"]) if both else None)
+        rows.append([*row, plain(one.get("mpc"), ".4f"), plain(one.get("emac"), ".4f"), plain(cmi, ".4f")])
+    return page.section("Modes", page.table([*head, "MPC", "EMAC", "CMI"], rows), page.note(
+        "MPC: phase collinearity of the shape; EMAC: consistency of the mode over the Hankel matrix; CMI: MPC times "
+        "EMAC. 1 is best for all three; below 0.5 a mode is probably noise."))  # fmt: skip
+
+
+def _best(m: Material, most: int) -> list[int]:
+    """The modes with the highest EMAC, ascending in frequency."""
+    quality = [float(one.get("emac") or 0.0) for one in m.result.raw["modes"]]
+    return sorted(sorted(range(len(quality)), key=lambda k: -quality[k])[:most])
+
+
+def _sticks(m: Material) -> list[str]:
+    shown = _best(m, MOST_SHAPES)
+    columns = min(4, len(shown)) if len(m.result.outputs) <= 12 else min(2, len(shown))
+    bands = -(-len(shown) // columns)
+    letters = max(len(figures.short(name)) for name in m.result.outputs)
+    height = 1.9 + (0.06 * letters if letters > 6 else 0.0)  # long names stand upright
+    drawing = figures.figure(9.6 if len(m.result.outputs) > 12 else min(9.6, 3.2 * columns), height * bands)
+    for place, k in enumerate(shown, 1):
+        damping = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
+        title = f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz, {damping:.2f} %"
+        figures.draw_shape(drawing.add_subplot(bands, columns, place), m.result.shapes[k], m.result.outputs, title)
+    words = "Sign from the real part, largest entry 1, outputs in their order."
+    count = len(m.result.shapes)
+    if count > len(shown):
+        words += f" The {len(shown)} of {count} modes with the highest EMAC are shown."
+    return [m.pictures.inline(drawing, "mode shapes against the outputs"), page.note(words)]
+
+
+def _player(m: Material) -> list[str]:
+    """Moving shapes on the screen, all modes; on paper a still picture of each."""
+    geometry, result = m.geometry, m.result
+    assert geometry is not None
+    count = len(result.shapes)
+    buttons = "\n".join(
+        f'<button type="button" data-mode="{k}" aria-pressed="{"true" if k == 0 else "false"}">'
+        f"{k + 1}: {result.frequency_hz[k]:.2f} Hz</button>"
+        for k in range(count)
+    )
+    payload = {
+        "geometry": {
+            "nodes": geometry.nodes, "lines": geometry.lines, "dofs": geometry.dofs, "names": result.outputs,
+        },
+        "shapes": [
+            {"re": [round(float(x), 5) for x in shape.real], "im": [round(float(x), 5) for x in shape.imag]}
+            for shape in result.shapes
+        ],
+    }  # fmt: skip
+    live = (
+        f'<div class="player"><div class="bar" role="group" aria-label="mode">\n'
+        f'<button type="button" class="go">Pause</button>\n{buttons}</div>\n'
+        '<canvas tabindex="0" role="img" aria-label="moving mode shape"></canvas>\n'
+        '<p class="note">Drag or arrow keys: turn, + and −: zoom, space: stop, Home: the first view.</p></div>\n'
+        + page.data("shapes-data", payload)
+    )
+    columns = min(4, count)
+    bands = -(-count // columns)
+    drawing = figures.figure(2.4 * columns, 2.2 * bands)
+    for k in range(count):
+        ax = drawing.add_subplot(bands, columns, k + 1)
+        drawings.draw_at_rest_and_moved(ax, geometry, result.shapes[k])
+        ax.set_title(f"{k + 1}: {result.frequency_hz[k]:.2f} Hz")
+    absent = [name for name, dof in zip(result.outputs, geometry.dofs, strict=True) if dof is None]
+    words = "Dashed: at rest." + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
+    return [live, m.pictures.inline(drawing, "still pictures of the mode shapes", "still"), page.note(words)]
+
+
+def shape_sections(m: Material) -> list[page.Section]:
+    """Nothing without modes."""
+    if not len(m.result.shapes):
+        return []
+    moving = _player(m) if m.geometry is not None else []
+    parts = [*moving, *([page.heading("By output")] if moving else []), *_sticks(m)]
+    out = [page.section("Mode shapes", *parts, name="Shapes")]
+    if len(m.result.outputs) < 2:
+        return out
+    return [*out, _complexity(m), _automac(m)]
+
+
+def _complexity(m: Material) -> page.Section:
+    shown = _best(m, MOST_SHAPES)
+    columns = min(6, len(shown))
+    bands = -(-len(shown) // columns)
+    drawing = figures.figure(1.6 * columns, 1.75 * bands)
+    for place, k in enumerate(shown, 1):
+        axes = drawing.add_subplot(bands, columns, place, projection="polar")
+        figures.draw_compass(axes, m.result.shapes[k], f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz")
+    words = "Every entry of a shape in the complex plane: proportionally damped structures lie on one line."
+    return page.section(
+        "Complexity", m.pictures.inline(drawing, "entries of the shapes in the complex plane"), page.note(words)
+    )
+
+
+def _automac(m: Material) -> page.Section:
+    shown = _best(m, MOST_SQUARES)
+    size = min(6.6, 1.9 + 0.5 * len(shown))
+    drawing = figures.figure(size + 0.8, size)
+    drawing.set_layout_engine("constrained", w_pad=0.12)  # the square is fitted after the layout
+    labels = [f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz" for k in shown]
+    figures.draw_mac(drawing.add_subplot(), m.result.shapes[shown], labels)
+    words = "MAC of every pair of modes: full ink is 1 (the same shape), no ink 0. Off the diagonal it should be pale."
+    picture = m.pictures.inline(drawing, "modal assurance criterion of every pair of modes")
+    return page.section("AutoMAC", picture, page.note(words))

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: MIT
+"""The sections on order and responses: singular values, stabilization, responses or spectra, impulse response."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from okid import figures
+from okid.frf import cmif, synthesise, synthesise_spectra
+from okid.report import drawings, page
+from okid.report.material import Material
+from okid.stabilization import Stabilization
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+MOST_PAIRS = 4
+LINES = 1200  # of a synthesised response
+
+
+def singular_section(m: Material) -> page.Section:
+    """Singular values with the order."""
+    drawing = figures.figure(9.6, 3.0)
+    figures.draw_singular_values(drawing.add_subplot(), m.result.singular_values, int(m.result.raw["order"]))
+    words = (
+        "How strong each further state of a model would be, the largest first. Blue: the "
+        f"{int(m.result.raw['order'])} that this model keeps. A step down behind the dashed line says that the order "
+        "is clear; without a step, compare the orders in the stabilization diagram."
+    )
+    picture = m.pictures.inline(drawing, "singular values of the Hankel matrix")
+    return page.section("Singular values", picture, page.note(words))
+
+
+def _background(m: Material) -> tuple[Real, Real] | None:
+    """Largest singular value of the measured responses or spectra over frequency."""
+    if m.measured is None:
+        return None
+    if m.measured.frf is not None:
+        return m.measured.frf.frequency_hz[1:], cmif(m.measured.frf.response[1:])
+    if m.measured.spectra is not None:
+        return m.measured.spectra.frequency_hz[1:], np.sqrt(cmif(m.measured.spectra.power[1:]))
+    return None
+
+
+def _how_to_read(m: Material, rows: Stabilization) -> list[str]:
+    """The caption of the diagram, for somebody who sees one for the first time."""
+    order, tried, limits = int(m.result.raw["order"]), sorted({row.order for row in rows}), rows.criteria
+    words = [
+        f"How to read it: the record was identified again with orders from {tried[0]} to {tried[-1]} (a mode takes "
+        "two). A mark is a pole: a mode that the model of this order has at this frequency. Modes of the structure "
+        "come back in every order and stand above each other as a column of green dots; what noise makes up wanders.",
+        f"Blue dashed line: order {order}, that of the model of this report; green vertical lines: the "
+        f"{page.count_of(len(m.result.frequency_hz), 'mode')} of it. A column without a green line is a mode that the "
+        "model lacks (try a higher order), a green line without a column is a mode to doubt.",
+        "Marks: a value holds when the next lower order has a pole near it, within "
+        f"{100.0 * limits.frequency:g} % in frequency, {100.0 * limits.damping:g} % in damping and with the same shape "
+        f"(MAC ≥ {limits.mac:g}). Green dot: all three hold. Blue triangle: frequency and shape, the damping not. "
+        "Orange diamond: frequency and damping, the shape not. Red cross: the frequency alone. Grey point: none.",
+        f"Blue bands: {page.count_of(len(rows.modes), 'column')} found by the program in at least "
+        f"{100.0 * limits.share:g} % of the orders, whatever the order used; ring: the pole nearest the medians.",
+    ]
+    if _background(m) is not None:
+        kind = "responses" if m.measured is not None and m.measured.frf is not None else "spectra of the outputs"
+        words[-1] += f" Behind: largest singular value of the measured {kind} (CMIF) in dB, without a scale: it peaks "
+        words[-1] += "at the resonances."
+    return words
+
+
+def stabilization_section(m: Material) -> page.Section:
+    """Poles over frequency and order with the modes of the result."""
+    title = "Stabilization diagram"
+    if m.measured is None:
+        absent = page.absent("Needs the record: run okid-report again with --record FILE.csv.")
+        return page.section(title, absent, name="Stabilization")
+    drawing = figures.figure(9.6, 4.8)
+    behind = _background(m)
+    figures.draw_stabilization(
+        drawing.add_subplot(),
+        m.measured.rows,
+        m.result.shown_hz,
+        m.result.frequency_hz.tolist(),
+        behind,
+        int(m.result.raw["order"]),
+    )
+    picture = m.pictures.inline(drawing, "poles over frequency and model order")
+    return page.section(title, picture, *map(page.note, _how_to_read(m, m.measured.rows)), name="Stabilization")
+
+
+def choose_pairs(response: Complex, coherence: Real | None) -> list[tuple[int, int]]:
+    """Up to four (output, input): the strongest response weighted by coherence, every input once before any twice."""
+    power = np.sqrt(np.mean(np.abs(response) ** 2, axis=0))
+    scale = np.max(power, axis=1, keepdims=True)
+    score = np.divide(power, scale, out=np.zeros_like(power), where=scale > 0.0)
+    if coherence is not None and np.any(np.isfinite(coherence)):
+        score = score * np.nanmean(coherence, axis=0)[:, None]
+    n_y, n_u = score.shape
+    order = [divmod(int(k), n_u) for k in np.argsort(-score, axis=None, kind="stable")]
+    chosen: list[tuple[int, int]] = []
+    for most in range(1, n_y + 1):  # how often an input may appear
+        for pair in order:
+            fresh = pair not in chosen and all(pair[0] != o for o, _ in chosen)
+            if len(chosen) < MOST_PAIRS and fresh and sum(pair[1] == i for _, i in chosen) < most:
+                chosen.append(pair)
+    for pair in order:
+        if len(chosen) < min(MOST_PAIRS, n_y * n_u) and pair not in chosen:
+            chosen.append(pair)
+    return sorted(chosen)
+
+
+def arranged(count: int) -> tuple[int, int]:
+    """Bands and columns of so many pictures."""
+    columns = count if count <= 3 else 2
+    return -(-count // columns), columns
+
+
+def _frf_title(m: Material, pair: tuple[int, int]) -> str:
+    out, into = m.result.outputs[pair[0]], m.result.inputs[pair[1]]
+    units = [m.unit(out), m.unit(into)]
+    unit = f"  [({units[0]})/{units[1]}]" if all(units) else ""
+    return f"{figures.short(out)} / {figures.short(into)}{unit}"
+
+
+def _frf_words(m: Material, shown: int, with_coherence: bool) -> str:
+    measured = m.measured
+    total = len(m.result.outputs) * len(m.result.inputs)
+    words = f"Magnitude: output unit over input unit. Shown: {shown} of {total} pairs"
+    words += ", the strongest with the best coherence and every input." if shown < total else "."
+    if measured is not None and measured.frf is None:
+        return f"{words} Model only, the measured responses are left out: {measured.no_frf}."
+    if measured is None or measured.frf is None:
+        return f"{words} Model only: the measured response and the coherence need --record FILE.csv."
+    data = measured.frf
+    averages = page.count_of(data.averages, "average")
+    words += f" Measured: H1, {averages}, {data.resolution_hz:.3g} Hz lines; multiple coherence."
+    return words + ("" if with_coherence else " Too few averages for a coherence.")
+
+
+def frf_section(m: Material) -> tuple[page.Section, list[tuple[int, int]]]:
+    """Frequency responses of the chosen pairs, and which those are."""
+    a, raw = m.result.matrices, m.result.raw
+    line = np.linspace(m.result.shown_hz / 2000.0, m.result.shown_hz, LINES)
+    model = synthesise(a["A"], a["B"], a["C"], a["D"], float(raw["model"]["dt"]), line)
+    data = None if m.measured is None else m.measured.frf
+    pairs = choose_pairs(model if data is None else data.response[1:], None if data is None else data.coherence[1:])
+    with_coherence = data is not None and bool(np.any(np.isfinite(data.coherence)))
+    heights = [3.0, 1.3, 0.9][: 3 if with_coherence else 2]
+    bands, columns = arranged(len(pairs))
+    drawing = figures.figure(9.6, 3.7 * bands)
+    grid = drawing.add_gridspec(bands, columns)
+    for place, pair in enumerate(pairs):
+        cells = grid[divmod(place, columns)].subgridspec(len(heights), 1, height_ratios=heights)
+        axes: list[Any] = list(np.asarray(cells.subplots(sharex=True), dtype=object))
+        figures.draw_frf(axes, data, line, model, pair)
+        axes[0].set_title(_frf_title(m, pair))
+        axes[0].set_ylabel("magnitude")
+        if data is not None:
+            axes[0].legend(loc="best")
+        axes[1].set_ylabel("phase [°]")
+        if with_coherence:
+            axes[2].set_ylabel("coher.")
+        axes[-1].set_xlabel("frequency [Hz]")
+        drawing.align_ylabels(axes)
+    title = "Frequency responses" if data is None else "Frequency responses, measured and synthesised"
+    text = "frequency responses of the model" + ("" if data is None else " and of the record")
+    picture = m.pictures.inline(drawing, text)
+    words = page.note(_frf_words(m, len(pairs), with_coherence))
+    return page.section(title, picture, words, name="Responses"), pairs
+
+
+def _strongest(power: Complex) -> list[int]:
+    """Up to four outputs whose spectra rise highest above their own medians, in their order."""
+    own = np.abs(np.diagonal(power, axis1=1, axis2=2))
+    rise = np.max(own, axis=0) / np.maximum(np.median(own, axis=0), 1e-300)
+    return sorted(int(k) for k in np.argsort(-rise, kind="stable")[:MOST_PAIRS])
+
+
+def spectra_section(m: Material) -> page.Section:
+    """Spectra of the outputs of an ambient record, measured and of the innovation model."""
+    title, data = "Spectra of the outputs", None if m.measured is None else m.measured.spectra
+    if data is None:
+        why = "need the record: run okid-report again with --record FILE.csv"
+        why = why if m.measured is None else f"are left out: {m.measured.no_frf}"
+        return page.section(title, page.absent(f"The spectra {why}."), name="Spectra")
+    assert m.measured is not None
+    line = np.linspace(m.result.shown_hz / 2000.0, m.result.shown_hz, LINES)
+    model, usable = m.result.model()
+    made = None
+    if usable and m.measured.innovation is not None:
+        made = synthesise_spectra(model.A, model.K, model.C, m.measured.innovation, model.dt, line)
+    shown = _strongest(data.power[1:])
+    bands, columns = arranged(len(shown))
+    drawing = figures.figure(9.6, 2.7 * bands)
+    for place, out in enumerate(shown, 1):
+        ax = drawing.add_subplot(bands, columns, place)
+        drawings.draw_spectra(ax, data, line, made, m.result.shown_hz, out)
+        ax.set_title(figures.short(m.result.outputs[out], 30))
+        ax.set_xlabel("frequency [Hz]")
+        unit = m.unit(m.result.outputs[out])
+        ax.set_ylabel(f"PSD [({unit})²/Hz]" if unit else "PSD [unit²/Hz]")
+        ax.legend(loc="best")
+    averages = page.count_of(data.averages, "average")
+    words = f"Shown: {len(shown)} of {len(m.result.outputs)} outputs. Measured: Welch, {averages}."
+    words += " Model: the innovations through the predictor of the result." if made is not None else ""
+    picture = m.pictures.inline(drawing, "spectra of the outputs of the record")
+    return page.section(title, picture, page.note(words), name="Spectra")
+
+
+def markov_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Section | None:
+    """Markov parameters of the chosen pairs over time; None when the result has none."""
+    if len(m.result.markov) < 2:
+        return None
+    bands, columns = arranged(len(pairs))
+    drawing = figures.figure(9.6, 2.1 * bands)
+    for place, pair in enumerate(pairs, 1):
+        ax = drawing.add_subplot(bands, columns, place)
+        figures.draw_markov(ax, m.result.markov, 1.0 / m.result.fs, pair, _frf_title(m, pair))
+        ax.locator_params(axis="y", nbins=5)
+        ax.set_xlabel("time [s]")
+        ax.set_ylabel("Y")
+    words = "Markov parameters over time; the dot is Y₀ = D, the direct feed-through."
+    picture = m.pictures.inline(drawing, "Markov parameters")
+    return page.section("Impulse response", picture, page.note(words))

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""The keys of an okid.result/1 and what each must hold: a damaged value is named before anything is made of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from okid._errors import InputError
+
+NEEDED = (
+    "fs_hz", "samples", "inputs", "outputs", "p", "rows", "order", "singular_values", "model", "modes", "warnings",
+)  # fmt: skip
+# Key -> kind; "?" behind a kind: null and absent are fine too.
+_TOP = {
+    "fs_hz": "rate", "samples": "count", "records": "count?", "gaps": "count?", "inputs": "names", "outputs": "names",
+    "p": "count", "rows": "count", "order": "count", "method": "text?", "hold": "text?", "detrend": "text?",
+    "start": "text?", "version": "text?", "singular_values": "numbers", "model": "object", "markov": "object?",
+    "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
+}  # fmt: skip
+_MODEL = {"dt": "rate", "A": "matrix", "B": "matrix", "C": "matrix", "D": "matrix", "K": "loose matrix?"}
+_MODE = {
+    "frequency_hz": "number", "damping_ratio": "number", "shape_re": "numbers", "shape_im": "numbers",
+    "frequency_std_hz": "number?", "damping_ratio_std": "number?", "mpc": "number?", "emac": "number?",
+    "cmi": "number?",
+}  # fmt: skip
+_FIT = {"simulation_percent": "by name?", "prediction_percent": "by name?"}
+_MKR = {
+    "M": "matrix", "K": "matrix", "R": "matrix", "R_normal_modes": "matrix", "checks": "object",
+    **{f"{name}_std": "loose matrix?" for name in ("M", "K", "R", "R_normal_modes")},
+}  # fmt: skip
+_PDC = {"alpha": "number", "beta": "number", "R": "matrix", "alpha_std": "number?", "beta_std": "number?"}
+_CHECKS = {
+    "m_positive_definite": "flag?", "k_positive_definite": "flag?", "r_positive_definite": "flag?",
+    "ww_residual": "number?", "feedthrough_misfit": "number?", "feedthrough_gain": "number?",
+    "selection_margin": "number?", "eigenvector_condition": "number?", "modes_used": "list?",
+}  # fmt: skip
+_WORDS = {
+    "rate": "a number above 0", "count": "a whole number from 0 on", "number": "a number", "text": "text",
+    "flag": "true or false", "names": "a list of names", "numbers": "a list of numbers", "list": "a list",
+    "matrix": "a list of rows of finite numbers", "loose matrix": "a list of rows of numbers or null",
+    "object": "an object", "objects": "a list of objects", "by name": "an object of numbers by output",
+}  # fmt: skip
+
+
+def _number(value: Any) -> bool:
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond 1e308
+        return False
+
+
+def _all(value: Any, kind: str) -> bool:
+    return isinstance(value, list) and all(_holds(one, kind) for one in value)
+
+
+def _holds(value: Any, kind: str) -> bool:
+    """Is the value of this kind?"""
+    if kind.endswith("?"):
+        return value is None or _holds(value, kind[:-1])
+    simple = {"text": str, "flag": bool, "list": list, "object": dict}
+    if kind in simple:
+        return isinstance(value, simple[kind])
+    if kind == "rate":
+        return _number(value) and value > 0
+    if kind == "count":
+        return _number(value) and value >= 0 and float(value).is_integer()
+    if kind == "by name":
+        return isinstance(value, dict) and all(one is None or _number(one) for one in value.values())
+    inner = {"names": "text", "numbers": "number", "objects": "object", "matrix": "numbers", "maybe": "number?"}
+    inner["loose matrix"] = "maybe"
+    return _all(value, inner[kind]) if kind in inner else _number(value)
+
+
+def _check(given: dict[str, Any], kinds: dict[str, str], where: str, source: str) -> None:
+    for key, kind in kinds.items():
+        value = given.get(key)
+        if key not in given and not kind.endswith("?"):
+            raise InputError(f"{source}: key {where + key!r} is missing, expected {_WORDS[kind]}")
+        if not _holds(value, kind):
+            raise InputError(f"{source}: {where}{key} is {value!r:.60}, expected {_WORDS[kind.rstrip('?')]}")
+
+
+def check_keys(raw: Any, source: str) -> None:
+    """InputError names `source`, the key, what was found and what was expected. Keys that are not known are free."""
+    schema = raw.get("schema") if isinstance(raw, dict) else None
+    if schema != "okid.result/1":
+        raise InputError(f"{source}: schema is {schema!r:.60}, expected 'okid.result/1'")
+    missing = [key for key in NEEDED if key not in raw]
+    if missing:
+        raise InputError(f"{source}: key {missing[0]!r} is missing")
+    _check(raw, _TOP, "", source)
+    if not raw["outputs"] or not raw["singular_values"]:
+        empty = "singular_values" if raw["outputs"] else "outputs"
+        raise InputError(f"{source}: {empty} is [], expected at least one")
+    model = dict(raw["model"])
+    if not raw["inputs"]:  # of an ambient result: empty or null
+        model.update(B=[], D=[])
+    _check(model, _MODEL, "model.", source)
+    for number, mode in enumerate(raw["modes"]):
+        _check(mode, _MODE, f"modes[{number}].", source)
+        for key in ("shape_re", "shape_im"):
+            if len(mode[key]) != len(raw["outputs"]):
+                text = f"has {len(mode[key])} numbers, expected {len(raw['outputs'])}, one an output"
+                raise InputError(f"{source}: modes[{number}].{key} {text}")
+        if mode["frequency_hz"] <= 0:
+            raise InputError(f"{source}: modes[{number}].frequency_hz is {mode['frequency_hz']!r}, expected Hz above 0")
+    _check(raw.get("fit") or {}, _FIT, "fit.", source)
+    if raw.get("mkr") and raw.get("pdc"):
+        _check(raw["mkr"], _MKR, "mkr.", source)
+        _check(raw["mkr"]["checks"], _CHECKS, "mkr.checks.", source)
+        _check(raw["pdc"], _PDC, "pdc.", source)

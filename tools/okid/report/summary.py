@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""The first section: what came out in a few lines, what was measured, whether every channel is complete, remarks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from okid.report import page
+from okid.report.completeness import complete_table, completeness, losses
+from okid.report.material import Material
+from okid.report.page import count_of
+from okid.report.remarks import remark_list
+from okid.report.verdict import verdict
+
+WORDS = ("title", "structure", "operator", "notes")
+
+
+def _notes(m: Material) -> dict[str, str]:
+    """Title, operator, structure ... of the record and of the run; the run has the last word."""
+    record = None if m.measured is None else m.measured.record
+    out = {} if record is None else {**({"title": record.title} if record.title else {}), **record.notes}
+    return {**out, **(m.events.notes if m.events is not None else {})}
+
+
+def _facts(m: Material) -> list[tuple[str, str]]:
+    r: dict[str, Any] = m.result.raw
+    notes = _notes(m)
+    rows = [(key.capitalize(), notes[key]) for key in WORDS if notes.get(key)]
+    rows += [(key.capitalize(), text) for key, text in notes.items() if key not in WORDS]
+    start = None if m.events is None or m.events.start is None else m.events.start.get("wall_time")
+    record = None if m.measured is None else m.measured.record
+    if start:
+        rows.append(("Begun", str(start)[:19].replace("T", " ") + " UTC"))
+    elif record is not None and record.start_time is not None:
+        rows.append(("Begun", record.start_time.isoformat()))
+    stamped = None if m.events is None else m.events.stamped_hz
+    seconds = int(r["samples"]) / m.result.fs
+    rows += [
+        (
+            "Samples",
+            f"{r['samples']} at {m.result.fs:g} Hz ({seconds:.2f} s) in {count_of(r.get('records', 1), 'record')}",
+        ),
+        *([] if stamped is None else [("Rate by the stamps", f"{stamped:.6g} Hz")]),
+        ("Gaps", f"{r.get('gaps', 0)}"),
+        ("Inputs", ", ".join(m.result.inputs) or "none: ambient"),
+        ("Outputs", ", ".join(m.result.outputs)),
+        ("Method", f"{r.get('method', '–')}, p = {r['p']}, {r['rows']} block rows, order {r['order']}"),
+        ("Treatment", f"hold {r.get('hold', '–')}, detrend {r.get('detrend', '–')}, start {r.get('start', 'moving')}"),
+    ]
+    if m.measured is not None:
+        rows.append(("Record", m.measured.source))
+        rows += [("Looked at", m.measured.part)] if m.measured.part else []
+    return rows
+
+
+def summary_section(m: Material) -> page.Section:
+    """Verdict, facts, completeness, remarks."""
+    facts, complete, told = page.facts(_facts(m)), complete_table(m), remark_list(m)
+    if len(completeness(m)) <= 12:
+        return page.section("Summary", verdict(m), page.beside(facts, complete), losses(m), told)
+    return page.section("Summary", verdict(m), facts, told, complete, losses(m))

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""A matplotlib figure as inline SVG whose ink follows the page: colours become CSS variables, text stays text."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from html import escape
+from itertools import count
+
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from okid import figures
+
+INK = {
+    figures.DARK: "--ink",
+    figures.EDGE: "--muted",
+    figures.GRID: "--grid",
+    figures.FAINT: "--faint",
+    figures.BLUE: "--blue",
+    figures.ORANGE: "--orange",
+    figures.GREEN: "--green",
+    figures.RED: "--red",
+    figures.GREY: "--grey",
+    figures.PAPER: "--paper",
+}
+_NUMBERS = re.compile(r"\b(d|x|y|points|transform|width|height)=\"([^\"]*)\"")
+_LONG = re.compile(r"-?\d+\.\d{3,}")
+
+
+def _short(found: re.Match[str]) -> str:
+    return f"{round(float(found.group()), 2) + 0.0:g}"
+
+
+class Pictures:
+    """Makes the pictures of one page; every picture has its own names for clips and markers."""
+
+    def __init__(self) -> None:
+        self._numbers = count(1)
+
+    def inline(self, drawing: Figure, text: str, kind: str = "fig") -> str:
+        """The figure as <svg role="img"> with `text` for those who cannot see it; same numbers, same bytes."""
+        raw = _raw(drawing)
+        root = raw[raw.index("<svg") :]
+        mark = f"f{next(self._numbers)}-"
+        used = set(re.findall(r"(?:url\(#|href=\"#)([^)\"]+)", root))
+
+        def tag(found: re.Match[str]) -> str:
+            return _tag(found.group(), mark, used)
+
+        body = re.sub(r"<[^>]*>", tag, re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", root, flags=re.S))
+        body = re.sub(r"\n\s*", "\n", body.strip())
+        body = body.replace("<defs>\n</defs>\n", "")
+        for _ in range(3):  # groups of nothing, one inside the other
+            body = re.sub(r"<g>\s*</g>\n?", "", body)
+        size = re.search(r"viewBox=\"([^\"]+)\"", body)
+        assert size is not None  # matplotlib always writes one
+        width = float(size.group(1).split()[2])
+        label = escape(text, quote=True)
+        top = f'<svg class="{kind}" role="img" aria-label="{label}" viewBox="{size.group(1)}"'
+        top += f' style="max-width:{width * 1.5:.0f}px">'
+        return re.sub(r"<svg[^>]*>", lambda _: top, body, count=1)
+
+
+def _raw(drawing: Figure) -> str:
+    """The SVG as matplotlib writes it, with places that are the same every time."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*missing from.*font")  # the reader's browser has its own fonts
+        canvas = FigureCanvasSVG(drawing)
+        engine = drawing.get_layout_engine()
+        if engine is not None:
+            engine.execute(drawing)
+        drawing.set_layout_engine("none")
+        for axes in drawing.axes:  # the layout solver is not repeatable in its last digits
+            axes.set_position(tuple(round(x, 4) for x in axes.get_position(original=True).bounds))
+        buffer = io.StringIO()
+        # savefig would draw everything twice
+        canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]
+    return buffer.getvalue()
+
+
+def _tag(text: str, mark: str, used: set[str]) -> str:
+    """One tag: own names, short numbers, colours of the page, fonts of the page."""
+    text = re.sub(r" id=\"([^\"]+)\"", lambda m: f' id="{mark}{m[1]}"' if m[1] in used else "", text)
+    text = re.sub(r"(url\(#|href=\"#)", rf"\g<1>{mark}", text).replace("xlink:href", "href")
+    text = _NUMBERS.sub(lambda m: f'{m[1]}="{_LONG.sub(_short, m[2])}"', text)
+    text = re.sub(r"(font: [^;\"]*?[\d.]+px) [^;\"]*", r"\1 var(--sans)", text)
+    text = re.sub(r"font-family: [^;\"]*", "font-family: var(--sans)", text)
+    return re.sub(r"#[0-9a-f]{6}\b", lambda m: f"var({INK.get(m[0], m[0])})" if m[0] in INK else m[0], text)

@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: MIT
+// The live page: what okid-live sends goes to lanes, plots, tables and the picture of the shape. It only listens.
+
+import { Lanes, numbers } from "./lanes.js";
+import { Plot, diagram, frf, spectra, tracking } from "./plots.js";
+import { Log, showHits, showModes, showResult, showStats } from "./tables.js";
+
+const by = (id) => document.getElementById(id);
+const MOST_SPECTRA = 8, MOST_UPDATES = 1000;
+const ADD_SAMPLES = "okid does not send the signals: add samples = true to [publish] of the config and start okid again";
+const page = { run: null, facts: null, state: null, modes: null, result: null, diagram: null, spectra: null, generation: 0, updates: [] };
+const lanes = new Lanes(by("lanes")), log = new Log(by("log"));
+let shape = null;
+
+const plots = {
+  tracking: new Plot("tracking", () => tracking(page.updates, page.state.marks, by("tracking-kind").value)),
+  frf: new Plot("frf", makeFrf),
+  spectra: new Plot("spectra", makeSpectra),
+  diagram: new Plot("diagram", () => (page.diagram ? diagram(page.diagram, topFrequency()) : waiting())),
+};
+
+const inputs = () => page.facts.channels.filter((one) => one.role === "force");
+const outputs = () => page.facts.channels.filter((one) => one.role !== "force" && one.role !== "aux");
+
+function waiting() {
+  if (!page.state || page.state.samples === "off") return ADD_SAMPLES;
+  return page.facts.hammer ? "waiting for a good blow" : "waiting for samples";
+}
+
+// Upper end of the frequency axes: Nyquist, or well above the highest mode.
+function topFrequency() {
+  const nyquist = (page.facts.rate_hz || 2) / 2, source = page.result || page.modes;
+  const highest = Math.max(0, ...(source ? source.modes.map((mode) => mode.frequency_hz) : []));
+  return highest > 0 ? Math.min(nyquist, 2 * highest) : nyquist;
+}
+
+function makeFrf() {
+  if (page.facts.channels.length && (!inputs().length || !outputs().length)) return "no response function without a force and a response";
+  const made = page.spectra && frf(page.spectra, units());
+  return made || waiting();
+}
+
+function makeSpectra() {
+  const found = page.spectra;
+  return found && found.channels.length && found.averages ? spectra(found, page.facts.channels, page.facts.hammer) : waiting();
+}
+
+function units() {
+  const y = outputs()[by("frf-output").selectedIndex], u = inputs()[by("frf-input").selectedIndex];
+  return y && u ? `(${y.unit || "–"})/${u.unit || "–"}` : "";
+}
+
+// -- what comes -------------------------------------------------------------------------------------------------------
+
+function showHello(hello) {
+  const other = hello.run !== page.run;
+  Object.assign(page, { run: hello.run, facts: hello.facts, result: hello.result, diagram: hello.diagram, modes: hello.modes });
+  showState(hello.state);
+  if (other) begin();
+  page.generation = -1;
+  takeTracks(hello.tracks);
+  takeModes(hello.modes);
+  if (hello.stats) showStats(hello.stats);
+  takeLog(hello.log);
+  takeHits(hello.hits);
+  takeResult(hello.result);
+  plots.diagram.want();
+  showDiagramNote();
+  fetchSpectra();
+}
+
+function begin() {
+  const { facts, state } = page, measured = state.measured;
+  Object.assign(page, { spectra: null, updates: [] });
+  document.title = facts.title ? `${facts.title} – okid live` : "okid live";
+  by("title").textContent = facts.title || "okid live";
+  by("facts").textContent = [facts.config, facts.rate_hz ? `${facts.rate_hz} Hz` : "", `${facts.channels.length} channels`, facts.method,
+    facts.window_s ? `window ${facts.window_s} s` : facts.forgetting ? `forgetting ${facts.forgetting}` : "all samples"].filter(Boolean).join(" · ");
+  lanes.reset(facts.channels, measured ? measured.columns : 1, measured ? measured.column_s : 1);
+  lanes.rate = facts.rate_hz;
+  log.reset();
+  showHits([]);
+  by("hammer").hidden = !facts.hammer;
+  for (const id of ["bus-table", "channel-table"]) by(id).replaceChildren();
+  document.querySelector("#health .absent").textContent = "no counts yet";
+  by("health-note").textContent = "";
+  choices();
+  options(by("frf-output"), outputs().map((one) => one.name));
+  options(by("frf-input"), inputs().map((one) => one.name));
+  for (const plot of Object.values(plots)) plot.want();
+}
+
+function showState(state) {
+  page.state = state;
+  const badge = by("link"), kind = { live: "good", ended: "", waiting: "warn" }[state.link];
+  badge.textContent = state.text;
+  badge.className = `badge ${kind}`;
+  by("clock").textContent = `t = ${state.t.toFixed(1)} s`;
+  by("alarm").hidden = !state.alarm;
+  const off = state.samples !== "live" && !(state.measured && lanes.end > 0);
+  by("lanes").hidden = off;
+  const text = document.querySelector("#signals .absent");
+  text.hidden = !off;
+  text.textContent = state.samples === "off" ? ADD_SAMPLES : "waiting for samples";
+  if (!plots.tracking.stale) markTracks();
+}
+
+let markedBefore = 0;
+function markTracks() {
+  if (page.state.marks.length !== markedBefore) plots.tracking.want();
+  markedBefore = page.state.marks.length;
+}
+
+function takeModes(event) {
+  page.modes = event;
+  showModes(event, page.result);
+  const badge = by("settled");
+  badge.hidden = !event || Boolean(page.result);
+  if (event) {
+    badge.textContent = event.settled ? "settled" : "settling";
+    badge.className = `badge ${event.settled ? "good" : "warn"}`;
+  }
+  showShapes();
+}
+
+function takeTracks(tracks) {
+  if (tracks.generation !== page.generation) page.updates = [];
+  page.generation = tracks.generation;
+  const last = page.updates.length ? page.updates[page.updates.length - 1].n : 0;
+  page.updates.push(...tracks.updates.filter((update) => update.n > last));
+  page.updates.splice(0, page.updates.length - MOST_UPDATES);
+  plots.tracking.want();
+}
+
+function takeLog({ entries }) {
+  for (const entry of log.add(entries)) if (entry.type === "gap") lanes.gap(entry.channel, entry.first, entry.last);
+}
+
+function takeHits(hits) {
+  if (page.facts.hammer || hits.length) {
+    by("hammer").hidden = false;
+    showHits(hits);
+  }
+}
+
+function takeResult(result) {
+  page.result = result;
+  by("result").hidden = !result;
+  if (!result) return;
+  showResult(result);
+  takeModes(page.modes);
+  fetchSpectra();
+}
+
+function showDiagramNote() {
+  const found = page.diagram;
+  const what = found && (page.facts.hammer ? `${found.stretches} blows` : `last ${found.seconds && found.seconds.toFixed(1)} s`);
+  const lines = found && !found.text ? found.modes.filter((mode) => mode[0] <= topFrequency()).length : 0;
+  by("diagram-note").textContent = found && !found.text ? `${what}, p = ${found.p}, ${lines} mode${lines === 1 ? "" : "s"} hold${lines === 1 ? "s" : ""}` : "";
+}
+
+// -- spectra are fetched for the channels this page shows ---------------------------------------------------------------
+
+let fetching = false, again = false;
+async function fetchSpectra() {
+  if (!page.facts || !page.facts.channels.length || document.hidden) return;
+  if (fetching) return void (again = true);
+  fetching = true;
+  const channels = lanes.shown.slice(0, MOST_SPECTRA).join(",");
+  try {
+    const reply = await fetch(`spectra?channels=${channels}&output=${Math.max(0, by("frf-output").selectedIndex)}&input=${Math.max(0, by("frf-input").selectedIndex)}`);
+    if (reply.ok) takeSpectra(await reply.json());
+  } catch {
+    // the server has gone: the badge says it
+  }
+  fetching = false;
+  if (again) {
+    again = false;
+    fetchSpectra();
+  }
+}
+
+function takeSpectra(found) {
+  if (found.text) return;
+  found.top = topFrequency();
+  found.frequency = numbers(found.frequency);
+  found.spectra = found.spectra.map((one) => numbers(one));
+  for (const key of ["magnitude", "phase", "coherence", "model", "model_phase"]) {
+    if (found.response && found.response[key]) found.response[key] = numbers(found.response[key]);
+  }
+  page.spectra = found;
+  const more = lanes.shown.length > MOST_SPECTRA ? `, first ${MOST_SPECTRA} chosen channels` : "";
+  const what = page.facts.hammer ? "blows" : "averages";
+  const number = found.most && found.averages > found.most ? `newest ${found.most}` : found.averages;
+  by("spectra-note").textContent = `${number} ${what} of ${found.segment_s.toPrecision(3)} s, ${found.resolution_hz.toPrecision(3)} Hz a line${more}`;
+  plots.spectra.want();
+  plots.frf.want();
+}
+
+// -- the picture of the shape -------------------------------------------------------------------------------------------
+
+// Place of every response: on the geometry of the config, else on a stick of one node a response.
+function geometry(names) {
+  const own = page.facts.geometry, channels = outputs();
+  if (own && own.dofs.length) {
+    const dofs = names.map((_, k) => own.dofs[((channels[k] && channels[k].dof) || k + 1) - 1] || null);
+    return { nodes: own.nodes, lines: own.lines, dofs, names };
+  }
+  const nodes = names.map((_, k) => [0, 0, k + 1]);
+  return { nodes: [[0, 0, 0], ...nodes], lines: names.map((_, k) => [k + 1, k + 2]), dofs: names.map((_, k) => [k + 2, "x"]), names };
+}
+
+function showShapes() {
+  const source = page.result || page.modes, list = source ? source.modes.filter((mode) => Array.isArray(mode.shape_re)) : [];
+  by("shape-canvas").hidden = !list.length;
+  document.querySelector("#shape .absent").textContent = list.length ? "" : "no modes yet";
+  if (!list.length) return;
+  const select = by("shape-mode"), chosen = Math.max(0, select.selectedIndex);
+  options(select, list.map((mode, k) => `${k + 1}: ${mode.frequency_hz.toPrecision(5)} Hz`));
+  select.selectedIndex = Math.min(chosen, list.length - 1);
+  const shapes = list.map((mode) => ({ re: mode.shape_re, im: mode.shape_im }));
+  const names = outputs().length === shapes[0].re.length ? outputs().map((one) => one.name) : shapes[0].re.map((_, k) => String(k + 1));
+  const place = geometry(names), key = JSON.stringify([page.run, names]);
+  if (!shape) {
+    shape = window.okidShapes(by("shape-canvas"), place, shapes);
+    shape.show(select.selectedIndex);
+    playing();
+  } else {
+    shape.set(shapes, key === page.shapeKey ? undefined : place);
+    if (shape.mode !== select.selectedIndex) shape.show(select.selectedIndex);
+  }
+  page.shapeKey = key;
+}
+
+function playing() {
+  by("shape-play").textContent = shape && shape.playing ? "Pause" : "Play";
+}
+
+// -- what the reader chooses --------------------------------------------------------------------------------------------
+
+function options(select, names) {
+  if (names.length === select.options.length && names.every((name, k) => select.options[k].textContent === name)) return;
+  const chosen = select.selectedIndex;
+  select.replaceChildren(...names.map((name) => {
+    const one = document.createElement("option");
+    one.textContent = name;
+    return one;
+  }));
+  select.selectedIndex = Math.min(Math.max(0, chosen), names.length - 1);
+}
+
+function choices() {
+  const list = document.querySelector("#chooser .list"), boxes = [];
+  const changed = () => {
+    lanes.choose(boxes.flatMap((box, k) => (box.checked ? [k] : [])));
+    fetchSpectra();
+  };
+  const all = document.createElement("div");
+  all.className = "both";
+  for (const [text, value] of [["all", true], ["none", false]]) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = text;
+    button.addEventListener("click", () => {
+      for (const box of boxes) box.checked = value;
+      changed();
+    });
+    all.append(button);
+  }
+  list.replaceChildren(all, ...page.facts.channels.map((channel) => {
+    const label = document.createElement("label"), box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = true;
+    box.addEventListener("change", changed);
+    boxes.push(box);
+    label.append(box, ` ${channel.name}${channel.unit ? ` [${channel.unit}]` : ""}`);
+    return label;
+  }));
+}
+
+by("lanes-span").addEventListener("change", (event) => {
+  lanes.span = Number(event.target.value);
+  lanes.scale = lanes.scale.map(() => null);
+  lanes.want();
+});
+by("lanes-pause").addEventListener("click", (event) => {
+  lanes.hold(!lanes.held);
+  event.target.setAttribute("aria-pressed", String(lanes.held));
+});
+by("tracking-kind").addEventListener("change", () => plots.tracking.want());
+for (const id of ["frf-output", "frf-input"]) by(id).addEventListener("change", fetchSpectra);
+by("shape-mode").addEventListener("change", (event) => shape && shape.show(event.target.selectedIndex));
+by("shape-play").addEventListener("click", () => shape && (shape.playing ? shape.pause() : shape.play()));
+by("shape-canvas").addEventListener("okid-shapes", playing);
+document.addEventListener("click", (event) => {
+  if (!by("chooser").contains(event.target)) by("chooser").open = false;
+});
+new IntersectionObserver((entries) => {
+  lanes.visible = entries[entries.length - 1].isIntersecting;
+  lanes.want();
+}).observe(by("lanes"));
+document.addEventListener("visibilitychange", () => {
+  if (document.hidden) return;
+  lanes.want();
+  fetchSpectra();
+  for (const plot of Object.values(plots)) if (plot.stale) plot.want();
+});
+
+// -- the stream -----------------------------------------------------------------------------------------------------------
+
+const takes = {
+  hello: showHello, state: showState, modes: takeModes, stats: showStats, tracks: takeTracks, log: takeLog, hits: takeHits, result: takeResult,
+  lanes: (frame) => lanes.channels.length && lanes.add(frame),
+  spectra: fetchSpectra,
+  diagram: (found) => {
+    page.diagram = found;
+    showDiagramNote();
+    plots.diagram.want();
+  },
+};
+const stream = new EventSource("events");
+for (const [kind, take] of Object.entries(takes)) {
+  stream.addEventListener(kind, (event) => {
+    if (kind === "hello" || page.run !== null) take(JSON.parse(event.data));
+  });
+}
+stream.addEventListener("error", () => {
+  by("link").textContent = "okid-live does not answer";
+  by("link").className = "badge bad";
+});
+window.okidLive = { page, lanes, plots }; // for a look from the console
