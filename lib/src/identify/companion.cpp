@@ -3,9 +3,9 @@
 // METHOD     two numbers. Growth: Arnoldi of a fixed vector, 64 steps, without any preparation; in a far from normal matrix
 //            its largest Ritz value stands above the spectral radius, as the response first grows before it decays, and such ARX
 //            models give poor Markov parameters. It counts where it is clearly above 1, in the units given and in units of each
-//            output's own size: what grows in one of them only is of the units. Radius: 200 power steps, then Arnoldi;
-//            restarts from the sum of the leading Ritz vectors
-// REFERENCE  Saad, Numerical Methods for Large Eigenvalue Problems (2011), ch. 6
+//            output's own size: what grows in one of them only is of the units. Radius: 200 power steps, then Arnoldi
+//            with thick restarts: 20 or 21 leading Ritz vectors stay in the basis of 64
+// REFERENCE  Saad, Numerical Methods for Large Eigenvalue Problems (2011), ch. 6; Morgan, Math. Comp. 65 (1996) 1213, sec. 3
 // NUMERICS   the growth is well determined: rounding in theta moves it as little. The radius is wanted to ~1e-6: lightly damped
 //            structures live there (float comes to 2e-5)
 // WORKSPACE  p n_y^2 numbers, with n = p n_y > 64 (n+1) 64 + O(64^2) more, else n^2 + 5 n; each step 2 p n_y^2 flop
@@ -17,12 +17,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 
 namespace okid {
 namespace {
 
 using std::size_t;
-constexpr int dense_limit = 64, warm_steps = 200, restarts = 12, leading = 8;
+constexpr int dense_limit = 64, warm_steps = 200, most_rounds = 24, leading = 20;
 constexpr okid_real_t growth_limit = static_cast<okid_real_t>(1.0005); // an offset left in makes a pole at 1
 // Residual of the Ritz pair and length of a new basis vector, relative to a matrix of size 1, as far as rounding allows.
 constexpr okid_real_t rounding = std::numeric_limits<okid_real_t>::epsilon();
@@ -56,6 +57,7 @@ void start_vector(okid_real_t* v, int size) {
         state = state * 6364136223846793005ULL + 1442695040888963407ULL;
         v[i] = static_cast<okid_real_t>(static_cast<double>(state >> 11) / 9007199254740992.0 - 0.5);
     }
+    scale(v, size, 1 / norm(v, size));
 }
 
 void power_steps(const companion& c, okid_real_t* v, okid_real_t* spare, int count) {
@@ -67,23 +69,33 @@ void power_steps(const companion& c, okid_real_t* v, okid_real_t* spare, int cou
     }
 }
 
-/// Arnoldi from basis column 0; returns the dimension reached, the next subdiagonal in *beyond.
-int arnoldi(const companion& c, companion_work& w, okid_real_t* beyond) {
+/// next less its part along the first `count` basis vectors, which goes to `h`; twice, for orthogonality to rounding.
+void orthogonalise(const companion& c, const companion_work& w, int count, okid_real_t* next, okid_real_t* h) {
+    const auto n = static_cast<size_t>(c.size);
+    for (int pass = 0; pass < 2; ++pass)
+        for (int i = 0; i < count; ++i) {
+            const okid_real_t* b = w.basis + static_cast<size_t>(i) * n;
+            okid_real_t along = 0;
+            for (size_t e = 0; e < n; ++e) along += b[e] * next[e];
+            for (size_t e = 0; e < n; ++e) next[e] -= along * b[e];
+            h[i] += along;
+        }
+}
+
+/// Arnoldi on top of `kept` basis vectors that span Ritz vectors (0: none) and the unit vector behind them.
+/// @return the dimension reached, the next subdiagonal in *beyond
+int arnoldi(const companion& c, companion_work& w, int kept, okid_real_t* beyond) {
     const int k = w.dimension;
     const auto n = static_cast<size_t>(c.size);
     std::fill(w.hessenberg, w.hessenberg + k * k, okid_real_t{0});
     *beyond = 0;
+    okid_real_t* const spare = w.basis + static_cast<size_t>(k) * n;
     for (int j = 0; j < k; ++j) {
-        okid_real_t* next = w.basis + static_cast<size_t>(j + 1) * n;
+        const bool known = j < kept; // what A makes of it lies in the kept vectors and the one behind them
+        okid_real_t* next = known ? spare : w.basis + static_cast<size_t>(j + 1) * n;
         c.apply(w.basis + static_cast<size_t>(j) * n, next);
-        for (int pass = 0; pass < 2; ++pass)
-            for (int i = 0; i <= j; ++i) {
-                const okid_real_t* b = w.basis + static_cast<size_t>(i) * n;
-                okid_real_t h = 0;
-                for (size_t e = 0; e < n; ++e) h += b[e] * next[e];
-                for (size_t e = 0; e < n; ++e) next[e] -= h * b[e];
-                w.hessenberg[j * k + i] += h;
-            }
+        orthogonalise(c, w, known ? kept + 1 : j + 1, next, w.hessenberg + j * k);
+        if (known) continue;
         const okid_real_t length = norm(next, c.size);
         if (length < invariant) return j + 1; // invariant subspace
         if (j + 1 < k)
@@ -95,22 +107,59 @@ int arnoldi(const companion& c, companion_work& w, okid_real_t* beyond) {
     return k;
 }
 
-/// Replace basis column 0 by the sum of the leading Ritz vectors.
-void restart(const companion& c, companion_work& w, int k) {
-    okid_real_t weights[dense_limit] = {};
-    bool taken[dense_limit] = {};
-    for (int count = 0; count < std::min(leading, k); ++count) {
+/// Marks the columns of the leading Ritz vectors in w.vectors, both of a pair.
+void mark_leading(const companion_work& w, bool* taken) {
+    for (int count = 0; count < leading; ++count) {
         int best = 0;
         while (taken[best]) ++best;
-        for (int i = best + 1; i < k; ++i)
+        for (int i = best + 1; i < w.dimension; ++i)
             if (!taken[i] && std::hypot(w.re[i], w.im[i]) > std::hypot(w.re[best], w.im[best])) best = i;
         taken[best] = true;
-        for (int i = 0; i < k; ++i) weights[i] += w.vectors[best * k + i];
+        if (w.im[best] == 0) continue;
+        taken[w.im[best] > 0 ? best + 1 : best - 1] = true;
+        ++count;
     }
-    okid_real_t* spare = w.basis + static_cast<size_t>(w.dimension) * static_cast<size_t>(c.size);
-    linalg::multiply(false, false, c.size, 1, k, 1, w.basis, c.size, weights, k, 0, spare, c.size);
-    const okid_real_t length = norm(spare, c.size);
-    std::transform(spare, spare + c.size, w.basis, [&](okid_real_t x) { return x / length; });
+}
+
+/// An orthonormal basis of what the leading columns of w.vectors span, at its front. @return its size
+int span_leading(companion_work& w) {
+    const int k = w.dimension;
+    bool taken[dense_limit] = {};
+    mark_leading(w, taken);
+    int count = 0;
+    for (int column = 0; column < k; ++column) {
+        if (!taken[column]) continue;
+        okid_real_t* const own = w.vectors + count * k;
+        std::copy_n(w.vectors + column * k, k, own);
+        const okid_real_t whole = norm(own, k);
+        for (int pass = 0; pass < 2; ++pass)
+            for (int i = 0; i < count; ++i) {
+                const okid_real_t* const other = w.vectors + i * k;
+                const okid_real_t along = std::inner_product(own, own + k, other, okid_real_t{0});
+                for (int e = 0; e < k; ++e) own[e] -= along * other[e];
+            }
+        const okid_real_t rest = norm(own, k);
+        if (!(rest > std::sqrt(rounding) * whole)) continue; // in the span already, as far as rounding tells
+        scale(own, k, 1 / rest);
+        ++count;
+    }
+    return count;
+}
+
+/// The basis becomes one of the leading Ritz vectors, with the vector behind the old one behind it: what Arnoldi goes on
+/// from. @return the number of Ritz vectors
+int keep_leading(const companion& c, companion_work& w) {
+    const int k = w.dimension;
+    const auto n = static_cast<size_t>(c.size);
+    const int kept = span_leading(w);
+    for (size_t row = 0; row < n; ++row) {
+        okid_real_t old[dense_limit];
+        for (int i = 0; i < k; ++i) old[i] = w.basis[static_cast<size_t>(i) * n + row];
+        for (int j = 0; j < kept; ++j)
+            w.basis[static_cast<size_t>(j) * n + row] = std::inner_product(old, old + k, w.vectors + j * k, okid_real_t{0});
+    }
+    std::copy_n(w.basis + static_cast<size_t>(k) * n, n, w.basis + static_cast<size_t>(kept) * n);
+    return kept;
 }
 
 double dense_radius(const companion& c, companion_work& w) {
@@ -133,12 +182,11 @@ struct ritz_pair {
     int dimension = 0;
 };
 
-/// Arnoldi from basis column 0 (any length); the largest of its eigenvalues. False when those do not converge.
+/// Arnoldi on top of `kept` vectors, the largest of its eigenvalues. False when those do not converge.
 /// @param vectors  where the Ritz vectors go; null: neither they nor the residual are wanted, at a third of the time
-bool largest_ritz(const companion& c, companion_work& w, okid_real_t* vectors, ritz_pair* out) {
-    scale(w.basis, c.size, 1 / norm(w.basis, c.size));
+bool largest_ritz(const companion& c, companion_work& w, int kept, okid_real_t* vectors, ritz_pair* out) {
     okid_real_t beyond = 0;
-    const int k = arnoldi(c, w, &beyond);
+    const int k = arnoldi(c, w, kept, &beyond);
     for (int j = 0; j < k && k < w.dimension; ++j) // repack when it ended early
         std::copy(w.hessenberg + j * w.dimension, w.hessenberg + j * w.dimension + k, w.hessenberg + j * k);
     if (linalg::eigen(k, w.hessenberg, w.re, w.im, vectors, w.eigen) != 0) return false;
@@ -166,7 +214,7 @@ template <class Scale> void rescale(int n_y, int p, const Scale* scale, okid_rea
 okid_real_t growth_of(const companion& c, companion_work& w) {
     ritz_pair pair;
     start_vector(w.basis, c.size);
-    return largest_ritz(c, w, nullptr, &pair) ? pair.size : std::numeric_limits<okid_real_t>::infinity();
+    return largest_ritz(c, w, 0, nullptr, &pair) ? pair.size : std::numeric_limits<okid_real_t>::infinity();
 }
 
 } // namespace
@@ -208,10 +256,10 @@ double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const
     start_vector(w.basis, c.size);
     power_steps(c, w.basis, w.basis + c.size, warm_steps);
     ritz_pair pair;
-    for (int round = 0; round < restarts; ++round) {
-        if (!largest_ritz(c, w, w.vectors, &pair)) return HUGE_VAL;
+    for (int round = 0, kept = 0; round < most_rounds; ++round) {
+        if (!largest_ritz(c, w, kept, w.vectors, &pair)) return HUGE_VAL;
         if (pair.residual <= tolerance * pair.size) break;
-        restart(c, w, pair.dimension);
+        kept = keep_leading(c, w);
     }
     return pair.size;
 }

@@ -18,8 +18,8 @@ void take_feedback(int n_u, int n_y, int p, const okid_real_t* theta, okid_real_
 
 /// Largest |eigenvalue| of y_n = sum_h theta^y_h y_(n-h), theta as okid_observer_solve() gives it, or its growth over 64
 /// samples where that is above 1.0005 both as the outputs are and with each in units of 1/scale, its own size. Companions
-/// of up to 64 states are solved densely, larger ones by restarted Arnoldi until the dominant Ritz pair has a residual
-/// below 1e-7 (6e-6 in float).
+/// of up to 64 states are solved densely, larger ones by Arnoldi with thick restarts until the dominant Ritz pair has a
+/// residual below 1e-7 (6e-6 in float), at most 24 rounds.
 /// @param scale  n_y numbers > 0, float or double
 template <class Scale>
 double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const Scale* scale, companion_work& work);
