@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import okid
 import pytest
+from gram import solve_gram
+from okid import Accumulator
 
 ROOT = Path(__file__).resolve().parents[2]
 FRAME_HZ = [62, 119, 155, 193, 215, 230, 239, 287, 321, 334, 352, 398, 417, 468]
@@ -82,3 +84,31 @@ def test_struck_plane_without_the_silent_past(plane: list[np.ndarray], chosen: i
 def test_a_hit_lost_in_the_first_samples_is_said(plane: list[np.ndarray]) -> None:
     result = okid.identify(plane[0][:, :1], plane[0][:, 1:], fs=512.0)
     assert "hit_at_start" in [w.code for w in result.warnings]
+
+
+def companion_radius(theta: np.ndarray, n_u: int, n_y: int) -> float:
+    """Largest |eigenvalue| of the ARX model by NumPy."""
+    m = n_u + n_y
+    own = np.hstack([theta[:, at : at + n_y] for at in range(2 * n_u, theta.shape[1], m)])
+    below = np.eye(own.shape[1] - n_y, own.shape[1])
+    return float(np.max(np.abs(np.linalg.eigvals(np.vstack([own, below])))))
+
+
+@pytest.mark.parametrize("record", [0, 1, 2])
+@pytest.mark.parametrize("p", [40, 80])
+def test_the_stability_of_a_measured_arx_model_is_known_to_all_digits(
+    plane: list[np.ndarray], record: int, p: int
+) -> None:
+    """120 and 240 states, dozens of them within 1 % of the circle: the ridge, and with it the modes, hang on it."""
+    sums = Accumulator(1, 3, p)
+    sums.add(plane[record])
+    stable = 0
+    for ridge in (3e-2, 1e-2, 3e-3, 1e-3):
+        theta, info = solve_gram(sums, "mean", False, ridge)
+        true = companion_radius(theta, 1, 3)
+        if info.radius > 1.0005:  # the growth, which stands above
+            assert info.radius > true
+        else:
+            assert info.radius == pytest.approx(true, abs=1e-7)
+            stable += 1
+    assert stable >= 2

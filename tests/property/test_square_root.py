@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import reference
 import systems
+from gram import solve_gram
 from hypothesis import given
 from hypothesis import strategies as st
 from okid import Accumulator, IdentificationError, InputError, SquareRoot, _abi
@@ -415,21 +415,6 @@ def test_noisy_solution_equals_least_squares(seed: int, force_unit: float) -> No
     true_condition = np.linalg.norm(gram, 1) * np.linalg.norm(np.linalg.inv(gram), 1)
     assert 0.1 * true_condition <= found.condition <= 1.001 * true_condition
     assert 0.3 < found.input_excitation <= 1.0
-
-
-def solve_gram(sums: Accumulator, detrend: str, stabilise: bool) -> tuple[np.ndarray, _abi.ObserverInfo]:
-    """okid_observer_solve() on the Gram matrix of the other kernel."""
-    library, q = _abi.library(), sums.n_u + sums.lags * sums.channels
-    config = _abi.ObserverConfig(sums.n_u, sums.n_y, sums.lags, 0.0, int(not stabilise))
-    work = _abi.block(int(library.okid_observer_memsize(ctypes.byref(config))))
-    theta, info = np.empty((q, sums.n_y)), _abi.ObserverInfo()
-    gram = sums.gram(detrend)[0]
-    status = library.okid_observer_solve(
-        ctypes.byref(config), _abi.pointer(gram), sums.rows, _abi.pointer(theta), None, ctypes.byref(info),
-        work.ctypes.data, work.size,
-    )  # fmt: skip
-    assert status == _abi.OK
-    return theta.T, info
 
 
 def test_an_unstable_model_gets_the_ridge_of_the_other_solver() -> None:
