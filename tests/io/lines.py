@@ -5,14 +5,17 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 import signal
 import struct
 import subprocess
+import termios
 import threading
 import tty
 import zlib
+from array import array
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -42,6 +45,10 @@ class Line:
     def write(self, data: bytes) -> None:
         while data:
             data = data[os.write(self.fd, data) :]
+
+    def unread(self) -> int:
+        """Bytes that the other end has not read yet."""
+        return int(array("i", fcntl.ioctl(self._far, termios.FIONREAD, bytes(4)))[0])
 
 
 @contextlib.contextmanager

@@ -32,12 +32,12 @@ def samples_of(rig: pathlib.Path) -> np.ndarray:
     return np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])[:, pick]
 
 
-def identify(tmp_path: pathlib.Path, values: np.ndarray) -> subprocess.CompletedProcess[str]:
+def identify(tmp_path: pathlib.Path, values: np.ndarray, *more: str) -> subprocess.CompletedProcess[str]:
     path = tmp_path / "record.csv"
     with path.open("w") as file:
         file.write("# fs_hz: 250\nforce1,acc1,acc2,acc3\n")
         np.savetxt(file, values, delimiter=",", fmt="%.12g")
-    return okid("identify", path, "--inputs", "force1", "--outputs", "acc1,acc2,acc3", "--json", "-")
+    return okid("identify", path, "--inputs", "force1", "--outputs", "acc1,acc2,acc3", "--json", "-", *more)
 
 
 def replay(rig: pathlib.Path, tmp_path: pathlib.Path, edit: tuple[str, str]) -> tuple[int, str, dict]:
@@ -284,13 +284,14 @@ def test_the_fit_can_be_recomputed(rig: pathlib.Path, tmp_path: pathlib.Path) ->
     np.testing.assert_allclose(list(result["fit"]["simulation_percent"].values()), percent, rtol=1e-8)
 
 
-@pytest.mark.parametrize("kind", ["noise", "equal"])
-def test_no_vibration_no_result(tmp_path: pathlib.Path, kind: str) -> None:
+@pytest.mark.parametrize("kind", ["noise", "equal", "multiples"])
+@pytest.mark.parametrize("method", ["okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"])
+def test_no_vibration_no_result(tmp_path: pathlib.Path, kind: str, method: str) -> None:
     rng = np.random.default_rng(7)
     values = rng.standard_normal((5000, 4))
-    if kind == "equal":
-        values[:, 1:] = values[:, :1]
-    done = identify(tmp_path, values)
+    if kind != "noise":
+        values[:, 1:] = values[:, :1] * (1.0 if kind == "equal" else [0.3, -2e3, 1e-6])
+    done = identify(tmp_path, values, "--method", method)
     assert done.returncode == 3
     assert done.stdout == ""
     assert done.stderr.startswith("okid: no model")

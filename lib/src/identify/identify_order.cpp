@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace okid {
 namespace {
@@ -39,6 +40,23 @@ okid_status_t realise_subspace(okid_identify& s, int order, bool whole) {
     return status;
 }
 
+/// Outputs that are multiples of the inputs of the same instant but for rounding: the same channels given twice, a loop
+/// of cable. What is left of a response is noise of the last digits, and any number of poles fits it.
+bool without_dynamics(const okid_identify& s) {
+    constexpr okid_real_t rounding = 100 * std::numeric_limits<okid_real_t>::epsilon();
+    const okid_real_t limit = std::max(static_cast<okid_real_t>(1e-9), rounding);
+    const int block = s.n_y * s.n_u;
+    for (int row = 0; row < s.n_y && s.n_u > 0; ++row) {
+        okid_real_t now = 0, later = 0;
+        for (int i = row; i < block * (s.markov_last + 1); i += s.n_y) {
+            okid_real_t& side = i < block ? now : later;
+            side = std::max(side, std::abs(s.markov[i]));
+        }
+        if (later > limit * now) return false;
+    }
+    return s.n_u > 0;
+}
+
 okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t* out) {
     if (order < 1 || order > s.max_order) return OKID_ERR_DIM;
     okid_status_t status = s.by_subspace     ? realise_subspace(s, order, whole)
@@ -59,7 +77,7 @@ okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t
     if (!(out->model_radius < 1)) out->warnings |= OKID_NOTE_MODEL_UNSTABLE;
     if (whole && !(predictor_radius(s, order) < 1)) out->warnings |= OKID_NOTE_PREDICTOR_UNSTABLE;
     if (whole && s.by_subspace) model_markov(s, order);
-    if (out->mode_count == 0) return OKID_ERR_NO_MODES;
+    if (out->mode_count == 0 || (whole && without_dynamics(s))) return OKID_ERR_NO_MODES;
     return out->warnings != 0 ? OKID_WARN_MODEL : OKID_OK;
 }
 
