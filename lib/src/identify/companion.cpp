@@ -156,7 +156,8 @@ int keep_leading(const companion& c, companion_work& w) {
         okid_real_t old[dense_limit];
         for (int i = 0; i < k; ++i) old[i] = w.basis[static_cast<size_t>(i) * n + row];
         for (int j = 0; j < kept; ++j)
-            w.basis[static_cast<size_t>(j) * n + row] = std::inner_product(old, old + k, w.vectors + j * k, okid_real_t{0});
+            w.basis[static_cast<size_t>(j) * n + row] =
+                std::inner_product(old, old + k, w.vectors + j * k, okid_real_t{0});
     }
     std::copy_n(w.basis + static_cast<size_t>(k) * n, n, w.basis + static_cast<size_t>(kept) * n);
     return kept;
