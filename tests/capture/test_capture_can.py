@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import os
@@ -18,6 +19,8 @@ import okid
 import pytest
 from captured import assert_same_result, assert_truth, edited, frames
 from okid import capture
+from okid.capture import command_can
+from okid.capture.recording import Recorder
 
 _numbers = itertools.count()
 
@@ -169,10 +172,21 @@ def wait_for_lines(path: Path, count: int) -> None:
     raise AssertionError(f"{path}: never had {count} lines")
 
 
-def test_a_full_disk_ends_no_measurement(rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("flush_s", "said"), [(0.0, ": no longer recorded"), (3600.0, "")], ids=["on the way", "at the end"]
+)
+def test_a_full_disk_ends_no_measurement(
+    rig: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    flush_s: float,
+    said: str,
+) -> None:
+    monkeypatch.setattr(command_can, "Recorder", functools.partial(Recorder, flush_s=flush_s))
     given = ("--log", rig / "a.log", "--config", rig / "a.toml", "--json", tmp_path / "r.json", "--out", "/dev/full")
     assert run("can", *given) == 2
-    assert capsys.readouterr().err == "okid-capture: /dev/full: No space left on device\n"
+    assert capsys.readouterr().err == f"okid-capture: /dev/full: No space left on device{said}\n"
     assert_same_result(json.loads((tmp_path / "r.json").read_text()), json.loads((rig / "replay.json").read_text()))
 
 

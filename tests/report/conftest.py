@@ -3,14 +3,20 @@
 
 from __future__ import annotations
 
+import sys
+from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import okid
 import pytest
 from okid import report
 from okid.demo import demo_record
+from okid.report.svg import Pictures
 from report_files import write_csv, write_events
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "property"))
 
 HOSTILE = ["<script>alert(1)</script>", 'a$b</script><img src=x onerror="alert(2)">', "acc '3' & ]]> $\\frac$"]
 
@@ -67,3 +73,13 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A report of each kind."""
     folder = tmp_path_factory.mktemp("reports")
     return {"frame": _frame(folder), "wide": _wide(folder), "ambient": _ambient(folder)}
+
+
+@pytest.fixture
+def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests that read the words of a page: its pictures, most of its cost, are empty but for their descriptions."""
+
+    def described(_self: Pictures, _drawing: Any, text: str, kind: str = "fig") -> str:
+        return f'<svg class="{kind}" role="img" aria-label="{escape(text, quote=True)}"></svg>'
+
+    monkeypatch.setattr(Pictures, "inline", described)

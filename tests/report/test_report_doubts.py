@@ -20,6 +20,8 @@ from okid.report.scale import agreement, doubts
 from okid.units import SI
 from report_files import FS
 
+pytestmark = pytest.mark.usefixtures("words_only")
+
 G = 9.80665
 
 

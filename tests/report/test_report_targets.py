@@ -19,6 +19,8 @@ from okid import report
 from okid.demo import demo_record
 from report_files import FS
 
+pytestmark = pytest.mark.usefixtures("words_only")
+
 COMMAND = [sys.executable, "-m", "okid.report"]
 
 

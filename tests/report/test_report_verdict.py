@@ -19,6 +19,8 @@ from okid.report.remarks import HARMLESS
 from okid.report.stamps import TOLERANCE
 from report_files import FS
 
+pytestmark = pytest.mark.usefixtures("words_only")
+
 ROOT = Path(__file__).parents[2]
 
 

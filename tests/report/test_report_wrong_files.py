@@ -19,6 +19,8 @@ from okid.demo import demo_record
 from okid.report import targets
 from report_files import FS
 
+pytestmark = pytest.mark.usefixtures("words_only")
+
 CONFIG = '# a frame\n[acquisition]\nrate_hz = 250.0\n[[bus]]\nname = "can0"\n'
 RIG = "rate_hz = 250.0\nmasses = [2.0, 1.5]\nsprings = [1.0, 2.0]\n"
 WRITES = "expected an okid.result/1, as `okid identify`, `okid run` or `okid replay` writes it with --json FILE"

@@ -91,6 +91,7 @@ def test_only_one_line_tells_the_time(made: tuple[Path, Path], tmp_path: Path, m
     assert "1970-01-02 00:00:00 UTC" in different[0][1]
 
 
+@pytest.mark.usefixtures("words_only")
 def test_uncertainties_fill_their_columns(made: tuple[Path, Path], tmp_path: Path) -> None:
     data = json.loads(made[0].read_text(encoding="utf-8"))
     for mode in data["modes"]:
@@ -105,6 +106,7 @@ def test_uncertainties_fill_their_columns(made: tuple[Path, Path], tmp_path: Pat
     assert "<td>–</td>" in html
 
 
+@pytest.mark.usefixtures("words_only")
 def test_live_results_without_fit_and_modes(made: tuple[Path, Path], tmp_path: Path) -> None:
     data = json.loads(made[0].read_text(encoding="utf-8"))
     data["model"]["x0"] = None
@@ -131,6 +133,7 @@ def test_live_results_without_fit_and_modes(made: tuple[Path, Path], tmp_path: P
         assert getattr(computed, key) == pytest.approx(own.raw["fit"][key], abs=1e-4)
 
 
+@pytest.mark.usefixtures("words_only")
 def test_records_with_regular_gaps(made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = made[1].read_text(encoding="utf-8").splitlines()
     for every, words in ((97, "Hz lines; multiple coherence"), (60, "left out: the longest stretch")):
@@ -144,6 +147,7 @@ def test_records_with_regular_gaps(made: tuple[Path, Path], tmp_path: Path, caps
         assert ("Behind: largest singular value" in html) == (every == 97)
 
 
+@pytest.mark.usefixtures("words_only")
 def test_a_record_of_another_rate_is_refused(
     made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,6 +199,7 @@ def test_unreadable_results(
     assert not list(tmp_path.glob("*.html"))
 
 
+@pytest.mark.usefixtures("words_only")
 def test_broken_matrices_and_foreign_records(
     made: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
