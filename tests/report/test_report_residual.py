@@ -10,8 +10,6 @@ from okid.demo import demo_record
 from okid.report.residual import BOUND_95, BOUND_99, whiteness
 from report_files import FS
 
-pytestmark = pytest.mark.usefixtures("words_only")
-
 RNG = np.random.default_rng(7)
 
 
