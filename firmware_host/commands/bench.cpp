@@ -4,7 +4,7 @@
 // run, one thread: the ratios count, not the times.
 #include "bench_identify.hpp"
 #include "commands.hpp"
-#include "result.hpp"
+#include "result/result.hpp"
 
 #include <Eigen/Core>
 #include <algorithm>

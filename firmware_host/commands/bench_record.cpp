@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "bench_record.hpp"
 
-#include "../gaussian.hpp"
+#include "rig/gaussian.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Records with known modes for okid bench: the three structures W1, W2, W3 of docs/numerics.md under white forces.
 #pragma once
-#include "../rig.hpp"
+#include "rig/rig.hpp"
 
 #include <cstdint>
 #include <string>

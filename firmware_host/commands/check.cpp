@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // okid check: is a CONFIG.toml right? Opens no device.
-#include "../config.hpp"
-#include "../error.hpp"
-#include "../live/identifier.hpp"
-#include "../live/trigger.hpp"
-#include "../method.hpp"
-#include "../presets.hpp"
-#include "../result.hpp"
+#include "align/trigger.hpp"
 #include "commands.hpp"
+#include "config/config.hpp"
+#include "config/presets.hpp"
+#include "error.hpp"
+#include "live/identifier.hpp"
+#include "result/method.hpp"
+#include "result/result.hpp"
 
 #include <fmt/format.h>
 #include <memory>

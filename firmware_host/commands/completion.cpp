@@ -2,8 +2,8 @@
 // okid completion: the command line as a shell has to know it, read out of the command line itself.
 #include "completion.hpp"
 
-#include "../result.hpp"
 #include "commands.hpp"
+#include "result/result.hpp"
 
 #include <algorithm>
 #include <cctype>

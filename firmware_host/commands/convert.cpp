@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 // okid convert: journals, logs of frames and tables of samples into one another.
-#include "../config.hpp"
-#include "../csv.hpp"
-#include "../csv_header.hpp"
-#include "../error.hpp"
-#include "../host_time.hpp"
-#include "../live/aligner.hpp"
-#include "../live/frame_maker.hpp"
-#include "../live/playback.hpp"
-#include "../recording/journal_header.hpp"
-#include "../result.hpp"
-#include "../whole_file.hpp"
+#include "acquire/frame_maker.hpp"
+#include "acquire/host_time.hpp"
+#include "acquire/playback.hpp"
+#include "align/aligner.hpp"
 #include "commands.hpp"
+#include "config/config.hpp"
+#include "error.hpp"
+#include "files/whole_file.hpp"
+#include "journal/journal_header.hpp"
+#include "record/csv.hpp"
+#include "record/csv_header.hpp"
+#include "result/result.hpp"
 
 #include <algorithm>
 #include <cmath>

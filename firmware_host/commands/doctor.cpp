@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // okid doctor: what a live measurement needs of this machine, what is missing, and the command that mends it.
-#include "../config.hpp"
-#include "../error.hpp"
-#include "../live/can_link.hpp"
-#include "../live/gpio_lines.hpp"
-#include "../live/reader.hpp"
-#include "../live/serial_line.hpp"
-#include "../nearest_name.hpp"
+#include "acquire/can_link.hpp"
+#include "acquire/gpio_lines.hpp"
+#include "acquire/reader.hpp"
+#include "acquire/serial_line.hpp"
 #include "commands.hpp"
+#include "config/config.hpp"
+#include "config/nearest_name.hpp"
+#include "error.hpp"
 #include "findings.hpp"
 
 #include <algorithm>

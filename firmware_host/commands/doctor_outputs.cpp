@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // okid doctor: what a run writes to and starts.
-#include "../config_alarm.hpp"
+#include "config/config_alarm.hpp"
 #include "findings.hpp"
 
 #include <algorithm>

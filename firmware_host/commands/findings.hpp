@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What okid doctor found: one line each on stdout, and how many things are missing.
 #pragma once
-#include "../config.hpp"
+#include "config/config.hpp"
 
 #include <fmt/format.h>
 #include <string>

@@ -2,16 +2,16 @@
 // okid identify: measured records in, modes and a state-space model out.
 #include "commands.hpp"
 
-#include "../csv_header.hpp"
-#include "../deviations.hpp"
-#include "../error.hpp"
-#include "../mat_file.hpp"
-#include "../method.hpp"
-#include "../nearest_name.hpp"
-#include "../progress.hpp"
-#include "../record.hpp"
-#include "../record_check.hpp"
-#include "../whole_file.hpp"
+#include "config/nearest_name.hpp"
+#include "error.hpp"
+#include "files/whole_file.hpp"
+#include "progress.hpp"
+#include "record/csv_header.hpp"
+#include "record/record.hpp"
+#include "record/record_check.hpp"
+#include "result/deviations.hpp"
+#include "result/mat_file.hpp"
+#include "result/method.hpp"
 
 #include <algorithm>
 #include <charconv>

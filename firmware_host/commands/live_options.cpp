@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "live_options.hpp"
 
-#include "../error.hpp"
-#include "../live/playback.hpp"
-#include "../nearest_name.hpp"
-#include "../whole_file.hpp"
+#include "acquire/playback.hpp"
+#include "config/nearest_name.hpp"
+#include "error.hpp"
+#include "files/whole_file.hpp"
 
 #include <algorithm>
 #include <charconv>

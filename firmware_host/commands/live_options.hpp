@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Options that run and replay have in common.
 #pragma once
-#include "../live/session.hpp"
+#include "live/session.hpp"
 
 #include <CLI/CLI.hpp>
 #include <cstdint>

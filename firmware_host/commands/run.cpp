@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // okid run: acquire, identify and show while it happens.
-#include "../live/capture.hpp"
-#include "../live/playback.hpp"
-#include "../live/session.hpp"
-#include "../live/stop_signal.hpp"
+#include "acquire/capture.hpp"
+#include "acquire/playback.hpp"
+#include "acquire/stop_signal.hpp"
 #include "commands.hpp"
+#include "live/session.hpp"
 #include "live_options.hpp"
 
 #include <memory>

@@ -2,15 +2,15 @@
 // okid simulate: a virtual rig with known M, K, R writes the log, record and truth a real one would give.
 #include "commands.hpp"
 
-#include "../error.hpp"
-#include "../live/stop_signal.hpp"
-#include "../progress.hpp"
-#include "../result.hpp"
-#include "../rig_files.hpp"
-#include "../rig_frames.hpp"
-#include "../rig_line.hpp"
-#include "../rig_play.hpp"
-#include "../whole_file.hpp"
+#include "acquire/stop_signal.hpp"
+#include "error.hpp"
+#include "files/whole_file.hpp"
+#include "progress.hpp"
+#include "result/result.hpp"
+#include "rig/rig_files.hpp"
+#include "rig/rig_frames.hpp"
+#include "rig/rig_line.hpp"
+#include "rig/rig_play.hpp"
 
 #include <cstdio>
 #include <filesystem>

@@ -5,7 +5,7 @@
 // when two updates in a row are more than k sigma off, sigma^2 = that of the baseline + that of the update; it is back
 // within k/2 sigma. One alarm stands as long as any mode is away.
 #pragma once
-#include "../config.hpp"
+#include "config/config.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "blocks.hpp"
 
-#include "../error.hpp"
+#include "error.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 // The blocks of a running stream that are left out in turn for standard deviations. A window has them in its slots; for a
 // growing or fading memory each block has an accumulator of its own beside the whole. All memory at the start.
 #pragma once
-#include "../deviations.hpp"
+#include "result/deviations.hpp"
 
 #include <okid/accumulator.h>
 

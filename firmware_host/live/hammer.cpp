@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hammer.hpp"
 
-#include "missing.hpp"
+#include "align/missing.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 // the structure still moved, the force is hardly above its noise, there was a second blow, or its spectrum ends too early.
 // No exponential window is put on the response: a model needs none, and it would add damping.
 #pragma once
-#include "../config.hpp"
+#include "config/config.hpp"
 
 #include <cstddef>
 #include <cstdint>

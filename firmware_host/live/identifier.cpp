@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "identifier.hpp"
 
-#include "../error.hpp"
-#include "../method.hpp"
+#include "error.hpp"
+#include "result/method.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Samples of the grid into the accumulator, and a model out of it whenever it is asked for. All memory at the start.
 #pragma once
-#include "../config.hpp"
 #include "blocks.hpp"
+#include "config/config.hpp"
 
 #include <okid/accumulator.h>
 #include <okid/identify.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "mode_tracks.hpp"
 
-#include "../error.hpp"
+#include "error.hpp"
 
 namespace okid_host {
 

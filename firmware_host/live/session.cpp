@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "session.hpp"
 
-#include "../error.hpp"
-#include "../host_time.hpp"
-#include "../method.hpp"
-#include "../publishing/service_notice.hpp"
-#include "../record_check.hpp"
-#include "serial_line.hpp"
-#include "stop_signal.hpp"
+#include "acquire/host_time.hpp"
+#include "acquire/serial_line.hpp"
+#include "acquire/stop_signal.hpp"
+#include "error.hpp"
+#include "publish/service_notice.hpp"
+#include "record/record_check.hpp"
+#include "result/method.hpp"
 
 #include <algorithm>
 #include <cmath>

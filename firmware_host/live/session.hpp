@@ -2,18 +2,18 @@
 // One live session: frames in, events and a result out. Everything happens by count of samples, nothing by the clock, so
 // that a recorded stream gives the same result at every speed.
 #pragma once
-#include "../config.hpp"
-#include "../publishing/publisher.hpp"
-#include "../publishing/sample_feed.hpp"
-#include "../result.hpp"
 #include "alarm.hpp"
-#include "aligner.hpp"
+#include "align/aligner.hpp"
+#include "align/trigger.hpp"
+#include "config/config.hpp"
 #include "hammer.hpp"
 #include "identifier.hpp"
 #include "mode_tracks.hpp"
+#include "publish/publisher.hpp"
+#include "publish/sample_feed.hpp"
+#include "result/result.hpp"
 #include "settling.hpp"
 #include "stream_target.hpp"
-#include "trigger.hpp"
 
 #include <cstdint>
 #include <drv/clock_fit.h>

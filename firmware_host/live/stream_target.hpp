@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What frames of live buses go to: a session that identifies, or one that only records.
 #pragma once
-#include "sender.hpp"
-#include "stream_check.hpp"
+#include "acquire/sender.hpp"
+#include "align/stream_check.hpp"
 
 #include <drv/frame.h>
 #include <drv/source.h>

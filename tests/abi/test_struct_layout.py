@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ctypes mirror in okid._abi equals the C headers: sizes, offsets, constants, functions and their arguments."""
+"""The ctypes mirror in okid.abi equals the C headers: sizes, offsets, constants, functions and their arguments."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from okid import _abi
+from okid import abi
 
 ROOT = Path(__file__).resolve().parents[2]
 INCLUDE = ROOT / "lib" / "include"
@@ -30,7 +30,7 @@ CONSTANT_PREFIXES = (
     "HOLDS_",
     "MKR_",
 )
-CONSTANTS = {name: value for name, value in vars(_abi).items() if name.startswith(CONSTANT_PREFIXES) and name.isupper()}
+CONSTANTS = {name: value for name, value in vars(abi).items() if name.startswith(CONSTANT_PREFIXES) and name.isupper()}
 # C parameter type (without const, names and spaces) -> kinds of ctypes that may stand for it
 SCALARS = {
     "int32_t": ctypes.c_int32,
@@ -63,7 +63,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, int]:
     assert compiler is not None, "a C compiler is needed to check the ABI"
     folder = tmp_path_factory.mktemp("abi")
     lines = []
-    for name, struct in _abi.STRUCTS.items():
+    for name, struct in abi.STRUCTS.items():
         lines.append(f'P("{name}", sizeof({name}));')
         for field, *_ in struct._fields_:
             lines.append(f'P("{name}.{field}", offsetof({name}, {field}));')
@@ -79,9 +79,9 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, int]:
     return {name: int(value) for name, value in (line.split() for line in shown.splitlines())}
 
 
-@pytest.mark.parametrize("name", sorted(_abi.STRUCTS))
+@pytest.mark.parametrize("name", sorted(abi.STRUCTS))
 def test_struct_layout(measured: dict[str, int], name: str) -> None:
-    struct = _abi.STRUCTS[name]
+    struct = abi.STRUCTS[name]
     assert ctypes.sizeof(struct) == measured[name]
     for field, *_ in struct._fields_:
         place = getattr(struct, field)
@@ -91,7 +91,7 @@ def test_struct_layout(measured: dict[str, int], name: str) -> None:
 def test_no_field_is_missing() -> None:
     text = headers_text()
     bodies = dict((name, body) for body, name in re.findall(r"typedef struct \w+ \{(.*?)\} (okid_\w+_t);", text, re.S))
-    assert set(bodies) == set(_abi.STRUCTS)
+    assert set(bodies) == set(abi.STRUCTS)
     for name, body in bodies.items():
         declared = [
             re.sub(r"[^\w]", "", piece.split()[-1])
@@ -99,7 +99,7 @@ def test_no_field_is_missing() -> None:
             for piece in line.split(",")
             if piece.strip()
         ]
-        assert declared == [field for field, *_ in _abi.STRUCTS[name]._fields_], name
+        assert declared == [field for field, *_ in abi.STRUCTS[name]._fields_], name
 
 
 def test_constants(measured: dict[str, int]) -> None:
@@ -120,15 +120,15 @@ def declarations() -> dict[str, tuple[str, list[str]]]:
 
 
 def test_every_function_is_bound() -> None:
-    assert set(declarations()) == set(_abi.SIGNATURES)
-    for name in _abi.SIGNATURES:
-        assert getattr(_abi.library(), name)
+    assert set(declarations()) == set(abi.SIGNATURES)
+    for name in abi.SIGNATURES:
+        assert getattr(abi.library(), name)
 
 
-@pytest.mark.parametrize("name", sorted(_abi.SIGNATURES))
+@pytest.mark.parametrize("name", sorted(abi.SIGNATURES))
 def test_arguments(name: str) -> None:
     result, arguments = declarations()[name]
-    bound_result, bound = _abi.SIGNATURES[name]
+    bound_result, bound = abi.SIGNATURES[name]
     assert len(arguments) == len(bound)
     for text, kind in zip(arguments, bound, strict=True):
         plain = re.sub(r"\bconst\b|\b\w+$", "", text).replace(" ", "")
@@ -139,19 +139,19 @@ def test_arguments(name: str) -> None:
         else:
             assert plain.endswith("*"), text
             target = plain.rstrip("*")
-            if target in _abi.STRUCTS:
-                assert kind._type_ is _abi.STRUCTS[target], text
+            if target in abi.STRUCTS:
+                assert kind._type_ is abi.STRUCTS[target], text
             elif target in POINTED:
                 assert kind._type_ is POINTED[target], text
             else:
                 assert kind is ctypes.c_void_p or kind._type_ is ctypes.c_void_p, text
     plain_result = result.replace("const", "").replace(" ", "")
-    expected_result = {"void": None, "char*": ctypes.c_char_p, "double*": _abi.doubles, **SCALARS}[plain_result]
+    expected_result = {"void": None, "char*": ctypes.c_char_p, "double*": abi.doubles, **SCALARS}[plain_result]
     assert bound_result is expected_result
 
 
 def test_status_texts_differ() -> None:
     statuses = [v for k, v in CONSTANTS.items() if k.startswith(("OK", "WARN_", "ERR_"))]
-    texts = [_abi.status_text(status) for status in statuses]
+    texts = [abi.status_text(status) for status in statuses]
     assert len(set(texts)) == len(texts)
     assert all(texts)

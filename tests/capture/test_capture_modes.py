@@ -13,7 +13,7 @@ import pytest
 from captured import assert_same_result, edited
 from okid import capture
 from okid.capture.mode_watch import Settling, mode_text
-from okid.result import Mode
+from okid.result.result import Mode
 from program import okid as program
 
 MEMORIES = {

@@ -14,7 +14,7 @@ from reference_tables import REFERENCE, codes, rows, sections
 PAGE = REFERENCE / "config.md"
 COLUMNS = "key | value | default | meaning"
 MANY = ("bus", "channel")  # [[name]]
-SOURCES = ROOT / "firmware_host"
+SOURCES = ROOT / "firmware_host" / "config"
 
 
 def page_rows(section: str) -> dict[str, list[str]]:

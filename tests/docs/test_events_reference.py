@@ -14,7 +14,11 @@ from reference_tables import REFERENCE, codes, documented, keys_of, rows, sectio
 PAGE = REFERENCE / "events.md"
 NAMED = ("bus", "channel", "notes")  # objects whose keys are the user's names
 ALWAYS = {"type", "t"}
-SOURCES = [p for room in ("live", "publishing", "recording") for p in (ROOT / "firmware_host" / room).glob("*.cpp")]
+SOURCES = [
+    p
+    for room in ("live", "acquire", "align", "publish", "journal")
+    for p in (ROOT / "firmware_host" / room).glob("*.cpp")
+]
 NEVER_RUN_HERE = {"lost"}  # a reader that is too slow: test_publishing.py makes one
 
 
@@ -73,17 +77,17 @@ def test_examples(seen: dict[str, set[str]]) -> None:
 
 
 def test_causes_kinds_and_reasons_are_those_of_the_source() -> None:
-    everything = "".join(path.read_text() for path in SOURCES + list((ROOT / "firmware_host" / "live").glob("*.hpp")))
+    everything = "".join(path.read_text() for path in SOURCES + list((ROOT / "firmware_host").glob("*/*.hpp")))
     text = sections(PAGE)
     causes = {code for cells in rows(text["gap"], "cause | what was lost where") for code in codes(cells[0])}
     assert causes == {key.rpartition(".")[2] for key in documented(text["stats"]) if ".lost_by." in key}
     kinds = {code for cells in rows(text["bus"], "event | means") for code in codes(cells[0])}
-    watch = (ROOT / "firmware_host" / "live" / "bus_watch.cpp").read_text()
-    capture = (ROOT / "firmware_host" / "live" / "capture.cpp").read_text()
+    watch = (ROOT / "firmware_host" / "acquire" / "bus_watch.cpp").read_text()
+    capture = (ROOT / "firmware_host" / "acquire" / "capture.cpp").read_text()
     told = set(re.findall(r'bus_event\(bus, "(\w+)"', capture))
     assert told and kinds == told | set(re.findall(r'push_back\(\s*\{"(\w+)"', watch))
     records = {code for cells in rows(text["record"], "event | means") for code in codes(cells[0])}
-    recorder = (ROOT / "firmware_host" / "recording" / "recorder.cpp").read_text()
+    recorder = (ROOT / "firmware_host" / "journal" / "recorder.cpp").read_text()
     assert records == set(re.findall(r'tell\("(\w+)"', recorder)) | {"segment", "started"} and '"segment"' in recorder
     reasons = set(codes(documented(text["hit"])["reason"])) - {"null"}
     hammer = (ROOT / "firmware_host" / "live" / "hammer.cpp").read_text()

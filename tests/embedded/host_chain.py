@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from okid import Accumulator, _abi
-from okid._layout import EraConfig, ObserverConfig, ObserverInfo
+from okid import Accumulator, abi
+from okid.abi.layout import EraConfig, ObserverConfig, ObserverInfo
 from qemu_node import Modes
 
 N_U, N_Y, ORDER = 1, 3, 6
@@ -28,7 +28,7 @@ def sums(parts: list[NDArray[np.int16]], p: int, gaps: list[int] | None = None) 
 
 def call(name: str, *arguments: Any) -> int:
     """A function of the library; raises for an error status."""
-    return _abi.check(getattr(_abi.library(), name)(*arguments), name)
+    return abi.check(getattr(abi.library(), name)(*arguments), name)
 
 
 def observe(accumulator: Accumulator, p: int) -> tuple[Real, ObserverInfo]:
@@ -36,8 +36,8 @@ def observe(accumulator: Accumulator, p: int) -> tuple[Real, ObserverInfo]:
     gram = np.asfortranarray(accumulator.gram("mean")[0])
     config, info = ObserverConfig(N_U, N_Y, p, 0.0, 0), ObserverInfo()
     theta = np.zeros(N_Y * (N_U + p * (N_U + N_Y)))
-    work = _abi.block(_abi.library().okid_observer_memsize(ctypes.byref(config)))
-    call("okid_observer_solve", ctypes.byref(config), _abi.pointer(gram), accumulator.rows, _abi.pointer(theta), None,
+    work = abi.block(abi.library().okid_observer_memsize(ctypes.byref(config)))
+    call("okid_observer_solve", ctypes.byref(config), abi.pointer(gram), accumulator.rows, abi.pointer(theta), None,
          ctypes.byref(info), work.ctypes.data, work.size)  # fmt: skip
     return theta, info
 
@@ -46,22 +46,22 @@ def identify(accumulator: Accumulator, p: int, rate_hz: float) -> Modes:
     """Modes with r = c = p and the order of three degrees of freedom."""
     theta, info = observe(accumulator, p)
     markov = np.zeros((2 * p + 1) * N_Y * N_U)
-    call("okid_markov_recursion", N_U, N_Y, p, _abi.pointer(theta), 2 * p, _abi.pointer(markov), None)
+    call("okid_markov_recursion", N_U, N_Y, p, abi.pointer(theta), 2 * p, abi.pointer(markov), None)
     config, era, count = EraConfig(N_U, N_Y, p, p, 0, 0, 0), ctypes.c_void_p(), ctypes.c_int32()
-    block = _abi.block(_abi.library().okid_era_memsize(ctypes.byref(config)))
+    block = abi.block(abi.library().okid_era_memsize(ctypes.byref(config)))
     call("okid_era_create", ctypes.byref(era), ctypes.byref(config), block.ctypes.data, block.size)
-    call("okid_era_decompose", era, _abi.pointer(markov))
-    values = np.ctypeslib.as_array(_abi.library().okid_era_singular_values(era, ctypes.byref(count)), (2 * p,))[:10]
+    call("okid_era_decompose", era, abi.pointer(markov))
+    values = np.ctypeslib.as_array(abi.library().okid_era_singular_values(era, ctypes.byref(count)), (2 * p,))[:10]
     A, B, C = np.zeros(ORDER * ORDER), np.zeros(ORDER * N_U), np.zeros(N_Y * ORDER)
-    call("okid_era_realize", era, ORDER, _abi.pointer(A), _abi.pointer(B), _abi.pointer(C), None, None)
+    call("okid_era_realize", era, ORDER, abi.pointer(A), abi.pointer(B), abi.pointer(C), None, None)
     half = ORDER // 2
     sizes = [half, half, half, N_Y * half, N_Y * half, half, half, ORDER * half, ORDER * half]
     out = [np.zeros(size) for size in sizes]  # f, zeta, mpc, shape re, im, mu re, im, psi re, im
-    work = _abi.block(_abi.library().okid_modal_memsize(N_Y, ORDER))
-    call("okid_modal_analyse", N_Y, ORDER, 1 / rate_hz, _abi.pointer(A), _abi.pointer(C), ctypes.byref(count),
-         *map(_abi.pointer, out), None, work.ctypes.data, work.size)  # fmt: skip
+    work = abi.block(abi.library().okid_modal_memsize(N_Y, ORDER))
+    call("okid_modal_analyse", N_Y, ORDER, 1 / rate_hz, abi.pointer(A), abi.pointer(C), ctypes.byref(count),
+         *map(abi.pointer, out), None, work.ctypes.data, work.size)  # fmt: skip
     emac, found = np.zeros(half), count.value
-    call("okid_era_emac", era, ORDER, found, *map(_abi.pointer, out[5:]), _abi.pointer(emac))
+    call("okid_era_emac", era, ORDER, found, *map(abi.pointer, out[5:]), abi.pointer(emac))
     shape = (out[3] + 1j * out[4]).reshape(half, N_Y)
     kept = [a[:found] for a in (out[0], out[1], out[2], emac, shape)]
     return Modes(0, 5, info.radius, info.ridge, values.copy(), *kept)

@@ -13,7 +13,7 @@ import numpy as np
 import okid
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from okid.records import ROLES, Record
+from okid.data.records import ROLES, Record
 from scipy.signal import cont2discrete, dlsim
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -15,10 +15,10 @@ import okid
 import pytest
 import pyuff
 from can_frames import plain_frames
+from okid.data.records import Record
 from okid.formats import read_record, write_csv, write_log
 from okid.formats.command import main
 from okid.formats.hdf5 import read_hdf5_result
-from okid.records import Record
 from sample_records import full_record, identified, program, shaken_frame
 
 GEOMETRY = """

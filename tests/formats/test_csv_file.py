@@ -11,8 +11,8 @@ import numpy as np
 import okid
 import pytest
 from hypothesis import given
+from okid.data.records import Record, read_csv
 from okid.formats import read_record, write_csv, write_record
-from okid.records import Record, read_csv
 from sample_records import NAMES, assert_same, full_record, program, records, shaken_frame, steady
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import okid
 import pytest
 from hypothesis import given
+from okid.data.records import Record
 from okid.formats import read_hdf5, write_hdf5, write_result
 from okid.formats.hdf5 import read_hdf5_result
-from okid.records import Record
 from sample_records import assert_same, full_record, identified, records, steady
 
 

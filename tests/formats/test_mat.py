@@ -10,9 +10,9 @@ import numpy as np
 import okid
 import pytest
 from hypothesis import given
+from okid.data.records import Record
 from okid.formats import read_mat, write_mat, write_result
 from okid.formats.mat import read_mat_result
-from okid.records import Record
 from sample_records import assert_same, full_record, identified, program, records, shaken_frame, steady
 from scipy.io import loadmat, savemat
 

@@ -11,8 +11,8 @@ import okid
 import pytest
 from asammdf import MDF, Signal
 from hypothesis import given
+from okid.data.records import Record
 from okid.formats import read_mdf4, write_mdf4
-from okid.records import Record
 from sample_records import assert_same, full_record, records, steady
 
 

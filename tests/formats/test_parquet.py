@@ -12,8 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
+from okid.data.records import Record
 from okid.formats import read_parquet, write_parquet
-from okid.records import Record
 from sample_records import assert_same, full_record, records, steady
 
 

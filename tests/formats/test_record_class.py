@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import okid
 import pytest
-from okid.records import CsvRecord, Record, even_rate, read_csv, unit_of_name
+from okid.data.records import CsvRecord, Record, even_rate, read_csv, unit_of_name
 from sample_records import full_record
 
 

@@ -10,10 +10,10 @@ import okid
 import pytest
 import pyuff
 from hypothesis import given
+from okid.data.records import Record
 from okid.formats import Geometry, read_geometry, read_record, read_uff, write_record, write_result, write_uff
 from okid.formats.uff import uff_losses
 from okid.formats.uff_function import shortest_rate
-from okid.records import Record
 from sample_records import NAMES, assert_same, full_record, identified, records, steady
 
 HISTORY = {

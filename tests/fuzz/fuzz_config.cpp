@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Any text as CONFIG.toml: a configuration that holds together, or a refusal.
-#include "config.hpp"
+#include "config/config.hpp"
 #include "text_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Any text as a CSV record: as many numbers as samples and columns, or a refusal.
-#include "csv.hpp"
+#include "record/csv.hpp"
 #include "text_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Any text as a DBC.
-#include "dbc.hpp"
+#include "config/dbc.hpp"
 #include "text_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -13,7 +13,7 @@ import pytest
 import reference
 from hypothesis import given
 from hypothesis import strategies as st
-from okid import Accumulator, Error, IdentificationError, InputError, _abi
+from okid import Accumulator, Error, IdentificationError, InputError, abi
 
 sizes = st.tuples(st.integers(0, 3), st.integers(1, 3), st.integers(1, 5))  # n_u, n_y, p
 seeds = st.integers(0, 2**31)
@@ -208,7 +208,7 @@ def test_full_scale_codes_are_counted() -> None:
     v = np.zeros((10, 2), np.int16)
     v[3, 0], v[7, 1] = 32767, -32768
     with Accumulator(1, 1, 2, codes=16) as sums:
-        assert sums.add(v) == _abi.WARN_SATURATED
+        assert sums.add(v) == abi.WARN_SATURATED
         assert sums.stats.saturated == 2
 
 
@@ -267,17 +267,17 @@ def test_sizes_out_of_range(wrong: dict[str, float]) -> None:
 
 
 def test_block_too_small_or_absent() -> None:
-    library, config = _abi.library(), _abi.AccumulatorConfig(1, 2, 4, 0, 0, 0, 1.0, 1, 0)
+    library, config = abi.library(), abi.AccumulatorConfig(1, 2, 4, 0, 0, 0, 1.0, 1, 0)
     needed = library.okid_accumulator_memsize(ctypes.byref(config))
-    handle, memory = ctypes.c_void_p(), _abi.block(needed)
+    handle, memory = ctypes.c_void_p(), abi.block(needed)
     create = library.okid_accumulator_create
     args = (ctypes.byref(handle), ctypes.byref(config))
-    assert create(*args, memory.ctypes.data, needed - 1) == _abi.ERR_MEMORY
-    assert create(*args, None, needed) == _abi.ERR_NULL
-    assert create(None, args[1], memory.ctypes.data, needed) == _abi.ERR_NULL
-    assert create(*args, memory.ctypes.data, needed) == _abi.OK
+    assert create(*args, memory.ctypes.data, needed - 1) == abi.ERR_MEMORY
+    assert create(*args, None, needed) == abi.ERR_NULL
+    assert create(None, args[1], memory.ctypes.data, needed) == abi.ERR_NULL
+    assert create(*args, memory.ctypes.data, needed) == abi.OK
     shifted = np.zeros(needed + 8, np.uint8)
-    assert create(*args, shifted.ctypes.data + 1, needed) == _abi.OK  # any alignment: the slack is inside memsize
+    assert create(*args, shifted.ctypes.data + 1, needed) == abi.OK  # any alignment: the slack is inside memsize
 
 
 def test_float32_and_lists_and_strided_arrays() -> None:

@@ -208,7 +208,7 @@ def test_a_record_without_inputs_in_any_stretch_has_no_fit() -> None:
     model = okid.Model(A, B, C, D, np.zeros((6, 3)), s.dt)
     v = np.random.default_rng(1).standard_normal((100, 4))
     v[::15, 0] = np.nan
-    fit, x0 = okid.record_fit.fit_records(model, [v], ["a", "b", "c"])
+    fit, x0 = okid.result.record_fit.fit_records(model, [v], ["a", "b", "c"])
     assert fit.simulation_percent == fit.prediction_percent == {"a": None, "b": None, "c": None}
     np.testing.assert_array_equal(x0, np.zeros((1, 6)))
 

@@ -37,7 +37,7 @@ def found(result: okid.Result, wanted: Sequence[float], within_hz: float) -> lis
 
 
 @pytest.fixture(scope="module")
-def frame() -> okid.records.CsvRecord:
+def frame() -> okid.Record:
     return okid.read_csv(data_file("daisy_flexible_structure/daisy_flexible_structure.csv"))
 
 
@@ -47,7 +47,7 @@ def plane() -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("options", [{}, {"p": 8, "rows": 30}, {"p": 15, "rows": 60}, {"order": 40}])
-def test_steel_frame_with_28_redundant_accelerometers(frame: okid.records.CsvRecord, options: dict[str, int]) -> None:
+def test_steel_frame_with_28_redundant_accelerometers(frame: okid.Record, options: dict[str, int]) -> None:
     assert frame.fs_hz == 1024.0
     assert frame.samples.shape == (8523, 30)
     result = okid.identify(frame.samples[:, :2], frame.samples[:, 2:], fs=frame.fs_hz, **options)

@@ -12,7 +12,7 @@ import systems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from okid import Accumulator, Identifier, _abi
+from okid import Accumulator, Identifier, abi
 from scipy.linalg import eigh, qr
 from scipy.signal import cont2discrete
 
@@ -24,22 +24,22 @@ def column_major(x: Array) -> Array:
     return np.asfortranarray(x, dtype=np.float64)
 
 
-def view(model: Model) -> _abi.ModelView:
+def view(model: Model) -> abi.ModelView:
     kept = [column_major(x) for x in model]
-    out = _abi.ModelView(kept[1].shape[1], kept[2].shape[0], len(kept[0]), *map(_abi.pointer, kept), None)
+    out = abi.ModelView(kept[1].shape[1], kept[2].shape[0], len(kept[0]), *map(abi.pointer, kept), None)
     out.kept = kept  # type: ignore[attr-defined]
     return out
 
 
 def convert(name: str, model: Model, dt: float, hold: int) -> Model:
     """okid_mechanics_c2d or _d2c."""
-    library, given_model = _abi.library(), view(model)
+    library, given_model = abi.library(), view(model)
     out = [np.empty(x.shape, order="F") for x in (model[0], model[1], model[3])]
     size = library.okid_mechanics_hold_memsize(given_model.n_u, given_model.n_y, given_model.n_z)
-    work = _abi.block(size)
+    work = abi.block(size)
     function = getattr(library, f"okid_mechanics_{name}")
-    status = function(ctypes.byref(given_model), dt, hold, *map(_abi.pointer, out), work.ctypes.data, size)
-    _abi.check(status, name)
+    status = function(ctypes.byref(given_model), dt, hold, *map(abi.pointer, out), work.ctypes.data, size)
+    abi.check(status, name)
     return out[0], out[1], model[2], out[2]
 
 
@@ -57,28 +57,28 @@ class Found:
     damping_ratio: Array
 
 
-def mkr(model: Model, s: systems.Structure, hold: int = _abi.HOLD_ZERO, sensing: list[int] | None = None) -> Found:
-    library, given_model, n = _abi.library(), view(model), len(s.M)
-    kinds = sensing or [_abi.SENSE_ACCELERATION] * len(s.sense_dofs)
+def mkr(model: Model, s: systems.Structure, hold: int = abi.HOLD_ZERO, sensing: list[int] | None = None) -> Found:
+    library, given_model, n = abi.library(), view(model), len(s.M)
+    kinds = sensing or [abi.SENSE_ACCELERATION] * len(s.sense_dofs)
     maps = [np.array(x, np.int32) for x in (s.force_dofs, s.sense_dofs, kinds)]
-    places = [x.ctypes.data_as(_abi.int32s) for x in maps]
-    config = _abi.MkrConfig(n, hold, s.dt, places[0], None, places[1], None, places[2])
+    places = [x.ctypes.data_as(abi.int32s) for x in maps]
+    config = abi.MkrConfig(n, hold, s.dt, places[0], None, places[1], None, places[2])
     size = library.okid_mkr_memsize(given_model.n_u, given_model.n_y, given_model.n_z, n)
-    work, out = _abi.block(size), _abi.Mkr()
+    work, out = abi.block(size), abi.Mkr()
     status = library.okid_mkr_identify(
         ctypes.byref(given_model), ctypes.byref(config), ctypes.byref(out), work.ctypes.data, size
     )
-    _abi.check(status, "okid_mkr_identify")
+    abi.check(status, "okid_mkr_identify")
     square = [np.ctypeslib.as_array(x, (n, n)).T.copy() for x in (out.M, out.R, out.K, out.R_normal)]
     modes = [np.ctypeslib.as_array(x, (n,)).copy() for x in (out.frequency_hz, out.damping_ratio)]
     return Found(status, out.notes, *square, *modes)
 
 
-def pdc(frequency_hz: Array, damping_ratio: Array, weight: Array | None = None) -> _abi.Pdc:
-    out = _abi.Pdc()
+def pdc(frequency_hz: Array, damping_ratio: Array, weight: Array | None = None) -> abi.Pdc:
+    out = abi.Pdc()
     kept = [None if x is None else np.ascontiguousarray(x) for x in (frequency_hz, damping_ratio, weight)]
-    status = _abi.library().okid_pdc_fit(len(frequency_hz), *map(_abi.pointer, kept), ctypes.byref(out))
-    _abi.check(status, "okid_pdc_fit")
+    status = abi.library().okid_pdc_fit(len(frequency_hz), *map(abi.pointer, kept), ctypes.byref(out))
+    abi.check(status, "okid_pdc_fit")
     return out
 
 
@@ -119,13 +119,13 @@ def realization(model: Model, rng: np.random.Generator, omega: float) -> Model:
     return turn @ model[0] @ back, turn @ model[1], model[2] @ back, model[3]
 
 
-@given(st.integers(0, 2**31), st.integers(1, 8), st.sampled_from([_abi.HOLD_ZERO, _abi.HOLD_FIRST]))
+@given(st.integers(0, 2**31), st.integers(1, 8), st.sampled_from([abi.HOLD_ZERO, abi.HOLD_FIRST]))
 def test_sampling_equals_scipy_and_goes_back(seed: int, n: int, hold: int) -> None:
     rng = np.random.default_rng(seed)
     s = random_structure(rng, n)
     model = continuous(s, [int(k) for k in rng.integers(0, 3, len(s.sense_dofs))])
     ours = convert("c2d", model, s.dt, hold)
-    theirs = cont2discrete(model, s.dt, "zoh" if hold == _abi.HOLD_ZERO else "foh")
+    theirs = cont2discrete(model, s.dt, "zoh" if hold == abi.HOLD_ZERO else "foh")
     for left, right in zip(ours, theirs[:4], strict=True):
         np.testing.assert_allclose(left, right, rtol=0, atol=1e-12 * float(np.max(np.abs(right))))
     back = convert("d2c", ours, s.dt, hold)
@@ -134,7 +134,7 @@ def test_sampling_equals_scipy_and_goes_back(seed: int, n: int, hold: int) -> No
         np.testing.assert_allclose(left, right, rtol=0, atol=1e-11 * float(np.max(np.abs(size))))
 
 
-@given(st.integers(0, 2**31), st.integers(1, 8), st.sampled_from([_abi.HOLD_ZERO, _abi.HOLD_FIRST]))
+@given(st.integers(0, 2**31), st.integers(1, 8), st.sampled_from([abi.HOLD_ZERO, abi.HOLD_FIRST]))
 def test_mkr_of_any_structure_and_realization(seed: int, n: int, hold: int) -> None:
     rng = np.random.default_rng(seed)
     s = random_structure(rng, n)

@@ -9,7 +9,7 @@ import numpy as np
 import okid
 import pytest
 import systems
-from okid.records import read_csv
+from okid.data.records import read_csv
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import systems
 from gram import solve_gram
 from hypothesis import given
 from hypothesis import strategies as st
-from okid import Accumulator, IdentificationError, InputError, SquareRoot, _abi
+from okid import Accumulator, IdentificationError, InputError, SquareRoot, abi
 
 sizes = st.tuples(st.integers(0, 3), st.integers(1, 3), st.integers(1, 5))  # n_u, n_y, p
 seeds = st.integers(0, 2**31)
@@ -103,7 +103,7 @@ def test_missing_samples_leave_their_rows_out(
     lost = ~np.all(np.isfinite(present(v)), axis=1)
     rows = SquareRoot(n_u, n_y, p)
     status = [rows.add(piece) for piece in (np.split(v, [41, 43, 90]) if split else [v])]
-    assert max(status) == (_abi.WARN_MISSING if np.any(lost) else _abi.OK)
+    assert max(status) == (abi.WARN_MISSING if np.any(lost) else abi.OK)
     stats = rows.stats
     assert (stats.missing, stats.samples) == (lost.sum(), len(v) - lost.sum())
     assert stats.gaps == lost[0] + np.sum(lost[1:] & ~lost[:-1])
@@ -242,7 +242,7 @@ def test_all_kinds_of_numbers_give_the_same_bits() -> None:
     factors = []
     for form in [*forms, np.asfortranarray(forms[3]), wide[:, ::2], codes.tolist()]:
         rows = SquareRoot(1, 2, 4)
-        assert rows.add(form) == _abi.OK
+        assert rows.add(form) == abi.OK
         factors.append(rows.factor("mean")[0])
     for other in factors[1:]:
         np.testing.assert_array_equal(factors[0], other)
@@ -253,7 +253,7 @@ def test_full_scale_codes_are_counted() -> None:
         v = np.zeros((10, 2), kind)
         v[3, 0], v[7, 1] = np.iinfo(kind).max, np.iinfo(kind).min
         rows = SquareRoot(1, 1, 2)
-        assert rows.add(v) == _abi.WARN_SATURATED
+        assert rows.add(v) == abi.WARN_SATURATED
         assert (rows.stats.saturated, rows.stats.samples) == (2, 10)
 
 
@@ -454,16 +454,16 @@ def test_what_the_data_do_not_determine_is_refused() -> None:
     rows = SquareRoot(2, 3, 4)
     rows.add(v)
     assert rows.observer("mean").theta.shape == (3, 22)
-    attempt(v[: 4 + 21], _abi.ERR_TOO_SHORT)
+    attempt(v[: 4 + 21], abi.ERR_TOO_SHORT)
     constant = v.copy()
     constant[:, 1] = 0.1
-    attempt(constant, _abi.ERR_INPUT)
+    attempt(constant, abi.ERR_INPUT)
     constant = v.copy()
     constant[:, 4] = -3.3
-    attempt(constant, _abi.ERR_OUTPUT)
+    attempt(constant, abi.ERR_OUTPUT)
     twice = v.copy()
     twice[:, 1] = 2.0 * twice[:, 0] + 1.0
-    attempt(twice, _abi.ERR_EXCITATION)
+    attempt(twice, abi.ERR_EXCITATION)
     sines = v.copy()
     sines[:, 0], sines[:, 1] = np.sin(0.3 * np.arange(600)), np.cos(0.5 * np.arange(600))
-    attempt(sines, _abi.ERR_EXCITATION, p=8)
+    attempt(sines, abi.ERR_EXCITATION, p=8)

@@ -19,13 +19,13 @@ import systems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from okid import Accumulator, _abi
+from okid import Accumulator, abi
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import detrend, lfilter
 from test_measured import FRAME_HZ, data_file
 
 Array = NDArray[np.float64]
-METHODS = {"moesp": _abi.SUBSPACE_MOESP, "cva": _abi.SUBSPACE_CVA, "ssarx": _abi.SUBSPACE_SSARX}
+METHODS = {"moesp": abi.SUBSPACE_MOESP, "cva": abi.SUBSPACE_CVA, "ssarx": abi.SUBSPACE_SSARX}
 ROWS = {"w1": 40, "w2": 30, "w3": 25}
 
 
@@ -76,26 +76,26 @@ class Subspace:
     def __init__(
         self, n_u: int, n_y: int, rows: int, method: str, max_order: int = 0, factor: int = 0, ridge: float = 0.0
     ) -> None:
-        self.n_u, self.n_y, self.lib = n_u, n_y, _abi.library()
-        config = _abi.SubspaceConfig(n_u, n_y, rows, METHODS[method], max_order, factor, ridge)
-        self.block = _abi.block(self.lib.okid_subspace_memsize(ctypes.byref(config)))
-        self.handle, self.info = ctypes.c_void_p(), _abi.SubspaceInfo()
+        self.n_u, self.n_y, self.lib = n_u, n_y, abi.library()
+        config = abi.SubspaceConfig(n_u, n_y, rows, METHODS[method], max_order, factor, ridge)
+        self.block = abi.block(self.lib.okid_subspace_memsize(ctypes.byref(config)))
+        self.handle, self.info = ctypes.c_void_p(), abi.SubspaceInfo()
         args = (ctypes.byref(self.handle), ctypes.byref(config), self.block.ctypes.data, self.block.size)
         assert self.lib.okid_subspace_create(*args) == 0
 
     def decompose(self, gram: Array, rows: int) -> Subspace:
         status = self.lib.okid_subspace_decompose(
-            self.handle, _abi.pointer(np.ascontiguousarray(gram)), rows, ctypes.byref(self.info)
+            self.handle, abi.pointer(np.ascontiguousarray(gram)), rows, ctypes.byref(self.info)
         )
-        assert status == 0, _abi.status_text(status)
+        assert status == 0, abi.status_text(status)
         return self
 
     def decompose_factor(self, columns: Array, rows: int) -> Subspace:
         """`columns`: the column-major factor as NumPy sees it, transposed."""
         status = self.lib.okid_subspace_decompose_factor(
-            self.handle, _abi.pointer(columns), rows, ctypes.byref(self.info)
+            self.handle, abi.pointer(columns), rows, ctypes.byref(self.info)
         )
-        assert status == 0, _abi.status_text(status)
+        assert status == 0, abi.status_text(status)
         return self
 
     def singular_values(self) -> Array:
@@ -107,9 +107,9 @@ class Subspace:
         u, y = self.n_u, self.n_y
         shapes = {"A": (n, n), "B": (u, n), "C": (n, y), "D": (u, y), "K": (y, n), "innovation": (y, y)}
         out = {name: np.zeros(shape) for name, shape in shapes.items()}
-        pointers = [None if u == 0 and name in "BD" else _abi.pointer(a) for name, a in out.items()]
+        pointers = [None if u == 0 and name in "BD" else abi.pointer(a) for name, a in out.items()]
         status = self.lib.okid_subspace_realize(self.handle, n, *pointers)
-        assert status == 0, _abi.status_text(status)
+        assert status == 0, abi.status_text(status)
         return Model(**{name: a.T for name, a in out.items()})
 
 
@@ -123,15 +123,15 @@ def sums(records: list[Array], n_u: int, i: int, mean: bool = False) -> tuple[Ar
 
 def triangle(record: Array, n_u: int, i: int) -> tuple[Array, int]:
     """okid_square_root_factor() of one record, as `decompose_factor` takes it."""
-    lib, config = _abi.library(), _abi.SquareRootConfig()
+    lib, config = abi.library(), abi.SquareRootConfig()
     config.n_u, config.n_y, config.lags, config.forgetting = n_u, record.shape[1] - n_u, 2 * i - 1, 1.0
-    block, handle = _abi.block(lib.okid_square_root_memsize(ctypes.byref(config))), ctypes.c_void_p()
+    block, handle = abi.block(lib.okid_square_root_memsize(ctypes.byref(config))), ctypes.c_void_p()
     args = (ctypes.byref(handle), ctypes.byref(config), block.ctypes.data, block.size)
     assert lib.okid_square_root_create(*args) == 0
     samples, size = np.ascontiguousarray(record), 2 * i * record.shape[1]
-    assert lib.okid_square_root_add(handle, _abi.pointer(samples), len(samples)) == 0
+    assert lib.okid_square_root_add(handle, abi.pointer(samples), len(samples)) == 0
     factor = np.zeros((size, size))
-    assert lib.okid_square_root_factor(handle, _abi.DETREND_NONE, _abi.pointer(factor), None) == 0
+    assert lib.okid_square_root_factor(handle, abi.DETREND_NONE, abi.pointer(factor), None) == 0
     return factor, lib.okid_square_root_rows(handle)
 
 
@@ -142,17 +142,17 @@ def identified(records: list[Array], n_u: int, i: int, n: int, method: str, ridg
 
 def output_error(A: Array, C: Array, records: list[Array], n_u: int) -> tuple[Array, Array, Array]:
     """B, D and the initial states (records, n_z)."""
-    lib, n, n_y = _abi.library(), len(A), len(C)
+    lib, n, n_y = abi.library(), len(A), len(C)
     v = np.ascontiguousarray(np.vstack(records))
     counts = np.array([len(r) for r in records], np.int32)
-    work = _abi.block(lib.okid_subspace_output_error_memsize(n_u, n_y, n, len(records)))
+    work = abi.block(lib.okid_subspace_output_error_memsize(n_u, n_y, n, len(records)))
     B, D, x0 = np.zeros((n_u, n)), np.zeros((n_u, n_y)), np.zeros((len(records), n))
     given_a, given_c = np.ascontiguousarray(A.T), np.ascontiguousarray(C.T)
     status = lib.okid_subspace_output_error(
-        n_u, n_y, n, _abi.pointer(given_a), _abi.pointer(given_c), len(records), counts.ctypes.data_as(_abi.int32s),
-        _abi.pointer(v), _abi.pointer(B), _abi.pointer(D), _abi.pointer(x0), work.ctypes.data, work.size,
+        n_u, n_y, n, abi.pointer(given_a), abi.pointer(given_c), len(records), counts.ctypes.data_as(abi.int32s),
+        abi.pointer(v), abi.pointer(B), abi.pointer(D), abi.pointer(x0), work.ctypes.data, work.size,
     )  # fmt: skip
-    assert status == 0, _abi.status_text(status)
+    assert status == 0, abi.status_text(status)
     return B.T, D.T, x0
 
 

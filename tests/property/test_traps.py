@@ -12,7 +12,7 @@ import reference
 import systems
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from okid import Accumulator, IdentificationError, Identifier, _abi
+from okid import Accumulator, IdentificationError, Identifier, abi
 
 
 def identified(records: list[np.ndarray], n_u: int, p: int, rows: int, order: int, dt: float, detrend: str = "mean"):
@@ -168,7 +168,7 @@ def test_innovation_covariance_is_the_residual_of_the_reference() -> None:
 
 
 @pytest.mark.parametrize(
-    ("column", "status"), [(0, _abi.ERR_INPUT), (1, _abi.ERR_OUTPUT), (2, _abi.ERR_OUTPUT)], ids=["u", "y1", "y2"]
+    ("column", "status"), [(0, abi.ERR_INPUT), (1, abi.ERR_OUTPUT), (2, abi.ERR_OUTPUT)], ids=["u", "y1", "y2"]
 )
 def test_constant_channels_are_named(column: int, status: int) -> None:
     v = np.random.default_rng(1).standard_normal((500, 3))
@@ -184,20 +184,20 @@ def test_too_few_rows_and_identical_inputs() -> None:
     v = rng.standard_normal((8, 2))
     with pytest.raises(IdentificationError) as caught:
         identified([v], 1, 6, 6, 2, 0.01)
-    assert caught.value.status == _abi.ERR_TOO_SHORT
+    assert caught.value.status == abi.ERR_TOO_SHORT
     u = rng.standard_normal((2000, 1))
     with pytest.raises(IdentificationError) as caught:
         identified([np.hstack([u, u, rng.standard_normal((2000, 1))])], 2, 6, 6, 2, 0.01)
-    assert caught.value.status == _abi.ERR_EXCITATION
+    assert caught.value.status == abi.ERR_EXCITATION
 
 
 def test_identifier_refuses_too_little_memory() -> None:
-    library, config = _abi.library(), _abi.IdentifyConfig(1, 2, 6, 0, 0, 0, 100.0, 0, 1)
+    library, config = abi.library(), abi.IdentifyConfig(1, 2, 6, 0, 0, 0, 100.0, 0, 1)
     needed = library.okid_identify_memsize(ctypes.byref(config))
-    handle, memory = ctypes.c_void_p(), _abi.block(needed)
+    handle, memory = ctypes.c_void_p(), abi.block(needed)
     create = library.okid_identify_create
     args = (ctypes.byref(handle), ctypes.byref(config), memory.ctypes.data)
-    assert create(*args, needed - 1) == _abi.ERR_MEMORY
-    assert create(*args, needed) == _abi.OK
+    assert create(*args, needed - 1) == abi.ERR_MEMORY
+    assert create(*args, needed) == abi.OK
     config.fs_hz = -1.0
     assert library.okid_identify_memsize(ctypes.byref(config)) == 0

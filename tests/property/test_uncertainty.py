@@ -11,11 +11,11 @@ import pytest
 import systems
 from numpy.typing import NDArray
 from okid import identify
-from okid.accumulator import Accumulator
-from okid.identifier import Identified, Identifier
-from okid.model import Model
-from okid.result import Result
-from okid.uncertainty import Jackknife, Replicates, Uncertainty
+from okid.abi.accumulator import Accumulator
+from okid.abi.identifier import Identified, Identifier
+from okid.result.model import Model
+from okid.result.result import Result
+from okid.result.uncertainty import Jackknife, Replicates, Uncertainty
 
 Array = NDArray[np.float64]
 SLOW = os.environ.get("OKID_SLOW") == "1"

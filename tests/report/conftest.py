@@ -33,7 +33,7 @@ def _frame(folder: Path) -> Path:
         '# </pre><script>alert(3)</script> mqtt = "mqtt://user:secret@host/okid"\n',
         encoding="utf-8",
     )
-    record = okid.records.Record(["force", *HOSTILE], np.hstack([u, y]), 1000.0)
+    record = okid.Record(["force", *HOSTILE], np.hstack([u, y]), 1000.0)
     hz = [mode.frequency_hz for mode in result.modes]
     events = write_events(folder / "frame.jsonl", HOSTILE, hz)
     report.write_report(

@@ -185,7 +185,7 @@ def test_records_of_other_formats(small: tuple[Path, Any, Any], tmp_path: Path) 
     from okid import formats
 
     path, u, y = small
-    record = okid.records.Record(["u1", "y1", "y2", "y3"], np.hstack([u, y]), FS, ["N", "m/s^2", "m/s^2", "m/s^2"])
+    record = okid.Record(["u1", "y1", "y2", "y3"], np.hstack([u, y]), FS, ["N", "m/s^2", "m/s^2", "m/s^2"])
     formats.write_record(tmp_path / "r.mat", record)
     assert report.main([str(path), "--record", str(tmp_path / "r.mat"), "--out", str(tmp_path / "r.html")]) == 0
     html = (tmp_path / "r.html").read_text(encoding="utf-8")
@@ -211,7 +211,7 @@ def test_passwords_stay_out() -> None:
 def test_the_stabilization_diagram_explains_itself(small: tuple[Path, Any, Any], tmp_path: Path) -> None:
     """Every mark and line of the picture is named in its legend and in the words below it; so is the order used."""
     path, u, y = small
-    record = okid.records.Record(["u1", "y1", "y2", "y3"], np.hstack([u, y]), FS)
+    record = okid.Record(["u1", "y1", "y2", "y3"], np.hstack([u, y]), FS)
     loaded = report.load_result(path)
     order, modes = loaded.raw["order"], len(loaded.raw["modes"])
     page = report.build(loaded, record)

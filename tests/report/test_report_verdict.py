@@ -88,7 +88,7 @@ def test_what_was_not_looked_at_is_said(raw: dict[str, Any], tmp_path: Path) -> 
     silent = shown(raw, events=written(tmp_path / "e.jsonl", CHANNELS, None))
     assert "rate by the time stamps (the events do not tell it)" in silent
     u, y = demo_record(4000)
-    record = okid.records.Record(CHANNELS, np.hstack([u, y]), FS)
+    record = okid.Record(CHANNELS, np.hstack([u, y]), FS)
     whole = shown(raw, events=written(tmp_path / "e.jsonl", CHANNELS, FS), record=record)
     assert "Not looked at" not in whole
     page = report.build(report.loaded_from(raw, "r"), events=written(tmp_path / "e.jsonl", CHANNELS, 1000.25))

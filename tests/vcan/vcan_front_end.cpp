@@ -2,7 +2,7 @@
 // okid's reader thread and ring on a CAN interface, and nothing behind it: what vcan_flood numbered is checked.
 // usage: vcan_front_end INTERFACE COUNT QUIET_SECONDS   ends after COUNT frames or when QUIET_SECONDS bring none.
 // "listening" when the socket is bound; "back NS" (CLOCK_MONOTONIC) for the first frame after the link was away.
-#include "live/reader.hpp"
+#include "acquire/reader.hpp"
 
 #include <cstdio>
 #include <cstdlib>

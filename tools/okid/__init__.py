@@ -10,20 +10,20 @@ from typing import Any
 
 from okid import frf, modal
 from okid._errors import Error, IdentificationError, InputError
-from okid.accumulator import Accumulator
+from okid.abi.accumulator import Accumulator
+from okid.abi.identifier import Identified, Identifier, usable_p
+from okid.abi.square_root import SquareRoot
+from okid.data.records import Record, read_csv
+from okid.data.structure import Structure
+from okid.data.sums import Stats
 from okid.demo import demo, demo_frame, demo_record
-from okid.identifier import Identified, Identifier, usable_p
 from okid.identify import identify
-from okid.mkr import MassMatrices, ProportionalDamping
-from okid.modal_table import ModalTable
-from okid.model import Model
-from okid.records import Record, read_csv
-from okid.result import Fit, Mode, Result
+from okid.result.mkr import MassMatrices, ProportionalDamping
+from okid.result.modal_table import ModalTable
+from okid.result.model import Model
+from okid.result.result import Fit, Mode, Result
+from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization, stabilization
 from okid.session import Session
-from okid.square_root import SquareRoot
-from okid.stabilization import Cluster, Criteria, OrderPoles, Stabilization, stabilization
-from okid.structure import Structure
-from okid.sums import Stats
 
 __all__ = [
     "Accumulator",
@@ -72,7 +72,7 @@ def __getattr__(name: str) -> Any:
     okid.__version__ is asked of the C library.
     """
     if name == "__version__":
-        from okid._abi import library
+        from okid.abi import library
 
         return library().okid_version().decode()
     if name in ("campaign", "capture", "formats", "live", "report"):
@@ -85,6 +85,6 @@ def __getattr__(name: str) -> Any:
 
 def library_version() -> str:
     """Version and linear-algebra backend of the loaded C library."""
-    from okid._abi import library
+    from okid.abi import library
 
     return f"{library().okid_version().decode()} ({library().okid_backend().decode()})"

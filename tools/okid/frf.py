@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
-from okid.arguments import positive
+from okid.abi.arguments import positive
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -113,7 +113,7 @@ def h1(
     Raises InputError when no complete segment is left, or none of 64 samples by default.
     Source: Bendat and Piersol, multiple-input H1.
     """
-    from okid.records import paired  # records imports nothing of this module
+    from okid.data.records import paired  # records imports nothing of this module
 
     fs = positive("fs", fs, "a sample rate in Hz")
     inputs, outputs = paired(u, y)
@@ -173,7 +173,7 @@ def spectra(y: ArrayLike | Sequence[ArrayLike], fs: float) -> Spectra:
     NaN = missing, segments avoid it. Raises InputError when no stretch of 64 samples is complete.
     Source: Bendat and Piersol, Random Data.
     """
-    from okid.records import paired  # records imports nothing of this module
+    from okid.data.records import paired  # records imports nothing of this module
 
     _, outputs = paired(None, y)
     nperseg = _segment_length(outputs)

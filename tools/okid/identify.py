@@ -10,22 +10,22 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from okid import _abi
+from okid import abi
 from okid._errors import Error, IdentificationError, InputError
-from okid.accumulator import Accumulator
-from okid.arguments import choice, frame_names, names, positive, whole, with_name
-from okid.identifier import HANKEL, METHODS, Identified, Identifier, usable_p
-from okid.mkr import MassMatrices, Plan, ProportionalDamping, make_plan, mass_matrices
-from okid.model import Model
-from okid.output_error import fit_inputs, refitted
-from okid.record_fit import detrended, fit_records
-from okid.records import paired
-from okid.refine import refined
-from okid.remarks import remarks_of
-from okid.result import Fit, Mode, Remark, Result, modes_of, put_deviations, with_deviations
-from okid.skew import without_skew
-from okid.square_root import SquareRoot
-from okid.uncertainty import FEWEST, GROUPS, MOST, Piece, Replicate, deviations, finite_p_bias, leave_out_blocks
+from okid.abi.accumulator import Accumulator
+from okid.abi.arguments import choice, frame_names, names, positive, whole, with_name
+from okid.abi.identifier import HANKEL, METHODS, Identified, Identifier, usable_p
+from okid.abi.square_root import SquareRoot
+from okid.data.records import paired
+from okid.result.mkr import MassMatrices, Plan, ProportionalDamping, make_plan, mass_matrices
+from okid.result.model import Model
+from okid.result.output_error import fit_inputs, refitted
+from okid.result.record_fit import detrended, fit_records
+from okid.result.refine import refined
+from okid.result.remarks import remarks_of
+from okid.result.result import Fit, Mode, Remark, Result, modes_of, put_deviations, with_deviations
+from okid.result.skew import without_skew
+from okid.result.uncertainty import FEWEST, GROUPS, MOST, Piece, Replicate, deviations, finite_p_bias, leave_out_blocks
 
 Real = NDArray[np.float64]
 Sums = TypeVar("Sums", Accumulator, SquareRoot)
@@ -39,7 +39,7 @@ def _check_moving(records: list[Real], names: list[str], n_u: int) -> None:
             raise InputError(f"{kind} {name!r} has no sample at all: every value is missing")
         if np.ptp(present) == 0.0:
             reason = "excites nothing" if k < n_u else "measures nothing"
-            status = _abi.ERR_INPUT if k < n_u else _abi.ERR_OUTPUT
+            status = abi.ERR_INPUT if k < n_u else abi.ERR_OUTPUT
             raise IdentificationError(f"no model: {kind} {name!r} is constant ({present[0]:g}): it {reason}", status)
 
 
@@ -78,7 +78,7 @@ def _better(
     """From the Gram matrix; nearly noise-free records, which lose half their digits in it, from their QR factor."""
     found = identifier.run(sums)
     floor_only = found.observer.ridge <= 1e-10  # else a ridge decides, not rounding
-    if not (found.notes & _abi.NOTE_ILL_CONDITIONED and floor_only):
+    if not (found.notes & abi.NOTE_ILL_CONDITIONED and floor_only):
         return found, []
     try:
         better = identifier.run(_feed(SquareRoot(sums.n_u, sums.n_y, sums.lags), records, sums.lags, rest))
@@ -143,7 +143,7 @@ def _usable(p: int, n_u: int, n_y: int, records: list[Real]) -> tuple[int, list[
         raise IdentificationError(
             f"no model: too few samples: {samples} complete ones, even the smallest model of {n_u} inputs and {n_y} "
             f"outputs needs {least} (10 for each unknown)",
-            _abi.ERR_TOO_SHORT,
+            abi.ERR_TOO_SHORT,
         )
     used = usable_p(n_u, n_y, p, samples)
     if gaps:
@@ -167,7 +167,7 @@ def _usable_rows(rows: int, method: str, n_u: int, n_y: int, records: list[Real]
     raise IdentificationError(
         f"no model: too few samples: {int(np.sum(runs))} complete ones, even the smallest model of {n_u} inputs and "
         f"{n_y} outputs needs {10 * least * (n_y + 2 * n_u) + 2 * least - 1} without a gap",
-        _abi.ERR_TOO_SHORT,
+        abi.ERR_TOO_SHORT,
     )
 
 
@@ -223,7 +223,7 @@ def _check_explains(fit: Fit) -> None:
         raise IdentificationError(
             f"no model: the best one explains {max(numbers, default=0.0):.1f} % of an output: the outputs do not "
             "answer these inputs, or a sensor was overloaded",
-            _abi.ERR_NO_MODES,
+            abi.ERR_NO_MODES,
         )
 
 
@@ -363,7 +363,7 @@ def identify(
         found, by_subspace = _with_inputs(identifier, found, own, n_u)
         remarks += by_subspace
     model = found.model()
-    fit, model.x0 = fit_records(model, own, out_names, predict=not found.notes & _abi.NOTE_PREDICTOR_UNSTABLE)
+    fit, model.x0 = fit_records(model, own, out_names, predict=not found.notes & abi.NOTE_PREDICTOR_UNSTABLE)
     refinement = None
     if refine:
         found, model, fit, refinement, of_refinement = refined(found, model, fit, own, out_names, detrend != "none")

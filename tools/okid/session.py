@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import Error, IdentificationError, InputError
-from okid.accumulator import Accumulator
-from okid.arguments import choice, frame_names, names, positive, whole, with_name
-from okid.identifier import METHODS, Identified, Identifier
-from okid.mkr import Plan, make_plan, mass_matrices
-from okid.records import ROLES, unmasked
-from okid.remarks import remarks_of
-from okid.result import Fit, Mode, Remark, Result, modes_of, put_deviations, with_deviations
-from okid.stream_blocks import StreamBlocks
-from okid.sums import Stats
-from okid.toml_file import read_toml
-from okid.uncertainty import FEWEST, GROUPS, MOST
+from okid.abi.accumulator import Accumulator
+from okid.abi.arguments import choice, frame_names, names, positive, whole, with_name
+from okid.abi.identifier import METHODS, Identified, Identifier
+from okid.data.records import ROLES, unmasked
+from okid.data.stream_blocks import StreamBlocks
+from okid.data.sums import Stats
+from okid.data.toml_file import read_toml
+from okid.result.mkr import Plan, make_plan, mass_matrices
+from okid.result.remarks import remarks_of
+from okid.result.result import Fit, Mode, Remark, Result, modes_of, put_deviations, with_deviations
+from okid.result.uncertainty import FEWEST, GROUPS, MOST
 
 Real = NDArray[np.float64]
 

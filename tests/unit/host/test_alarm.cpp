@@ -3,7 +3,7 @@
 // those of a jackknife. No alarm in a very long time of nothing; one for a shift, over when it is gone.
 #include "live/alarm.hpp"
 #include "live/settling.hpp"
-#include "publishing/terminal_table.hpp"
+#include "publish/terminal_table.hpp"
 
 #include <cmath>
 #include <deque>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Nodes on clocks of their own, brought to one grid; decimation: every sample that comes out is that of its time.
-#include "live/aligner.hpp"
+#include "align/aligner.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A sensor without a counter (WitMotion, VectorNav): its packets reach the host in bursts, behind a latency timer, late by
 // a scheduler. Every sample is placed, no gap that was not, and what was lost is marked to the sample.
-#include "live/grid.hpp"
+#include "align/grid.hpp"
 
 #include <array>
 #include <cmath>

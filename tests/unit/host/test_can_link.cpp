@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What okid doctor and okid run say of a CAN interface, for states that no virtual one can have.
-#include "live/bus_watch.hpp"
-#include "live/can_link.hpp"
+#include "acquire/bus_watch.hpp"
+#include "acquire/can_link.hpp"
 
 #include <cstring>
 #include <unity.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Every wrong CONFIG.toml ends with exit 2 and a message that names line, key, what was found and what was expected.
-#include "config.hpp"
+#include "config/config.hpp"
 #include "error.hpp"
 
 #include <cstdio>

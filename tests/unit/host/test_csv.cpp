@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The CSV reader: dialects, missing samples, sample rate, and a clear refusal of everything else.
-#include "csv.hpp"
-#include "csv_header.hpp"
+#include "config/nearest_name.hpp"
 #include "error.hpp"
-#include "nearest_name.hpp"
+#include "record/csv.hpp"
+#include "record/csv_header.hpp"
 
 #include <cmath>
 #include <cstdio>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Frames lost, doubled and out of order over many seeds: the gaps on the grid are the losses that were made.
-#include "live/grid.hpp"
+#include "align/grid.hpp"
 
 #include <algorithm>
 #include <cmath>

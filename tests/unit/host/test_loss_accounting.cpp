@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Every fault over many seeds, from a source through the ring to the grid: nothing crashes or hangs, every number stands in
 // its row, and the marked gaps are the losses that were made.
+#include "align/grid.hpp"
 #include "fault_source.h"
-#include "live/grid.hpp"
 
 #include <cmath>
 #include <cstdio>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The recorder between its threads: two buses at once, the trigger, what nobody took.
-#include "recording/recorder.hpp"
+#include "journal/recorder.hpp"
 
 #include <cstdlib>
 #include <filesystem>

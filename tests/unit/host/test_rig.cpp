@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The virtual rig against closed forms: discretisation, damping, response, noise, codes, frames.
 #include "error.hpp"
-#include "gaussian.hpp"
-#include "rig.hpp"
-#include "rig_files.hpp"
-#include "rig_frames.hpp"
-#include "rig_run.hpp"
+#include "rig/gaussian.hpp"
+#include "rig/rig.hpp"
+#include "rig/rig_files.hpp"
+#include "rig/rig_frames.hpp"
+#include "rig/rig_run.hpp"
 
 #include <cmath>
 #include <cstdio>

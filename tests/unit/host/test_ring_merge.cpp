@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Frames of several buses in the order of time: a program that was away for seconds gives no sample up, and neither does
 // one whose adapter holds its frames back for less than a second.
-#include "live/grid.hpp"
-#include "live/ring_merge.hpp"
+#include "acquire/ring_merge.hpp"
+#include "align/grid.hpp"
 
 #include <memory>
 #include <unity.h>

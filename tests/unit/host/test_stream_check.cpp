@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What the first frames of a stream say against the configuration, and that a right one gives no cause.
-#include "live/stream_check.hpp"
+#include "align/stream_check.hpp"
 
 #include <cmath>
 #include <random>

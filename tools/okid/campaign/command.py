@@ -20,8 +20,8 @@ from okid.campaign.pieces import make_identifier
 from okid.campaign.record_list import list_records
 from okid.campaign.spec import CampaignSpec, Trend, load_spec
 from okid.campaign.virtual_year import Year, simulate_year
+from okid.data.whole_file import whole_file
 from okid.report.written_line import written_line
-from okid.whole_file import whole_file
 
 EXIT_DONE, EXIT_USAGE, EXIT_NO_MODEL, EXIT_INTERRUPTED = 0, 2, 3, 130
 _SHOWN = 10

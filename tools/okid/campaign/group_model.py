@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from okid._errors import Error, IdentificationError
-from okid.accumulator import Accumulator
+from okid.abi.accumulator import Accumulator
+from okid.abi.identifier import Identified, Identifier
 from okid.campaign.pieces import make_identifier
 from okid.campaign.spec import CampaignSpec
 from okid.campaign.sums_file import whole_of
-from okid.identifier import Identified, Identifier
-from okid.modal_table import known
-from okid.stabilization import of_identifiers
-from okid.uncertainty import FEWEST, Uncertainty, without_each
+from okid.result.modal_table import known
+from okid.result.stabilization import of_identifiers
+from okid.result.uncertainty import FEWEST, Uncertainty, without_each
 
 _NEAR = 0.01  # relative: a cluster of the stabilization diagram is that of a mode
 _FEWEST_ORDERS = 12

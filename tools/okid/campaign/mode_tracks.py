@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from okid import _abi
+from okid import abi
 from okid.campaign.spec import Trend
 
 MOST = 256  # modes of a group, and tracks
@@ -19,11 +19,11 @@ class Tracker:
     """Tracks of one series. A mode that is not seen for any time keeps its number; the first group begins them."""
 
     def __init__(self, n_y: int) -> None:
-        config = _abi.TrackConfig(n_y, MOST, MOST, 1, 2**31 - 1, 0.0, 0.0, 0.0)
-        size = int(_abi.library().okid_track_memsize(ctypes.byref(config)))
-        self._block, self._handle = _abi.block(size), ctypes.c_void_p()
+        config = abi.TrackConfig(n_y, MOST, MOST, 1, 2**31 - 1, 0.0, 0.0, 0.0)
+        size = int(abi.library().okid_track_memsize(ctypes.byref(config)))
+        self._block, self._handle = abi.block(size), ctypes.c_void_p()
         place = (ctypes.byref(self._handle), ctypes.byref(config), self._block.ctypes.data, self._block.size)
-        _abi.check(_abi.library().okid_track_create(*place), "tracks")
+        abi.check(abi.library().okid_track_create(*place), "tracks")
 
     def update(self, modes: Sequence[dict[str, Any]]) -> list[int]:
         """The number of each mode of the next group, 0 = none."""
@@ -35,9 +35,9 @@ class Tracker:
         re = np.ascontiguousarray([mode["shape_re"] for mode in modes[:count]], dtype=np.float64)
         im = np.ascontiguousarray([mode["shape_im"] for mode in modes[:count]], dtype=np.float64)
         numbers = np.zeros(count, dtype=np.int32)
-        pointers = [_abi.pointer(one) for one in (f, z, re, im)]
+        pointers = [abi.pointer(one) for one in (f, z, re, im)]
         out = numbers.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))
-        _abi.check(_abi.library().okid_track_update(self._handle, count, *pointers, out), "tracks")
+        abi.check(abi.library().okid_track_update(self._handle, count, *pointers, out), "tracks")
         return [*numbers.tolist(), *[0] * (len(modes) - count)]
 
 

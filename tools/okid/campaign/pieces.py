@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
-from okid.accumulator import Accumulator
+from okid.abi.accumulator import Accumulator
+from okid.abi.identifier import Identifier
 from okid.campaign.record_read import ReadRecord
 from okid.campaign.spec import CampaignSpec
-from okid.identifier import Identifier
 
 
 def make_identifier(spec: CampaignSpec) -> Identifier:

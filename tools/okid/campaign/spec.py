@@ -14,7 +14,7 @@ from typing import Any
 
 from okid._errors import InputError
 from okid.campaign.spec_keys import Place, check_keys, nearest
-from okid.uncertainty import FEWEST, GROUPS
+from okid.result.uncertainty import FEWEST, GROUPS
 
 TIME_KEYS = ("hour", "day", "week", "month", "year")
 BAND = "temperature_band"

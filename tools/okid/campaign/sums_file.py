@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from okid._errors import InputError
-from okid.accumulator import Accumulator
+from okid.abi.accumulator import Accumulator
 from okid.campaign.pieces import empty_sums, fold, folds
 from okid.campaign.spec import CampaignSpec
 

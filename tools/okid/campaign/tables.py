@@ -14,7 +14,7 @@ from okid.campaign.grouping import Group
 from okid.campaign.mode_tracks import follow
 from okid.campaign.run import Outcome
 from okid.campaign.spec import CampaignSpec
-from okid.whole_file import whole_file
+from okid.data.whole_file import whole_file
 
 NAMES = ("records", "groups", "modes")
 

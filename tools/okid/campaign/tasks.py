@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from okid._errors import Error
-from okid.accumulator import Accumulator
+from okid.abi.accumulator import Accumulator
 from okid.campaign.group_model import identify_group
 from okid.campaign.pieces import fold, make_identifier, part_of, record_sums
 from okid.campaign.record_list import RecordRef, Skipped

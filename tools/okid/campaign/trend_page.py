@@ -12,13 +12,13 @@ from typing import Any, cast
 import matplotlib as mpl
 import numpy as np
 
-from okid import figures
 from okid.campaign.spec import Trend
 from okid.campaign.trend import SEEN, SeriesTrend, analyse, series_of
 from okid.campaign.trend_pictures import draw_chart, draw_over_temperature, draw_over_time, time_axis
+from okid.data.whole_file import whole_file
 from okid.report import page
 from okid.report.svg import Pictures
-from okid.whole_file import whole_file
+from okid.result import figures
 
 MOST_SERIES, MOST_TRACKS, MOST_ROWS = 12, 8, 60
 _TABLE_WORDS = (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from okid.campaign.trend import SeriesTrend, Track
 from okid.campaign.trend_model import design
-from okid.figures import BLUE, FAINT, GREEN, GREY, ORANGE, RED, log_axis
+from okid.result.figures import BLUE, FAINT, GREEN, GREY, ORANGE, RED, log_axis
 
 Real = NDArray[np.float64]
 MOST_POINTS = 1500  # of a picture; more are thinned out

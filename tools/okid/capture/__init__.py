@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from okid.interrupt import early_end
+from okid.data.interrupt import early_end
 
 if TYPE_CHECKING:
     from okid.capture.can_samples import CanSamples, can_blocks

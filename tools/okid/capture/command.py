@@ -12,7 +12,7 @@ from importlib import import_module
 from types import FrameType
 
 from okid.capture.command_line import make_parser
-from okid.interrupt import early_end
+from okid.data.interrupt import early_end
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

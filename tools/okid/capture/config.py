@@ -18,8 +18,8 @@ from okid._errors import InputError
 from okid.capture.channel_bits import FrameFilter, Selector, of_message, of_table
 from okid.capture.dbc import read_dbc
 from okid.capture.signal_bits import SignalBits
-from okid.toml_file import read_toml
-from okid.units import SI
+from okid.data.toml_file import read_toml
+from okid.data.units import SI
 
 ROLES = ("force", "acceleration", "velocity", "displacement", "aux")
 _SECTIONS = (

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Lanes whose frames carry a counter of samples: unwrapped, late and double frames told apart, jumps believed or not.
 
-The rules are those of firmware_host/live/grid_lane.cpp, so that a script and `okid replay` see the same samples.
+The rules are those of firmware_host/align/grid_lane.cpp, so that a script and `okid replay` see the same samples.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 """Frames of several messages onto one sample grid: by counter where there is one, else by time stamps.
 
 Nothing is interpolated: a sample that did not arrive is NaN and counted. Memory is bounded: a ring of two seconds.
-The rules are those of firmware_host/live/grid.cpp.
+The rules are those of firmware_host/align/grid.cpp.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from okid.result import Mode
+from okid.result.result import Mode
 from okid.session import Session
 
 Real = NDArray[np.float64]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from okid.capture.config import CaptureConfig
 from okid.capture.program import run_program
-from okid.toml_file import read_toml
-from okid.whole_file import whole_file
+from okid.data.toml_file import read_toml
+from okid.data.whole_file import whole_file
 
 
 @dataclass(frozen=True)

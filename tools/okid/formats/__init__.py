@@ -8,6 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from okid.data.geometry import Geometry, read_geometry
+    from okid.data.records import Record, read_csv
     from okid.formats.by_name import read_record, write_record, write_result
     from okid.formats.can_log import convert_log, read_log, write_log
     from okid.formats.csv_file import write_csv
@@ -18,8 +20,6 @@ if TYPE_CHECKING:
     from okid.formats.uff import UffFile, read_uff, write_uff
     from okid.formats.uff_function import UffFunction
     from okid.formats.uff_model import UffMode
-    from okid.geometry import Geometry, read_geometry
-    from okid.records import Record, read_csv
 
 __all__ = [
     "Geometry",
@@ -59,8 +59,8 @@ _NAMES = {
     "okid.formats.uff": "UffFile, read_uff, write_uff",
     "okid.formats.uff_function": "UffFunction",
     "okid.formats.uff_model": "UffMode",
-    "okid.geometry": "Geometry, read_geometry",
-    "okid.records": "Record, read_csv",
+    "okid.data.geometry": "Geometry, read_geometry",
+    "okid.data.records": "Record, read_csv",
 }  # of the modules; they load when they are first used: some bring scipy or python-can with them
 
 

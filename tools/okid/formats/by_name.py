@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from okid._errors import InputError
+from okid.data.geometry import Geometry
+from okid.data.records import Record, read_csv
 from okid.formats.csv_file import write_csv
 from okid.formats.foreign_library import reading
 from okid.formats.hdf5 import read_hdf5, write_hdf5
@@ -15,9 +17,7 @@ from okid.formats.mat import read_mat, write_mat
 from okid.formats.mdf4 import read_mdf4, write_mdf4
 from okid.formats.parquet import read_parquet, write_parquet
 from okid.formats.uff import read_uff, write_uff
-from okid.geometry import Geometry
-from okid.records import Record, read_csv
-from okid.result import Result
+from okid.result.result import Result
 
 Part = int | str | None
 EXTENSIONS = (".csv", ".uff", ".unv", ".mf4", ".h5", ".hdf5", ".mat", ".parquet")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
-from okid.records import Record, even_rate
+from okid.data.records import Record, even_rate
 
 RATE_NAMES = frozenset(
     "fs fs_hz rate rate_hz samplerate sample_rate sample_rate_hz "

@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from okid.interrupt import early_end
+from okid.data.interrupt import early_end
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from okid._errors import Error, InputError
+from okid.data.geometry import read_geometry
+from okid.data.interrupt import EXIT_INTERRUPTED
 from okid.formats.by_name import EXTENSIONS, RESULT_EXTENSIONS, read_record, write_record, write_result
 from okid.formats.log_names import LOG_EXTENSIONS, is_frame_csv
 from okid.formats.mdf4 import holds_frames
 from okid.formats.result_tree import load_result
 from okid.formats.uff import uff_losses
-from okid.geometry import read_geometry
-from okid.interrupt import EXIT_INTERRUPTED
 
 EXIT_DONE, EXIT_USAGE = 0, 2
 _FRAMES_ONLY = (".log", ".asc", ".blf", ".trc", ".db")

@@ -8,8 +8,8 @@ import re
 from pathlib import Path
 
 from okid._errors import InputError
-from okid.records import Record, unit_of_name
-from okid.whole_file import whole_file
+from okid.data.records import Record, unit_of_name
+from okid.data.whole_file import whole_file
 
 _ROWS = 65536
 

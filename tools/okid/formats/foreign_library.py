@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from okid._errors import Error, InputError
-from okid.whole_file import whole_file
+from okid.data.whole_file import whole_file
 
 
 def library(name: str, purpose: str) -> Any:

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.data.records import Record
 from okid.formats.channel_arrays import record_of_arrays, stated_rate
 from okid.formats.foreign_library import library, reading, writing
 from okid.formats.result_tree import result_dict, result_tree
-from okid.records import Record
-from okid.result import Result
+from okid.result.result import Result
 
 _CHUNK = 8192
 

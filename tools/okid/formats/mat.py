@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.io import loadmat, savemat
 
 from okid._errors import InputError
+from okid.data.records import Record
 from okid.formats.channel_arrays import record_of_arrays, stated_rate
 from okid.formats.foreign_library import library, reading, writing
 from okid.formats.result_tree import result_dict, result_tree
-from okid.records import Record
-from okid.result import Result
+from okid.result.result import Result
 
 _SIGNATURE_73 = b"\x89HDF\r\n\x1a\n"
 _MOST_BYTES = 2**31 - 1  # of one variable in version 5

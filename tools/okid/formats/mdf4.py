@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.data.records import Record, even_rate
 from okid.formats.foreign_library import library, reading, writing
-from okid.records import Record, even_rate
 
 Real = NDArray[np.float64]
 _MARK = "okid record "

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.data.records import Record
 from okid.formats.channel_arrays import record_of_arrays, stated_rate
 from okid.formats.foreign_library import library, reading, writing
-from okid.records import Record
 
 
 def write_parquet(path: str | Path, record: Record) -> None:

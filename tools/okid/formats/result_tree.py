@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from okid._errors import InputError
-from okid.result import Result
-from okid.result_file import read_result
+from okid.result.result import Result
+from okid.result.result_file import read_result
 
 _NUMBERS = ("frequency_hz", "damping_ratio", "frequency_std_hz", "damping_ratio_std", "mpc", "emac", "cmi")
 

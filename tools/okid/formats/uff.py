@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from okid import _abi, frf
+from okid import abi, frf
 from okid._errors import InputError
+from okid.data.geometry import Geometry
+from okid.data.records import Record, even_rate
+from okid.data.whole_file import whole_file
 from okid.formats.foreign_library import reading
 from okid.formats.result_tree import mode_arrays, result_dict, result_tree
 from okid.formats.uff_blocks import read_blocks
@@ -30,10 +33,7 @@ from okid.formats.uff_model import (
     read_units,
     units_text,
 )
-from okid.geometry import Geometry
-from okid.records import Record, even_rate
-from okid.result import Result
-from okid.whole_file import whole_file
+from okid.result.result import Result
 
 FRF_LINES = 1025
 _SENSING = {"acceleration": (12, "m/s^2"), "velocity": (11, "m/s"), "displacement": (8, "m")}
@@ -237,7 +237,7 @@ def write_uff(
     """
     if sensing not in _SENSING:
         raise InputError(f"sensing is {sensing!r}, expected {', '.join(_SENSING)}")
-    version = _abi.library().okid_version().decode()
+    version = abi.library().okid_version().decode()
     title = what.title if isinstance(what, Record) else ""
     parts = [header_text(title, version, datetime.now(UTC)).encode(), units_text().encode()]
     try:

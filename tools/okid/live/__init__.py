@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from okid.interrupt import early_end
+from okid.data.interrupt import early_end
 
 __all__ = ["main"]
 

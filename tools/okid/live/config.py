@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from okid._errors import InputError
-from okid.geometry import Geometry, geometry_of
-from okid.toml_file import read_toml
+from okid.data.geometry import Geometry, geometry_of
+from okid.data.toml_file import read_toml
 
 LONGEST_SOCKET = 107  # sun_path less its final zero
 KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import Error
-from okid.accumulator import Accumulator
-from okid.identifier import Identifier, usable_p
+from okid.abi.accumulator import Accumulator
+from okid.abi.identifier import Identifier, usable_p
 from okid.live.config import Identification
-from okid.stabilization import Cluster, OrderPoles, Stabilization, default_orders, of_identifiers
+from okid.result.stabilization import Cluster, OrderPoles, Stabilization, default_orders, of_identifiers
 
 Real = NDArray[np.float64]
 PAUSE_S, SHARE, MOST_ORDER = 4.0, 0.15, 60

@@ -39,7 +39,7 @@ _PLACES = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of okid-report; returns the exit code 0, 2, or 130 after Ctrl-C. What draws is loaded when needed."""
-    from okid.interrupt import guarded
+    from okid.data.interrupt import guarded
 
     return guarded("okid-report", "okid.report.command", arguments)
 

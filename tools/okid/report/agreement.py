@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from okid import figures
 from okid.report import drawings, page
 from okid.report.loaded import known_fit
 from okid.report.material import Material
 from okid.report.residual import BOUND_95, Whiteness
+from okid.result import figures
 
 MOST_SHOWN = 4
 

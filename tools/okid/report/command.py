@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from okid._errors import Error, InputError
-from okid.interrupt import halt_if_interrupted
+from okid.data.interrupt import halt_if_interrupted
 from okid.report.other_kinds import MADE_BY, check_kind
 from okid.report.pdf import browser, print_pdf
 from okid.report.targets import check_place, check_target, write_whole

@@ -9,9 +9,9 @@ from typing import Any, cast
 
 import matplotlib
 
-from okid import figures
 from okid._errors import InputError
-from okid.records import Record
+from okid.data.records import Record
+from okid.data.toml_file import read_toml
 from okid.report import page
 from okid.report.agreement import fit_section, history_section, residual_section
 from okid.report.events import read_events
@@ -28,8 +28,8 @@ from okid.report.responses import frf_section, markov_section, singular_section,
 from okid.report.summary import summary_section
 from okid.report.targets import check_place, check_target, write_whole
 from okid.report.tracking import tracking_section
-from okid.result import Result
-from okid.toml_file import read_toml
+from okid.result import figures
+from okid.result.result import Result
 
 Place = str | Path
 

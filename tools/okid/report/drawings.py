@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from okid.figures import BLUE, DARK, EDGE, FAINT, GREY, ORANGE, RED, log_axis
 from okid.frf import Spectra
 from okid.modal import normalised
 from okid.report.events import Events, Point
 from okid.report.geometry import Geometry
 from okid.report.measured import Excerpt
 from okid.report.residual import BOUND_95, BOUND_99, Whiteness
+from okid.result.figures import BLUE, DARK, EDGE, FAINT, GREY, ORANGE, RED, log_axis
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

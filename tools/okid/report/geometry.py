@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
-from okid.geometry import AXES, geometry_of
-from okid.toml_file import read_toml
+from okid.data.geometry import AXES, geometry_of
+from okid.data.toml_file import read_toml
 
 Real = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
-from okid.model import Model
 from okid.report.other_kinds import MADE_BY, check_kind
 from okid.report.result_keys import check_keys
-from okid.result_file import read_result
+from okid.result.model import Model
+from okid.result.result_file import read_result
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from okid import figures
 from okid._errors import InputError
 from okid.report import page
 from okid.report.material import Material
+from okid.result import figures
 
 MOST_SHOWN = 12  # columns that fit on the page
 

@@ -6,12 +6,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from okid import figures
 from okid.report.events import Events
 from okid.report.geometry import Geometry
 from okid.report.loaded import Loaded
 from okid.report.measured import Measured
 from okid.report.svg import Pictures
+from okid.result import figures
 
 
 class Source(NamedTuple):

@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import Error, IdentificationError, InputError
+from okid.data.records import Record, read_csv
 from okid.frf import Frf, Spectra, h1, is_hit, spectra
 from okid.identify import identify
-from okid.model import Model
-from okid.record_fit import detrended, fit_records, stretches
-from okid.records import Record, read_csv
 from okid.report.loaded import Loaded, known_fit
 from okid.report.residual import Whiteness, whiteness
 from okid.report.scale import Agreement, agreement
-from okid.result import Fit
-from okid.stabilization import Stabilization
+from okid.result.model import Model
+from okid.result.record_fit import detrended, fit_records, stretches
+from okid.result.result import Fit
+from okid.result.stabilization import Stabilization
 
 Real = NDArray[np.float64]
 SHORTEST_LAGS, LONGEST_LAGS = 25, 60

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from okid.stabilization import Stabilization
+from okid.result.stabilization import Stabilization
 
 SHARE = 0.7  # of the models that must have it
 LEAST_MPC = 0.7  # noise poles have shapes out of phase

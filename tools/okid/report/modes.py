@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from okid import figures
 from okid.report import drawings, page
 from okid.report.material import Material
+from okid.result import figures
 
 MOST_SHAPES, MOST_SQUARES = 16, 60
 

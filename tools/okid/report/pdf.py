@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from okid._errors import InputError
-from okid.interrupt import halt_if_interrupted
+from okid.data.interrupt import halt_if_interrupted
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 TIMEOUT_S = 120.0

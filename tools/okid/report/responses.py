@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from okid import figures
 from okid.frf import cmif, synthesise, synthesise_spectra
 from okid.report import drawings, page
 from okid.report.material import Material
-from okid.stabilization import Stabilization
+from okid.result import figures
+from okid.result.stabilization import Stabilization
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from okid.data.records import Record
+from okid.data.units import SI
 from okid.frf import is_hit
-from okid.model import Model
-from okid.record_fit import detrended, stretches
-from okid.records import Record
-from okid.units import SI
+from okid.result.model import Model
+from okid.result.record_fit import detrended, stretches
 
 Real = NDArray[np.float64]
 TOLERANCE = 0.2  # a factor this near 1 is the structure's own affair, not a unit

@@ -12,7 +12,7 @@ from itertools import count
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from okid import figures
+from okid.result import figures
 
 INK = {
     figures.DARK: "--ink",

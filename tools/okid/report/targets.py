@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from okid._errors import InputError
-from okid.interrupt import halt_if_interrupted
+from okid.data.interrupt import halt_if_interrupted
 
 Place = str | Path
 _READ = {

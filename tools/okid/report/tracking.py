@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from okid import figures
 from okid.report import drawings, page
 from okid.report.events import Events
 from okid.report.material import Material
+from okid.result import figures
 
 MOST_TRACKS, FEWEST_POINTS, MOST_LINES = 8, 3, 20
 

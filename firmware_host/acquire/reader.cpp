@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+#include "reader.hpp"
+
+#include "config/nearest_name.hpp"
+#include "error.hpp"
+
+#include "serial_line.hpp"
+#include "threads.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <net/if_arp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+namespace okid_host {
+namespace {
+
+constexpr std::size_t ring_frames = 1 << 17; // 6 s of a saturated FD bus, 15 s of a classic one
+constexpr int look_ms = 100;                 // how often a vanished interface is looked for
+constexpr auto busy = std::chrono::milliseconds(2), rest = std::chrono::milliseconds(1);
+constexpr auto publish_every = std::chrono::milliseconds(20);
+constexpr int batches_between_looks = 64;
+
+} // namespace
+
+bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_event& wake)
+    : interface_(config_of_all.buses[bus].on_line() ? config_of_all.buses[bus].device
+                                                    : config_of_all.buses[bus].interface),
+      bus_(static_cast<std::uint8_t>(bus)), wake_(wake), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      block_(new std::byte[drv_ring_memsize(ring_frames)]()), batch_(64) {
+    ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));
+    const bus_config& mine = config_of_all.buses[bus];
+    const std::vector<drv_filter_t> frames = wanted_frames(config_of_all, bus);
+    source_.ops = mine.serial() ? &drv_source_serial : mine.on_line() ? &drv_source_slcan : &drv_source_socketcan;
+    drv_source_config_t config{};
+    config.interfaces[0] = interface_.c_str();
+    config.interface_count = 1;
+    if (mine.on_line()) config.line = line_settings(mine, config_of_all.rate_hz);
+    // The load of a bus is that of all its frames: then nothing is left out by the kernel.
+    if (frames.size() <= DRV_MAX_FILTERS && !mine.bitrate) {
+        config.filters = frames.data();
+        config.filter_count = static_cast<std::int32_t>(frames.size());
+        filtered_ = !mine.on_line();
+    }
+    const int code = source_.ops->open(&source_, &config);
+    if (code != 0) {
+        close(stop_fd_);
+        if (mine.on_line()) throw_line_failure(-code, interface_, source_.error);
+        throw_interface_failure(-code, interface_, source_.error);
+    }
+    publish_stats();
+}
+
+bus_reader::~bus_reader() {
+    stop();
+    source_.ops->close(&source_);
+    close(stop_fd_);
+}
+
+void bus_reader::start(const realtime_config& realtime) {
+    thread_ = quiet_thread([this] { run(); });
+    put_first(thread_, realtime);
+}
+
+void bus_reader::stop() {
+    if (!thread_.joinable()) return;
+    stopping_ = true;
+    const std::uint64_t one = 1;
+    (void)!write(stop_fd_, &one, sizeof one);
+    thread_.join();
+}
+
+/// One read of the source. @return frames moved, negative when it failed
+int bus_reader::drain_once() {
+    const int count = source_.ops->read(&source_, batch_.data(), static_cast<int>(batch_.size()));
+    if (count <= 0) return count;
+    for (int i = 0; i < count; ++i) batch_[static_cast<std::size_t>(i)].bus = bus_;
+    drv_ring_push(ring_, batch_.data(), static_cast<std::size_t>(count));
+    if (second_ring_) drv_ring_push(second_ring_, batch_.data(), static_cast<std::size_t>(count));
+    wake_.signal();
+    return count;
+}
+
+void bus_reader::publish_stats() {
+    drv_stats_t now{};
+    source_.ops->stats(&source_, &now);
+    const std::lock_guard<std::mutex> hold(mutex_);
+    seen_ = now;
+}
+
+drv_stats_t bus_reader::stats() const {
+    const std::lock_guard<std::mutex> hold(mutex_);
+    return seen_;
+}
+
+void bus_reader::run() {
+    using clock = std::chrono::steady_clock;
+    const int whole = static_cast<int>(batch_.size());
+    // The kernel stamps CAN frames: on a busy bus many are taken at once instead of one at a time. A line is stamped here.
+    const bool may_rest = source_.ops == &drv_source_socketcan;
+    int moved = 0;
+    auto published = clock::now(), before = published;
+    while (!stopping_) {
+        pollfd waits[2] = {{stop_fd_, POLLIN, 0}, {source_.ops->fd(&source_), POLLIN, 0}};
+        // A negative fd is left out, and so is a source that fails: then only the time runs.
+        (void)poll(waits, moved < 0 ? 1 : 2, look_ms);
+        for (int i = 0; i < batches_between_looks && !stopping_; ++i)
+            if ((moved = drain_once()) < whole) break;
+        const auto now = clock::now();
+        if (now - published >= publish_every) {
+            published = now;
+            publish_stats();
+        }
+        if (may_rest && moved > 0 && now - before < busy) std::this_thread::sleep_for(rest);
+        before = now;
+    }
+    for (int i = 0; i < 1 << 14 && drain_once() > 0; ++i) {
+    } // what had arrived before the end
+    publish_stats();
+}
+
+std::vector<std::string> can_interfaces() {
+    std::vector<std::string> out;
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator("/sys/class/net", ignored)) {
+        int type = 0;
+        std::ifstream(entry.path() / "type") >> type;
+        if (type == ARPHRD_CAN) out.push_back(entry.path().filename().string());
+    }
+    std::sort(out.begin(), out.end());
+    return out;
+}
+
+void throw_interface_failure(int code, const std::string& interface, const std::string& reason) {
+    const std::string text = printable(reason, 300);
+    if (code == EAFNOSUPPORT)
+        throw failure(exit_device, text +
+                                       ". Load the modules: sudo modprobe -a can can-raw vcan; without them use `okid "
+                                       "replay LOG -c CONFIG.toml`");
+    if (code == ENETDOWN)
+        throw failure(
+            exit_device,
+            fmt::format("{}. Bring it up: sudo ip link set {} up (a real bus also needs type can bitrate 1000000)",
+                        text, interface));
+    if (code == EPERM || code == EACCES) throw failure(exit_device, text + ". Run it with sudo, or with CAP_NET_RAW");
+    const std::vector<std::string> there = can_interfaces();
+    const std::string found = there.empty()
+                                  ? "this machine has no CAN interface"
+                                  : "CAN interfaces found: " + list_names(there) + did_you_mean(interface, there);
+    throw failure(exit_device, fmt::format("{}; {}. Plug the adapter in, or make a virtual one: sudo ip link add {} "
+                                           "type vcan && sudo ip link set {} up",
+                                           text, found, interface, interface));
+}
+
+} // namespace okid_host

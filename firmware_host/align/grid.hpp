@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: MIT
+// Channels of several messages onto one sample grid: by sequence counter where a message has one, else by the cadence of
+// its time stamps. Nothing is interpolated: a sample that did not arrive is NaN and part of a marked gap.
+//
+// Frames of one message (and multiplexor value) are a lane. Counters of all lanes count the same samples when they stand
+// close together at the start; a lane whose counter is unrelated is placed by time once, then counts on. The grid begins
+// with the first sample for which every lane has been heard, so a stream may be joined in the middle. A sample goes out
+// when it is complete, or when the newest nine frames of every lane that lacks it lie beyond it, or when any lane is a
+// second ahead of those that are silent: for so long an adapter may hold its frames back, and nothing is lost.
+#pragma once
+#include "config/config.hpp"
+
+#include <drv/clock_fit.h>
+#include <drv/frame.h>
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+/// Why samples are missing; exclusive.
+enum class gap_cause { socket_overflow, driver, sequence, crc, link_down, stall };
+const char* gap_cause_name(gap_cause cause);
+
+/// A run of missing samples of one channel; `first`..`last` count from the first sample of the grid.
+struct grid_gap {
+    std::size_t channel = 0;
+    std::int64_t first = 0, last = 0, count = 0;
+    gap_cause cause = gap_cause::sequence;
+};
+
+/// Where samples go. The row holds one number a channel, raw (before scale and offset), NaN where missing.
+class grid_sink {
+  public:
+    virtual ~grid_sink() = default;
+    virtual void on_sample(std::int64_t index, const double* row) = 0;
+    /// `count` samples from `index` on are missing on all channels.
+    virtual void on_missing(std::int64_t index, std::int64_t count) = 0;
+    virtual void on_gap(const grid_gap& gap) = 0;
+};
+
+/// A stamp further ahead is no time but an error.
+constexpr double longest_silence_ns = 400 * 86400e9;
+
+/// Counts of one bus. lost: frames missing on the grid, by cause.
+struct grid_bus_counts {
+    std::uint64_t received = 0, out_of_order = 0, duplicate = 0, decode_errors = 0;
+    std::array<std::uint64_t, 6> lost{};
+};
+
+struct grid_channel_counts {
+    std::int64_t expected = 0, received = 0;
+};
+
+class grid {
+  public:
+    grid(const live_config& config, grid_sink& sink);
+
+    /// Decode a frame and place it. O(channels of the message), no heap.
+    void push(const drv_frame_t& frame);
+
+    /// The stream ends: everything that waits goes out. A last sample that was cut by the end is left off.
+    void finish();
+
+    /// Let no sample from `count` on go out.
+    void set_limit(std::int64_t count) { limit_ = count; }
+    std::int64_t emitted() const { return next_; } ///< samples given to the sink, missing ones included
+    bool started() const { return anchored_; }
+    /// The earliest time stamp of a sample the sink was just given.
+    std::int64_t time_ns(std::int64_t index) const { return times_[static_cast<std::size_t>(index & mask_)]; }
+    const grid_bus_counts& bus(std::size_t index) const { return buses_[index]; }
+    grid_channel_counts channel(std::size_t index) const;
+    /// Channels of which no frame was ever received.
+    std::vector<std::size_t> silent_channels() const;
+
+  private:
+    struct cause_mark {
+        std::int64_t first = 0, last = -1;
+        gap_cause cause = gap_cause::sequence;
+    };
+    struct lane {
+        std::uint32_t key = 0, mask = 0; ///< mask: which bits of the identifier are in the key, 0 = all
+        int next = -1;                   ///< another lane of the same identifier (multiplexing)
+        std::size_t bus = 0;
+        std::vector<std::size_t> channels;
+        std::optional<drv_signal_t> sequence;
+        std::vector<multiplexor> selectors;
+        // Where the lane stands on the grid.
+        bool waiting = false, heard = false;
+        std::uint64_t counter = 0; ///< as last received
+        std::int64_t last = 0;     ///< unwrapped place of the newest frame
+        std::int64_t time_ns = 0;  ///< its stamp
+        std::uint8_t loss = 0;     ///< DRV_LOSS_… told by the bus since
+        // A counter far off is believed when a second frame agrees.
+        bool suspected = false;
+        std::int64_t suspect_age = 0; ///< frames that came in their places since
+        drv_frame_t suspect{};
+        // Without a counter: the line of least delays, when the newest frame was due on it, frames that wait, in the
+        // order of their stamps, and the newest that were placed.
+        drv_clock_fit_t clock{};
+        double phase_ns = 0, beat_ns = 0;
+        double usual = 0;   ///< how late frames were, of late, before which nothing was lost, periods
+        double early = 0;   ///< of the line the earliest was, of late, periods
+        double on_time = 0; ///< of a period; what is later was held up, or a sample before it is missing
+        std::vector<drv_frame_t> late;
+        std::array<drv_frame_t, 9> beats{};
+        std::size_t beat_at = 0;
+        // The newest frames: what lies before all of them does not come any more (a frame may be eight places late).
+        std::array<std::int64_t, 9> recent{};
+        std::size_t recent_at = 0;
+        std::int64_t passed = std::numeric_limits<std::int64_t>::min();
+        // The gap that is open.
+        std::int64_t gap_first = -1, gap_count = 0;
+        std::int64_t expected = 0, received = 0;
+        std::array<cause_mark, 64> marks{};
+        std::size_t mark_count = 0;
+    };
+    void build_lanes(const live_config& config);
+    bool push_to_lanes(const drv_frame_t& frame, std::uint32_t mask);
+    void push_to(lane& l, const drv_frame_t& frame);
+    bool decode(lane& l, const drv_frame_t& frame);
+    bool read_counter(const lane& l, const drv_frame_t& frame, std::uint64_t& counter) const;
+
+    void hear_first(lane& l, const drv_frame_t& frame);
+    void hold_until_anchored(lane& l, const drv_frame_t& frame);
+    void anchor();
+    bool place_by_kin(const lane& l, std::uint64_t counter, std::int64_t& index) const;
+    void place(lane& l, const drv_frame_t& frame);
+    void place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter);
+    void move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool pause);
+    bool count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& step) const;
+    void doubt_suspect(lane& l);
+    void drop_suspect(lane& l);
+    void recall_suspect(lane& l);
+    void accept_jump(lane& l, const drv_frame_t& frame);
+    void end_suspicion(lane& l);
+    void judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter);
+    std::int64_t place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const;
+    void begin_cadence(lane& l, std::int64_t time_ns);
+    void place_by_cadence(lane& l, const drv_frame_t& frame);
+    double lateness(const lane& l, const drv_frame_t& frame, std::size_t before) const;
+    bool is_double(const lane& l, const drv_frame_t& frame, bool early) const;
+    bool overtaken(lane& l, const drv_frame_t& frame);
+    void follow_line(lane& l, const drv_frame_t& frame, std::int64_t expected);
+    void settle_overdue(std::int64_t now_ns);
+    void settle(lane& l, std::int64_t now_ns, bool all);
+    std::size_t place_after_loss(lane& l, std::size_t first, std::size_t last, std::int64_t lost);
+    void beat(lane& l, const drv_frame_t& frame, std::int64_t step);
+    bool awaited(const lane& l, std::int64_t index) const;
+    void note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause);
+    void insert(lane& l, std::int64_t index, const drv_frame_t& frame);
+
+    bool may_come(const lane& l) const;
+    void drain(bool all);
+    void emit_front();
+    void skip_to(std::int64_t index);
+    void extend_gap(lane& l, std::int64_t first, std::int64_t count);
+    void close_gap(lane& l, bool resumed);
+
+    double* row(std::int64_t index) { return values_.data() + static_cast<std::size_t>(index & mask_) * width_; }
+    const std::uint8_t* present(std::int64_t index) const {
+        return present_.data() + static_cast<std::size_t>(index & mask_) * lanes_.size();
+    }
+    std::uint8_t* present(std::int64_t index) {
+        return present_.data() + static_cast<std::size_t>(index & mask_) * lanes_.size();
+    }
+    std::int64_t& slot(std::int64_t index) { return slots_[static_cast<std::size_t>(index & mask_)]; }
+    void open_rows(std::int64_t upto);
+
+    grid_sink& sink_;
+    double rate_hz_, period_ns_;
+    std::vector<channel_config> channels_;
+    std::vector<lane> lanes_;
+    std::vector<int> table_;           ///< hash of identifier to lane
+    std::vector<std::uint32_t> masks_; ///< of identifiers that stand for many, the strictest first
+    std::size_t width_ = 0;
+    std::int64_t reorder_ = 16, window_ = 0, mask_ = 0;
+    std::int64_t lag_ = 0;       ///< samples by which a silent lane may be behind: a second
+    std::int64_t hold_ = 0;      ///< periods a frame without a counter may wait for those that tell its place
+    std::size_t late_lanes_ = 0; ///< lanes with such frames
+    std::vector<double> values_, decoded_;
+    std::vector<std::uint8_t> present_;
+    std::vector<std::int64_t> slots_; ///< how many lanes a row has
+    std::vector<std::int64_t> times_; ///< the earliest stamp of a row, 0 while it is empty
+    std::int64_t limit_ = std::numeric_limits<std::int64_t>::max();
+    std::int64_t next_ = 0, opened_ = 0; ///< next row to go out; rows below opened_ are laid out in the ring
+    bool anchored_ = false;
+    std::size_t heard_ = 0;
+    std::vector<std::pair<int, drv_frame_t>> held_; ///< frames before the grid begins
+    std::vector<grid_bus_counts> buses_;
+};
+
+} // namespace okid_host

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: MIT
+// One rule a key; the rules of a section stand together in the order of the documentation.
+#include "config_schema.hpp"
+
+#include "error.hpp"
+#include "nearest_name.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <vector>
+
+namespace okid_host {
+namespace {
+
+enum class kind { text, number, positive, whole, flag, choice, order, array, start_bits, line, gpio };
+
+struct key_rule {
+    const char* key;
+    kind what;
+    double low = -std::numeric_limits<double>::infinity();
+    double high = std::numeric_limits<double>::infinity();
+    std::vector<std::string> choices = {};
+};
+
+struct section_rule {
+    const char* name;
+    bool many; ///< [[name]]
+    std::vector<key_rule> keys;
+};
+
+/// One lamp.
+const section_rule gpio_rule = {
+    "", false, {{"chip", kind::text}, {"line", kind::line, 0, 65535}, {"active_low", kind::flag}}};
+
+const std::vector<section_rule> schema = {
+    {"acquisition",
+     false,
+     {{"rate_hz", kind::positive, 0, 1e6},
+      {"decimate", kind::whole, 1, 64},
+      {"title", kind::text},
+      {"operator", kind::text},
+      {"structure", kind::text},
+      {"specimen", kind::text},
+      {"location", kind::text},
+      {"notes", kind::text}}},
+    {"bus",
+     true,
+     {{"name", kind::text},
+      {"preset", kind::text},
+      {"type", kind::choice, 0, 0, {"socketcan", "slcan", "serial", "replay"}},
+      {"interface", kind::text},
+      {"device", kind::text},
+      {"baud", kind::whole, 50, 2e7},
+      {"framing", kind::choice, 0, 0, {"cobs", "ascii", "witmotion", "vectornav"}},
+      {"counter_field", kind::whole, 0, 1023},
+      {"counter_bits", kind::whole, 2, 32},
+      {"btr", kind::text},
+      {"clock", kind::choice, 0, 0, {"shared", "free"}},
+      {"rate_hz", kind::positive, 0, 1e6},
+      {"file", kind::text},
+      {"fd", kind::flag},
+      {"bitrate", kind::whole, 1000, 2e7},
+      {"dbitrate", kind::whole, 1000, 2e7},
+      {"dbc", kind::text},
+      {"sync_hz", kind::positive, 0, 1e4},
+      {"sync_id", kind::whole, 0, 0x1FFFFFFF},
+      {"sync_data", kind::text},
+      {"start", kind::array}}},
+    {"channel",
+     true,
+     {{"name", kind::text},
+      {"preset", kind::text},
+      {"role", kind::choice, 0, 0, {"force", "acceleration", "velocity", "displacement", "aux"}},
+      {"dof", kind::whole, 1, 100000},
+      {"unit", kind::text},
+      {"bus", kind::text},
+      {"message", kind::text},
+      {"signal", kind::text},
+      {"can_id", kind::whole, 0, 0x1FFFFFFF},
+      {"pgn", kind::whole, 0, 0x3FFFF},
+      {"source_address", kind::whole, 0, 255},
+      {"extended", kind::flag},
+      {"start_bit", kind::whole, 0, 511},
+      {"length", kind::whole, 1, 64},
+      {"byte_order", kind::choice, 0, 0, {"little", "big", "intel", "motorola"}},
+      {"signed", kind::flag},
+      {"value", kind::choice, 0, 0, {"integer", "float32", "float64"}},
+      {"scale", kind::number},
+      {"offset", kind::number},
+      {"zero_code", kind::number},
+      {"field", kind::whole, 0, 1023},
+      {"sequence", kind::start_bits}}},
+    {"identification",
+     false,
+     {{"method", kind::choice, 0, 0, {"okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"}},
+      {"p", kind::whole, 1, 4096},
+      {"rows", kind::whole, 2, 100000},
+      {"hankel", kind::choice, 0, 0, {"system", "innovations", "literal"}},
+      {"order", kind::order, 1, 10000},
+      {"hold", kind::choice, 0, 0, {"zoh", "foh"}},
+      {"detrend", kind::choice, 0, 0, {"none", "mean", "linear"}},
+      {"window_s", kind::positive, 0, 1e6},
+      {"forgetting", kind::positive, 0, 1},
+      {"update_s", kind::positive, 0, 1e5},
+      {"sigma_blocks", kind::whole, 0, 100},
+      {"restart_on_change", kind::flag},
+      {"mkr", kind::flag}}},
+    {"alarm",
+     false,
+     {{"enabled", kind::flag},
+      {"k_sigma", kind::positive, 0, 1e6},
+      {"baseline_updates", kind::whole, 1, 1000000},
+      {"command", kind::text}}},
+    {"trigger",
+     false,
+     {{"source", kind::choice, 0, 0, {"immediate", "level", "gpio"}},
+      {"channel", kind::text},
+      {"level", kind::number},
+      {"pretrigger_s", kind::number, 0, 1e5},
+      {"chip", kind::text},
+      {"line", kind::line, 0, 65535},
+      {"active_low", kind::flag},
+      {"edge", kind::choice, 0, 0, {"rising", "falling", "both"}}}},
+    {"hammer",
+     false,
+     {{"channel", kind::text},
+      {"level", kind::number},
+      {"hits", kind::whole, 1, 1000},
+      {"length_s", kind::positive, 0, 1e4},
+      {"pretrigger_s", kind::number, 0, 1e4},
+      {"double_percent", kind::positive, 0, 100},
+      {"spectrum_hz", kind::positive, 0, 1e6}}},
+    {"lamps", false, {{"armed", kind::gpio}, {"go", kind::gpio}, {"alarm", kind::gpio}}},
+    {"record",
+     false,
+     {{"directory", kind::text},
+      {"segment_mb", kind::positive, 0, 1e6},
+      {"max_mb", kind::positive, 0, 1e9},
+      {"pretrigger_s", kind::number, 0, 1e5}}},
+    {"publish",
+     false,
+     {{"socket", kind::text},
+      {"samples", kind::flag},
+      {"udp", kind::text},
+      {"prometheus", kind::text},
+      {"mqtt", kind::text}}},
+    {"realtime", false, {{"priority", kind::whole, 0, 99}, {"lock_memory", kind::flag}, {"cpus", kind::array}}},
+    {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
+
+void check_number(const config_place& place, const toml::node& node, const key_rule& rule) {
+    const bool whole = rule.what == kind::whole;
+    const auto value = node.value<double>();
+    const bool fits = whole ? node.is_integer() : node.is_number();
+    if (fits && value && std::isfinite(*value) && *value >= rule.low && *value <= rule.high &&
+        (rule.what != kind::positive || *value > rule.low))
+        return;
+    std::string expected = whole ? "a whole number" : "a number";
+    if (rule.what == kind::positive)
+        expected += fmt::format(" above {:.10g}", rule.low);
+    else if (std::isfinite(rule.low))
+        expected += fmt::format(" from {:.10g}", rule.low);
+    if (std::isfinite(rule.high)) expected += fmt::format(" to {:.10g}", rule.high);
+    refuse_key(place, node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
+}
+
+void check_choice(const config_place& place, const toml::node& node, const key_rule& rule) {
+    const auto text = node.value<std::string>();
+    if (text && std::find(rule.choices.begin(), rule.choices.end(), *text) != rule.choices.end()) return;
+    refuse_key(place, node, rule.key,
+               fmt::format("found {}{}, expected one of: {}", found_value(node),
+                           text ? did_you_mean(*text, rule.choices) : "", list_names(rule.choices)));
+}
+
+void check_table(const config_place& place, const toml::table& table, const section_rule& rule);
+
+void check_value(const config_place& place, const toml::node& node, const key_rule& rule) {
+    const auto expect = [&](bool holds, const char* expected) {
+        if (!holds)
+            refuse_key(place, node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
+    };
+    switch (rule.what) {
+    case kind::text: expect(node.is_string() && !node.value<std::string>()->empty(), "text in quotes"); break;
+    case kind::flag: expect(node.is_boolean(), "true or false"); break;
+    case kind::array: expect(node.is_array(), "an array"); break;
+    case kind::start_bits:
+        expect((node.is_string() && !node.value<std::string>()->empty()) || node.is_table(),
+               "the name of a signal or { start_bit = 0, length = 16 }");
+        break;
+    case kind::order:
+        if (node.value<std::string>() != "auto") {
+            expect(node.is_integer(), "\"auto\" or a whole number");
+            check_number(place, node, {rule.key, kind::whole, rule.low, rule.high});
+        }
+        break;
+    case kind::line:
+        if (!node.is_string() || node.value<std::string>()->empty()) {
+            expect(node.is_integer(), "the number of a line on its chip or its name in quotes");
+            check_number(place, node, {rule.key, kind::whole, rule.low, rule.high});
+        }
+        break;
+    case kind::gpio:
+        expect(node.is_table(), "a GPIO line, such as { chip = \"gpiochip0\", line = 17 }");
+        check_table({place.path, fmt::format("{} {}", place.section, rule.key)}, *node.as_table(), gpio_rule);
+        break;
+    case kind::choice: check_choice(place, node, rule); break;
+    default: check_number(place, node, rule);
+    }
+}
+
+using table_entry = std::pair<std::string_view, const toml::node*>;
+
+/// The entries of a table in the order of the file, so that the first fault is the one told.
+std::vector<table_entry> in_order(const toml::table& table) {
+    std::vector<table_entry> out;
+    for (const auto& [key, node] : table) out.emplace_back(key.str(), &node);
+    std::stable_sort(out.begin(), out.end(), [](const table_entry& a, const table_entry& b) {
+        return a.second->source().begin < b.second->source().begin;
+    });
+    return out;
+}
+
+void check_table(const config_place& place, const toml::table& table, const section_rule& rule) {
+    std::vector<std::string> known;
+    for (const key_rule& key : rule.keys) known.emplace_back(key.key);
+    for (const auto& [key, node] : in_order(table)) {
+        const std::string name(key);
+        const auto found =
+            std::find_if(rule.keys.begin(), rule.keys.end(), [&](const key_rule& k) { return name == k.key; });
+        if (found == rule.keys.end())
+            refuse_key(place, *node, key,
+                       fmt::format("unknown key{}; known here: {}", did_you_mean(name, known), list_names(known)));
+        check_value(place, *node, *found);
+    }
+}
+
+void check_section(const std::string& path, std::string_view key, const toml::node& node) {
+    const auto& rules = schema;
+    const auto rule = std::find_if(rules.begin(), rules.end(), [&](const section_rule& r) { return key == r.name; });
+    const config_place top{path, "top level"};
+    if (rule == rules.end()) {
+        std::vector<std::string> known;
+        for (const section_rule& each : rules) known.emplace_back(each.name);
+        refuse_key(top, node, key,
+                   fmt::format("unknown {}{}; known: {}", node.is_table() || node.is_array() ? "section" : "key",
+                               did_you_mean(std::string(key), known), list_names(known)));
+    }
+    if (!rule->many) {
+        if (!node.is_table())
+            refuse_key(top, node, key, fmt::format("found {}, expected a section [{}]", found_value(node), key));
+        check_table({path, fmt::format("[{}]", key)}, *node.as_table(), *rule);
+        return;
+    }
+    const toml::array* entries = node.as_array();
+    if (!entries || !entries->is_homogeneous(toml::node_type::table))
+        refuse_key(top, node, key,
+                   fmt::format("found {}, expected sections [[{}]] with two brackets", found_value(node), key));
+    for (std::size_t i = 0; i < entries->size(); ++i)
+        check_table({path, entry_name(rule->name, *entries->get_as<toml::table>(i), i)},
+                    *entries->get_as<toml::table>(i), *rule);
+}
+
+} // namespace
+
+void refuse_key(const config_place& place, const toml::node& node, std::string_view key, const std::string& text) {
+    const auto line = node.source().begin.line; // keys taken over from a preset have none
+    throw failure(exit_usage, fmt::format("{}: {}, {}, key \"{}\": {}", place.path,
+                                          line ? fmt::format("line {}", line) : "from the preset", place.section,
+                                          printable(std::string(key)), text));
+}
+
+std::string found_value(const toml::node& node) {
+    if (const auto text = node.value<std::string>(); text && node.is_string()) return '"' + printable(*text) + '"';
+    if (const auto flag = node.as_boolean()) return flag->get() ? "true" : "false";
+    if (const auto whole = node.as_integer()) return std::to_string(whole->get());
+    if (const auto number = node.as_floating_point()) return fmt::format("{:g}", number->get());
+    if (node.is_table()) return "a table";
+    return node.is_array() ? "an array" : "a date or time";
+}
+
+std::string entry_name(const char* section, const toml::table& entry, std::size_t index) {
+    const auto name = entry["name"].value<std::string>();
+    return name ? fmt::format("[[{}]] \"{}\"", section, printable(*name))
+                : fmt::format("[[{}]] number {}", section, index + 1);
+}
+
+void check_schema(const std::string& path, const toml::table& file) {
+    for (const auto& [key, node] : in_order(file)) check_section(path, key, *node);
+}
+
+} // namespace okid_host

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  the border between C++ and the C face: exceptions become exit codes and a sentence
+#pragma once
+#include "error.hpp"
+
+#include <exception>
+#include <new>
+#include <string>
+
+namespace okid_host::face {
+
+/// Keeps what okid_host_error() gives to this thread. @return `code`
+int keep_error(int code, const char* text) noexcept;
+
+/// Runs `work()`; 0, or the exit code of what it threw.
+template <class Work> int guard(Work&& work) noexcept {
+    try {
+        work();
+        return exit_ok;
+    } catch (const failure& error) {
+        return keep_error(error.code, error.what());
+    } catch (const std::bad_alloc&) {
+        return keep_error(exit_device, "out of memory");
+    } catch (const std::exception& error) {
+        return keep_error(exit_device, error.what());
+    } catch (...) {
+        return keep_error(exit_device, "internal error: an exception without a text");
+    }
+}
+
+} // namespace okid_host::face

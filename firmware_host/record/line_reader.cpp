@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+#include "line_reader.hpp"
+
+#include "error.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace okid_host {
+namespace {
+
+constexpr std::size_t read_bytes = std::size_t{1} << 22;   // 4 MiB a read
+constexpr std::size_t longest_line = std::size_t{1} << 26; // 64 MiB: beyond this it is no CSV
+
+} // namespace
+
+line_reader::line_reader(std::string path) : path_(std::move(path)) {
+    if (path_.empty()) throw failure(exit_usage, "the name of the record is empty, expected a CSV file");
+    fd_ = open(path_.c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd_ < 0) throw failure(exit_usage, fmt::format("{}: cannot be opened: {}", path_, std::strerror(errno)));
+    struct stat status{};
+    if (fstat(fd_, &status) == 0 && S_ISREG(status.st_mode)) size_ = static_cast<std::size_t>(status.st_size);
+    try {
+        if (S_ISDIR(status.st_mode)) throw failure(exit_usage, fmt::format("{}: is a folder, expected a file", path_));
+        buffer_.resize(read_bytes);
+        fill();
+        if (end_ == 0) throw failure(exit_usage, fmt::format("{}: the file is empty", path_));
+        check_first_bytes();
+    } catch (...) {
+        close(fd_);
+        throw;
+    }
+}
+
+line_reader::~line_reader() { close(fd_); }
+
+void line_reader::check_first_bytes() {
+    const auto starts = [&](const char* bytes, std::size_t n) {
+        return end_ >= n && std::memcmp(buffer_.data(), bytes, n) == 0;
+    };
+    if (starts("\xEF\xBB\xBF", 3)) begin_ = searched_ = 3;
+    if (starts("\xFF\xFE", 2) || starts("\xFE\xFF", 2))
+        throw failure(exit_usage, fmt::format("{}: is UTF-16 text, expected UTF-8: save it as \"CSV UTF-8\"", path_));
+    if (starts("\x1F\x8B", 2) || starts("PK\x03\x04", 4))
+        throw failure(exit_usage, fmt::format("{}: is a compressed file or a spreadsheet, expected CSV text", path_));
+    const std::size_t look = end_ < 4096 ? end_ : 4096;
+    if (const void* zero = std::memchr(buffer_.data(), 0, look))
+        throw failure(exit_usage, fmt::format("{}: byte 0x00 at position {}: this is not a text file, expected a CSV",
+                                              path_, static_cast<const char*>(zero) - buffer_.data() + 1));
+}
+
+bool line_reader::fill() {
+    if (at_end_) return false;
+    if (begin_ > 0) {
+        std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+        end_ -= begin_;
+        searched_ -= begin_;
+        begin_ = 0;
+    }
+    if (end_ == buffer_.size()) {
+        if (end_ >= longest_line)
+            throw failure(exit_usage,
+                          fmt::format("{}, line {}: longer than 64 MiB, expected rows of a CSV", path_, number_ + 1));
+        buffer_.resize(buffer_.size() * 2);
+    }
+    ssize_t got = 0;
+    do got = read(fd_, buffer_.data() + end_, buffer_.size() - end_);
+    while (got < 0 && errno == EINTR);
+    if (got < 0) throw failure(exit_usage, fmt::format("{}: cannot be read: {}", path_, std::strerror(errno)));
+    at_end_ = got == 0;
+    end_ += static_cast<std::size_t>(got);
+    bytes_ += static_cast<std::size_t>(got);
+    return got > 0;
+}
+
+bool line_reader::next(std::string_view& line) {
+    for (;;) {
+        const char* data = buffer_.data();
+        const auto* newline = static_cast<const char*>(std::memchr(data + searched_, '\n', end_ - searched_));
+        if (newline || at_end_) {
+            if (!newline && begin_ == end_) return false;
+            const std::size_t stop = newline ? static_cast<std::size_t>(newline - data) : end_;
+            line = std::string_view(data + begin_, stop - begin_);
+            if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+            begin_ = searched_ = newline ? stop + 1 : end_;
+            ++number_;
+            return true;
+        }
+        searched_ = end_;
+        fill();
+    }
+}
+
+} // namespace okid_host

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+#include "record_uncertainty.hpp"
+
+#include "error.hpp"
+#include "result/method.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <new>
+
+namespace okid_host {
+namespace {
+
+struct sums {
+    std::unique_ptr<std::byte[]> block;
+    okid_accumulator_t* handle = nullptr;
+
+    explicit sums(const okid_accumulator_config_t& shape) {
+        const std::size_t bytes = okid_accumulator_memsize(&shape);
+        block.reset(new (std::nothrow) std::byte[bytes]);
+        if (block && okid_accumulator_create(&handle, &shape, block.get(), bytes) != OKID_OK) handle = nullptr;
+    }
+};
+
+/// Equal parts of all regression rows together; what stands before a record's first row is history only.
+std::vector<std::vector<record_piece>> cut(const std::vector<record_data>& records, std::size_t history,
+                                           std::size_t parts) {
+    std::size_t total = 0;
+    for (const record_data& record : records) total += record.count - std::min(history, record.count);
+    std::vector<std::vector<record_piece>> out(parts);
+    std::size_t at = 0;
+    for (std::size_t r = 0; r < records.size(); ++r) {
+        const std::size_t start = std::min(history, records[r].count), end = at + records[r].count - start;
+        for (std::size_t k = 0; k < parts; ++k) {
+            const std::size_t low = std::max(at, k * total / parts), high = std::min(end, (k + 1) * total / parts);
+            if (low < high) out[k].push_back({r, start + low - at, start + high - at});
+        }
+        at = end;
+    }
+    return out;
+}
+
+/// The pieces, each behind the samples before it; before a record begins there is silence.
+okid_status_t feed(okid_accumulator_t* to, const std::vector<record_data>& records,
+                   const std::vector<record_piece>& pieces, std::size_t lags, std::size_t n_u, std::size_t n_y) {
+    okid_accumulator_reset(to);
+    std::vector<double> v;
+    for (const record_piece& piece : pieces) {
+        const std::size_t before = std::min(lags, piece.first), silent = lags - before;
+        const std::size_t count = before + piece.last - piece.first;
+        v.assign((silent + count) * (n_u + n_y), 0.0);
+        interleave(records[piece.record], n_u, n_y, piece.first - before, count, &v[silent * (n_u + n_y)]);
+        okid_accumulator_gap(to, 0);
+        const okid_status_t status = okid_accumulator_add(to, v.data(), silent + count);
+        if (status < 0) return status;
+    }
+    return OKID_OK;
+}
+
+replicate_model keep(const okid_model_t& model) {
+    replicate_model out;
+    out.n_u = model.n_u;
+    out.n_y = model.n_y;
+    out.n_z = model.n_z;
+    out.A.assign(model.A, model.A + model.n_z * model.n_z);
+    out.B.assign(model.B, model.B + model.n_z * model.n_u);
+    out.C.assign(model.C, model.C + model.n_y * model.n_z);
+    out.D.assign(model.D, model.D + model.n_y * model.n_u);
+    return out;
+}
+
+/// The modes that stand elsewhere in `other` by more than two deviations, as text.
+std::string moved(const okid_identified_t& model, const okid_identified_t& other, const deviations& sigma) {
+    std::string text;
+    for (int k = 0; k < model.mode_count; ++k) {
+        const auto at = static_cast<std::size_t>(k);
+        const double f = model.frequency_hz[k], zeta = model.damping_ratio[k];
+        if (!(sigma.frequency_hz[at] > 0) || !(sigma.damping_ratio[at] > 0)) continue;
+        int near = 0;
+        for (int i = 1; i < other.mode_count; ++i)
+            if (std::abs(other.frequency_hz[i] - f) < std::abs(other.frequency_hz[near] - f)) near = i;
+        const double df = (other.frequency_hz[near] - f) / sigma.frequency_hz[at];
+        const double dz = (other.damping_ratio[near] - zeta) / sigma.damping_ratio[at];
+        if (std::abs(other.frequency_hz[near] - f) > 0.05 * f || std::max(std::abs(df), std::abs(dz)) <= 2) continue;
+        text += fmt::format("{}mode {} by {:+.1f} σ in f and {:+.1f} σ in ζ", text.empty() ? "" : ", ", k + 1, df, dz);
+    }
+    return text;
+}
+
+} // namespace
+
+std::vector<replicate_model> leave_out_blocks(const std::vector<record_data>& records,
+                                              const okid_identify_config_t& config, bool at_rest,
+                                              okid_accumulator_t* whole, const okid_identified_t& model, int blocks) {
+    okid_jackknife_config_t shape{};
+    shape.identify = config;
+    shape.identify.order = shape.identify.max_order = model.n_z;
+    okid_accumulator_config(whole, &shape.sums);
+    const auto lags = static_cast<std::size_t>(shape.sums.lags);
+    const std::size_t parts =
+        std::min(static_cast<std::size_t>(blocks), static_cast<std::size_t>(okid_accumulator_rows(whole)) / lags);
+    std::vector<replicate_model> out;
+    const sums part(shape.sums);
+    const std::size_t bytes = okid_jackknife_memsize(&shape);
+    const std::unique_ptr<std::byte[]> block(new (std::nothrow) std::byte[bytes]);
+    okid_jackknife_t* jackknife = nullptr;
+    if (parts < std::size_t{fewest_blocks} || !part.handle || !block ||
+        okid_jackknife_create(&jackknife, &shape, block.get(), bytes) != OKID_OK ||
+        okid_jackknife_begin(jackknife, whole, &model) != OKID_OK)
+        return out;
+    for (const auto& pieces : cut(records, at_rest ? 0 : lags, parts)) {
+        const auto n_u = static_cast<std::size_t>(config.n_u), n_y = static_cast<std::size_t>(config.n_y);
+        if (feed(part.handle, records, pieces, lags, n_u, n_y) < 0) return {};
+        if (okid_accumulator_rows(part.handle) == 0) continue;
+        okid_model_t found{};
+        double share = 0;
+        const okid_status_t status = okid_jackknife_delete(jackknife, part.handle, 1, &found, &share);
+        if (!(share > 0)) return {};
+        out.push_back(status < 0 ? replicate_model{} : keep(found));
+        out.back().share = share;
+        out.back().pieces = pieces;
+    }
+    return out;
+}
+
+deviations deviations_of(const okid_identified_t& model, const std::vector<replicate_model>& replicates,
+                         const mass_plan& plan) {
+    replicate_statistics statistics(model.n_u, model.n_y, model.n_z, plan, model.dt);
+    statistics.begin(model_view(model));
+    for (const replicate_model& replicate : replicates) {
+        const okid_model_t view = replicate.view();
+        statistics.add(replicate.found() ? &view : nullptr, replicate.share);
+    }
+    return statistics.finish();
+}
+
+void remark_finite_p(const okid_identify_config_t& config, long long rows, const okid_identified_t& model,
+                     const deviations& sigma, const identify_again& again, remarks& said) {
+    if (config.n_u == 0 || is_subspace(config.method)) return;
+    okid_identify_config_t longer = config;
+    longer.p = 2 * config.p;
+    longer.rows = model.rows;
+    longer.order = model.n_z;
+    if (rows < 10LL * unknowns_of(config.method, config.n_u, config.n_y, longer.p)) return;
+    std::string text;
+    try {
+        again(longer, [&](okid_identify_t*, const okid_identified_t& other) { text = moved(model, other, sigma); });
+    } catch (const failure&) {
+        return; // no memory for it: no remark
+    }
+    if (!text.empty())
+        said.emplace_back(
+            "finite_p_bias",
+            fmt::format("p {} instead of {} moves {}: a bias that ± does not show. Use --p {} or more, or "
+                        "an n4sid method",
+                        longer.p, config.p, text, longer.p));
+}
+
+} // namespace okid_host

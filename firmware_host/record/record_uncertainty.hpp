@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Standard deviations of what is identified from records in memory: the same again without one block of them each.
+#pragma once
+#include "record.hpp"
+#include "record_stabilization.hpp"
+#include "result/deviations.hpp"
+
+#include <okid/accumulator.h>
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+namespace okid_host {
+
+/// Samples first .. last-1 of one record.
+struct record_piece {
+    std::size_t record, first, last;
+};
+
+/// The model without one block; none when the block was indispensable.
+struct replicate_model {
+    std::vector<record_piece> pieces;
+    double share = 0;
+    int n_u = 0, n_y = 0, n_z = 0;
+    std::vector<double> A, B, C, D;
+    bool found() const { return n_z > 0; }
+    okid_model_t view() const { return {n_u, n_y, n_z, A.data(), B.data(), C.data(), D.data(), nullptr}; }
+};
+
+/// Leave out each of so many equal blocks in turn. `records` are what `whole` was fed with. Empty: too short.
+std::vector<replicate_model> leave_out_blocks(const std::vector<record_data>& records,
+                                              const okid_identify_config_t& config, bool at_rest,
+                                              okid_accumulator_t* whole, const okid_identified_t& model, int blocks);
+
+/// Deviations of the modes, and of M, K, R where the plan wants them.
+deviations deviations_of(const okid_identified_t& model, const std::vector<replicate_model>& replicates,
+                         const mass_plan& plan);
+
+/// Does a horizon of 2 p say something else than p, by more than two standard deviations? Then a remark names the modes:
+/// the bias of a finite p, which no deviation sees. Nothing when `rows` regression rows are too few for 2 p.
+void remark_finite_p(const okid_identify_config_t& config, long long rows, const okid_identified_t& model,
+                     const deviations& sigma, const identify_again& again, remarks& said);
+
+} // namespace okid_host

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// An identified model as people and programs see it: okid.result/1 and the modal table.
+#pragma once
+#include "deviations.hpp"
+#include "record/record_stabilization.hpp"
+#include "refinement.hpp"
+
+#include <okid/identify.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+constexpr double doubtful_emac = 0.5; ///< below this a mode seldom belongs to the structure
+
+/// What the library does not know about a result.
+struct result_context {
+    std::string method = "okid-era";
+    std::optional<std::string> hankel; ///< of methods with an observer
+    double fs_hz = 0;
+    long long samples = 0;
+    int records = 1;
+    long long gaps = 0;
+    std::vector<std::string> inputs, outputs;
+    std::string hold = "zoh", detrend = "mean", start = "moving";
+    std::optional<std::vector<std::vector<double>>> x0;        ///< one initial state per record; absent live (null)
+    std::optional<std::vector<double>> simulation_percent;     ///< per output; absent live (null)
+    std::optional<std::vector<double>> prediction_percent;     ///< per output; absent = null
+    std::optional<deviations> sigma;                           ///< of the modes; absent = null
+    std::optional<stabilization> stable;                       ///< where it was asked for
+    std::optional<refinement> refined;                         ///< of a model that was refined
+    std::optional<channel_skew> skew;                          ///< delays of the outputs, of a refined model
+    std::optional<mass_matrices> mass;                         ///< M, K, R where the channels have degrees of freedom
+    std::vector<std::pair<std::string, std::string>> warnings; ///< further (code, text)
+};
+
+/// {"frequency_hz": …, "damping_ratio": …, "shape_re": […], "shape_im": […], "mpc": …, "emac": …, "cmi": …} of every mode.
+/// @param sigma  their standard deviations, or nullptr (null)
+nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma);
+
+/// The whole okid.result/1 object.
+nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context);
+
+/// The modal table and the remarks, as text for a person (no escape codes).
+std::string result_table(const okid_identified_t& model, const result_context& context);
+
+/// The warnings of the model in words, with their numbers, then those of the context.
+std::vector<std::pair<std::string, std::string>> result_warnings(const okid_identified_t& model,
+                                                                 const result_context& context);
+
+/// Turn a failed okid_identify_run() into the failure to throw: exit 3 and what to do about it.
+[[noreturn]] void throw_identify_failure(okid_status_t status, const okid_identified_t& model,
+                                         const okid_identify_config_t& config, const result_context& context);
+
+/// Write `text` to `path` through a temporary file and rename; "-" is stdout.
+void write_whole_file(const std::string& path, const std::string& text);
+
+} // namespace okid_host

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Files, records and names that users hand in."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""What an identification gives: models, modes, matrices, tables, pictures."""

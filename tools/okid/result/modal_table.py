@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""The modes of a result as a table: rows for programs (pandas.DataFrame takes it), text and HTML for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from okid.result.result import Mode
+
+
+def known(value: float | None) -> float | None:
+    """The number, None for one that is missing or not finite."""
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
+    return [
+        {
+            "mode": k,
+            "frequency_hz": mode.frequency_hz,
+            "frequency_std_hz": known(mode.frequency_std_hz),
+            "damping_ratio": mode.damping_ratio,
+            "damping_ratio_std": known(mode.damping_ratio_std),
+            "mpc": known(mode.mpc),
+            "emac": known(mode.emac),
+            "cmi": known(mode.cmi),
+        }
+        for k, mode in enumerate(modes, 1)
+    ]
+
+
+class ModalTable(list[dict[str, Any]]):
+    """A row a mode, ascending in frequency: mode (from 1), frequency_hz, frequency_std_hz, damping_ratio,
+    damping_ratio_std, mpc, emac, cmi; None = not known. str() and notebooks show it with the remarks of the result.
+
+    >>> import okid
+    >>> table = okid.ModalTable([okid.Mode(10.96, 0.012, None, 0.99, 0.98)], "one mode")
+    >>> table[0]["frequency_hz"], str(table)
+    (10.96, 'one mode')
+    """
+
+    def __init__(self, modes: Sequence[Mode], text: str, remarks: Sequence[str] = ()) -> None:
+        super().__init__(_rows(modes))
+        self._text, self._remarks = text, list(remarks)
+
+    def __str__(self) -> str:
+        return self._text
+
+    def _repr_html_(self) -> str:
+        with_std = [any(row[key] is not None for row in self) for key in ("frequency_std_hz", "damping_ratio_std")]
+        head = ["mode", "f [Hz]", *["± [Hz]"] * with_std[0], "ζ [%]", *["± [%]"] * with_std[1], "MPC", "EMAC", "CMI"]
+        lines = []
+        for row in self:
+            cells = [str(row["mode"]), f"{row['frequency_hz']:.5f}"]
+            cells += [_short(row["frequency_std_hz"], 1.0)] * with_std[0]
+            cells += [f"{100.0 * row['damping_ratio']:.4f}"]
+            cells += [_short(row["damping_ratio_std"], 100.0)] * with_std[1]
+            cells += ["–" if row[key] is None else f"{row[key]:.4f}" for key in ("mpc", "emac", "cmi")]
+            lines.append(
+                "<tr>" + "".join(f'<td style="text-align:right">{escape(cell)}</td>' for cell in cells) + "</tr>"
+            )
+        header = "".join(f'<th style="text-align:right">{escape(name)}</th>' for name in head)
+        said = "".join(f"<li>{escape(remark)}</li>" for remark in self._remarks)
+        return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(lines)}</tbody></table>" + (
+            f"<ul>{said}</ul>" if said else ""
+        )
+
+
+def _short(value: float | None, factor: float) -> str:
+    return "–" if value is None else format(factor * value, ".2g")

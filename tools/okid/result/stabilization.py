@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: MIT
+"""Which poles hold while model order and horizon change, and the modes of the structure found from that."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from okid import abi
+from okid._errors import Error, InputError
+
+if TYPE_CHECKING:
+    from okid.abi.identifier import Identified, Identifier
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+
+class OrderPoles(NamedTuple):
+    """Poles of one order, (k,) each, shapes (k, n_y); the flags compare with the next lower order of the diagram.
+
+    `cluster` (k,): index into Stabilization.clusters, -1 = none; `horizon`: p, or block rows, of the model.
+    """
+
+    order: int
+    frequency_hz: Real
+    damping_ratio: Real
+    shapes: Complex
+    stable_frequency: Flags
+    stable_damping: Flags
+    stable_shape: Flags
+    horizon: int
+    cluster: NDArray[np.int32]
+
+    @property
+    def stable(self) -> Flags:
+        """Frequency, damping and shape all hold."""
+        return self.stable_frequency & self.stable_damping & self.stable_shape
+
+
+class Cluster(NamedTuple):
+    """Poles that belong together, at most one of each model: medians, and robust spreads over the models (how much the
+    choice of order matters, not an error of measurement).
+
+    `hits` of `models`: where it was found; `physical`: in at least the share asked for; `horizon`, `order`: the model
+    whose pole lies nearest the medians, `shape` (n_y,) its shape.
+    """
+
+    frequency_hz: float
+    damping_ratio: float
+    frequency_spread_hz: float
+    damping_ratio_spread: float
+    mpc: float
+    hits: int
+    models: int
+    physical: bool
+    horizon: int
+    order: int
+    shape: Complex
+
+
+class Criteria(NamedTuple):
+    """A pole holds when the order before has one within `frequency` and `damping` (relative) and `mac`; a cluster is
+    a mode of the structure when it is found in `share` of the models."""
+
+    frequency: float = 0.01
+    damping: float = 0.05
+    mac: float = 0.98
+    share: float = 0.5
+
+
+class Stabilization(Sequence[OrderPoles]):
+    """The rows of the diagram, one a model, and the clusters, ascending in frequency."""
+
+    def __init__(self, rows: list[OrderPoles], clusters: list[Cluster], criteria: Criteria) -> None:
+        self.rows, self.clusters, self.criteria = rows, clusters, criteria
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{mode.frequency_hz:.4g}" for mode in self.modes)
+        return f"<Stabilization of {len(self.rows)} models, modes at {found} Hz>"
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.rows[index]
+
+    def __iter__(self) -> Iterator[OrderPoles]:
+        return iter(self.rows)
+
+    @property
+    def modes(self) -> list[Cluster]:
+        """The clusters found in enough models: modes of the structure."""
+        return [cluster for cluster in self.clusters if cluster.physical]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The key "stabilization" of okid.result/1."""
+        keys = ("frequency_hz", "damping_ratio", "frequency_spread_hz", "damping_ratio_spread", "mpc", "hits",
+                "models", "physical", "horizon", "order")  # fmt: skip
+        return {
+            "criteria": self.criteria._asdict(),
+            "models": [[row.horizon, row.order] for row in self.rows],
+            "poles": [
+                {
+                    "horizon": row.horizon,
+                    "order": row.order,
+                    "frequency_hz": float(row.frequency_hz[k]),
+                    "damping_ratio": float(row.damping_ratio[k]),
+                    "stable_frequency": bool(row.stable_frequency[k]),
+                    "stable_damping": bool(row.stable_damping[k]),
+                    "stable_shape": bool(row.stable_shape[k]),
+                    "cluster": int(row.cluster[k]),
+                }
+                for row in self.rows
+                for k in range(len(row.frequency_hz))
+            ],
+            "clusters": [{key: getattr(cluster, key) for key in keys} for cluster in self.clusters],
+        }
+
+
+class Collector:
+    """The library's workspace: add() the last model of an identifier, find() the clusters."""
+
+    def __init__(self, n_y: int, models: int, poles: int, criteria: Criteria) -> None:
+        self.criteria = criteria
+        config = abi.StabilizationConfig(n_y, models, poles, *criteria)
+        size = int(abi.library().okid_stabilization_memsize(ctypes.byref(config)))
+        if size == 0:
+            raise InputError(f"{models} models of {poles} poles with {criteria}: outside what the library takes")
+        self._block = abi.block(size)
+        self._handle = ctypes.c_void_p()
+        status = abi.library().okid_stabilization_create(
+            ctypes.byref(self._handle), ctypes.byref(config), self._block.ctypes.data, self._block.size
+        )
+        abi.check(status, "stabilization")
+        self._found: list[Identified] = []
+
+    def add_orders(self, identifier: Identifier, orders: Iterable[int]) -> None:
+        """Every order, ascending, from the decomposition of the identifier's last run()."""
+        for order in sorted(set(orders)):
+            try:
+                found = identifier.poles(order)
+            except Error as fault:
+                if fault.status not in (abi.ERR_NO_MODES, abi.ERR_NUMERIC, abi.ERR_DIM):
+                    raise
+                continue  # no pole to draw at this order
+            abi.check(abi.library().okid_stabilization_add(self._handle, identifier.raw), f"order {order}")
+            self._found.append(found)
+
+    def find(self) -> Stabilization:
+        """Rows and clusters."""
+        raw = abi.Stabilized()
+        abi.check(abi.library().okid_stabilization_find(self._handle, ctypes.byref(raw)), "clusters")
+        rows, first = [], 0
+        for found in self._found:
+            own = [raw.poles[k] for k in range(first, first + len(found.frequency_hz))]
+            first += len(own)
+            holds = np.array([pole.holds for pole in own], dtype=np.int32)
+            flags = [holds & bit != 0 for bit in (abi.HOLDS_FREQUENCY, abi.HOLDS_DAMPING, abi.HOLDS_SHAPE)]
+            cluster = np.array([pole.cluster for pole in own], dtype=np.int32)
+            rows.append(OrderPoles(found.order, found.frequency_hz, found.damping_ratio, found.shapes,
+                                   flags[0], flags[1], flags[2], found.p, cluster))  # fmt: skip
+        shapes = np.vstack([found.shapes for found in self._found]) if rows else np.zeros((0, 1), complex)
+        clusters = []
+        for k in range(int(raw.cluster_count)):
+            c = raw.clusters[k]
+            pole = raw.poles[c.pole]
+            clusters.append(Cluster(
+                c.frequency_hz, c.damping_ratio, c.frequency_spread_hz, c.damping_ratio_spread, c.mpc, c.hits,
+                int(raw.model_count), bool(c.physical), pole.horizon, pole.order, shapes[c.pole],
+            ))  # fmt: skip
+        return Stabilization(rows, clusters, self.criteria)
+
+
+def default_orders(identifier: Identifier) -> range:
+    """Every even order up to half of the rank that the past can have: near that rank noise looks consistent too."""
+    config = identifier.config
+    past = config.p if config.n_u > 0 and not identifier.subspace else identifier.block_rows
+    return range(2, max(2, min(identifier.largest_order(), past * config.n_y // 2)) + 1, 2)
+
+
+def of_identifiers(
+    identifiers: Sequence[Identifier], orders: Iterable[int] | None = None, criteria: Criteria | None = None
+) -> Stabilization:
+    """Orders (default: default_orders()) of one identifier for each horizon, each after its run()."""
+    wanted = [
+        sorted({n for n in (default_orders(one) if orders is None else orders) if 1 <= n <= one.largest_order()})
+        for one in identifiers
+    ]
+    models, largest = sum(len(each) for each in wanted), max((each[-1] for each in wanted if each), default=0)
+    if models == 0:
+        raise InputError("no order to draw: expected numbers from 1 to the largest order of the decomposition")
+    collector = Collector(int(identifiers[0].config.n_y), models, max(1, largest // 2), criteria or Criteria())
+    for one, each in zip(identifiers, wanted, strict=True):
+        collector.add_orders(one, each)
+    return collector.find()
+
+
+def stabilization(
+    u: ArrayLike | Sequence[ArrayLike] | None,
+    y: ArrayLike | Sequence[ArrayLike],
+    *,
+    fs: float,
+    horizons: Sequence[int] | None = None,
+    orders: Iterable[int] | None = None,
+    criteria: Criteria | None = None,
+    **options: Any,
+) -> Stabilization:
+    """Identify at several horizons and orders and gather the poles into modes: no order has to be chosen.
+
+    `horizons`: values of p, or of the block rows for methods without observer (default: a half, three quarters and all
+    of what okid.identify() would take); `orders` default: all even ones the data carry. Other arguments are those of
+    okid.identify(), u and y too. Result: `modes`, `clusters`, and the rows of the diagram.
+
+    >>> import okid
+    >>> found = okid.stabilization(*okid.demo_record(), fs=1000.0)
+    >>> [round(mode.frequency_hz, 1) for mode in found.modes]
+    [11.0, 31.8, 45.7]
+    """
+    from okid.identify import identify
+
+    if "order" in options:
+        raise InputError("order is not an argument of stabilization(): it looks at many, give orders=[...]")
+    subspace = str(options.get("method", "okid-era")).startswith("n4sid")
+    key = "rows" if u is None or subspace else "p"
+    asked = None if orders is None else sorted(set(orders))
+    if asked:
+        options.setdefault("max_order", max(asked))
+    if horizons is None:
+        first = identify(u, y, fs=fs, **options)
+        reach = first.p
+        results = [first] + [
+            identify(u, y, fs=fs, **{**options, key: n}) for n in sorted({reach // 2, 3 * reach // 4} - {0, 1, reach})
+        ]
+    else:
+        results = [identify(u, y, fs=fs, **{**options, key: int(n)}) for n in sorted(set(horizons))]
+    results.sort(key=lambda result: result.p)
+    return of_identifiers([result.identifier for result in results if result.identifier is not None], asked, criteria)
