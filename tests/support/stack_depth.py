@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Worst-case stack of the library's public functions, from the compiler's own call graph (gcc -fcallgraph-info=su).
+"""Worst-case stack of the library's public functions, from the compiler's own call graph (tests/support/call_graph).
 
 usage: stack_depth.py LIMIT_BYTES FOLDER [FOLDER ..]
-Reads every *.ci below the folders, adds the frames along the deepest path of each okid_ function, prints the deepest
+Reads every *.su below the folders, adds the frames along the deepest path of each okid_ function, prints the deepest
 ones, and fails when one is deeper than the limit, when a frame has no bound or when functions call themselves.
 Functions outside the library (libm, memcpy, LAPACK) count as nothing: their names are printed.
 """
@@ -25,7 +25,7 @@ def read(folders: list[Path]) -> tuple[dict[str, int], dict[str, set[str]], list
     calls: dict[str, set[str]] = {}
     files: dict[str, set[str]] = {}
     wrong = []
-    for path in sorted(p for folder in folders for p in folder.rglob("*.ci")):
+    for path in sorted(p for folder in folders for p in folder.rglob("*.su")):
         text = path.read_text(encoding="utf-8")
         for title, label in NODE.findall(text):
             found = FRAME.search(label)
@@ -86,7 +86,7 @@ def main() -> int:
     limit, folders = int(sys.argv[1]), [Path(a) for a in sys.argv[2:]]
     frames, calls, wrong = read(folders)
     if not frames:
-        print(f"stack: no *.ci file below {', '.join(map(str, folders))}: build with gcc first", file=sys.stderr)
+        print(f"stack: no *.su file below {', '.join(map(str, folders))}: build with gcc first", file=sys.stderr)
         return 1
     depth, through, loops = deepest(frames, calls)
     headers = Path(__file__).resolve().parents[2] / "lib" / "include" / "okid"
