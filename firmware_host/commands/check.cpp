@@ -3,6 +3,7 @@
 #include "align/trigger.hpp"
 #include "commands.hpp"
 #include "config/config.hpp"
+#include "config/config_json.hpp"
 #include "config/presets.hpp"
 #include "error.hpp"
 #include "live/identifier.hpp"
@@ -11,49 +12,9 @@
 
 #include <fmt/format.h>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 namespace okid_host {
 namespace {
-
-using nlohmann::ordered_json;
-
-const char* role_name(channel_role role) {
-    static const char* const names[] = {"force", "acceleration", "velocity", "displacement", "aux"};
-    return names[static_cast<std::size_t>(role)];
-}
-
-ordered_json bits_json(const drv_signal_t& signal) {
-    static const char* const values[] = {"integer", "float32", "float64"};
-    return {{"start_bit", signal.start_bit},
-            {"length", signal.length},
-            {"byte_order", signal.big_endian ? "big" : "little"},
-            {"signed", signal.is_signed != 0},
-            {"value", values[signal.value]},
-            {"scale", signal.scale},
-            {"offset", signal.offset}};
-}
-
-ordered_json channel_json(const live_config& config, const channel_config& channel) {
-    ordered_json out{{"name", channel.name},       {"role", role_name(channel.role)},
-                     {"unit", channel.unit},       {"bus", config.buses[channel.bus].name},
-                     {"can_id", channel.frame.id}, {"extended", channel.frame.extended != 0}};
-    out.update(bits_json(channel.layout));
-    const bool multiplexed = !channel.selectors.empty();
-    out["multiplexor"] = multiplexed ? bits_json(channel.selectors.front().layout) : ordered_json(nullptr);
-    out["multiplexor_value"] =
-        multiplexed ? ordered_json(channel.selectors.front().values.front().first) : ordered_json(nullptr);
-    out["sequence"] = channel.sequence ? bits_json(*channel.sequence) : ordered_json(nullptr);
-    return out;
-}
-
-ordered_json config_json(const live_config& config) {
-    ordered_json out{{"schema", "okid.check/1"},   {"config", config.path}, {"rate_hz", config.rate_hz},
-                     {"inputs", config.n_u},       {"outputs", config.n_y}, {"channels", ordered_json::array()},
-                     {"warnings", config.warnings}};
-    for (const channel_config& channel : config.channels) out["channels"].push_back(channel_json(config, channel));
-    return out;
-}
 
 std::string memory_text(const live_config& config) {
     const identification_config& id = config.identification;
@@ -85,7 +46,7 @@ std::string summary(const live_config& config, bool exact) {
         const drv_signal_t& layout = channel.layout;
         const char* kind = layout.value == DRV_VALUE_INTEGER ? (layout.is_signed ? "int" : "uint") : "float";
         out += fmt::format(
-            "{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", channel.name, role_name(channel.role),
+            "{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", channel.name, channel_role_name(channel.role),
             channel.unit.empty() ? "-" : channel.unit, config.buses[channel.bus].name,
             fmt::format("{:#x}{}", channel.frame.id, channel.frame.extended ? " ext" : ""),
             fmt::format("{}{} at {} {}", kind, layout.length, layout.start_bit, layout.big_endian ? "big" : "little"),
@@ -128,8 +89,9 @@ void add_check(CLI::App& app) {
         require_identifiable(config);
         const bool exact = identifier(config).exact(); // its memory is proved here, not in the lab
         write_whole_file(
-            "-", given->json ? config_json(config).dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n"
-                             : summary(config, exact));
+            "-", given->json
+                     ? config_json(config).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"
+                     : summary(config, exact));
     });
 }
 

@@ -386,6 +386,12 @@ live_config load_config(const std::string& path) {
     return make_config(path, std::move(texts), true);
 }
 
+live_config load_config_text(const std::string& path, const std::string& text) {
+    config_texts texts;
+    texts.config = text;
+    return make_config(path, std::move(texts), true);
+}
+
 live_config load_config(const std::string& path, const config_texts& texts) { return make_config(path, texts, false); }
 
 void require_identifiable(const live_config& config) {

@@ -200,6 +200,9 @@ struct live_config {
 /// Read and check. Throws `failure` (exit 2) naming file, line, key, what was found and what was expected.
 live_config load_config(const std::string& path);
 
+/// The same with the text of the file at hand; what it names is read from the files beside `path`.
+live_config load_config_text(const std::string& path, const std::string& text);
+
 /// The same out of texts instead of files. @param path  where they come from, for messages
 live_config load_config(const std::string& path, const config_texts& texts);
 
