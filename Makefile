@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo test test-slow test-wheel test-embedded test-package package docs bench bench-check bench-peers \
+.PHONY: help setup build demo check test test-slow test-wheel test-embedded test-package package docs bench bench-check bench-peers \
 	fuzz lint format sanitize sanitize-all coverage sbom clean
 
 help: ## this list
@@ -23,6 +23,10 @@ build: setup ## build/okid, build/libokid.so, build/libokid.a, .venv with `impor
 demo: build ## play a simulated shaker test, frame by frame, through the front end, identify it while it plays, write a report
 	@tools/demo.sh
 
+check: ## while you work: build and unit tests; T=refine: the unit and Python tests of that idea; LF=1: what failed last
+	@tools/setup.sh test
+	@tests/check "$(T)" $(if $(LF),--lf)
+
 test: ## everything that proves the product, real vcan included
 	@tools/setup.sh test
 	@[ -e build/okid ] || echo "build: compiling, some minutes the first time"
@@ -30,14 +34,10 @@ test: ## everything that proves the product, real vcan included
 	@cmake --build build -j$(JOBS) -- --quiet
 	@tests/run
 
-test-slow: ## the long tiers: more seeds, more frames
-	@tools/setup.sh test
-	@cmake --preset release -DOKID_BUILD_TESTS=ON --log-level=WARNING >/dev/null
-	@cmake --build build -j$(JOBS) -- --quiet
-	@OKID_SLOW=1 tests/run
-	@$(MAKE) --no-print-directory sanitize-all test-package
+test-slow: ## the same with more seeds, more frames, longer loads
+	@OKID_SLOW=1 $(MAKE) --no-print-directory test
 
-test-wheel: ## the Python package as a stranger installs it: source distribution, wheel, fresh environments
+test-wheel: ## the Python package as a stranger installs it: source distribution, wheel, fresh environment
 	@tools/setup.sh test
 	@tests/wheel/run
 
@@ -60,7 +60,7 @@ bench-peers: build ## other programs on the same data, into build/peers.json
 	@tools/setup.sh bench || echo "bench-peers: going on without SLICOT"
 	@tests/bench/peers/run
 
-sanitize: ## unit tests under AddressSanitizer and UndefinedBehaviourSanitizer
+sanitize: ## unit tests under AddressSanitizer and UndefinedBehaviourSanitizer, on one linear-algebra backend
 	@tools/setup.sh test
 	@cmake --preset sanitize --log-level=WARNING >/dev/null
 	@cmake --build build-sanitize -j$(JOBS) -- --quiet
@@ -104,4 +104,4 @@ format: ## rewrite C, C++ and Python in the house style
 	@.venv/bin/ruff format --config tools/pyproject.toml -q tools tests
 
 clean: ## remove build folders (not .venv)
-	@rm -rf build build-sanitize build-coverage build-float build-embedded build-fuzz build-thread
+	@rm -rf build build-dev build-sanitize build-coverage build-float build-embedded build-fuzz build-thread

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Format, static analysis and the rules of the house that a grep can check. Exits non-zero on the first kind of trouble.
+# OKID_LINT_BASE=COMMIT: clang-tidy, most of the time, reads only what changed since then; .ci/nightly reads everything.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 bad=0
@@ -18,8 +19,19 @@ tidy() { xargs -r -P 2 -n 4 $bin/clang-tidy --quiet -p build/tidy "$@" 2>/dev/nu
 analyser='clang-analyzer-*,-clang-analyzer-optin.performance.Padding,-clang-analyzer-unix.StdCLibraryFunctions'
 analyser+=',-clang-analyzer-security.insecureAPI.DeprecatedOrUnsafeBufferHandling'
 built() { git ls-files "$@" | while read -r file; do grep -q "/$file\"" build/tidy/compile_commands.json && echo "$file"; done; }
-tidy "--checks=$analyser" < <(built 'lib/src/*.c' 'drivers/src/*.c') # of the two libgpiod sources the one this machine has
-tidy < <(git ls-files 'lib/src/*.cpp' 'firmware_host/*.cpp')
+base=${OKID_LINT_BASE:-}
+[ -z "$base" ] || git diff --quiet "$base" -- .clang-tidy tools/lint.sh || base= # other rules: everything
+touched() { # of the files named on stdin those that changed since the base, or that include a header that did
+  [ -n "$base" ] || { cat; return; }
+  local file
+  git diff --name-only "$base" -- '*.c' '*.cpp' '*.h' '*.hpp' >build/tidy/changed
+  while read -r file; do
+    git grep -lE "#include [<\"]([^\"]*/)?$(basename "$file")[>\"]" -- '*.c' '*.cpp'
+  done < <(grep -E '\.(h|hpp)$' build/tidy/changed) >build/tidy/including
+  grep -Fx -f build/tidy/changed -f build/tidy/including || true
+}
+tidy "--checks=$analyser" < <(built 'lib/src/*.c' 'drivers/src/*.c' | touched) # of the two libgpiod sources the one this machine has
+tidy < <(git ls-files 'lib/src/*.cpp' 'firmware_host/*.cpp' | touched)
 
 # A second reader of C and C++. What it may not say, and why:
 checked=(--quiet --enable=warning,performance,portability --inline-suppr --error-exitcode=1 -D_GNU_SOURCE
