@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """GPIO lines on simulated chips (gpio-sim): the driver for both APIs of libgpiod, and okid run with trigger and lamps.
 
-Run by tests/gpio/run in a kernel of its own, where vcan0 is too.
+Run by tests/kernel/run in the test kernel, where vcan0 is too.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # PID 1 inside User-Mode Linux; the root is the host's own, so nothing is touched before /dev is private.
-# Run by run_uml; $OKID_ROOM (from the kernel's command line) holds the command, its folder and its environment.
+# Run by boot; $OKID_ROOM (from the kernel's command line) holds the command, its folder and its environment.
 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 power_off() {
   sync
@@ -21,11 +21,6 @@ ip link set lo up
 # One slow processor for senders and receivers: what vcan hands on must not be dropped before a socket sees it.
 echo 100000 >/proc/sys/net/core/netdev_max_backlog
 
-modules=/usr/lib/uml/modules/$(uname -r)/kernel
-for module in net/can/can net/can/can-raw net/can/can-bcm net/can/can-gw drivers/net/can/dev/can-dev drivers/net/can/vcan \
-  drivers/net/can/vxcan drivers/net/can/slcan/slcan; do
-  [ -f "$modules/$module.ko" ] && insmod "$modules/$module.ko" 2>/dev/null
-done
 ip link add vcan0 type vcan && ip link set vcan0 mtu 72 && ip link set vcan0 up || power_off
 
 room=$OKID_ROOM

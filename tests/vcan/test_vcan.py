@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""okid on a real CAN interface (vcan0): can-utils on one side, okid on the other. Run by tests/vcan/run."""
+"""okid on a real CAN interface (vcan0): can-utils on one side, okid on the other. Run by tests/kernel/run."""
 
 from __future__ import annotations
 
