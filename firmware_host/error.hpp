@@ -14,8 +14,10 @@ enum exit_code { exit_ok = 0, exit_usage = 2, exit_no_model = 3, exit_device = 4
 
 /// Thrown anywhere in the host, caught once in main(): printed as "okid: <what>" on stderr, exits with `code`.
 struct failure : std::runtime_error {
-    failure(int exit_status, const std::string& what) : std::runtime_error(what), code(exit_status) {}
+    failure(int exit_status, const std::string& what, int of_library = 0)
+        : std::runtime_error(what), code(exit_status), status(of_library) {}
     int code;
+    int status; ///< okid_status_t where the library found the fault, else 0
 };
 
 /// A line for people on stderr. One that cannot be written (a full disk, a terminal that hung up) ends nothing.

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: MIT
-// okid identify: measured records in, modes and a state-space model out.
+// PURPOSE  okid identify: measured records in, modes and a state-space model out
 #include "commands.hpp"
 
 #include "config/nearest_name.hpp"
 #include "error.hpp"
 #include "files/whole_file.hpp"
 #include "progress.hpp"
+#include "record/csv.hpp"
 #include "record/csv_header.hpp"
 #include "record/record.hpp"
-#include "record/record_check.hpp"
-#include "result/deviations.hpp"
+#include "record/request.hpp"
 #include "result/mat_file.hpp"
 #include "result/method.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -24,130 +23,25 @@ namespace {
 
 /// The command line as it was typed.
 struct identify_arguments {
+    record_request wanted;
     std::vector<std::string> records;
-    std::string inputs, outputs, method = "okid-era", hankel = "system", order = "auto", hold = "zoh", detrend = "mean",
-                                 start = "moving";
-    std::string sensing = "acceleration", input_dofs, output_dofs, range, json, model;
-    std::string fs, p, rows, sigma_blocks;
-    bool refine = false, stabilization = false, quiet = false;
+    std::string inputs, outputs, range, json, model;
+    bool quiet = false;
 };
 
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
 
-void one_of(const std::string& option, const std::string& value, const std::vector<std::string>& choices) {
-    if (std::find(choices.begin(), choices.end(), value) != choices.end()) return;
-    usage(fmt::format("{}: found \"{}\"{}, expected one of: {}", option, printable(value), did_you_mean(value, choices),
-                      list_names(choices)));
-}
-
-long long whole_number(const std::string& option, const std::string& text, long long low, long long high) {
-    long long value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || value < low || value > high)
-        usage(
-            fmt::format("{}: found \"{}\", expected a whole number from {} to {}", option, printable(text), low, high));
-    return value;
-}
-
-void check_refine(const identify_arguments& given) {
-    if (given.refine && given.inputs.empty())
-        usage("--refine needs a measured force: without --inputs (ambient) there is nothing to simulate");
-}
-
-/// The inputs and outputs, checked; names the columns there are when none were chosen.
-void choose_channels(const identify_arguments& given, record_options& options) {
-    const auto columns = [&] { return list_names(read_csv_columns(given.records.front())); };
+/// The names of the columns; says which there are when none were chosen.
+void choose_columns(identify_arguments& given) {
     if (given.outputs.empty())
         usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}",
-                          given.records.front(), columns()));
-    if (!given.inputs.empty()) options.inputs = split_names("--inputs", given.inputs);
-    options.outputs = split_names("--outputs", given.outputs);
-    for (const std::string& name : options.outputs)
-        if (std::find(options.inputs.begin(), options.inputs.end(), name) != options.inputs.end())
+                          given.records.front(), list_names(read_csv_columns(given.records.front()))));
+    if (!given.inputs.empty()) given.wanted.inputs = split_names("--inputs", given.inputs);
+    given.wanted.outputs = split_names("--outputs", given.outputs);
+    for (const std::string& name : given.wanted.outputs)
+        if (std::find(given.wanted.inputs.begin(), given.wanted.inputs.end(), name) != given.wanted.inputs.end())
             usage(fmt::format("\"{}\" stands in --inputs and in --outputs, expected a column to be one of them",
                               printable(name)));
-    if (options.inputs.size() + options.outputs.size() > 256)
-        usage(fmt::format("{} channels were chosen, at most 256 can be identified together",
-                          options.inputs.size() + options.outputs.size()));
-}
-
-/// One kind for each output.
-std::vector<int> check_sensing(const std::string& sensing, std::size_t outputs) {
-    std::vector<std::string> kinds;
-    for (std::size_t at = 0; at <= sensing.size();) {
-        const std::size_t comma = std::min(sensing.find(',', at), sensing.size());
-        kinds.push_back(sensing.substr(at, comma - at));
-        at = comma + 1;
-    }
-    for (const std::string& kind : kinds) one_of("--sensing", kind, {"acceleration", "velocity", "displacement"});
-    if (kinds.size() != 1 && kinds.size() != outputs)
-        usage(fmt::format("--sensing: found {} kinds for {} outputs, expected one for all or one for each",
-                          kinds.size(), outputs));
-    std::vector<int> out;
-    for (std::size_t i = 0; i < outputs; ++i) out.push_back(sensing_of(kinds[kinds.size() == 1 ? 0 : i]));
-    return out;
-}
-
-/// The degrees of freedom of the channels, when any are given.
-mass_plan check_dofs(const identify_arguments& given, const record_options& options, const std::vector<int>& sensing) {
-    mass_plan plan;
-    if (given.input_dofs.empty() && given.output_dofs.empty()) return plan;
-    for (const auto& [option, other, list] : {std::tuple{"--input-dofs", "--output-dofs", &given.input_dofs},
-                                              std::tuple{"--output-dofs", "--input-dofs", &given.output_dofs}})
-        if (list->empty()) usage(fmt::format("{} is missing: {} is given, M, K and R need both", option, other));
-    for (const std::string& name : options.inputs) plan.inputs.emplace_back().name = name;
-    for (const std::string& name : options.outputs) plan.outputs.emplace_back().name = name;
-    for (std::size_t i = 0; i < sensing.size(); ++i) plan.outputs[i].sensing = sensing[i];
-    plan.hold = options.hold;
-    read_dofs("--input-dofs", given.input_dofs, "input", plan.inputs);
-    read_dofs("--output-dofs", given.output_dofs, "output", plan.outputs);
-    if (const std::string fault = plan_fault(plan); !fault.empty())
-        usage(fmt::format("--input-dofs, --output-dofs: {}", fault));
-    return plan;
-}
-
-record_options check_options(const identify_arguments& given) {
-    record_options options;
-    one_of("--method", given.method, method_names());
-    one_of("--hankel", given.hankel, hankel_names());
-    check_refine(given);
-    one_of("--hold", given.hold, {"zoh", "foh"});
-    one_of("--detrend", given.detrend, {"none", "mean", "linear"});
-    one_of("--start", given.start, {"moving", "rest"});
-    options.p_given = !given.p.empty();
-    if (options.p_given) options.p = static_cast<int>(whole_number("--p", given.p, 1, 4096));
-    if (!given.rows.empty()) options.rows = static_cast<int>(whole_number("--rows", given.rows, 2, 100000));
-    if (given.order != "auto") {
-        if (given.order.empty() || given.order[0] < '0' || given.order[0] > '9')
-            usage(fmt::format("--order: found \"{}\", expected a whole number or auto", printable(given.order)));
-        options.order = static_cast<int>(whole_number("--order", given.order, 1, 10000));
-    }
-    if (!given.sigma_blocks.empty())
-        options.sigma_blocks = static_cast<int>(whole_number("--sigma-blocks", given.sigma_blocks, 0, most_blocks));
-    if (options.sigma_blocks > 0 && options.sigma_blocks < fewest_blocks)
-        usage(fmt::format("--sigma-blocks: found {}, expected 0 (no standard deviations) or {} to {}",
-                          options.sigma_blocks, fewest_blocks, most_blocks));
-    options.stabilization = given.stabilization;
-    options.method = given.method;
-    options.hankel = given.hankel;
-    options.refine = given.refine;
-    options.hold = given.hold;
-    options.detrend = given.detrend;
-    options.start = given.start;
-    choose_channels(given, options);
-    if (const std::string fault = hankel_fault(given.hankel, given.method, options.inputs.size()); !fault.empty())
-        usage("--hankel: " + fault);
-    options.mass = check_dofs(given, options, check_sensing(given.sensing, options.outputs.size()));
-    return options;
-}
-
-std::optional<double> check_rate(const std::string& text) {
-    if (text.empty()) return std::nullopt;
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || !(value > 0) || !std::isfinite(value))
-        usage(fmt::format("--fs: found \"{}\", expected a sample rate in Hz above 0", printable(text)));
-    return value;
 }
 
 /// First and one past the last sample of `--range a:b`; either may be left out.
@@ -178,23 +72,24 @@ void check_targets(const identify_arguments& given) {
         usage(fmt::format("--json and --model both name {}, expected two files", given.json));
 }
 
-std::vector<record_data> read_records(const identify_arguments& given, record_options& options, progress& display) {
+record_set read_records(const identify_arguments& given, record_options& options, progress& display) {
     csv_request request;
     request.columns = options.inputs;
     request.columns.insert(request.columns.end(), options.outputs.begin(), options.outputs.end());
-    request.fs_hz = check_rate(given.fs);
-    std::vector<record_data> records;
+    if (!given.wanted.fs.empty()) request.fs_hz = check_rate(given.wanted.fs);
+    record_set set;
+    set.n_u = options.inputs.size();
+    set.n_y = options.outputs.size();
     std::vector<std::string> units;
     for (const std::string& path : given.records) {
         request.progress = [&](double megabytes) {
             display.stage(fmt::format("reading {}, {:.0f} MB", path, megabytes));
         };
-        const csv_record record = read_csv(path, request);
-        if (records.empty()) {
+        csv_record record = read_csv(path, request);
+        if (set.records.empty()) {
             options.fs_hz = record.fs_hz;
             units = record.units;
-            remark_exchanged(units, options, options.said);
-            if (options.mass.wanted()) take_units(units, options.mass, options.said);
+            take_record_units(units, options);
         }
         if (request.fs_hz && record.said_fs_hz && std::abs(*record.said_fs_hz / *request.fs_hz - 1) > 1e-9)
             options.said.emplace_back("fs_overrides_file",
@@ -209,24 +104,14 @@ std::vector<record_data> read_records(const identify_arguments& given, record_op
                 "{}: found a sample rate of {} Hz, expected {} Hz as in {}: only records of one rate can be merged",
                 path, record.fs_hz, options.fs_hz, given.records.front()));
         const auto [first, last] = check_range(given.range, record);
-        records.push_back(split_record(record, options.inputs.size(), first, last));
+        set.add(path, std::move(record.samples), first, last);
     }
-    return records;
+    return set;
 }
 
-/// One key a line, so that a person can look into it; matrices stay compact.
-std::string result_text(const nlohmann::ordered_json& result) {
-    std::string out = "{\n";
-    std::size_t left = result.size();
-    for (const auto& [key, value] : result.items())
-        out += fmt::format("\"{}\":{}{}\n", key,
-                           value.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace),
-                           --left ? "," : "");
-    return out + "}\n";
-}
-
-void identify(const identify_arguments& given) {
-    record_options options = check_options(given);
+void identify(identify_arguments given) {
+    choose_columns(given);
+    record_options options = check_request(given.wanted);
     check_targets(given);
     record_result result;
     {
@@ -234,10 +119,11 @@ void identify(const identify_arguments& given) {
         options.stage = [&](const char* stage) { display.stage(stage); };
         result = identify_records(read_records(given, options, display), options);
     }
-    if (!given.model.empty()) write_whole_file(given.model, mat_file(result.model));
-    if (!given.json.empty()) write_whole_file(given.json, result_text(result_json(result.model, result.context)));
+    const okid_identified_t& model = result.model.view();
+    if (!given.model.empty()) write_whole_file(given.model, mat_file(model));
+    if (!given.json.empty()) write_whole_file(given.json, result_text(result_json(model, result.context)));
     if (given.json != "-" && given.model != "-" && !given.quiet)
-        write_whole_file("-", result_table(result.model, result.context));
+        write_whole_file("-", result_table(model, result.context));
 }
 
 } // namespace
@@ -251,51 +137,53 @@ void add_identify(CLI::App& app) {
     command->add_option("--inputs", given->inputs, "force columns, with commas between; none = ambient: modes only")
         ->type_name("NAMES");
     command->add_option("--outputs", given->outputs, "response columns, with commas between")->type_name("NAMES");
-    command->add_option("--fs", given->fs, "sample rate; default: what the file says")->type_name("HZ");
-    command->add_option("--method", given->method, "how the model is found (default okid-era)")
+    command->add_option("--fs", given->wanted.fs, "sample rate; default: what the file says")->type_name("HZ");
+    command->add_option("--method", given->wanted.method, "how the model is found (default okid-era)")
         ->type_name(fmt::format("{}", fmt::join(method_names(), "|")));
-    command->add_option("--p", given->p, "observer order in samples (default 40; not for n4sid)")->type_name("N");
+    command->add_option("--p", given->wanted.p, "observer order in samples (default 40; not for n4sid)")
+        ->type_name("N");
     command
-        ->add_option("--rows", given->rows,
+        ->add_option("--rows", given->wanted.rows,
                      "block rows of the Hankel matrix (default 2 p, n4sid 30, okid without inputs p)")
         ->type_name("N");
     command
-        ->add_option("--hankel", given->hankel,
+        ->add_option("--hankel", given->wanted.hankel,
                      "what the Hankel matrix of the okid methods holds: system (default), innovations (those too, "
                      "weighted: free of units) or literal (eq. 42 as printed, for comparison only)")
         ->type_name(fmt::format("{}", fmt::join(hankel_names(), "|")));
-    command->add_option("--order", given->order, "number of states, or auto (default)")->type_name("N|auto");
-    command->add_option("--hold", given->hold, "force between samples: held (zoh, default) or linear (foh)")
+    command->add_option("--order", given->wanted.order, "number of states, or auto (default)")->type_name("N|auto");
+    command->add_option("--max-order", given->wanted.max_order, "largest order that auto may choose")->type_name("N");
+    command->add_option("--hold", given->wanted.hold, "force between samples: held (zoh, default) or linear (foh)")
         ->type_name("zoh|foh");
-    command->add_option("--detrend", given->detrend, "what is taken out of every channel first (default mean)")
+    command->add_option("--detrend", given->wanted.detrend, "what is taken out of every channel first (default mean)")
         ->type_name("none|mean|linear");
     command
         ->add_option(
-            "--start", given->start,
+            "--start", given->wanted.start,
             "moving (default): nothing is known before the record; rest: every record begins with the structure "
             "at rest, as a hammer test with a short pre-trigger does")
         ->type_name("moving|rest");
     command
-        ->add_option("--sensing", given->sensing,
+        ->add_option("--sensing", given->wanted.sensing,
                      "what the outputs measure (default acceleration): one kind, or one per output with commas between")
         ->type_name("acceleration|velocity|displacement");
     command
-        ->add_option("--input-dofs", given->input_dofs,
+        ->add_option("--input-dofs", given->wanted.input_dofs,
                      "where each force acts: numbers of degrees of freedom from 1 (-3: at 3, polarity reversed). With "
                      "--output-dofs: mass, stiffness and damping matrices")
         ->type_name("LIST");
     command
-        ->add_option("--output-dofs", given->output_dofs,
+        ->add_option("--output-dofs", given->wanted.output_dofs,
                      "where each sensor stands; every degree of freedom needs a force or a sensor, one needs both")
         ->type_name("LIST");
-    command->add_flag("--refine", given->refine,
+    command->add_flag("--refine", given->wanted.refine,
                       "improve the model by maximum likelihood: with noise at the sensors nothing can be more exact. "
                       "Needs --inputs");
     command->add_flag(
-        "--stabilization", given->stabilization,
+        "--stabilization", given->wanted.stabilization,
         "look at all orders and three horizons too, and list the modes that hold (JSON: \"stabilization\")");
     command
-        ->add_option("--sigma-blocks", given->sigma_blocks,
+        ->add_option("--sigma-blocks", given->wanted.sigma_blocks,
                      "blocks of the record left out in turn for the standard deviations (default 20), 0 = none")
         ->type_name("N");
     command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")

@@ -9,10 +9,12 @@ namespace {
 
 /// A fixed buffer: telling of a failed allocation must not allocate.
 thread_local char last_error[8192];
+thread_local int last_status = 0;
 
 } // namespace
 
-int keep_error(int code, const char* text) noexcept {
+int keep_error(int code, const char* text, int status) noexcept {
+    last_status = status;
     std::size_t n = 0;
     while (text[n] != '\0' && n + 1 < sizeof last_error) ++n;
     for (std::size_t i = 0; i < n; ++i) last_error[i] = text[i];
@@ -27,3 +29,5 @@ int keep_error(int code, const char* text) noexcept {
 int32_t okid_host_abi(void) { return OKID_HOST_ABI; }
 
 const char* okid_host_error(void) { return okid_host::face::last_error; }
+
+int32_t okid_host_error_status(void) { return okid_host::face::last_status; }

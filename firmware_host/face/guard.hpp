@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  the border between C++ and the C face: exceptions become exit codes and a sentence
 #pragma once
+#include "argument_words.hpp"
 #include "error.hpp"
 
 #include <exception>
@@ -9,8 +10,8 @@
 
 namespace okid_host::face {
 
-/// Keeps what okid_host_error() gives to this thread. @return `code`
-int keep_error(int code, const char* text) noexcept;
+/// Keeps what okid_host_error() and okid_host_error_status() give to this thread. @return `code`
+int keep_error(int code, const char* text, int status = 0) noexcept;
 
 /// Runs `work()`; 0, or the exit code of what it threw.
 template <class Work> int guard(Work&& work) noexcept {
@@ -18,7 +19,7 @@ template <class Work> int guard(Work&& work) noexcept {
         work();
         return exit_ok;
     } catch (const failure& error) {
-        return keep_error(error.code, error.what());
+        return keep_error(error.code, argument_words(error.what()).c_str(), error.status);
     } catch (const std::bad_alloc&) {
         return keep_error(exit_device, "out of memory");
     } catch (const std::exception& error) {

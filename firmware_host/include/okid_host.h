@@ -42,8 +42,13 @@ OKID_HOST_API int32_t okid_host_abi(void);
 /** What the last failed call of this thread has to say: one or more lines of UTF-8, "" before the first failure. */
 OKID_HOST_API const char* okid_host_error(void);
 
+/// okid_status_t behind that failure where the kernels found it (okid/types.h), else 0.
+OKID_HOST_API int32_t okid_host_error_status(void);
+
 #ifdef __cplusplus
 }
 #endif
+
+#include <okid_host/record.h>
 
 #endif

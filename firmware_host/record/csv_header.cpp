@@ -185,15 +185,11 @@ std::vector<std::string> split_names(const std::string& option, const std::strin
     bool open_quote = false;
     std::vector<std::string> names = split_quoted(list, ',', open_quote);
     if (open_quote) throw failure(exit_usage, fmt::format("{}: a quoted name has no closing quote", option));
-    std::unordered_set<std::string> seen;
-    for (const std::string& name : names) {
+    for (const std::string& name : names)
         if (name.empty())
             throw failure(exit_usage,
                           fmt::format("{}: found an empty name in \"{}\", expected names with commas between", option,
                                       printable(list, 80)));
-        if (!seen.insert(name).second)
-            throw failure(exit_usage, fmt::format("{}: the name \"{}\" stands twice", option, printable(name)));
-    }
     return names;
 }
 

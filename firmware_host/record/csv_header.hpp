@@ -30,7 +30,7 @@ std::size_t find_csv_column(const std::string& path, const csv_header& header, c
 /// "g" of `acc1 [g]`, `acc1 (g)` and `acc1_g`; "" when the name carries no known unit.
 std::string unit_of_name(const std::string& name);
 
-/// The names of an option, `a,b,"c,d"`; throws on an empty or repeated one.
+/// The names of an option, `a,b,"c,d"`; throws on an empty one.
 std::vector<std::string> split_names(const std::string& option, const std::string& list);
 
 } // namespace okid_host

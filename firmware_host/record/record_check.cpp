@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// PURPOSE  refuses records no honest model can come from, and says what looks wrong about the others
 #include "record_check.hpp"
 
 #include "config/units.hpp"
@@ -13,25 +14,32 @@ namespace okid_host {
 namespace {
 
 struct channel_range {
-    double low = INFINITY, high = -INFINITY, largest = 0;
+    double low = INFINITY, high = -INFINITY;
 };
 
-channel_range range_of(const std::vector<double>& samples, std::size_t channels, std::size_t channel,
-                       channel_range out) {
-    for (std::size_t i = channel; i < samples.size(); i += channels) {
-        if (std::isnan(samples[i])) continue;
-        out.low = std::min(out.low, samples[i]);
-        out.high = std::max(out.high, samples[i]);
-        out.largest = std::max(out.largest, std::abs(samples[i]));
+channel_range range_of(const record_set& set, std::size_t channel) {
+    channel_range out;
+    for (std::size_t i = channel; i < set.samples.size(); i += set.channels()) {
+        if (std::isnan(set.samples[i])) continue;
+        out.low = std::min(out.low, set.samples[i]);
+        out.high = std::max(out.high, set.samples[i]);
     }
     return out;
 }
 
+const std::string& name_of(std::size_t channel, const record_options& options) {
+    const std::size_t n_u = options.inputs.size();
+    return channel < n_u ? options.inputs[channel] : options.outputs[channel - n_u];
+}
+
 /// Correlation of the inputs over all samples that have them all; each record about its own mean.
-Eigen::MatrixXd input_correlation(const std::vector<record_data>& records, Eigen::Index n_u) {
+Eigen::MatrixXd input_correlation(const record_set& set) {
+    using inputs = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+    const auto n_u = static_cast<Eigen::Index>(set.n_u);
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(n_u, n_u);
-    for (const record_data& record : records) {
-        const Eigen::Map<const Eigen::MatrixXd> u(record.u.data(), n_u, static_cast<Eigen::Index>(record.count));
+    for (const record_data& record : set.records) {
+        const inputs u(set.rows(record), n_u, static_cast<Eigen::Index>(record.count),
+                       Eigen::OuterStride<>(static_cast<Eigen::Index>(set.channels())));
         Eigen::VectorXd mean = Eigen::VectorXd::Zero(n_u), centred(n_u);
         double present = 0;
         for (Eigen::Index n = 0; n < u.cols(); ++n)
@@ -49,64 +57,48 @@ Eigen::MatrixXd input_correlation(const std::vector<record_data>& records, Eigen
 
 } // namespace
 
-missing_count count_missing(const std::vector<record_data>& records, std::size_t n_u, std::size_t n_y) {
-    missing_count out;
-    for (const record_data& record : records) {
-        bool in_gap = false;
-        for (std::size_t n = 0; n < record.count; ++n) {
-            const auto nan = [](double x) { return std::isnan(x); };
-            const bool gone = std::any_of(record.u.data() + n * n_u, record.u.data() + (n + 1) * n_u, nan) ||
-                              std::any_of(&record.y[n * n_y], &record.y[n * n_y] + n_y, nan);
-            out.samples += gone;
-            out.gaps += gone && !in_gap;
-            in_gap = gone;
-        }
+void check_moving(const record_set& set, const record_options& options) {
+    for (std::size_t k = 0; k < set.channels(); ++k) {
+        const channel_range range = range_of(set, k);
+        if (range.high > range.low) continue;
+        const bool input = k < set.n_u;
+        if (range.low > range.high)
+            throw failure(exit_no_model, fmt::format("no model: {} \"{}\" has no sample in the range used",
+                                                     input ? "input" : "output", name_of(k, options)));
+        throw failure(
+            exit_no_model,
+            fmt::format("no model: {} \"{}\" is constant ({:g}): it {}. Leave it out of --{}, or check the {} "
+                        "and its wiring",
+                        input ? "input" : "output", name_of(k, options), range.low,
+                        input ? "excites nothing" : "measures nothing", input ? "inputs" : "outputs",
+                        input ? "force sensor" : "sensor"),
+            input ? OKID_ERR_INPUT : OKID_ERR_OUTPUT);
     }
+}
+
+std::vector<double> largest_of(const record_set& set, const record_data& record) {
+    std::vector<double> out(set.channels());
+    const double* x = set.rows(record);
+    for (std::size_t i = 0; i < record.count; ++i)
+        for (double& largest : out) largest = std::fmax(largest, std::abs(*x++)); // of NaN and a number: the number
     return out;
 }
 
-void check_moving(const std::vector<record_data>& records, const record_options& options) {
-    const auto check = [&](const std::vector<double> record_data::* side, const std::vector<std::string>& names,
-                           bool input) {
-        for (std::size_t k = 0; k < names.size(); ++k) {
-            channel_range range;
-            for (const record_data& record : records) range = range_of(record.*side, names.size(), k, range);
-            if (range.high > range.low) continue;
-            if (range.low > range.high)
-                throw failure(exit_no_model, fmt::format("no model: {} \"{}\" has no sample in the range used",
-                                                         input ? "input" : "output", names[k]));
-            throw failure(exit_no_model, fmt::format("no model: {} \"{}\" is constant ({:g}): it {}. Leave it out of "
-                                                     "--{}, or check the {} and its wiring",
-                                                     input ? "input" : "output", names[k], range.low,
-                                                     input ? "excites nothing" : "measures nothing",
-                                                     input ? "inputs" : "outputs", input ? "force sensor" : "sensor"));
-        }
-    };
-    check(&record_data::u, options.inputs, true);
-    check(&record_data::y, options.outputs, false);
+void check_not_a_line(const record_set& set, const record_data& record, const std::vector<double>& before,
+                      const record_options& options) {
+    const std::vector<double> left = largest_of(set, record);
+    for (std::size_t k = 0; k < left.size(); ++k)
+        if (before[k] > 0 && left[k] <= 1e-12 * before[k])
+            throw failure(exit_no_model,
+                          fmt::format("no model: {}: {} \"{}\" is a straight line, nothing is left of it after "
+                                      "--detrend linear",
+                                      record.path, k < set.n_u ? "input" : "output", name_of(k, options)));
 }
 
-void check_not_a_line(const record_data& record, const record_data& before, const record_options& options) {
-    const auto check = [&](const std::vector<double> record_data::* side, const std::vector<std::string>& names,
-                           const char* kind) {
-        for (std::size_t k = 0; k < names.size(); ++k) {
-            const double left = range_of(record.*side, names.size(), k, {}).largest;
-            const double scale = range_of(before.*side, names.size(), k, {}).largest;
-            if (scale > 0 && left <= 1e-12 * scale)
-                throw failure(exit_no_model,
-                              fmt::format("no model: {}: {} \"{}\" is a straight line, nothing is left of it after "
-                                          "--detrend linear",
-                                          record.path, kind, names[k]));
-        }
-    };
-    check(&record_data::u, options.inputs, "input");
-    check(&record_data::y, options.outputs, "output");
-}
-
-void check_different_inputs(const std::vector<record_data>& records, const record_options& options) {
+void check_different_inputs(const record_set& set, const record_options& options) {
     const auto n_u = static_cast<Eigen::Index>(options.inputs.size());
     if (n_u == 0) return;
-    Eigen::MatrixXd left = input_correlation(records, n_u);
+    Eigen::MatrixXd left = input_correlation(set);
     for (Eigen::Index k = 0; k < n_u; ++k) { // what is left of an input after the earlier ones explain what they can
         if (left(k, k) < 1e-10)
             throw failure(exit_no_model, fmt::format("no model: not enough excitation: input \"{}\" repeats {} and "
@@ -170,20 +162,21 @@ void remark_exchanged(const std::vector<std::string>& units, const record_option
     }
 }
 
-void remark_early_hit(const std::vector<record_data>& records, int n_u, int p, result_context& context) {
-    const auto inputs = static_cast<std::size_t>(n_u);
+void remark_early_hit(const record_set& set, int p, result_context& context) {
     double early = 0, total = 0;
-    for (const record_data& record : records)
-        for (std::size_t k = 0; k < inputs; ++k) {
-            std::vector<double> values;
-            for (std::size_t i = k; i < record.u.size(); i += inputs)
-                if (!std::isnan(record.u[i])) values.push_back(record.u[i]);
+    std::vector<double> values;
+    for (const record_data& record : set.records)
+        for (std::size_t k = 0; k < set.n_u; ++k) {
+            const double* u = set.rows(record) + k;
+            values.clear();
+            for (std::size_t i = 0; i < record.count; ++i)
+                if (!std::isnan(u[i * set.channels()])) values.push_back(u[i * set.channels()]);
             if (values.empty()) continue;
             const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
             std::nth_element(values.begin(), middle, values.end());
             const double quiet = *middle;
             for (std::size_t i = 0; i < record.count; ++i) {
-                const double x = record.u[i * inputs + k] - quiet;
+                const double x = u[i * set.channels()] - quiet;
                 if (std::isnan(x)) continue;
                 total += x * x;
                 if (i < static_cast<std::size_t>(p)) early += x * x;

@@ -5,19 +5,19 @@
 
 namespace okid_host {
 
-struct missing_count {
-    long long samples = 0, gaps = 0; ///< samples with any channel missing, and the runs they form
-};
-missing_count count_missing(const std::vector<record_data>& records, std::size_t n_u, std::size_t n_y);
-
 /// A channel that never moves makes any model a guess.
-void check_moving(const std::vector<record_data>& records, const record_options& options);
+void check_moving(const record_set& set, const record_options& options);
 
 /// Inputs that repeat each other share their effect in any proportion.
-void check_different_inputs(const std::vector<record_data>& records, const record_options& options);
+void check_different_inputs(const record_set& set, const record_options& options);
+
+/// Largest magnitude in each channel of a record.
+std::vector<double> largest_of(const record_set& set, const record_data& record);
 
 /// A straight line is removed by --detrend linear and leaves rounding noise only; that is no excitation either.
-void check_not_a_line(const record_data& record, const record_data& before, const record_options& options);
+/// @param before  largest_of() the record as it was
+void check_not_a_line(const record_set& set, const record_data& record, const std::vector<double>& before,
+                      const record_options& options);
 
 /// A model that neither simulates nor predicts a twentieth of any output says nothing about the structure.
 void check_explains(const result_context& context);
@@ -29,6 +29,6 @@ void remark_low_fit(const std::vector<double>& percent, bool simulated, result_c
 void remark_exchanged(const std::vector<std::string>& units, const record_options& options, remarks& said);
 
 /// A hit within the first p samples of every record serves as history only, and is lost: adds the remark hit_at_start.
-void remark_early_hit(const std::vector<record_data>& records, int n_u, int p, result_context& context);
+void remark_early_hit(const record_set& set, int p, result_context& context);
 
 } // namespace okid_host

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// PURPOSE  how well a model reproduces the records it came from
+// METHOD   records are cut where an input is missing; each stretch has its own least-squares initial state
 #include "record_fit.hpp"
 
 #include "error.hpp"
@@ -56,37 +58,49 @@ struct fit_run {
     std::vector<double> work;
     std::vector<output_sums> simulated, predicted;
 
+    fit_run(const okid_model_t& of, double spectral_radius, bool with_prediction)
+        : model(of), radius(spectral_radius), predict(with_prediction), work(okid_model_workspace(&of)),
+          simulated(static_cast<std::size_t>(of.n_y)), predicted(static_cast<std::size_t>(of.n_y)) {}
+
     /// One stretch from its own least-squares initial state, which is returned.
-    std::vector<double> add(const record_data& record, const stretch& piece) {
-        const auto n_u = static_cast<std::size_t>(model.n_u), n_y = static_cast<std::size_t>(model.n_y);
-        const double *u = &record.u[piece.first * n_u], *y = &record.y[piece.first * n_y];
-        std::vector<double> x0(static_cast<std::size_t>(model.n_z)), estimate(piece.count * n_y);
+    std::vector<double> add(const record_set& set, const record_data& record, const stretch& piece) {
+        const double* row = set.rows(record) + piece.first * set.channels();
+        u_.clear(), y_.clear();
+        for (std::size_t i = 0; i < piece.count; ++i, row += set.channels()) {
+            u_.insert(u_.end(), row, row + set.n_u);
+            y_.insert(y_.end(), row + set.n_u, row + set.channels());
+        }
+        const double *u = u_.data(), *y = y_.data();
+        std::vector<double> x0(static_cast<std::size_t>(model.n_z)), estimate(piece.count * set.n_y);
         const std::size_t used = initial_state_samples(radius, piece.count);
         if (okid_model_initial_state(&model, u, y, used, x0.data(), work.data()) < 0)
             std::fill(x0.begin(), x0.end(), 0.0);
         if (okid_model_simulate(&model, u, piece.count, x0.data(), estimate.data(), work.data()) < 0)
             throw failure(exit_no_model,
                           fmt::format("{}: the model cannot be simulated over this record", record.path));
-        pool(y, estimate, n_y, simulated);
+        pool(y, estimate, set.n_y, simulated);
         if (predict) {
             if (okid_model_predict(&model, u, y, piece.count, x0.data(), estimate.data(), work.data()) < 0)
                 std::fill(estimate.begin(), estimate.end(), std::numeric_limits<double>::quiet_NaN());
-            pool(y, estimate, n_y, predicted);
+            pool(y, estimate, set.n_y, predicted);
         }
         return x0;
     }
+
+  private:
+    std::vector<double> u_, y_; // of the stretch
 };
 
 /// Without inputs there is nothing to simulate: prediction from rest.
-void fit_ambient(const std::vector<record_data>& records, fit_run& run, result_context& context) {
+void fit_ambient(const record_set& set, fit_run& run, result_context& context) {
     const std::vector<double> rest(static_cast<std::size_t>(run.model.n_z));
-    for (const record_data& record : records) {
+    for (const record_data& record : set.records) {
         if (!run.predict) break;
-        std::vector<double> estimate(record.y.size());
-        if (okid_model_predict(&run.model, record.y.data(), record.y.data(), record.count, rest.data(), estimate.data(),
-                               run.work.data()) < 0)
+        const double* y = set.rows(record);
+        std::vector<double> estimate(record.count * set.n_y);
+        if (okid_model_predict(&run.model, y, y, record.count, rest.data(), estimate.data(), run.work.data()) < 0)
             std::fill(estimate.begin(), estimate.end(), std::numeric_limits<double>::quiet_NaN());
-        pool(record.y.data(), estimate, static_cast<std::size_t>(run.model.n_y), run.predicted);
+        pool(y, estimate, set.n_y, run.predicted);
     }
     context.prediction_percent =
         run.predict ? percent(run.predicted)
@@ -95,47 +109,39 @@ void fit_ambient(const std::vector<record_data>& records, fit_run& run, result_c
 
 } // namespace
 
-std::vector<stretch> stretches_of(const record_data& record, std::size_t n_u, std::size_t least) {
+std::vector<stretch> stretches_of(const record_set& set, const record_data& record, std::size_t least) {
     std::vector<stretch> out;
     std::size_t first = 0;
     for (std::size_t i = 0; i <= record.count; ++i) {
-        bool present = i < record.count;
-        for (std::size_t k = 0; present && k < n_u; ++k) present = !std::isnan(record.u[i * n_u + k]);
-        if (present) continue;
+        const double* u = set.rows(record) + i * set.channels();
+        if (i < record.count && std::none_of(u, u + set.n_u, [](double x) { return std::isnan(x); })) continue;
         if (i - first >= least || (first == 0 && i == record.count)) out.push_back({first, i - first});
         first = i + 1;
     }
     return out;
 }
 
-void fit_records(const std::vector<record_data>& records, record_result& result) {
-    const okid_identified_t& found = result.model;
+void fit_records(const record_set& set, const okid_identified_t& found, result_context& context) {
     const okid_model_t model{found.n_u, found.n_y, found.n_z, found.A, found.B, found.C, found.D, found.K};
-    const auto n_y = static_cast<std::size_t>(found.n_y);
     const bool predict = found.K && !(found.warnings & OKID_NOTE_PREDICTOR_UNSTABLE);
-    fit_run run{model,
-                found.model_radius,
-                predict,
-                std::vector<double>(okid_model_workspace(&model)),
-                std::vector<output_sums>(n_y),
-                std::vector<output_sums>(n_y)};
-    if (found.n_u == 0) return fit_ambient(records, run, result.context);
+    fit_run run(model, found.model_radius, predict);
+    if (found.n_u == 0) return fit_ambient(set, run, context);
     const std::size_t least = std::max<std::size_t>(20, 2 * static_cast<std::size_t>(found.n_z));
     std::vector<std::vector<double>> states;
-    for (const record_data& record : records) {
+    for (const record_data& record : set.records) {
         std::vector<double> first(static_cast<std::size_t>(found.n_z), 0.0);
         bool begun = false;
-        for (const stretch& piece : stretches_of(record, static_cast<std::size_t>(found.n_u), least)) {
-            const std::vector<double> x0 = run.add(record, piece);
+        for (const stretch& piece : stretches_of(set, record, least)) {
+            const std::vector<double> x0 = run.add(set, record, piece);
             if (!begun) first = x0;
             begun = true;
         }
         states.push_back(std::move(first));
     }
-    result.context.x0 = std::move(states);
-    result.context.simulation_percent = percent(run.simulated);
-    result.context.prediction_percent =
-        predict ? percent(run.predicted) : std::vector<double>(n_y, std::numeric_limits<double>::quiet_NaN());
+    context.x0 = std::move(states);
+    context.simulation_percent = percent(run.simulated);
+    context.prediction_percent =
+        predict ? percent(run.predicted) : std::vector<double>(set.n_y, std::numeric_limits<double>::quiet_NaN());
 }
 
 } // namespace okid_host

@@ -12,10 +12,10 @@ struct stretch {
 
 /// What a missing force did is not known: the record is cut there. Stretches of less than `least` samples, too short to
 /// tell their initial state from the noise, are left out; a record without missing inputs is one stretch.
-std::vector<stretch> stretches_of(const record_data& record, std::size_t n_u, std::size_t least);
+std::vector<stretch> stretches_of(const record_set& set, const record_data& record, std::size_t least);
 
-/// Fill x0, simulation_percent and prediction_percent of result.context. The records are in the model's own terms
+/// Fill x0, simulation_percent and prediction_percent of the context. The records are in the model's own terms
 /// (detrended); missing inputs are taken as 0. Without inputs: prediction_percent only.
-void fit_records(const std::vector<record_data>& records, record_result& result);
+void fit_records(const record_set& set, const okid_identified_t& model, result_context& context);
 
 } // namespace okid_host

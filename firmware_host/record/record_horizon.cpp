@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// PURPOSE  how far back a method may look in the records there are
 #include "record_horizon.hpp"
 
 #include "error.hpp"
@@ -10,26 +11,6 @@
 
 namespace okid_host {
 namespace {
-
-/// Lengths of the unbroken runs of complete samples.
-std::vector<long long> runs_of(const std::vector<record_data>& records, std::size_t n_u, std::size_t n_y) {
-    std::vector<long long> runs;
-    for (const record_data& record : records) {
-        long long run = 0;
-        for (std::size_t i = 0; i <= record.count; ++i) {
-            bool whole = i < record.count;
-            for (std::size_t k = 0; whole && k < n_u; ++k) whole = !std::isnan(record.u[i * n_u + k]);
-            for (std::size_t k = 0; whole && k < n_y; ++k) whole = !std::isnan(record.y[i * n_y + k]);
-            if (whole) {
-                ++run;
-            } else if (run > 0) {
-                runs.push_back(run);
-                run = 0;
-            }
-        }
-    }
-    return runs;
-}
 
 /// Gaps cost p rows each: the largest p up to `most` whose rows are ten times its unknowns; the best there is otherwise.
 int choose_p_beside_gaps(const std::vector<long long>& runs, int n_u, int n_y, int least, int most) {
@@ -49,7 +30,7 @@ int choose_p_beside_gaps(const std::vector<long long>& runs, int n_u, int n_y, i
 }
 
 /// p for the samples there are.
-int choose_p(const record_options& options, const std::vector<record_data>& records, long long samples, bool gaps,
+int choose_p(const record_options& options, const record_set& set, long long samples, bool gaps,
              result_context& context) {
     const int n_u = static_cast<int>(options.inputs.size()), n_y = static_cast<int>(options.outputs.size());
     const int least_p = n_y >= 2 ? 1 : 2; // p n_y states: two make the first mode
@@ -62,7 +43,7 @@ int choose_p(const record_options& options, const std::vector<record_data>& reco
                                   samples, n_u, n_y, least));
     int p = okid_identify_usable_p(n_u, n_y, options.p, samples);
     if (gaps) {
-        const auto runs = runs_of(records, options.inputs.size(), options.outputs.size());
+        const auto runs = complete_runs(set);
         p = choose_p_beside_gaps(runs, n_u, n_y, std::min(least_p, p), p);
     }
     if (p < options.p)
@@ -75,12 +56,12 @@ int choose_p(const record_options& options, const std::vector<record_data>& reco
 }
 
 /// Block rows of a method without observer: as many as leave ten Hankel columns for each unknown.
-int choose_rows(const record_options& options, const std::vector<record_data>& records, long long samples,
-                okid_identify_config_t config, result_context& context) {
+int choose_rows(const record_options& options, const record_set& set, long long samples, okid_identify_config_t config,
+                result_context& context) {
     const int n_u = config.n_u, n_y = config.n_y;
     const int least = n_y >= 2 ? 2 : 3; // (rows - 1) n_y states: two make the first mode
     const int wanted = rows_used(config.method, options.inputs.size(), options.p, options.rows);
-    const auto runs = runs_of(records, options.inputs.size(), options.outputs.size());
+    const auto runs = complete_runs(set);
     config.fs_hz = options.fs_hz;
     for (int i = std::max(wanted, least); i >= least; --i) {
         config.rows = i;
@@ -103,14 +84,15 @@ int choose_rows(const record_options& options, const std::vector<record_data>& r
 
 } // namespace
 
-void choose_horizon(const record_options& options, const std::vector<record_data>& records, long long samples,
-                    bool gaps, okid_identify_config_t& config, result_context& context) {
+void choose_horizon(const record_options& options, const record_set& set, const missing_count& missing,
+                    okid_identify_config_t& config, result_context& context) {
+    const long long samples = static_cast<long long>(set.count()) - missing.samples;
     if (!looks_back_rows(config.method, options.inputs.size())) {
-        config.p = choose_p(options, records, samples, gaps, context);
+        config.p = choose_p(options, set, samples, missing.samples > 0, context);
         config.rows = options.rows;
         return;
     }
-    config.rows = choose_rows(options, records, samples, config, context);
+    config.rows = choose_rows(options, set, samples, config, context);
     config.p = 0;
     if (options.p_given && (is_subspace(config.method) || options.rows > 0))
         context.warnings.emplace_back("p_ignored",

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// PURPOSE  maximum-likelihood refinement of a model, and the delays of its outputs
+// METHOD   okid/refine.h over the longest driven stretches; the better one of start and refined model stays
 #include "record_refine.hpp"
 
 #include "record_fit.hpp"
@@ -27,10 +29,10 @@ struct driven_runs {
     std::vector<std::int32_t> counts;
     std::vector<double> samples;
 
-    driven_runs(const std::vector<record_data>& records, std::size_t n_u, std::size_t n_y, std::size_t least) {
+    driven_runs(const record_set& set, std::size_t least) {
         std::vector<std::pair<const record_data*, stretch>> all;
-        for (const record_data& record : records)
-            for (const stretch& piece : stretches_of(record, n_u, least)) all.emplace_back(&record, piece);
+        for (const record_data& record : set.records)
+            for (const stretch& piece : stretches_of(set, record, least)) all.emplace_back(&record, piece);
         std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { // longest first, then as they came
             if (a.second.count != b.second.count) return a.second.count > b.second.count;
             return a.first != b.first ? a.first < b.first : a.second.first < b.second.first;
@@ -38,9 +40,8 @@ struct driven_runs {
         all.resize(std::min(all.size(), most_runs));
         for (const auto& [record, piece] : all) {
             counts.push_back(static_cast<std::int32_t>(piece.count));
-            const std::size_t first = samples.size();
-            samples.resize(first + piece.count * (n_u + n_y));
-            interleave(*record, n_u, n_y, piece.first, piece.count, samples.data() + first);
+            const double* rows = set.rows(*record) + piece.first * set.channels();
+            samples.insert(samples.end(), rows, rows + piece.count * set.channels());
         }
     }
 };
@@ -164,17 +165,22 @@ bool make_model(const okid_identified_t& start, const okid_refined_t& found, ref
     return true;
 }
 
+struct record_trial {
+    okid_identified_t model{};
+    result_context context;
+};
+
 /// The fits with the Kalman gain of the start, or with none (the model alone) where that predicts better.
-void choose_gain(const std::vector<record_data>& records, double before, refined_arrays& arrays, record_result& trial) {
+void choose_gain(const record_set& set, double before, refined_arrays& arrays, record_trial& trial) {
     trial.model.warnings &= ~std::uint32_t{OKID_NOTE_PREDICTOR_UNSTABLE};
-    fit_records(records, trial);
+    fit_records(set, trial.model, trial.context);
     const double now = mean_of(trial.context.prediction_percent);
     if (std::isfinite(now) && now >= before - same_percent) return;
     std::vector<double> gain(arrays.K.size(), 0.0);
     std::swap(gain, arrays.K);
     trial.model.K = arrays.K.data();
     const result_context with_gain = trial.context;
-    fit_records(records, trial);
+    fit_records(set, trial.model, trial.context);
     if (mean_of(trial.context.prediction_percent) > now) return;
     std::swap(gain, arrays.K);
     trial.model.K = arrays.K.data();
@@ -210,11 +216,9 @@ refinement report(const okid_refined_t& found, int n_y) {
 
 } // namespace
 
-std::vector<replicate_model> refine_model(const std::vector<record_data>& records, bool constants,
-                                          record_result& result) {
+std::vector<replicate_model> refine_model(bool constants, record_work& result) {
     const okid_identified_t start = result.model;
-    const driven_runs runs(records, size_of(start.n_u), size_of(start.n_y),
-                           std::max<std::size_t>(20, 2 * size_of(start.n_z)));
+    const driven_runs runs(result.set, std::max<std::size_t>(20, 2 * size_of(start.n_z)));
     std::string reason = "it simulates the record worse";
     for (const bool with : {true, false}) {
         if (with && !constants) continue;
@@ -223,11 +227,11 @@ std::vector<replicate_model> refine_model(const std::vector<record_data>& record
             reason = okid_status_text(one.status);
             break;
         }
-        record_result trial;
-        auto arrays = std::make_shared<refined_arrays>();
+        record_trial trial;
+        auto arrays = std::make_unique<refined_arrays>();
         if (!make_model(start, one.found, *arrays, trial.model)) continue;
         const double predicted = mean_of(result.context.prediction_percent);
-        choose_gain(records, predicted, *arrays, trial);
+        choose_gain(result.set, predicted, *arrays, trial);
         if (!(mean_of(trial.context.simulation_percent) >= mean_of(result.context.simulation_percent) - same_percent))
             continue;
         result.model = trial.model;
@@ -246,7 +250,7 @@ std::vector<replicate_model> refine_model(const std::vector<record_data>& record
 }
 
 okid_identified_t without_skew(const std::vector<replicate_model>& replicates, const mass_plan& plan,
-                               record_result& result) {
+                               record_work& result) {
     okid_identified_t model = result.model;
     const mkr_arguments given(plan, model.dt);
     const okid_skew_config_t config{model.n_u, model.n_y, model.n_z, static_cast<std::int32_t>(replicates.size()),

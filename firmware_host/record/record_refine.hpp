@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Maximum-likelihood refinement of a model identified from records in memory (okid/refine.h).
 #pragma once
-#include "record.hpp"
 #include "record_uncertainty.hpp"
+#include "record_work.hpp"
 
 namespace okid_host {
 
@@ -10,12 +10,11 @@ namespace okid_host {
 /// stands there with its fits; else a remark refine_failed. The records are in the model's own terms.
 /// @param constants  the records are less their means or lines: the constants of the outputs are not known exactly
 /// @return models without one of twenty blocks each, of the refined model; none when nothing was refined
-std::vector<replicate_model> refine_model(const std::vector<record_data>& records, bool constants,
-                                          record_result& result);
+std::vector<replicate_model> refine_model(bool constants, record_work& result);
 
 /// The model as M, K and R want it: without the delays of its outputs, where they are known. What is found goes into
 /// result.context, the new C and D into result.refined.
 okid_identified_t without_skew(const std::vector<replicate_model>& replicates, const mass_plan& plan,
-                               record_result& result);
+                               record_work& result);
 
 } // namespace okid_host

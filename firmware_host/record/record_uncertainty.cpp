@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: MIT
+// PURPOSE  standard deviations of what is identified from records in memory
+// METHOD   delete-one-block jackknife over the sums of lagged products (okid/uncertainty.h)
 #include "record_uncertainty.hpp"
+
+#include "record_work.hpp"
 
 #include "error.hpp"
 #include "result/method.hpp"
@@ -42,17 +46,16 @@ std::vector<std::vector<record_piece>> cut(const std::vector<record_data>& recor
 }
 
 /// The pieces, each behind the samples before it; before a record begins there is silence.
-okid_status_t feed(okid_accumulator_t* to, const std::vector<record_data>& records,
-                   const std::vector<record_piece>& pieces, std::size_t lags, std::size_t n_u, std::size_t n_y) {
+okid_status_t feed_pieces(okid_accumulator_t* to, const record_set& set, const std::vector<record_piece>& pieces,
+                          std::size_t lags) {
     okid_accumulator_reset(to);
-    std::vector<double> v;
+    const std::vector<double> silence(lags * set.channels());
     for (const record_piece& piece : pieces) {
-        const std::size_t before = std::min(lags, piece.first), silent = lags - before;
-        const std::size_t count = before + piece.last - piece.first;
-        v.assign((silent + count) * (n_u + n_y), 0.0);
-        interleave(records[piece.record], n_u, n_y, piece.first - before, count, &v[silent * (n_u + n_y)]);
+        const std::size_t before = std::min(lags, piece.first);
+        const double* rows = set.rows(set.records[piece.record]) + (piece.first - before) * set.channels();
         okid_accumulator_gap(to, 0);
-        const okid_status_t status = okid_accumulator_add(to, v.data(), silent + count);
+        okid_status_t status = okid_accumulator_add(to, silence.data(), lags - before);
+        if (status >= 0) status = okid_accumulator_add(to, rows, before + piece.last - piece.first);
         if (status < 0) return status;
     }
     return OKID_OK;
@@ -90,12 +93,10 @@ std::string moved(const okid_identified_t& model, const okid_identified_t& other
 
 } // namespace
 
-std::vector<replicate_model> leave_out_blocks(const std::vector<record_data>& records,
-                                              const okid_identify_config_t& config, bool at_rest,
-                                              okid_accumulator_t* whole, const okid_identified_t& model, int blocks) {
+std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accumulator_t* whole, int blocks) {
     okid_jackknife_config_t shape{};
-    shape.identify = config;
-    shape.identify.order = shape.identify.max_order = model.n_z;
+    shape.identify = work.config;
+    shape.identify.order = shape.identify.max_order = work.model.n_z;
     okid_accumulator_config(whole, &shape.sums);
     const auto lags = static_cast<std::size_t>(shape.sums.lags);
     const std::size_t parts =
@@ -107,11 +108,10 @@ std::vector<replicate_model> leave_out_blocks(const std::vector<record_data>& re
     okid_jackknife_t* jackknife = nullptr;
     if (parts < std::size_t{fewest_blocks} || !part.handle || !block ||
         okid_jackknife_create(&jackknife, &shape, block.get(), bytes) != OKID_OK ||
-        okid_jackknife_begin(jackknife, whole, &model) != OKID_OK)
+        okid_jackknife_begin(jackknife, whole, &work.model) != OKID_OK)
         return out;
-    for (const auto& pieces : cut(records, at_rest ? 0 : lags, parts)) {
-        const auto n_u = static_cast<std::size_t>(config.n_u), n_y = static_cast<std::size_t>(config.n_y);
-        if (feed(part.handle, records, pieces, lags, n_u, n_y) < 0) return {};
+    for (const auto& pieces : cut(work.set.records, work.at_rest ? 0 : lags, parts)) {
+        if (feed_pieces(part.handle, work.set, pieces, lags) < 0) return {};
         if (okid_accumulator_rows(part.handle) == 0) continue;
         okid_model_t found{};
         double share = 0;

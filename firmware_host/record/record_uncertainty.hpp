@@ -28,10 +28,10 @@ struct replicate_model {
     okid_model_t view() const { return {n_u, n_y, n_z, A.data(), B.data(), C.data(), D.data(), nullptr}; }
 };
 
-/// Leave out each of so many equal blocks in turn. `records` are what `whole` was fed with. Empty: too short.
-std::vector<replicate_model> leave_out_blocks(const std::vector<record_data>& records,
-                                              const okid_identify_config_t& config, bool at_rest,
-                                              okid_accumulator_t* whole, const okid_identified_t& model, int blocks);
+struct record_work;
+
+/// Leave out each of so many equal blocks in turn. The records of `work` are what `whole` was fed with. Empty: too short.
+std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accumulator_t* whole, int blocks);
 
 /// Deviations of the modes, and of M, K, R where the plan wants them.
 deviations deviations_of(const okid_identified_t& model, const std::vector<replicate_model>& replicates,

@@ -78,9 +78,10 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
 
 void throw_identify_failure(okid_status_t status, const okid_identified_t& model, const okid_identify_config_t& config,
                             const result_context& context) {
-    for (const auto& [code, text] : context.warnings) // what was adapted to the record is a likely reason
-        if (code == "p_reduced" || code == "rows_reduced") say("okid: warning: {}\n", text);
-    throw failure(exit_no_model, "no model: " + reason(status, model, config, context));
+    std::string text = "no model: " + reason(status, model, config, context);
+    for (const auto& [code, adapted] : context.warnings) // what was adapted to the record is a likely reason
+        if (code == "p_reduced" || code == "rows_reduced") text += fmt::format(" ({})", adapted);
+    throw failure(exit_no_model, text, status);
 }
 
 } // namespace okid_host

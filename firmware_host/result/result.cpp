@@ -57,6 +57,16 @@ ordered_json percent_json(const std::optional<std::vector<double>>& percent, con
     return out;
 }
 
+void put_arrays_json(const okid_identified_t& model, const result_context& context, ordered_json& out) {
+    out["model"] = model_json(model, context);
+    ordered_json blocks = ordered_json::array();
+    const std::ptrdiff_t block = static_cast<std::ptrdiff_t>(model.n_y) * model.n_u;
+    for (int k = 0; k < model.markov_count; ++k)
+        blocks.push_back(matrix_json(model.markov + k * block, model.n_y, model.n_u));
+    out["markov"]["Y"] = std::move(blocks);
+    out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
+}
+
 std::string counted(long long count, const char* noun) {
     return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
 }
@@ -190,7 +200,7 @@ nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviatio
     return out;
 }
 
-nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context) {
+nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context, bool arrays) {
     ordered_json out;
     out["schema"] = "okid.result/1";
     out["version"] = okid_version();
@@ -208,15 +218,9 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["hold"] = context.hold;
     out["detrend"] = context.detrend;
     out["start"] = context.start;
-    out["singular_values"] = vector_json(model.singular_values, model.singular_count);
+    if (arrays) out["singular_values"] = vector_json(model.singular_values, model.singular_count);
     out["singular_noise"] = number_json(model.noise_level);
-    out["model"] = model_json(model, context);
-    ordered_json blocks = ordered_json::array();
-    const std::ptrdiff_t block = static_cast<std::ptrdiff_t>(model.n_y) * model.n_u;
-    for (int k = 0; k < model.markov_count; ++k)
-        blocks.push_back(matrix_json(model.markov + k * block, model.n_y, model.n_u));
-    out["markov"]["Y"] = std::move(blocks);
-    out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
+    if (arrays) put_arrays_json(model, context, out);
     out["fit"]["simulation_percent"] = percent_json(context.simulation_percent, context.outputs);
     out["fit"]["prediction_percent"] = percent_json(context.prediction_percent, context.outputs);
     if (context.stable) out["stabilization"] = stabilization_json(*context.stable);
@@ -227,6 +231,15 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     for (const auto& [code, text] : result_warnings(model, context))
         out["warnings"].push_back(ordered_json{{"code", code}, {"text", text}});
     return out;
+}
+
+std::string result_text(const nlohmann::ordered_json& result) {
+    std::string out = "{\n";
+    std::size_t left = result.size();
+    for (const auto& [key, value] : result.items())
+        out += fmt::format("\"{}\":{}{}\n", key, value.dump(-1, ' ', false, ordered_json::error_handler_t::replace),
+                           --left ? "," : "");
+    return out + "}\n";
 }
 
 std::string result_table(const okid_identified_t& model, const result_context& context) {

@@ -41,8 +41,11 @@ struct result_context {
 /// @param sigma  their standard deviations, or nullptr (null)
 nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma);
 
-/// The whole okid.result/1 object.
-nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context);
+/// The whole okid.result/1 object. @param arrays  false: without singular_values, model, markov and modes
+nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context, bool arrays = true);
+
+/// Its text: one key a line, so that a person can look into it; matrices stay compact.
+std::string result_text(const nlohmann::ordered_json& result);
 
 /// The modal table and the remarks, as text for a person (no escape codes).
 std::string result_table(const okid_identified_t& model, const result_context& context);

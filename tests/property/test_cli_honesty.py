@@ -172,7 +172,7 @@ def test_a_misread_sign_is_no_reversed_polarity(rig: pathlib.Path, tmp_path: pat
 def test_no_model_is_told_with_what_was_adapted_and_what_to_try(tmp_path: pathlib.Path) -> None:
     done = identify(tmp_path, np.random.default_rng(2).standard_normal((200, 4)))
     assert done.returncode == 3
-    assert "okid: warning: p is 4 instead of 40" in done.stderr and "method n4sid-moesp" in done.stderr
+    assert "p is 4 instead of 40" in done.stderr and "method n4sid-moesp" in done.stderr
 
 
 def test_a_free_decay_is_for_the_subspace_methods(tmp_path: pathlib.Path) -> None:

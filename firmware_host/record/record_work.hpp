@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  what the steps of a record identification hand on to each other
+#pragma once
+#include "record.hpp"
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+namespace okid_host {
+
+/// The memory of a refined model.
+struct refined_arrays {
+    std::vector<double> A, B, C, D, K, markov, frequency, damping, mpc, emac, cmi, shape_re, shape_im;
+    std::vector<double> C_without_skew, D_without_skew; ///< where outputs come late
+};
+
+/// Records, configuration and model. The model looks into `memory` (of `identifier`) or, refined, into `refined`.
+struct record_work {
+    record_set set;
+    bool at_rest = false; ///< every record begins with silence
+    okid_identify_config_t config{};
+    okid_identified_t model{};
+    result_context context;
+    std::unique_ptr<std::byte[]> memory;
+    okid_identify_t* identifier = nullptr;
+    std::unique_ptr<refined_arrays> refined;
+};
+
+} // namespace okid_host

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  the options of an identification as a user gave them, and the one place where they are checked
+#pragma once
+#include "record.hpp"
+
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+/// What was asked for, as text; "" = not given.
+struct record_request {
+    std::vector<std::string> inputs, outputs; ///< names of the channels
+    std::string method = "okid-era", hankel = "system", order = "auto", hold = "zoh", detrend = "mean",
+                start = "moving";
+    std::string sensing = "acceleration", input_dofs, output_dofs; ///< lists with commas between
+    std::string fs, p, rows, max_order, sigma_blocks;
+    bool refine = false, stabilization = false;
+};
+
+/// Throws `failure` (exit 2) naming the option, what was found and what was expected. `fs_hz` stays 0.
+record_options check_request(const record_request& given);
+
+/// Of `--fs HZ`.
+double check_rate(const std::string& text);
+
+/// A whole number from low to high.
+long long whole_number(const std::string& option, const std::string& text, long long low, long long high);
+
+/// Remarks on the units of the channels (inputs, then outputs), and what M, K and R make of them.
+void take_record_units(const std::vector<std::string>& units, record_options& options);
+
+} // namespace okid_host
