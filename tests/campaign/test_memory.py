@@ -20,7 +20,7 @@ outputs = ["a1", "a2", "a3", "a4", "a5", "a6"]
 fs_hz = 256.0
 scale = [1e-3]
 [identification]
-p = 40
+p = 10
 order = 6
 stabilization = false
 [group]

@@ -86,10 +86,20 @@ def test_noisy_records(name: str, noise: int) -> None:
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", sorted(HORIZON))
 def test_noise_free_records(name: str, method: str, sensing: str) -> None:
+    """Modes, matrices, Markov parameters and the simulation; without deviations, which are test_uncertainty.py's."""
     s = dataclasses.replace(getattr(systems, name)(), sensing=(sensing,) * len(getattr(systems, name)().M))
     u, y = systems.record(s, 10000, 0.0, 7)
-    found = errors(s, identify(s, u, y, name, method, sensing=sensing))
+    result = identify(s, u, y, name, method, sensing=sensing)
+    found = errors(s, result)
     assert max(found[:4]) < 1e-8 and found[4] < 1e-6, dict(zip(QUANTITIES, found, strict=True))
+    assert min(v or 0.0 for v in result.fit.simulation_percent.values()) > 99.9999
+    A, B, C, D = s.discrete()
+    truth, x = [D], B
+    for _ in range(40):
+        truth.append(C @ x)
+        x = A @ x
+    assert np.linalg.norm(result.markov[:41] - np.array(truth)) < 1e-8 * np.linalg.norm(truth)
+    assert len(result.markov) > 2 * result.rows
 
 
 @pytest.mark.parametrize("method", METHODS)
