@@ -87,7 +87,7 @@ void add_check(CLI::App& app) {
                           "the presets there are");
         const live_config config = load_config(given->config);
         require_identifiable(config);
-        const bool exact = identifier(config).exact(); // its memory is proved here, not in the lab
+        const bool exact = identifier(stream_of(config)).exact(); // its memory is proved here, not in the lab
         write_whole_file(
             "-", given->json
                      ? config_json(config).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"

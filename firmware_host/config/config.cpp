@@ -6,6 +6,7 @@
 #include "config_clock.hpp"
 #include "config_geometry.hpp"
 #include "config_hammer.hpp"
+#include "config_identification.hpp"
 #include "config_line.hpp"
 #include "config_publish.hpp"
 #include "config_realtime.hpp"
@@ -17,8 +18,6 @@
 #include "files/file_kind.hpp"
 #include "nearest_name.hpp"
 #include "presets.hpp"
-#include "result/deviations.hpp"
-#include "result/method.hpp"
 #include "units.hpp"
 
 #include <algorithm>
@@ -243,60 +242,6 @@ void read_channels(const std::string& path, const toml::table& file, const std::
                                       config.n_u + config.n_y));
 }
 
-void read_identification(const std::string& path, const toml::table& file, live_config& config) {
-    identification_config& out = config.identification;
-    const toml::table* table = file["identification"].as_table();
-    if (!table) return;
-    const config_place place{path, "[identification]"};
-    const toml::table& t = *table;
-    out.method = t["method"].value_or(out.method);
-    out.hankel = t["hankel"].value_or(out.hankel);
-    if (const std::string fault = hankel_fault(out.hankel, out.method, config.n_u); !fault.empty())
-        refuse_key(place, *t.get("hankel"), "hankel", fault);
-    out.hold = t["hold"].value_or(out.hold);
-    out.detrend = t["detrend"].value_or(out.detrend);
-    if (out.detrend == "linear")
-        refuse_key(place, *t.get("detrend"), "detrend",
-                   "\"linear\" needs the whole record: none and mean are possible while a stream runs");
-    out.p = static_cast<int>(t["p"].value_or(std::int64_t{out.p}));
-    out.rows = static_cast<int>(t["rows"].value_or(std::int64_t{0}));
-    out.order = static_cast<int>(t["order"].value_or(std::int64_t{0}));
-    out.window_s = t["window_s"].value<double>();
-    out.forgetting = t["forgetting"].value<double>();
-    out.update_s = t["update_s"].value_or(out.update_s);
-    out.sigma_blocks = static_cast<int>(t["sigma_blocks"].value_or(std::int64_t{out.sigma_blocks}));
-    if (out.sigma_blocks > 0 && out.sigma_blocks < fewest_blocks)
-        refuse_key(
-            place, *t.get("sigma_blocks"), "sigma_blocks",
-            fmt::format("found {}, expected 0 (no standard deviations) or {} to 100", out.sigma_blocks, fewest_blocks));
-    if (out.window_s && out.forgetting)
-        refuse_key(place, *t.get("forgetting"), "forgetting",
-                   "window_s is given too; a window and forgetting together are not available, choose one");
-    const okid_method_t method = method_of(out.method);
-    const bool by_rows = looks_back_rows(method, config.n_u);
-    if (by_rows && t.contains("p") && (is_subspace(method) || out.rows > 0))
-        config.warnings.push_back(
-            fmt::format("[identification] p belongs to the observer of the okid methods: {} looks back {} block rows "
-                        "here",
-                        out.method, rows_used(method, config.n_u, out.p, out.rows)));
-    const int least = 2 * (by_rows ? rows_used(method, config.n_u, out.p, out.rows) : out.p);
-    if (out.window_s && *out.window_s * config.rate_hz < least)
-        refuse_key(place, *t.get("window_s"), "window_s",
-                   fmt::format("{:g} s are {:.0f} samples at {:g} Hz, expected more than 2 {} = {}", *out.window_s,
-                               *out.window_s * config.rate_hz, config.rate_hz, by_rows ? "rows" : "p", least));
-    if (out.update_s * config.rate_hz < 1)
-        refuse_key(
-            place, *t.get("update_s"), "update_s",
-            fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
-    out.restart_on_change = t["restart_on_change"].value_or(true);
-    out.mkr = t["mkr"].value_or(false);
-    if (out.mkr && config.n_u == 0)
-        config.warnings.emplace_back(
-            "[identification] mkr: no [[channel]] has the role force, so there is no M, K and R");
-    const std::string fault = out.mkr && config.n_u > 0 && config.n_y > 0 ? plan_fault(live_mass_plan(config)) : "";
-    if (!fault.empty()) refuse_key(place, *t.get("mkr"), "mkr", fault + ". The key \"dof\" of [[channel]] says where");
-}
-
 /// A unit of something else than what the role says: M, K and R of it would be nonsense, modes are not.
 void check_measures(live_config& config, const channel_config& channel, const std::string& si) {
     static const std::array<const char*, 4> measured{"N", "m/s^2", "m/s", "m"}; // as channel_role
@@ -366,7 +311,7 @@ static live_config make_config(const std::string& path, config_texts texts, bool
     read_buses(path, file, config);
     read_channels(path, file, read_dbcs(config, from_files, texts), config);
     read_clocks(file, config);
-    read_identification(path, file, config);
+    read_identification(file, config);
     read_trigger(file, config);
     read_hammer(file, config);
     read_alarm(file, config);

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// PURPOSE  standard deviations while a stream runs: the sums of its blocks, each left out in turn
+// METHOD   delete-one-block jackknife (okid/uncertainty.h); blocks of a growing memory are paired up when all are full
 #include "blocks.hpp"
 
 #include "error.hpp"
@@ -10,8 +12,6 @@
 
 namespace okid_host {
 namespace {
-
-constexpr double remembered = 0.99; // share of a fading memory that the blocks cover
 
 std::unique_ptr<std::byte[]> allocate(std::size_t bytes, int blocks) {
     std::unique_ptr<std::byte[]> block(bytes > 0 ? new (std::nothrow) std::byte[bytes] : nullptr);
@@ -26,6 +26,12 @@ std::unique_ptr<std::byte[]> allocate(std::size_t bytes, int blocks) {
 
 } // namespace
 
+owned_sums::owned_sums(const okid_accumulator_config_t& config) {
+    const std::size_t bytes = okid_accumulator_memsize(&config);
+    block.reset(new (std::nothrow) std::byte[bytes]);
+    if (block && okid_accumulator_create(&sums, &config, block.get(), bytes) != OKID_OK) sums = nullptr;
+}
+
 live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks)
     : whole_(whole), sums_(whole), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),
       blocks_(static_cast<std::size_t>(blocks)), n_u_(whole.n_u), n_y_(whole.n_y),
@@ -35,6 +41,7 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
     const std::size_t most = window() ? 0 : static_cast<std::size_t>(whole.lags) * m_;
     history_.reserve(most);
     codes_.reserve(whole.sample == OKID_SAMPLE_INT16 ? most : 0);
+    wide_codes_.reserve(whole.sample == OKID_SAMPLE_INT24 || whole.sample == OKID_SAMPLE_INT32 ? most : 0);
     if (fading()) { // whole slots, so many that all blocks together cover what is remembered
         const double rows = std::log(1 - remembered) / std::log(whole.forgetting) / (2 * blocks);
         length_ = std::max<std::int64_t>(1, std::llround(rows / whole.block)) * whole.block;
@@ -53,6 +60,7 @@ void live_blocks::reset() {
     for (part& each : parts_) okid_accumulator_reset(each.sums);
     open_ = 0;
     history_.clear();
+    given_.clear();
     if (!window() && !fading()) length_ = whole_.lags;
 }
 
@@ -89,6 +97,8 @@ void live_blocks::add(const okid_accumulator_t* whole, const Number* samples, st
 }
 
 template void live_blocks::add(const okid_accumulator_t*, const std::int16_t*, std::size_t);
+template void live_blocks::add(const okid_accumulator_t*, const std::int32_t*, std::size_t);
+template void live_blocks::add(const okid_accumulator_t*, const float*, std::size_t);
 template void live_blocks::add(const okid_accumulator_t*, const double*, std::size_t);
 
 void live_blocks::gap(const okid_accumulator_t* whole, std::int64_t count) {
@@ -114,15 +124,19 @@ void live_blocks::turn(const okid_accumulator_t* whole) {
     begin_part();
 }
 
+template <class Code> void live_blocks::begin_with(okid_accumulator_t* sums, std::vector<Code>& codes) {
+    codes.assign(history_.begin(), history_.end());
+    check_statistics(add_samples(sums, codes.data(), codes.size() / m_));
+}
+
 void live_blocks::begin_part() {
     okid_accumulator_t* sums = parts_[open_].sums;
     okid_accumulator_reset(sums);
-    const std::size_t count = history_.size() / m_;
-    if (whole_.sample == OKID_SAMPLE_INT16) {
-        codes_.assign(history_.begin(), history_.end());
-        check_statistics(okid_accumulator_add_i16(sums, codes_.data(), count));
-    } else {
-        check_statistics(okid_accumulator_add(sums, history_.data(), count));
+    switch (whole_.sample) {
+    case OKID_SAMPLE_INT16: begin_with(sums, codes_); break;
+    case OKID_SAMPLE_INT24:
+    case OKID_SAMPLE_INT32: begin_with(sums, wide_codes_); break;
+    default: check_statistics(okid_accumulator_add(sums, history_.data(), history_.size() / m_));
     }
 }
 
@@ -151,6 +165,7 @@ void live_blocks::delete_parts(okid_accumulator_t* whole, replicate_statistics& 
         const double age = k < open_ ? static_cast<double>(closed - parts_[k].closed_at) : 0;
         leave_out(parts_[k].sums, fading() ? std::pow(whole_.forgetting, age) : 1, to);
     }
+    for (const owned_sums& each : given_) leave_out(each.sums, 1, to);
 }
 
 /// Groups of consecutive slots with about equal rows.

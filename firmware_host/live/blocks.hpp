@@ -17,12 +17,30 @@ namespace okid_host {
 inline okid_status_t add_samples(okid_accumulator_t* to, const std::int16_t* samples, std::size_t count) {
     return okid_accumulator_add_i16(to, samples, count);
 }
+inline okid_status_t add_samples(okid_accumulator_t* to, const std::int32_t* samples, std::size_t count) {
+    return okid_accumulator_add_i32(to, samples, count);
+}
+inline okid_status_t add_samples(okid_accumulator_t* to, const float* samples, std::size_t count) {
+    return okid_accumulator_add_f32(to, samples, count);
+}
 inline okid_status_t add_samples(okid_accumulator_t* to, const double* samples, std::size_t count) {
     return okid_accumulator_add(to, samples, count);
 }
 
+/// An accumulator in memory of its own.
+struct owned_sums {
+    std::unique_ptr<std::byte[]> block;
+    okid_accumulator_t* sums = nullptr;
+
+    owned_sums() = default;
+    explicit owned_sums(
+        const okid_accumulator_config_t& config); ///< `sums` stays NULL when the memory does not suffice
+};
+
 class live_blocks {
   public:
+    static constexpr double remembered = 0.99; ///< share of a fading memory that the blocks cover
+
     /// @param whole   of the stream
     /// @param blocks  to leave out: a window has about so many, a growing memory from so many to twice as many, a fading
     ///                one twice as many, because the young ones weigh most. Throws `failure` (exit 2) when the memory
@@ -37,6 +55,9 @@ class live_blocks {
     template <class Number> void add(const okid_accumulator_t* whole, const Number* samples, std::size_t count);
     void gap(const okid_accumulator_t* whole, std::int64_t count);
 
+    /// Sums that were merged into a growing whole: one more block.
+    void take(owned_sums more) { given_.push_back(std::move(more)); }
+
     /// Begin anew, as the whole does.
     void reset();
 
@@ -44,9 +65,7 @@ class live_blocks {
     std::optional<deviations> sigma(okid_accumulator_t* whole, const okid_identified_t& model, const mass_plan& plan);
 
   private:
-    struct part {
-        std::unique_ptr<std::byte[]> block;
-        okid_accumulator_t* sums = nullptr;
+    struct part : owned_sums {
         std::int64_t closed_at = 0; ///< rows in closed slots of the whole when it ended
     };
     bool window() const { return whole_.slots > 0; }
@@ -54,6 +73,7 @@ class live_blocks {
     part make() const;
     void turn(const okid_accumulator_t* whole);
     void begin_part();
+    template <class Code> void begin_with(okid_accumulator_t* sums, std::vector<Code>& codes);
     void pair_up();
     void delete_parts(okid_accumulator_t* whole, replicate_statistics& to);
     void delete_slots(okid_accumulator_t* whole, replicate_statistics& to);
@@ -64,8 +84,10 @@ class live_blocks {
     std::int64_t length_ = 0; ///< rows of a part
     std::vector<part> parts_; ///< parts_[open_] grows; window: all slots together, then one group of them
     std::size_t open_ = 0;
+    std::vector<owned_sums> given_;
     std::vector<double> history_;     ///< the last samples of the run, at most `lags`
     std::vector<std::int16_t> codes_; ///< the same as codes, when a part begins
+    std::vector<std::int32_t> wide_codes_;
     std::unique_ptr<std::byte[]> jackknife_block_;
     okid_jackknife_t* jackknife_ = nullptr;
     std::unique_ptr<replicate_statistics> modes_;

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// PURPOSE  a stream of samples into sums, and out of them a model whenever it is asked for
+// METHOD   rows go to the accumulator as they come, one by one through a small buffer; a watch compares them with the last
+//          model at rest and tells of a change, from which on a memory that forgets begins anew
 #include "identifier.hpp"
 
 #include "error.hpp"
@@ -8,6 +11,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <new>
+#include <type_traits>
 #include <utility>
 
 namespace okid_host {
@@ -17,104 +21,74 @@ constexpr std::size_t chunk = 256; // samples handed over at a time
 constexpr std::int32_t watch_block = 32,
                        watch_blocks = 3; // samples whose errors are averaged; so many high ones are a change
 
-/// Do the raw numbers of every channel fit int16 as they are?
-bool fits_codes(const live_config& config) {
-    return !resampled(config) &&
-           std::all_of(config.channels.begin(),
-                       config.channels.begin() + static_cast<std::ptrdiff_t>(config.n_u + config.n_y),
-                       [](const channel_config& channel) {
-                           const drv_signal_t& layout = channel.layout;
-                           return layout.value == DRV_VALUE_INTEGER && layout.length <= (layout.is_signed ? 16 : 15);
-                       });
-}
-
-std::unique_ptr<std::byte[]> allocate(const live_config& config, std::size_t bytes, const char* what) {
+std::unique_ptr<std::byte[]> allocate(const stream_config& config, std::size_t bytes, const char* what) {
     if (bytes == 0)
-        throw failure(
-            exit_usage,
-            fmt::format("{}: [identification]: p, rows, order or window_s do not go together with {} channels ({})",
-                        config.path, config.n_u + config.n_y, what));
+        throw failure(exit_usage, fmt::format("{}p, rows, order or window_s do not go together with {} channels ({})",
+                                              config.where, config.channels(), what));
     std::unique_ptr<std::byte[]> block(new (std::nothrow) std::byte[bytes]);
     if (!block)
-        throw failure(exit_usage, fmt::format("{}: [identification]: {} needs {:.1f} GB; lower p, rows or window_s",
-                                              config.path, what, static_cast<double>(bytes) / 1e9));
+        throw failure(exit_usage, fmt::format("{}{} needs {:.1f} GB; lower p, rows or window_s", config.where, what,
+                                              static_cast<double>(bytes) / 1e9));
     return block;
+}
+
+/// Numbers of the type can be added to such sums as they are.
+template <class Number> bool takes(okid_sample_t sample) {
+    if (std::is_floating_point_v<Number>) return sample == OKID_SAMPLE_DOUBLE;
+    return sizeof(Number) == 2 ? sample == OKID_SAMPLE_INT16
+                               : sample == OKID_SAMPLE_INT24 || sample == OKID_SAMPLE_INT32;
+}
+
+const char* sample_text(okid_sample_t sample) {
+    switch (sample) {
+    case OKID_SAMPLE_INT16: return "16-bit codes as int16";
+    case OKID_SAMPLE_INT24: return "24-bit codes as int32";
+    case OKID_SAMPLE_INT32: return "32-bit codes as int32";
+    default: return "real numbers";
+    }
 }
 
 } // namespace
 
-identifier::identifier(const live_config& config) : m_(config.n_u + config.n_y), exact_(fits_codes(config)) {
-    for (std::size_t i = 0; i < m_; ++i) {
-        scale_.push_back(config.channels[i].layout.scale * config.channels[i].si_factor());
-        offset_.push_back(config.channels[i].layout.offset * config.channels[i].si_factor());
-    }
-    if (exact_)
-        codes_.resize(chunk * m_);
-    else
-        doubles_.resize(chunk * m_);
+identifier::identifier(const stream_config& config)
+    : where_(config.where), m_(config.channels()), scale_(config.scale), offset_(config.offset) {
     create_identifier(config);
     create_accumulator(config);
     create_watch(config);
+    if (sums_config_.sample == OKID_SAMPLE_INT16)
+        codes_.resize(chunk * m_);
+    else
+        doubles_.resize(chunk * m_);
 }
 
-/// The window moves in whole blocks: about a twentieth of it, or one update where that is finer.
-void identifier::create_accumulator(const live_config& config) {
-    const identification_config& wanted = config.identification;
-    const std::int64_t update = std::max<std::int64_t>(1, std::llround(wanted.update_s * config.rate_hz));
-    okid_accumulator_config_t a{};
-    a.n_u = static_cast<std::int32_t>(config.n_u);
-    a.n_y = static_cast<std::int32_t>(config.n_y);
-    a.lags = okid_identify_lags(&identify_config_);
-    a.sample = exact_ ? OKID_SAMPLE_INT16 : OKID_SAMPLE_DOUBLE;
-    a.forgetting = wanted.forgetting.value_or(1.0);
-    a.edges = 1;
-    if (wanted.window_s) {
-        const std::int64_t window = std::max<std::int64_t>(1, std::llround(*wanted.window_s * config.rate_hz));
-        const std::int64_t block =
-            std::clamp(update, std::max<std::int64_t>(1, window / 64), std::max<std::int64_t>(1, window / 20));
-        a.block = static_cast<std::int32_t>(std::min<std::int64_t>(block, INT32_MAX));
-        a.slots = static_cast<std::int32_t>(
-            std::max<std::int64_t>(1, std::llround(static_cast<double>(window) / static_cast<double>(a.block))));
-        a.spare_slots = a.slots / 2 + 8;
-        memory_samples_ = std::int64_t{a.slots} * a.block;
-    } else if (a.forgetting < 1) {
-        const double memory = 1 / (1 - a.forgetting);
-        a.block = static_cast<std::int32_t>(
-            std::clamp<std::int64_t>(std::llround(memory / 20), 1, std::min<std::int64_t>(update, 1 << 20)));
-        memory_samples_ = std::llround(std::min(memory, 1e15));
-    }
-    const std::size_t bytes = okid_accumulator_memsize(&a);
-    accumulator_block_ = allocate(config, bytes, "the accumulator");
-    if (okid_accumulator_create(&accumulator_, &a, accumulator_block_.get(), bytes) != OKID_OK)
-        throw failure(exit_usage, fmt::format("{}: [identification]: the accumulator cannot be made", config.path));
+void identifier::create_accumulator(const stream_config& config) {
+    sums_config_ = sums_config_of(config);
+    if (config.wanted.window_s)
+        memory_samples_ = std::int64_t{sums_config_.slots} * sums_config_.block;
+    else if (sums_config_.forgetting < 1)
+        memory_samples_ = std::llround(std::min(1 / (1 - sums_config_.forgetting), 1e15));
+    sums_bytes_ = okid_accumulator_memsize(&sums_config_);
+    whole_.block = allocate(config, sums_bytes_, "the accumulator");
+    if (okid_accumulator_create(&accumulator_, &sums_config_, whole_.block.get(), sums_bytes_) != OKID_OK)
+        throw failure(exit_usage, where_ + "the accumulator cannot be made");
     okid_accumulator_set_units(accumulator_, scale_.data(), offset_.data());
-    if (wanted.sigma_blocks == 0) return;
-    blocks_ = std::make_unique<live_blocks>(a, identify_config_, wanted.sigma_blocks);
+    if (config.wanted.sigma_blocks == 0) return;
+    blocks_ = std::make_unique<live_blocks>(sums_config_, identify_config_, config.wanted.sigma_blocks);
     blocks_->set_units(scale_, offset_);
 }
 
-void identifier::create_identifier(const live_config& config) {
-    const identification_config& wanted = config.identification;
-    okid_identify_config_t& c = identify_config_;
-    c.n_u = static_cast<std::int32_t>(config.n_u);
-    c.n_y = static_cast<std::int32_t>(config.n_y);
-    c.p = wanted.p;
-    c.rows = wanted.rows;
-    c.order = wanted.order;
-    c.fs_hz = config.rate_hz;
-    c.method = method_of(wanted.method);
-    c.hankel = hankel_of(wanted.hankel);
-    c.detrend = wanted.detrend == "none" ? OKID_DETREND_NONE : OKID_DETREND_MEAN;
-    q_ = c.n_u + std::int64_t{okid_identify_lags(&c)} * (c.n_u + c.n_y);
-    const std::size_t bytes = okid_identify_memsize(&c);
+void identifier::create_identifier(const stream_config& config) {
+    identify_config_ = identify_config_of(config);
+    q_ = identify_config_.n_u + lags() * static_cast<std::int64_t>(m_);
+    const std::size_t bytes = okid_identify_memsize(&identify_config_);
     identify_block_ = allocate(config, bytes, "the identification");
-    if (okid_identify_create(&identify_, &c, identify_block_.get(), bytes) != OKID_OK)
-        throw failure(exit_usage, fmt::format("{}: [identification]: the identification cannot be made", config.path));
+    if (okid_identify_create(&identify_, &identify_config_, identify_block_.get(), bytes) != OKID_OK)
+        throw failure(exit_usage, where_ + "the identification cannot be made");
 }
 
 /// A growing memory keeps everything, as it was asked for: of a change it only tells.
-void identifier::create_watch(const live_config& config) {
-    const identification_config& wanted = config.identification;
+void identifier::create_watch(const stream_config& config) {
+    const identification_config& wanted = config.wanted;
     restart_on_change_ = wanted.restart_on_change && (wanted.window_s || wanted.forgetting);
     okid_watch_config_t c{};
     c.n_u = identify_config_.n_u;
@@ -127,7 +101,7 @@ void identifier::create_watch(const live_config& config) {
     const std::size_t bytes = okid_watch_memsize(&c);
     watch_block_ = allocate(config, bytes, "the watch over the model");
     if (okid_watch_create(&watch_, &c, watch_block_.get(), bytes) != OKID_OK)
-        throw failure(exit_usage, fmt::format("{}: [identification]: the watch cannot be made", config.path));
+        throw failure(exit_usage, where_ + "the watch cannot be made");
     row_.resize(m_);
 }
 
@@ -136,16 +110,35 @@ void identifier::watch_model() {
     okid_watch_state(watch_, &now);
     if (now.learning || (now.watching && samples_ < due_)) return;
     if (okid_watch_set_model(watch_, &model_) != OKID_OK) return; // a model without a predictor is not watched
+    watched_ = true;
     const std::int64_t age = memory_samples_ > 0 ? memory_samples_ : basis();
     due_ = samples_ + age;
 }
 
-/// The row in engineering units through the watch.
-void identifier::watch(const double* row) {
-    for (std::size_t i = 0; i < m_; ++i) row_[i] = scale_[i] * row[i] + offset_[i];
-    if (!okid_watch_add(watch_, row_.data())) return;
+/// A row in engineering units through the watch. @return the structure has changed
+bool identifier::watch(const double* row) {
+    if (!okid_watch_add(watch_, row)) return false;
     change_at_ = samples_ - change_samples_;
-    if (restart_on_change_) restart();
+    watched_ = false;
+    return true;
+}
+
+/// The rows up to a change, its last one with them, through the watch; they count as seen.
+template <class Number> std::size_t identifier::rows_until_change(const Number* rows, std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) {
+        bool there = true;
+        for (std::size_t i = 0; i < m_; ++i) {
+            const auto number = static_cast<double>(rows[k * m_ + i]);
+            there = there && std::isfinite(number);
+            row_[i] = scale_[i] * number + offset_[i];
+        }
+        ++samples_;
+        if (!there)
+            okid_watch_gap(watch_);
+        else if (watch(row_.data()))
+            return k + 1;
+    }
+    return count;
 }
 
 std::optional<std::int64_t> identifier::take_change() {
@@ -167,31 +160,36 @@ std::vector<double> identifier::predicted_percent() {
 }
 
 void identifier::restart() {
+    if (!restart_on_change_) return;
     before_ = stats();
     ++restarts_;
     okid_accumulator_reset(accumulator_);
     if (blocks_) blocks_->reset();
 }
 
-/// What waits into the sums, and into those of the blocks beside them.
-template <class Number> void identifier::absorb(const Number* samples) {
-    for (std::size_t done = 0; done < pending_;) {
-        const std::size_t n = blocks_ ? blocks_->room(accumulator_, pending_ - done) : pending_ - done;
+/// Samples into the sums, and into those of the blocks beside them.
+template <class Number> okid_status_t identifier::absorb(const Number* samples, std::size_t count) {
+    okid_status_t worst = OKID_OK;
+    for (std::size_t done = 0; done < count;) {
+        const std::size_t n = blocks_ ? blocks_->room(accumulator_, count - done) : count - done;
         const okid_status_t status = add_samples(accumulator_, samples + done * m_, n);
         if (status < 0)
-            throw failure(exit_no_model,
+            throw failure(status == OKID_ERR_RANGE && sizeof(Number) > 2 ? exit_usage : exit_no_model,
                           fmt::format("the samples cannot be summed any further: {}", okid_status_text(status)));
         if (blocks_) blocks_->add(accumulator_, samples + done * m_, n);
+        worst = std::max(worst, status);
         done += n;
     }
-    pending_ = 0;
+    return worst;
 }
 
 void identifier::flush() {
-    if (exact_)
-        absorb(codes_.data());
+    const std::size_t count = std::exchange(pending_, 0);
+    if (count == 0) return;
+    if (sums_config_.sample == OKID_SAMPLE_INT16)
+        absorb(codes_.data(), count);
     else
-        absorb(doubles_.data());
+        absorb(doubles_.data(), count);
 }
 
 void identifier::add(const double* row) {
@@ -201,17 +199,43 @@ void identifier::add(const double* row) {
         add_missing(1);
         return;
     }
-    if (exact_) {
+    if (sums_config_.sample == OKID_SAMPLE_INT16) {
         std::int16_t* to = codes_.data() + pending_ * m_;
         for (std::size_t i = 0; i < m_; ++i) to[i] = static_cast<std::int16_t>(row[i]);
     } else {
         double* to = doubles_.data() + pending_ * m_;
         std::copy_n(row, m_, to);
     }
-    ++samples_;
     if (++pending_ == chunk) flush();
-    watch(row);
+    if (!watched_)
+        ++samples_;
+    else if (rows_until_change(row, 1), !watched_)
+        restart();
 }
+
+template <class Number> okid_status_t identifier::add_rows(const Number* rows, std::size_t count) {
+    if (!takes<Number>(sums_config_.sample))
+        throw failure(exit_usage,
+                      fmt::format("the stream takes {}, found {} of {} bytes", sample_text(sums_config_.sample),
+                                  std::is_floating_point_v<Number> ? "real numbers" : "codes", sizeof(Number)));
+    flush();
+    okid_status_t worst = OKID_OK;
+    while (count > 0) {
+        const bool watching = watched_;
+        const std::size_t n = watching ? rows_until_change(rows, count) : count;
+        if (!watching) samples_ += static_cast<std::int64_t>(n);
+        worst = std::max(worst, absorb(rows, n));
+        if (watching && !watched_) restart();
+        rows += n * m_;
+        count -= n;
+    }
+    return worst;
+}
+
+template okid_status_t identifier::add_rows(const double*, std::size_t);
+template okid_status_t identifier::add_rows(const float*, std::size_t);
+template okid_status_t identifier::add_rows(const std::int16_t*, std::size_t);
+template okid_status_t identifier::add_rows(const std::int32_t*, std::size_t);
 
 void identifier::add_missing(std::int64_t count) {
     flush();
@@ -219,6 +243,72 @@ void identifier::add_missing(std::int64_t count) {
     okid_watch_gap(watch_);
     okid_accumulator_gap(accumulator_, count);
     if (blocks_) blocks_->gap(accumulator_, count);
+}
+
+void identifier::reset() {
+    pending_ = 0;
+    okid_accumulator_reset(accumulator_);
+    if (blocks_) blocks_->reset();
+    okid_watch_reset(watch_);
+    watched_ = false;
+    samples_ = due_ = blind_until_ = restarts_ = 0;
+    change_at_.reset();
+    before_ = {};
+}
+
+std::vector<std::byte> identifier::state() {
+    flush();
+    std::vector<std::byte> out(okid_accumulator_serialised_size(accumulator_));
+    if (okid_accumulator_serialise(accumulator_, out.data(), out.size()) != OKID_OK)
+        throw failure(exit_device, where_ + "the state cannot be written");
+    return out;
+}
+
+/// The sums of a state, of these channels, lags and kind of samples.
+owned_sums identifier::read_state(const void* state, std::size_t bytes, const okid_accumulator_config_t& shape) const {
+    okid_accumulator_config_t found{};
+    if (const okid_status_t status = okid_accumulator_peek(state, bytes, &found); status != OKID_OK)
+        throw failure(exit_usage, fmt::format("{}the state is damaged: {}", where_, okid_status_text(status)));
+    owned_sums out(found);
+    if (!out.sums) throw failure(exit_device, where_ + "out of memory for a state");
+    const bool fits = found.n_u == shape.n_u && found.n_y == shape.n_y && found.lags == shape.lags &&
+                      found.sample == shape.sample && found.slots == shape.slots && found.block == shape.block &&
+                      found.forgetting == shape.forgetting;
+    if (!fits || okid_accumulator_deserialise(out.sums, state, bytes) != OKID_OK)
+        throw failure(exit_usage,
+                      fmt::format("{}the state is of {} inputs and {} outputs, {} lags, {}, window of {} x {} samples, "
+                                  "forgetting {:g}; expected {}, {}, {}, {}, {} x {}, {:g}",
+                                  where_, found.n_u, found.n_y, found.lags, sample_text(found.sample), found.slots,
+                                  found.block, found.forgetting, shape.n_u, shape.n_y, shape.lags,
+                                  sample_text(shape.sample), shape.slots, shape.block, shape.forgetting));
+    return out;
+}
+
+void identifier::restore(const void* state, std::size_t bytes) {
+    owned_sums from = read_state(state, bytes, sums_config_);
+    reset();
+    if (const okid_status_t status = okid_accumulator_deserialise(accumulator_, state, bytes); status != OKID_OK)
+        throw failure(exit_usage, fmt::format("{}the state: {}", where_, okid_status_text(status)));
+    const okid_accumulator_stats_t counts = held();
+    samples_ = counts.samples + counts.missing;
+    if (!blocks_) return;
+    if (memory_samples_ == 0)
+        blocks_->take(std::move(from)); // all that was is one block
+    else if (sums_config_.slots == 0)   // fading: its blocks must begin where slots do
+        blind_until_ =
+            samples_ + std::llround(std::log(1 - live_blocks::remembered) / std::log(sums_config_.forgetting));
+}
+
+void identifier::merge(const void* state, std::size_t bytes) {
+    if (memory_samples_ > 0)
+        throw failure(exit_usage, where_ + "a window and a fading memory take no further records, only a growing one");
+    owned_sums from = read_state(state, bytes, sums_config_);
+    flush();
+    if (const okid_status_t status = okid_accumulator_merge(accumulator_, from.sums); status != OKID_OK)
+        throw failure(exit_usage, fmt::format("{}the state: {}", where_, okid_status_text(status)));
+    const okid_accumulator_stats_t counts = held();
+    samples_ = counts.samples + counts.missing;
+    if (blocks_) blocks_->take(std::move(from));
 }
 
 okid_status_t identifier::run() {

@@ -2,7 +2,7 @@
 // Samples of the grid into the accumulator, and a model out of it whenever it is asked for. All memory at the start.
 #pragma once
 #include "blocks.hpp"
-#include "config/config.hpp"
+#include "stream_config.hpp"
 
 #include <okid/accumulator.h>
 #include <okid/identify.h>
@@ -19,19 +19,31 @@ namespace okid_host {
 class identifier {
   public:
     /// Throws `failure` (exit 2) when p, rows or the window ask for more than the library or the memory can give.
-    explicit identifier(const live_config& config);
+    explicit identifier(const stream_config& config);
 
     /// One row of raw numbers of the grid (inputs, outputs, then whatever); a NaN among the first two makes it missing.
     void add(const double* row);
-    void add_missing(std::int64_t count);
+    /// Rows as the stream was made for: double or float, int16_t, int32_t. @return the worst status of the library, >= 0.
+    /// Throws `failure` (exit 2) for another type, and for a word that is no code.
+    template <class Number> okid_status_t add_rows(const Number* rows, std::size_t count);
+    void add_missing(std::int64_t count); ///< 0: another record begins
+    void reset();                         ///< forget all samples
+
+    /// The sums as bytes (okid_accumulator_serialise()): any release reads them.
+    std::vector<std::byte> state();
+    /// Go on where state() stood. Throws `failure` (exit 2) for bytes of another shape.
+    void restore(const void* state, std::size_t bytes);
+    /// Add all of a state as further records, and as one block for standard deviations. Not with a window or forgetting.
+    void merge(const void* state, std::size_t bytes);
 
     /// Identify from what is there. @return status of okid_identify_run(); the model stays valid until the next call
     okid_status_t run();
     const okid_identified_t& model() const { return model_; }
+    okid_identify_t* decomposition() { return identify_; } ///< of the last run()
     /// Standard deviations for the model of the last run(), of its modes and what the plan wants; none when sigma_blocks is
     /// 0 or there is too little to cut into blocks.
     std::optional<deviations> sigma(const mass_plan& plan) {
-        return blocks_ ? blocks_->sigma(accumulator_, model_, plan) : std::nullopt;
+        return blocks_ && samples_ >= blind_until_ ? blocks_->sigma(accumulator_, model_, plan) : std::nullopt;
     }
     /// Of each output 100 (1 - innovation / spread), both RMS: what the model of the last run() says of the next sample.
     std::vector<double> predicted_percent();
@@ -45,41 +57,48 @@ class identifier {
     std::optional<std::int64_t> take_change();
     std::int64_t restarts() const { return restarts_; }
 
-    bool exact() const { return exact_; } ///< 16-bit codes, summed exactly
+    bool exact() const { return sums_config_.sample != OKID_SAMPLE_DOUBLE; } ///< codes, summed exactly
     std::int64_t lags() const { return okid_identify_lags(&identify_config_); }
-    std::int64_t unknowns() const { return q_; } ///< regressors q = n_u + lags m
-    std::int64_t rows();                         ///< regression rows now in the sums
-    std::int64_t basis();                        ///< samples the model rests on
-    okid_accumulator_stats_t stats();            ///< since the start, restarts or not
+    std::int64_t unknowns() const { return q_; }           ///< regressors q = n_u + lags m
+    std::int64_t rows();                                   ///< regression rows now in the sums
+    std::int64_t basis();                                  ///< samples the model rests on
+    okid_accumulator_stats_t stats();                      ///< since the start, restarts or not
+    std::size_t sums_bytes() const { return sums_bytes_; } ///< of the sums of the whole
 
   private:
     void flush();
-    void create_watch(const live_config& config);
-    void watch(const double* row);
+    void create_watch(const stream_config& config);
+    bool watch(const double* row);
+    template <class Number> std::size_t rows_until_change(const Number* rows, std::size_t count);
     void restart();
     okid_accumulator_stats_t held();
-    void create_accumulator(const live_config& config);
-    void create_identifier(const live_config& config);
-    template <class Number> void absorb(const Number* samples);
+    void create_accumulator(const stream_config& config);
+    void create_identifier(const stream_config& config);
+    template <class Number> okid_status_t absorb(const Number* samples, std::size_t count);
+    owned_sums read_state(const void* state, std::size_t bytes, const okid_accumulator_config_t& shape) const;
 
+    std::string where_;
     std::size_t m_;
-    bool exact_;
     std::int64_t q_ = 0, memory_samples_ = 0; ///< 0 = everything is kept
     std::vector<double> scale_, offset_, doubles_;
     std::vector<std::int16_t> codes_;
     std::size_t pending_ = 0;
-    std::unique_ptr<std::byte[]> accumulator_block_, identify_block_;
-    okid_accumulator_t* accumulator_ = nullptr;
+    okid_accumulator_config_t sums_config_{};
+    owned_sums whole_;
+    std::unique_ptr<std::byte[]> identify_block_;
+    std::size_t sums_bytes_ = 0;
+    okid_accumulator_t* accumulator_ = nullptr; ///< of whole_
     okid_identify_t* identify_ = nullptr;
     okid_identify_config_t identify_config_{};
     okid_identified_t model_{};
     std::unique_ptr<live_blocks> blocks_;
 
-    bool restart_on_change_ = false;
+    bool restart_on_change_ = false, watched_ = false; ///< the watch has a model
     std::unique_ptr<std::byte[]> watch_block_;
     okid_watch_t* watch_ = nullptr;
     std::vector<double> row_;            ///< in engineering units
     std::int64_t samples_ = 0, due_ = 0; ///< ever; when the watch gets a newer model
+    std::int64_t blind_until_ = 0;       ///< a fading memory was restored: no blocks of it before
     std::int64_t change_samples_ = 0;    ///< what a change takes to be noticed
     std::optional<std::int64_t> change_at_;
     std::int64_t restarts_ = 0;

@@ -6,8 +6,6 @@
 #include "acquire/stop_signal.hpp"
 #include "error.hpp"
 #include "publish/service_notice.hpp"
-#include "record/record_check.hpp"
-#include "result/method.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -68,10 +66,9 @@ ordered_json clock_json(const drv_clock_fit_t& clock) {
 session::session(const live_config& config, const session_options& options)
     : config_(config), options_(options),
       publisher_(config, {options.events, options.events != "-" && options.json != "-", options.live}),
-      grid_(config, *this), check_(config), identifier_(config),
-      tracks_(static_cast<int>(config.n_y), identifier_.most_modes()), alarm_(config.alarm), trigger_(config),
-      hammer_(config, identifier_.lags()), losses_(config.buses.size()), health_(config.buses.size()),
-      clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
+      grid_(config, *this), check_(config), stream_(stream_of(config)), identifier_(stream_.sums()),
+      alarm_(config.alarm), trigger_(config), hammer_(config, identifier_.lags()), losses_(config.buses.size()),
+      health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)) {
     if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
     if (config.publish.samples) feed_.emplace(config);
@@ -319,40 +316,8 @@ void session::check_heard() const {
 }
 
 result_context session::context() {
-    result_context out;
-    out.warnings = config_.unit_remarks;
-    out.method = config_.identification.method;
-    if (!looks_back_rows(method_of(out.method), config_.n_u)) out.hankel = config_.identification.hankel;
-    out.fs_hz = config_.rate_hz;
-    out.samples = identifier_.basis();
-    out.gaps = identifier_.stats().gaps;
-    out.hold = config_.identification.hold;
-    out.detrend = config_.identification.detrend;
-    const okid_accumulator_stats_t stats = identifier_.stats();
-    if (stats.missing > 0)
-        out.warnings.emplace_back(
-            "missing_samples",
-            fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags start "
-                        "anew after each gap",
-                        stats.missing, stats.samples + stats.missing, stats.gaps, stats.gaps == 1 ? "" : "s"));
-    if (identifier_.restarts() > 0)
-        out.warnings.emplace_back(
-            "restarted", fmt::format("the structure changed: the result rests on the {} samples after sample {}",
-                                     out.samples, restarted_at_));
-    if (identifier_.restarts() == 0 && changed_at_ > 0)
-        out.warnings.emplace_back(
-            "changed", fmt::format("the structure changed near t = {:.4g} s, and the result mixes what was before with "
-                                   "what came after: set window_s or forgetting",
-                                   seconds(changed_at_)));
-    if (stats.saturated > 0)
-        out.warnings.emplace_back(
-            "saturated",
-            fmt::format("{} codes stood at full scale: taken as they are, but a clipped signal bends every mode; lower "
-                        "the gain or the force",
-                        stats.saturated));
+    result_context out = stream_.context(config_.unit_remarks);
     for (auto& remark : check_.doubts()) out.warnings.push_back(std::move(remark));
-    for (std::size_t i = 0; i < config_.n_u + config_.n_y; ++i)
-        (i < config_.n_u ? out.inputs : out.outputs).push_back(config_.channels[i].name);
     return out;
 }
 
@@ -403,19 +368,12 @@ void session::remark_clocks(result_context& about) const {
                                                 config_.decimate, fir_kernel::pass_band * config_.rate_hz));
 }
 
-/// M, K and R where the config asks for them; what stands in their way is no reason to lose the modes.
-void session::add_mass(result_context& about) const {
-    const mass_plan plan = live_mass_plan(config_);
-    if (!plan.wanted()) return;
+void session::remark_converted(result_context& about) const {
+    if (!config_.identification.mkr || config_.n_u == 0) return;
     for (const channel_config& channel : config_.channels)
         if (channel.dof > 0 && channel.role != channel_role::aux && channel.unit == "g")
             about.warnings.emplace_back(
                 "unit_converted", fmt::format("\"{}\" is in g: all numbers of it are in m/s^2 here", channel.name));
-    try {
-        about.mass = find_mass_matrices(identifier_.model(), plan, about.warnings);
-    } catch (const failure& why) {
-        about.warnings.emplace_back("mkr_failed", why.what());
-    }
 }
 
 void session::finish() {
@@ -437,11 +395,11 @@ void session::finish() {
         tell_remarks();
         throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
     }
-    remark_low_fit(identifier_.predicted_percent(), false, about);
+    stream_.remark_fit(about);
     remark_clocks(about);
-    add_mass(about);
-    about.sigma = identifier_.sigma(about.mass ? live_mass_plan(config_) : mass_plan{});
-    if (about.mass && about.sigma) add_deviations(*about.sigma, *about.mass);
+    remark_converted(about);
+    stream_.add_mass(about);
+    stream_.add_sigma(about);
     const ordered_json result = result_json(identifier_.model(), about);
     tell({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
     const std::string text = result.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";

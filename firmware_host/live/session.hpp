@@ -7,12 +7,10 @@
 #include "align/trigger.hpp"
 #include "config/config.hpp"
 #include "hammer.hpp"
-#include "identifier.hpp"
-#include "mode_tracks.hpp"
 #include "publish/publisher.hpp"
 #include "publish/sample_feed.hpp"
 #include "result/result.hpp"
-#include "settling.hpp"
+#include "stream.hpp"
 #include "stream_target.hpp"
 
 #include <cstdint>
@@ -66,8 +64,7 @@ class session : public stream_target, private grid_sink {
     void await(std::int64_t samples);
     void show_modes(std::int64_t samples);
     table_state table(std::int64_t samples);
-    void follow(std::int64_t samples, const deviations* sigma, table_state& state);
-    void tell_change(std::int64_t samples);
+    void follow(std::int64_t samples, const stream_update& found, table_state& state);
     void tell_modes(const table_state& state, const deviations* sigma);
     void tell_alarm(double t);
     void send_samples(const json_line& block);
@@ -76,7 +73,7 @@ class session : public stream_target, private grid_sink {
     void check_heard() const;
     nlohmann::ordered_json bus_stats(std::size_t bus) const;
     result_context context();
-    void add_mass(result_context& about) const;
+    void remark_converted(result_context& about) const;
     double observed_rate_hz() const;
     void remark_rate() const;
     void tell_remarks();
@@ -89,9 +86,8 @@ class session : public stream_target, private grid_sink {
     std::optional<sample_feed> feed_;
     aligner grid_;
     stream_check check_;
-    identifier identifier_;
-    settling settling_;
-    mode_tracks tracks_;
+    stream stream_;
+    identifier& identifier_; ///< of stream_
     alarm_watch alarm_;
     trigger trigger_;
     hammer hammer_;
@@ -104,10 +100,10 @@ class session : public stream_target, private grid_sink {
         std::int64_t index = 0, ns = 0;
     } first_, last_;            ///< samples that came, and their time stamps
     std::int64_t start_ns_ = 0; ///< what t counts from
-    std::int64_t gaps_ = 0, restarted_at_ = 0, restarts_told_ = 0;
+    std::int64_t gaps_ = 0;
     std::vector<observed_mode> observed_; ///< of the newest update
     table_state shown_;                   ///< hammer test: after the newest blow
-    std::int64_t stats_told_ = 0, changed_at_ = 0;
+    std::int64_t stats_told_ = 0;
     bool started_ = false, settled_ = false, due_ = false, remarked_ = false;
 };
 

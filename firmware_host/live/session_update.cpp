@@ -53,19 +53,20 @@ table_state session::table(std::int64_t samples) {
 
 /// Modes are shown once there are twice as many equations as unknowns: below that they only repeat the noise.
 void session::show_modes(std::int64_t samples) {
-    tell_change(samples);
+    const stream_update found = stream_.update(samples);
+    if (found.changed)
+        tell({{"type", "change"},
+              {"t", seconds(samples)},
+              {"sample", found.changed->sample},
+              {"restarted", found.changed->restarted}});
     table_state state = table(samples);
-    const std::int64_t rows = identifier_.rows(), need = 2 * identifier_.unknowns();
-    okid_status_t outcome = OKID_ERR_TOO_SHORT;
-    if (rows >= need) outcome = identifier_.run();
-    if (outcome >= 0) {
-        const std::optional<deviations> sigma = identifier_.sigma({});
-        follow(samples, sigma ? &*sigma : nullptr, state);
+    if (found.tracks) {
+        follow(samples, found, state);
     } else {
-        settling_.reset();
         state.alarm = alarm_.standing();
-        state.waiting = rows < need ? fmt::format("waiting for samples, {} of {}", rows, need)
-                                    : fmt::format("no model yet: {}", okid_status_text(outcome));
+        state.waiting = found.rows < stream_.needed()
+                            ? fmt::format("waiting for samples, {} of {}", found.rows, stream_.needed())
+                            : fmt::format("no model yet: {}", okid_status_text(found.status));
     }
     settled_ = state.settled;
     if (hammer_.wanted()) {
@@ -75,31 +76,16 @@ void session::show_modes(std::int64_t samples) {
     publisher_.table(state);
 }
 
-void session::tell_change(std::int64_t samples) {
-    const std::optional<std::int64_t> ago = identifier_.take_change();
-    if (!ago) return;
-    const bool restarted = identifier_.restarts() > restarts_told_;
-    restarts_told_ = identifier_.restarts();
-    changed_at_ = samples - *ago;
-    if (restarted) {
-        restarted_at_ = samples - identifier_.basis();
-        tracks_.jump();
-        settling_.reset();
-    }
-    tell({{"type", "change"}, {"t", seconds(samples)}, {"sample", samples - *ago}, {"restarted", restarted}});
-}
-
-/// The modes of a new model: which they are, whether they rest, whether one has left its baseline.
-void session::follow(std::int64_t samples, const deviations* sigma, table_state& state) {
-    const okid_identified_t& model = identifier_.model();
-    static const std::vector<double> unknown;
-    const std::vector<double>& sigma_hz = sigma ? sigma->frequency_hz : unknown;
-    const std::vector<int>& tracks = tracks_.update(model);
-    state.settled = settling_.add(model, tracks, sigma_hz);
-    if (state.settled) identifier_.watch_model();
+/// The modes of a new model: has one left its baseline?
+void session::follow(std::int64_t samples, const stream_update& found, table_state& state) {
+    const okid_identified_t& model = stream_.model();
+    const deviations* sigma = found.sigma ? &*found.sigma : nullptr;
+    const std::vector<int>& tracks = *found.tracks;
+    state.settled = found.settled;
     observed_.clear();
     for (std::size_t k = 0; k < tracks.size(); ++k)
-        observed_.push_back({tracks[k], model.frequency_hz[k], sigma ? sigma_hz[k] : NAN, settling_.at_rest(k)});
+        observed_.push_back(
+            {tracks[k], model.frequency_hz[k], sigma ? sigma->frequency_hz[k] : NAN, stream_.at_rest(k)});
     const bool turned = alarm_.update(observed_, samples - identifier_.basis(), samples);
     state.alarm = alarm_.standing();
     for (std::size_t k = 0; k < tracks.size(); ++k) {

@@ -143,8 +143,8 @@ static void test_wrong_types_and_ranges() {
     refuse_change("signed = true", "signed = 1", {"found 1, expected true or false"});
     refuse_change("length = 12", "length = 65", {"found 65", "from 1 to 64"});
     refuse_change("role = \"force\"", "role = \"forse\"", {"found \"forse\"", "did you mean \"force\"?"});
-    refuse_change("window_s = 10", "window_s = 0.01", {"window_s", "2 p = 40"});
-    refuse_change("window_s = 10", "window_s = 0.01\nmethod = \"n4sid-moesp\"", {"window_s", "2 rows = "});
+    refuse_change("window_s = 10", "window_s = 0.01", {"window_s", "unknowns (p 20)"});
+    refuse_change("window_s = 10", "window_s = 0.01\nmethod = \"n4sid-moesp\"", {"window_s", "unknowns (rows 30)"});
     refuse_change("window_s = 10", "update_s = 0.0001", {"update_s", "at least one sample"});
     refuse_change("[[bus]]", "[bus]", {"expected sections [[bus]]"});
     refuse_change("[identification]", "[[identification]]", {"expected a section [identification]"});

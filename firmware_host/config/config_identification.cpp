@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  what a CONFIG.toml asks of the identification
+// METHOD   check_schema() has looked at keys, kinds and ranges; here is what one key makes of another
+#include "config_identification.hpp"
+
+#include "result/deviations.hpp"
+#include "result/method.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace okid_host {
+
+std::string window_fault(const identification_config& wanted, std::size_t n_u, std::size_t n_y, double rate_hz) {
+    if (!wanted.window_s || n_y == 0) return "";
+    const okid_method_t method = method_of(wanted.method);
+    const bool by_rows = looks_back_rows(method, n_u);
+    const int horizon = by_rows ? rows_used(method, n_u, wanted.p, wanted.rows) : wanted.p;
+    const double unknowns =
+        static_cast<double>(unknowns_of(method, static_cast<int>(n_u), static_cast<int>(n_y), horizon));
+    const double samples = *wanted.window_s * rate_hz;
+    if (samples >= unknowns && samples >= 2 * horizon) return "";
+    return fmt::format("{:g} s are {:.0f} samples at {:g} Hz, but there are {:.0f} unknowns ({} {}): expected a longer "
+                       "window, or a smaller {}",
+                       *wanted.window_s, samples, rate_hz, std::max(unknowns, 2.0 * horizon), by_rows ? "rows" : "p",
+                       horizon, by_rows ? "rows" : "p");
+}
+
+void read_identification(const toml::table& file, live_config& config) {
+    identification_config& out = config.identification;
+    const toml::table* table = file["identification"].as_table();
+    if (!table) return;
+    const config_place place{config.path, "[identification]"};
+    const toml::table& t = *table;
+    out.method = t["method"].value_or(out.method);
+    out.hankel = t["hankel"].value_or(out.hankel);
+    if (const std::string fault = hankel_fault(out.hankel, out.method, config.n_u); !fault.empty())
+        refuse_key(place, *t.get("hankel"), "hankel", fault);
+    out.hold = t["hold"].value_or(out.hold);
+    out.detrend = t["detrend"].value_or(out.detrend);
+    if (out.detrend == "linear")
+        refuse_key(place, *t.get("detrend"), "detrend",
+                   "\"linear\" needs the whole record: none and mean are possible while a stream runs");
+    out.p = static_cast<int>(t["p"].value_or(std::int64_t{out.p}));
+    out.rows = static_cast<int>(t["rows"].value_or(std::int64_t{0}));
+    out.order = static_cast<int>(t["order"].value_or(std::int64_t{0}));
+    out.window_s = t["window_s"].value<double>();
+    out.forgetting = t["forgetting"].value<double>();
+    out.update_s = t["update_s"].value_or(out.update_s);
+    out.sigma_blocks = static_cast<int>(t["sigma_blocks"].value_or(std::int64_t{out.sigma_blocks}));
+    if (out.sigma_blocks > 0 && out.sigma_blocks < fewest_blocks)
+        refuse_key(
+            place, *t.get("sigma_blocks"), "sigma_blocks",
+            fmt::format("found {}, expected 0 (no standard deviations) or {} to 100", out.sigma_blocks, fewest_blocks));
+    if (out.window_s && out.forgetting)
+        refuse_key(place, *t.get("forgetting"), "forgetting",
+                   "window_s is given too; a window and forgetting together are not available, choose one");
+    const okid_method_t method = method_of(out.method);
+    const bool by_rows = looks_back_rows(method, config.n_u);
+    if (by_rows && t.contains("p") && (is_subspace(method) || out.rows > 0))
+        config.warnings.push_back(
+            fmt::format("[identification] p belongs to the observer of the okid methods: {} looks back {} block rows "
+                        "here",
+                        out.method, rows_used(method, config.n_u, out.p, out.rows)));
+    if (const std::string fault = window_fault(out, config.n_u, config.n_y, config.rate_hz); !fault.empty())
+        refuse_key(place, *t.get("window_s"), "window_s", fault);
+    if (out.update_s * config.rate_hz < 1)
+        refuse_key(
+            place, *t.get("update_s"), "update_s",
+            fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
+    out.restart_on_change = t["restart_on_change"].value_or(true);
+    out.mkr = t["mkr"].value_or(false);
+    if (out.mkr && config.n_u == 0)
+        config.warnings.emplace_back(
+            "[identification] mkr: no [[channel]] has the role force, so there is no M, K and R");
+    const std::string fault = out.mkr && config.n_u > 0 && config.n_y > 0 ? plan_fault(live_mass_plan(config)) : "";
+    if (!fault.empty()) refuse_key(place, *t.get("mkr"), "mkr", fault + ". The key \"dof\" of [[channel]] says where");
+}
+
+} // namespace okid_host

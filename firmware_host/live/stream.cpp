@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  updates and results of a running stream, for the live program and for other languages
+// METHOD   an update identifies, gives the modes their tracks and looks whether they rest; from then on the newest model at
+//          rest is watched, and a change of the structure is told with the next update
+#include "stream.hpp"
+
+#include "error.hpp"
+#include "record/record_check.hpp"
+#include "result/method.hpp"
+
+#include <fmt/format.h>
+#include <utility>
+
+namespace okid_host {
+
+stream::stream(stream_config config)
+    : config_(std::move(config)), identifier_(config_),
+      tracks_(static_cast<int>(config_.outputs.size()), identifier_.most_modes()) {}
+
+void stream::reset() {
+    identifier_.reset();
+    forget_updates();
+}
+
+void stream::restore(const void* state, std::size_t bytes) {
+    identifier_.restore(state, bytes);
+    forget_updates();
+}
+
+void stream::forget_updates() {
+    settling_.reset();
+    tracks_.jump();
+    changed_at_ = restarted_at_ = restarts_told_ = 0;
+}
+
+stream_update stream::update(std::int64_t now) {
+    stream_update out;
+    if (const std::optional<std::int64_t> ago = identifier_.take_change()) {
+        changed_at_ = now - *ago;
+        out.changed = {changed_at_, identifier_.restarts() > restarts_told_};
+        restarts_told_ = identifier_.restarts();
+        if (out.changed->restarted) {
+            restarted_at_ = now - identifier_.basis();
+            tracks_.jump();
+            settling_.reset();
+        }
+    }
+    out.rows = identifier_.rows();
+    if (out.rows >= needed()) out.status = identifier_.run();
+    if (out.status < 0) {
+        settling_.reset();
+        return out;
+    }
+    static const std::vector<double> unknown;
+    out.sigma = identifier_.sigma({});
+    out.tracks = &tracks_.update(model());
+    out.settled = settling_.add(model(), *out.tracks, out.sigma ? out.sigma->frequency_hz : unknown);
+    if (out.settled) identifier_.watch_model();
+    return out;
+}
+
+void stream::identify() {
+    const okid_status_t status = identifier_.run();
+    if (status < 0) throw_identify_failure(status, model(), identifier_.config(), context());
+}
+
+result_context stream::context(remarks said) {
+    const okid_accumulator_stats_t stats = identifier_.stats();
+    result_context out;
+    out.warnings = std::move(said);
+    out.method = config_.wanted.method;
+    if (!looks_back_rows(method_of(out.method), config_.inputs.size())) out.hankel = config_.wanted.hankel;
+    out.fs_hz = config_.rate_hz;
+    out.samples = identifier_.basis();
+    out.gaps = stats.gaps;
+    out.hold = config_.wanted.hold;
+    out.detrend = config_.wanted.detrend;
+    out.inputs = config_.inputs;
+    out.outputs = config_.outputs;
+    if (stats.missing > 0)
+        out.warnings.emplace_back(
+            "missing_samples",
+            fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags start "
+                        "anew after each gap",
+                        stats.missing, stats.samples + stats.missing, stats.gaps, stats.gaps == 1 ? "" : "s"));
+    if (identifier_.restarts() > 0)
+        out.warnings.emplace_back(
+            "restarted", fmt::format("the structure changed: the result rests on the {} samples after sample {}",
+                                     out.samples, restarted_at_));
+    else if (changed_at_ > 0)
+        out.warnings.emplace_back(
+            "changed", fmt::format("the structure changed near t = {:.4g} s, and the result mixes what was before with "
+                                   "what came after: set window_s or forgetting",
+                                   static_cast<double>(changed_at_) / config_.rate_hz));
+    if (stats.saturated > 0)
+        out.warnings.emplace_back(
+            "saturated",
+            fmt::format("{} codes stood at full scale: taken as they are, but a clipped signal bends every mode; lower "
+                        "the gain or the force",
+                        stats.saturated));
+    return out;
+}
+
+void stream::remark_fit(result_context& about) { remark_low_fit(identifier_.predicted_percent(), false, about); }
+
+void stream::add_mass(result_context& about) const {
+    if (!config_.mass.wanted()) return;
+    try {
+        about.mass = find_mass_matrices(model(), config_.mass, about.warnings);
+    } catch (const failure& why) {
+        about.warnings.emplace_back("mkr_failed", why.what());
+    }
+}
+
+void stream::add_sigma(result_context& about) {
+    about.sigma = identifier_.sigma(about.mass ? config_.mass : mass_plan{});
+    if (about.mass && about.sigma) add_deviations(*about.sigma, *about.mass);
+}
+
+} // namespace okid_host

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// A stream of samples and what is known of it: updates while it runs, results whenever they are wanted. The live program and
+// other languages feed the same object.
+#pragma once
+#include "identifier.hpp"
+#include "mode_tracks.hpp"
+#include "result/result.hpp"
+#include "settling.hpp"
+
+#include <cstdint>
+#include <optional>
+
+namespace okid_host {
+
+/// What an update found.
+struct stream_update {
+    struct change {
+        std::int64_t sample; ///< where it began, about
+        bool restarted;      ///< what was before is forgotten
+    };
+    std::optional<change> changed; ///< since the last update
+    std::int64_t rows = 0;         ///< equations at hand
+    okid_status_t status = OKID_ERR_TOO_SHORT;
+    std::optional<deviations> sigma;          ///< of the modes
+    const std::vector<int>* tracks = nullptr; ///< of each mode, 0 = none; only with a model
+    bool settled = false;                     ///< the modal table has come to rest
+};
+
+class stream {
+  public:
+    /// Throws `failure` (exit 2) as identifier does.
+    explicit stream(stream_config config);
+
+    identifier& sums() { return identifier_; }
+    const okid_identified_t& model() const { return identifier_.model(); }
+    /// Equations an update needs: with fewer a model only repeats the noise.
+    std::int64_t needed() const { return 2 * identifier_.unknowns(); }
+
+    /// Identify, follow the modes, and watch what comes from a model at rest on. Nothing in the sums changes.
+    /// @param now  samples of the stream so far, as messages count them
+    stream_update update(std::int64_t now);
+    bool at_rest(std::size_t mode) const { return settling_.at_rest(mode); } ///< of the last update
+    void reset();
+    /// As identifier::restore().
+    void restore(const void* state, std::size_t bytes);
+
+    /// Identify for a result. Throws `failure` (exit 3) when no model can be had.
+    void identify();
+    /// What is known of the result of the last identify() or update(), without standard deviations.
+    /// @param said  what to say first
+    result_context context(remarks said = {});
+    /// Outputs that the model of the last identify() hardly follows.
+    void remark_fit(result_context& about);
+    /// M, K and R where they are wanted; what stands in their way is no reason to lose the modes.
+    void add_mass(result_context& about) const;
+    /// Standard deviations of modes and matrices.
+    void add_sigma(result_context& about);
+
+  private:
+    void forget_updates();
+
+    stream_config config_;
+    identifier identifier_;
+    settling settling_;
+    mode_tracks tracks_;
+    std::int64_t changed_at_ = 0, restarted_at_ = 0, restarts_told_ = 0;
+};
+
+} // namespace okid_host
