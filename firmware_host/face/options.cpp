@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  options as JSON to texts
+// METHOD   a value becomes what a command line would hold, and is checked where that is: one set of sentences
+#include "options.hpp"
+
+#include "config/nearest_name.hpp"
+#include "error.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace okid_host::face {
+namespace {
+
+using nlohmann::json;
+
+/// As it would stand on a command line: lists with commas, text without quotes.
+std::string words_of(const json& value) {
+    if (value.is_string()) return value.get<std::string>();
+    if (!value.is_array()) return value.dump();
+    std::string out;
+    for (const json& one : value) out += (&one == &value.front() ? "" : ",") + words_of(one);
+    return out;
+}
+
+std::vector<std::string> names_of(const std::string& key, const json& value) {
+    std::vector<std::string> out;
+    if (!value.is_array()) throw failure(exit_usage, fmt::format("{}: found {}, expected a list", key, value.dump()));
+    for (const json& one : value) out.push_back(words_of(one));
+    return out;
+}
+
+bool flag_of(const std::string& key, const json& value) {
+    if (!value.is_boolean())
+        throw failure(exit_usage, fmt::format("{}: found {}, expected true or false", key, value.dump()));
+    return value.get<bool>();
+}
+
+void take_option(const std::string& key, const json& value, const option_places& to) {
+    std::vector<std::string> known;
+    for (const auto& [name, place] : to.texts) {
+        known.emplace_back(name);
+        if (key == name) return void(*place = words_of(value));
+    }
+    for (const auto& [name, place] : to.flags) {
+        known.emplace_back(name);
+        if (key == name) return void(*place = flag_of(key, value));
+    }
+    for (const auto& [name, place] : to.lists) {
+        known.emplace_back(name);
+        if (key == name) return void(*place = names_of(key, value));
+    }
+    throw failure(exit_usage, fmt::format("no option \"{}\"{}, expected one of: {}", printable(key),
+                                          did_you_mean(key, known), list_names(known)));
+}
+
+} // namespace
+
+option_places places_of(record_request& r) {
+    return {{{"fs", &r.fs},
+             {"method", &r.method},
+             {"p", &r.p},
+             {"rows", &r.rows},
+             {"order", &r.order},
+             {"max_order", &r.max_order},
+             {"hankel", &r.hankel},
+             {"hold", &r.hold},
+             {"detrend", &r.detrend},
+             {"sensing", &r.sensing},
+             {"input_dofs", &r.input_dofs},
+             {"output_dofs", &r.output_dofs},
+             {"sigma_blocks", &r.sigma_blocks}},
+            {},
+            {{"inputs", &r.inputs}, {"outputs", &r.outputs}}};
+}
+
+void read_options(const char* text, const option_places& to) {
+    const json options = json::parse(text, nullptr, false);
+    if (!options.is_object()) throw failure(exit_usage, "the options are no JSON object");
+    for (const auto& [key, value] : options.items())
+        if (!value.is_null()) take_option(key, value, to);
+    for (const auto& [name, place] : to.texts)
+        if (std::string_view(name) == "fs" && place->empty())
+            throw failure(exit_usage, "fs is missing, expected a sample rate in Hz above 0");
+}
+
+} // namespace okid_host::face

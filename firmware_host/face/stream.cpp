@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  okid_host/stream.h: streams of samples for other languages
+// METHOD   the options are checked where those of records and configurations are; the stream is that of the live program
+#include "live/stream.hpp"
+
+#include "config/config_identification.hpp"
+#include "guard.hpp"
+#include "options.hpp"
+#include "result_handle.hpp"
+
+#include <okid_host/stream.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <fmt/format.h>
+
+struct okid_host_stream {
+    okid_host::stream stream;
+    std::vector<std::byte> state;
+
+    explicit okid_host_stream(okid_host::stream_config config) : stream(std::move(config)) {}
+    std::int64_t now() {
+        const okid_accumulator_stats_t counts = stream.sums().stats();
+        return counts.samples + counts.missing;
+    }
+};
+
+namespace okid_host::face {
+namespace {
+
+[[noreturn]] void refuse(const char* name, const std::string& found, const std::string& expected) {
+    throw failure(exit_usage, fmt::format("{}: found {}, expected {}", name, found, expected));
+}
+
+double number_of(const char* name, const std::string& text, const char* expected) {
+    double value = NAN;
+    const char* const end = text.data() + text.size();
+    if (std::from_chars(text.data(), end, value).ptr != end || !std::isfinite(value)) refuse(name, text, expected);
+    return value;
+}
+
+/// Above 0, at most `high`.
+std::optional<double> positive(const char* name, const std::string& text, double high, const char* what) {
+    if (text.empty()) return std::nullopt;
+    const std::string expected = fmt::format("{} above 0 to {:.10g}", what, high);
+    const double value = number_of(name, text, expected.c_str());
+    if (!(value > 0 && value <= high)) refuse(name, text, expected);
+    return value;
+}
+
+/// One finite number for all channels, or one for each.
+std::vector<double> each(const char* name, const std::string& list, std::size_t channels, double otherwise) {
+    std::vector<double> out;
+    const std::string expected = fmt::format("a number, or one for each of the {} channels", channels);
+    for (std::size_t at = 0; !list.empty() && at <= list.size();) {
+        const std::size_t comma = std::min(list.find(',', at), list.size());
+        out.push_back(number_of(name, list.substr(at, comma - at), expected.c_str()));
+        at = comma + 1;
+    }
+    if (out.size() <= 1) out.assign(channels, out.empty() ? otherwise : out.front());
+    if (out.size() != channels) refuse(name, fmt::format("{} numbers", out.size()), expected);
+    return out;
+}
+
+okid_sample_t sample_of(const std::string& codes) {
+    if (codes.empty() || codes == "0") return OKID_SAMPLE_DOUBLE;
+    if (codes == "16") return OKID_SAMPLE_INT16;
+    if (codes == "24") return OKID_SAMPLE_INT24;
+    if (codes == "32") return OKID_SAMPLE_INT32;
+    refuse("codes", codes, "the bits of an ADC code: 16, 24 or 32, or 0 for real numbers");
+}
+
+struct stream_request {
+    record_request record;
+    std::string window_s, forgetting, update_s, codes, scale, offset, saturated = "keep";
+    bool restart_on_change = true;
+};
+
+void take_memory(const stream_request& given, stream_config& config) {
+    identification_config& wanted = config.wanted;
+    wanted.window_s = positive("window_s", given.window_s, 1e6, "seconds");
+    wanted.forgetting = positive("forgetting", given.forgetting, 1, "a factor");
+    wanted.update_s = positive("update_s", given.update_s, 1e5, "seconds").value_or(wanted.update_s);
+    wanted.restart_on_change = given.restart_on_change;
+    if (wanted.window_s && wanted.forgetting)
+        throw failure(exit_usage, "window_s and forgetting exclude each other: give one of them, or neither");
+    if (const std::string fault = window_fault(wanted, config.inputs.size(), config.outputs.size(), config.rate_hz);
+        !fault.empty())
+        throw failure(exit_usage, "window_s: " + fault);
+}
+
+void take_samples(const stream_request& given, stream_config& config) {
+    config.sample = sample_of(given.codes);
+    config.bulk = true;
+    if (given.saturated != "keep" && given.saturated != "missing")
+        refuse("saturated", '"' + given.saturated + '"', "keep or missing");
+    config.saturated_missing = given.saturated == "missing";
+    config.scale = each("scale", given.scale, config.channels(), 1);
+    config.offset = each("offset", given.offset, config.channels(), 0);
+    for (const double scale : config.scale)
+        if (scale == 0) throw failure(exit_usage, "scale: found 0: a channel times 0 measures nothing");
+}
+
+stream_config read_stream(const char* text) {
+    stream_request given;
+    option_places places = places_of(given.record);
+    for (const auto& [name, place] :
+         {std::pair{"window_s", &given.window_s}, std::pair{"forgetting", &given.forgetting},
+          std::pair{"update_s", &given.update_s}, std::pair{"codes", &given.codes}, std::pair{"scale", &given.scale},
+          std::pair{"offset", &given.offset}, std::pair{"saturated", &given.saturated}})
+        places.texts.emplace_back(name, place);
+    places.flags.emplace_back("restart_on_change", &given.restart_on_change);
+    read_options(text, places);
+    const record_options checked = check_request(given.record);
+    if (checked.detrend == "linear") refuse("detrend", "\"linear\"", "none or mean: a stream has no line of its own");
+    stream_config out;
+    out.inputs = checked.inputs;
+    out.outputs = checked.outputs;
+    for (const std::string& name : out.inputs)
+        if (std::find(out.outputs.begin(), out.outputs.end(), name) != out.outputs.end())
+            throw failure(
+                exit_usage,
+                fmt::format("\"{}\" is among inputs and outputs, every channel needs a name of its own", name));
+    out.rate_hz = check_rate(given.record.fs);
+    out.max_order = checked.max_order;
+    out.mass = checked.mass;
+    identification_config& wanted = out.wanted;
+    wanted.method = checked.method;
+    wanted.hankel = checked.hankel;
+    wanted.hold = checked.hold;
+    wanted.detrend = checked.detrend;
+    wanted.p = checked.p;
+    wanted.rows = checked.rows;
+    wanted.order = checked.order;
+    wanted.sigma_blocks = checked.sigma_blocks;
+    take_memory(given, out);
+    take_samples(given, out);
+    return out;
+}
+
+okid_status_t add_rows(identifier& to, int32_t kind, const void* rows, std::size_t count) {
+    switch (kind) {
+    case OKID_HOST_DOUBLE: return to.add_rows(static_cast<const double*>(rows), count);
+    case OKID_HOST_FLOAT: return to.add_rows(static_cast<const float*>(rows), count);
+    case OKID_HOST_INT16: return to.add_rows(static_cast<const std::int16_t*>(rows), count);
+    case OKID_HOST_INT32: return to.add_rows(static_cast<const std::int32_t*>(rows), count);
+    default: throw failure(exit_usage, fmt::format("there are no samples of kind {}", kind));
+    }
+}
+
+/// The model by now, with the decomposition of the stream.
+okid_host_result_t* result_of(stream& from, result_context about) {
+    okid_host_result_t* const out = make_result(from.model(), std::move(about));
+    out->found.config = from.sums().config();
+    out->found.identifier = from.sums().decomposition();
+    return out;
+}
+
+} // namespace
+} // namespace okid_host::face
+
+using namespace okid_host;
+
+int32_t okid_host_stream_create(const char* options, okid_host_stream_t** out) {
+    *out = nullptr;
+    return face::guard([&] { *out = new okid_host_stream(face::read_stream(options)); });
+}
+
+int32_t okid_host_stream_add(okid_host_stream_t* self, int32_t kind, const void* rows, size_t count) {
+    okid_status_t status = OKID_OK;
+    const int code = face::guard([&] { status = face::add_rows(self->stream.sums(), kind, rows, count); });
+    return code == 0 ? status : -code;
+}
+
+int32_t okid_host_stream_gap(okid_host_stream_t* self, int64_t count) {
+    return face::guard([&] {
+        if (count < 0) throw failure(exit_usage, fmt::format("count: found {}, expected 0 or more", count));
+        self->stream.sums().add_missing(count);
+    });
+}
+
+void okid_host_stream_reset(okid_host_stream_t* self) { self->stream.reset(); }
+
+int32_t okid_host_stream_stats(okid_host_stream_t* self, okid_host_stream_counts_t* out) {
+    return face::guard([&] {
+        identifier& sums = self->stream.sums();
+        const okid_accumulator_stats_t counts = sums.stats();
+        *out = {counts.samples, counts.missing, counts.gaps,     counts.saturated,
+                counts.rows,    counts.dropped, sums.restarts(), static_cast<std::int64_t>(sums.sums_bytes()),
+                sums.unknowns()};
+    });
+}
+
+int32_t okid_host_stream_update(okid_host_stream_t* self, okid_host_result_t** result) {
+    *result = nullptr;
+    return face::guard([&] {
+        stream_update found = self->stream.update(self->now());
+        if (!found.tracks) return;
+        result_context about = self->stream.context();
+        about.sigma = std::move(found.sigma);
+        *result = face::result_of(self->stream, std::move(about));
+    });
+}
+
+int32_t okid_host_stream_identify(okid_host_stream_t* self, okid_host_result_t** result) {
+    *result = nullptr;
+    return face::guard([&] {
+        stream& from = self->stream;
+        from.identify();
+        result_context about = from.context();
+        from.remark_fit(about);
+        from.add_mass(about);
+        from.add_sigma(about);
+        *result = face::result_of(from, std::move(about));
+    });
+}
+
+int32_t okid_host_stream_state(okid_host_stream_t* self, const void** state, size_t* bytes) {
+    return face::guard([&] {
+        self->state = self->stream.sums().state();
+        *state = self->state.data();
+        *bytes = self->state.size();
+    });
+}
+
+int32_t okid_host_stream_restore(okid_host_stream_t* self, const void* state, size_t bytes) {
+    return face::guard([&] { self->stream.restore(state, bytes); });
+}
+
+int32_t okid_host_stream_merge(okid_host_stream_t* self, const void* state, size_t bytes) {
+    return face::guard([&] { self->stream.sums().merge(state, bytes); });
+}
+
+void okid_host_stream_delete(okid_host_stream_t* self) { delete self; }
