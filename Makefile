@@ -51,7 +51,7 @@ bench: build ## speed of the kernels and of whole identifications as ratios with
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --save build/bench.json
 	@$(PYTHON) tests/bench/python_call.py build/bench.json
 	@$(PYTHON) tests/bench/campaign.py 1000 5 build/bench.json
-	@PYTHONPATH=tests/property:tests/io OPENBLAS_NUM_THREADS=1 $(PYTHON) tests/bench/live_latency.py
+	@PYTHONPATH=tests/support OPENBLAS_NUM_THREADS=1 $(PYTHON) tests/bench/live_latency.py
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
 	@$(PYTHON) tools/bench_check.py build/bench.json

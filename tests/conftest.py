@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""What all tests have in common: signals as a terminal gives them, and one browser for those that look at pages."""
+"""What all tests have in common: the helpers of tests/support, signals as a terminal gives them, and one browser for
+those that look at pages."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import signal
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent / "support"))
 
 # Under nohup, or behind an & of a script, these are ignored, and what the tests start would inherit that.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)

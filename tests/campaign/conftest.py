@@ -3,15 +3,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from distributed import Client, LocalCluster
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "property"))
 
 
 @pytest.fixture(scope="session")

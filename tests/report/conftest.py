@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,6 @@ from okid import report
 from okid.demo import demo_record
 from okid.report.svg import Pictures
 from report_files import write_csv, write_events
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "property"))
 
 HOSTILE = ["<script>alert(1)</script>", 'a$b</script><img src=x onerror="alert(2)">', "acc '3' & ]]> $\\frac$"]
 

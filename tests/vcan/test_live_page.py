@@ -8,20 +8,16 @@ import csv
 import json
 import shutil
 import signal
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from event_source import Listener, ask
+from live_process import Live
 from okid.frf import h1
 from test_vcan import OKID, Run, bus, interface, make_record, play, sh  # noqa: F401  (interface is a fixture)
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "live"))
-
-from event_source import Listener, ask  # noqa: E402
-from live_process import Live  # noqa: E402
 
 RATE, COLUMN = 500, 5  # samples/s; samples of a column of the lanes
 NAMES = ["force1", "acc1", "acc2"]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """One problem for every peer: the records of W1, W2, W3 as files, and the worst error of the modes that were found.
 
-Structures and noise are those of tests/property/systems.py: white forces, accelerometers on every mass, noise in
+Structures and noise are those of tests/support/systems.py: white forces, accelerometers on every mass, noise in
 percent of the root mean square of each sensor. True order and the same block rows for all.
 """
 

@@ -1,7 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""The helpers of tests/property."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "property"))
