@@ -13,7 +13,6 @@ import socket
 import struct
 import subprocess
 import threading
-import time
 import tty
 import zlib
 from collections.abc import Iterator
@@ -21,6 +20,7 @@ from typing import Any
 
 from cobs import cobs
 from command_help import OKID
+from waiting import until
 
 Event = dict[str, Any]
 CHAIN = "masses = [1.0, 0.8, 1.2]\nsprings = [3e4, 2e4, 2.5e4]\nsense_dofs = [1, 2, 3]\n"
@@ -159,13 +159,6 @@ class Line:
             packet = cobs.encode(plain + struct.pack("<I", zlib.crc32(plain))) + b"\0"
             while packet:
                 packet = packet[os.write(self.fd, packet) :]
-
-
-def until(what: Any, seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < end, "it did not come"
-        time.sleep(0.02)
 
 
 @contextlib.contextmanager

@@ -4,10 +4,7 @@
 from __future__ import annotations
 
 import functools
-import os
-import subprocess
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import okid
@@ -16,20 +13,12 @@ from hypothesis import strategies as st
 from okid.data.records import ROLES, Record
 from scipy.signal import cont2discrete, dlsim
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("OKID_PROGRAM") or str(ROOT / "build" / "okid")
 # The same examples every time; each one writes over the file of the one before.
 steady = settings(
     deadline=None, derandomize=True, database=None, max_examples=25, print_blob=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )  # fmt: skip
 NAMES = ["shaker", "storey1", "storey2", "storey3"]
-
-
-def program(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """`okid ARGUMENTS`; whatever its exit code is."""
-    words = [PROGRAM, *map(str, arguments)]
-    return subprocess.run(words, capture_output=True, text=True, timeout=120, stdin=subprocess.DEVNULL, check=False)
 
 
 @functools.cache

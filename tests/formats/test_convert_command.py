@@ -19,7 +19,8 @@ from okid.data.records import Record
 from okid.formats import read_record, write_csv, write_log
 from okid.formats.command import main
 from okid.formats.hdf5 import read_hdf5_result
-from sample_records import full_record, identified, program, shaken_frame
+from program import okid as okid_program
+from sample_records import full_record, identified, shaken_frame
 
 GEOMETRY = """
 [geometry]
@@ -87,14 +88,14 @@ def test_logs_both_ways_and_replayed(tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
     names = {"--log": "a.log", "--truth": "t.json", "--config": "c.toml", "--dbc": "a.dbc"}
     options = [part for option, name in names.items() for part in (option, tmp_path / name)]
-    assert program("simulate", tmp_path / "rig.toml", *options).returncode == 0
+    assert okid_program("simulate", tmp_path / "rig.toml", *options).returncode == 0
     assert main([str(tmp_path / "a.log"), str(tmp_path / "b.blf")]) == 0
     assert main([str(tmp_path / "b.blf"), str(tmp_path / "c.can.csv")]) == 0
     assert main([str(tmp_path / "c.can.csv"), str(tmp_path / "d.mf4")]) == 0
     assert main([str(tmp_path / "d.mf4"), str(tmp_path / "e.log")]) == 0
     modes = []
     for name in ("a.log", "e.log"):
-        done = program("replay", tmp_path / name, "-c", tmp_path / "c.toml", "--json", "-")
+        done = okid_program("replay", tmp_path / name, "-c", tmp_path / "c.toml", "--json", "-")
         assert done.returncode == 0, done.stderr
         modes.append(json.loads(done.stdout)["modes"])
     assert modes[0] == modes[1]

@@ -13,7 +13,8 @@ import pytest
 from hypothesis import given
 from okid.data.records import Record, read_csv
 from okid.formats import read_record, write_csv, write_record
-from sample_records import NAMES, assert_same, full_record, program, records, shaken_frame, steady
+from program import okid as okid_program
+from sample_records import NAMES, assert_same, full_record, records, shaken_frame, steady
 
 
 def test_everything_comes_back(tmp_path: Path) -> None:
@@ -42,7 +43,7 @@ def test_okid_identify_finds_the_same_as_identify(tmp_path: Path, ending: str) -
     record = Record(list(NAMES), np.hstack([u, y]), 1000.0, ["N", *["m/s^2"] * 3], "frame fs_hz = 7")
     write_record(tmp_path / f"a.{ending}", record)
     write_csv(tmp_path / "b.csv", read_record(tmp_path / f"a.{ending}"))
-    done = program(
+    done = okid_program(
         "identify", tmp_path / "b.csv", "--inputs", NAMES[0], "--outputs", ",".join(NAMES[1:]), "--json", "-"
     )
     assert done.returncode == 0, done.stderr

@@ -13,7 +13,8 @@ from hypothesis import given
 from okid.data.records import Record
 from okid.formats import read_mat, write_mat, write_result
 from okid.formats.mat import read_mat_result
-from sample_records import assert_same, full_record, identified, program, records, shaken_frame, steady
+from program import okid as okid_program
+from sample_records import assert_same, full_record, identified, records, shaken_frame, steady
 from scipy.io import loadmat, savemat
 
 
@@ -97,7 +98,7 @@ def test_result_has_what_identify_model_writes(tmp_path: Path) -> None:
     seen = loadmat(tmp_path / "r.mat", squeeze_me=True)
     u, y = shaken_frame()
     okid.formats.write_csv(tmp_path / "a.csv", Record(["u", "y1", "y2", "y3"], np.hstack([u, y]), 1000.0))
-    done = program(
+    done = okid_program(
         "identify", tmp_path / "a.csv", "--inputs", "u", "--outputs", "y1,y2,y3", "--model", tmp_path / "m.mat"
     )
     assert done.returncode == 0, done.stderr

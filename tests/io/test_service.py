@@ -12,7 +12,7 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ import program
 import pytest
 from lines import Line, line, packet
 from two_masses import rig_text
+from waiting import until
 
 ROOT = Path(__file__).resolve().parents[2]
 RATE_HZ = 250
@@ -30,16 +31,6 @@ at_s = 60.0
 springs = [3e4, 1.8e4]
 """
 )
-
-
-def until(what: Callable[[], Any], seconds: float = 30) -> Any:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        found = what()
-        if found:
-            return found
-        time.sleep(0.02)
-    raise AssertionError("it did not come in time")
 
 
 class Manager:
@@ -244,11 +235,7 @@ def test_unit_file() -> None:
     """The unit as systemd reads it: every line known, and little is left that it may do."""
     unit = ROOT / "packaging" / "okid.service"
     analyse = shutil.which("systemd-analyze")
-    if analyse is None:  # not part of every container: then at least the lines that matter
-        text = unit.read_text()
-        for wanted in ["Type=notify", "WatchdogSec=", "NoNewPrivileges=yes", "User=okid", "DevicePolicy=closed"]:
-            assert wanted in text
-        return
+    assert analyse is not None, "systemd-analyze is missing: apt-get install systemd"
     done = subprocess.run([analyse, "verify", unit], capture_output=True, text=True, timeout=60, check=False)
     complaints = [text for text in done.stderr.splitlines() if "is not executable" not in text and "okid" in text]
     assert not complaints

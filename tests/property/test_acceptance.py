@@ -10,12 +10,11 @@ import numpy as np
 import okid
 import pytest
 import systems
+from methods import HORIZON, METHODS, horizon
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 Array = NDArray[np.float64]
-METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
-HORIZON = {"w1": (40, 80, 40), "w2": (40, 80, 30), "w3": (40, 60, 25)}  # p, rows of okid, rows of n4sid
 QUANTITIES = ("f", "zeta", "M", "K", "R", "R by PDC", "alpha", "beta")
 # (structure, noise in percent) -> worst error of each of them over the seeds and methods of the specification
 ACCEPTED = {
@@ -33,10 +32,10 @@ def relative(found: Array, true: Array) -> float:
 
 
 def identify(s: systems.Structure, u: Array, y: Array, name: str, method: str, **options: Any) -> okid.Result:
-    p, rows, i = HORIZON[name]
-    reach: dict[str, Any] = {"rows": i} if method.startswith("n4sid") else {"p": p, "rows": rows}
     dofs: dict[str, Any] = {"input_dofs": [d + 1 for d in s.force_dofs], "output_dofs": [d + 1 for d in s.sense_dofs]}
-    result = okid.identify(u, y, fs=s.fs, method=method, detrend="none", sigma_blocks=0, **reach, **dofs, **options)
+    result = okid.identify(
+        u, y, fs=s.fs, method=method, detrend="none", sigma_blocks=0, **horizon(name, method), **dofs, **options
+    )
     assert result.order == 2 * len(s.M), result.table()  # found by itself
     return result
 

@@ -3,31 +3,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import okid
 import pytest
 from gram import solve_gram
+from measured_data import data_file
 from okid import Accumulator
 
-ROOT = Path(__file__).resolve().parents[2]
 FRAME_HZ = [62, 119, 155, 193, 215, 230, 239, 287, 321, 334, 352, 398, 417, 468]
 PLANE_HZ = [18.84, 40.18, 97.53, 105.19, 143.37, 166.27]
 PLANE_ALL_HZ = [*PLANE_HZ, 87.74, 89.63, 117.91, 125.2, 125.69, 129.74, 135.12]
-
-
-def data_file(name: str) -> Path:
-    folder = Path(os.environ.get("OKID_DATA") or ROOT.parent / "shared" / "data")
-    path = folder / name
-    if not path.is_file():
-        message = f"reference data not found: {path}; set OKID_DATA to the folder that holds it"
-        if os.environ.get("CI") == "true":
-            pytest.fail(message)
-        pytest.skip(message)
-    return path
 
 
 def found(result: okid.Result, wanted: Sequence[float], within_hz: float) -> list[float]:

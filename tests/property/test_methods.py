@@ -5,22 +5,20 @@ numbers from both. How exact they are: test_acceptance.py."""
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import okid
 import pytest
 import systems
+from measured_data import data_file
+from methods import METHODS, N4SID
 from numpy.typing import NDArray
+from program import ROOT
 from program import okid as run
 from scipy.signal import detrend
-from test_measured import data_file
 
-ROOT = Path(__file__).resolve().parents[2]
 Array = NDArray[np.float64]
-METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
-N4SID = METHODS[2:]
 CONFIG = '[identification]\nmethod = "okid-era"\np = 40\nrows = 80\n'
 
 
@@ -37,12 +35,6 @@ def of_result(s: systems.Structure, result: okid.Result) -> tuple[float, float]:
         np.array([mode.frequency_hz for mode in result.modes]),
         np.array([mode.damping_ratio for mode in result.modes]),
     )
-
-
-def program(*arguments: object) -> subprocess.CompletedProcess[str]:
-    done = run(*arguments)
-    assert done.returncode == 0, done.stderr
-    return done
 
 
 def write_csv(path: Path, fs: float, columns: dict[str, Array]) -> Path:
@@ -65,7 +57,7 @@ def test_program_equals_python(method: str, tmp_path: Path) -> None:
     rows = 20 if method in N4SID else 40
     options = ["--inputs", "u1,u2", "--outputs", ",".join(f"y{k}" for k in range(1, 7)), "--rows", rows, "--quiet"]
     options += [] if method in N4SID else ["--p", 20]
-    program("identify", path, *options, "--method", method, "--json", tmp_path / "r.json")
+    run("identify", path, *options, "--method", method, "--json", tmp_path / "r.json", status=0)
     shown = json.loads((tmp_path / "r.json").read_text())
     p = None if method in N4SID else 20
     own = okid.identify(u, y, fs=fs, method=method, p=p, rows=rows).to_dict()
@@ -96,7 +88,7 @@ def test_record_without_inputs(method: str, tmp_path: Path) -> None:
     assert min(v or 0.0 for v in result.fit.prediction_percent.values()) > 50.0
     path = write_csv(tmp_path / "ambient.csv", fs, channels(y[:, :0], y))
     options = ["--outputs", "y1,y2,y3", "--method", method, "--rows", 40, "--order", 6]
-    shown = json.loads(program("identify", path, *options, "--json", "-").stdout)
+    shown = json.loads(run("identify", path, *options, "--json", "-", status=0).stdout)
     assert shown["inputs"] == [] and shown["markov"]["Y"] == [] and shown["model"]["x0"] is None
     assert shown["fit"]["simulation_percent"] is None
     np.testing.assert_allclose(
@@ -104,7 +96,7 @@ def test_record_without_inputs(method: str, tmp_path: Path) -> None:
     )
     own = result.fit.prediction_percent
     assert shown["fit"]["prediction_percent"] == pytest.approx(own, abs=1e-6)
-    table = program("identify", path, *options, "--model", tmp_path / "model.mat").stdout
+    table = run("identify", path, *options, "--model", tmp_path / "model.mat", status=0).stdout
     assert "0 inputs" in table and "remark" not in table
 
 
@@ -124,7 +116,7 @@ def test_published_simulation_errors(
     """norm(y - simulated, 1) / norm(y, 1) from the result file alone: model, its initial state, the record."""
     file, (inputs, outputs) = data_file(path), names.split()
     options = ["--method", "n4sid-moesp", "--rows", rows, "--order", order, "--detrend", trend, "--fs", 100]
-    program("identify", file, "--inputs", inputs, "--outputs", outputs, *options, "--json", tmp_path / "r.json")
+    run("identify", file, "--inputs", inputs, "--outputs", outputs, *options, "--json", tmp_path / "r.json", status=0)
     model = json.loads((tmp_path / "r.json").read_text())["model"]
     v = np.genfromtxt(file, delimiter=",", comments="#")[1:]
     v = detrend(v, axis=0) if trend == "linear" else v
@@ -140,7 +132,7 @@ def test_remarks_on_what_is_not_used(tmp_path: Path) -> None:
     u, y = systems.record(s, 1000, 1.0, 2)
     path = write_csv(tmp_path / "short.csv", 1 / s.dt, channels(u, y))
     options = ["--inputs", "u1", "--outputs", "y1,y2,y3", "--method", "n4sid-moesp", "--p", 20, "--json", "-"]
-    shown = json.loads(program("identify", path, *options).stdout)
+    shown = json.loads(run("identify", path, *options, status=0).stdout)
     own = okid.identify(u, y, fs=1 / s.dt, method="n4sid-moesp", p=20)
     for codes in ([w["code"] for w in shown["warnings"]], [w.code for w in own.warnings]):
         assert {"p_ignored", "rows_reduced"} <= set(codes)
@@ -152,8 +144,8 @@ def test_remarks_on_what_is_not_used(tmp_path: Path) -> None:
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The demo rig: rig.log, rig.toml, truth.json."""
     folder = tmp_path_factory.mktemp("rig")
-    program("simulate", ROOT / "tests" / "replay" / "demo_rig.toml", "--log", folder / "rig.log", "--truth",
-            folder / "truth.json", "--dbc", folder / "okid.dbc", "--config", folder / "rig.toml")  # fmt: skip
+    run("simulate", ROOT / "tests" / "replay" / "demo_rig.toml", "--log", folder / "rig.log", "--truth",
+        folder / "truth.json", "--dbc", folder / "okid.dbc", "--config", folder / "rig.toml", status=0)  # fmt: skip
     assert CONFIG in (folder / "rig.toml").read_text()
     return folder
 
@@ -167,8 +159,8 @@ def test_replay_of_a_rig(method: str, rig: Path) -> None:
         .read_text()
         .replace(CONFIG, f'[identification]\nmethod = "{method}"\n' + ("" if method in N4SID else "p = 40\n"))
     )
-    assert method in program("check", config).stdout
-    program("replay", rig / "rig.log", "-c", config, "--json", rig / f"{method}.json")
+    assert method in run("check", config, status=0).stdout
+    run("replay", rig / "rig.log", "-c", config, "--json", rig / f"{method}.json", status=0)
     result, truth = (json.loads((rig / name).read_text()) for name in (f"{method}.json", "truth.json"))
     assert result["method"] == method
     assert result["rows"] == (30 if method in N4SID else 80)

@@ -18,12 +18,13 @@ import termios
 import threading
 import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from program import PROGRAM, okid
 from two_masses import rig_text, simulate_rig
+from waiting import until
 
 
 @pytest.fixture(scope="module")
@@ -54,16 +55,6 @@ def replaying(rig: pathlib.Path, section: str, *options: object, **how: Any) -> 
             yield run
         finally:
             run.kill()
-
-
-def until(what: Callable[[], Any], seconds: float = 20) -> Any:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        found = what()
-        if found:
-            return found
-        time.sleep(0.01)
-    raise AssertionError("it did not come in time")
 
 
 def connected(path: pathlib.Path) -> socket.socket:

@@ -10,8 +10,9 @@ import numpy as np
 import okid
 import pytest
 import systems
+from measured_data import data_file
 from program import okid as run
-from test_measured import FRAME_HZ, data_file
+from test_measured import FRAME_HZ
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -195,13 +195,17 @@ def test_a_short_horizon_is_called_biased() -> None:
     assert said[60] == []
 
 
-def test_a_record_too_short_for_blocks_says_so() -> None:
-    """No deviation is invented."""
+@pytest.mark.parametrize(
+    ("samples", "method", "asked", "said"),
+    [(330, "n4sid-moesp", {"rows": 30}, "rows_reduced"), (100, "okid-era-dc", {"p": 20}, "p_reduced")],
+)
+def test_the_shortest_records_are_cut_into_blocks_too(
+    samples: int, method: str, asked: dict[str, int], said: str
+) -> None:
+    """The horizon is cut to what the record bears, which is said; the blocks follow it: every mode has deviations."""
     u, y = systems.record(W1, 330, 1.0, 3)
-    result = identify(u, y, fs=W1.fs, method="n4sid-moesp", rows=30, order=6)
-    short = [w.code for w in result.warnings]
-    if result.rows * 2 * 8 > 330:
-        assert "no_deviation" in short
-        assert all(mode.frequency_std_hz is None for mode in result.modes)
-    else:
-        assert "no_deviation" not in short
+    result = identify(u[:samples], y[:samples], fs=W1.fs, method=method, order=6, **asked)
+    codes = {w.code for w in result.warnings}
+    assert said in codes and "no_deviation" not in codes
+    assert len(result.modes) == 3
+    assert all((m.frequency_std_hz or 0.0) > 0.0 and (m.damping_ratio_std or 0.0) > 0.0 for m in result.modes)

@@ -2,35 +2,15 @@
 """Measured records through the whole front end: CSV -> CAN frames -> replay -> grid -> okid-era."""
 
 import json
-import os
 import pathlib
-import subprocess
 
 import measured_can
 import numpy as np
-import pytest
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-OKID = os.environ.get("OKID_PROGRAM", str(ROOT / "build" / "okid"))
-DATA = pathlib.Path(os.environ.get("OKID_DATA", ROOT.parent / "shared" / "data"))
+from measured_data import data_file
+from program import okid
 
 FLEXIBLE_PEAKS = [62, 119, 155, 193, 215, 230, 239, 287, 321, 334, 352, 398, 417, 468]
 HAMMER_POLES = [18.84, 40.18, 97.53, 105.19, 143.37, 166.27]
-
-
-def data_file(*parts: str) -> pathlib.Path:
-    path = DATA.joinpath(*parts)
-    if not path.is_file():
-        message = f"reference data not found: {path.name}; set OKID_DATA to the folder of measured records"
-        if os.environ.get("CI") == "true":
-            pytest.fail(message)
-        pytest.skip(message)
-    return path
-
-
-def okid(*arguments: object) -> None:
-    done = subprocess.run([OKID, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
 
 
 def through_the_front_end(
@@ -40,11 +20,11 @@ def through_the_front_end(
     config = tmp_path / "rig.toml"
     measured_can.write_config(config, record, inputs, rate_hz, settings)
     measured_can.write_csv(tmp_path / "rig.csv", record, rate_hz)
-    okid("convert", tmp_path / "rig.csv", tmp_path / "rig.log", "-c", config)
+    okid("convert", tmp_path / "rig.csv", tmp_path / "rig.log", "-c", config, status=0)
     frames = sum(1 for _ in (tmp_path / "rig.log").open())
     assert frames == len(record.values) * -(-len(record.names) // 3)
     out = ["--events", tmp_path / "events.jsonl", "--json", tmp_path / "r.json"]
-    okid("replay", tmp_path / "rig.log", "-c", config, *out)
+    okid("replay", tmp_path / "rig.log", "-c", config, *out, status=0)
     events = [json.loads(line) for line in (tmp_path / "events.jsonl").open()]
     assert events[0]["type"] == "start"
     assert events[-1]["type"] == "result"
@@ -105,7 +85,7 @@ def test_hammer_from_rest(tmp_path: pathlib.Path) -> None:
     channels = ["--inputs", "force_N", "--outputs", "acc1_g,acc2_g,acc3_g", "--hold", "foh"]
     results = {}
     for start in ("moving", "rest"):
-        okid("identify", path, *channels, "--start", start, "--quiet", "--json", tmp_path / f"{start}.json")
+        okid("identify", path, *channels, "--start", start, "--quiet", "--json", tmp_path / f"{start}.json", status=0)
         results[start] = json.loads((tmp_path / f"{start}.json").read_text())
         assert found(results[start], HAMMER_POLES, 0.5) == HAMMER_POLES
     codes = {start: {w["code"] for w in result["warnings"]} for start, result in results.items()}

@@ -11,9 +11,9 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("OKID_PROGRAM") or str(ROOT / "build" / "okid")
 
 
-def okid(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """`okid ARGUMENTS` without a terminal; whatever its exit code is."""
-    return subprocess.run(
+def okid(*arguments: object, status: int | None = None) -> subprocess.CompletedProcess[str]:
+    """`okid ARGUMENTS` without a terminal; whatever its exit code is, or with the one that is asked for."""
+    done = subprocess.run(
         [PROGRAM, *map(str, arguments)],
         capture_output=True,
         text=True,
@@ -21,3 +21,8 @@ def okid(*arguments: object) -> subprocess.CompletedProcess[str]:
         stdin=subprocess.DEVNULL,
         check=False,
     )
+    if status is not None:
+        assert (
+            done.returncode == status
+        ), f"okid {' '.join(map(str, arguments))}: {done.returncode}\n{done.stdout}{done.stderr}"
+    return done
