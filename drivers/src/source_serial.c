@@ -5,7 +5,6 @@
 //          packet back from its arrival at the sample rate; the device's clock, unwrapped, goes along
 #include "line_link.h"
 
-#include <drv/host_clock.h>
 #include <drv/line_frame.h>
 
 #include <errno.h>
@@ -26,6 +25,8 @@ typedef struct serial_t {
     unsigned sample, field; ///< of the packet at hand, next to go out
     int open_packet;
     unsigned reads;
+    uint16_t kind;           ///< first field of the packets that count the samples of a line without any time
+    uint64_t passed, before; ///< samples of that kind so far; before the packet at hand
     // the device's clock, unwrapped
     int timed;
     uint64_t device_ns, device_wrapped_ns;
@@ -80,18 +81,27 @@ static void unwrap_time(serial_t* state, const drv_packet_t* packet) {
     state->device_seen_ns = state->arrived_ns;
 }
 
+/// Host time of the sample at hand. Bytes that nobody stamped (a file of them) begin at 1 s.
+static int64_t stamp(const serial_t* state, const drv_packet_t* packet) {
+    const unsigned behind = packet->samples - 1U - state->sample;
+    if (state->arrived_ns != 0) {
+        const size_t unread = state->decoder.end - state->decoder.begin + state->link.waiting;
+        return state->arrived_ns - (int64_t)unread * byte_ns - (int64_t)((double)behind * state->period_ns);
+    }
+    if (packet->timed) return 1000000000 + (int64_t)state->device_ns + (int64_t)(state->sample * state->period_ns);
+    return 1000000000 + (int64_t)((double)(state->before + state->sample) * state->period_ns);
+}
+
 /// The next frame of the packet at hand.
 static void next_frame(drv_source_t* self, serial_t* state, drv_frame_t* frame) {
     const drv_packet_t* packet = &state->decoder.packet;
     const unsigned together = drv_framing_fields(state->decoder.framing);
     const unsigned left = packet->fields - state->field;
-    const unsigned behind = packet->samples - 1U - state->sample;
     memset(frame, 0, offsetof(drv_frame_t, data));
     drv_line_frame_fill(
         frame, (packet->first_field + state->field) / together, packet->counted ? packet->sequence + state->sample : 0,
         packet->values + (size_t)state->sample * packet->fields + state->field, left < together ? left : together);
-    const int64_t unread_ns = (int64_t)(state->decoder.end - state->decoder.begin) * byte_ns;
-    frame->time_ns = state->arrived_ns - unread_ns - (int64_t)((double)behind * state->period_ns);
+    frame->time_ns = stamp(state, packet);
     if (packet->timed) {
         frame->hw_time_ns = (int64_t)(state->device_ns + (uint64_t)((double)state->sample * state->period_ns));
         if (frame->hw_time_ns == 0) frame->hw_time_ns = 1; // 0 means none
@@ -105,6 +115,14 @@ static void next_frame(drv_source_t* self, serial_t* state, drv_frame_t* frame) 
     if (++state->sample == packet->samples) state->open_packet = 0;
 }
 
+/// Devices that send one packet for each quantity send all of them once a sample: those of the first kind count.
+static void count_samples(serial_t* state, const drv_packet_t* packet) {
+    if (state->passed == 0) state->kind = packet->first_field;
+    if (packet->first_field != state->kind) return;
+    state->before = state->passed;
+    state->passed += packet->samples;
+}
+
 static int next_packet(drv_source_t* self, serial_t* state) {
     const int found = drv_decoder_next(&state->decoder);
     self->counts.damaged = state->decoder.damaged;
@@ -114,21 +132,22 @@ static int next_packet(drv_source_t* self, serial_t* state) {
     state->open_packet = 1;
     state->sample = state->field = 0;
     unwrap_time(state, &state->decoder.packet);
+    count_samples(state, &state->decoder.packet);
     return 1;
 }
 
 /// @return 1 when more bytes came
 static int fetch(drv_source_t* self, serial_t* state) {
     uint8_t* at = NULL;
-    int fresh = 0;
+    int torn = 0;
     const size_t room = drv_decoder_room(&state->decoder, &at);
-    const int got = line_link_read(&state->link, self, at, room, &fresh);
-    if (state->link.port.fd < 0 || fresh) { // what was begun is never finished
+    const int got = line_link_read(&state->link, self, at, room, &torn);
+    if (torn) { // what was begun is never finished
         if (got > 0) memmove(state->decoder.bytes, at, (size_t)got);
         drv_decoder_restart(&state->decoder);
     }
     if (got <= 0) return 0;
-    state->arrived_ns = drv_host_time_ns();
+    state->arrived_ns = line_link_time(&state->link);
     drv_decoder_add(&state->decoder, (size_t)got);
     if (++state->reads % READS_BETWEEN_COUNTS == 0) line_link_count(&state->link, self);
     return 1;
@@ -141,7 +160,7 @@ static int serial_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
     while (count < capacity) {
         if (state->open_packet || next_packet(self, state))
             next_frame(self, state, &frames[count++]);
-        else if (reads++ == READS_A_CALL || !fetch(self, state))
+        else if ((reads++ >= READS_A_CALL && state->link.waiting == 0) || !fetch(self, state))
             break;
     }
     return count;

@@ -4,7 +4,6 @@
 //          frame. The adapter's stamps, milliseconds of a minute, are unwrapped with the host's clock
 #include "line_link.h"
 
-#include <drv/host_clock.h>
 #include <drv/slcan.h>
 
 #include <errno.h>
@@ -54,7 +53,7 @@ static int slcan_open(drv_source_t* self, const drv_source_config_t* config) {
     }
     const int length = opening_of(&config->line, state->opening, self->error, sizeof self->error);
     int status = length < 0 ? -EINVAL : line_link_open(&state->link, self, &config->line);
-    if (status == 0) {
+    if (status == 0 && !state->link.pushed) {
         state->opening_length = (size_t)length;
         status = send_opening(state);
         if (status != 0) {
@@ -143,20 +142,20 @@ static int next_frame(drv_source_t* self, slcan_t* state, drv_frame_t* frame) {
 }
 
 static int fetch(drv_source_t* self, slcan_t* state) {
-    int fresh = 0;
+    int torn = 0;
     memmove(state->bytes, state->bytes + state->begin, state->end - state->begin);
     state->end -= state->begin;
     state->begin = 0;
     const int got = line_link_read(&state->link, self, (uint8_t*)state->bytes + state->end,
-                                   sizeof state->bytes - state->end, &fresh);
-    if (state->link.port.fd < 0 || fresh) {
+                                   sizeof state->bytes - state->end, &torn);
+    if (torn) {
         if (got > 0) memmove(state->bytes, state->bytes + state->end, (size_t)got);
         state->end = 0;
         state->joined = state->endless = 0;
     }
-    if (fresh && state->link.port.fd >= 0) (void)send_opening(state);
+    if (torn && state->link.port.fd >= 0) (void)send_opening(state);
     if (got <= 0) return 0;
-    state->arrived_ns = drv_host_time_ns();
+    state->arrived_ns = line_link_time(&state->link);
     state->end += (size_t)got;
     return 1;
 }
@@ -168,7 +167,7 @@ static int slcan_read(drv_source_t* self, drv_frame_t* frames, int capacity) {
     while (count < capacity) {
         if (next_frame(self, state, &frames[count]))
             ++count;
-        else if (reads++ == READS_A_CALL || !fetch(self, state))
+        else if ((reads++ >= READS_A_CALL && state->link.waiting == 0) || !fetch(self, state))
             break;
     }
     return count;

@@ -19,6 +19,7 @@ struct bus_event {
 class bus_watch {
   public:
     explicit bus_watch(std::string interface) : interface_(std::move(interface)) {}
+    const std::string& interface() const { return interface_; }
     /// Compare with the last look. What floods (losses, missing acknowledgements) is urgent the first time only.
     std::vector<bus_event> look(const drv_stats_t& now);
 

@@ -49,6 +49,7 @@ OKID_HOST_API int32_t okid_host_error_status(void);
 }
 #endif
 
+#include <okid_host/capture.h>
 #include <okid_host/files.h>
 #include <okid_host/record.h>
 #include <okid_host/stream.h>

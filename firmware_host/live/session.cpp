@@ -65,7 +65,10 @@ ordered_json clock_json(const drv_clock_fit_t& clock) {
 
 session::session(const live_config& config, const session_options& options)
     : config_(config), options_(options),
-      publisher_(config, {options.events, options.events != "-" && options.json != "-", options.live}),
+      publisher_(config,
+                 {options.events, options.table && options.events != "-" && options.json != "-", options.live,
+                  options.listener ? [to = options.listener](const std::string& line) { to->on_event(line); }
+                                   : std::function<void(const std::string&)>()}),
       grid_(config, *this), check_(config), stream_(stream_of(config)), identifier_(stream_.sums()),
       alarm_(config.alarm), trigger_(config), hammer_(config, identifier_.lags()), losses_(config.buses.size()),
       health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
@@ -130,6 +133,8 @@ void session::on_sample(std::int64_t index, const double* row) {
     now_ = index + 1;
     last_ = {index, grid_.time_ns(index)};
     if (first_.ns == 0) first_ = last_;
+    if (options_.listener) options_.listener->on_sample(index, row);
+    if (!options_.identify) return;
     if (feed_) send_samples(feed_->add(index, row));
     if (hammer_.wanted()) {
         if (hammer_.add(index, row, 1)) strike();
@@ -149,6 +154,8 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
     if (limit_ > 0) count = std::min(count, limit_ - index);
     if (count <= 0) return;
     now_ = index + count;
+    if (options_.listener) options_.listener->on_missing(index, count);
+    if (!options_.identify) return;
     if (feed_) send_samples(feed_->end_block());
     if (hammer_.wanted()) {
         if (hammer_.add(index, nullptr, count)) strike();
@@ -223,6 +230,7 @@ lamp_state session::lamps() const {
 
 void session::on_gap(const grid_gap& gap) {
     ++gaps_;
+    if (options_.listener) options_.listener->on_gap(gap);
     tell({{"type", "gap"},
           {"t", seconds(std::max(now_, gap.last + 1))},
           {"channel", config_.channels[gap.channel].name},
@@ -268,7 +276,7 @@ void session::record_event(const std::string& kind, const std::string& text) {
     tell({{"type", "record"}, {"t", seconds(now_)}, {"event", kind}, {"text", text}});
 }
 
-void session::write_stats() {
+ordered_json session::stats_event() const {
     ordered_json event{
         {"type", "stats"}, {"t", seconds(now_)}, {"bus", ordered_json::object()}, {"channel", ordered_json::object()}};
     for (std::size_t i = 0; i < config_.buses.size(); ++i) event["bus"][config_.buses[i].name] = bus_stats(i);
@@ -286,7 +294,7 @@ void session::write_stats() {
             {{"skew_us", skew.us}, {"skew_std_us", skew.std_us}, {"rate_ppm", skew.rate_ppm}});
     const double rate_hz = observed_rate_hz();
     event["rate_hz_by_stamps"] = rate_hz > 0 ? ordered_json(rate_hz) : ordered_json(nullptr);
-    tell(event);
+    return event;
 }
 
 /// Why nothing of a channel is on the grid, though the stream is.
@@ -381,8 +389,9 @@ void session::finish() {
     grid_.finish();
     if (feed_) send_samples(feed_->end_block());
     start(std::int64_t{std::time(nullptr)} * 1000000000); // nothing was heard at all
-    const okid_status_t status = identifier_.run();
-    write_stats();
+    const okid_status_t status = options_.identify ? identifier_.run() : OKID_OK;
+    tell(stats_event());
+    if (!options_.identify) return publisher_.finish();
     check_heard();
     if (trigger_.waiting()) throw failure(exit_no_model, trigger_.missed());
     if (const std::string lacking = hammer_.shortfall(); !lacking.empty()) {
@@ -407,7 +416,7 @@ void session::finish() {
     if (to_file) write_whole_file(options_.json, text); // first: whoever reads the events may hold up the end of them
     publisher_.finish();
     if (!options_.json.empty() && !to_file) write_whole_file("-", text);
-    if (!publisher_.events_on_stdout() && options_.json != "-")
+    if (options_.table && !publisher_.events_on_stdout() && options_.json != "-")
         write_whole_file("-", result_table(identifier_.model(), about));
 }
 

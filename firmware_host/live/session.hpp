@@ -21,11 +21,20 @@
 
 namespace okid_host {
 
+/// Looks on beside the files and terminals: every sample and gap of the grid, every event as a line.
+class session_listener : public grid_sink {
+  public:
+    virtual void on_event(const std::string& line) = 0;
+};
+
 struct session_options {
     std::optional<double> duration_s;       ///< stream seconds
     std::string events, json;               ///< files, "-" = stdout, "" = none
     std::optional<std::int64_t> trigger_ns; ///< a log holds no edge of a GPIO line: when it came
     bool live = false;                      ///< from devices: the clock does not wait, and a service manager may
+    bool identify = true;                   ///< false: samples, gaps and counts only; no trigger, no result
+    bool table = true;                      ///< modes and result on stdout, unless something else goes there
+    session_listener* listener = nullptr;
 };
 
 class session : public stream_target, private grid_sink {
@@ -42,6 +51,7 @@ class session : public stream_target, private grid_sink {
     bool triggered() const override { return !trigger_.waiting(); }
     lamp_state lamps() const override;
     bool done() const override { return (limit_ > 0 && grid_.emitted() >= limit_) || hammer_.done(); }
+    nlohmann::ordered_json stats_event() const; ///< the counts by now
     double stream_s() const { return static_cast<double>(grid_.emitted()) / config_.rate_hz; }
     bool heard() const override { return started_; }
     stream_check& check() override { return check_; }
@@ -68,7 +78,6 @@ class session : public stream_target, private grid_sink {
     void tell_modes(const table_state& state, const deviations* sigma);
     void tell_alarm(double t);
     void send_samples(const json_line& block);
-    void write_stats();
     std::string silence(std::size_t index) const;
     void check_heard() const;
     nlohmann::ordered_json bus_stats(std::size_t bus) const;

@@ -30,7 +30,7 @@ void session::update(std::int64_t samples) {
     }
     if (samples / stats_samples_ == stats_told_) return;
     stats_told_ = samples / stats_samples_;
-    write_stats();
+    tell(stats_event());
 }
 
 /// What is waited for, above the modes of the blows so far.

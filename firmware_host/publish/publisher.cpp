@@ -65,13 +65,14 @@ void publisher::wake() const {
 }
 
 void publisher::event(nlohmann::ordered_json event, double wall_s) {
-    if (!events_ && sinks_.empty()) return;
+    if (!events_ && sinks_.empty() && !options_.listener) return;
     publication one;
     one.wall_s = wall_s;
     one.type = event.value("type", "");
     one.line = std::make_shared<const std::string>(
         event.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
     one.event = std::make_shared<const nlohmann::ordered_json>(std::move(event));
+    if (options_.listener) options_.listener(*one.line);
     if (events_) events_->put(one.line);
     if (!sinks_.empty()) hand_over(std::move(one));
 }

@@ -12,6 +12,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -25,6 +26,7 @@ struct publisher_options {
     std::string events;      ///< file, "-" = stdout, "" = none
     bool show_table = false; ///< on stdout
     bool live = false;       ///< the clock does not wait: what is behind loses events instead
+    std::function<void(const std::string&)> listener; ///< gets every event as a line, on the thread of event()
 };
 
 class publisher {

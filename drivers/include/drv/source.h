@@ -37,7 +37,8 @@ typedef struct drv_filter_t {
 
 /// Of a serial line.
 typedef struct drv_line_config_t {
-    const char* device;    ///< best of /dev/serial/by-id/: that name finds the device again after it was unplugged
+    const char* device;    ///< best of /dev/serial/by-id/: that name finds the device again after it was unplugged;
+                           ///< NULL = the bytes come from drv_line_push()
     int32_t baud;          ///< bit/s of the line
     drv_framing_t framing; ///< serial
     int32_t counter;       ///< serial, lines of text: 1 + the field that counts samples, 0 = none
@@ -126,6 +127,14 @@ extern const drv_source_ops_t drv_source_replay;    ///< a `candump -L` text log
 extern const drv_source_ops_t drv_source_journal;   ///< a journal and the segments behind it, journal.h; every bus
 extern const drv_source_ops_t drv_source_serial;    ///< a serial line of samples, line_frame.h
 extern const drv_source_ops_t drv_source_slcan;     ///< a CAN adapter on a serial line
+
+/// Bytes for a serial or slcan source that was opened without a device. They are not copied: read() until it returns 0.
+/// @param arrived_ns  host time, 0 = not known: samples of a serial line are then stamped by the device's clock or, where
+///                    it tells none, one sample period apart
+void drv_line_push(drv_source_t* self, const uint8_t* bytes, size_t count, int64_t arrived_ns);
+
+/// The line of such a source went away: what was begun is never finished, and the next frame is marked DRV_LOSS_LINK.
+void drv_line_break(drv_source_t* self);
 
 #ifdef __cplusplus
 }
