@@ -7,11 +7,13 @@
 #include "acquire/gpio_lines.hpp"
 #include "acquire/playback.hpp"
 #include "acquire/serial_line.hpp"
+#include "files.hpp"
 #include "guard.hpp"
 #include "journal/recording_link.hpp"
 #include "live/session.hpp"
 
 #include <drv/can_error.h>
+#include <drv/stream.h>
 #include <fmt/format.h>
 #include <mutex>
 #include <okid_host/capture.h>
@@ -19,21 +21,12 @@
 namespace okid_host::face {
 namespace {
 
-live_config config_of(const okid_host_capture_options_t& options) {
+live_config config_of(const okid_host_config_t& given, const okid_host_capture_options_t& options) {
     if (options.size != sizeof options)
         throw failure(exit_usage, fmt::format("okid_host_capture_options_t: found size {}, expected {}: call "
                                               "okid_host_capture_defaults() first, and compile against this library",
                                               options.size, sizeof options));
-    if (!options.config) throw failure(exit_usage, "okid_host_capture_options_t: config is missing");
-    live_config config;
-    if (options.text) {
-        config_texts texts;
-        texts.config = options.text;
-        for (int i = 0; i < options.text_count; ++i) texts.dbcs[options.dbc_names[i]] = options.dbc_texts[i];
-        config = load_config(options.config, texts);
-    } else {
-        config = load_config(options.config);
-    }
+    live_config config = given.config;
     require_identifiable(config);
     if (!options.identify) {
         config.publish = {};
@@ -99,7 +92,7 @@ class waiting_rows {
 using namespace okid_host;
 
 struct okid_host_capture_t final : private session_listener {
-    explicit okid_host_capture_t(const okid_host_capture_options_t& given);
+    okid_host_capture_t(const okid_host_config_t& config, const okid_host_capture_options_t& given);
     void push(const drv_frame_t& frame);
     void push_bytes(std::size_t bus, const std::uint8_t* bytes, std::size_t count, std::int64_t time_ns);
     void link(std::size_t bus, bool up);
@@ -149,8 +142,8 @@ struct okid_host_capture_t final : private session_listener {
     std::unique_ptr<recording_link> recording_;
 };
 
-okid_host_capture_t::okid_host_capture_t(const okid_host_capture_options_t& given)
-    : config_(face::config_of(given)), keep_samples_(given.keep_samples != 0), keep_events_(given.keep_events != 0),
+okid_host_capture_t::okid_host_capture_t(const okid_host_config_t& config, const okid_host_capture_options_t& given)
+    : config_(face::config_of(config, given)), keep_samples_(given.keep_samples != 0), keep_events_(given.keep_events != 0),
       live_(given.live != 0) {
     session_options options;
     if (given.duration_s > 0) options.duration_s = given.duration_s;
@@ -318,9 +311,10 @@ void okid_host_capture_defaults(okid_host_capture_options_t* options) {
     options->identify = 1;
 }
 
-int okid_host_capture_create(const okid_host_capture_options_t* options, okid_host_capture_t** out) {
+int okid_host_capture_create(const okid_host_config_t* config, const okid_host_capture_options_t* options,
+                             okid_host_capture_t** out) {
     *out = nullptr;
-    return face::guard([&] { *out = new okid_host_capture_t(*options); });
+    return face::guard([&] { *out = new okid_host_capture_t(*config, *options); });
 }
 
 void okid_host_capture_delete(okid_host_capture_t* self) { delete self; }
@@ -396,4 +390,22 @@ const char* okid_host_capture_stats(okid_host_capture_t* self) {
 
 int okid_host_capture_finish(okid_host_capture_t* self) {
     return face::guard([&] { self->finish(); });
+}
+
+size_t okid_host_packet_encode(int32_t format, size_t channels, size_t samples, uint32_t sequence, uint32_t time_us,
+                               const double* values, uint8_t* out, size_t capacity) {
+    const bool fits = format >= DRV_STREAM_INT16 && format <= DRV_STREAM_FLOAT32 && channels > 0 && channels < 256 &&
+                      samples > 0 && samples < 256;
+    const drv_stream_header_t header{static_cast<drv_stream_format_t>(fits ? format : 0), static_cast<uint8_t>(channels),
+                                     static_cast<uint8_t>(samples), sequence, time_us};
+    if (!fits || drv_stream_bytes(&header) == 0) return 0;
+    size_t written = 0;
+    (void)face::guard([&] {
+        const double* const end = values + channels * samples;
+        if (format == DRV_STREAM_FLOAT32)
+            written = drv_stream_encode_floats(&header, std::vector<float>(values, end).data(), out, capacity);
+        else
+            written = drv_stream_encode_codes(&header, std::vector<std::int32_t>(values, end).data(), out, capacity);
+    });
+    return written;
 }

@@ -22,9 +22,9 @@ def frames(path: Path) -> list[can.Message]:
     return list(capture.log_messages(path))
 
 
-def samples_of(log: Path, config: Path) -> tuple[NDArray[np.float64], capture.CanSamples]:
+def samples_of(log: Path, config: Path) -> tuple[NDArray[np.float64], capture.Capture]:
     """The samples of a log by the package, and its counts."""
-    kept = capture.CanSamples(capture.load_config(config))
+    kept = capture.Capture(config, identify=False)
     blocks = list(capture.can_blocks(capture.log_messages(log), kept.config, samples=kept))
     return np.vstack(blocks), kept
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import inspect
+import os
 import random
 import tracemalloc
 from pathlib import Path
@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 from captured import edited, samples_by_program, samples_of
 from okid import capture
-from okid.capture.grid import Grid
-from okid.capture.lane import BusCounts, Frame
 
 
 def battered(lines: list[str], seed: int) -> list[str]:
@@ -167,48 +165,62 @@ def test_multiplexed_signals(tmp_path: Path) -> None:
     assert np.allclose(rows, np.column_stack([0.5 * k, 0.25 * k + 1]))
 
 
-def test_a_long_silence_is_missing_samples_and_no_memory() -> None:
-    grid, counts = Grid(1000.0, 1), BusCounts()
-    lane = grid.add_lane([0], counts, 16)
-    for k in [*range(100), 100 + 3_600_000, 101 + 3_600_000]:
-        grid.push(lane, Frame(k * 1000, [1.0], k & 0xFFFF))
-    grid.finish()
-    tracemalloc.start()
-    blocks = grid.take()
-    assert tracemalloc.get_traced_memory()[0] < 1 << 20
-    tracemalloc.stop()
-    assert sum(map(len, blocks)) == 3_600_102
-    assert counts.lost_in_all == 3_600_000
+def counted(k: int) -> can.Message:
+    return can.Message(100.0 + k / 1000, 0x10, is_extended_id=False, data=(k & 0xFFFF).to_bytes(2, "little") + b"\1\0")
 
 
-def held_by_the_grid() -> int:
-    """Bytes asked for by the grid and by this file: other threads of the process allocate too."""
-    package = Path(inspect.getfile(Grid)).parent
-    mine = tracemalloc.Filter(True, __file__), tracemalloc.Filter(True, f"{package}/*")
-    return sum(trace.size for trace in tracemalloc.take_snapshot().filter_traces(mine).traces)
+COUNTED = """[acquisition]
+rate_hz = 1000.0
+[[bus]]
+name = "can0"
+interface = "can0"
+[[channel]]
+name = "a"
+role = "acceleration"
+can_id = 0x10
+start_bit = 16
+length = 16
+sequence = { start_bit = 0, length = 16 }
+"""
 
 
-def test_memory_does_not_grow_with_the_stream() -> None:
-    grid, counts = Grid(1000.0, 2), BusCounts()
-    lanes = [grid.add_lane([column], counts, bits) for column, bits in ((0, 16), (1, None))]
+def test_a_long_silence_is_missing_samples_and_no_memory(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(COUNTED)
+    with capture.Capture(tmp_path / "c.toml", identify=False) as kept:
+        kept.push(counted(k) for k in [*range(100), 100 + 3_600_000, 101 + 3_600_000])
+        kept.finish()
+        tracemalloc.start()
+        blocks = kept.take()
+        assert tracemalloc.get_traced_memory()[0] < 1 << 20
+        tracemalloc.stop()
+        assert sum(map(len, blocks)) == 3_600_102
+        assert kept.counts["can0"].lost_in_all == 3_600_000
 
-    def run(first: int, count: int) -> int:
-        for k in range(first, first + count):
-            for lane in lanes:
-                if k % 97:  # losses all along
-                    grid.push(lane, Frame(k * 1000, [float(k)], k & 0xFFFF))
-            if k % 250 == 0:
-                grid.take()
-        return held_by_the_grid()
 
-    tracemalloc.start()
-    before = run(0, 4000)
-    after = run(4000, 8000)
-    tracemalloc.stop()
-    assert after - before < 100_000
-    assert counts.lost["sequence"] > 150
+def resident() -> int:
+    """Bytes of this process."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_memory_does_not_grow_with_the_stream(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(COUNTED)
+    with capture.Capture(tmp_path / "c.toml", identify=False, keep_events=False) as kept:
+        taken = 0
+
+        def run(first: int, count: int) -> int:
+            nonlocal taken
+            for at in range(first, first + count, 250):
+                kept.push(counted(k) for k in range(at, at + 250) if k % 97)  # losses all along
+                taken += sum(map(len, kept.take()))
+            return resident()
+
+        before = run(0, 20000)
+        after = run(20000, 60000)
+        assert after - before < 1 << 20
+        assert taken > 78000
+        assert kept.counts["can0"].lost["sequence"] > 780
 
 
 def test_a_limit_ends_the_samples_exactly(rig: Path) -> None:
-    kept = capture.CanSamples(capture.load_config(rig / "a.toml"), limit=777)
+    kept = capture.Capture(rig / "a.toml", identify=False, duration=777 / 250)
     assert sum(map(len, capture.can_blocks(capture.log_messages(rig / "a.log"), kept.config, samples=kept))) == 777

@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 import json
 import socket
+import struct
 import threading
 import time
 import tomllib
@@ -19,11 +20,10 @@ import pytest
 import serial
 from captured import assert_same_result, assert_truth, edited
 from cobs import cobs
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from okid import capture
-from okid.capture.cobs_packets import stuff, unstuff
-from okid.capture.framing import Framing, Lines, parse_line
+from okid.capture import emulate
 
 
 @pytest.fixture(scope="session")
@@ -40,83 +40,39 @@ def run(*arguments: object) -> int:
     return capture.main([str(argument) for argument in arguments])
 
 
-@given(st.binary(max_size=1024))
-def test_stuffing_is_cobs(plain: bytes) -> None:
-    assert stuff(plain) == cobs.encode(plain)
-    assert unstuff(stuff(plain)) == plain
-
-
-@pytest.mark.parametrize("count", [253, 254, 255, 508, 509, 1000])
-def test_stuffing_of_long_runs(count: int) -> None:
-    for plain in (b"\1" * count, b"\1" * count + b"\0", b"\0" + b"\1" * count):
-        assert stuff(plain) == cobs.encode(plain)
-        assert unstuff(cobs.encode(plain)) == plain
-
-
-def test_the_packet_of_the_documentation() -> None:
-    wire = bytes.fromhex("02 01 04 02 01 07 01 01 03 58 1B 01 02 64 07 9C FF EB 44 1B AD 00")
-    packet = capture.decode_packet(wire[:-1])
-    assert packet is not None
-    assert (packet.sequence, packet.time_us, packet.rows.tolist()) == (7, 7000, [[100.0, -100.0]])
-    assert capture.encode_packet(packet, 0) == wire
-
-
 @pytest.mark.parametrize("number_format", [0, 1, 2])
-def test_packets_of_every_format(number_format: int) -> None:
+def test_packets_of_every_format(rig: Path, number_format: int) -> None:
+    """As docs/wire-protocol.md has them, by other code."""
+    config = capture.load_config(rig / "a.toml")
     rows = np.random.default_rng(1).integers(-(2 ** [15, 23, 20][number_format]), 2**15, (7, 5)).astype(float)
-    data = capture.encode_packet(capture.Packet(2**32 - 3, 2**32 - 1, rows), number_format)
-    packet = capture.decode_packet(data[:-1])
-    assert packet is not None
-    assert (packet.sequence, packet.time_us) == (2**32 - 3, 2**32 - 1)
-    assert np.array_equal(packet.rows, rows)
-    for at in range(len(data) - 1):
-        assert capture.decode_packet(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 : -1]) is None
-    plain = cobs.decode(data[:-1])[:-4]
-    wrong = bytes([9]) + plain[1:]  # another version, with its right sum
-    assert capture.decode_packet(cobs.encode(wrong + zlib.crc32(wrong).to_bytes(4, "little"))) is None
+    data = emulate._packet(number_format, rows, 2**32 - 3, config)
+    plain = cobs.decode(data[:-1])
+    assert data[-1] == 0 and zlib.crc32(plain[:-4]) == int.from_bytes(plain[-4:], "little")
+    time_us = round((2**32 - 3) / config.rate_hz * 1e6) & 0xFFFFFFFF
+    assert struct.unpack("<BBBBII", plain[:12]) == (1, number_format, 5, 7, 2**32 - 3, time_us)
+    if number_format == 2:
+        assert np.array_equal(np.frombuffer(plain[12:-4], "<f4"), rows.ravel())
+    else:
+        assert lines.unpack(data)[0][2] == rows.astype(int).tolist()
+    with pytest.raises(okid.InputError, match="do not fit a packet"):
+        emulate._packet(2, np.zeros((1, 253)), 0, config)
 
 
+@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.binary(max_size=300), max_size=6), st.integers(1, 50))
-def test_any_bytes_in_any_pieces(pieces: list[bytes], cut: int) -> None:
-    """Nothing raises, memory stays bounded, and the cut into reads changes nothing."""
-    stream = b"".join([*pieces, lines.packet(5, [[1, 2]]), *pieces, lines.packet(6, [[3, 4]])])
-    for make in (Framing, lambda: Lines(None)):
-        whole, parts = make(), make()
-        at_once = list(whole.add(stream))
-        piecewise = [rows for k in range(0, len(stream), cut) for rows in parts.add(stream[k : k + cut])]
-        assert [str(r.rows) for r in at_once] == [str(r.rows) for r in piecewise]
-        assert (whole.damaged, whole.skipped) == (parts.damaged, parts.skipped)
-        assert len(parts._bytes) <= parts.longest
-
-
-@pytest.mark.parametrize(
-    ("text", "values"),
-    [
-        ("1.5,2,-3e2", [1.5, 2.0, -300.0]),
-        ("1.5 2\t3", [1.5, 2.0, 3.0]),
-        ("ax:1.5 ay:2 az= 3", [1.5, 2.0, 3.0]),
-        ("1;;3;", [1.0, None, 3.0]),
-        ("1,nan,inf", [1.0, None, None]),
-        ("1,x", None),
-        ("0x10,1", None),
-        ("1_0", None),
-        (",,", None),
-        ("ax:", None),
-        ("1,\u00b5", None),
-    ],
-)
-def test_lines_of_text(text: str, values: list[float | None] | None) -> None:
-    found = parse_line(text.encode())
-    assert values == (None if found is None else [None if x != x else x for x in found])
-
-
-def test_torn_lines_and_another_width_are_refused() -> None:
-    framing = Lines(counter_field=0)
-    text = b"7,1\n8,1.0\n9,2.0\n10\n11,3.0\n1.5,2\n12,4,5\n13,4,5\n14,4,5\n"
-    got = list(framing.add(text))
-    assert [rows.sequence for rows in got] == [8, 9, 11, 14]  # the first may be torn; three alike make a new width
-    assert [rows.broken for rows in got] == [False, False, True, True]
-    assert framing.damaged == 4
+def test_any_bytes_in_any_pieces(tmp_path: Path, pieces: list[bytes], cut: int) -> None:
+    """Nothing raises, and the cut into reads changes nothing."""
+    config = lines.node_config(tmp_path)
+    whole = [lines.packet(k, [[k, -k]], time_us=10000 * k) for k in range(12)]
+    stream = b"".join([whole[0], *pieces, *whole[1:10], *pieces, *whole[10:]])
+    found = []
+    for size in (len(stream), cut):
+        with capture.Capture(config, identify=False) as kept:
+            for k in range(0, len(stream), size):
+                kept.push_bytes(stream[k : k + size])
+            kept.finish()
+            found.append((np.vstack(kept.take()).tolist(), kept.counts["node"].more))
+    assert found[0][1] == found[1][1] and str(found[0][0]) == str(found[1][0])
 
 
 def test_recorded_bytes_give_the_result_of_the_can_bus(
@@ -136,13 +92,13 @@ def test_losses_by_cause(line: tuple[Path, bytes], tmp_path: Path) -> None:
     del packets[200:203]  # never came
     packets.insert(300, packets[300])  # came twice
     loaded = capture.load_config(config)
-    kept = capture.SerialSamples(loaded, loaded.bus("serial"))
+    kept = capture.Capture(loaded, identify=False)
     blocks = capture.serial_blocks(io.BytesIO(b"".join(packets)), loaded, samples=kept)
     rows = np.vstack(list(blocks))
-    in_packet = len(rows) // (len(packets) - 1 + 3)
-    assert kept.counts.lost == {"crc": in_packet, "sequence": 3 * in_packet}
-    assert kept.counts.duplicate == in_packet
-    assert kept.damaged == 1
+    in_packet, counts = len(rows) // (len(packets) - 1 + 3), kept.counts["node"]
+    assert counts.lost == {"crc": in_packet, "sequence": 3 * in_packet}
+    assert counts.duplicate == in_packet
+    assert counts.more["damaged"] == 1
     assert int(np.isnan(rows).all(axis=1).sum()) == 4 * in_packet
 
 
@@ -225,8 +181,7 @@ def test_lines_of_text_are_placed_by_their_counter(rig: Path, line: tuple[Path, 
     config = edited(line[0], tmp_path / "a.toml", to_text)
     fields = [channel["field"] for channel in tomllib.loads(config.read_text())["channel"]]
     assert fields == [1, 2, 3]
-    rows = [packet.rows for piece in line[1].split(b"\0")[:-1] if (packet := capture.decode_packet(piece))]
-    codes = np.vstack(rows).astype(int)
+    codes = np.vstack([rows for _, _, rows in lines.unpack(line[1])])
     text = "".join(f"{k & 255},{u},{a},{b}\r\n" for k, (u, a, b) in enumerate(codes.tolist()) if k not in (500, 501))
     (tmp_path / "run.txt").write_text("torn,1\n" + text)
     assert run("serial", "--from", tmp_path / "run.txt", "--config", config, "--json", tmp_path / "r.json") == 0
@@ -245,7 +200,7 @@ def test_lines_of_text_are_placed_by_their_counter(rig: Path, line: tuple[Path, 
         (["--port", "loop://", "--out", "/nowhere/run.bin"], 2, "/nowhere/run.bin"),
         (["--port", "loop://", "--duration", "0"], 2, "--duration"),
         (["--port", "loop://", "--baud", "1"], 2, "--baud"),
-        (["--port", "loop://", "--duration", "0.01"], 3, "no usable frame of channel force1, acc1, acc2"),
+        (["--port", "loop://", "--duration", "0.01"], 3, 'no usable sample of channel "force1" was received (field 0,'),
     ],
 )
 def test_refusals(

@@ -16,6 +16,7 @@
 
 #include <drv/frame.h>
 #include <okid_host.h>
+#include <okid_host/files.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -33,11 +34,7 @@ typedef struct okid_host_capture_options_t {
     int32_t table;               /**< 1 = modes and result on stdout as `okid run` shows them; default 0 */
     int32_t keep_samples;        /**< 1 = samples wait for okid_host_capture_rows(); default 0 */
     int32_t keep_events;         /**< 1 = events wait for okid_host_capture_events(); default 0 */
-    int32_t text_count;          /**< of dbc_names and dbc_texts */
-    const char* config;          /**< path of CONFIG.toml; with `text` only what messages call it */
-    const char* text;            /**< the config itself; NULL (default) = read `config` */
-    const char* const* dbc_names; /**< with `text`: the DBC files it names .. */
-    const char* const* dbc_texts; /**< .. and what stands in them */
+    int32_t reserved;            /**< 0 */
     const char* events;          /**< file for events as JSON lines, "-" = stdout, NULL (default) = none */
     const char* json;            /**< file for the result, "-" = stdout, NULL (default) = none */
     double duration_s;           /**< stream seconds to end after, 0 (default) = none */
@@ -54,8 +51,12 @@ typedef struct okid_host_rows_t {
 /** The defaults named above. */
 OKID_HOST_API void okid_host_capture_defaults(okid_host_capture_options_t* options);
 
-/** Reads and checks the config; nothing of a device is opened but the GPIO lines of a live capture. 0, 2 or 4. */
-OKID_HOST_API int okid_host_capture_create(const okid_host_capture_options_t* options, okid_host_capture_t** out);
+/**
+ * Begins a capture of the buses of a configuration, of which it keeps a copy. No device is opened but the GPIO lines of a
+ * live capture. 0, 2 or 4.
+ */
+OKID_HOST_API int okid_host_capture_create(const okid_host_config_t* config, const okid_host_capture_options_t* options,
+                                           okid_host_capture_t** out);
 
 /** Without okid_host_capture_finish() there is no result; NULL is taken too. */
 OKID_HOST_API void okid_host_capture_delete(okid_host_capture_t* self);
@@ -113,6 +114,15 @@ OKID_HOST_API const char* okid_host_capture_stats(okid_host_capture_t* self);
  * (samples and stats are there all the same); 4. Nothing can be put in afterwards.
  */
 OKID_HOST_API int okid_host_capture_finish(okid_host_capture_t* self);
+
+/**
+ * A packet of the project's own serial stream (docs/wire-protocol.md), as a node sends it.
+ * @param format  of the numbers: 0 int16, 1 int24, 2 float32
+ * @param values  channels x samples, sample by sample; codes of formats 0 and 1 are whole numbers
+ * @return bytes written to `out`, the closing 0 included; 0 = the samples do not fit a packet, or the packet not `out`
+ */
+OKID_HOST_API size_t okid_host_packet_encode(int32_t format, size_t channels, size_t samples, uint32_t sequence,
+                                             uint32_t time_us, const double* values, uint8_t* out, size_t capacity);
 
 #ifdef __cplusplus
 }

@@ -14,13 +14,30 @@ from typing import Any
 
 from okid._errors import Error, IdentificationError, InputError
 
-_text, _handle, _status = ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int32
+_text, _handle, _status, _size = ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int32, ctypes.c_size_t
 SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_abi": (_status, []),
     "okid_host_error": (_text, []),
     "okid_host_config_load": (_status, [_text, _text, ctypes.POINTER(_handle)]),
     "okid_host_config_json": (_text, [_handle]),
     "okid_host_config_delete": (None, [_handle]),
+    "okid_host_capture_defaults": (None, [_handle]),
+    "okid_host_capture_create": (_status, [_handle, _handle, ctypes.POINTER(_handle)]),
+    "okid_host_capture_delete": (None, [_handle]),
+    "okid_host_capture_frames": (_status, [_handle, _handle, _size]),
+    "okid_host_capture_bytes": (_status, [_handle, _size, ctypes.c_char_p, _size, ctypes.c_int64]),
+    "okid_host_capture_link": (_status, [_handle, _size, _status]),
+    "okid_host_capture_lost": (_status, [_handle, _size, ctypes.c_uint64, ctypes.c_uint64]),
+    "okid_host_capture_edge": (_status, [_handle, ctypes.c_int64]),
+    "okid_host_capture_serve": (_status, [_handle]),
+    "okid_host_capture_open": (_status, [_handle, _text]),
+    "okid_host_capture_play": (_status, [_handle, _size, ctypes.POINTER(_size)]),
+    "okid_host_capture_done": (_status, [_handle]),
+    "okid_host_capture_rows": (_status, [_handle, _status, _handle]),
+    "okid_host_capture_events": (_text, [_handle]),
+    "okid_host_capture_stats": (_text, [_handle]),
+    "okid_host_capture_finish": (_status, [_handle]),
+    "okid_host_packet_encode": (_size, [_status, _size, _size, ctypes.c_uint32, ctypes.c_uint32, _handle, _handle, _size]),
 }
 ABI = 1
 _ERRORS: dict[int, type[Error]] = {2: InputError, 3: IdentificationError}

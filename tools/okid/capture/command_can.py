@@ -15,7 +15,6 @@ from typing import Any
 import can
 
 from okid._errors import InputError
-from okid.capture.can_samples import CanSamples, can_blocks
 from okid.capture.config import BusConfig, CaptureConfig
 from okid.capture.dbc import read_dbc
 from okid.capture.frame_log import log_messages, messages_for
@@ -23,17 +22,21 @@ from okid.capture.outcome import (
     EXIT_DEVICE,
     EXIT_DONE,
     EXIT_USAGE,
-    Run,
+    check_duration,
     check_target,
     complain,
-    count_lines,
+    end,
+    make_capture,
     read_config,
 )
 from okid.capture.output_files import check_log_target, check_outputs
 from okid.capture.recording import Recorder, record_bus
+from okid.capture.sources import feed_messages
+from okid.capture.stream import Capture
 
 _SO_RCVBUFFORCE = 33
 _ROOM = 8 << 20  # bytes of a socket: some 13,000 frames
+_PIECE = 20_000  # frames of a log between two looks at Ctrl-C
 
 
 def open_bus(interface: str, channel: str, *, fd: bool = False, bitrate: int | None = None) -> can.BusABC:
@@ -84,19 +87,22 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError(f"no python-can interface {args.interface!r}; there are {known}, and file")
     if args.out is None and args.config is None:
         raise InputError("nothing to do: give --out FILE.log, --config CONFIG.toml, or both")
-    if args.duration is not None and not 0.0 < args.duration < float("inf"):
-        raise InputError(f"--duration is {args.duration}, expected seconds > 0")
+    check_duration(args.duration)
     if args.frames is not None and args.frames < 1:
         raise InputError(f"--frames is {args.frames}, expected a whole number >= 1")
     if (args.dbc is None) != (args.csv is None):
         raise InputError("--dbc and --csv belong together")
     if args.csv is not None and args.out is None:
         raise InputError("--csv is written beside --out FILE.log")
-    if args.json is not None and args.config is None:
-        raise InputError("--json needs --config CONFIG.toml")
-    check_target(args.json)
-    inputs = {"--log": args.log, "--config": args.config, "--dbc": args.dbc}
-    check_outputs(inputs, {"--out": args.out, "--csv": args.csv, "--json": args.json})
+    for option in ("json", "events"):
+        if getattr(args, option) is not None and args.config is None:
+            raise InputError(f"--{option} needs --config CONFIG.toml")
+        check_target(getattr(args, option))
+    check_outputs({"--log": args.log, "--config": args.config, "--dbc": args.dbc}, _outputs(args))
+
+
+def _outputs(args: argparse.Namespace) -> dict[str, str | None]:
+    return {"--out": args.out, "--csv": args.csv, "--json": args.json, "--events": args.events}
 
 
 def _tell_appended(path: str | None) -> None:
@@ -111,18 +117,12 @@ def run_can(args: argparse.Namespace, stop: threading.Event) -> int:
     database = None if args.dbc is None else read_dbc(args.dbc)
     config = None if args.config is None else read_config(args.config)
     for dbc in () if config is None else config.dbcs:
-        check_outputs({"the DBC of --config": dbc}, {"--out": args.out, "--csv": args.csv, "--json": args.json})
+        check_outputs({"the DBC of --config": dbc}, _outputs(args))
     source = None if config is None or args.log is not None else config.bus("can", args.bus)
     _tell_appended(args.out)
-    run = None if config is None else Run(config, args.json, args.quiet)
     if args.log is not None:
         remarks: list[str] = []
-        messages = log_messages(args.log, remarks) if config is None else messages_for(args.log, config, remarks)
-        code = (
-            _copy(args, messages, database, stop)
-            if run is None
-            else _identify(args, run, messages, None, database, stop)
-        )
+        code = _from_log(args, config, remarks, database, stop)
         for remark in remarks:
             complain(f"{args.log}: {remark}")
         return code
@@ -133,11 +133,38 @@ def run_can(args: argparse.Namespace, stop: threading.Event) -> int:
         complain(refused)
         return EXIT_DEVICE
     try:
-        if run is None:
+        if config is None:
             return _record(args, bus, database, stop)
-        return _identify(args, run, bus, source, database, stop)
+        return _identify(args, config, bus, source, database, stop)
     finally:
         bus.shutdown()
+
+
+def _from_log(
+    args: argparse.Namespace, config: CaptureConfig | None, remarks: list[str], database: Any, stop: threading.Event
+) -> int:
+    if config is None:
+        return _copy(args, log_messages(args.log, remarks), database, stop)
+    if args.out is None and args.log.lower().endswith((".log", ".okj")):
+        return _replay(args, config, stop)
+    return _identify(args, config, messages_for(args.log, config, remarks), None, database, stop)
+
+
+def _replay(args: argparse.Namespace, config: CaptureConfig, stop: threading.Event) -> int:
+    """A log that the library reads by itself."""
+    with make_capture(config, args, live=False) as capture:
+        capture.open(args.log)
+        left = 1 << 62 if args.frames is None else args.frames
+        while left > 0 and not stop.is_set():
+            asked = min(left, _PIECE)
+            left -= asked
+            if capture.play(asked) < asked:
+                break
+        return end(capture, args, lambda: _count_lines(capture), None)
+
+
+def _count_lines(capture: Capture) -> list[str]:
+    return [counts.text(name) for name, counts in capture.counts.items()]
 
 
 def _place_of(args: argparse.Namespace, source: BusConfig | None) -> None:
@@ -237,15 +264,18 @@ class _Tap:
 
 
 def _identify(
-    args: argparse.Namespace, run: Run, source: Any, bus: BusConfig | None, database: Any, stop: threading.Event
+    args: argparse.Namespace,
+    config: CaptureConfig,
+    source: Any,
+    bus: BusConfig | None,
+    database: Any,
+    stop: threading.Event,
 ) -> int:
-    config: CaptureConfig = run.config
-    limit = None if args.duration is None else max(1, round(args.duration * config.rate_hz))
-    samples = CanSamples(config, limit=limit)
-    if bus is not None:
-        samples.use_bus(bus)
-    fault = None
+    fault, live = None, args.log is None
     with contextlib.ExitStack() as kept:
+        capture = kept.enter_context(make_capture(config, args, live))
+        if bus is not None:
+            capture.use_bus(bus)
         recorder = None
         if args.out is not None:
             try:
@@ -253,20 +283,24 @@ def _identify(
             except OSError as full:
                 raise InputError(f"{full.filename or args.out}: {full.strerror or full}") from None
         tap = _Tap(recorder, args.frames)
-        kept.callback(tap.close)
-        duration = None if args.log is not None else args.duration
-        blocks = can_blocks(
-            source, config, samples=samples, duration=duration, stop=lambda: stop.is_set() or tap.done,
-            tap=tap.add, idle=tap.idle,
-        )  # fmt: skip
+
+        def idle() -> None:
+            tap.idle()
+            capture.serve()
+
         try:
-            run.watch.follow(blocks)
+            for _ in feed_messages(
+                source, capture, duration=args.duration if live else None, stop=lambda: stop.is_set() or tap.done,
+                tap=tap.add, idle=idle,
+            ):  # fmt: skip
+                pass
         except (can.CanError, OSError) as failed:
             fault = f"{args.channel}: {str(failed) or type(failed).__name__}"
-    if recorder is not None:
-        run.say(recorder.summary.text())
-    lines = [line for name, one in samples.counts.items() for line in count_lines(name, one, {})]
-    if samples.error_frames:
-        lines.append(f"{samples.error_frames} error frames")
-    code = run.end(lines, samples.silent, fault, samples.others_text())
+        finally:
+            tap.close()
+
+        def lines() -> list[str]:
+            return [*([] if recorder is None else [recorder.summary.text()]), *_count_lines(capture)]
+
+        code = end(capture, args, lines, fault)
     return EXIT_USAGE if code == EXIT_DONE and tap.fault is not None else code

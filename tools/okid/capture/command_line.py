@@ -38,11 +38,11 @@ def _add_can(kinds: Any) -> None:
     bus.add_argument("--interface", metavar="NAME", help="of python-can: socketcan, slcan, virtual, udp_multicast .., "
                      "or file with a log as channel; default: what the config says")  # fmt: skip
     bus.add_argument("--channel", metavar="NAME", help="can0, vcan0, /dev/ttyACM0, 239.74.163.2 .., run.blf")
-    bus.add_argument("--log", metavar="FILE", help="read this log instead of a bus: .log .blf .asc .trc .mf4 ..")
+    bus.add_argument("--log", metavar="FILE", help="read this log instead of a bus: .log .okj .blf .asc .trc .mf4 ..")
     bus.add_argument("--out", metavar="FILE.log", help="log file; an existing one is appended to")
     bus.add_argument("--config", metavar="CONFIG.toml", help="identify: what the frames mean, and how")
     bus.add_argument("--bus", metavar="NAME", help="the [[bus]] of the config that this is, when it has several")
-    bus.add_argument("--json", metavar="FILE|-", help="the result, okid.result/1")
+    _add_outputs(bus)
     bus.add_argument("--quiet", action="store_true", help="no modes and no table on stdout")
     bus.add_argument("--bitrate", type=int, metavar="BIT/S", help="where the adapter sets it")
     bus.add_argument("--fd", action="store_true", help="receive CAN FD frames too")
@@ -60,7 +60,7 @@ def _add_serial(kinds: Any) -> None:
         "serial",
         help="record and identify a serial line through pyserial",
         description="Read a serial line with pyserial: keep its bytes as they come (--out), decode and identify them "
-        "(framing cobs or ascii of the config); ends on Ctrl-C or --duration, and when the line is unplugged.",
+        "(any framing of the config); ends on Ctrl-C or --duration, and when the line is unplugged.",
         epilog="examples: okid-capture serial --port /dev/ttyUSB0 --config node.toml --out run.bin --json result.json; "
         "okid-capture serial --port socket://192.168.0.7:5000 --config node.toml; "
         "okid-capture serial --from run.bin --config node.toml",
@@ -71,10 +71,16 @@ def _add_serial(kinds: Any) -> None:
     line.add_argument("--bus", metavar="NAME", help="the [[bus]] of the config that this is, when it has several")
     line.add_argument("--baud", type=int, metavar="N", help="default: the config's")
     line.add_argument("--out", metavar="FILE", help="every byte as it came; an existing file is appended to")
-    line.add_argument("--json", metavar="FILE|-", help="the result, okid.result/1")
+    _add_outputs(line)
     line.add_argument("--quiet", action="store_true", help="no modes and no table on stdout")
     line.add_argument("--duration", type=float, metavar="S", help="end after so many seconds of samples")
     line.set_defaults(command="command_serial:run_serial")
+
+
+def _add_outputs(command: Any) -> None:
+    command.add_argument("--json", metavar="FILE|-", help="the result, okid.result/1")
+    command.add_argument("--events", metavar="FILE|-", help="events as JSON lines, as `okid run` writes them")
+    command.add_argument("--trigger-at", type=float, metavar="S", help="when the GPIO edge came, in the time of the log")
 
 
 def _add_sync(kinds: Any) -> None:

@@ -13,14 +13,15 @@ from okid.capture.outcome import (
     EXIT_DEVICE,
     EXIT_DONE,
     EXIT_USAGE,
-    Run,
+    check_duration,
     check_target,
     complain,
-    count_lines,
+    end,
+    make_capture,
     read_config,
 )
 from okid.capture.output_files import check_outputs, raw_target
-from okid.capture.serial_samples import RawFile, SerialSamples, serial_blocks
+from okid.capture.sources import RawFile, feed_bytes
 
 
 def open_port(url: str, baud: int = 115200) -> Any:
@@ -39,13 +40,13 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError("--from is read instead of a port: leave --port out")
     if args.recorded is not None and args.out is not None:
         raise InputError("--from is recorded already: leave --out out")
-    if args.duration is not None and not 0.0 < args.duration < float("inf"):
-        raise InputError(f"--duration is {args.duration}, expected seconds > 0")
+    check_duration(args.duration)
     if args.baud is not None and args.baud < 50:
         raise InputError(f"--baud is {args.baud}, expected a whole number >= 50")
     check_target(args.json)
+    check_target(args.events)
     inputs = {"--from": args.recorded, "--config": args.config}
-    check_outputs(inputs, {"--out": args.out, "--json": args.json})
+    check_outputs(inputs, {"--out": args.out, "--json": args.json, "--events": args.events})
 
 
 class _Tap:
@@ -70,19 +71,16 @@ def run_serial(args: argparse.Namespace, stop: threading.Event) -> int:
     _check(args)
     config = read_config(args.config)
     bus = config.bus("serial", args.bus)
-    run = Run(config, args.json, args.quiet)
-    limit = None if args.duration is None else max(1, round(args.duration * config.rate_hz))
-    samples = SerialSamples(config, bus, limit=limit)
     name = args.recorded or args.port or bus.device or ""
+    live = args.recorded is None
     fault = None
     with contextlib.ExitStack() as kept:
+        capture = kept.enter_context(make_capture(config, args, live))
+        capture.use_bus(bus)
         try:
-            if args.recorded is not None:
-                port: Any = kept.enter_context(open(args.recorded, "rb"))
-            else:
-                port = kept.enter_context(open_port(name, args.baud or bus.baud))
+            port: Any = kept.enter_context(open_port(name, args.baud or bus.baud) if live else open(name, "rb"))  # noqa: SIM115
         except OSError as refused:
-            if args.recorded is not None:
+            if not live:
                 raise InputError(f"{name}: {refused.strerror or refused}") from None
             complain(refused)
             return EXIT_DEVICE
@@ -94,16 +92,16 @@ def run_serial(args: argparse.Namespace, stop: threading.Event) -> int:
         if said is not None:
             complain(said)
         tap = _Tap(file)
-        duration = None if args.recorded is not None else args.duration
+        duration = args.duration if live else None
         try:
-            run.watch.follow(
-                serial_blocks(port, config, samples=samples, duration=duration, stop=stop.is_set, tap=tap.add)
-            )
+            for _ in feed_bytes(port, capture, duration=duration, stop=stop.is_set, tap=tap.add):
+                pass
         except OSError as failed:
             fault = f"{name}: {str(failed) or type(failed).__name__}"
-    more = {"damaged": samples.damaged, "bytes skipped": samples.skipped}
-    lines = count_lines(bus.name, samples.counts, more)
-    if file is not None:
-        lines.append(f"{file.path}: {file.bytes} bytes added")
-    code = run.end(lines, samples.silent, fault)
+
+        def lines() -> list[str]:
+            added = [] if file is None else [f"{file.path}: {file.bytes} bytes added"]
+            return [capture.counts[bus.name].text(bus.name), *added]
+
+        code = end(capture, args, lines, fault)
     return EXIT_USAGE if code == EXIT_DONE and tap.fault is not None else code

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -10,15 +11,18 @@ from typing import Any
 
 import can
 import numpy as np
+from numpy.typing import NDArray
 
 from okid._errors import InputError
-from okid.capture.can_samples import CanSamples
-from okid.capture.cobs_packets import Packet, encode_packet, room
+from okid.abi import host
 from okid.capture.config import CaptureConfig
 from okid.capture.pacing import Pacer
+from okid.capture.sources import feed_messages
+from okid.capture.stream import Capture
 
 _FULL_S = 5.0  # a full queue is waited for so long
 _PACKET_S = 5e-3
+_LONGEST = 1024 + 1024 // 254 + 2  # bytes of a packet on the wire
 
 
 @dataclass
@@ -100,47 +104,51 @@ def packets_of(messages: Iterable[can.Message], config: CaptureConfig) -> Iterat
     lacks are left out, which their numbers tell. Raises InputError when the channels do not fit a packet.
     """
     number_format = _number_format(config)
-    most = min(room(len(config.wanted), number_format), max(1, round(_PACKET_S * config.rate_hz)))
-    if most < 1:
-        raise InputError(f"{config.path}: {len(config.wanted)} channels do not fit a packet: play it on a CAN bus")
-    waiting: list[list[float]] = []
+    most = max(1, round(_PACKET_S * config.rate_hz))
+    while most > 1 and not _packet(number_format, np.zeros((most, len(config.wanted))), 0, config):
+        most -= 1
     number = 0
-
-    def packet() -> tuple[float, bytes]:
-        first = number - len(waiting)
-        time_us = round(first / config.rate_hz * 1e6)
-        return (number - 1) / config.rate_hz, encode_packet(Packet(first, time_us, np.array(waiting)), number_format)
-
     for block in _raw_blocks(messages, config):
-        for row in block.tolist():
-            missing = any(value != value for value in row)
-            if waiting and (missing or len(waiting) == most):
-                yield packet()
-                waiting = []
-            number += 1
-            if not missing:
-                waiting.append(row)
-    if waiting:
-        yield packet()
+        whole = ~np.isnan(block).any(axis=1)
+        at = 0
+        while at < len(block):
+            count = 0
+            while at + count < len(block) and count < most and whole[at + count]:
+                count += 1
+            if count > 0:
+                last = number + at + count - 1
+                yield last / config.rate_hz, _packet(number_format, block[at : at + count], number + at, config)
+            at += max(count, 1)
+        number += len(block)
+
+
+def _packet(number_format: int, rows: NDArray[Any], first: int, config: CaptureConfig) -> bytes:
+    """b"" when the rows do not fit."""
+    samples, channels = rows.shape
+    out, values = (ctypes.c_uint8 * _LONGEST)(), np.ascontiguousarray(rows, np.float64)
+    time_us = round(first / config.rate_hz * 1e6)
+    used = host.library().okid_host_packet_encode(
+        number_format, channels, samples, first & 0xFFFFFFFF, time_us & 0xFFFFFFFF, values.ctypes.data, out, _LONGEST
+    )
+    if used == 0 and samples == 1:
+        raise InputError(f"{config.path}: {channels} channels do not fit a packet: play it on a CAN bus")
+    return bytes(out[:used])
 
 
 def _raw_blocks(messages: Iterable[can.Message], config: CaptureConfig) -> Iterator[Any]:
     """Rows of numbers as they stand in the frames."""
-    samples = CanSamples(config)
-    for message in messages:
-        samples.push(message)
-        if samples.grid.waiting >= 256:
-            yield from samples.grid.take()
-    samples.grid.finish()
-    yield from samples.grid.take()
+    with Capture(config, identify=False, keep_events=False) as capture:
+        for _ in feed_messages(messages, capture):
+            yield from capture.take(raw=True)
+        capture.finish()
+        yield from capture.take(raw=True)
 
 
 def _number_format(config: CaptureConfig) -> int:
     """The shortest that holds the numbers of every channel: 0 int16, 1 int24, 2 float32."""
-    bits = [channel.bits for channel in config.wanted if channel.bits is not None]
-    if any(one.value != "integer" for one in bits):
+    if any(channel.number != "integer" for channel in config.wanted):
         return 2
-    most = max(one.length + (not one.signed) for one in bits)
+    most = max(channel.length + (not channel.signed) for channel in config.wanted)
     return 0 if most <= 16 else 1 if most <= 24 else 2
 
 

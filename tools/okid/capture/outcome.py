@@ -1,22 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""The end of a run, whatever ended it: the last model, the file, the counts, the exit code."""
+"""The end of a run, whatever ended it: what is told, the exit code."""
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import threading
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from okid._errors import Error, IdentificationError, InputError
 from okid.capture.config import CaptureConfig, load_config
-from okid.capture.lane import BusCounts
-from okid.capture.mode_watch import ModeWatch
-from okid.capture.program import check_config
-from okid.session import Session
+from okid.capture.stream import Capture
 
 EXIT_DONE, EXIT_USAGE, EXIT_NO_MODEL, EXIT_DEVICE = 0, 2, 3, 4
 
@@ -24,15 +20,6 @@ EXIT_DONE, EXIT_USAGE, EXIT_NO_MODEL, EXIT_DEVICE = 0, 2, 3, 4
 def complain(text: object) -> None:
     """One line on stderr."""
     print(f"okid-capture: {text}", file=sys.stderr, flush=True)
-
-
-def count_lines(name: str, counts: BusCounts, more: dict[str, int]) -> list[str]:
-    """What was received and what was not, for a person."""
-    causes = ", ".join(f"{cause} {number}" for cause, number in sorted(counts.lost.items()))
-    text = f"{name}: {counts.received} received, {counts.lost_in_all} lost" + (f" ({causes})" if causes else "")
-    rest = {"out of order": counts.out_of_order, "duplicate": counts.duplicate, "not decodable": counts.decode_errors}
-    said = [f"{number} {what}" for what, number in (rest | more).items() if number]
-    return [", ".join([text, *said])]
 
 
 def check_target(path: str | None) -> None:
@@ -46,77 +33,56 @@ def check_target(path: str | None) -> None:
         raise InputError(f"{path}: cannot be written")
 
 
+def check_duration(seconds: float | None) -> None:
+    """Raises InputError."""
+    if seconds is not None and not 0.0 < seconds < float("inf"):
+        raise InputError(f"--duration is {seconds}, expected seconds > 0")
+
+
 def read_config(path: str) -> CaptureConfig:
-    """Checked by the program where there is one, then read. Remarks go to stderr."""
-    check_config(path)
+    """Read and checked. Remarks go to stderr."""
     config = load_config(path)
     for remark in config.remarks:
         complain(f"{config.path}: {remark}")
     return config
 
 
-@dataclass
-class Run:
-    """One identification of a stream by a command. `json_path` "-": the result alone goes to stdout."""
+def make_capture(config: CaptureConfig, args: Any, live: bool) -> Capture:
+    """As the command line asks for it. Raises InputError."""
+    if args.events == "-" and args.json == "-":
+        raise InputError("--events - and --json - both want stdout, expected a file for one of them")
+    if config.trigger == "gpio" and not live and args.trigger_at is None:
+        raise InputError(f"{config.path}: waits for an edge of a GPIO line, which no log holds: say --trigger-at SECONDS")
+    return Capture(
+        config, duration=args.duration, trigger_at=args.trigger_at, events=args.events, json=args.json, live=live,
+        record=live, table=not args.quiet, keep_events=False,
+    )  # fmt: skip
 
-    config: CaptureConfig
-    json_path: str | None = None
-    quiet: bool = False
-    session: Session = field(init=False)
-    watch: ModeWatch = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.session = Session.from_config(self.config.path)
-        self.watch = ModeWatch(self.session, self.config.update_s, self.say)
-
-    def say(self, text: str) -> None:
-        """To stdout, unless only the result belongs there."""
-        if self.quiet or self.json_path == "-":
-            return
+def end(capture: Capture, args: Any, lines: Callable[[], list[str]], fault: str | None) -> int:
+    """The result of what came; `fault` of the device is told last and decides the exit code. `lines`: the counts."""
+    code = EXIT_DONE
+    try:
+        capture.finish()
+    except IdentificationError as why:
+        complain(why)
+        code = EXIT_NO_MODEL
+    except InputError as why:  # a file that cannot be written
+        complain(why)
+        code = EXIT_USAGE
+    except Error as why:
+        complain(why)
+        code = EXIT_DEVICE
+    if not args.quiet and "-" not in (args.json, args.events):
         try:
-            print(text, flush=True)
-        except OSError:  # whoever read our lines has gone: the measurement goes on
-            self.quiet = True
-
-    def end(self, lines: list[str], silent: list[str], fault: str | None, others: str = "") -> int:
-        """The result of what came; `fault` of the device is told last and decides the exit code.
-
-        `others`: what came that no channel of the config asks for.
-        """
-        for line in lines:
-            self.say(line)
-        code = self._result(silent, others)
-        if fault is not None:
-            kept = "what came before is in the result" if code == EXIT_DONE else "what came before gives no model"
-            complain(f"{fault}; {kept}")
-            return EXIT_DEVICE
-        return code
-
-    def _result(self, silent: list[str], others: str) -> int:
-        if silent:
-            complain(
-                f"no usable frame of channel {', '.join(silent)} was received: "
-                + (f"the bus carries {others}; " if others else "")
-                + f"is the sensor on, and are bus and identifier right in {self.config.path}?"
-            )
-            return EXIT_NO_MODEL
-        try:
-            result = self.session.identify()
-        except IdentificationError as why:
-            complain(why)
-            return EXIT_NO_MODEL
-        if self.json_path == "-":
-            json.dump(result.to_dict(), sys.stdout, allow_nan=False)
-            sys.stdout.write("\n")
-            return EXIT_DONE
-        if self.json_path is not None:
-            try:
-                result.save(self.json_path)
-            except OSError as fault:
-                complain(f"{self.json_path}: {fault.strerror or fault}")
-                return EXIT_USAGE
-        self.say(str(result.table()))
-        return EXIT_DONE
+            print("\n".join(lines()), flush=True)
+        except OSError:  # whoever read our lines has gone
+            args.quiet = True
+    if fault is not None:
+        kept = "what came before is in the result" if code == EXIT_DONE else "what came before gives no model"
+        complain(f"{fault}; {kept}")
+        return EXIT_DEVICE
+    return code
 
 
 def guarded(command: Any, args: Any, stop: threading.Event) -> int:
@@ -126,6 +92,9 @@ def guarded(command: Any, args: Any, stop: threading.Event) -> int:
     except InputError as wrong:
         complain(wrong)
         return EXIT_USAGE
-    except Error as wrong:
+    except IdentificationError as wrong:
         complain(wrong)
         return EXIT_NO_MODEL
+    except Error as wrong:
+        complain(wrong)
+        return EXIT_DEVICE

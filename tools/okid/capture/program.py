@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The program `okid`, where there is one: it checks a config with line and column, and simulates rigs."""
+"""The program `okid`, where there is one: it simulates rigs and converts logs."""
 
 from __future__ import annotations
 
@@ -35,9 +35,3 @@ def run_program(*arguments: str | Path) -> str:
         lines = [line for line in done.stderr.strip().splitlines() if line] or [f"it ended with {done.returncode}"]
         raise InputError(lines[-1].removeprefix("okid: "))
     return done.stdout
-
-
-def check_config(path: str | Path) -> None:
-    """`okid check` where there is a program: InputError says what is wrong, by file, line and key."""
-    if find_program() is not None:
-        run_program("check", path)

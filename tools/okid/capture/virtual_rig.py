@@ -31,18 +31,13 @@ def simulate_rig(rig: str | Path, folder: str | Path) -> VirtualRig:
 def line_config(of_can: CaptureConfig, url: str, baud: int) -> str:
     """The CONFIG.toml of the same channels on a serial line, as packets_of() numbers them."""
     file = read_toml(of_can.path)[0]
-    tables = {table["name"]: table for table in file["channel"]}
     text = "# written by okid-capture emulate\n" + _section("[acquisition]", file["acquisition"])
     bus = {"name": "node", "type": "serial", "device": url, "baud": baud, "framing": "cobs"}
     text += "\n" + _section("[[bus]]", bus)
     for field, channel in enumerate(of_can.wanted):
-        kept = {
-            key: tables[channel.name][key] for key in ("name", "role", "dof", "unit") if key in tables[channel.name]
-        }
-        scale = channel.bits.scale if channel.bits is not None else 1.0
-        offset = channel.bits.offset if channel.bits is not None else 0.0
-        numbers = {"scale": float(tables[channel.name].get("scale", scale)), "offset": float(offset)}
-        text += "\n" + _section("[[channel]]", kept | {"bus": "node", "field": field} | numbers)
+        kept = {"name": channel.name, "role": channel.role, "dof": channel.dof, "unit": channel.unit or None}
+        place = {"bus": "node", "field": field, "scale": channel.scale, "offset": channel.offset}
+        text += "\n" + _section("[[channel]]", {key: value for key, value in kept.items() if value is not None} | place)
     if "identification" in file:
         text += "\n" + _section("[identification]", file["identification"])
     return text

@@ -15,8 +15,8 @@ from typing import Any
 import can
 
 from okid._errors import InputError
-from okid.capture.recording import log_line
 from okid.formats.bus_mdf4 import bus_number, write_bus_mdf4
+from okid.formats.candump_text import log_line
 from okid.formats.foreign_library import library, reading, writing
 from okid.formats.log_names import FRAME_CSV_HEAD, LOG_EXTENSIONS, is_frame_csv
 from okid.formats.mdf4 import quiet_asammdf
