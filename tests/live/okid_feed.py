@@ -15,6 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+# A config that is whole but for what a test adds.
+WHOLE = """[acquisition]
+rate_hz = 1000.0
+[[bus]]
+name = "can0"
+interface = "can0"
+[[channel]]
+name = "f"
+role = "force"
+can_id = 1
+start_bit = 0
+length = 16
+[[channel]]
+name = "a"
+role = "acceleration"
+can_id = 1
+start_bit = 16
+length = 16
+"""
+
+
 def until(what: Callable[[], Any], seconds: float = 20.0) -> Any:
     """The first true value of what()."""
     end = time.monotonic() + seconds

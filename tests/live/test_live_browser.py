@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from live_process import Live
-from okid_feed import OkidFeed, channel, mode, modes, samples, start
+from okid_feed import WHOLE, OkidFeed, channel, mode, modes, samples, start
 from program import PROGRAM
 from two_masses import rig_text, simulate_rig
 
@@ -212,7 +212,7 @@ def hostile_feed(feed: OkidFeed) -> None:
 
 
 def test_names_are_text_and_nothing_else(tmp_path: Path, browser: Any, okid_live: Callable[..., Live]) -> None:
-    (tmp_path / "b.toml").write_text(PUBLISH)
+    (tmp_path / "b.toml").write_text(WHOLE + PUBLISH)
     feed = OkidFeed(tmp_path / "s")
     live = okid_live(tmp_path / "b.toml")
     page = Page(browser, live)
@@ -251,7 +251,7 @@ def test_names_are_text_and_nothing_else(tmp_path: Path, browser: Any, okid_live
 
 
 def test_without_samples_it_says_what_to_add(tmp_path: Path, browser: Any, okid_live: Callable[..., Live]) -> None:
-    (tmp_path / "b.toml").write_text('[publish]\nsocket = "s"\n')
+    (tmp_path / "b.toml").write_text(WHOLE + '[publish]\nsocket = "s"\n')
     feed = OkidFeed(tmp_path / "s")
     live = okid_live(tmp_path / "b.toml")
     page = Page(browser, live)
@@ -283,7 +283,7 @@ def test_without_samples_it_says_what_to_add(tmp_path: Path, browser: Any, okid_
 
 
 def test_sixty_channels(tmp_path: Path, browser: Any, okid_live: Callable[..., Live]) -> None:
-    (tmp_path / "b.toml").write_text(PUBLISH + "[identification]\np = 3\n")
+    (tmp_path / "b.toml").write_text(WHOLE + PUBLISH + "[identification]\np = 3\n")
     feed = OkidFeed(tmp_path / "s")
     live = okid_live(tmp_path / "b.toml")
     page = Page(browser, live)

@@ -19,14 +19,14 @@ from okid.live.config import read_config
 from okid.live.feed import LineSplitter
 from okid.live.hub import Outbox
 from okid.live.session import Session
-from okid_feed import OkidFeed, channel, modes, samples, start, until
+from okid_feed import WHOLE, OkidFeed, channel, modes, samples, start, until
 
 CHANNELS = [
     channel("f", "force", "N", 1),
     channel("a", "acceleration", "m/s^2", 1),
     channel("b", "acceleration", "g", 2),
 ]
-CONFIG = '[publish]\nsocket = "s"\nsamples = true\n'
+CONFIG = WHOLE + '[publish]\nsocket = "s"\nsamples = true\n'
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -246,7 +246,7 @@ def test_sleep_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_without_samples_everything_else_is_there(tmp_path: Path) -> None:
-    with session(tmp_path, '[publish]\nsocket = "s"\n', start_it=False) as one:
+    with session(tmp_path, WHOLE + '[publish]\nsocket = "s"\n', start_it=False) as one:
         page = Page(one)
         one.line(json.dumps(start(CHANNELS)).encode())
         one.line(json.dumps(modes(1.0, [10.0])).encode())
@@ -323,16 +323,15 @@ def test_many_threads_at_once(tmp_path: Path) -> None:
         ('[publish]\nsocket = "s"\nsamples = 1\n', '"samples": found 1, expected true or false'),
         ('[publish]\nsocket = "s"\n[identification]\np = -1\n', '"p": found -1'),
         ('[publish]\nsocket = "s"\n[identification]\nwindow_s = "x"\n', '"window_s"'),
-        ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0, 0]]\n', 'nodes, entry 1'),
-        ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0,0,0]]\ndofs = [[1,"x"]]\nlines = [[1,2]]', 'lines, entry 1'),
-        ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0, 0, 0]]\ndofs = [[1, "q"]]\n', 'dofs, entry 1'),
-        ('publish = 3\n', '"publish"'),
+        ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0, 0]]\ndofs = [[1,"x"]]\n', '"nodes": entry 1'),
+        ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0,0,0]]\ndofs = [[1,"x"]]\nlines = [[1,2]]', '"lines": entry 1'),
+        ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0, 0, 0]]\ndofs = [[1, "q"]]\n', '"dofs": entry 1'),
         (f'[publish]\nsocket = "{"x" * 120}"\n', "at most 107"),
-        ("[publish\n", "not TOML"),
+        ("[publish\n", "line "),
     ],
 )  # fmt: skip
 def test_configs_that_are_wrong(tmp_path: Path, text: str, found: str) -> None:
-    (tmp_path / "a.toml").write_text(text)
+    (tmp_path / "a.toml").write_text(WHOLE + text)
     with pytest.raises(InputError) as fault:
         read_config(tmp_path / "a.toml")
     assert found in str(fault.value) and "\n" not in str(fault.value).strip()
@@ -340,13 +339,13 @@ def test_configs_that_are_wrong(tmp_path: Path, text: str, found: str) -> None:
 
 def test_a_config_that_is_right(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(
-        '\ufeff[publish]\nsocket = "run/s"\n[identification]\nwindow_s = 20\np = 12\n'
-        "[hammer]\nlevel = 3\nlength_s = 1.5\n"
+        '\ufeff' + WHOLE + '[publish]\nsocket = "run/s"\n[identification]\np = 12\n'
+        '[hammer]\nchannel = "f"\nlevel = 3\nlength_s = 1.5\n'
         '[geometry]\nnodes = [[0, 0, 0], [1, 0, 0]]\nlines = [[1, 2]]\ndofs = [[2, "-z"]]\n'
     )
     config = read_config(tmp_path / "a.toml")
     assert config.socket == tmp_path / "run/s" and not config.samples and config.hammer and config.hit_s == 1.5
-    assert config.identification.window_s == 20 and config.identification.p == 12
+    assert config.identification.window_s is None and config.identification.p == 12
     assert config.geometry is not None and config.geometry.dofs == [(2, "-z")]
     assert set(Session(config)._facts()["geometry"]) == {"nodes", "lines", "dofs"}  # what shapes.js takes
     assert read_config(tmp_path / "a.toml", "other").socket == Path("other")

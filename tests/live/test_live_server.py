@@ -18,14 +18,14 @@ from event_source import Listener, ask
 from live_process import Live
 from okid.live import main
 from okid.live.server import host_of, is_loopback
-from okid_feed import OkidFeed, channel, modes, start, until
+from okid_feed import WHOLE, OkidFeed, channel, modes, start, until
 
 CHANNELS = [channel("f", "force", "N", 1), channel("a", "acceleration", "m/s^2", 1)]
 
 
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
-    (tmp_path / "a.toml").write_text('[acquisition]\nrate_hz = 1000.0\n[publish]\nsocket = "s"\nsamples = true\n')
+    (tmp_path / "a.toml").write_text(WHOLE + '[publish]\nsocket = "s"\nsamples = true\n')
     return tmp_path / "a.toml"
 
 
@@ -33,7 +33,7 @@ def config(tmp_path: Path) -> Path:
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     """One server for all that only ask."""
     folder = tmp_path_factory.mktemp("shared")
-    (folder / "a.toml").write_text('[publish]\nsocket = "s"\n')
+    (folder / "a.toml").write_text(WHOLE + '[publish]\nsocket = "s"\n')
     one = Live(folder / "a.toml")
     yield one
     assert one.end() == (0, "")
@@ -167,9 +167,9 @@ def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     ("text", "more", "code", "found"),
     [
         ("[publish]\n", (), 2, '[publish] "socket" is missing'),
-        ("[publish\n", (), 2, "not TOML"),
+        ("[publish\n", (), 2, "a.toml: line "),
         ("", ("--port", "70000"), 2, "--port is 70000"),
-        (None, (), 2, "No such file"),
+        (None, (), 2, "no such file"),
         ('[publish]\nsocket = "s"\n', ("--host", "192.0.2.1"), 4, "--host 192.0.2.1: Cannot assign"),
         ('[publish]\nsocket = "s"\n', ("--host", "no.such.host.invalid"), 4, "no.such.host.invalid"),
     ],
@@ -178,7 +178,7 @@ def test_what_is_wrong_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str | None, more: tuple[str, ...], code: int, found: str
 ) -> None:
     if text is not None:
-        (tmp_path / "a.toml").write_text(text)
+        (tmp_path / "a.toml").write_text(WHOLE + text)
     assert main([str(tmp_path / "a.toml"), *more]) == code
     said = capsys.readouterr()
     assert said.out == ""

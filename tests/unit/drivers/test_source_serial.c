@@ -168,6 +168,53 @@ static void test_unplugged_and_back(void) {
     }
 }
 
+/// The frames of pushed bytes, at once.
+static int pushed(const void* bytes, size_t count, int64_t arrived_ns) {
+    int got = 0;
+    drv_line_push(&source, bytes, count, arrived_ns);
+    for (int more; (more = source.ops->read(&source, frames + got, 256 - got)) > 0;) got += more;
+    return got;
+}
+
+static void test_bytes_that_are_pushed(void) {
+    static uint8_t wire[60 * 64];
+    drv_source_config_t config = settings(DRV_FRAMING_COBS);
+    config.line.device = NULL;
+    start(&drv_source_serial, &config);
+    TEST_ASSERT_EQUAL_INT(-1, source.ops->fd(&source));
+    size_t count = 0;
+    for (uint32_t k = 0; k < 60; ++k) {
+        const drv_stream_header_t header = {DRV_STREAM_INT24, 12, 1, k, k * 1000};
+        int32_t codes[12] = {(int32_t)k};
+        count += drv_stream_encode_codes(&header, codes, wire + count, sizeof wire - count);
+    }
+    TEST_ASSERT_EQUAL_INT(120, pushed(wire, count, INT64_C(5000000000))); // more than one read of the decoder
+    TEST_ASSERT_EQUAL_INT64(INT64_C(5000000000), frames[119].time_ns);
+    TEST_ASSERT_TRUE(frames[0].time_ns < frames[2].time_ns && frames[117].time_ns < frames[119].time_ns);
+    TEST_ASSERT_EQUAL_INT(0, pushed(wire, count / 60 / 2, INT64_C(6000000000)));
+    drv_line_break(&source);
+    TEST_ASSERT_EQUAL_INT(2, pushed(wire, count / 60, INT64_C(7000000000)));
+    TEST_ASSERT_EQUAL_HEX8(DRV_LOSS_LINK, frames[0].loss);
+    drv_stats_t stats;
+    source.ops->stats(&source, &stats);
+    TEST_ASSERT_EQUAL_UINT64(1, stats.link_down);
+    TEST_ASSERT_EQUAL_INT(0, stats.link_is_down);
+    source.ops->close(&source);
+    start(&drv_source_serial, &config);
+    TEST_ASSERT_EQUAL_INT(120, pushed(wire, count, 0)); // nobody knows when: by the node's clock
+    TEST_ASSERT_EQUAL_INT64(INT64_C(1059000000), frames[119].time_ns);
+    source.ops->close(&source);
+    config.line.framing = DRV_FRAMING_ASCII;
+    start(&drv_source_serial, &config);
+    TEST_ASSERT_EQUAL_INT(3, pushed("0,0\n1,2\n3,4\n5,6\n", 16, 0)); // .. or one period apart
+    TEST_ASSERT_EQUAL_INT64(INT64_C(1000000000), frames[0].time_ns);
+    TEST_ASSERT_EQUAL_INT64(INT64_C(1002000000), frames[2].time_ns);
+    source.ops->close(&source);
+    start(&drv_source_slcan, &config);
+    TEST_ASSERT_EQUAL_INT(2, pushed("\rt1231AA\rt0010\rt12", 18, 42));
+    TEST_ASSERT_EQUAL_INT64(42, frames[1].time_ns);
+}
+
 static void test_what_cannot_be_opened(void) {
     drv_serial_t port;
     char plain[80];
@@ -339,6 +386,7 @@ int main(void) {
     RUN_TEST(test_packets_become_frames);
     RUN_TEST(test_damage_marks_the_next_frame);
     RUN_TEST(test_unplugged_and_back);
+    RUN_TEST(test_bytes_that_are_pushed);
     RUN_TEST(test_what_cannot_be_opened);
     RUN_TEST(test_the_line_is_raw_and_any_baud_is_taken);
     RUN_TEST(test_slcan_adapter);
