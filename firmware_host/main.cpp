@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // okid: one binary, sub-commands. Parses the command line, runs one command, turns a failure into a message.
 #include "commands/commands.hpp"
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "files/whole_file.hpp"
 
 #include <csignal>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "reader.hpp"
 
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 
 #include "serial_line.hpp"
 #include "threads.hpp"

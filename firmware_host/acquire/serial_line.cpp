@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "serial_line.hpp"
 
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 
 #include <algorithm>
 #include <cerrno>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "aligner.hpp"
 
-#include "acquire/ring_mask.hpp"
 #include "config/config_clock.hpp"
 #include "missing.hpp"
+#include "ring_mask.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "free_node.hpp"
 
-#include "acquire/ring_mask.hpp"
 #include "missing.hpp"
+#include "ring_mask.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,6 +4,7 @@
 // run, one thread: the ratios count, not the times.
 #include "bench_identify.hpp"
 #include "commands.hpp"
+#include "files/whole_file.hpp"
 #include "result/result.hpp"
 
 #include <Eigen/Core>

@@ -6,6 +6,7 @@
 #include "config/config_json.hpp"
 #include "config/presets.hpp"
 #include "error.hpp"
+#include "files/whole_file.hpp"
 #include "live/identifier.hpp"
 #include "result/method.hpp"
 #include "result/result.hpp"

@@ -3,7 +3,7 @@
 #include "completion.hpp"
 
 #include "commands.hpp"
-#include "result/result.hpp"
+#include "files/whole_file.hpp"
 
 #include <algorithm>
 #include <cctype>

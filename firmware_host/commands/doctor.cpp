@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // okid doctor: what a live measurement needs of this machine, what is missing, and the command that mends it.
 #include "acquire/can_link.hpp"
-#include "acquire/gpio_lines.hpp"
 #include "acquire/reader.hpp"
 #include "acquire/serial_line.hpp"
 #include "commands.hpp"
 #include "config/config.hpp"
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "findings.hpp"
+#include "live/gpio_lines.hpp"
 
 #include <algorithm>
 #include <cerrno>

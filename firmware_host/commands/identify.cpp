@@ -2,8 +2,8 @@
 // PURPOSE  okid identify: measured records in, modes and a state-space model out
 #include "commands.hpp"
 
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "files/whole_file.hpp"
 #include "progress.hpp"
 #include "record/csv.hpp"

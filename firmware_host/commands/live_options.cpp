@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "live_options.hpp"
 
-#include "acquire/playback.hpp"
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "files/whole_file.hpp"
+#include "live/playback.hpp"
 
 #include <algorithm>
 #include <charconv>

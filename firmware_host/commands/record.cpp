@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // okid record: raw frames onto the disk, nothing else.
-#include "acquire/capture.hpp"
-#include "acquire/playback.hpp"
 #include "acquire/stop_signal.hpp"
 #include "commands.hpp"
-#include "journal/record_watch.hpp"
+#include "live/capture.hpp"
+#include "live/playback.hpp"
+#include "live/record_watch.hpp"
 #include "live_options.hpp"
 
 #include <cstdio>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // okid replay: a recorded log through the live path, or onto a bus.
-#include "acquire/playback.hpp"
 #include "acquire/stop_signal.hpp"
 #include "commands.hpp"
 #include "error.hpp"
+#include "live/playback.hpp"
 #include "live/session.hpp"
 #include "live_options.hpp"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // okid run: acquire, identify and show while it happens.
-#include "acquire/capture.hpp"
-#include "acquire/playback.hpp"
 #include "acquire/stop_signal.hpp"
 #include "commands.hpp"
+#include "live/capture.hpp"
+#include "live/playback.hpp"
 #include "live/session.hpp"
 #include "live_options.hpp"
 

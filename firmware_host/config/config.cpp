@@ -16,9 +16,9 @@
 #include "config_trigger.hpp"
 #include "error.hpp"
 #include "files/file_kind.hpp"
-#include "nearest_name.hpp"
+#include "files/nearest_name.hpp"
+#include "files/units.hpp"
 #include "presets.hpp"
-#include "units.hpp"
 
 #include <algorithm>
 #include <array>

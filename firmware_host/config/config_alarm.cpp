@@ -2,7 +2,7 @@
 #include "config_alarm.hpp"
 
 #include "error.hpp"
-#include "nearest_name.hpp"
+#include "files/nearest_name.hpp"
 
 #include <filesystem>
 #include <fmt/format.h>

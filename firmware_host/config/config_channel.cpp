@@ -3,7 +3,8 @@
 
 #include "config_line.hpp"
 #include "error.hpp"
-#include "nearest_name.hpp"
+#include "files/nearest_name.hpp"
+#include "files/units.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -264,6 +265,16 @@ void resolve_channel(const config_place& place, const toml::table& table, const 
     }
     if (const toml::node* node = table.get("offset")) channel.layout.offset = *node->value<double>();
     channel.layout.offset -= table["zero_code"].value_or(0.0) * channel.layout.scale; // offset binary
+}
+
+double channel_config::si_factor() const {
+    const unit_rule* rule = find_unit(unit);
+    return rule ? rule->factor : 1;
+}
+
+std::string channel_config::si_unit() const {
+    const unit_rule* rule = find_unit(unit);
+    return rule ? rule->si : unit;
 }
 
 } // namespace okid_host

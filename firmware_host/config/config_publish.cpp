@@ -2,7 +2,7 @@
 #include "config_publish.hpp"
 
 #include "error.hpp"
-#include "nearest_name.hpp"
+#include "files/nearest_name.hpp"
 
 #include <arpa/inet.h>
 #include <charconv>

@@ -3,7 +3,7 @@
 #include "config_schema.hpp"
 
 #include "error.hpp"
-#include "nearest_name.hpp"
+#include "files/nearest_name.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "config_send.hpp"
 
-#include "nearest_name.hpp"
+#include "files/nearest_name.hpp"
 
 #include <drv/candump.h>
 #include <fmt/format.h>

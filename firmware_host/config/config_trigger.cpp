@@ -2,7 +2,7 @@
 #include "config_trigger.hpp"
 
 #include "error.hpp"
-#include "nearest_name.hpp"
+#include "files/nearest_name.hpp"
 
 #include <algorithm>
 #include <cmath>

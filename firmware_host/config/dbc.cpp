@@ -4,7 +4,7 @@
 #include "dbc.hpp"
 
 #include "error.hpp"
-#include "nearest_name.hpp"
+#include "files/nearest_name.hpp"
 
 #include <algorithm>
 #include <cerrno>

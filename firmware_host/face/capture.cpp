@@ -4,12 +4,12 @@
 //          Bytes of a line go through the source that reads such a line, opened without a device. Samples and events that
 //          nobody has taken yet wait in arrays, runs of missing samples as one entry
 #include "acquire/bus_watch.hpp"
-#include "acquire/gpio_lines.hpp"
-#include "acquire/playback.hpp"
 #include "acquire/serial_line.hpp"
 #include "files.hpp"
 #include "guard.hpp"
-#include "journal/recording_link.hpp"
+#include "live/gpio_lines.hpp"
+#include "live/playback.hpp"
+#include "live/recording_link.hpp"
 #include "live/session.hpp"
 
 #include <drv/can_error.h>
@@ -143,8 +143,8 @@ struct okid_host_capture_t final : private session_listener {
 };
 
 okid_host_capture_t::okid_host_capture_t(const okid_host_config_t& config, const okid_host_capture_options_t& given)
-    : config_(face::config_of(config, given)), keep_samples_(given.keep_samples != 0), keep_events_(given.keep_events != 0),
-      live_(given.live != 0) {
+    : config_(face::config_of(config, given)), keep_samples_(given.keep_samples != 0),
+      keep_events_(given.keep_events != 0), live_(given.live != 0) {
     session_options options;
     if (given.duration_s > 0) options.duration_s = given.duration_s;
     if (given.trigger_ns != 0) options.trigger_ns = given.trigger_ns;
@@ -199,8 +199,9 @@ void okid_host_capture_t::push_bytes(std::size_t index, const std::uint8_t* byte
     face::pushed_bus& from = bus(index);
     const bus_config& wanted = config_.buses[index];
     if (!wanted.on_line())
-        throw failure(exit_usage, fmt::format("{}: bus \"{}\" is of type {}, expected serial or slcan for bytes of a line",
-                                              config_.path, wanted.name, wanted.type));
+        throw failure(exit_usage,
+                      fmt::format("{}: bus \"{}\" is of type {}, expected serial or slcan for bytes of a line",
+                                  config_.path, wanted.name, wanted.type));
     if (!from.line.ops) {
         drv_source_config_t line{};
         line.line = line_settings(wanted, config_.rate_hz);
@@ -299,7 +300,8 @@ okid_host_rows_t okid_host_capture_t::rows(bool raw) {
 
 void okid_host_capture_t::finish() {
     session& ending = stream();
-    if (config_.trigger.source == trigger_source::gpio && !live_ && !ending.triggered()) require_edge_time(config_, false);
+    if (config_.trigger.source == trigger_source::gpio && !live_ && !ending.triggered())
+        require_edge_time(config_, false);
     finished_ = true;
     recording_->finish(ending);
     ending.finish();
@@ -396,8 +398,8 @@ size_t okid_host_packet_encode(int32_t format, size_t channels, size_t samples, 
                                const double* values, uint8_t* out, size_t capacity) {
     const bool fits = format >= DRV_STREAM_INT16 && format <= DRV_STREAM_FLOAT32 && channels > 0 && channels < 256 &&
                       samples > 0 && samples < 256;
-    const drv_stream_header_t header{static_cast<drv_stream_format_t>(fits ? format : 0), static_cast<uint8_t>(channels),
-                                     static_cast<uint8_t>(samples), sequence, time_us};
+    const drv_stream_header_t header{static_cast<drv_stream_format_t>(fits ? format : 0),
+                                     static_cast<uint8_t>(channels), static_cast<uint8_t>(samples), sequence, time_us};
     if (!fits || drv_stream_bytes(&header) == 0) return 0;
     size_t written = 0;
     (void)face::guard([&] {

@@ -3,8 +3,8 @@
 // METHOD   a value becomes what a command line would hold, and is checked where that is: one set of sentences
 #include "options.hpp"
 
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -3,7 +3,6 @@
 #include "whole_file.hpp"
 
 #include "error.hpp"
-#include "result/result.hpp"
 
 #include <cerrno>
 #include <csignal>

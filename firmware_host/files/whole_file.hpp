@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file appears under its final name complete or not at all. (write_whole_file(), for one text, stands in result.hpp.)
+// A file appears under its final name complete or not at all.
 #pragma once
 #include <cstddef>
 #include <string>
@@ -32,6 +32,9 @@ class whole_file {
     std::string path_, target_, temporary_, buffer_;
     int fd_ = -1;
 };
+
+/// Write `text` to `path` through a temporary file and rename; "-" is stdout.
+void write_whole_file(const std::string& path, const std::string& text);
 
 /// For a signal handler: remove the temporary of a write in progress. Async-signal-safe.
 void remove_unfinished_file();

@@ -5,6 +5,7 @@
 #include "acquire/serial_line.hpp"
 #include "acquire/stop_signal.hpp"
 #include "error.hpp"
+#include "files/whole_file.hpp"
 #include "publish/service_notice.hpp"
 
 #include <algorithm>
@@ -65,10 +66,9 @@ ordered_json clock_json(const drv_clock_fit_t& clock) {
 
 session::session(const live_config& config, const session_options& options)
     : config_(config), options_(options),
-      publisher_(config,
-                 {options.events, options.table && options.events != "-" && options.json != "-", options.live,
-                  options.listener ? [to = options.listener](const std::string& line) { to->on_event(line); }
-                                   : std::function<void(const std::string&)>()}),
+      publisher_(config, {options.events, options.table && options.events != "-" && options.json != "-", options.live,
+                          options.listener ? [to = options.listener](const std::string& line) { to->on_event(line); }
+                                           : std::function<void(const std::string&)>()}),
       grid_(config, *this), check_(config), stream_(stream_of(config)), identifier_(stream_.sums()),
       alarm_(config.alarm), trigger_(config), hammer_(config, identifier_.lags()), losses_(config.buses.size()),
       health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),

@@ -23,9 +23,9 @@
 namespace okid_host {
 
 struct publisher_options {
-    std::string events;      ///< file, "-" = stdout, "" = none
-    bool show_table = false; ///< on stdout
-    bool live = false;       ///< the clock does not wait: what is behind loses events instead
+    std::string events;                               ///< file, "-" = stdout, "" = none
+    bool show_table = false;                          ///< on stdout
+    bool live = false;                                ///< the clock does not wait: what is behind loses events instead
     std::function<void(const std::string&)> listener; ///< gets every event as a line, on the thread of event()
 };
 

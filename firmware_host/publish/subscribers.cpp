@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "subscribers.hpp"
 
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 
 #include <array>
 #include <cerrno>

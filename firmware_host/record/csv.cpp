@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "csv.hpp"
 
-#include "config/nearest_name.hpp"
 #include "csv_header.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "line_reader.hpp"
 
 #include <algorithm>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "csv_header.hpp"
 
-#include "config/nearest_name.hpp"
 #include "error.hpp"
 #include "files/file_kind.hpp"
+#include "files/nearest_name.hpp"
 
 #include <algorithm>
 #include <array>

@@ -2,8 +2,8 @@
 // PURPOSE  refuses records no honest model can come from, and says what looks wrong about the others
 #include "record_check.hpp"
 
-#include "config/units.hpp"
 #include "error.hpp"
+#include "files/units.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -2,8 +2,8 @@
 // Standard deviations of what is identified from records in memory: the same again without one block of them each.
 #pragma once
 #include "record.hpp"
-#include "record_stabilization.hpp"
 #include "result/deviations.hpp"
+#include "result/stabilization.hpp"
 
 #include <okid/accumulator.h>
 

@@ -3,8 +3,8 @@
 // METHOD   everything comes as text, so that the same words answer the same mistake wherever it is made
 #include "request.hpp"
 
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "record_check.hpp"
 #include "result/method.hpp"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "mass_matrices.hpp"
 
-#include "config/nearest_name.hpp"
-#include "config/units.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
+#include "files/units.hpp"
 
 #include <algorithm>
 #include <charconv>

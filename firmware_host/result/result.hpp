@@ -2,8 +2,8 @@
 // An identified model as people and programs see it: okid.result/1 and the modal table.
 #pragma once
 #include "deviations.hpp"
-#include "record/record_stabilization.hpp"
 #include "refinement.hpp"
+#include "stabilization.hpp"
 
 #include <okid/identify.h>
 
@@ -57,8 +57,5 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
 /// Turn a failed okid_identify_run() into the failure to throw: exit 3 and what to do about it.
 [[noreturn]] void throw_identify_failure(okid_status_t status, const okid_identified_t& model,
                                          const okid_identify_config_t& config, const result_context& context);
-
-/// Write `text` to `path` through a temporary file and rename; "-" is stdout.
-void write_whole_file(const std::string& path, const std::string& text);
 
 } // namespace okid_host

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // RIG.toml: every key checked, each complaint with line and column.
-#include "config/nearest_name.hpp"
 #include "config/toml_parser.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "rig.hpp"
 
 #include <algorithm>

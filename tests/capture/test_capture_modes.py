@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The result of every kind of memory and method is that of `okid replay`; blocks for a Session are those of the grid."""
+"""Results of every kind of memory and method are those of `okid replay`; blocks for a Session are those of the grid."""
 
 from __future__ import annotations
 

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-
 # A config that is whole but for what a test adds.
 WHOLE = """[acquisition]
 rate_hz = 1000.0

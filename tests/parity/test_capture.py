@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""okid-capture of a log is okid replay of it: the same samples and gap marks to the bit, the same causes, events and result,
-for every framing and kind of clock, read by the library or handed over message by message."""
+"""okid-capture of a log is okid replay of it: the same samples and gap marks to the bit, the same causes, events and
+result, for every framing and kind of clock, read by the library or handed over message by message."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import binascii
 import json
 import random
 import struct
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,13 +16,10 @@ import can
 import numpy as np
 import okid as okid_package
 import pytest
+from lines import packet
 from numpy.typing import NDArray
 from okid import capture
-
-for name in ("property", "io"):
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / name))
-from lines import packet  # noqa: E402
-from program import okid  # noqa: E402
+from program import okid
 
 RATE, SAMPLES = 200.0, 2400
 HEAD = f"[acquisition]\nrate_hz = {RATE}\n"
@@ -48,7 +44,9 @@ def signals(count: int = SAMPLES, rate_hz: float = RATE) -> NDArray[np.float64]:
 
 def channel(name: str, role: str, **keys: Any) -> str:
     shown = {"name": name, "role": role, **keys}
-    return "[[channel]]\n" + "".join(f"{key} = {value if key == 'sequence' else json.dumps(value)}\n" for key, value in shown.items())
+    return "[[channel]]\n" + "".join(
+        f"{key} = {value if key == 'sequence' else json.dumps(value)}\n" for key, value in shown.items()
+    )
 
 
 NAMES = (("f", "force"), ("a", "acceleration"), ("b", "acceleration"))
@@ -153,7 +151,9 @@ def flexible() -> tuple[str, list[str]]:
     """Everything in one CAN FD frame of 64 bytes, big-endian, float32 and float64 among it."""
     text = HEAD + BUS.replace("interface", "fd = true\ninterface")
     count = "{ start_bit = 0, length = 32 }"
-    text += channel(*NAMES[0], bus="can0", can_id=0x20, start_bit=39, length=24, signed=True, byte_order="big", sequence=count)
+    text += channel(
+        *NAMES[0], bus="can0", can_id=0x20, start_bit=39, length=24, signed=True, byte_order="big", sequence=count
+    )
     text += channel(*NAMES[1], bus="can0", can_id=0x20, start_bit=64, length=32, value="float32", sequence=count)
     text += channel(*NAMES[2], bus="can0", can_id=0x20, start_bit=448, length=64, value="float64", sequence=count)
     lines = []
@@ -232,7 +232,9 @@ def written(rows: NDArray[np.float64], like: list[list[str]]) -> list[list[str]]
         short = "nan" if np.isnan(value) else f"{value:.10g}"
         return f"{value:.17g}" if other not in (short, "nan") and short != "nan" else short
 
-    return [[text(*pair) for pair in zip(row, other, strict=True)] for row, other in zip(rows.tolist(), like, strict=True)]
+    return [
+        [text(*pair) for pair in zip(row, other, strict=True)] for row, other in zip(rows.tolist(), like, strict=True)
+    ]
 
 
 @pytest.fixture(params=CASES)
@@ -318,7 +320,7 @@ def slcan(k: int, f: float, a: float, b: float) -> bytes:
 
 LINES: dict[str, Callable[[int, list[float]], bytes]] = {
     "cobs": lambda k, row: packet(k, [[int(x) for x in row]], time_us=int(k / RATE * 1e6)),
-    "ascii": lambda k, row: ("%d,%d,%d,%d\r\n" % (k & 255, *row)).encode(),
+    "ascii": lambda k, row: ",".join(str(int(x)) for x in (k & 255, *row)).encode() + b"\r\n",
     "witmotion": lambda k, row: witmotion(*row),
     "vectornav": lambda k, row: vectornav(k, *row),
     "slcan": lambda k, row: slcan(k, *row),
@@ -436,5 +438,8 @@ def test_a_limit_of_samples_and_a_finished_capture(tmp_path: Path) -> None:
         assert len(rows_of(kept)) == 777
         with pytest.raises(okid_package.InputError, match="has been finished"):
             kept.push(sent[:1])
-    with capture.Capture(tmp_path / "c.toml") as kept, pytest.raises(okid_package.InputError, match="there is no bus 1"):
+    with (
+        capture.Capture(tmp_path / "c.toml") as kept,
+        pytest.raises(okid_package.InputError, match="there is no bus 1"),
+    ):
         kept.link(up=False, bus=1)

@@ -43,7 +43,7 @@ def summary(page: str) -> str:
 
 
 def test_units_are_those_of_the_program() -> None:
-    text = (Path(__file__).parents[2] / "firmware_host" / "config" / "units.cpp").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "firmware_host" / "files" / "units.cpp").read_text(encoding="utf-8")
     rules = re.findall(r'\{"([^"]*)", ([0-9.e-]+), "([^"]*)"\}', text)
     table = {re.sub(r"\\u00b5", "µ", name): (float(size), si) for name, size, si in rules if float(size) != 1.0}
     assert table == SI

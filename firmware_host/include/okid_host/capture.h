@@ -27,18 +27,18 @@ typedef struct okid_host_capture_t okid_host_capture_t;
 
 /** What a capture is to do. Texts are read during okid_host_capture_create() only. */
 typedef struct okid_host_capture_options_t {
-    uint32_t size;               /**< sizeof this; set by okid_host_capture_defaults() */
-    int32_t identify;            /**< 1 (default); 0 = samples, gaps and counts only: [publish], [record] and triggers rest */
-    int32_t live;                /**< 1 = from devices: the clock does not wait, alarms call their command; default 0 */
-    int32_t record;              /**< 1 = journals as [record] asks for, where it does; default 0 */
-    int32_t table;               /**< 1 = modes and result on stdout as `okid run` shows them; default 0 */
-    int32_t keep_samples;        /**< 1 = samples wait for okid_host_capture_rows(); default 0 */
-    int32_t keep_events;         /**< 1 = events wait for okid_host_capture_events(); default 0 */
-    int32_t reserved;            /**< 0 */
-    const char* events;          /**< file for events as JSON lines, "-" = stdout, NULL (default) = none */
-    const char* json;            /**< file for the result, "-" = stdout, NULL (default) = none */
-    double duration_s;           /**< stream seconds to end after, 0 (default) = none */
-    int64_t trigger_ns;          /**< when the edge of a GPIO line came, for a log, which holds none; 0 (default) = not known */
+    uint32_t size;        /**< sizeof this; set by okid_host_capture_defaults() */
+    int32_t identify;     /**< 1 (default); 0 = samples, gaps and counts only: [publish], [record] and triggers rest */
+    int32_t live;         /**< 1 = from devices: the clock does not wait, alarms call their command; default 0 */
+    int32_t record;       /**< 1 = journals as [record] asks for, where it does; default 0 */
+    int32_t table;        /**< 1 = modes and result on stdout as `okid run` shows them; default 0 */
+    int32_t keep_samples; /**< 1 = samples wait for okid_host_capture_rows(); default 0 */
+    int32_t keep_events;  /**< 1 = events wait for okid_host_capture_events(); default 0 */
+    int32_t reserved;     /**< 0 */
+    const char* events;   /**< file for events as JSON lines, "-" = stdout, NULL (default) = none */
+    const char* json;     /**< file for the result, "-" = stdout, NULL (default) = none */
+    double duration_s;    /**< stream seconds to end after, 0 (default) = none */
+    int64_t trigger_ns; /**< when the edge of a GPIO line came, for a log, which holds none; 0 (default) = not known */
 } okid_host_capture_options_t;
 
 /** A run of samples. */
@@ -79,7 +79,8 @@ OKID_HOST_API int okid_host_capture_bytes(okid_host_capture_t* self, size_t bus,
 OKID_HOST_API int okid_host_capture_link(okid_host_capture_t* self, size_t bus, int32_t up);
 
 /** Frames that the source of a bus knows to have lost since the beginning: for want of room in a socket, or in the driver. */
-OKID_HOST_API int okid_host_capture_lost(okid_host_capture_t* self, size_t bus, uint64_t socket_overflow, uint64_t driver);
+OKID_HOST_API int okid_host_capture_lost(okid_host_capture_t* self, size_t bus, uint64_t socket_overflow,
+                                         uint64_t driver);
 
 /** An edge of the trigger line. Nothing comes of it when none is waited for. */
 OKID_HOST_API int okid_host_capture_edge(okid_host_capture_t* self, int64_t time_ns);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The CSV reader: dialects, missing samples, sample rate, and a clear refusal of everything else.
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "record/csv.hpp"
 #include "record/csv_header.hpp"
 

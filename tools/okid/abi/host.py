@@ -37,7 +37,10 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_capture_events": (_text, [_handle]),
     "okid_host_capture_stats": (_text, [_handle]),
     "okid_host_capture_finish": (_status, [_handle]),
-    "okid_host_packet_encode": (_size, [_status, _size, _size, ctypes.c_uint32, ctypes.c_uint32, _handle, _handle, _size]),
+    "okid_host_packet_encode": (
+        _size,
+        [_status, _size, _size, ctypes.c_uint32, ctypes.c_uint32, _handle, _handle, _size],
+    ),
 }
 ABI = 1
 _ERRORS: dict[int, type[Error]] = {2: InputError, 3: IdentificationError}

@@ -80,7 +80,9 @@ def _add_serial(kinds: Any) -> None:
 def _add_outputs(command: Any) -> None:
     command.add_argument("--json", metavar="FILE|-", help="the result, okid.result/1")
     command.add_argument("--events", metavar="FILE|-", help="events as JSON lines, as `okid run` writes them")
-    command.add_argument("--trigger-at", type=float, metavar="S", help="when the GPIO edge came, in the time of the log")
+    command.add_argument(
+        "--trigger-at", type=float, metavar="S", help="when the GPIO edge came, in the time of the log"
+    )
 
 
 def _add_sync(kinds: Any) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a CONFIG.toml says of buses and channels: read, checked and completed by the host library, as `okid check` does."""
+"""What a CONFIG.toml says of buses and channels: read and checked by the host library, as `okid check` does."""
 
 from __future__ import annotations
 
@@ -80,10 +80,10 @@ class CaptureConfig:
 
 
 def _bus(table: dict[str, Any]) -> BusConfig:
-    rate = table["bitrate"]
+    rate, interface = table["bitrate"], table["interface"] or table["name"]
     return BusConfig(
-        table["name"], table["type"], table["interface"] or table["name"], table["fd"], rate if rate is None else int(rate),
-        table["device"], table.get("baud") or 115200,
+        table["name"], table["type"], interface, table["fd"], rate if rate is None else int(rate), table["device"],
+        table.get("baud") or 115200,
     )  # fmt: skip
 
 
@@ -100,6 +100,6 @@ def load_config(path: str | Path) -> CaptureConfig:
     buses = tuple(map(_bus, found["buses"]))
     dbcs = tuple(one["dbc"] for one in found["buses"] if one["dbc"])
     return CaptureConfig(
-        Path(path), found["rate_hz"], buses, channels, found["identification"]["update_s"], tuple(found["warnings"]), dbcs,
-        found["trigger"]["source"],
+        Path(path), found["rate_hz"], buses, channels, found["identification"]["update_s"], tuple(found["warnings"]),
+        dbcs, found["trigger"]["source"],
     )  # fmt: skip

@@ -52,7 +52,9 @@ def make_capture(config: CaptureConfig, args: Any, live: bool) -> Capture:
     if args.events == "-" and args.json == "-":
         raise InputError("--events - and --json - both want stdout, expected a file for one of them")
     if config.trigger == "gpio" and not live and args.trigger_at is None:
-        raise InputError(f"{config.path}: waits for an edge of a GPIO line, which no log holds: say --trigger-at SECONDS")
+        raise InputError(
+            f"{config.path}: waits for an edge of a GPIO line, which no log holds: say --trigger-at SECONDS"
+        )
     return Capture(
         config, duration=args.duration, trigger_at=args.trigger_at, events=args.events, json=args.json, live=live,
         record=live, table=not args.quiet, keep_events=False,

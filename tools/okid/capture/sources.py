@@ -93,7 +93,7 @@ def feed_bytes(
     """Bytes into a capture until it is done: yields after each read.
 
     `port`: an open pyserial port, or a binary file of bytes that were recorded, which ends by itself. A port is read in
-    a thread of its own for `duration` s (and a second more) or until `stop()`; `tap` gets the bytes there, as they come.
+    a thread of its own for `duration` s (and a second more) or until `stop()`; `tap` gets the bytes there.
     `clock` stamps them, s. Raises OSError when the port fails, as when it is unplugged, or what `tap` raises.
     """
     chunks = _port_chunks(port, duration, stop, tap, clock) if hasattr(port, "in_waiting") else _file_chunks(port, stop)
@@ -174,7 +174,9 @@ def can_blocks(
     Raises InputError (config), can.CanError or OSError (the bus failed: what came before has been given out).
     """
     kept = samples or Capture(config, identify=False, duration=duration, keep_events=False)
-    yield from _blocks(feed_messages(bus, kept, duration=duration, stop=stop, tap=tap, idle=idle), kept, block, latency_s)
+    yield from _blocks(
+        feed_messages(bus, kept, duration=duration, stop=stop, tap=tap, idle=idle), kept, block, latency_s
+    )
 
 
 def serial_blocks(
@@ -191,7 +193,9 @@ def serial_blocks(
 ) -> Iterator[Real]:
     """The same for a serial line, with the arguments of feed_bytes()."""
     kept = samples or Capture(config, identify=False, duration=duration, keep_events=False)
-    yield from _blocks(feed_bytes(port, kept, duration=duration, stop=stop, tap=tap, clock=clock), kept, block, latency_s)
+    yield from _blocks(
+        feed_bytes(port, kept, duration=duration, stop=stop, tap=tap, clock=clock), kept, block, latency_s
+    )
 
 
 class RawFile:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames and bytes in; samples, gaps, events and the result out: one capture of the host library, as `okid run` does it."""
+"""Frames and bytes in; samples, gaps, events and the result out: a capture of the host library, as in `okid run`."""
 
 from __future__ import annotations
 
@@ -102,10 +102,10 @@ class Capture:
     """Put in what a device gives, take out samples (n, inputs + outputs) in SI units, NaN where one is missing; or have
     them identified on the way, as `okid run` does, with its events, table and result.
 
-    identify=False: samples, gaps and counts only. duration: seconds of samples. trigger_at: when the edge of a GPIO line
-    came, s since 1970 (for logs). events, json: files as of `okid run`, "-" = stdout. table: modes and result on stdout.
-    live: from a device; record: journals as [record] of the config asks. keep_samples (default: without identification)
-    and keep_events: they wait for take() and events().
+    identify=False: samples, gaps and counts only. duration: seconds of samples. trigger_at: when the edge of a GPIO
+    line came, s since 1970 (for logs). events, json: files as of `okid run`, "-" = stdout. table: modes and result on
+    stdout. live: from a device; record: journals as [record] of the config asks. keep_samples (default: without
+    identification) and keep_events: they wait for take() and events().
     A context manager. Raises InputError for a config or an argument that is wrong.
     """
 
@@ -175,7 +175,7 @@ class Capture:
         self._only = self._serial = self.config.buses.index(bus)
 
     def push(self, messages: Iterable[can.Message]) -> None:
-        """Messages of python-can, as many as there are: one call of the library a batch. Those of no bus are left out."""
+        """Messages of python-can: one call of the library a batch. Those of no bus are left out."""
         if self._only is not None:
             return self.push_frames(frames_of(messages, self._only))
         parts = [
@@ -191,8 +191,8 @@ class Capture:
         host.call("capture_frames", self._open(), given.ctypes.data, given.size)
 
     def push_bytes(self, data: bytes, time_s: float | None = None) -> None:
-        """Bytes of a serial line, in any pieces, and when they came; None = out of a file: by the node's clock, else one
-        sample after the other."""
+        """Bytes of a serial line, in any pieces, and when they came; None = out of a file: by the node's clock, else
+        one sample after the other."""
         stamp = 0 if time_s is None else round(time_s * 1e6) * 1000
         host.call("capture_bytes", self._open(), self._serial, data, len(data), stamp)
 
@@ -228,8 +228,8 @@ class Capture:
         return bool(host.library().okid_host_capture_done(self._open()))
 
     def take(self, *, raw: bool = False, every: bool = False) -> list[Real]:
-        """Blocks of samples that wait, in order. raw: numbers as they stand in the frames; every: channels of role aux too.
-        A long silence is one block of NaN that takes no memory."""
+        """Blocks of samples that wait, in order. raw: numbers as they stand in the frames; every: channels of role aux
+        too. A long silence is one block of NaN that takes no memory."""
         out, rows = [], _Rows()
         width = len(self.config.channels)
         shown = width if every else len(self.config.wanted)

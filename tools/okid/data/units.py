@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Units that are made SI."""
 
-# Name, size in the SI unit, SI unit: as firmware_host/config/units.cpp has them (a test compares).
+# Name, size in the SI unit, SI unit: as firmware_host/files/units.cpp has them (a test compares).
 SI = {
     "kN": (1e3, "N"),
     "mN": (1e-3, "N"),

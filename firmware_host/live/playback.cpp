@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "playback.hpp"
 
-#include "config/nearest_name.hpp"
+#include "acquire/frame_target.hpp"
+#include "acquire/stop_signal.hpp"
 #include "error.hpp"
-#include "frame_target.hpp"
-#include "journal/recording_link.hpp"
-#include "stop_signal.hpp"
+#include "files/nearest_name.hpp"
+#include "recording_link.hpp"
 
 #include <algorithm>
 #include <cerrno>

@@ -2,7 +2,7 @@
 // The GPIO lines of a live run: the trigger input and the lamps.
 #pragma once
 #include "config/config.hpp"
-#include "live/stream_target.hpp"
+#include "stream_target.hpp"
 
 #include <drv/gpio.h>
 

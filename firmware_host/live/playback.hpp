@@ -2,7 +2,7 @@
 // Recorded logs: through a session, or onto a bus, as fast as possible or at a multiple of their own time.
 #pragma once
 #include "journal/recorder.hpp"
-#include "live/stream_target.hpp"
+#include "stream_target.hpp"
 
 #include <drv/pacer.h>
 

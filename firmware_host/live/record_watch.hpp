@@ -4,7 +4,7 @@
 #include "align/aligner.hpp"
 #include "align/trigger.hpp"
 #include "config/config.hpp"
-#include "live/stream_target.hpp"
+#include "stream_target.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "capture.hpp"
 
-#include "bus_listener.hpp"
-#include "bus_watch.hpp"
+#include "acquire/bus_listener.hpp"
+#include "acquire/bus_watch.hpp"
+#include "acquire/reader.hpp"
+#include "acquire/ring_merge.hpp"
+#include "acquire/sender.hpp"
+#include "acquire/stop_signal.hpp"
+#include "acquire/threads.hpp"
 #include "error.hpp"
 #include "gpio_lines.hpp"
-#include "journal/recording_link.hpp"
-#include "reader.hpp"
-#include "ring_merge.hpp"
-#include "sender.hpp"
-#include "stop_signal.hpp"
-#include "threads.hpp"
+#include "recording_link.hpp"
 
 #include <chrono>
 #include <fmt/format.h>

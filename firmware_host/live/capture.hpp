@@ -3,7 +3,7 @@
 // asked duration; recorded on the way where that is wanted.
 #pragma once
 #include "journal/recorder.hpp"
-#include "live/stream_target.hpp"
+#include "stream_target.hpp"
 
 #include <optional>
 

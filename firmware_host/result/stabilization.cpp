@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "record_stabilization.hpp"
+#include "stabilization.hpp"
 
 #include "error.hpp"
-#include "result/method.hpp"
+#include "method.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "gpio_lines.hpp"
 
-#include "config/nearest_name.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 
 #include <cerrno>
 #include <fmt/format.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Between a recorder and what its frames go to beside it: the trigger one way, news the other way.
 #pragma once
-#include "live/stream_target.hpp"
-#include "recorder.hpp"
+#include "journal/recorder.hpp"
+#include "stream_target.hpp"
 
 #include <memory>
 #include <optional>

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "units.hpp"
 
-#include "config.hpp"
-
 namespace okid_host {
 namespace {
 
@@ -36,16 +34,6 @@ const unit_rule* find_unit(const std::string& name) {
     for (const unit_rule& rule : rules)
         if (name == rule.name) return &rule;
     return nullptr;
-}
-
-double channel_config::si_factor() const {
-    const unit_rule* rule = find_unit(unit);
-    return rule ? rule->factor : 1;
-}
-
-std::string channel_config::si_unit() const {
-    const unit_rule* rule = find_unit(unit);
-    return rule ? rule->si : unit;
 }
 
 } // namespace okid_host
