@@ -241,8 +241,8 @@ def _identify(
 
         try:
             for _ in feed_messages(
-                source, capture, duration=args.duration if live else None, stop=lambda: stop.is_set() or seen == args.frames,
-                tap=keep, idle=idle,
+                source, capture, duration=args.duration if live else None,
+                stop=lambda: stop.is_set() or seen == args.frames, tap=keep, idle=idle,
             ):  # fmt: skip
                 pass
         except (can.CanError, OSError) as failed:
