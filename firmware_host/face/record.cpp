@@ -5,6 +5,7 @@
 #include "options.hpp"
 #include "result_handle.hpp"
 
+#include "record/csv.hpp"
 #include "record/csv_header.hpp"
 #include "record/request.hpp"
 
@@ -61,7 +62,12 @@ int32_t okid_host_identify(const char* options, int32_t records, const double* c
         std::size_t total = 0;
         for (int32_t i = 0; i < records; ++i) total += counts[i];
         set.samples.reserve(total * set.channels());
-        for (int32_t i = 0; i < records; ++i) set.add(names[i], samples[i], counts[i]);
+        std::vector<std::string> columns = wanted.inputs;
+        columns.insert(columns.end(), wanted.outputs.begin(), wanted.outputs.end());
+        for (int32_t i = 0; i < records; ++i) {
+            check_columns(names[i], columns, samples[i], counts[i]);
+            set.add(names[i], samples[i], counts[i]);
+        }
         *result = face::make_result(identify_records(std::move(set), wanted));
     });
 }

@@ -122,6 +122,7 @@ okid_host_result_t* make_result(record_result found) {
 okid_host_result_t* make_result(const okid_identified_t& model, result_context context) {
     record_result found;
     found.model = kept_model(model);
+    found.realised = model;
     found.context = std::move(context);
     return make_result(std::move(found));
 }
@@ -152,9 +153,8 @@ int32_t okid_host_result_array(const okid_host_result_t* self, const char* name,
     return there;
 }
 
-int32_t okid_host_result_decomposition(okid_host_result_t* self, void** identifier, const void** config) {
-    *identifier = self->found.identifier;
-    *config = &self->found.config;
+int32_t okid_host_result_decomposition(okid_host_result_t* self, okid_host_decomposition_t* out) {
+    *out = {self->found.identifier, &self->found.config, &self->found.realised};
     return self->found.identifier ? 1 : 0;
 }
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// PURPOSE  rows of a CSV file into samples, with the place of every fault
+// METHOD   plain numbers by from_chars where they stand; anything else in a cell takes the slow way
 #include "csv.hpp"
 
 #include "csv_header.hpp"
@@ -13,6 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fmt/format.h>
+#include <iterator>
 #include <limits>
 
 namespace okid_host {
@@ -26,8 +29,7 @@ constexpr double missing_value = std::numeric_limits<double>::quiet_NaN();
 class row_parser {
   public:
     row_parser(const std::string& path, const csv_header& header, const csv_request& request, csv_record& out)
-        : path_(path), header_(header), out_(out), target_(header.names.size(), skipped), row_(request.columns.size()),
-          present_(request.columns.size(), 0) {
+        : path_(path), header_(header), out_(out), target_(header.names.size(), skipped), row_(request.columns.size()) {
         for (std::size_t k = 0; k < request.columns.size(); ++k) {
             const std::size_t at = find_csv_column(path, header, request.columns[k]);
             if (target_[at] != skipped)
@@ -46,8 +48,14 @@ class row_parser {
         if (target_[column] == skipped) target_[column] = time_stamp;
     }
 
+    /// The time stamps of a column that was read as samples.
+    void take_times(std::size_t column) {
+        time_column_ = static_cast<int>(column);
+        const auto at = static_cast<std::size_t>(target_[column]);
+        for (std::size_t i = 0; i < out_.count; ++i) take_time(out_.first_line + i, out_.samples[i * row_.size() + at]);
+    }
+
     void add(std::size_t number, std::string_view line);
-    void check_columns() const;
     double rate_of_time() const;
 
   private:
@@ -63,7 +71,6 @@ class row_parser {
     csv_record& out_;
     std::vector<int> target_;
     std::vector<double> row_;
-    std::vector<std::size_t> present_;
     std::vector<double> times_;
     int time_column_ = -1, copy_time_from_ = skipped;
     char decimal_ = 0; // '.' or ',' once seen in a semicolon file
@@ -171,21 +178,12 @@ void row_parser::add(std::size_t number, std::string_view line) {
             take_time(number, value);
         } else {
             row_[static_cast<std::size_t>(slot)] = value;
-            present_[static_cast<std::size_t>(slot)] += value == value ? 1u : 0u;
         }
     }
     if (at != end) ragged(number, line);
     if (copy_time_from_ >= 0) take_time(number, row_[static_cast<std::size_t>(copy_time_from_)]);
     out_.samples.insert(out_.samples.end(), row_.begin(), row_.end());
     ++out_.count;
-}
-
-void row_parser::check_columns() const {
-    for (std::size_t k = 0; k < present_.size(); ++k)
-        if (present_[k] == 0)
-            throw failure(exit_usage, fmt::format("{}: column \"{}\" holds no number in any of its {} rows, expected "
-                                                  "measurements",
-                                                  path_, out_.columns[k], out_.count));
 }
 
 double row_parser::rate_of_time() const {
@@ -214,6 +212,7 @@ csv_header read_head(line_reader& reader, const std::string& path) {
         if (start == std::string_view::npos) continue;
         if (line[start] == '#') {
             read_csv_comment(path, reader.number(), line, header);
+            header.comments.emplace_back(line);
             continue;
         }
         read_csv_names(path, reader.number(), line, header);
@@ -268,17 +267,35 @@ static std::string time_like(const std::vector<std::string>& names) {
     return "";
 }
 
-csv_record read_csv(const std::string& path, const csv_request& request) {
+void check_columns(const std::string& path, const std::vector<std::string>& columns, const double* rows,
+                   std::size_t count) {
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+        std::size_t i = 0;
+        while (i < count && std::isnan(rows[i * columns.size() + k])) ++i;
+        if (i == count)
+            throw failure(exit_usage, fmt::format("{}: column \"{}\" holds no number in any of its {} rows, expected "
+                                                  "measurements",
+                                                  path, columns[k], count));
+    }
+}
+
+csv_record read_csv(const std::string& path, const csv_request& asked) {
     line_reader reader(path);
     const csv_header header = read_head(reader, path);
+    csv_request request = asked;
+    if (asked.whole)
+        std::copy_if(header.names.begin(), header.names.end(), std::back_inserter(request.columns),
+                     [](const std::string& name) { return !name.empty(); });
     csv_record out;
     out.path = path;
     out.columns = request.columns;
+    out.comments = header.comments;
+    out.said_fs_hz = header.fs_hz;
     row_parser rows(path, header, request, out);
     const auto time = std::find(header.names.begin(), header.names.end(), "time_s");
     const bool use_time = !request.fs_hz && !header.fs_hz && time != header.names.end();
-    if (use_time) rows.want_time(static_cast<std::size_t>(time - header.names.begin()));
-    if (!request.fs_hz && !header.fs_hz && !use_time)
+    if (use_time && !request.whole) rows.want_time(static_cast<std::size_t>(time - header.names.begin()));
+    if (!request.fs_hz && !header.fs_hz && !use_time && !request.whole)
         throw failure(exit_usage,
                       fmt::format("{}: no sample rate{}{}; expected --fs HZ, a line \"# fs_hz: 1024\" above the column "
                                   "names, or a column time_s",
@@ -288,9 +305,16 @@ csv_record read_csv(const std::string& path, const csv_request& request) {
     if (out.count == 0)
         throw failure(exit_usage,
                       fmt::format("{}: no rows after the column names (line {}), expected samples", path, header.line));
-    rows.check_columns();
-    out.said_fs_hz = header.fs_hz;
-    out.fs_hz = request.fs_hz ? *request.fs_hz : header.fs_hz ? *header.fs_hz : rows.rate_of_time();
+    if (!request.whole) check_columns(path, out.columns, out.samples.data(), out.count);
+    out.fs_hz = request.fs_hz.value_or(header.fs_hz.value_or(0));
+    if (!use_time) return out;
+    if (!request.whole) return out.fs_hz = rows.rate_of_time(), out;
+    try { // without a rate a record can still be looked at
+        rows.take_times(static_cast<std::size_t>(time - header.names.begin()));
+        out.fs_hz = rows.rate_of_time();
+    } catch (const failure& fault) {
+        out.rate_remark = fault.what();
+    }
     return out;
 }
 

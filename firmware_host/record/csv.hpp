@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One CSV record in memory: the columns asked for, NaN where a sample is missing.
+// PURPOSE  one CSV record in memory: the columns asked for, NaN where a sample is missing.
 #pragma once
 #include <cstddef>
 #include <functional>
@@ -10,24 +10,31 @@
 namespace okid_host {
 
 struct csv_request {
-    std::vector<std::string> columns;               ///< names, in the order wanted
-    std::optional<double> fs_hz;                    ///< overrides what the file says
+    std::vector<std::string> columns; ///< names, in the order wanted
+    bool whole = false;               ///< instead: every column that has a name, empty ones and an unknown rate too
+    std::optional<double> fs_hz;      ///< overrides what the file says
     std::function<void(double megabytes)> progress; ///< called now and then while reading; may be empty
 };
 
 struct csv_record {
     std::string path;
     std::vector<std::string> columns, units; ///< as asked for; unit "" when the header names none
-    double fs_hz = 0;
-    std::optional<double> said_fs_hz; ///< what the file itself says above its column names
-    std::size_t count = 0;            ///< samples
-    std::vector<double> samples;      ///< columns x count, column-major: one sample after the other
-    std::size_t first_line = 0;       ///< line number of the first sample
+    double fs_hz = 0;                        ///< 0: not known (`whole` only)
+    std::optional<double> said_fs_hz;        ///< what the file itself says above its column names
+    std::size_t count = 0;                   ///< samples
+    std::vector<double> samples;             ///< columns x count, column-major: one sample after the other
+    std::size_t first_line = 0;              ///< line number of the first sample
+    std::vector<std::string> comments;       ///< the lines above the names, as they stand
+    std::string rate_remark;                 ///< why a time_s column gives no rate (`whole` only)
 };
 
 /// Read a record. Throws `failure` (exit 2) naming file, line, column, what was found and what was expected.
 /// Columns that were not asked for are skipped unread.
 csv_record read_csv(const std::string& path, const csv_request& request);
+
+/// Throws (exit 2) where a column of `count` rows is missing throughout.
+void check_columns(const std::string& path, const std::vector<std::string>& columns, const double* rows,
+                   std::size_t count);
 
 /// Only the column names, for messages.
 std::vector<std::string> read_csv_columns(const std::string& path);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The head of a CSV record: comment lines, separator, column names with their units, the stated sample rate.
+// PURPOSE  the head of a CSV record: comment lines, separator, column names with their units, the stated sample rate.
 #pragma once
 #include <cstddef>
 #include <optional>
@@ -10,10 +10,11 @@
 namespace okid_host {
 
 struct csv_header {
-    std::size_t line = 0;            ///< line number of the names, from 1
-    char separator = ',';            ///< ',' ';' or tab
-    std::vector<std::string> names;  ///< as written, quotes removed
-    std::optional<double> fs_hz;     ///< from `# fs_hz: …` or `# sample_rate_hz = …`
+    std::size_t line = 0;           ///< line number of the names, from 1
+    char separator = ',';           ///< ',' ';' or tab
+    std::vector<std::string> names; ///< as written, quotes removed
+    std::optional<double> fs_hz;    ///< from `# fs_hz: …` or `# sample_rate_hz = …`
+    std::vector<std::string> comments;
     std::string fs_remark;           ///< a rate line that holds no number, for the message
     bool looks_like_numbers = false; ///< the line holds numbers: the file has no header
 };

@@ -50,7 +50,8 @@ std::unique_ptr<std::byte[]> library_memory(std::size_t bytes, const okid_identi
 }
 
 void check_status(okid_status_t status, const char* what) {
-    if (status < 0) throw failure(exit_no_model, fmt::format("no model: {}: {}", what, okid_status_text(status)));
+    if (status < 0)
+        throw failure(exit_no_model, fmt::format("no model: {}: {}", what, okid_status_text(status)), status);
 }
 
 /// Feed all records, a gap between each two, as many samples of silence as lags before each that begins at rest.
@@ -257,6 +258,7 @@ long long find_model(const record_options& options, okid_accumulator_t*& accumul
     okid_status_t status = okid_identify_run(work.identifier, accumulator, &work.model);
     status = refine_by_factor(accumulator, status, work);
     if (status < 0) throw_identify_failure(status, work.model, work.config, work.context);
+    work.realised = work.model;
     return rows;
 }
 
@@ -328,6 +330,7 @@ record_result identify_records(record_set records, const record_options& options
     result.config = work.config;
     result.memory = std::move(work.memory);
     result.identifier = work.identifier;
+    result.realised = work.realised;
     return result;
 }
 

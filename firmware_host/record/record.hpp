@@ -37,6 +37,7 @@ struct record_result {
     okid_identify_config_t config{};
     std::unique_ptr<std::byte[]> memory;   ///< of `identifier`
     okid_identify_t* identifier = nullptr; ///< for the poles of other orders; `model` does not look into it
+    okid_identified_t realised{};          ///< what it gave, in its own memory
 };
 
 /// Identify from all records together. Throws `failure`: exit 3 when no honest model can be had.

@@ -101,13 +101,15 @@ void check_different_inputs(const record_set& set, const record_options& options
     Eigen::MatrixXd left = input_correlation(set);
     for (Eigen::Index k = 0; k < n_u; ++k) { // what is left of an input after the earlier ones explain what they can
         if (left(k, k) < 1e-10)
-            throw failure(exit_no_model, fmt::format("no model: not enough excitation: input \"{}\" repeats {} and "
-                                                     "cannot be told apart from {}. Leave it "
-                                                     "out of --inputs, or drive the forces independently",
-                                                     options.inputs[static_cast<std::size_t>(k)],
-                                                     k == 1 ? "input \"" + options.inputs[0] + "\""
-                                                            : "a combination of the inputs before it",
-                                                     k == 1 ? "it" : "them"));
+            throw failure(
+                exit_no_model,
+                fmt::format("no model: not enough excitation: input \"{}\" repeats {} and "
+                            "cannot be told apart from {}. Leave it "
+                            "out of --inputs, or drive the forces independently",
+                            options.inputs[static_cast<std::size_t>(k)],
+                            k == 1 ? "input \"" + options.inputs[0] + "\"" : "a combination of the inputs before it",
+                            k == 1 ? "it" : "them"),
+                OKID_ERR_EXCITATION);
         const Eigen::VectorXd column = left.col(k) / left(k, k);
         left -= column * left.row(k).eval();
     }
@@ -125,7 +127,8 @@ void check_explains(const result_context& context) {
         fmt::format(
             "no model: the best one explains {:.1f} % of an output: the outputs do not answer these inputs, or a "
             "sensor was overloaded. Check wiring, ranges and column names",
-            std::max(best, 0.0)));
+            std::max(best, 0.0)),
+        OKID_ERR_NO_MODES);
 }
 
 void remark_low_fit(const std::vector<double>& percent, bool simulated, result_context& context) {

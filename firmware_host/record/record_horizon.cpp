@@ -40,7 +40,8 @@ int choose_p(const record_options& options, const record_set& set, long long sam
                       fmt::format("no model: too few samples: {} complete samples, but even the smallest model of {} "
                                   "inputs and {} outputs needs {} (10 for each unknown). Record longer or use fewer "
                                   "channels",
-                                  samples, n_u, n_y, least));
+                                  samples, n_u, n_y, least),
+                      OKID_ERR_TOO_SHORT);
     int p = okid_identify_usable_p(n_u, n_y, options.p, samples);
     if (gaps) {
         const auto runs = complete_runs(set);
@@ -79,7 +80,8 @@ int choose_rows(const record_options& options, const record_set& set, long long 
     throw failure(exit_no_model,
                   fmt::format("no model: too few samples: {} complete samples, but even the smallest model of {} "
                               "inputs and {} outputs needs {} in one stretch. Record longer or use fewer channels",
-                              samples, n_u, n_y, 10 * unknowns_of(config.method, n_u, n_y, least) + 2 * least - 1));
+                              samples, n_u, n_y, 10 * unknowns_of(config.method, n_u, n_y, least) + 2 * least - 1),
+                  OKID_ERR_TOO_SHORT);
 }
 
 } // namespace

@@ -24,6 +24,7 @@ struct record_work {
     result_context context;
     std::unique_ptr<std::byte[]> memory;
     okid_identify_t* identifier = nullptr;
+    okid_identified_t realised{}; ///< what it gave, before any refinement
     std::unique_ptr<refined_arrays> refined;
 };
 

@@ -92,12 +92,14 @@ std::string likely_cause(const okid_identified_t& model, const mass_plan& plan) 
             fmt::format("no M, K and R: {} admissible mode{} (underdamped, below {:g} Hz) found in the model of "
                         "order {}, {} needed, one for each degree of freedom. Excite and sample all of them, "
                         "try a larger order, or name fewer degrees of freedom",
-                        found, found == 1 ? "" : "s", 0.5 / model.dt, model.n_z, needed));
+                        found, found == 1 ? "" : "s", 0.5 / model.dt, model.n_z, needed),
+            tried.status);
     if (tried.status == OKID_ERR_NUMERIC)
         throw failure(exit_no_model,
                       "no M, K and R: the modes cannot be scaled or their sum is singular: a mode does not show at the "
-                      "co-located pair, or two sensors repeat each other. Try another order, or a force elsewhere");
-    throw failure(exit_no_model, fmt::format("no M, K and R: {}", okid_status_text(tried.status)));
+                      "co-located pair, or two sensors repeat each other. Try another order, or a force elsewhere",
+                      tried.status);
+    throw failure(exit_no_model, fmt::format("no M, K and R: {}", okid_status_text(tried.status)), tried.status);
 }
 
 /// Copies, and the proportional damping of the same modes.

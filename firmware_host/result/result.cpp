@@ -64,7 +64,6 @@ void put_arrays_json(const okid_identified_t& model, const result_context& conte
     for (int k = 0; k < model.markov_count; ++k)
         blocks.push_back(matrix_json(model.markov + k * block, model.n_y, model.n_u));
     out["markov"]["Y"] = std::move(blocks);
-    out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
 }
 
 std::string counted(long long count, const char* noun) {
@@ -221,6 +220,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     if (arrays) out["singular_values"] = vector_json(model.singular_values, model.singular_count);
     out["singular_noise"] = number_json(model.noise_level);
     if (arrays) put_arrays_json(model, context, out);
+    out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
     out["fit"]["simulation_percent"] = percent_json(context.simulation_percent, context.outputs);
     out["fit"]["prediction_percent"] = percent_json(context.prediction_percent, context.outputs);
     if (context.stable) out["stabilization"] = stabilization_json(*context.stable);
@@ -256,7 +256,7 @@ std::string result_table(const okid_identified_t& model, const result_context& c
     if (context.mass) out += mass_text(*context.mass);
     const auto warnings = result_warnings(model, context);
     if (!warnings.empty()) out += "\n";
-    for (const auto& [code, text] : warnings) out += fmt::format("remark {}: {}\n", code, text);
+    for (const auto& [code, text] : warnings) out += fmt::format("warning {}: {}\n", code, text);
     return out;
 }
 

@@ -41,7 +41,7 @@ struct result_context {
 /// @param sigma  their standard deviations, or nullptr (null)
 nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma);
 
-/// The whole okid.result/1 object. @param arrays  false: without singular_values, model, markov and modes
+/// The whole okid.result/1 object. @param arrays  false: without singular_values, model and markov
 nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context, bool arrays = true);
 
 /// Its text: one key a line, so that a person can look into it; matrices stay compact.

@@ -69,7 +69,8 @@ def test_uneven_time_stamps_give_no_rate_and_say_so(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("time_s,a\n0,1\n0.01,2\n0.03,3\n", encoding="utf-8")
     record = read_csv(tmp_path / "t.csv")
     assert record.fs_hz is None
-    assert "time_s gives no sample rate: a step of 0.01 s after sample 0" in record.remarks[0]
+    assert "time_s gives no sample rate: " in record.remarks[0] and "line 3" in record.remarks[0]
+    assert "found a step of 0.01 s, expected 0.015 s" in record.remarks[0]
 
 
 @pytest.mark.parametrize("line", ["# units: a=N b=m/s^2", "# units: a N, b m/s^2"])

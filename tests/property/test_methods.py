@@ -14,6 +14,7 @@ import systems
 from measured_data import data_file
 from methods import METHODS, N4SID
 from numpy.typing import NDArray
+from okid import abi
 from program import ROOT
 from program import okid as run
 from scipy.signal import detrend
@@ -45,6 +46,30 @@ def write_csv(path: Path, fs: float, columns: dict[str, Array]) -> Path:
 
 def channels(u: Array, y: Array) -> dict[str, Array]:
     return {f"u{k + 1}": u[:, k] for k in range(u.shape[1])} | {f"y{k + 1}": y[:, k] for k in range(y.shape[1])}
+
+
+@pytest.mark.parametrize("inputs", [1, 0], ids=["driven", "ambient"])
+@pytest.mark.parametrize("method", METHODS)
+def test_what_stood_in_the_memory_does_not_matter(method: str, inputs: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    s = systems.w1()
+    samples = np.hstack(systems.record(s, 3000, 1.0, 1))[:, 1 - inputs :]
+    found = []
+    block = abi.block
+    for byte in (0, 0x3F, 0xFF):  # zeros, small numbers, NaN
+
+        def filled(size: int, byte: int = byte) -> NDArray[np.uint8]:
+            out = block(size)
+            out[:] = byte
+            return out
+
+        monkeypatch.setattr(abi, "block", filled)
+        identifier = okid.Identifier(inputs, 3, fs=s.fs, method=method, order=6)
+        with okid.Accumulator(inputs, 3, identifier.lags) as sums:
+            sums.add(samples)
+            found.append(identifier.run(sums))
+    for other in found[1:]:
+        for name in ("A", "B", "C", "D", "K", "singular_values", "frequency_hz", "emac"):
+            np.testing.assert_array_equal(getattr(other, name), getattr(found[0], name), err_msg=name)
 
 
 @pytest.mark.parametrize("method", METHODS)

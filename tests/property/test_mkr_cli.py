@@ -188,7 +188,7 @@ def test_a_slip_is_named(tmp_path: Path, slip: str, code: str, words: str, cause
     said = codes(bench.result())
     assert words in said[code]
     assert cause in said["mkr_likely_cause"]
-    assert f"remark {code}" in bench.run().stdout
+    assert f"warning {code}" in bench.run().stdout
     mended = {"swapped": ["--input-dofs=-1", bench.dofs[1]], "foh": [*bench.dofs, "--hold=foh"]}
     result = bench.result(dofs=mended.get(slip, [*bench.dofs, f"--sensing={slip}"]))
     assert not [one for one in codes(result) if one.startswith("mkr")]

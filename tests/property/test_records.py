@@ -20,6 +20,7 @@ from okid.data.records import read_csv
         ("a\tb\n1e-3\t-2\n", ["a", "b"], [[1e-3, -2]], None),
         ('# fs_hz: unknown\n"a, left","b [g]"\n1,2\n', ["a, left", "b [g]"], [[1, 2]], None),
         ("time_s,a\n0,1\n0.01,2\n0.02,3\n", ["time_s", "a"], [[0, 1], [0.01, 2], [0.02, 3]], 100.0),
+        ("a,\n1,2\n", ["a"], [[1]], None),
         ("a,b\n1,\n,NaN\n", ["a", "b"], [[1, np.nan], [np.nan, np.nan]], None),
     ],
 )  # fmt: skip
@@ -35,14 +36,15 @@ def test_csv_forms(tmp_path: Path, text: str, names: list[str], samples: list, r
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (b"", "no header"),
-        (b"a,b\n", "no samples"),
-        (b"a,b\n1,2\n1\n", r"r.csv:3: expected 2 cells, found 1"),
-        (b"a,b\n1,2\n3,x\n", r"r.csv:3: column 'b': expected a number, found 'x'"),
-        (b"a,b\n1,2\n3,inf\n", r"r.csv:3: column 'b': infinite"),
-        (b"a,a\n1,2\n", "duplicate"),
-        (b"a,\n1,2\n", "empty column name"),
-        (b"a,b\n\xff\xfe\n", "UTF-8"),
+        (b"", "the file is empty"),
+        (b"# nothing\n", "no line of column names"),
+        (b"a,b\n", "no rows after the column names"),
+        (b"a,b\n1,2\n1\n", "r.csv, line 3: found 1 cell, expected 2"),
+        (b"a,b\n1,2\n3,x\n", r'r.csv, line 3, column 2 \(b\): found "x", expected a number'),
+        (b"a,b\n1,2\n3,inf\n", r'r.csv, line 3, column 2 \(b\): found "inf", expected a finite number'),
+        (b"a,b\n1,2\n\n3,4\n", "r.csv, line 3: an empty line between rows"),
+        (b"a,a\n1,2\n", "stands twice"),
+        (b"\xff\xfea,b\n1,2\n", "UTF-8"),
     ],
 )
 def test_csv_faults_are_named(tmp_path: Path, text: bytes, words: str) -> None:

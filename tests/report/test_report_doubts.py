@@ -104,9 +104,9 @@ def test_no_factor_where_the_shape_is_another(frame: tuple[Any, Any, Any]) -> No
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("missing", "output 'roof' has no sample at all"),
-        ("constant", "output 'roof' is constant (1.5)"),
-        ("force", "input 'push' is constant (2)"),
+        ("missing", 'column "roof" holds no number'),
+        ("constant", 'output "roof" is constant (1.5)'),
+        ("force", 'input "push" is constant (2)'),
         ("short", "too few samples: 5"),
     ],
 )

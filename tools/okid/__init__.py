@@ -18,10 +18,10 @@ from okid.data.structure import Structure
 from okid.data.sums import Stats
 from okid.demo import demo, demo_frame, demo_record
 from okid.identify import identify
-from okid.result.mkr import MassMatrices, ProportionalDamping
 from okid.result.modal_table import ModalTable
 from okid.result.model import Model
-from okid.result.result import Fit, Mode, Result
+from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping
+from okid.result.result import Result
 from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization, stabilization
 from okid.session import Session
 

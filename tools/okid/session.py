@@ -22,8 +22,11 @@ from okid.data.stream_blocks import StreamBlocks
 from okid.data.sums import Stats
 from okid.data.toml_file import read_toml
 from okid.result.mkr import Plan, make_plan, mass_matrices
+from okid.result.parts import Fit, Mode
+from okid.result.parts import Warning as Remark
 from okid.result.remarks import remarks_of
-from okid.result.result import Fit, Mode, Remark, Result, modes_of, put_deviations, with_deviations
+from okid.result.result import Result
+from okid.result.stream_result import StreamResult, modes_of, put_deviations, with_deviations
 from okid.result.uncertainty import FEWEST, GROUPS, MOST
 
 Real = NDArray[np.float64]
@@ -263,13 +266,14 @@ class Session:
         unknown: dict[str, float | None] = dict.fromkeys(self.outputs)
         samples = min(self.samples, self._memory_samples) if self._memory_samples else self.samples
         by_observer = bool(self.inputs) and not self.method.startswith("n4sid")
-        return Result(
+        made = StreamResult(
             self.method, self.fs, samples, 1, counts.gaps, list(self.inputs), list(self.outputs), found.p, found.rows,
             found.order, self.hold, self.detrend, "moving", found.singular_values, model, found.markov, modes,
-            Fit(dict(unknown), dict(unknown)), remarks, found.observer, self._identifier, mkr, pdc,
+            Fit(dict(unknown), dict(unknown)), remarks, found.observer, mkr, pdc,
             hankel=self.hankel if by_observer else None,
             singular_noise=found.noise_level if math.isfinite(found.noise_level) else None,
         )  # fmt: skip
+        return made.as_result(self._identifier)
 
     def _unknowns(self) -> int:
         return len(self.inputs) + self._identifier.lags * len(self.names)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /**
  * @file files.h
- * @brief Files of a user, read and checked: configurations.
+ * @brief Files of a user, read and checked: configurations, CSV records; units.
  */
 #ifndef OKID_HOST_FILES_H
 #define OKID_HOST_FILES_H
@@ -29,6 +29,36 @@ OKID_HOST_API int32_t okid_host_config_load(const char* path, const char* text, 
 OKID_HOST_API const char* okid_host_config_json(const okid_host_config_t* self);
 
 OKID_HOST_API void okid_host_config_delete(okid_host_config_t* self);
+
+/** A CSV record. */
+typedef struct okid_host_csv okid_host_csv_t;
+
+/**
+ * Read all columns of a CSV record that have a name, by the rules of `okid identify`.
+ * @return 0, or 2: okid_host_error() names file, line and column, what was found and what was expected
+ */
+OKID_HOST_API int32_t okid_host_csv_read(const char* path, okid_host_csv_t** out);
+
+/** {"names": [..], "units": [..] ("" = the name has none), "fs_hz": number or null, "comments": the lines above the names,
+ * "rate_remark": why a column time_s gives no rate, or ""}. */
+OKID_HOST_API const char* okid_host_csv_json(const okid_host_csv_t* self);
+
+/** The samples, row by row, NaN = missing. @param rows, columns  how many */
+OKID_HOST_API const double* okid_host_csv_samples(const okid_host_csv_t* self, size_t* rows, size_t* columns);
+
+OKID_HOST_API void okid_host_csv_delete(okid_host_csv_t* self);
+
+/**
+ * The unit in the name of a column ("g" of "acc1 [g]", "acc1 (g)" and "acc1_g").
+ * @return its length, 0 = none; at most `size` - 1 bytes and a NUL are written to `unit`
+ */
+OKID_HOST_API size_t okid_host_unit_of_name(const char* name, char* unit, size_t size);
+
+/**
+ * What makes a unit SI: 1 unit = factor si.
+ * @return 1; 0: the unit is not known
+ */
+OKID_HOST_API int32_t okid_host_unit(const char* unit, double* factor, const char** si);
 
 #ifdef __cplusplus
 }

@@ -39,7 +39,7 @@ OKID_HOST_API int32_t okid_host_identify(const char* options, int32_t records, c
 /** okid.result/1, as `okid identify --json` writes it. NULL when memory ran out. */
 OKID_HOST_API const char* okid_host_result_json(okid_host_result_t* self);
 
-/** The same without singular_values, model, markov and modes, which are there as arrays. */
+/** The same without singular_values, model and markov, which are there as arrays. */
 OKID_HOST_API const char* okid_host_result_summary(okid_host_result_t* self);
 
 /** The modal table, fits, matrices and warnings for a person, as `okid identify` prints them. */
@@ -62,12 +62,15 @@ typedef struct okid_host_array {
  */
 OKID_HOST_API int32_t okid_host_result_array(const okid_host_result_t* self, const char* name, okid_host_array_t* out);
 
-/**
- * The decomposition the result came from, for models of other orders (okid_identify_order(), okid_identify_poles()): an
- * okid_identify_t, and its okid_identify_config_t. What is done with it does not change the result.
- * @return 1; 0: the result has none
- */
-OKID_HOST_API int32_t okid_host_result_decomposition(okid_host_result_t* self, void** identifier, const void** config);
+/** Of a result of records: an okid_identify_t with its okid_identify_config_t, and the okid_identified_t it gave. */
+typedef struct okid_host_decomposition {
+    void* identifier;   /**< for okid_identify_order() and okid_identify_poles(), which do not change the result */
+    const void* config;
+    const void* model;
+} okid_host_decomposition_t;
+
+/** The decomposition the result came from, for models of other orders. @return 1; 0: the result has none */
+OKID_HOST_API int32_t okid_host_result_decomposition(okid_host_result_t* self, okid_host_decomposition_t* out);
 
 OKID_HOST_API void okid_host_result_delete(okid_host_result_t* self);
 

@@ -71,6 +71,7 @@ void ssarx::correct(const subspace_sizes& z, const hankel_factor& f, double* sol
             }
     for (int a = 0; a < z.i; ++a)
         for (int o = 0; o < z.n_y; ++o) toeplitz[at(a * z.n_y + o, a * z.m + z.n_u + o, z.h)] = 1;
+    std::fill(corrected, corrected + at(0, 2 * z.w, z.h), 0.0); // sums over rows of different reach read beyond it
     const int blocks = std::max(1, 64 / z.n_y);
     for (int a = 0; a < z.i; a += blocks) {
         const int last = std::min(z.i, a + blocks), reach = last * z.m;

@@ -44,6 +44,17 @@ def names(given: Sequence[str] | None, letter: str, count: int) -> list[str]:
     return out
 
 
+def channel_names(given: Sequence[str] | None, values: Any, letter: str, count: int) -> list[str]:
+    """The names given, else those of a frame, else u1, u2 ..: as many as channels. InputError when they are not."""
+    found = frame_names(values) if given is None else given
+    if isinstance(found, str):
+        raise InputError(f"names are given as {found!r}, expected a list, such as [{found!r}]")
+    out = [f"{letter}{k + 1}" for k in range(count)] if found is None else [str(name) for name in found]
+    if len(out) != count:
+        raise InputError(f"{count} names are needed for the channels of {letter}, got {out}")
+    return out
+
+
 def with_name(fault: IdentificationError, inputs: Sequence[str], outputs: Sequence[str]) -> IdentificationError:
     """The same fault with the name of the channel it lies in, where the library says which."""
     channel = getattr(fault, "channel", -1)

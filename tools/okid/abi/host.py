@@ -12,12 +12,45 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from okid._errors import Error, IdentificationError, InputError
 
 _text, _handle, _status, _size = ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int32, ctypes.c_size_t
+_out, _sizes = ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(ctypes.c_size_t)
+
+
+class Array(ctypes.Structure):
+    """okid_host_array_t."""
+
+    _fields_ = (("data", ctypes.POINTER(ctypes.c_double)), ("rank", ctypes.c_int32), ("size", ctypes.c_size_t * 3),
+                ("stride", ctypes.c_size_t * 3))  # fmt: skip
+
+
+class Decomposition(ctypes.Structure):
+    """okid_host_decomposition_t."""
+
+    _fields_ = (("identifier", _handle), ("config", _handle), ("model", _handle))
+
+
 SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_abi": (_status, []),
     "okid_host_error": (_text, []),
+    "okid_host_error_status": (_status, []),
+    "okid_host_identify": (_status, [_text, _status, _out, _sizes, ctypes.POINTER(_text), _handle, _handle, _out]),
+    "okid_host_result_json": (_text, [_handle]),
+    "okid_host_result_summary": (_text, [_handle]),
+    "okid_host_result_table": (_text, [_handle]),
+    "okid_host_result_array": (_status, [_handle, _text, ctypes.POINTER(Array)]),
+    "okid_host_result_decomposition": (_status, [_handle, ctypes.POINTER(Decomposition)]),
+    "okid_host_result_delete": (None, [_handle]),
+    "okid_host_csv_read": (_status, [_text, _out]),
+    "okid_host_csv_json": (_text, [_handle]),
+    "okid_host_csv_samples": (ctypes.POINTER(ctypes.c_double), [_handle, _sizes, _sizes]),
+    "okid_host_csv_delete": (None, [_handle]),
+    "okid_host_unit_of_name": (_size, [_text, _text, _size]),
+    "okid_host_unit": (_status, [_text, ctypes.POINTER(ctypes.c_double), ctypes.POINTER(_text)]),
     "okid_host_config_load": (_status, [_text, _text, ctypes.POINTER(_handle)]),
     "okid_host_config_json": (_text, [_handle]),
     "okid_host_config_delete": (None, [_handle]),
@@ -78,7 +111,7 @@ def call(name: str, *arguments: Any) -> int:
     if status == 0:
         return 0
     text: bytes = library().okid_host_error()
-    raise _ERRORS.get(status, Error)(text.decode("utf-8", "replace"), status)
+    raise _ERRORS.get(status, Error)(text.decode("utf-8", "replace"), library().okid_host_error_status())
 
 
 def config(path: str | Path, text: str | None = None) -> dict[str, Any]:
@@ -91,3 +124,31 @@ def config(path: str | Path, text: str | None = None) -> dict[str, Any]:
         return out
     finally:
         library().okid_host_config_delete(made)
+
+
+def csv(path: str | Path) -> tuple[dict[str, Any], NDArray[np.float64]]:
+    """names, units, fs_hz, comments, rate_remark of a CSV record, and its samples (N, m). Raises InputError."""
+    made, rows, columns = ctypes.c_void_p(), ctypes.c_size_t(), ctypes.c_size_t()
+    call("csv_read", os.fsencode(path), ctypes.byref(made))
+    try:
+        data = library().okid_host_csv_samples(made, ctypes.byref(rows), ctypes.byref(columns))
+        about: dict[str, Any] = json.loads(library().okid_host_csv_json(made))
+        return about, np.array(np.ctypeslib.as_array(data, (rows.value, columns.value)))
+    finally:
+        library().okid_host_csv_delete(made)
+
+
+def unit_of_name(name: str) -> str:
+    """ "g" of "a [g]", "a (g)" and "a_g", else ""."""
+    encoded = name.encode()
+    text = ctypes.create_string_buffer(len(encoded) + 1)
+    library().okid_host_unit_of_name(encoded, text, len(text))
+    return text.value.decode()
+
+
+def unit(name: str) -> tuple[float, str] | None:
+    """What makes a unit SI: "mm" is (0.001, "m"). None: it is not known."""
+    factor, si = ctypes.c_double(), ctypes.c_char_p()
+    if not library().okid_host_unit(name.encode(), ctypes.byref(factor), ctypes.byref(si)):
+        return None
+    return factor.value, (si.value or b"").decode()

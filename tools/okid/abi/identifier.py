@@ -170,13 +170,21 @@ class Identifier:
                 "n4sid needs rows >= 2, an order is at most what rows and p carry",
                 abi.ERR_DIM,
             )
-        self._block = abi.block(size)
+        self._block: Any = abi.block(size)
         self._handle = ctypes.c_void_p()
         status = abi.library().okid_identify_create(
             ctypes.byref(self._handle), ctypes.byref(self.config), self._block.ctypes.data, self._block.size
         )
         abi.check(status, "identifier")
         self._raw = abi.Identified()
+
+    @classmethod
+    def of_handle(cls, handle: int, config: Any, last: Any, owner: object) -> Identifier:
+        """The identifier behind an okid_identify_t that `owner` keeps alive; `last` the model of its last run()."""
+        out = cls.__new__(cls)
+        out.config, out._block, out._handle = config, owner, ctypes.c_void_p(handle)
+        out._raw = abi.Identified.from_buffer_copy(last)
+        return out
 
     def run(self, accumulator: Accumulator | SquareRoot) -> Identified:
         """Identify from what the accumulator, or the factor of the second kernel, holds now; it is not changed.

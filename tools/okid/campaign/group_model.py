@@ -15,7 +15,7 @@ from okid.abi.identifier import Identified, Identifier
 from okid.campaign.pieces import make_identifier
 from okid.campaign.spec import CampaignSpec
 from okid.campaign.sums_file import whole_of
-from okid.result.modal_table import known
+from okid.result.parts import known
 from okid.result.stabilization import of_identifiers
 from okid.result.uncertainty import FEWEST, Uncertainty, without_each
 

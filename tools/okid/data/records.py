@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import re
@@ -18,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
+from okid.abi import host
 
 Real = NDArray[np.float64]
 
@@ -92,16 +91,11 @@ def _base(name: str) -> str:
 
 
 ROLES = ("force", "acceleration", "velocity", "displacement", "aux")
-_SUFFIX_UNITS = ("g", "N", "kN", "m/s2", "m/s^2", "m/s", "mm", "um", "m", "V", "Nm", "mps2")
 
 
 def unit_of_name(name: str) -> str:
     """The unit in a column name, by the rule of `okid identify`: "g" of "a [g]", "a (g)" and "a_g", else ""."""
-    found = re.match(r"[^\[(]*(?:\[([^\]]*)\]|\(([^)]*)\))", name)
-    if found:
-        return (found.group(1) if found.group(1) is not None else found.group(2)).strip()
-    stem, bar, tail = name.rpartition("_")
-    return tail if bar and stem and tail in _SUFFIX_UNITS else ""
+    return host.unit_of_name(name)
 
 
 def _name_fault(names: Sequence[str]) -> str | None:
@@ -265,79 +259,15 @@ def even_rate(times_s: Real) -> float | str:
     return float(f"{1.0 / mean:.9g}")
 
 
-def _separator(header: str) -> str:
-    unquoted = re.sub(r'"[^"]*"', "", header)
-    return max(";\t,", key=unquoted.count) if any(c in unquoted for c in ";\t,") else ","
-
-
-def _rate(comments: Sequence[str]) -> float | None:
-    for line in comments:
-        found = re.search(r"\b(?:fs_hz|sample_rate_hz)\s*[:=]\s*([0-9.][0-9.eE+-]*)", line)
-        if found:
-            try:
-                rate = float(found.group(1))
-            except ValueError:
-                continue
-            if rate > 0.0 and math.isfinite(rate):
-                return rate
-    return None
-
-
-def _cell(text: str, comma_decimal: bool, where: str) -> float:
-    cleaned = text.strip().strip('"')
-    if cleaned == "" or cleaned.lower() == "nan":
-        return math.nan
-    try:
-        value = float(cleaned.replace(",", ".") if comma_decimal else cleaned)
-    except ValueError:
-        raise InputError(f"{where}: expected a number, found {cleaned!r}") from None
-    if math.isinf(value):
-        raise InputError(f"{where}: infinite value; leave the cell empty when the sample is missing")
-    return value
-
-
-def _slow(lines: Sequence[str], first: int, names: Sequence[str], separator: str, source: str) -> Real:
-    rows = []
-    for offset, cells in enumerate(csv.reader(lines, delimiter=separator)):
-        if not cells or (len(cells) == 1 and not cells[0].strip() and len(names) > 1):
-            continue
-        line = first + offset
-        if len(cells) != len(names):
-            raise InputError(f"{source}:{line}: expected {len(names)} cells, found {len(cells)}")
-        rows.append(
-            [
-                _cell(text, separator == ";", f"{source}:{line}: column {name!r}")
-                for name, text in zip(names, cells, strict=True)
-            ]
-        )
-    return np.array(rows, dtype=np.float64).reshape(-1, len(names))
-
-
-def _quick(body: Sequence[str], separator: str, width: int) -> Real:
-    """All rows at once, empty cells as nan; ValueError when a cell is not a plain number."""
-    if separator == ";":
-        raise ValueError("decimal commas need the slow way")
-    text = "\n".join(body)
-    framed = f"\n{text}\n"
-    if separator * 2 in text or f"\n{separator}" in framed or f"{separator}\n" in framed:
-        for _ in range(2):  # three separators in a row are two empty cells
-            framed = framed.replace(separator * 2, f"{separator}nan{separator}")
-        text = framed.replace(f"\n{separator}", f"\nnan{separator}").replace(f"{separator}\n", f"{separator}nan\n")
-    samples = np.loadtxt(io.StringIO(text), delimiter=separator, ndmin=2, comments=None)
-    if samples.shape[1] != width or np.any(np.isinf(samples)):
-        raise ValueError("the slow way finds the line")
-    return samples
-
-
-def _units(names: Sequence[str], comments: Sequence[str]) -> list[str]:
+def _units(names: Sequence[str], units: Sequence[str], comments: Sequence[str]) -> list[str]:
     """Units in the names, else those of a `# units:` line as `okid convert` and `okid simulate` write it."""
     listed = next((line.split("units:", 1)[1] for line in comments if re.match(r"#\s*units:", line)), "")
-    units = [unit_of_name(name) for name in names]
+    out = list(units)
     for k, name in enumerate(names):
         found = re.search(rf"(?:^|[\s,]){re.escape(name)}[ =]([^\s,]+)", listed)
-        if not units[k] and found and found.group(1) != "-":
-            units[k] = found.group(1)
-    return units
+        if not out[k] and found and found.group(1) != "-":
+            out[k] = found.group(1)
+    return out
 
 
 def _stated(comments: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
@@ -354,54 +284,24 @@ def _stated(comments: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
     return about if fits and all(full.startswith(name) for full, name in zip(names, known, strict=True)) else {}
 
 
-def _described_csv(source: str, names: list[str], samples: Real, comments: Sequence[str]) -> Record:
-    rate, remarks = _rate(comments), []
-    if rate is None and "time_s" in names and len(samples) > 1:
-        found = even_rate(samples[:, names.index("time_s")])
-        rate = found if isinstance(found, float) else None
-        remarks = [] if rate is not None else [f"time_s gives no sample rate: {found}"]
-    stated = _stated(comments, names)
-    try:
-        if stated:
-            return Record.described(samples, {**stated, "fs_hz": rate}, remarks)
-        return Record(names, samples, rate, _units(names, comments), remarks=remarks)
-    except InputError as fault:
-        raise InputError(f"{source}: {fault}") from None
-
-
 def read_csv(path: str | Path) -> Record:
-    """Read a record: `#` comments first, one header line, comma, semicolon or tab, decimal comma with semicolon.
+    """Read a record by the rules of `okid identify`, all its columns: `#` comments first, one header line, comma,
+    semicolon or tab, decimal comma with semicolon.
 
     `nan` and empty cells are missing samples. The rate comes from a `fs_hz` or `sample_rate_hz` comment, else from a
     `time_s` column with even steps. Names stand as in the header; units come from them ("a [g]", "a_g") or from a
     `# units:` comment. What write_csv() said about the record is taken over. InputError names file, line and column
-    of the first fault. 10^6 rows take seconds when every cell is a number, nan or empty.
+    of the first fault.
     """
-    source = str(path)
+    about, samples = host.csv(path)
+    names, comments = about["names"], about["comments"]
+    told = about["rate_remark"]
+    remarks = [f"time_s gives no sample rate: {told}"] if told else []
+    stated = _stated(comments, names)
     try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
-    except OSError as fault:
-        raise InputError(f"{source}: {fault.strerror or fault}") from None
-    except UnicodeDecodeError as fault:
-        raise InputError(f"{source}: not UTF-8 text (byte {fault.start})") from None
-    lines = text.splitlines()
-    start = 0
-    while start < len(lines) and (lines[start].startswith("#") or not lines[start].strip()):
-        start += 1
-    if start >= len(lines):
-        raise InputError(f"{source}: no header line found, expected column names")
-    separator = _separator(lines[start])
-    names = [name.strip() for name in next(csv.reader([lines[start]], delimiter=separator))]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice or "" in names:
-        raise InputError(f"{source}:{start + 1}: duplicate or empty column name {twice or ['']}")
-    body = lines[start + 1 :]
-    if not any(line.strip() for line in body):
-        raise InputError(f"{source}: no samples after the header")
-    try:
-        samples = _quick(body, separator, len(names))
-    except ValueError:
-        samples = _slow(body, start + 2, names, separator, source)
-    if len(samples) == 0:
-        raise InputError(f"{source}: no samples after the header")
-    return _described_csv(source, names, samples, lines[:start])
+        if stated:
+            return Record.described(samples, {**stated, "fs_hz": about["fs_hz"]}, remarks)
+        units = _units(names, about["units"], comments)
+        return Record(names, samples, about["fs_hz"], units, remarks=remarks)
+    except InputError as fault:
+        raise InputError(f"{path}: {fault}") from None

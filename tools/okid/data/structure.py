@@ -15,7 +15,7 @@ from okid import abi
 from okid._errors import InputError
 from okid.result.mkr import SENSING
 from okid.result.model import Model
-from okid.result.result import Mode
+from okid.result.parts import Mode
 
 Real = NDArray[np.float64]
 _HOLDS = {"zoh": abi.HOLD_ZERO, "foh": abi.HOLD_FIRST}

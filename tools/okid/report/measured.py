@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,16 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from okid._errors import Error, IdentificationError, InputError
+from okid._errors import Error, InputError
 from okid.data.records import Record, read_csv
 from okid.frf import Frf, Spectra, h1, is_hit, spectra
 from okid.identify import identify
+from okid.report.answers import Answer, answers, detrended, fit_of
 from okid.report.loaded import Loaded, known_fit
 from okid.report.residual import Whiteness, whiteness
 from okid.report.scale import Agreement, agreement
-from okid.result.model import Model
-from okid.result.record_fit import detrended, fit_records, stretches
-from okid.result.result import Fit
+from okid.result.parts import Fit
 from okid.result.stabilization import Stabilization
 
 Real = NDArray[np.float64]
@@ -103,38 +101,9 @@ def _poles(result: Loaded, u: Real, y: Real, source: str) -> Stabilization:
         raise type(fault)(f"{source}: {fault}", fault.status) from None
 
 
-class _Answer(NamedTuple):
-    """One stretch of the record without a missing input, and what the model makes of it."""
-
-    first: int
-    u: Real
-    y: Real
-    simulated: Real | None
-    predicted: Real | None
-
-
-def _answers(model: Model, predict: bool, data: Real, n_u: int) -> list[_Answer]:
-    """Every stretch of at least max(20, 2 order) samples, simulated (with inputs) and predicted (stable predictor)."""
-    out = []
-    for piece in stretches(data[:, :n_u], max(20, 2 * model.order)) if n_u else [slice(0, len(data))]:
-        u, y = data[piece, :n_u], data[piece, n_u:]
-        x0, simulated = None, None
-        if n_u:
-            radius = model.radius()
-            informed = math.log(1e-16) / math.log(radius) if 0.0 < radius < 1.0 else math.inf
-            used = max(1, int(min(len(u), informed)))
-            try:
-                x0 = model.initial_state(u[:used], y[:used])
-            except IdentificationError:
-                x0 = np.zeros(model.order)
-            simulated = model.simulate(u, x0)
-        out.append(_Answer(int(piece.start), u, y, simulated, model.predict(u, y, x0) if predict else None))
-    return out
-
-
-def _excerpt(result: Loaded, answers: list[_Answer]) -> Excerpt | None:
+def _excerpt(result: Loaded, answered: list[Answer]) -> Excerpt | None:
     """About twelve periods of the lowest mode, 120 to 600 samples, where the responses are largest."""
-    usable = [one for one in answers if one.simulated is not None or one.predicted is not None]
+    usable = [one for one in answered if one.simulated is not None or one.predicted is not None]
     if not usable:
         return None
     lowest = float(np.min(result.frequency_hz, initial=result.fs / 20.0))
@@ -158,11 +127,11 @@ def _excerpt(result: Loaded, answers: list[_Answer]) -> Excerpt | None:
     return Excerpt(time, best.y[part], modelled[part], best.simulated is not None, hit)
 
 
-def _residual(result: Loaded, answers: list[_Answer]) -> tuple[Whiteness | None, Real | None]:
+def _residual(result: Loaded, answered: list[Answer]) -> tuple[Whiteness | None, Real | None]:
     """Correlations of the innovation, and its covariance (n_y, n_y); the predictor settles first."""
     settle = 5 * len(result.matrices["A"])
     pieces = []
-    for one in answers:
+    for one in answered:
         skip = min(settle, len(one.y) // 4)
         if one.predicted is not None:
             pieces.append((one.y[skip:] - one.predicted[skip:], one.u[skip:]))
@@ -211,13 +180,12 @@ def measured_from(result: Loaded, record: Record, source: str) -> Measured:
     u, y = own.samples[used, :n_u], own.samples[used, n_u:]
     responses, own_spectra, reason = _answering(result, u, y)
     data = detrended(np.hstack([u, y]), detrend)
-    fit = fit_records(model, [data], result.outputs, predict)[0]
-    answers = _answers(model, predict, data, n_u)
-    white, covariance = _residual(result, answers)
-    excerpt = _excerpt(result, answers)
+    answered = answers(model, predict, data, n_u)
+    white, covariance = _residual(result, answered)
+    excerpt = _excerpt(result, answered)
     if excerpt is not None:
         excerpt = excerpt._replace(time_s=excerpt.time_s + used.start / result.fs)
     return Measured(
-        responses, reason, poles, fit, source, own_spectra, covariance, excerpt, white,
+        responses, reason, poles, fit_of(answered, result.outputs), source, own_spectra, covariance, excerpt, white,
         missing, rows, part, own, agreed.factor, agreed.said,
     )  # fmt: skip

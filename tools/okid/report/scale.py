@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from okid.data.records import Record
 from okid.data.units import SI
 from okid.frf import is_hit
+from okid.report.answers import detrended, stretches
 from okid.result.model import Model
-from okid.result.record_fit import detrended, stretches
 
 Real = NDArray[np.float64]
 TOLERANCE = 0.2  # a factor this near 1 is the structure's own affair, not a unit

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from okid import abi
 from okid._errors import IdentificationError, InputError
 from okid.result.model import Model
+from okid.result.parts import MassMatrices, ProportionalDamping
 
 Real = NDArray[np.float64]
 SENSING = ("displacement", "velocity", "acceleration")  # in the order of okid_sensing_t
@@ -26,51 +27,21 @@ def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-@dataclass
-class MassMatrices:
-    """M (kg), K (N/m), R (N s/m), R_normal_modes: (n_x, n_x), symmetric; degrees of freedom 1 .. n_x in order.
-
-    `checks` tells whether they can be believed, `modes` what they were made of: docs of okid/mkr.h. Paper eq. 96-123.
-    """
-
-    M: Real
-    K: Real
-    R: Real
-    R_normal_modes: Real
-    checks: dict[str, Any]
-    modes: list[dict[str, Any]]
-    M_std: Real | None = None
-    K_std: Real | None = None
-    R_std: Real | None = None
-    R_normal_modes_std: Real | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """The key "mkr" of okid.result/1."""
-        out: dict[str, Any] = {name: getattr(self, name).tolist() for name in ("M", "K", "R", "R_normal_modes")}
-        for name in ("M_std", "K_std", "R_std", "R_normal_modes_std"):
-            value = getattr(self, name)
-            out[name] = None if value is None else [[_number(x) for x in row] for row in value.tolist()]
-        return {**out, "checks": dict(self.checks), "modes": [dict(mode) for mode in self.modes]}
+def mkr_dict(found: MassMatrices) -> dict[str, Any]:
+    """The key "mkr" of okid.result/1."""
+    out: dict[str, Any] = {name: getattr(found, name).tolist() for name in ("M", "K", "R", "R_normal_modes")}
+    for name in ("M_std", "K_std", "R_std", "R_normal_modes_std"):
+        value = getattr(found, name)
+        out[name] = None if value is None else [[_number(x) for x in row] for row in value.tolist()]
+    return {**out, "checks": dict(found.checks), "modes": [dict(mode) for mode in found.modes]}
 
 
-@dataclass
-class ProportionalDamping:
-    """R = alpha M + beta K (N s/m) from the damping ratios; `residual`: share of them it misses. Paper eq. 124-131."""
-
-    alpha: float
-    beta: float
-    R: Real
-    residual: float
-    condition: float
-    alpha_std: float | None = None
-    beta_std: float | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """The key "pdc" of okid.result/1."""
-        return {
-            "alpha": self.alpha, "beta": self.beta, "R": self.R.tolist(), "alpha_std": self.alpha_std,
-            "beta_std": self.beta_std, "residual": _number(self.residual), "condition": _number(self.condition),
-        }  # fmt: skip
+def pdc_dict(found: ProportionalDamping) -> dict[str, Any]:
+    """The key "pdc" of okid.result/1."""
+    return {
+        "alpha": found.alpha, "beta": found.beta, "R": found.R.tolist(), "alpha_std": found.alpha_std,
+        "beta_std": found.beta_std, "residual": _number(found.residual), "condition": _number(found.condition),
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from okid.result.result import Mode
-
-
-def known(value: float | None) -> float | None:
-    """The number, None for one that is missing or not finite."""
-    return float(value) if value is not None and math.isfinite(value) else None
+from okid.result.parts import Mode, known
 
 
 def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
@@ -35,7 +28,7 @@ def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
 
 class ModalTable(list[dict[str, Any]]):
     """A row a mode, ascending in frequency: mode (from 1), frequency_hz, frequency_std_hz, damping_ratio,
-    damping_ratio_std, mpc, emac, cmi; None = not known. str() and notebooks show it with the remarks of the result.
+    damping_ratio_std, mpc, emac, cmi; None = not known. str() and notebooks show it with the warnings of the result.
 
     >>> import okid
     >>> table = okid.ModalTable([okid.Mode(10.96, 0.012, None, 0.99, 0.98)], "one mode")
@@ -43,9 +36,9 @@ class ModalTable(list[dict[str, Any]]):
     (10.96, 'one mode')
     """
 
-    def __init__(self, modes: Sequence[Mode], text: str, remarks: Sequence[str] = ()) -> None:
+    def __init__(self, modes: Sequence[Mode], text: str, warnings: Sequence[str] = ()) -> None:
         super().__init__(_rows(modes))
-        self._text, self._remarks = text, list(remarks)
+        self._text, self._warnings = text, list(warnings)
 
     def __str__(self) -> str:
         return self._text
@@ -64,7 +57,7 @@ class ModalTable(list[dict[str, Any]]):
                 "<tr>" + "".join(f'<td style="text-align:right">{escape(cell)}</td>' for cell in cells) + "</tr>"
             )
         header = "".join(f'<th style="text-align:right">{escape(name)}</th>' for name in head)
-        said = "".join(f"<li>{escape(remark)}</li>" for remark in self._remarks)
+        said = "".join(f"<li>{escape(warning)}</li>" for warning in self._warnings)
         return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(lines)}</tbody></table>" + (
             f"<ul>{said}</ul>" if said else ""
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from okid import abi
 from okid.abi.identifier import Identified
-from okid.result.result import Remark
+from okid.result.parts import Warning as Remark
 
 
 def _unknowns(found: Identified) -> int:

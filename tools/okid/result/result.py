@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,98 +14,46 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from okid import abi
-from okid._errors import Error
+from okid._errors import Error, InputError
+from okid.abi.identifier import Observer
 from okid.data.whole_file import whole_file
-from okid.result.mkr import MassMatrices, ProportionalDamping, mass_table
-from okid.result.modal_table import ModalTable, known
+from okid.result.modal_table import ModalTable
 from okid.result.model import Model
+from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping, Refinement, Skew, Warning, numbers
 from okid.result.stabilization import Criteria, Stabilization, of_identifiers
 
 if TYPE_CHECKING:
-    from okid.abi.identifier import Identified, Identifier, Observer
-    from okid.result.refine import Refinement
-    from okid.result.skew import Skew
-    from okid.result.uncertainty import Uncertainty
+    from okid.abi.host_result import HostResult
+    from okid.abi.identifier import Identifier
 
 Real = NDArray[np.float64]
+_PLAIN = ("method", "fs_hz", "samples", "records", "gaps", "p", "rows", "order", "hold", "detrend", "start")
 
 
-class Mode(NamedTuple):
-    """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known."""
+class _Parsed(NamedTuple):
+    """An okid.result/1 object in the place of a result of the library."""
 
-    frequency_hz: float
-    damping_ratio: float
-    shape: NDArray[np.complex128]
-    mpc: float
-    emac: float
-    frequency_std_hz: float | None = None
-    damping_ratio_std: float | None = None
-    shape_re_std: Real | None = None
-    shape_im_std: Real | None = None
-
-    @property
-    def cmi(self) -> float:
-        """Consistent-mode indicator EMAC x MPC, 0..1."""
-        return self.emac * self.mpc
-
-
-class Fit(NamedTuple):
-    """100 (1 - |y - yhat| / |y - mean|) for each output by name; None = not available."""
-
-    simulation_percent: dict[str, float | None]
-    prediction_percent: dict[str, float | None]
-
-
-class Remark(NamedTuple):
-    """A remark on a valid result."""
-
-    code: str
+    raw: dict[str, Any]
     text: str
+    decomposition: Identifier | None = None
 
+    def json(self) -> str:
+        return json.dumps(self.raw, allow_nan=False) + "\n"
 
-def modes_of(found: Identified) -> list[Mode]:
-    """The modes of an Identified as a list, ascending in frequency."""
-    return [
-        Mode(float(f), float(z), shape, float(mpc), float(emac))
-        for f, z, shape, mpc, emac in zip(
-            found.frequency_hz, found.damping_ratio, found.shapes, found.mpc, found.emac, strict=True
-        )
-    ]
+    def about(self) -> dict[str, Any]:
+        return self.raw
 
+    def table(self) -> str:
+        return self.text
 
-def with_deviations(modes: list[Mode], sigma: Uncertainty) -> list[Mode]:
-    """The same modes with their standard deviations."""
-    return [
-        mode._replace(
-            frequency_std_hz=known(float(sigma.frequency_hz[k])),
-            damping_ratio_std=known(float(sigma.damping_ratio[k])),
-            shape_re_std=sigma.shape_re[k],
-            shape_im_std=sigma.shape_im[k],
-        )
-        for k, mode in enumerate(modes)
-    ]
+    def array(self, name: str) -> Real | None:
+        part: Any = self.raw
+        for key in name.split("."):
+            part = part.get(key) if isinstance(part, dict) else None
+        return None if part is None else numbers(part)
 
-
-def put_deviations(sigma: Uncertainty, mkr: MassMatrices | None, pdc: ProportionalDamping | None) -> None:
-    """Standard deviations of the matrices, alpha and beta to where they are, if they are."""
-    if mkr is not None:
-        mkr.M_std, mkr.K_std, mkr.R_std = sigma.M, sigma.K, sigma.R
-        mkr.R_normal_modes_std = sigma.R_normal_modes
-    if pdc is not None:
-        pdc.alpha_std, pdc.beta_std = known(sigma.alpha), known(sigma.beta)
-
-
-def _spread(value: float | None, factor: float) -> str:
-    """One cell of a column of standard deviations."""
-    number = known(value)
-    return f" {'-' if number is None else format(factor * number, '.2g'):>9}"
-
-
-def _nested(array: Real) -> Any:
-    if array.ndim == 1:
-        return [known(x) for x in array.tolist()]
-    return [_nested(row) for row in array]
+    def identifier(self) -> Identifier | None:
+        return self.decomposition
 
 
 @dataclass(repr=False)
@@ -133,78 +82,81 @@ class Result:
     markov: Real
     modes: list[Mode]
     fit: Fit
-    warnings: list[Remark]
+    warnings: list[Warning]
     observer: Observer
-    identifier: Identifier | None = field(default=None, repr=False, compare=False)
     mkr: MassMatrices | None = None
     pdc: ProportionalDamping | None = None
     hankel: str | None = None  # of methods with an observer
     singular_noise: float | None = None  # singular values up to this can come from the observer's errors alone
     refinement: Refinement | None = None  # with refine=True
     skew: Skew | None = None  # with refine=True and degrees of freedom
+    _source: Any = field(default=None, repr=False, compare=False)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "identifier": None}  # holds memory of the C library: cannot be pickled
+    @classmethod
+    def of_host(cls, source: HostResult) -> Result:
+        """The result behind a handle of the host library."""
+        return cls._made(source)
+
+    @classmethod
+    def from_dict(cls, raw: Mapping[str, Any]) -> Result:
+        """The result of an okid.result/1 object, as json.loads() gives it; without decomposition, and its table() is
+        rows only. InputError when it is not complete."""
+        return cls._read(dict(raw), "")
+
+    @classmethod
+    def _read(cls, raw: dict[str, Any], text: str) -> Result:
+        if raw.get("schema") != "okid.result/1":
+            raise InputError(f"schema is {raw.get('schema')!r}, expected 'okid.result/1'")
+        try:
+            return cls._made(_Parsed(raw, text))
+        except (KeyError, TypeError, ValueError, AttributeError) as fault:
+            raise InputError(f"not a complete okid.result/1: {type(fault).__name__}: {fault}") from None
+
+    @classmethod
+    def _made(cls, source: Any) -> Result:
+        about = source.about()
+        outputs = list(about["outputs"])
+
+        def array(name: str, *empty: int) -> Real:
+            found = source.array(name)
+            return np.zeros(empty) if found is None or found.size == 0 else found
+
+        n_u, n_y, n_z = len(about["inputs"]), len(outputs), int(about["order"])
+        model = Model(
+            array("model.A", n_z, n_z), array("model.B", n_z, n_u), array("model.C", n_y, n_z),
+            array("model.D", n_y, n_u), array("model.K", n_z, n_y), 1.0 / float(about["fs_hz"]),
+            source.array("model.x0"),
+        )  # fmt: skip
+        observer = source.array("observer")
+        return cls(
+            **{key: about[key] for key in _PLAIN},
+            inputs=list(about["inputs"]), outputs=outputs, singular_values=array("singular_values", 0), model=model,
+            markov=array("markov.Y", 0, n_y, n_u), modes=[Mode.of(one) for one in about["modes"]],
+            fit=Fit.of(about["fit"], outputs), warnings=[Warning(**one) for one in about["warnings"]],
+            observer=Observer(*([np.nan] * len(Observer._fields) if observer is None else observer.tolist())),
+            mkr=MassMatrices.of(about.get("mkr")), pdc=ProportionalDamping.of(about.get("pdc")),
+            hankel=about.get("hankel"), singular_noise=about.get("singular_noise"),
+            refinement=Refinement.of(about.get("refinement")), skew=Skew.of(about.get("skew"), outputs), _source=source,
+        )  # fmt: skip
+
+    def __reduce__(self) -> Any:  # what holds memory of the C library cannot be pickled
+        return Result._read, (self.to_dict(), self._source.table())
+
+    @cached_property
+    def identifier(self) -> Identifier | None:
+        """The decomposition of the library, for models of other orders; None: there is none."""
+        found: Identifier | None = self._source.identifier()
+        return found
 
     def to_dict(self) -> dict[str, Any]:
-        """okid.result/1 (docs/result-json): plain lists and numbers, None for a missing number."""
-        m = self.model
-        return {
-            "schema": "okid.result/1",
-            "version": abi.library().okid_version().decode(),
-            "method": self.method,
-            "fs_hz": self.fs_hz,
-            "samples": self.samples,
-            "records": self.records,
-            "gaps": self.gaps,
-            "inputs": list(self.inputs),
-            "outputs": list(self.outputs),
-            "p": self.p,
-            "rows": self.rows,
-            "hankel": self.hankel,
-            "order": self.order,
-            "hold": self.hold,
-            "detrend": self.detrend,
-            "start": self.start,
-            "singular_values": _nested(self.singular_values),
-            "singular_noise": known(self.singular_noise),
-            "model": {
-                "dt": m.dt,
-                **{name: _nested(getattr(m, name)) for name in "ABCDK"},
-                "x0": None if m.x0 is None else _nested(m.x0),
-            },
-            "markov": {"Y": _nested(self.markov)},
-            "modes": [
-                {
-                    "frequency_hz": mode.frequency_hz,
-                    "damping_ratio": mode.damping_ratio,
-                    "shape_re": _nested(mode.shape.real),
-                    "shape_im": _nested(mode.shape.imag),
-                    "frequency_std_hz": known(mode.frequency_std_hz),
-                    "damping_ratio_std": known(mode.damping_ratio_std),
-                    "shape_re_std": None if mode.shape_re_std is None else _nested(mode.shape_re_std),
-                    "shape_im_std": None if mode.shape_im_std is None else _nested(mode.shape_im_std),
-                    "mpc": known(mode.mpc),
-                    "emac": known(mode.emac),
-                    "cmi": known(mode.cmi),
-                }
-                for mode in self.modes
-            ],
-            "fit": {
-                "simulation_percent": dict(self.fit.simulation_percent),
-                "prediction_percent": dict(self.fit.prediction_percent),
-            },
-            **({} if self.refinement is None else {"refinement": self.refinement.to_dict(self.outputs)}),
-            **({} if self.skew is None else {"skew": self.skew.to_dict(self.outputs)}),
-            **({} if self.mkr is None else {"mkr": self.mkr.to_dict()}),
-            **({} if self.pdc is None else {"pdc": self.pdc.to_dict()}),
-            "warnings": [{"code": w.code, "text": w.text} for w in self.warnings],
-        }
+        """okid.result/1 (docs/result-json) as it was identified: plain lists and numbers, None for a missing number."""
+        out: dict[str, Any] = json.loads(self._source.json())
+        return out
 
     def save(self, path: str | Path) -> None:
         """Write okid.result/1 as JSON, whole or not at all (temporary file, then rename), else InputError."""
         with whole_file(path) as part:
-            part.write_text(json.dumps(self.to_dict(), allow_nan=False) + "\n", encoding="utf-8")
+            part.write_text(self._source.json(), encoding="utf-8")
 
     def to_scipy(self) -> Any:
         """scipy.signal.StateSpace with dt."""
@@ -215,8 +167,8 @@ class Result:
         return self.model.to_control()
 
     def table(self) -> ModalTable:
-        """The modes as rows (pandas.DataFrame(result.table())); str() of it: with fits and remarks, for a person."""
-        return ModalTable(self.modes, self._text(), [f"{w.code}: {w.text}" for w in self.warnings])
+        """The modes as rows (pandas.DataFrame(result.table())); str() of it: what `okid identify` prints."""
+        return ModalTable(self.modes, self._source.table(), [f"{w.code}: {w.text}" for w in self.warnings])
 
     def _head(self) -> str:
         return (
@@ -230,34 +182,6 @@ class Result:
 
     def _repr_html_(self) -> str:
         return f"<p>{escape(self._head())}</p>" + self.table()._repr_html_()
-
-    def _text(self) -> str:
-        f_std = any(known(mode.frequency_std_hz) is not None for mode in self.modes)
-        z_std = any(known(mode.damping_ratio_std) is not None for mode in self.modes)
-        lines = [
-            f"{self.method}: {self.samples} samples at {self.fs_hz:g} Hz, {self.records} record(s), {self.gaps} gap(s)",
-            f"p {self.p}, {self.rows} block rows, order {self.order}, detrend {self.detrend}, start {self.start}",
-            "",
-            f"   #       f [Hz]{'         ±' * f_std}     ζ [%]{'         ±' * z_std}     MPC    EMAC     CMI",
-        ]
-        for k, mode in enumerate(self.modes, 1):
-            line = f"{k:4d} {mode.frequency_hz:12.5f}"
-            line += _spread(mode.frequency_std_hz, 1.0) if f_std else ""
-            line += f" {100 * mode.damping_ratio:9.4f}"
-            line += _spread(mode.damping_ratio_std, 100.0) if z_std else ""
-            lines.append(f"{line} {mode.mpc:7.4f} {mode.emac:7.4f} {mode.cmi:7.4f}")
-        width = max([6, *(len(name) for name in self.outputs)])
-        lines += ["", f"{'output':<{width}}  simulated [%]  predicted [%]"]
-        for name in self.outputs:
-            pair = (self.fit.simulation_percent.get(name), self.fit.prediction_percent.get(name))
-            cells = ["-" if value is None else f"{value:.2f}" for value in pair]
-            lines.append(f"{name:<{width}}  {cells[0]:>13}  {cells[1]:>13}")
-        if self.refinement is not None:
-            lines += ["", self.refinement.text(self.outputs)]
-        if self.mkr is not None and self.pdc is not None:
-            lines += ["", mass_table(self.mkr, self.pdc)]
-        lines += [f"warning {w.code}: {w.text}" for w in self.warnings]
-        return "\n".join(lines)
 
     def stabilization(self, orders: Iterable[int] | None = None, criteria: Criteria | None = None) -> Stabilization:
         """Poles of other orders from the same decomposition, each compared with the order before, and their clusters.

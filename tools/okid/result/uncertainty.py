@@ -4,25 +4,21 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from okid import abi
-from okid._errors import Error, InputError
+from okid._errors import InputError
 from okid.abi.accumulator import Accumulator
-from okid.abi.identifier import HANKEL, METHODS, Identifier
+from okid.abi.identifier import Identifier
 from okid.result.mkr import Plan, raw_plan
 from okid.result.model import Model
 
-if TYPE_CHECKING:
-    from okid.result.result import Mode
-
 Real = NDArray[np.float64]
-Piece = tuple[int, int, int]  # record, first sample, one past the last
 GROUPS, FEWEST, MOST = 20, 8, 100  # parts of a record; below 8 a standard deviation says nothing
 
 
@@ -141,78 +137,6 @@ class Jackknife:
         return Model(A, B, C, D, np.zeros((n_z, n_y)), self._dt), share.value
 
 
-def parts_of(records: Sequence[Real], lags: int, rest: bool, groups: int = GROUPS) -> Iterator[list[Piece]]:
-    """Equal parts of all regression rows together: pieces (record, first, last) of samples, without their lead-in."""
-    first = 0 if rest else lags  # what stands before is history only
-    rows = [max(0, len(record) - first) for record in records]
-    ends = np.cumsum([0, *rows])
-    cuts = [round(k * int(ends[-1]) / groups) for k in range(groups + 1)]
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
-        pieces = [(r, first + max(low, a) - a, first + min(high, b) - a)
-                  for r, (a, b) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
-                  if max(low, a) < min(high, b)]  # fmt: skip
-        yield pieces
-
-
-def feed_part(part: Accumulator, records: Sequence[Real], pieces: list[Piece]) -> None:
-    """The pieces with the `lags` samples before each; before a record begins there is silence."""
-    part.reset()
-    for record, low, high in pieces:
-        samples = records[record]
-        part.gap(0)
-        if low < part.lags:
-            part.add(np.zeros((part.lags - low, samples.shape[1])))
-        part.add(samples[max(0, low - part.lags) : high])
-
-
-class Replicate(NamedTuple):
-    """The model without some pieces (record, first, last) of the records, None: there is none; their information."""
-
-    model: Model | None
-    share: float
-    pieces: list[Piece]
-
-
-def leave_out_blocks(
-    identifier: Identifier, records: Sequence[Real], whole: Accumulator, blocks: int = GROUPS, rest: bool = False
-) -> list[Replicate]:
-    """Leave out each of `blocks` equal blocks in turn. `whole` holds `records`; the identifier's last run was on it.
-
-    `rest`: silence stands before each record. Empty: the record is too short.
-    """
-    groups = min(blocks, whole.rows // whole.lags)
-    if groups < FEWEST:
-        return []
-    out, jackknife = [], Jackknife(identifier, whole)
-    with Accumulator(whole.n_u, whole.n_y, whole.lags) as part:
-        for pieces in parts_of(records, whole.lags, rest, groups):
-            feed_part(part, records, pieces)
-            if part.rows > 0:
-                out.append(Replicate(*jackknife.delete(part), pieces))
-    return out
-
-
-def deviations(
-    full: Model,
-    replicates: Sequence[Replicate],
-    plan: Plan | None = None,
-    refit: Callable[[Model, list[Piece]], Model] | None = None,
-) -> Uncertainty | None:
-    """Standard deviations of `full`; `refit` makes of a replicate what the full model is beyond the identifier.
-
-    None without replicates.
-    """
-    if not replicates:
-        return None
-    sums = Replicates(full, plan)
-    for model, share, pieces in replicates:
-        try:
-            sums.add(model if model is None or refit is None else refit(model, pieces), share)
-        except Error:
-            sums.add(None, share)
-    return sums.finish()
-
-
 def without_each(
     identifier: Identifier,
     whole: Accumulator,
@@ -231,40 +155,3 @@ def without_each(
                 statistics.add(model, share)
     found = statistics.finish()
     return found if found.replicates >= FEWEST else None
-
-
-def finite_p_bias(config: Any, records: Sequence[Real], rest: bool, modes: Sequence[Mode], order: int) -> str | None:
-    """What a horizon of 2 p says otherwise by more than two standard deviations; None: nothing, or too few samples.
-
-    `config`: okid_identify_config_t of an okid method with inputs; `modes` with their deviations.
-    """
-    twice = Identifier(
-        config.n_u, config.n_y, fs=config.fs_hz, p=2 * config.p, rows=config.rows or 2 * config.p, order=order,
-        method=next(name for name, number in METHODS.items() if number == config.method),
-        hankel=next(name for name, number in HANKEL.items() if number == config.hankel),
-        detrend="mean" if config.detrend == abi.DETREND_MEAN else "none",
-    )  # fmt: skip
-    with Accumulator(config.n_u, config.n_y, twice.lags) as sums:
-        feed_part(sums, records, next(parts_of(records, twice.lags, rest, 1)))
-        if sums.rows < 10 * (config.n_u + 2 * config.p * (config.n_u + config.n_y)):
-            return None
-        try:
-            other = twice.run(sums)
-        except Error:
-            return None
-    moved = []
-    for k, mode in enumerate(modes, 1):
-        if not mode.frequency_std_hz or not mode.damping_ratio_std or len(other.frequency_hz) == 0:
-            continue
-        near = int(np.argmin(np.abs(other.frequency_hz - mode.frequency_hz)))
-        shift = float(other.frequency_hz[near]) - mode.frequency_hz
-        df = shift / mode.frequency_std_hz
-        dz = (float(other.damping_ratio[near]) - mode.damping_ratio) / mode.damping_ratio_std
-        if abs(shift) <= 0.05 * mode.frequency_hz and max(abs(df), abs(dz)) > 2.0:
-            moved.append(f"mode {k} by {df:+.1f} σ in f and {dz:+.1f} σ in ζ")
-    if not moved:
-        return None
-    return (
-        f"p {2 * config.p} instead of {config.p} moves {', '.join(moved)}: a bias that ± does not show. Use "
-        f"p={2 * config.p} or more, or an n4sid method"
-    )

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""How well a model explains whole records: simulation and one-step prediction, output by output."""
+"""What a model makes of a record: simulation and one-step prediction, output by output, and how well they fit."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import IdentificationError
 from okid.result.model import Model
-from okid.result.result import Fit
+from okid.result.parts import Fit
 
 Real = NDArray[np.float64]
 
@@ -62,36 +63,40 @@ def stretches(u: Real, least: int) -> list[slice]:
     return [slice(a + 1, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a - 1 >= least]
 
 
-def fit_records(
-    model: Model, records: Sequence[Real], outputs: Sequence[str], predict: bool = True
-) -> tuple[Fit, Real | None]:
-    """Both fits over all records (N, n_u + n_y), inputs first, already detrended, and x0 (records, n_z) of each.
+class Answer(NamedTuple):
+    """One stretch of a record without a missing input, and what a model makes of it."""
 
-    A record is cut where an input is missing: each stretch has its own least-squares initial state, stretches of fewer
-    than max(20, 2 order) samples are left out. x0 of a record is that of its first stretch, zero when it has none.
-    Missing outputs carry no weight. `predict` False leaves the prediction None (unstable predictor). Without inputs
-    there is nothing to simulate: prediction from rest, no x0.
+    first: int
+    u: Real
+    y: Real
+    simulated: Real | None
+    predicted: Real | None
+
+
+def answers(model: Model, predict: bool, data: Real, n_u: int) -> list[Answer]:
+    """Every stretch of at least max(20, 2 order) samples, simulated (with inputs) and predicted (stable predictor).
+
+    Each has its own least-squares initial state. Without inputs: prediction of the whole record from rest.
     """
-    if model.B.shape[1] == 0:
-        pairs = [(r, model.predict(np.zeros((len(r), 0)), r)) for r in records] if predict else []
-        return Fit({name: None for name in outputs}, _percent(pairs, outputs)), None
-    n_u, radius, states = model.B.shape[1], model.radius(), []
-    informed = math.log(1e-16) / math.log(radius) if 0.0 < radius < 1.0 else math.inf  # then x0 has died away
-    simulated: list[tuple[Real, Real]] = []
-    predicted: list[tuple[Real, Real]] = []
-    for record in records:
-        first = np.zeros(model.order)
-        for turn, piece in enumerate(stretches(record[:, :n_u], max(20, 2 * model.order))):
-            u, y = record[piece, :n_u], record[piece, n_u:]
+    out = []
+    for piece in stretches(data[:, :n_u], max(20, 2 * model.order)) if n_u else [slice(0, len(data))]:
+        u, y = data[piece, :n_u], data[piece, n_u:]
+        x0, simulated = None, None
+        if n_u:
+            radius = model.radius()
+            informed = math.log(1e-16) / math.log(radius) if 0.0 < radius < 1.0 else math.inf  # then x0 has died away
             used = max(1, int(min(len(u), informed)))
             try:
                 x0 = model.initial_state(u[:used], y[:used])
             except IdentificationError:
                 x0 = np.zeros(model.order)
-            if turn == 0:
-                first = x0
-            simulated.append((y, model.simulate(u, x0)))
-            if predict:
-                predicted.append((y, model.predict(u, y, x0)))
-        states.append(first)
-    return Fit(_percent(simulated, outputs), _percent(predicted, outputs)), np.array(states)
+            simulated = model.simulate(u, x0)
+        out.append(Answer(int(piece.start), u, y, simulated, model.predict(u, y, x0) if predict else None))
+    return out
+
+
+def fit_of(given: Sequence[Answer], outputs: Sequence[str]) -> Fit:
+    """Both fits over all stretches together."""
+    simulated = [(one.y, one.simulated) for one in given if one.simulated is not None]
+    predicted = [(one.y, one.predicted) for one in given if one.predicted is not None]
+    return Fit(_percent(simulated, outputs), _percent(predicted, outputs))

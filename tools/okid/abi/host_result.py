@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""Records in, a result of the host library out: its text, its arrays, its decomposition. Source: okid_host/record.h."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import math
+import weakref
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from okid import abi
+from okid._errors import Error
+from okid.abi import host
+from okid.abi.identifier import Identifier
+
+Real = NDArray[np.float64]
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it; what JSON cannot hold stays as text, so that the library says what is wrong with it."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [_plain(one) for one in value]
+    return value if value is None or isinstance(value, bool | int | float | str) else repr(value)
+
+
+class HostResult:
+    """An okid_host_result_t, deleted with this object."""
+
+    def __init__(self, handle: ctypes.c_void_p) -> None:
+        self.handle = handle
+        weakref.finalize(self, host.library().okid_host_result_delete, handle)
+
+    def _text(self, what: str) -> str:
+        text: bytes | None = getattr(host.library(), f"okid_host_result_{what}")(self.handle)
+        if text is None:
+            raise Error(host.library().okid_host_error().decode("utf-8", "replace"))
+        return text.decode("utf-8", "replace")
+
+    def json(self) -> str:
+        """okid.result/1, as `okid identify --json` writes it."""
+        return self._text("json")
+
+    def about(self) -> dict[str, Any]:
+        """The same, parsed, without singular_values, model and markov."""
+        out: dict[str, Any] = json.loads(self._text("summary"))
+        return out
+
+    def table(self) -> str:
+        """What `okid identify` prints, options named as arguments."""
+        return self._text("table")
+
+    def array(self, name: str) -> Real | None:
+        """A copy of an array by its place in okid.result/1 ("model.A", "markov.Y" ..); None: there is none."""
+        view = host.Array()
+        if not host.library().okid_host_result_array(self.handle, name.encode(), ctypes.byref(view)):
+            return None
+        shape, strides = (tuple(numbers[: view.rank]) for numbers in (view.size, view.stride))
+        if 0 in shape:
+            return np.zeros(shape)
+        count = 1 + sum((n - 1) * step for n, step in zip(shape, strides, strict=True))
+        flat = np.ctypeslib.as_array(view.data, (count,))
+        return np.array(np.lib.stride_tricks.as_strided(flat, shape, [8 * step for step in strides]), order="C")
+
+    def identifier(self) -> Identifier | None:
+        """The decomposition, for models of other orders; it keeps this object alive. None: there is none."""
+        raw = host.Decomposition()
+        if not host.library().okid_host_result_decomposition(self.handle, ctypes.byref(raw)):
+            return None
+        config, model = abi.IdentifyConfig.from_address(raw.config), abi.Identified.from_address(raw.model)
+        return Identifier.of_handle(raw.identifier, config, model, self)
+
+
+def identify(options: Mapping[str, Any], records: Sequence[Real]) -> HostResult:
+    """`options` by the names of the arguments of okid.identify(); records (N, n_u + n_y), inputs first."""
+    handle, count = ctypes.c_void_p(), len(records)
+    rows = [np.ascontiguousarray(record, dtype=np.float64) for record in records]
+    samples = (ctypes.c_void_p * count)(*(one.ctypes.data for one in rows))
+    counts = (ctypes.c_size_t * count)(*map(len, rows))
+    names = (ctypes.c_char_p * count)(*(f"record {k} (counted from 0)".encode() for k in range(count)))
+    text = json.dumps(_plain(options)).encode()
+    host.call("identify", text, count, samples, counts, names, None, None, ctypes.byref(handle))
+    return HostResult(handle)

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""The parts of a result: modes, fits, warnings, matrices; each is made of its key of okid.result/1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+_Part = Mapping[str, Any]
+
+
+def known(value: float | None) -> float | None:
+    """The number, None for one that is missing or not finite."""
+    return float(value) if value is not None and math.isfinite(value) else None
+
+
+def numbers(nested: Any) -> Real:
+    """Nested lists as an array; None is NaN."""
+    return np.array(nested, dtype=np.float64)
+
+
+def _optional(nested: Any) -> Real | None:
+    return None if nested is None else numbers(nested)
+
+
+class Mode(NamedTuple):
+    """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known."""
+
+    frequency_hz: float
+    damping_ratio: float
+    shape: NDArray[np.complex128]
+    mpc: float
+    emac: float
+    frequency_std_hz: float | None = None
+    damping_ratio_std: float | None = None
+    shape_re_std: Real | None = None
+    shape_im_std: Real | None = None
+
+    @property
+    def cmi(self) -> float:
+        """Consistent-mode indicator EMAC x MPC, 0..1."""
+        return self.emac * self.mpc
+
+    @classmethod
+    def of(cls, one: _Part) -> Mode:
+        """Of an entry of "modes"."""
+        f, zeta, mpc, emac = numbers([one[key] for key in ("frequency_hz", "damping_ratio", "mpc", "emac")]).tolist()
+        shape = numbers(one["shape_re"]) + 1j * numbers(one["shape_im"])
+        return cls(f, zeta, shape, mpc, emac, one.get("frequency_std_hz"), one.get("damping_ratio_std"),
+                   _optional(one.get("shape_re_std")), _optional(one.get("shape_im_std")))  # fmt: skip
+
+
+class Fit(NamedTuple):
+    """100 (1 - |y - yhat| / |y - mean|) for each output by name; None = not available."""
+
+    simulation_percent: dict[str, float | None]
+    prediction_percent: dict[str, float | None]
+
+    @classmethod
+    def of(cls, fit: _Part, outputs: Sequence[str]) -> Fit:
+        """Of "fit"; null stands for all outputs."""
+        return cls(*(dict(fit[key] or dict.fromkeys(outputs)) for key in cls._fields))
+
+
+class Warning(NamedTuple):
+    """What speaks against a valid result, or has to be known of it."""
+
+    code: str
+    text: str
+
+
+@dataclass
+class MassMatrices:
+    """M (kg), K (N/m), R (N s/m), R_normal_modes: (n_x, n_x), symmetric; degrees of freedom 1 .. n_x in order.
+
+    `checks` tells whether they can be believed, `modes` what they were made of: docs of okid/mkr.h. Paper eq. 96-123.
+    """
+
+    M: Real
+    K: Real
+    R: Real
+    R_normal_modes: Real
+    checks: dict[str, Any]
+    modes: list[dict[str, Any]]
+    M_std: Real | None = None
+    K_std: Real | None = None
+    R_std: Real | None = None
+    R_normal_modes_std: Real | None = None
+
+    @classmethod
+    def of(cls, mkr: _Part | None) -> MassMatrices | None:
+        """Of "mkr"."""
+        if mkr is None:
+            return None
+        found = cls(
+            numbers(mkr["M"]), numbers(mkr["K"]), numbers(mkr["R"]), numbers(mkr["R_normal_modes"]),
+            mkr.get("checks") or {}, mkr.get("modes") or [],
+        )  # fmt: skip
+        for name in ("M_std", "K_std", "R_std", "R_normal_modes_std"):
+            setattr(found, name, _optional(mkr.get(name)))
+        return found
+
+
+@dataclass
+class ProportionalDamping:
+    """R = alpha M + beta K (N s/m) from the damping ratios; `residual`: share of them it misses. Paper eq. 124-131."""
+
+    alpha: float
+    beta: float
+    R: Real
+    residual: float
+    condition: float
+    alpha_std: float | None = None
+    beta_std: float | None = None
+
+    @classmethod
+    def of(cls, pdc: _Part | None) -> ProportionalDamping | None:
+        """Of "pdc"."""
+        if pdc is None:
+            return None
+        alpha, beta, residual, condition = numbers([pdc.get(k) for k in ("alpha", "beta", "residual", "condition")])
+        return cls(float(alpha), float(beta), numbers(pdc["R"]), float(residual), float(condition),
+                   pdc.get("alpha_std"), pdc.get("beta_std"))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What came of it: steps, log-likelihood gained over the start and left (of one more step), the mean of N r^2 over
+    the autocorrelations of the residuals at lags 1..20 (1 = white), residual standard deviation of each output."""
+
+    iterations: int
+    converged: bool
+    samples: int
+    gain: float
+    decrement: float
+    whiteness: float
+    noise_std: Real
+
+    @classmethod
+    def of(cls, part: _Part | None) -> Refinement | None:
+        """Of "refinement"."""
+        if part is None:
+            return None
+        gain, left, white = numbers([part["log_likelihood_gain"], part["log_likelihood_left"], part["whiteness"]])
+        return cls(part["iterations"], part["converged"], part["samples"], float(gain), float(left), float(white),
+                   numbers(list(part["noise_std"].values())))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Skew:
+    """Delay and standard deviation of each output, µs (> 0: late against the forces); `late` those that were corrected.
+
+    `scatter`: what is left of the angles of the modes over its deviation; above 3 the delays are undetermined.
+    """
+
+    us: Real
+    std_us: Real
+    late: NDArray[np.bool_]
+    undetermined: bool
+    scatter: float
+
+    @classmethod
+    def of(cls, part: _Part | None, outputs: Sequence[str]) -> Skew | None:
+        """Of "skew"."""
+        if part is None:
+            return None
+        late = np.array([name in part["outputs_corrected"] for name in outputs])
+        return cls(numbers(list(part["us"].values())), numbers(list(part["std_us"].values())), late,
+                   part["undetermined"], float(numbers(part["scatter"])))  # fmt: skip
