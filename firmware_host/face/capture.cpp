@@ -243,10 +243,11 @@ void okid_host_capture_t::lost(std::size_t index, const device_losses& losses) {
     session_->set_losses(index, losses);
 }
 
-/// Counts of the source for the stats, and what they tell of the bus.
+/// Counts of the source for the stats, and what they tell of the bus. A log without errors has nothing to tell.
 void okid_host_capture_t::tell_health() {
     for (std::size_t i = 0; i < buses_.size(); ++i) {
         face::pushed_bus& from = *buses_[i];
+        if (!live_ && !from.line.ops && from.counts.error_frames + from.counts.link_down == 0) continue;
         bus_health health{from.counts, std::nullopt};
         if (from.line.ops) {
             from.line.ops->stats(&from.line, &health.counts);

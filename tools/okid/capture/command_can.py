@@ -22,6 +22,7 @@ from okid.capture.outcome import (
     EXIT_DEVICE,
     EXIT_DONE,
     EXIT_USAGE,
+    Tap,
     check_duration,
     check_target,
     complain,
@@ -144,7 +145,9 @@ def _from_log(
     args: argparse.Namespace, config: CaptureConfig | None, remarks: list[str], database: Any, stop: threading.Event
 ) -> int:
     if config is None:
-        return _copy(args, log_messages(args.log, remarks), database, stop)
+        rest = iter(log_messages(args.log, remarks))
+        first = next(rest)  # no copy is made when it cannot be read
+        return _record(args, chain([first], rest), database, stop)
     if args.out is None and args.log.lower().endswith((".log", ".okj")):
         return _replay(args, config, stop)
     return _identify(args, config, messages_for(args.log, config, remarks), None, database, stop)
@@ -186,11 +189,13 @@ def _channel_name(args: argparse.Namespace, source: BusConfig | None = None) -> 
     return str(args.channel or "can0").rsplit("/", 1)[-1]
 
 
-def _record(args: argparse.Namespace, bus: can.BusABC, database: Any, stop: threading.Event) -> int:
+def _record(
+    args: argparse.Namespace, source: can.BusABC | Iterable[can.Message], database: Any, stop: threading.Event
+) -> int:
     try:
         summary = record_bus(
-            bus, args.out, channel=_channel_name(args), duration=args.duration, frames=args.frames,
-            database=database, csv_path=args.csv, stop=stop.is_set,
+            source, args.out, channel=_channel_name(args), duration=None if args.log else args.duration,
+            frames=args.frames, database=database, csv_path=args.csv, stop=stop.is_set,
         )  # fmt: skip
     except OSError as full:
         complain(f"{full.filename or args.out}: {full.strerror or full}")
@@ -200,67 +205,6 @@ def _record(args: argparse.Namespace, bus: can.BusABC, database: Any, stop: thre
         complain(f"{args.channel}: {summary.fault}; what came before is in {args.out}")
         return EXIT_DEVICE
     return EXIT_DONE
-
-
-def _copy(args: argparse.Namespace, messages: Iterable[can.Message], database: Any, stop: threading.Event) -> int:
-    """A log into another one, which is not made when the first frame cannot be read."""
-    rest = iter(messages)
-    messages = chain([next(rest)], rest)  # a log without a frame is refused by who reads it
-    try:
-        with Recorder(args.out, channel=_channel_name(args), database=database, csv_path=args.csv) as recorder:
-            for message in messages:
-                if stop.is_set() or recorder.summary.frames == args.frames:
-                    break
-                recorder.add(message)
-    except OSError as full:
-        complain(f"{full.filename or args.out}: {full.strerror or full}")
-        return EXIT_USAGE
-    print(recorder.summary.text())
-    return EXIT_DONE
-
-
-class _Tap:
-    """Every frame on its way: recorded where it is wanted, counted; when the disk is full the measurement goes on."""
-
-    def __init__(self, recorder: Recorder | None, frames: int | None) -> None:
-        self._recorder, self._left = recorder, frames
-        self.fault: str | None = None
-
-    @property
-    def done(self) -> bool:
-        """So many frames as were asked for."""
-        return self._left is not None and self._left <= 0
-
-    def add(self, message: can.Message) -> None:
-        if self._left is not None:
-            self._left -= 1
-        self._keep(message)
-
-    def idle(self) -> None:
-        self._keep(None)
-
-    def close(self) -> None:
-        """The recorder, with what it still holds."""
-        if self._recorder is None:
-            return
-        try:
-            self._recorder.close()
-        except OSError as full:
-            if self.fault is None:
-                self.fault = f"{self._recorder.summary.path}: {full.strerror or full}"
-                complain(self.fault)
-
-    def _keep(self, message: can.Message | None) -> None:
-        if self._recorder is None or self.fault is not None:
-            return
-        try:
-            if message is None:
-                self._recorder.tick()
-            else:
-                self._recorder.add(message)
-        except OSError as full:
-            self.fault = f"{self._recorder.summary.path}: {full.strerror or full}: no longer recorded"
-            complain(self.fault)
 
 
 def _identify(
@@ -282,22 +226,30 @@ def _identify(
                 recorder = Recorder(args.out, channel=_channel_name(args, bus), database=database, csv_path=args.csv)
             except OSError as full:
                 raise InputError(f"{full.filename or args.out}: {full.strerror or full}") from None
-        tap = _Tap(recorder, args.frames)
+        tap, seen = Tap(args.out), 0
+
+        def keep(message: can.Message) -> None:
+            nonlocal seen
+            seen += 1
+            if recorder is not None:
+                tap.keep(recorder.add, message)
 
         def idle() -> None:
-            tap.idle()
+            if recorder is not None:
+                tap.keep(recorder.tick)
             capture.serve()
 
         try:
             for _ in feed_messages(
-                source, capture, duration=args.duration if live else None, stop=lambda: stop.is_set() or tap.done,
-                tap=tap.add, idle=idle,
+                source, capture, duration=args.duration if live else None,
+                stop=lambda: stop.is_set() or seen == args.frames, tap=keep, idle=idle,
             ):  # fmt: skip
                 pass
         except (can.CanError, OSError) as failed:
             fault = f"{args.channel}: {str(failed) or type(failed).__name__}"
         finally:
-            tap.close()
+            if recorder is not None:
+                tap.keep(recorder.close, last=True)
 
         def lines() -> list[str]:
             return [*([] if recorder is None else [recorder.summary.text()]), *_count_lines(capture)]

@@ -13,6 +13,7 @@ from okid.capture.outcome import (
     EXIT_DEVICE,
     EXIT_DONE,
     EXIT_USAGE,
+    Tap,
     check_duration,
     check_target,
     complain,
@@ -49,23 +50,6 @@ def _check(args: argparse.Namespace) -> None:
     check_outputs(inputs, {"--out": args.out, "--json": args.json, "--events": args.events})
 
 
-class _Tap:
-    """Bytes on their way into the file, in the thread that reads; when the disk is full the measurement goes on."""
-
-    def __init__(self, file: RawFile | None) -> None:
-        self._file = file
-        self.fault: str | None = None
-
-    def add(self, data: bytes) -> None:
-        if self._file is None or self.fault is not None:
-            return
-        try:
-            self._file.add(data)
-        except OSError as full:
-            self.fault = f"{self._file.path}: {full.strerror or full}: no longer recorded"
-            complain(self.fault)
-
-
 def run_serial(args: argparse.Namespace, stop: threading.Event) -> int:
     """Exit code of `okid-capture serial`. Raises InputError."""
     _check(args)
@@ -91,10 +75,15 @@ def run_serial(args: argparse.Namespace, stop: threading.Event) -> int:
             raise InputError(f"{args.out}: {full.strerror or full}") from None
         if said is not None:
             complain(said)
-        tap = _Tap(file)
+        tap = Tap(args.out)
+
+        def keep(data: bytes) -> None:
+            if file is not None:
+                tap.keep(file.add, data)
+
         duration = args.duration if live else None
         try:
-            for _ in feed_bytes(port, capture, duration=duration, stop=stop.is_set, tap=tap.add):
+            for _ in feed_bytes(port, capture, duration=duration, stop=stop.is_set, tap=keep):
                 pass
         except OSError as failed:
             fault = f"{name}: {str(failed) or type(failed).__name__}"

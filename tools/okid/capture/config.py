@@ -90,11 +90,13 @@ def _bus(table: dict[str, Any]) -> BusConfig:
 def load_config(path: str | Path) -> CaptureConfig:
     """Read and check a CONFIG.toml. Raises InputError naming file, line, key, what was found and what was expected."""
     found = host.config(path)
-    keys = ("name", "role", "bus", "dof", "unit", "scale", "offset")
     channels = tuple(
-        ChannelConfig(*(one[key] for key in keys), number=one["value"], length=one["length"], signed=one["signed"])
+        ChannelConfig(
+            one["name"], one["role"], one["bus"], one["dof"], one["unit"], one["scale"], one["offset"], one["value"],
+            one["length"], one["signed"],
+        )
         for one in found["channels"]
-    )
+    )  # fmt: skip
     if found["outputs"] == 0:
         raise InputError(f"{path}: no [[channel]] has the role acceleration, velocity or displacement, expected one")
     buses = tuple(map(_bus, found["buses"]))

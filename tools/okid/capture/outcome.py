@@ -22,6 +22,25 @@ def complain(text: object) -> None:
     print(f"okid-capture: {text}", file=sys.stderr, flush=True)
 
 
+class Tap:
+    """What is written on the way of a measurement: when the disk is full the measurement goes on without."""
+
+    def __init__(self, path: str | None) -> None:
+        self._path = path
+        self.fault: str | None = None
+
+    def keep(self, write: Callable[..., None], *given: Any, last: bool = False) -> None:
+        """write(*given), until it fails; `last`: in any case, for it closes the file."""
+        if self.fault is not None and not last:
+            return
+        try:
+            write(*given)
+        except OSError as full:
+            if self.fault is None:
+                self.fault = f"{self._path}: {full.strerror or full}" + ("" if last else ": no longer recorded")
+                complain(self.fault)
+
+
 def check_target(path: str | None) -> None:
     """Where a result is to go, before anything is opened. Raises InputError."""
     if path is None or path == "-":

@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -203,7 +203,7 @@ class Recorder:
 
 
 def record_bus(
-    bus: can.BusABC,
+    bus: can.BusABC | Iterable[can.Message],
     path: str | os.PathLike[str],
     *,
     channel: str = "can0",
@@ -215,7 +215,7 @@ def record_bus(
     stop: Callable[[], bool] | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> Summary:
-    """Append every frame of an open python-can bus to a `candump -L` log.
+    """Append every frame of an open python-can bus, or of messages that end by themselves, to a `candump -L` log.
 
     Ends after `duration` s, after `frames` frames, when `stop()` says so, or when the bus fails (Summary.fault then
     says why; what came before is kept). `database` (cantools) with `csv_path` also writes decoded signals, one row a
@@ -225,15 +225,21 @@ def record_bus(
         path, channel=channel, database=database, csv_path=csv_path, flush_s=flush_s, clock=clock
     ) as recorder:
         summary = recorder.summary
-        begun = clock()
+        begun, given = clock(), None if hasattr(bus, "recv") else iter(bus)
         while not (stop is not None and stop()):
             now = clock()
             if (duration is not None and now - begun >= duration) or (frames is not None and summary.frames >= frames):
                 break
             recorder.tick()
+            if given is not None:
+                message = next(given, None)
+                if message is None:
+                    break
+                recorder.add(message)
+                continue
             left = _POLL_S if duration is None else min(_POLL_S, max(0.0, duration - (now - begun)))
             try:
-                message = bus.recv(timeout=left)
+                message = bus.recv(timeout=left)  # type: ignore[union-attr]
             except (can.CanError, OSError) as fault:
                 summary.fault = str(fault) or type(fault).__name__
                 break

@@ -230,7 +230,8 @@ class Capture:
     def take(self, *, raw: bool = False, every: bool = False) -> list[Real]:
         """Blocks of samples that wait, in order. raw: numbers as they stand in the frames; every: channels of role aux
         too. A long silence is one block of NaN that takes no memory."""
-        out, rows = [], _Rows()
+        out: list[Real] = []
+        rows = _Rows()
         width = len(self.config.channels)
         shown = width if every else len(self.config.wanted)
         while True:
