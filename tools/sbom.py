@@ -44,9 +44,10 @@ INTRODUCTION = """\
 
 What okid is built from, runs with and is tested with; none of it is part of this repository. Versions and licences are
 those of the machine where the release was tested, read off its packages by `tools/sbom.py`, which also writes this list
-together with what the packages bring along as CycloneDX 1.5 into `build/sbom.cdx.json`. The wheel holds the library
-with Eigen's headers compiled in and links the run-time libraries of C and C++ only. `a|b`: the first the distribution
-has. Licences stand as the packages name them."""
+together with what the packages bring along as CycloneDX 1.5 into `build/sbom.cdx.json`. The wheel holds the
+libraries with the headers of Eigen, fmt, nlohmann-json and toml++ compiled in and links the run-time libraries of C and
+C++ only; toml++ (MIT) is taken from libtomlplusplus-dev, or from the source distribution of pytomlpp 1.1.0. `a|b`: the
+first the distribution has. Licences stand as the packages name them."""
 
 
 class Missing(Exception):

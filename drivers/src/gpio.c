@@ -72,6 +72,8 @@ static int open_chip(drv_gpio_t* self, const char* name) {
     }
     int code = gpio_backend_chip(self, path, label);
     if (code == -EACCES || code == -EPERM) return explain(self, EACCES, "no permission to open %s", path);
+    if (code == -ENOSYS)
+        return explain(self, ENOSYS, "this build has no GPIO: install libgpiod-dev and build okid again%s", "");
     if (code) return explain(self, ENOTTY, "it is no GPIO chip that can be opened (%s)", strerror(-code));
     return 0;
 }

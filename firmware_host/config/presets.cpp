@@ -6,6 +6,7 @@
 #include "files/nearest_name.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace okid_host {
 namespace {

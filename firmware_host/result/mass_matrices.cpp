@@ -9,6 +9,7 @@
 #include <charconv>
 #include <cstddef>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <memory>
 
 namespace okid_host {

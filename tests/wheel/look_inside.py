@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a wheel holds and what its library needs of the system. usage: look_inside.py WHEEL PACKAGE_FOLDER"""
+"""What a wheel holds and what its libraries need of the system. usage: look_inside.py WHEEL PACKAGE_FOLDER"""
 
 import re
 import subprocess
@@ -19,12 +19,18 @@ with zipfile.ZipFile(wheel) as archive, tempfile.TemporaryDirectory() as folder:
     lacking = {f"okid/{Path(name).relative_to(package)}" for name in tracked if Path(name).exists()} - held
     if lacking:
         sys.exit(f"{wheel.name}: lacks {', '.join(sorted(lacking))}")
-    archive.extract("okid/libokid.so", folder)
-    dynamic = subprocess.run(
-        ["readelf", "-d", f"{folder}/okid/libokid.so"], capture_output=True, text=True, check=True
-    ).stdout
-    needed = re.findall(r"\(NEEDED\).*\[(.*)\]", dynamic)
-    foreign = [name for name in needed if not ALLOWED.fullmatch(name)]
-    if foreign:
-        sys.exit(f"{wheel.name}: its library needs {', '.join(foreign)} of the system")
-print(f"wheel: {wheel.name}, {wheel.stat().st_size / 1024:.0f} KiB, {len(held)} files, needs {', '.join(needed)}")
+    needed = set()
+    for library, also in (("libokid.so", None), ("libokid_host.so", "libokid.so")):
+        archive.extract(f"okid/{library}", folder)
+        dynamic = subprocess.run(
+            ["readelf", "-d", f"{folder}/okid/{library}"], capture_output=True, text=True, check=True
+        ).stdout
+        own = set(re.findall(r"\(NEEDED\).*\[(.*)\]", dynamic))
+        foreign = sorted(name for name in own if not ALLOWED.fullmatch(name) and name != also)
+        if foreign:
+            sys.exit(f"{wheel.name}: {library} needs {', '.join(foreign)} of the system")
+        if also and (also not in own or "[$ORIGIN]" not in dynamic):
+            sys.exit(f"{wheel.name}: {library} does not take {also} from beside itself")
+        needed |= own
+size = wheel.stat().st_size / 1024
+print(f"wheel: {wheel.name}, {size:.0f} KiB, {len(held)} files, needs {', '.join(sorted(needed))}")

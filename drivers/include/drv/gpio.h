@@ -76,7 +76,7 @@ typedef struct drv_gpio_t {
 } drv_gpio_t;
 
 /// Take a line as an input. Errors: -ENOENT no such chip or line, -EACCES, -EBUSY in use, -EINVAL, -ENODEV the chip cannot tell
-/// edges, -EOPNOTSUPP debounce, -ENOTTY no GPIO chip.
+/// edges, -EOPNOTSUPP debounce, -ENOTTY no GPIO chip, -ENOSYS built without libgpiod.
 int drv_gpio_open_input(drv_gpio_t* self, const drv_gpio_config_t* config);
 /// Take a line as an output; errors as above.
 int drv_gpio_open_output(drv_gpio_t* self, const drv_gpio_config_t* config);
