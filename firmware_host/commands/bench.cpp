@@ -15,6 +15,7 @@
 #include <functional>
 #include <lapacke.h>
 #include <okid/okid.h>
+#include <okid/steps/square_root.h>
 #include <random>
 #include <vector>
 

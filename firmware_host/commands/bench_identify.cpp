@@ -12,6 +12,8 @@
 #include <fmt/format.h>
 #include <limits>
 #include <okid/okid.h>
+#include <okid/steps/subspace.h>
+#include <okid/steps/square_root.h>
 
 namespace okid_host {
 namespace {

@@ -12,7 +12,8 @@
 #include "record_work.hpp"
 #include "result/method.hpp"
 
-#include <okid/subspace.h>
+#include <okid/steps/subspace.h>
+#include <okid/steps/square_root.h>
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 
 #include <okid/modal.h>
 #include <okid/refine.h>
-#include <okid/skew.h>
+#include <okid/steps/skew.h>
 
 #include <algorithm>
 #include <cmath>

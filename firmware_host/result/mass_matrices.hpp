@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 // From an identified model to mass, stiffness and damping: which channel stands at which degree of freedom, the matrices
-// of okid/mkr.h and okid/pdc.h in SI units, their checks in words.
+// of okid/mkr.h and okid/mkr.h in SI units, their checks in words.
 #pragma once
 #include <okid/identify.h>
 #include <okid/mkr.h>
-#include <okid/pdc.h>
 
 #include <cmath>
 #include <cstdint>

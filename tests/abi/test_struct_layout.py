@@ -51,7 +51,7 @@ POINTED = {
 
 def headers_text() -> str:
     """All public headers without comments."""
-    text = "\n".join(path.read_text(encoding="utf-8") for path in sorted((INCLUDE / "okid").glob("*.h")))
+    text = "\n".join(path.read_text(encoding="utf-8") for path in sorted((INCLUDE / "okid").rglob("*.h")))
     text = re.sub(r"\bokid_real_t\b", "double", text)  # what the shared library of hosts is built with
     return re.sub(r"//[^\n]*", "", re.sub(r"/\*.*?\*/", "", text, flags=re.S))
 
@@ -69,7 +69,8 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, int]:
             lines.append(f'P("{name}.{field}", offsetof({name}, {field}));')
             lines.append(f'P("{name}.{field}.size", sizeof((({name}*)0)->{field}));')
     lines += [f'P("OKID_{name}", OKID_{name});' for name in CONSTANTS]
-    head = "#include <okid/okid.h>\n#include <stdio.h>\n#include <stddef.h>\n"
+    headers = sorted(path.relative_to(INCLUDE) for path in (INCLUDE / "okid").rglob("*.h"))
+    head = "".join(f"#include <{name}>\n" for name in [*headers, "stdio.h", "stddef.h"])
     head += '#define P(name, value) printf("%s %lld\\n", name, (long long)(value))\n'
     source = folder / "layout.c"
     source.write_text(head + "int main(void) {\n" + "\n".join(lines) + "\nreturn 0;\n}\n", encoding="utf-8")

@@ -6,6 +6,7 @@
 #include "modal_rig.h"
 
 #include <okid/okid.h>
+#include <okid/steps/square_root.h>
 #include <unity.h>
 
 static rig_t rig;

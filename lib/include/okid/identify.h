@@ -5,8 +5,7 @@
 #define OKID_IDENTIFY_H
 
 #include <okid/accumulator.h>
-#include <okid/observer.h>
-#include <okid/square_root.h>
+#include <okid/types.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -17,7 +16,7 @@ typedef enum okid_method_t {
     OKID_METHOD_OKID_ERA = 0,    ///< observer least squares, Markov recursion, ERA. Without inputs: ERA on the
                                  ///< covariances of the outputs, which stand in the place of the Markov parameters
     OKID_METHOD_OKID_ERA_DC = 1, ///< the same Markov parameters, ERA with data correlations (xi = zeta = 2, tau = 1)
-    OKID_METHOD_N4SID_MOESP = 2, ///< subspace methods, okid/subspace.h; with and without inputs
+    OKID_METHOD_N4SID_MOESP = 2, ///< subspace methods, okid/steps/subspace.h; with and without inputs
     OKID_METHOD_N4SID_CVA = 3,   ///< canonical weighting
     OKID_METHOD_N4SID_SSARX = 4  ///< the future corrected by an ARX model
 } okid_method_t;
@@ -33,7 +32,7 @@ typedef enum okid_hankel_t {
 /// How the observer's least squares are solved from an accumulator.
 typedef enum okid_solver_t {
     OKID_SOLVER_DENSE = 0,     ///< from the Gram matrix, (m(p+1))^2 doubles: fastest, any accumulator
-    OKID_SOLVER_STRUCTURED = 1 ///< from the sums themselves, O(m q) memory: one unbroken run (okid/structured.h)
+    OKID_SOLVER_STRUCTURED = 1 ///< from the sums themselves, O(m q) memory: one unbroken run (okid/steps/observer.h)
 } okid_solver_t;
 
 /// Remarks on a valid result, as bits of okid_identified_t::warnings; okid_warning_code() and _text() name them.
@@ -66,6 +65,17 @@ typedef struct okid_identify_config_t {
     okid_solver_t solver;   ///< n4sid, and okid without inputs: dense
     okid_hankel_t hankel;   ///< n4sid, and okid without inputs: system
 } okid_identify_config_t;
+
+/// What the least squares of an observer found, beside the parameters.
+typedef struct okid_observer_info_t {
+    double ridge;  ///< ridge used, relative to the unit-diagonal Gram
+    double radius; ///< spectral radius of the ARX companion matrix with that ridge; beyond 64 states its growth over 64
+                   ///< samples where that is above 1.0005: a response that first grows marks a poor model too
+    double radius_plain;     ///< the same with ridge_min: >= 1 means the plain least squares is unstable (trap 22)
+    double condition;        ///< estimate (1-norm) of the condition of the equilibrated, ridged Gram
+    double input_excitation; ///< smallest over largest pivot of the equilibrated Gram of the input lags; near 0 = poor
+    int32_t channel;         ///< the channel an error speaks of, else -1
+} okid_observer_info_t;
 
 /// An identified model. Every pointer looks into the identifier's block and stays valid until the next run. Of an n4sid
 /// method, and of an okid method without inputs, p is rows (the past it looks back on), `observer` is NULL,
@@ -133,12 +143,6 @@ OKID_NODISCARD OKID_API okid_status_t okid_identify_create(okid_identify_t** sel
 ///         OKID_ERR_MISMATCH (sizes; with the structured solver also more than one run) and OKID_ERR_NO_MODES
 OKID_NODISCARD OKID_API okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator,
                                                         okid_identified_t* out);
-
-/// The same from the second kernel: nothing is squared, for noise-free or very lightly damped records (condition above 1e10)
-/// and as the cross-check. Needs a configuration with the dense solver, and inputs for the okid methods (covariances are
-/// squares anyway). @return as okid_identify_run()
-OKID_NODISCARD OKID_API okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root,
-                                                               okid_identified_t* out);
 
 /// Largest order that can be asked for.
 OKID_API int32_t okid_identify_max_order(const okid_identify_config_t* config);

@@ -2,7 +2,7 @@
 // PURPOSE    memory map of a square-root accumulator, shared by what absorbs samples (square_root.cpp) and what makes
 //            results of the factor (square_root_result.cpp)
 #pragma once
-#include <okid/square_root.h>
+#include <okid/steps/square_root.h>
 
 #include "accumulate/householder.h"
 

@@ -6,7 +6,7 @@
 //            Schenk (1993)
 // NUMERICS   the columns of H hold Y_k only: with Y0_k the truncation mixes noise modes in (trap 1)
 // WORKSPACE  H, the factors and what the SVD asks for; an SVD of (r n_y) x (c n_u) and 2 r n_y c n_u k flop
-#include <okid/era.h>
+#include <okid/steps/era.h>
 
 #include "identify/era_correlation.hpp"
 #include "linalg/linalg.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    the block Hankel matrix of data correlations that ERA/DC decomposes, in a small equivalent form
 #pragma once
-#include <okid/era.h>
+#include <okid/steps/era.h>
 
 #include "linalg/arena.hpp"
 

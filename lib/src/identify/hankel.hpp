@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    LQ factor of the block Hankel rows of a record, in the order a method wants, without the Hankel matrix
 #pragma once
-#include <okid/subspace.h>
+#include <okid/steps/subspace.h>
 
 #include "linalg/arena.hpp"
 

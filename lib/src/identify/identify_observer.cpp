@@ -6,8 +6,9 @@
 // WORKSPACE  the modules' own
 #include "identify/identify.hpp"
 
-#include <okid/markov.h>
-#include <okid/structured.h>
+#include <okid/steps/observer.h>
+#include <okid/steps/era.h>
+#include <okid/steps/square_root.h>
 
 #include <algorithm>
 #include <cmath>

@@ -7,6 +7,8 @@
 #include "identify/identify.hpp"
 
 #include <okid/modal.h>
+#include <okid/steps/era.h>
+#include <okid/steps/subspace.h>
 
 #include "identify/order.hpp"
 #include "linalg/linalg.hpp"

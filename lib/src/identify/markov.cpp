@@ -4,7 +4,7 @@
 // REFERENCE  paper eq. (26), (40), (41)
 // NUMERICS   stable exactly when the ARX companion matrix is (observer.cpp sees to that)
 // WORKSPACE  none; 2 count p n_y^2 m flop
-#include <okid/markov.h>
+#include <okid/steps/observer.h>
 
 #include "linalg/linalg.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    the singular values that errors of the observer alone give the Hankel matrix
 #pragma once
-#include <okid/observer.h>
+#include <okid/steps/observer.h>
 
 #include "linalg/arena.hpp"
 

@@ -6,7 +6,7 @@
 // NUMERICS   squares cond(V): fine to 1e7 with exact sums; the refinement step takes the ridge of 1e-12 out again
 //            double in every build; theta is rounded to okid_real_t and its companion matrix judged as it is then
 // WORKSPACE  q^2 + 3 m (p+1) n_y doubles and the Arnoldi basis; q^3/3 + 2 q^2 n_y flop a ridge
-#include <okid/observer.h>
+#include <okid/steps/observer.h>
 
 #include "identify/companion.hpp"
 #include "identify/noise_level.hpp"

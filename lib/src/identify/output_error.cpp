@@ -7,7 +7,7 @@
 // WORKSPACE  the squares of n_z n_u + n_z + n_u and of n_u (n_z + n_y), n_z n_u (n_z + n_y) numbers a record
 #include "identify/modal_filters.hpp"
 
-#include <okid/subspace.h>
+#include <okid/steps/subspace.h>
 
 #include <cmath>
 

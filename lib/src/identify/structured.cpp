@@ -11,7 +11,7 @@
 //            noise, where the Gram matrix is singular
 // WORKSPACE  2 (m+2)(n+m) + (1 + 3 min(4, n_y)) n + O(m^2) doubles, n = m(p+1), or the Arnoldi basis of the companion
 //            radius where that is larger; (6 m + 14 n_y + 40) n^2 flop a ridge
-#include <okid/structured.h>
+#include <okid/steps/observer.h>
 
 #include "identify/companion.hpp"
 #include "identify/stabilise.hpp"

@@ -8,7 +8,7 @@
 //            equals theta but for curvature and rounding: a full model found another way (QR) does no harm. Sums in double
 // WORKSPACE  n_z/2 (n_z/2 + 12 n_y) + 20 n_x^2 numbers, the modal analysis' and okid_mkr_identify()'s; no heap
 #include <okid/modal.h>
-#include <okid/pdc.h>
+#include <okid/mkr.h>
 #include <okid/uncertainty.h>
 
 #include "linalg/arena.hpp"

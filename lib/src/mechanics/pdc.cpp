@@ -5,7 +5,7 @@
 // REFERENCE  paper eq. (124)-(131), over n_x modes (trap 20: the text says n_z; both of a pair would change nothing)
 // NUMERICS   condition |a + b|/|a - b| instead of 1e4-1e5 of the unscaled columns; nothing is squared. Double in any build
 // WORKSPACE  none; 20 flop a mode
-#include <okid/pdc.h>
+#include <okid/mkr.h>
 
 #include <cmath>
 #include <limits>

@@ -5,7 +5,7 @@
 // REFERENCE  docs/numerics.md trap 15 and "channel delays"; paper eq. (105), (118)-(120) for the phase of c and b
 // NUMERICS   angles below pi/2: delays below half a sample at Nyquist. Angles worse than 0.3 rad say nothing and are left out
 // WORKSPACE  the pole analysis, okid_mkr_identify() and replicates x n_x x n_y doubles; 30 n_z^3 flop a model
-#include <okid/skew.h>
+#include <okid/steps/skew.h>
 
 #include "linalg/linalg.hpp"
 #include "poles.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The compile-time sizes of static arrays are never less than what the library asks for, and not much more (Eigen backend).
-#include <okid/era.h>
+#include <okid/steps/era.h>
 #include <okid/modal.h>
-#include <okid/structured.h>
+#include <okid/steps/observer.h>
 #include <unity.h>
 
 enum { SLACK = 1200 };

@@ -5,10 +5,9 @@
 // REFERENCE docs/porting.md; paper eq. (36)-(54)
 #include "identifier.h"
 
-#include <okid/era.h>
-#include <okid/markov.h>
+#include <okid/steps/era.h>
+#include <okid/steps/observer.h>
 #include <okid/modal.h>
-#include <okid/structured.h>
 
 #include <string.h>
 

@@ -4,6 +4,7 @@
 #include "modal_rig.h"
 
 #include <okid/okid.h>
+#include <okid/steps/square_root.h>
 #include <unity.h>
 
 extern void* __libc_malloc(size_t size);

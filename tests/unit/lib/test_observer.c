@@ -4,6 +4,7 @@
 #include "tolerance.h"
 
 #include <okid/okid.h>
+#include <okid/steps/observer.h>
 #include <unity.h>
 
 enum { P = 10, Q = RIG_NU + P * RIG_M, W = RIG_M * (P + 1), LAST = 60 };

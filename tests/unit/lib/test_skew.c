@@ -4,6 +4,7 @@
 #include "tolerance.h"
 
 #include <okid/okid.h>
+#include <okid/steps/skew.h>
 #include <unity.h>
 
 enum { REPLICATES = 8 };

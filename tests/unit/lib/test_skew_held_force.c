@@ -5,6 +5,7 @@
 #include "tolerance.h"
 
 #include <okid/okid.h>
+#include <okid/steps/skew.h>
 #include <unity.h>
 
 enum { N_Z = 7, REPLICATES = 6 };

@@ -4,6 +4,8 @@
 
 #include <float.h>
 #include <okid/okid.h>
+#include <okid/steps/observer.h>
+#include <okid/steps/square_root.h>
 #include <unity.h>
 
 enum { P = 10, N = 3000, Q = RIG_NU + P * RIG_M, W = RIG_M * (P + 1), LAST = 60 };

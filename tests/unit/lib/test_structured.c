@@ -3,6 +3,7 @@
 #include "modal_rig.h"
 
 #include <okid/okid.h>
+#include <okid/steps/observer.h>
 #include <unity.h>
 
 enum { P = 20, N = 4000, LAST = 100, M_MAX = 7, NY_MAX = 5, W_MAX = M_MAX * (P + 1) };

@@ -4,6 +4,8 @@
 #include "tolerance.h"
 
 #include <okid/okid.h>
+#include <okid/steps/subspace.h>
+#include <okid/steps/square_root.h>
 #include <unity.h>
 
 enum { I = 10, LAGS = 2 * I - 1, W = 2 * I * RIG_M, N = 4000, TOP = 12, LAST = 40 };

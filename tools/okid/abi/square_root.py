@@ -37,7 +37,7 @@ class SquareRoot(Sums):
 
     Parameters: `n_u` inputs, `n_y` outputs, `lags` p; `batch` rows absorbed at once (0 = the default); `block`,
     `slots`, `spare_slots` and `forgetting` as for an Accumulator. Raises InputError for sizes out of range.
-    Source: lib/include/okid/square_root.h, paper eq. 36-39.
+    Source: lib/include/okid/steps/square_root.h, paper eq. 36-39.
     """
 
     kernel = "okid_square_root"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// @file subspace.h
+/// @file steps/subspace.h
 /// Subspace identification (N4SID): MOESP, CVA and SSARX from the Gram matrix of the lagged samples, or from their
 /// triangular factor (paper eq. 55-95; Jansson 2003 for SSARX).
 ///
@@ -10,8 +10,8 @@
 /// order from it. Models of output-only records (n_u = 0) have A, C, K; B and D have no columns.
 /// Redundant, band-limited channels (real arrays) give models of high order with spurious poles outside the unit
 /// circle; a ridge of 1e-4..1e-2 brings them in and leaves the modes (numerics.md, trap 22).
-#ifndef OKID_SUBSPACE_H
-#define OKID_SUBSPACE_H
+#ifndef OKID_STEPS_SUBSPACE_H
+#define OKID_STEPS_SUBSPACE_H
 
 #include <okid/types.h>
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-/// @file skew.h
+/// @file steps/skew.h
 /// How late each sensor comes against the forces, from the phases of the modes of an identified model, and the model
 /// without these delays. A hundredth of a sample ruins R (docs/numerics.md, trap 15), and no fit of the outputs shows it.
 ///
 /// Of a structure whose points move in phase (real modes) every residue c b stands at a known angle; a sensor that is tau
 /// late turns mode k by -w_k tau. One delay for each output is fitted to the angles of all modes. What no delay explains
 /// are complex modes, a wrong hold or a wrong kind of sensor: then the delays are undetermined, and nothing is corrected.
-#ifndef OKID_SKEW_H
-#define OKID_SKEW_H
+#ifndef OKID_STEPS_SKEW_H
+#define OKID_STEPS_SKEW_H
 
 #include <okid/mkr.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// @file square_root.h
+/// @file steps/square_root.h
 /// The second recursive kernel: the triangular factor of the rows instead of their Gram matrix (block QR).
 ///
 /// R with R^T R = sum w_n w_n^T is kept, the Gram matrix itself never: the condition of the data is not squared. For
@@ -17,12 +17,10 @@
 /// Slots, gaps, window and forgetting mean what they mean in okid/accumulator.h, and the same record gives the same Gram
 /// matrix to rounding. Rows wait until `batch` of them can be taken at once: how a record is cut into calls changes no
 /// bit (as long as the factor is looked at after the same samples).
-#ifndef OKID_SQUARE_ROOT_H
-#define OKID_SQUARE_ROOT_H
+#ifndef OKID_STEPS_SQUARE_ROOT_H
+#define OKID_STEPS_SQUARE_ROOT_H
 
-#include <okid/accumulator.h>
-#include <okid/observer.h>
-#include <okid/types.h>
+#include <okid/identify.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -109,26 +107,11 @@ OKID_NODISCARD OKID_API okid_status_t okid_square_root_gram(okid_square_root_t* 
 OKID_NODISCARD OKID_API okid_status_t okid_square_root_factor(okid_square_root_t* self, okid_detrend_t detrend,
                                                               okid_real_t* factor, double* mean);
 
-/// Bytes of work okid_observer_solve_factor() needs; 0 when the configuration is invalid.
-OKID_API size_t okid_observer_factor_memsize(const okid_observer_config_t* config);
-
-/// okid_observer_solve() from the factor: the condition of the data is not squared. The ridge is never below eps^(3/2) of
-/// the unit-diagonal Gram (3e-24 in double, 4e-11 in float), which rank-deficient, that is noise-free, data need; an
-/// unstable ARX model gets the ridges of the same grid, from 1e-12 up.
-/// Method: unit columns, sqrt(ridge) I stacked under the factor by the same Householder update, back substitution.
-/// @param factor      in, n x n of okid_square_root_factor()
-/// @param rows        in, regression rows behind it
-/// @param theta       out, n_y x q column-major as of okid_observer_solve()
-/// @param innovation  out, n_y x n_y covariance of the residual, may be NULL
-/// @param info        out; condition and input_excitation are those of the Gram matrix, that is, squares
-/// @param work        caller's block of okid_observer_factor_memsize() bytes
-/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY, OKID_ERR_TOO_SHORT, OKID_ERR_INPUT, OKID_ERR_OUTPUT,
-///         OKID_ERR_EXCITATION, OKID_ERR_NUMERIC, OKID_ERR_UNSTABLE
-/// Cost 2/3 q^3 + q^2 n_y flop for each ridge tried. Source: paper eq. (36)-(39) without V V^T.
-OKID_NODISCARD OKID_API okid_status_t okid_observer_solve_factor(const okid_observer_config_t* config,
-                                                                 const okid_real_t* factor, int64_t rows,
-                                                                 okid_real_t* theta, okid_real_t* innovation,
-                                                                 okid_observer_info_t* info, void* work, size_t bytes);
+/// okid_identify_run() from the second kernel: nothing is squared, for noise-free or very lightly damped records (condition above 1e10)
+/// and as the cross-check. Needs a configuration with the dense solver, and inputs for the okid methods (covariances are
+/// squares anyway). @return as okid_identify_run()
+OKID_NODISCARD OKID_API okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root,
+                                                               okid_identified_t* out);
 
 #ifdef __cplusplus
 }
