@@ -3,6 +3,8 @@
 #include "identify_bench.h"
 #include "tolerance.h"
 
+#include <okid/steps/era.h>
+
 enum { P = 20, N = 6000 };
 
 static const double frequency_limit = TOLERANCE(1e-10, 2e-5), damping_limit = TOLERANCE(1e-8, 2e-2);
