@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <limits>
 #include <okid/okid.h>
-#include <okid/steps/subspace.h>
 #include <okid/steps/square_root.h>
+#include <okid/steps/subspace.h>
 
 namespace okid_host {
 namespace {
@@ -138,8 +138,9 @@ class okid_contender : public contender {
 
     bool fit_inputs() {
         const std::int32_t count = record_.samples;
-        return okid_subspace_output_error(record_.n_u, record_.n_y, found_.n_z, found_.A, found_.C, 1, &count,
-                                          record_.v.data(), B_.data(), D_.data(), nullptr, work_.data(),
+        const okid_model_t model{record_.n_u, record_.n_y, found_.n_z, found_.A, nullptr, found_.C, nullptr, nullptr};
+        const okid_records_t records{1, &count, record_.v.data()};
+        return okid_subspace_output_error(&model, &records, B_.data(), D_.data(), nullptr, work_.data(),
                                           work_.size()) == OKID_OK &&
                okid_identify_set_inputs(identify_, B_.data(), D_.data(), &found_) == OKID_OK;
     }

@@ -2,6 +2,8 @@
 // The completion script for bash: stands on bash alone, not on the functions of the package bash-completion.
 #include "completion.hpp"
 
+#include <okid/types.h>
+
 namespace okid_host {
 namespace {
 

@@ -2,6 +2,8 @@
 // The completion script for fish: one line for each command, option and argument.
 #include "completion.hpp"
 
+#include <okid/types.h>
+
 namespace okid_host {
 namespace {
 

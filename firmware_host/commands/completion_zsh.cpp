@@ -2,6 +2,8 @@
 // The completion script for zsh: one call of _arguments for each command. Works as an autoloaded _okid and when sourced.
 #include "completion.hpp"
 
+#include <okid/types.h>
+
 namespace okid_host {
 namespace {
 

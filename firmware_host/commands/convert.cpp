@@ -23,6 +23,7 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <okid/types.h>
 #include <random>
 
 namespace okid_host {

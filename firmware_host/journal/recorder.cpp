@@ -15,6 +15,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <limits>
+#include <okid/types.h>
 #include <random>
 #include <regex>
 

@@ -12,8 +12,8 @@
 #include "record_work.hpp"
 #include "result/method.hpp"
 
-#include <okid/steps/subspace.h>
 #include <okid/steps/square_root.h>
+#include <okid/steps/subspace.h>
 
 #include <algorithm>
 #include <cmath>
@@ -125,8 +125,9 @@ okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const
     const std::size_t bytes = okid_subspace_output_error_memsize(n_u, n_y, n_z, count);
     if (bytes == 0) return OKID_ERR_DIM;
     std::vector<std::byte> block(bytes);
-    return okid_subspace_output_error(n_u, n_y, n_z, A, C, count, counts.data(), set.samples.data(), B.data(), D.data(),
-                                      nullptr, block.data(), bytes);
+    const okid_model_t model{n_u, n_y, n_z, A, nullptr, C, nullptr, nullptr};
+    const okid_records_t records{count, counts.data(), set.samples.data()};
+    return okid_subspace_output_error(&model, &records, B.data(), D.data(), nullptr, block.data(), bytes);
 }
 
 /// B and D of a subspace model from the records. Where that fails, those of the subspace equations stay.

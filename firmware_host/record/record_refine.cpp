@@ -118,10 +118,16 @@ bool find_modes(const okid_identified_t& start, refined_arrays& to, okid_identif
     for (auto* column : {&to.frequency, &to.damping, &to.mpc, &to.emac, &to.cmi}) column->assign(most, 0);
     for (auto* shape : {&to.shape_re, &to.shape_im}) shape->assign(most * size_of(model.n_y), 0);
     std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
-    if (okid_modal_analyse(model.n_y, model.n_z, model.dt, model.A, model.C, &model.mode_count, to.frequency.data(),
-                           to.damping.data(), to.mpc.data(), to.shape_re.data(), to.shape_im.data(), nullptr, nullptr,
-                           nullptr, nullptr, &model.model_radius, work.data(), work.size()) < 0)
-        return false;
+    const okid_model_t view{model.n_u, model.n_y, model.n_z, model.A, model.B, model.C, model.D, model.K};
+    okid_modes_t modes{};
+    modes.frequency_hz = to.frequency.data();
+    modes.damping_ratio = to.damping.data();
+    modes.mpc = to.mpc.data();
+    modes.shape_re = to.shape_re.data();
+    modes.shape_im = to.shape_im.data();
+    if (okid_modal_analyse(&view, model.dt, &modes, work.data(), work.size()) < 0) return false;
+    model.mode_count = modes.count;
+    model.model_radius = modes.radius;
     for (std::size_t k = 0; k < size_of(model.mode_count); ++k) {
         double nearest = INFINITY;
         for (int j = 0; j < start.mode_count; ++j) {

@@ -120,6 +120,54 @@ def declarations() -> dict[str, tuple[str, list[str]]]:
     return {name: (result, [] if args == ["void"] else args) for name, (result, args) in split.items()}
 
 
+def test_interface_and_version_are_those_of_the_headers() -> None:
+    text = headers_text()
+    assert int(re.findall(r"#define OKID_ABI (\d+)", text)[0]) == abi.ABI
+    (version,) = re.findall(r'#define OKID_VERSION "(.+)"', text)
+    parts = re.findall(r"#define OKID_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", text)
+    project = (ROOT / "tools" / "pyproject.toml").read_text(encoding="utf-8")
+    assert version == ".".join(parts) == abi.library().okid_version().decode()
+    assert f'\nversion = "{version}"\n' in project
+
+
+def test_what_makes_an_object_or_takes_arrays_alone_links_to_one_interface_only() -> None:
+    linked = set(re.findall(r"#define (okid_\w+) OKID_LINKED\(", headers_text()))
+    declared = declarations()
+    takes_arrays = {
+        name
+        for name, (_, arguments) in declared.items()
+        if not re.match(r"(const )?okid_\w+_t\* self", arguments[0] if arguments else "")
+        and any(re.match(r"(const )?(double|okid_(model|records|run_sums)_t)\*", argument) for argument in arguments)
+    }
+    makes = {name for name in declared if name.endswith("_create")}
+    assert linked == (makes | takes_arrays) - {"okid_model_workspace"} | {
+        "okid_mechanics_continuous",
+        "okid_mechanics_modes",
+    }
+
+
+@pytest.mark.parametrize(("name", "real"), [("okid_identify_create", "float"), ("okid_modal_analyse", "float")])
+def test_a_library_of_another_number_type_does_not_link(tmp_path: Path, name: str, real: str) -> None:
+    compiler = shutil.which("cc")
+    assert compiler is not None
+    source = tmp_path / "use.c"
+    source.write_text(f"#include <okid/okid.h>\nint main(void) {{ return ((int (*)(void)){name})(); }}\n")
+    command = [
+        compiler,
+        "-std=c99",
+        "-w",
+        "-I",
+        str(INCLUDE),
+        str(source),
+        str(abi.candidates()[-1]),
+        "-o",
+        str(tmp_path / "use"),
+    ]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    other = subprocess.run([*command, f"-DOKID_REAL={real}"], capture_output=True, text=True, timeout=120)
+    assert other.returncode != 0 and f"{name}_{abi.ABI}_{real}" in other.stderr
+
+
 def test_every_function_is_bound() -> None:
     assert set(declarations()) == set(abi.SIGNATURES)
     for name in abi.SIGNATURES:

@@ -58,10 +58,11 @@ def identify(accumulator: Accumulator, p: int, rate_hz: float) -> Modes:
     sizes = [half, half, half, N_Y * half, N_Y * half, half, half, ORDER * half, ORDER * half]
     out = [np.zeros(size) for size in sizes]  # f, zeta, mpc, shape re, im, mu re, im, psi re, im
     work = abi.block(abi.library().okid_modal_memsize(N_Y, ORDER))
-    call("okid_modal_analyse", N_Y, ORDER, 1 / rate_hz, abi.pointer(A), abi.pointer(C), ctypes.byref(count),
-         *map(abi.pointer, out), None, work.ctypes.data, work.size)  # fmt: skip
-    emac, found = np.zeros(half), count.value
-    call("okid_era_emac", era, ORDER, found, *map(abi.pointer, out[5:]), abi.pointer(emac))
+    modes = abi.Modes(0, 0.0, *map(abi.pointer, out))
+    view = abi.ModelView(N_U, N_Y, ORDER, A=abi.pointer(A), C=abi.pointer(C))
+    call("okid_modal_analyse", view, 1 / rate_hz, modes, work.ctypes.data, work.size)
+    emac, found = np.zeros(half), modes.count
+    call("okid_era_emac", era, ORDER, modes, abi.pointer(emac))
     shape = (out[3] + 1j * out[4]).reshape(half, N_Y)
     kept = [a[:found] for a in (out[0], out[1], out[2], emac, shape)]
     return Modes(0, 5, info.radius, info.ridge, values.copy(), *kept)

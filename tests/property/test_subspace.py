@@ -149,8 +149,9 @@ def output_error(A: Array, C: Array, records: list[Array], n_u: int) -> tuple[Ar
     B, D, x0 = np.zeros((n_u, n)), np.zeros((n_u, n_y)), np.zeros((len(records), n))
     given_a, given_c = np.ascontiguousarray(A.T), np.ascontiguousarray(C.T)
     status = lib.okid_subspace_output_error(
-        n_u, n_y, n, abi.pointer(given_a), abi.pointer(given_c), len(records), counts.ctypes.data_as(abi.int32s),
-        abi.pointer(v), abi.pointer(B), abi.pointer(D), abi.pointer(x0), work.ctypes.data, work.size,
+        abi.ModelView(n_u, n_y, n, A=abi.pointer(given_a), C=abi.pointer(given_c)),
+        abi.Records(len(records), counts.ctypes.data_as(abi.int32s), abi.pointer(v)),
+        *map(abi.pointer, (B, D, x0)), work.ctypes.data, work.size,
     )  # fmt: skip
     assert status == 0, abi.status_text(status)
     return B.T, D.T, x0

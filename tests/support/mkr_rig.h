@@ -73,9 +73,10 @@ static inline void residues_of(const structure_t* s, residues_t* r) {
     okid_real_t f[S_MAX], zeta[S_MAX], re[S_MAX * S_MAX], im[S_MAX * S_MAX];
     const size_t bytes = okid_mechanics_memsize(s->n, 1);
     void* work = malloc(bytes);
-    int32_t count = 0;
-    TEST_ASSERT_EQUAL(OKID_OK, okid_mechanics_modes(s->n, s->M, s->R, s->K, &count, f, zeta, re, im, work, bytes));
-    TEST_ASSERT_EQUAL(s->n, count);
+    const okid_mechanics_t self = {.n_x = s->n, .M = s->M, .R = s->R, .K = s->K};
+    okid_modes_t modes = {.frequency_hz = f, .damping_ratio = zeta, .shape_re = re, .shape_im = im};
+    TEST_ASSERT_EQUAL(OKID_OK, okid_mechanics_modes(&self, &modes, work, bytes));
+    TEST_ASSERT_EQUAL(s->n, modes.count);
     free(work);
     r->modes = s->n;
     for (int k = 0; k < s->n; ++k) {

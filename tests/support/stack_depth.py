@@ -16,6 +16,7 @@ from pathlib import Path
 
 NODE = re.compile(r'node: \{ title: "([^"]+)" label: "([^"]*)"')
 EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"(?: label: "([^":]*))?')
+LINKED = re.compile(r"(\bokid_\w+?)_\d+_(?:double|float)\b")  # lib/include/okid/abi.h
 FRAME = re.compile(r"(\d+) bytes \(([^)]+)\)")
 
 
@@ -26,7 +27,7 @@ def read(folders: list[Path]) -> tuple[dict[str, int], dict[str, set[str]], list
     files: dict[str, set[str]] = {}
     wrong = []
     for path in sorted(p for folder in folders for p in folder.rglob("*.su")):
-        text = path.read_text(encoding="utf-8")
+        text = LINKED.sub(r"\1", path.read_text(encoding="utf-8"))
         for title, label in NODE.findall(text):
             found = FRAME.search(label)
             if found is None:

@@ -62,6 +62,12 @@ typedef struct okid_accumulator_config_t {
         buffer; ///< samples that wait for the kernel; 0 = 256, 1 = none: least memory, for processors that have little
 } okid_accumulator_config_t;
 
+/// Doubles of one unbroken run: growing, no window, no edges.
+static inline okid_accumulator_config_t okid_accumulator_defaults(int32_t n_u, int32_t n_y, int32_t lags) {
+    const okid_accumulator_config_t config = {n_u, n_y, lags, OKID_SAMPLE_DOUBLE, 0, 0, 1, 0, 0, 0, 0, 0};
+    return config;
+}
+
 /// Counts since create or reset.
 typedef struct okid_accumulator_stats_t {
     int64_t samples;   ///< samples absorbed, missing ones not counted
@@ -190,17 +196,23 @@ OKID_NODISCARD OKID_API okid_status_t okid_accumulator_gram(okid_accumulator_t* 
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_energy(okid_accumulator_t* self, okid_detrend_t detrend,
                                                               double* energy);
 
-/// The sums of one unbroken run in engineering units: all that okid_structured_solve() needs, O(m q) numbers.
+/// The sums of one unbroken run: all that okid_structured_solve() needs, O(m q) numbers. The arrays are the caller's.
+typedef struct okid_run_sums_t {
+    double* S;    ///< m x m(p+1) column-major: S_0 .. S_p side by side, S_b(r, c) = sum of v_n[r] v_(n-b)[c]
+    double* head; ///< m x p: column a is v_(f-1-a), f the first regression row
+    double* tail; ///< m x p: column a is v_(l-a), l the last regression row
+    double* sum;  ///< m: sum of v_n over the rows
+    double* mean; ///< m means of the lag-0 rows, or NULL
+    int64_t rows; ///< regression rows behind the sums
+} okid_run_sums_t;
+
+/// The sums of the one run there is, in engineering units.
 /// With OKID_DETREND_MEAN the samples are taken less a constant near their mean (codes: the nearest whole code), which `sum`
 /// accounts for: removing the means with it is then harmless to the digits.
-/// @param S     out, m x m(p+1) column-major: S_0 .. S_p side by side, S_b(r, c) = sum of v_n[r] v_(n-b)[c]
-/// @param head  out, m x p: column a is v_(f-1-a), f the first regression row
-/// @param tail  out, m x p: column a is v_(l-a), l the last regression row
-/// @param sum   out, m: sum of v_n over the rows
-/// @param mean  out, m means of the lag-0 rows in engineering units, may be NULL
+/// @param sums  in: the arrays; out: what they hold, and rows
 /// Cost O(m^2 p slots). @return OKID_OK, OKID_ERR_NULL, OKID_ERR_TOO_SHORT (no rows), OKID_ERR_MISMATCH (more than one run)
-OKID_NODISCARD OKID_API okid_status_t okid_accumulator_run(okid_accumulator_t* self, okid_detrend_t detrend, double* S,
-                                                           double* head, double* tail, double* sum, double* mean);
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_run(okid_accumulator_t* self, okid_detrend_t detrend,
+                                                           okid_run_sums_t* sums);
 
 /// The whole state as bytes for a file, another machine or a later version; the same on every processor and in every build.
 /// Little endian: 8 bytes "OKIDACC\n"; int32 format (1), n_u, n_y, lags, sample, block, slots, edges, spare_slots,

@@ -66,6 +66,13 @@ typedef struct okid_identify_config_t {
     okid_hankel_t hankel;   ///< n4sid, and okid without inputs: system
 } okid_identify_config_t;
 
+/// okid-era with p = 40, automatic order, means removed.
+static inline okid_identify_config_t okid_identify_defaults(int32_t n_u, int32_t n_y, double fs_hz) {
+    const okid_identify_config_t config = {
+        n_u, n_y, 40, 0, 0, 0, fs_hz, OKID_METHOD_OKID_ERA, OKID_DETREND_MEAN, OKID_SOLVER_DENSE, OKID_HANKEL_SYSTEM};
+    return config;
+}
+
 /// What the least squares of an observer found, beside the parameters.
 typedef struct okid_observer_info_t {
     double ridge;  ///< ridge used, relative to the unit-diagonal Gram

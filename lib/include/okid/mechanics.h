@@ -7,8 +7,8 @@
 #ifndef OKID_MECHANICS_H
 #define OKID_MECHANICS_H
 
+#include <okid/modal.h>
 #include <okid/model.h>
-#include <okid/types.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -71,16 +71,12 @@ OKID_NODISCARD OKID_API okid_status_t okid_mechanics_continuous(const okid_mecha
 
 /// Underdamped modes of M, R, K, ascending in frequency: (lambda^2 M + lambda R + K) w = 0, f = |lambda|/(2 pi),
 /// zeta = -Re lambda/|lambda|. Rigid-body and overdamped motions are no modes and are left out. 25 (2 n_x)^3 flop.
-/// @param R      in, or NULL (no damping: f are the undamped natural frequencies)
-/// @param count  out, modes found, <= n_x
-/// @param frequency_hz, damping_ratio  out, room for n_x each
-/// @param shape_re, shape_im           out, n_x x n_x or both NULL; a column is the displacements, largest entry 1
+/// @param self   in, n_x, M, K, and R or NULL (no damping: f are the undamped natural frequencies); the rest is not read
+/// @param modes  in: arrays with room for n_x modes: frequency_hz, damping_ratio, and shape_re and shape_im (n_x x n_x, a
+///               column is the displacements, largest entry 1) or NULL; the others are not written. out: count <= n_x
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY, OKID_ERR_NUMERIC (M is not positive definite)
-OKID_NODISCARD OKID_API okid_status_t okid_mechanics_modes(int32_t n_x, const okid_real_t* M, const okid_real_t* R,
-                                                           const okid_real_t* K, int32_t* count,
-                                                           okid_real_t* frequency_hz, okid_real_t* damping_ratio,
-                                                           okid_real_t* shape_re, okid_real_t* shape_im, void* work,
-                                                           size_t bytes);
+OKID_NODISCARD OKID_API okid_status_t okid_mechanics_modes(const okid_mechanics_t* self, okid_modes_t* modes,
+                                                           void* work, size_t bytes);
 
 /// Bytes of work for okid_mechanics_c2d() and okid_mechanics_d2c(). 0 if a size is < 1.
 OKID_API size_t okid_mechanics_hold_memsize(int32_t n_u, int32_t n_y, int32_t n_z);

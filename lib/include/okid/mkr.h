@@ -26,13 +26,19 @@ typedef struct okid_mkr_config_t {
     const int32_t* output_sensing;  ///< n_y: okid_sensing_t of each sensor, mixed as they come
 } okid_mkr_config_t;
 
+/// Forces held between samples, all gains 1. input_dof, output_dof and output_sensing are still to be given.
+static inline okid_mkr_config_t okid_mkr_defaults(int32_t n_x, double dt) {
+    const okid_mkr_config_t config = {n_x, OKID_HOLD_ZERO, dt, NULL, NULL, NULL, NULL, NULL};
+    return config;
+}
+
 /// Remarks on a result; okid_mkr_note() gives their names.
 enum {
-    OKID_MKR_POLARITY = 1 << 0,    ///< -M is positive definite: a swapped polarity, or sensing kinds off by two
-    OKID_MKR_MASS = 1 << 1,        ///< neither M nor -M is positive definite
-    OKID_MKR_STIFFNESS = 1 << 2,   ///< K is not positive definite
-    OKID_MKR_DAMPING = 1 << 3,     ///< R is not positive definite (the hardest of the three: see R_normal, okid_pdc_fit())
-    OKID_MKR_RESIDUAL = 1 << 4,    ///< residual > 0.03: residues out of phase (kinds off by one, channels late, noise)
+    OKID_MKR_POLARITY = 1 << 0,  ///< -M is positive definite: a swapped polarity, or sensing kinds off by two
+    OKID_MKR_MASS = 1 << 1,      ///< neither M nor -M is positive definite
+    OKID_MKR_STIFFNESS = 1 << 2, ///< K is not positive definite
+    OKID_MKR_DAMPING = 1 << 3,  ///< R is not positive definite (the hardest of the three: see R_normal, okid_pdc_fit())
+    OKID_MKR_RESIDUAL = 1 << 4, ///< residual > 0.03: residues out of phase (kinds off by one, channels late, noise)
     OKID_MKR_FEEDTHROUGH = 1 << 5, ///< feedthrough > 0.1: D does not fit M (delay, missing modes, wrong kind of sensor)
     OKID_MKR_COMPLEX = 1 << 6,     ///< a mode with mpc < 0.9: its points do not move in phase
     OKID_MKR_SPREAD = 1 << 7,      ///< a mode with pair_spread > 0.1: the co-located pairs contradict each other

@@ -22,6 +22,13 @@ typedef struct okid_model_t {
     const okid_real_t* K; ///< n_z x n_y, Kalman gain: x+ = A x + B u + K (y - C x - D u)
 } okid_model_t;
 
+/// Views of measured records, one after the other.
+typedef struct okid_records_t {
+    int32_t count;         ///< records, >= 1
+    const int32_t* counts; ///< count: samples of each
+    const double* samples; ///< column-major m x (sum of counts), inputs, then outputs
+} okid_records_t;
+
 /// Numbers (okid_real_t) of scratch the three functions below need.
 OKID_API size_t okid_model_workspace(const okid_model_t* model);
 

@@ -27,6 +27,12 @@ typedef struct okid_refine_config_t {
     int32_t offset;     ///< 1: every run has an unknown constant in every output (records less their mean); 0: none
 } okid_refine_config_t;
 
+/// One run, no replicates, no offsets.
+static inline okid_refine_config_t okid_refine_defaults(int32_t n_u, int32_t n_y, int32_t n_z) {
+    const okid_refine_config_t config = {n_u, n_y, n_z, 1, 0, 0, 0};
+    return config;
+}
+
 /// The result; the arrays live in the block until the next run.
 typedef struct okid_refined_t {
     int32_t iterations;    ///< steps taken

@@ -23,6 +23,13 @@ typedef struct okid_stabilization_config_t {
     double share;       ///< of the models a mode of the structure is found in, at least; 0 = 0.5
 } okid_stabilization_config_t;
 
+/// Every criterion at its default.
+static inline okid_stabilization_config_t okid_stabilization_defaults(int32_t n_y, int32_t max_models,
+                                                                      int32_t max_poles) {
+    const okid_stabilization_config_t config = {n_y, max_models, max_poles, 0, 0, 0, 0};
+    return config;
+}
+
 /// What of a pole agrees with the order before, at the same horizon.
 enum {
     OKID_HOLDS_FREQUENCY = 1 << 0, ///< its frequency

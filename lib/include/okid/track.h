@@ -24,6 +24,12 @@ typedef struct okid_track_config_t {
     double mac;         ///< MAC of the shapes, at least; 0 = 0.5. Midway to 1 for a jump
 } okid_track_config_t;
 
+/// As many tracks as modes, every criterion at its default.
+static inline okid_track_config_t okid_track_defaults(int32_t n_y, int32_t max_modes) {
+    const okid_track_config_t config = {n_y, max_modes, max_modes, 0, 0, 0, 0, 0};
+    return config;
+}
+
 /// What is known of a track.
 typedef struct okid_track_t {
     int32_t number;       ///< from 1 in the order of birth; 0 = a candidate

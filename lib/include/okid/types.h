@@ -12,6 +12,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/// Version of these headers; okid_version() is that of the library.
+#define OKID_VERSION_MAJOR 0
+#define OKID_VERSION_MINOR 2
+#define OKID_VERSION_PATCH 0
+#define OKID_VERSION "0.2.0"
+
 /// What a program that links with the library may call.
 #if defined(_WIN32)
 #define OKID_API
@@ -35,6 +41,7 @@ extern "C" {
 #ifndef OKID_REAL
 #define OKID_REAL double
 #endif
+#include <okid/abi.h>
 /// The number type of results: OKID_REAL.
 typedef OKID_REAL okid_real_t;
 

@@ -30,6 +30,12 @@ typedef struct okid_replicates_config_t {
     const okid_mkr_config_t* mkr; ///< for M, K, R, alpha, beta; NULL: modes only. Used until finish(), not copied
 } okid_replicates_config_t;
 
+/// Modes only.
+static inline okid_replicates_config_t okid_replicates_defaults(int32_t n_u, int32_t n_y, int32_t n_z) {
+    const okid_replicates_config_t config = {n_u, n_y, n_z, NULL};
+    return config;
+}
+
 /// What finish() found; the arrays live in the object until the next begin(). NaN where nothing can be said: the mode was
 /// missing in replicates that hold more than a quarter of the information, or fewer than three replicates came.
 typedef struct okid_uncertainty_t {
@@ -90,6 +96,13 @@ typedef struct okid_jackknife_config_t {
     okid_identify_config_t identify; ///< of the full model; its `order` is not read
     okid_accumulator_config_t sums;  ///< of the whole: okid_accumulator_config(). edges = 1, slots = 0
 } okid_jackknife_config_t;
+
+/// Of an identifier and of the sums it is given.
+static inline okid_jackknife_config_t okid_jackknife_defaults(const okid_identify_config_t* identify,
+                                                              const okid_accumulator_config_t* sums) {
+    const okid_jackknife_config_t config = {*identify, *sums};
+    return config;
+}
 
 /// Bytes okid_jackknife_create() needs, those of an identifier and of an accumulator; 0 when the configuration is invalid.
 OKID_API size_t okid_jackknife_memsize(const okid_jackknife_config_t* config);

@@ -24,6 +24,12 @@ typedef struct okid_watch_config_t {
     double ratio;      ///< high is this many times the usual; 0 = 3
 } okid_watch_config_t;
 
+/// Every criterion at its default.
+static inline okid_watch_config_t okid_watch_defaults(int32_t n_u, int32_t n_y, int32_t max_order, int32_t lead) {
+    const okid_watch_config_t config = {n_u, n_y, max_order, lead, 0, 0, 0, 0};
+    return config;
+}
+
 /// What it is doing.
 typedef struct okid_watch_state_t {
     int32_t watching; ///< 1: a model is at work whose usual errors are known

@@ -161,9 +161,8 @@ static void run_sums(const run_t* f, size_t i, size_t j, double* out) {
     }
 }
 
-okid_status_t okid_accumulator_run(okid_accumulator_t* self, okid_detrend_t detrend, double* S, double* head,
-                                   double* tail, double* sum, double* mean) {
-    if (!self || !S || !head || !tail || !sum) return OKID_ERR_NULL;
+okid_status_t okid_accumulator_run(okid_accumulator_t* self, okid_detrend_t detrend, okid_run_sums_t* sums) {
+    if (!self || !sums || !sums->S || !sums->head || !sums->tail || !sums->sum) return OKID_ERR_NULL;
     okid_accumulator_settle(self);
     if (self->stats.rows == 0) return OKID_ERR_TOO_SHORT;
     if (!only_run(self)) return OKID_ERR_MISMATCH;
@@ -177,21 +176,22 @@ okid_status_t okid_accumulator_run(okid_accumulator_t* self, okid_detrend_t detr
                      acc_has_codes(a),
                      detrend == OKID_DETREND_MEAN};
     const double rows = (double)f.rows;
+    sums->rows = f.rows;
     for (size_t j = 0; j < m; ++j) {
-        for (size_t i = 0; i < m; ++i) run_sums(&f, i, j, S + j * m + i);
+        for (size_t i = 0; i < m; ++i) run_sums(&f, i, j, sums->S + j * m + i);
         const double total =
             f.codes ? (double)okid_accumulator_lag_sum_exact(a, j, 0) : okid_accumulator_lag_sum(a, j, 0);
         const double centre = f.codes ? (double)okid_accumulator_whole_mean((int64_t)total, f.rows) : total / rows;
         for (size_t l = 0; l < p; ++l) {
-            head[l * m + j] = engineering(&f, j, acc_number(a, f.first + acc_end(a, l, j)), centre);
-            tail[l * m + j] = engineering(&f, j, acc_number(a, f.last + acc_end(a, l, j)), centre);
+            sums->head[l * m + j] = engineering(&f, j, acc_number(a, f.first + acc_end(a, l, j)), centre);
+            sums->tail[l * m + j] = engineering(&f, j, acc_number(a, f.last + acc_end(a, l, j)), centre);
         }
         const double *scale = acc_scale(a), *offset = scale + m;
         if (!f.centred)
-            sum[j] = scale[j] * total + rows * offset[j];
+            sums->sum[j] = scale[j] * total + rows * offset[j];
         else
-            sum[j] = f.codes ? scale[j] * (total - rows * centre) : 0;
-        if (mean) mean[j] = scale[j] * total / rows + offset[j];
+            sums->sum[j] = f.codes ? scale[j] * (total - rows * centre) : 0;
+        if (sums->mean) sums->mean[j] = scale[j] * total / rows + offset[j];
     }
     return OKID_OK;
 }

@@ -169,21 +169,21 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, 
     return OKID_OK;
 }
 
-okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count, const okid_real_t* lambda_re,
-                            const okid_real_t* lambda_im, const okid_real_t* psi_re, const okid_real_t* psi_im,
-                            okid_real_t* emac) {
-    if (self == nullptr || emac == nullptr) return OKID_ERR_NULL;
+okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_modes_t* modes, okid_real_t* emac) {
+    if (self == nullptr || modes == nullptr || modes->mu_re == nullptr || modes->mu_im == nullptr ||
+        modes->psi_re == nullptr || modes->psi_im == nullptr || emac == nullptr)
+        return OKID_ERR_NULL;
     const okid_era& e = *self;
     if (order < 1 || order > e.rank) return OKID_ERR_DIM;
     const int ny = e.config.n_y, last = e.height - ny;
     constexpr okid_real_t quarter_pi = static_cast<okid_real_t>(0.78539816339744831);
-    for (int k = 0; k < count; ++k) {
-        const okid_real_t* re = psi_re + static_cast<size_t>(k) * static_cast<size_t>(order);
-        const okid_real_t* im = psi_im + static_cast<size_t>(k) * static_cast<size_t>(order);
+    for (int k = 0; k < modes->count; ++k) {
+        const okid_real_t* re = modes->psi_re + static_cast<size_t>(k) * static_cast<size_t>(order);
+        const okid_real_t* im = modes->psi_im + static_cast<size_t>(k) * static_cast<size_t>(order);
         const int block_rows = e.height / ny;
         const auto steps = static_cast<okid_real_t>(block_rows - 1);
-        const okid_real_t radius = std::pow(std::hypot(lambda_re[k], lambda_im[k]), steps);
-        const okid_real_t angle = steps * std::atan2(lambda_im[k], lambda_re[k]);
+        const okid_real_t radius = std::pow(std::hypot(modes->mu_re[k], modes->mu_im[k]), steps);
+        const okid_real_t angle = steps * std::atan2(modes->mu_im[k], modes->mu_re[k]);
         okid_real_t weighted = 0, total = 0;
         for (int o = 0; o < ny; ++o) {
             okid_real_t first_re = 0, first_im = 0, end_re = 0, end_im = 0;

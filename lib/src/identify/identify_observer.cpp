@@ -6,8 +6,8 @@
 // WORKSPACE  the modules' own
 #include "identify/identify.hpp"
 
-#include <okid/steps/observer.h>
 #include <okid/steps/era.h>
+#include <okid/steps/observer.h>
 #include <okid/steps/square_root.h>
 
 #include <algorithm>
@@ -47,13 +47,13 @@ okid_status_t observe_dense(okid_identify& s, okid_accumulator_t* accumulator, o
 
 /// theta from the sums of one run.
 okid_status_t observe_structured(okid_identify& s, okid_accumulator_t* accumulator, okid_identified_t* out) {
-    okid_status_t status = okid_accumulator_run(accumulator, s.config.detrend, s.gram, s.head, s.tail, s.sum, s.mean);
+    okid_run_sums_t sums{s.gram, s.head, s.tail, s.sum, s.mean, 0};
+    okid_status_t status = okid_accumulator_run(accumulator, s.config.detrend, &sums);
     if (status != OKID_OK) return status;
-    const int64_t rows = out->regression_rows;
     status = check_constant_gram(s, s.m, out);
     if (status != OKID_OK) return status;
-    return okid_structured_solve(&s.observer_config, s.config.detrend, s.gram, s.head, s.tail, s.sum, rows, s.theta,
-                                 s.innovation, &out->observer_info, s.observer_work, s.observer_bytes);
+    return okid_structured_solve(&s.observer_config, s.config.detrend, &sums, s.theta, s.innovation,
+                                 &out->observer_info, s.observer_work, s.observer_bytes);
 }
 
 /// theta from the triangular factor, columns [u_n, v_(n-1), .., y_n].

@@ -67,13 +67,15 @@ okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t
     if (status != OKID_OK) return status;
     out->n_z = order;
     out->warnings &= ~static_cast<uint32_t>(OKID_NOTE_MODEL_UNSTABLE | OKID_NOTE_PREDICTOR_UNSTABLE);
-    status = okid_modal_analyse(s.n_y, order, out->dt, s.A, s.C, &out->mode_count, s.frequency, s.damping, s.mpc,
-                                s.shape_re, s.shape_im, s.mu_re, s.mu_im, s.psi_re, s.psi_im, &out->model_radius,
-                                s.modal_work, s.modal_bytes);
+    const okid_model_t model{s.n_u, s.n_y, order, s.A, s.B, s.C, s.D, s.K};
+    okid_modes_t modes{0,          0,       s.frequency, s.damping, s.mpc,   s.shape_re,
+                       s.shape_im, s.mu_re, s.mu_im,     s.psi_re,  s.psi_im};
+    status = okid_modal_analyse(&model, out->dt, &modes, s.modal_work, s.modal_bytes);
     if (status != OKID_OK) return status;
-    status = s.by_subspace ? okid_subspace_emac(s.subspace, order, out->mode_count, s.C, s.mu_re, s.mu_im, s.psi_re,
-                                                s.psi_im, s.emac)
-                           : okid_era_emac(s.era, order, out->mode_count, s.mu_re, s.mu_im, s.psi_re, s.psi_im, s.emac);
+    out->mode_count = modes.count;
+    out->model_radius = modes.radius;
+    status = s.by_subspace ? okid_subspace_emac(s.subspace, order, s.C, &modes, s.emac)
+                           : okid_era_emac(s.era, order, &modes, s.emac);
     if (status != OKID_OK) return status;
     for (int k = 0; k < out->mode_count; ++k) s.cmi[k] = s.emac[k] * s.mpc[k];
     if (!(out->model_radius < 1)) out->warnings |= OKID_NOTE_MODEL_UNSTABLE;

@@ -167,29 +167,31 @@ size_t okid_subspace_output_error_memsize(int32_t n_u, int32_t n_y, int32_t n_z,
     return memory.bytes();
 }
 
-okid_status_t okid_subspace_output_error(int32_t n_u, int32_t n_y, int32_t n_z, const okid_real_t* A,
-                                         const okid_real_t* C, int32_t records, const int32_t* counts,
-                                         const double* samples, okid_real_t* B, okid_real_t* D, okid_real_t* x0,
-                                         void* work, size_t bytes) {
-    if (A == nullptr || C == nullptr || counts == nullptr || samples == nullptr || work == nullptr ||
-        (n_u > 0 && (B == nullptr || D == nullptr)))
+okid_status_t okid_subspace_output_error(const okid_model_t* model, const okid_records_t* records, okid_real_t* B,
+                                         okid_real_t* D, okid_real_t* x0, void* work, size_t bytes) {
+    if (model == nullptr || model->A == nullptr || model->C == nullptr || records == nullptr ||
+        records->counts == nullptr || records->samples == nullptr || work == nullptr ||
+        (model->n_u > 0 && (B == nullptr || D == nullptr)))
         return OKID_ERR_NULL;
-    const size_t needed = okid_subspace_output_error_memsize(n_u, n_y, n_z, records);
-    if (needed == 0 || std::any_of(counts, counts + records, [](int32_t n) { return n < 0; })) return OKID_ERR_DIM;
+    const int n_u = model->n_u, n_y = model->n_y, n_z = model->n_z, count = records->count;
+    const int32_t* counts = records->counts;
+    const double* samples = records->samples;
+    const size_t needed = okid_subspace_output_error_memsize(n_u, n_y, n_z, count);
+    if (needed == 0 || std::any_of(counts, counts + count, [](int32_t n) { return n < 0; })) return OKID_ERR_DIM;
     if (bytes < needed) return OKID_ERR_MEMORY;
     okid::linalg::warm_up();
     okid::arena memory(work);
-    okid::output_error e(n_u, n_y, n_z, records, memory);
-    if (!e.filters.decompose(A, C)) return OKID_ERR_NUMERIC;
+    okid::output_error e(n_u, n_y, n_z, count, memory);
+    if (!e.filters.decompose(model->A, model->C)) return OKID_ERR_NUMERIC;
     std::fill(e.equations, e.equations + okid::at(0, e.unknowns, e.unknowns), 0.0);
     std::fill(e.right, e.right + e.unknowns, 0.0);
-    for (int r = 0; r < records; ++r) {
+    for (int r = 0; r < count; ++r) {
         if (!e.record(samples, counts[r], e.of_record(r))) return OKID_ERR_NUMERIC;
         samples += static_cast<size_t>(counts[r]) * static_cast<size_t>(n_u + n_y);
     }
     if (e.used * n_y < e.unknowns + n_z) return OKID_ERR_TOO_SHORT;
     if (!e.solve()) return OKID_ERR_NUMERIC;
-    for (int r = 0; x0 != nullptr && r < records; ++r) {
+    for (int r = 0; x0 != nullptr && r < count; ++r) {
         double *Hxt = e.of_record(r), *state = Hxt + okid::at(0, e.unknowns, n_z); // Hxx^-1 (gx - Hxt theta)
         if (e.unknowns > 0)
             okid::linalg::multiply(false, false, n_z, 1, e.unknowns, -1, Hxt, n_z, e.right, e.unknowns, 1, state, n_z);

@@ -416,24 +416,24 @@ size_t okid_structured_memsize(const okid_observer_config_t* config) {
     return okid::lay_out(*config, nullptr, nullptr);
 }
 
-okid_status_t okid_structured_solve(const okid_observer_config_t* config, okid_detrend_t detrend, const double* S,
-                                    const double* head, const double* tail, const double* sum, int64_t rows,
-                                    okid_real_t* theta, okid_real_t* innovation, okid_observer_info_t* info, void* work,
-                                    size_t bytes) {
+okid_status_t okid_structured_solve(const okid_observer_config_t* config, okid_detrend_t detrend,
+                                    const okid_run_sums_t* sums, okid_real_t* theta, okid_real_t* innovation,
+                                    okid_observer_info_t* info, void* work, size_t bytes) {
     const bool mean = detrend == OKID_DETREND_MEAN;
-    if (config == nullptr || S == nullptr || head == nullptr || tail == nullptr || (mean && sum == nullptr) ||
-        theta == nullptr || info == nullptr || work == nullptr)
+    if (config == nullptr || sums == nullptr || sums->S == nullptr || sums->head == nullptr || sums->tail == nullptr ||
+        (mean && sums->sum == nullptr) || theta == nullptr || info == nullptr || work == nullptr)
         return OKID_ERR_NULL;
     const size_t needed = okid_structured_memsize(config);
     if (needed == 0) return OKID_ERR_DIM;
     if (bytes < needed) return OKID_ERR_MEMORY;
     *info = okid_observer_info_t{0, 0, 0, 0, 0, -1};
     const int m = config->n_u + config->n_y, n = m * (config->p + 1);
-    okid::solver s{config->n_u, config->n_y, config->p, m, n, n - config->n_y, S, head, tail, mean, rows, {}, info};
+    okid::solver s{config->n_u, config->n_y, config->p,  m,  n,   n - config->n_y, sums->S, sums->head,
+                   sums->tail,  mean,        sums->rows, {}, info};
     okid::lay_out(*config, work, &s.w);
     okid::linalg::warm_up();
-    if (rows < s.q) return OKID_ERR_TOO_SHORT;
-    info->channel = s.prepare(sum);
+    if (sums->rows < s.q) return OKID_ERR_TOO_SHORT;
+    info->channel = s.prepare(sums->sum);
     if (info->channel >= 0) return info->channel < s.n_u ? OKID_ERR_INPUT : OKID_ERR_OUTPUT;
     if (s.poor_input()) return OKID_ERR_EXCITATION;
     const double ridge_min = config->ridge_min > 0 ? config->ridge_min : 1e-12;

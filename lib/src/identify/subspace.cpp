@@ -194,23 +194,22 @@ okid_status_t okid_subspace_realize(okid_subspace_t* self, int32_t order, okid_r
     return OKID_OK;
 }
 
-okid_status_t okid_subspace_emac(const okid_subspace_t* self, int32_t order, int32_t count, const okid_real_t* C,
-                                 const okid_real_t* lambda_re, const okid_real_t* lambda_im, const okid_real_t* psi_re,
-                                 const okid_real_t* psi_im, okid_real_t* emac) {
-    if (self == nullptr || C == nullptr || lambda_re == nullptr || lambda_im == nullptr || psi_re == nullptr ||
-        psi_im == nullptr || emac == nullptr)
+okid_status_t okid_subspace_emac(const okid_subspace_t* self, int32_t order, const okid_real_t* C,
+                                 const okid_modes_t* modes, okid_real_t* emac) {
+    if (self == nullptr || C == nullptr || modes == nullptr || modes->mu_re == nullptr || modes->mu_im == nullptr ||
+        modes->psi_re == nullptr || modes->psi_im == nullptr || emac == nullptr)
         return OKID_ERR_NULL;
     const okid_subspace& s = *self;
     const okid::subspace_sizes& z = s.sizes;
-    if (order < 1 || order > std::min(z.top, s.cut.carried) || count < 0) return OKID_ERR_DIM;
+    if (order < 1 || order > std::min(z.top, s.cut.carried) || modes->count < 0) return OKID_ERR_DIM;
     const bool by_states = s.config.method == OKID_SUBSPACE_SSARX;
     const double* end = by_states ? s.ssarx.end : s.projection.end(z);
     const int ld = by_states ? z.n_y : z.h;
     constexpr double quarter_pi = 0.78539816339744831;
-    for (int k = 0; k < count; ++k) {
-        const okid_real_t *re = psi_re + okid::at(0, k, order), *im = psi_im + okid::at(0, k, order);
-        const double steps = z.i - 1, radius = std::pow(std::hypot(lambda_re[k], lambda_im[k]), steps);
-        const double angle = steps * std::atan2(lambda_im[k], lambda_re[k]);
+    for (int k = 0; k < modes->count; ++k) {
+        const okid_real_t *re = modes->psi_re + okid::at(0, k, order), *im = modes->psi_im + okid::at(0, k, order);
+        const double steps = z.i - 1, radius = std::pow(std::hypot(modes->mu_re[k], modes->mu_im[k]), steps);
+        const double angle = steps * std::atan2(modes->mu_im[k], modes->mu_re[k]);
         double weighted = 0, total = 0;
         for (int o = 0; o < z.n_y; ++o) {
             double first_re = 0, first_im = 0, end_re = 0, end_im = 0;

@@ -7,8 +7,8 @@
 //            denominator runs over the replicates that had the quantity. The centre sum (1-W_j) theta_j / sum (1-W_j)
 //            equals theta but for curvature and rounding: a full model found another way (QR) does no harm. Sums in double
 // WORKSPACE  n_z/2 (n_z/2 + 12 n_y) + 20 n_x^2 numbers, the modal analysis' and okid_mkr_identify()'s; no heap
-#include <okid/modal.h>
 #include <okid/mkr.h>
+#include <okid/modal.h>
 #include <okid/uncertainty.h>
 
 #include "linalg/arena.hpp"
@@ -132,9 +132,10 @@ bool fits(const okid_replicates& s, const okid_model_t& m) {
 }
 
 okid_status_t find_modes(okid_replicates& s, const okid_model_t& m, mode_list& out) {
-    out.count = 0;
-    return okid_modal_analyse(m.n_y, m.n_z, s.dt, m.A, m.C, &out.count, out.frequency, out.damping, out.mpc, out.re,
-                              out.im, nullptr, nullptr, nullptr, nullptr, nullptr, s.modal_work, s.modal_bytes);
+    okid_modes_t modes{0, 0, out.frequency, out.damping, out.mpc, out.re, out.im, nullptr, nullptr, nullptr, nullptr};
+    const okid_status_t status = okid_modal_analyse(&m, s.dt, &modes, s.modal_work, s.modal_bytes);
+    out.count = modes.count;
+    return status;
 }
 
 /// Does the model give M, K, R, alpha and beta?

@@ -173,35 +173,36 @@ okid_status_t okid_mechanics_continuous(const okid_mechanics_t* self, okid_real_
     return OKID_OK;
 }
 
-okid_status_t okid_mechanics_modes(int32_t n_x, const okid_real_t* M, const okid_real_t* R, const okid_real_t* K,
-                                   int32_t* count, okid_real_t* frequency_hz, okid_real_t* damping_ratio,
-                                   okid_real_t* shape_re, okid_real_t* shape_im, void* work, size_t bytes) {
-    if (M == nullptr || K == nullptr || count == nullptr || frequency_hz == nullptr || damping_ratio == nullptr ||
-        (shape_re == nullptr) != (shape_im == nullptr) || work == nullptr)
+okid_status_t okid_mechanics_modes(const okid_mechanics_t* self, okid_modes_t* modes, void* work, size_t bytes) {
+    if (self == nullptr || self->M == nullptr || self->K == nullptr || modes == nullptr ||
+        modes->frequency_hz == nullptr || modes->damping_ratio == nullptr ||
+        (modes->shape_re == nullptr) != (modes->shape_im == nullptr) || work == nullptr)
         return OKID_ERR_NULL;
+    const int n_x = self->n_x;
     if (n_x < 1) return OKID_ERR_DIM;
     if (bytes < okid_mechanics_memsize(n_x, 1)) return OKID_ERR_MEMORY;
     okid::linalg::warm_up();
     okid::arena memory(work);
     mechanics_work w{};
     lay_out(n_x, 1, memory, w);
-    if (!solve_mass(n_x, M, K, R, nullptr, 0, w)) return OKID_ERR_NUMERIC;
+    if (!solve_mass(n_x, self->M, self->K, self->R, nullptr, 0, w)) return OKID_ERR_NUMERIC;
     const auto x = static_cast<size_t>(n_x), z = 2 * x;
     state_matrix(x, w.solved, w.a);
     okid::balance(2 * n_x, w.a, w.scale);
     if (okid::linalg::eigen(2 * n_x, w.a, w.re, w.im, w.vectors, w.eigen) != 0) return OKID_ERR_NUMERIC;
-    *count = list_modes(2 * n_x, w);
-    for (size_t m = 0; m < static_cast<size_t>(*count); ++m) {
+    modes->count = list_modes(2 * n_x, w);
+    for (size_t m = 0; m < static_cast<size_t>(modes->count); ++m) {
         const auto k = static_cast<size_t>(w.order[m]);
         const real size = std::hypot(w.re[k], w.im[k]);
-        frequency_hz[m] = size / static_cast<real>(2 * pi);
-        damping_ratio[m] = -w.re[k] / size;
-        if (shape_re == nullptr) continue;
+        modes->frequency_hz[m] = size / static_cast<real>(2 * pi);
+        modes->damping_ratio[m] = -w.re[k] / size;
+        if (modes->shape_re == nullptr) continue;
+        real *re = modes->shape_re + m * x, *im = modes->shape_im + m * x;
         for (size_t i = 0; i < x; ++i) {
-            shape_re[m * x + i] = w.scale[i] * w.vectors[k * z + i];
-            shape_im[m * x + i] = w.scale[i] * w.vectors[(k + 1) * z + i];
+            re[i] = w.scale[i] * w.vectors[k * z + i];
+            im[i] = w.scale[i] * w.vectors[(k + 1) * z + i];
         }
-        normalise(x, shape_re + m * x, shape_im + m * x);
+        normalise(x, re, im);
     }
     return OKID_OK;
 }

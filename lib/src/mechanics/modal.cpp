@@ -67,6 +67,10 @@ okid_real_t collinearity(int n, const okid_real_t* re, const okid_real_t* im) {
     return sum > 0 ? ((xx - yy) * (xx - yy) + 4 * xy * xy) / (sum * sum) : 0;
 }
 
+void put(okid_real_t* array, int i, double value) {
+    if (array != nullptr) array[i] = static_cast<okid_real_t>(value);
+}
+
 } // namespace
 
 size_t okid_modal_memsize(int32_t n_y, int32_t n_z) {
@@ -75,14 +79,14 @@ size_t okid_modal_memsize(int32_t n_y, int32_t n_z) {
     return lay_out(n_z, memory, nullptr);
 }
 
-okid_status_t okid_modal_analyse(int32_t n_y, int32_t n_z, double dt, const okid_real_t* A, const okid_real_t* C,
-                                 int32_t* count, okid_real_t* frequency_hz, okid_real_t* damping_ratio,
-                                 okid_real_t* mpc, okid_real_t* shape_re, okid_real_t* shape_im, okid_real_t* mu_re,
-                                 okid_real_t* mu_im, okid_real_t* psi_re, okid_real_t* psi_im, double* radius,
-                                 void* work, size_t bytes) {
-    if (A == nullptr || C == nullptr || count == nullptr || frequency_hz == nullptr || damping_ratio == nullptr ||
-        mpc == nullptr || shape_re == nullptr || shape_im == nullptr || work == nullptr)
+okid_status_t okid_modal_analyse(const okid_model_t* model, double dt, okid_modes_t* modes, void* work, size_t bytes) {
+    if (model == nullptr || model->A == nullptr || model->C == nullptr || modes == nullptr || work == nullptr ||
+        (modes->shape_re == nullptr) != (modes->shape_im == nullptr) ||
+        (modes->mpc != nullptr && modes->shape_re == nullptr))
         return OKID_ERR_NULL;
+    const int n_y = model->n_y, n_z = model->n_z;
+    const okid_real_t *A = model->A, *C = model->C;
+    okid_modes_t& to = *modes;
     if (n_y < 1 || n_z < 1 || !(dt > 0)) return OKID_ERR_DIM;
     if (bytes < okid_modal_memsize(n_y, n_z)) return OKID_ERR_MEMORY;
     okid::linalg::warm_up();
@@ -107,24 +111,25 @@ okid_status_t okid_modal_analyse(int32_t n_y, int32_t n_z, double dt, const okid
     for (int i = 1; i < found; ++i) // insertion: std::sort calls itself, and a stack has a bound here
         for (int j = i; j > 0 && w.sorted[w.order[j]] < w.sorted[w.order[j - 1]]; --j)
             std::swap(w.order[j], w.order[j - 1]);
-    *count = found;
-    if (radius != nullptr) *radius = largest;
+    to.count = found;
+    to.radius = largest;
     for (int i = 0; i < found; ++i) {
         const int k = w.order[i];
-        const okid_real_t* re = w.vectors + static_cast<size_t>(k) * n;
-        const okid_real_t* im = re + n;
-        okid_real_t *to_re = shape_re + static_cast<size_t>(i) * ny, *to_im = shape_im + static_cast<size_t>(i) * ny;
+        const okid_real_t *re = w.vectors + static_cast<size_t>(k) * n, *im = re + n;
+        const double size = std::hypot(static_cast<double>(w.re[k]), static_cast<double>(w.im[k]));
+        put(to.frequency_hz, i, w.sorted[k] / (2 * pi));
+        put(to.damping_ratio, i, -std::log(size) / (dt * w.sorted[k]));
+        put(to.mu_re, i, w.re[k]);
+        put(to.mu_im, i, w.im[k]);
+        if (to.psi_re != nullptr) std::copy(re, re + n, to.psi_re + static_cast<size_t>(i) * n);
+        if (to.psi_im != nullptr) std::copy(im, im + n, to.psi_im + static_cast<size_t>(i) * n);
+        if (to.shape_re == nullptr) continue;
+        okid_real_t *to_re = to.shape_re + static_cast<size_t>(i) * ny,
+                    *to_im = to.shape_im + static_cast<size_t>(i) * ny;
         okid::linalg::multiply(false, false, n_y, 1, n_z, 1, C, n_y, re, n_z, 0, to_re, n_y);
         okid::linalg::multiply(false, false, n_y, 1, n_z, 1, C, n_y, im, n_z, 0, to_im, n_y);
         normalise(n_y, to_re, to_im);
-        const double size = std::hypot(static_cast<double>(w.re[k]), static_cast<double>(w.im[k]));
-        frequency_hz[i] = static_cast<okid_real_t>(w.sorted[k] / (2 * pi));
-        damping_ratio[i] = static_cast<okid_real_t>(-std::log(size) / (dt * w.sorted[k]));
-        mpc[i] = collinearity(n_y, to_re, to_im);
-        if (mu_re != nullptr) mu_re[i] = w.re[k];
-        if (mu_im != nullptr) mu_im[i] = w.im[k];
-        if (psi_re != nullptr) std::copy(re, re + n, psi_re + static_cast<size_t>(i) * n);
-        if (psi_im != nullptr) std::copy(im, im + n, psi_im + static_cast<size_t>(i) * n);
+        put(to.mpc, i, collinearity(n_y, to_re, to_im));
     }
     return OKID_OK;
 }

@@ -5,9 +5,9 @@
 // REFERENCE docs/porting.md; paper eq. (36)-(54)
 #include "identifier.h"
 
+#include <okid/modal.h>
 #include <okid/steps/era.h>
 #include <okid/steps/observer.h>
-#include <okid/modal.h>
 
 #include <string.h>
 
@@ -76,12 +76,12 @@ static okid_status_t observe(node_modes_t* out) {
     observing_t* w = &work.observing;
     const okid_observer_config_t config = {.n_u = NU, .n_y = NY, .p = P};
     okid_observer_info_t info;
-    okid_status_t status = okid_accumulator_run(state.sums, OKID_DETREND_MEAN, w->S, w->head, w->tail, w->sum, NULL);
-    const int64_t rows = okid_accumulator_rows(state.sums);
+    okid_run_sums_t sums = {.S = w->S, .head = w->head, .tail = w->tail, .sum = w->sum};
+    okid_status_t status = okid_accumulator_run(state.sums, OKID_DETREND_MEAN, &sums);
     if (status < 0) return status;
     out->stage = 1;
-    status = okid_structured_solve(&config, OKID_DETREND_MEAN, w->S, w->head, w->tail, w->sum, rows, state.theta, NULL,
-                                   &info, w->work, sizeof w->work);
+    status =
+        okid_structured_solve(&config, OKID_DETREND_MEAN, &sums, state.theta, NULL, &info, w->work, sizeof w->work);
     out->radius = info.radius;
     out->ridge = info.ridge;
     return status;
@@ -107,11 +107,13 @@ static okid_status_t realize(okid_era_t** era, node_modes_t* out) {
 static okid_status_t analyse(okid_era_t* era, double rate_hz, node_modes_t* out) {
     realizing_t* w = &work.realizing;
     out->stage = 5;
-    okid_status_t status =
-        okid_modal_analyse(NY, NZ, 1 / rate_hz, w->A, w->C, &out->count, w->frequency, w->damping, w->mpc, w->shape_re,
-                           w->shape_im, w->mu_re, w->mu_im, w->psi_re, w->psi_im, NULL, w->modal, sizeof w->modal);
+    const okid_model_t model = {.n_u = NU, .n_y = NY, .n_z = NZ, .A = w->A, .C = w->C};
+    okid_modes_t modes = {0,           0,        w->frequency, w->damping, w->mpc,   w->shape_re,
+                          w->shape_im, w->mu_re, w->mu_im,     w->psi_re,  w->psi_im};
+    okid_status_t status = okid_modal_analyse(&model, 1 / rate_hz, &modes, w->modal, sizeof w->modal);
     if (status < 0) return status;
-    status = okid_era_emac(era, NZ, out->count, w->mu_re, w->mu_im, w->psi_re, w->psi_im, w->emac);
+    out->count = modes.count;
+    status = okid_era_emac(era, NZ, &modes, w->emac);
     for (int32_t k = 0; k < out->count; ++k) {
         out->mode[k].frequency_hz = w->frequency[k];
         out->mode[k].damping_ratio = w->damping[k];

@@ -282,6 +282,7 @@ static void records_are_centred_one_by_one(void) {
 /// S, head, tail and sum of a run give the Gram matrix back.
 static void one_run_is_exported(void) {
     static double S[M * W], head[P * M], tail[P * M], sum[M], mean[M], same_mean[M], gram[W * W], expected[W * W], g[W];
+    okid_run_sums_t sums = {S, head, tail, sum, mean, 0};
     const okid_sample_t kinds[] = {OKID_SAMPLE_DOUBLE, OKID_SAMPLE_INT16, OKID_SAMPLE_INT24};
     for (int k = 0; k < 12; ++k) { // kind, detrend, window
         const okid_sample_t kind = kinds[k / 4];
@@ -291,10 +292,11 @@ static void one_run_is_exported(void) {
         void* block;
         okid_accumulator_t* a = make(config, &block);
         okid_accumulator_set_units(a, (double[]){2, 0.5, 1, 3}, (double[]){1, 0, -1, 2});
-        TEST_ASSERT_EQUAL(OKID_ERR_TOO_SHORT, okid_accumulator_run(a, detrend, S, head, tail, sum, mean));
+        TEST_ASSERT_EQUAL(OKID_ERR_TOO_SHORT, okid_accumulator_run(a, detrend, &sums));
         TEST_ASSERT_EQUAL(OKID_OK, feed(a, kind, 0, k & 2 ? P + 480 : N));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_run(a, detrend, S, head, tail, sum, mean));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_run(a, detrend, &sums));
         const double rows = (double)okid_accumulator_rows(a);
+        TEST_ASSERT_EQUAL(rows, sums.rows);
         for (int j = 0; j < W; ++j) {
             g[j] = j < M ? sum[j] : g[j - M] + head[j - M] - tail[j - M];
             for (int i = 0; i <= j; ++i)
@@ -312,7 +314,7 @@ static void one_run_is_exported(void) {
                                           gram[j * W + i] - (detrend ? g[i] * g[j] / rows : 0));
         okid_accumulator_gap(a, 1);
         TEST_ASSERT_EQUAL(OKID_OK, feed(a, kind, 0, 100));
-        TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_accumulator_run(a, detrend, S, head, tail, sum, mean));
+        TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_accumulator_run(a, detrend, &sums));
         free(block);
     }
 }

@@ -119,13 +119,13 @@ static void over_order_picks_the_modes_of_the_structure(void) {
             TEST_ASSERT_EQUAL(s.n + 4, result.admissible); // the unstable one and the one near Nyquist are no modes
             assert_exact(&s);
             TEST_ASSERT_TRUE(result.margin > 2);
-            okid_real_t f[S_NZ / 2], zeta[S_NZ / 2], mpc[S_NZ / 2], re[S_NY * S_NZ], im[S_NY * S_NZ];
+            okid_real_t f[S_NZ / 2];
             const size_t bytes = okid_modal_memsize(m.n_y, m.n_z);
             void* work = malloc(bytes);
-            int32_t count = 0;
-            TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(m.n_y, m.n_z, m.dt, m.A, m.C, &count, f, zeta, mpc, re, im,
-                                                          NULL, NULL, NULL, NULL, NULL, work, bytes));
-            TEST_ASSERT_EQUAL(count, result.admissible);
+            const okid_model_t model = {.n_u = m.n_u, .n_y = m.n_y, .n_z = m.n_z, .A = m.A, .C = m.C};
+            okid_modes_t modes = {.frequency_hz = f};
+            TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(&model, m.dt, &modes, work, bytes));
+            TEST_ASSERT_EQUAL(modes.count, result.admissible);
             for (int k = 0; k < s.n; ++k) // `mode` is the place in that list
                 TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-10, 1e-3) * f[result.mode[k]], f[result.mode[k]],
                                           result.frequency_hz[k]);

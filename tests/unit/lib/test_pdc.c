@@ -117,10 +117,11 @@ static void damping_matrix_of_the_structures(void) {
         s_make(&s, which);
         const size_t bytes = okid_mechanics_memsize(s.n, 1);
         void* work = malloc(bytes);
-        int32_t count = 0;
-        TEST_ASSERT_EQUAL(OKID_OK, okid_mechanics_modes(s.n, s.M, s.R, s.K, &count, f, z, NULL, NULL, work, bytes));
-        TEST_ASSERT_EQUAL(s.n, count);
-        TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_fit(count, f, z, NULL, &pdc));
+        const okid_mechanics_t mechanics = {.n_x = s.n, .M = s.M, .R = s.R, .K = s.K};
+        okid_modes_t modes = {.frequency_hz = f, .damping_ratio = z};
+        TEST_ASSERT_EQUAL(OKID_OK, okid_mechanics_modes(&mechanics, &modes, work, bytes));
+        TEST_ASSERT_EQUAL(s.n, modes.count);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_fit(modes.count, f, z, NULL, &pdc));
         TEST_ASSERT_EQUAL(OKID_OK, okid_pdc_damping(s.n, &pdc, s.M, s.K, R));
         assert_near(s.alpha, TOLERANCE(1e-11, 1e-2), pdc.alpha);
         assert_near(s.beta, TOLERANCE(1e-11, 1e-2), pdc.beta);

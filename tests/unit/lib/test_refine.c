@@ -57,13 +57,12 @@ static okid_status_t refine(int runs, int offset, int blocks, const int32_t* cou
 }
 
 static void modes_of(const okid_real_t* a, const okid_real_t* c, okid_real_t* f, okid_real_t* zeta) {
-    static okid_real_t mpc[RIG_NZ], re[RIG_NY * RIG_NZ], im[RIG_NY * RIG_NZ];
     const size_t bytes = okid_modal_memsize(RIG_NY, RIG_NZ);
     void* work = malloc(bytes);
-    int32_t count = 0;
-    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(RIG_NY, RIG_NZ, 1 / RIG_FS, a, c, &count, f, zeta, mpc, re, im, NULL,
-                                                  NULL, NULL, NULL, NULL, work, bytes));
-    TEST_ASSERT_EQUAL(RIG_MODES, count);
+    const okid_model_t model = {.n_u = RIG_NU, .n_y = RIG_NY, .n_z = RIG_NZ, .A = a, .C = c};
+    okid_modes_t modes = {.frequency_hz = f, .damping_ratio = zeta};
+    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(&model, 1 / RIG_FS, &modes, work, bytes));
+    TEST_ASSERT_EQUAL(RIG_MODES, modes.count);
     free(work);
 }
 

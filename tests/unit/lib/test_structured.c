@@ -70,8 +70,8 @@ static okid_status_t solve(const okid_observer_config_t* config, okid_detrend_t 
     const size_t bytes = okid_structured_memsize(config);
     char* work = malloc(bytes + 1);
     work[bytes] = 77; // the block ends here
-    const okid_status_t status =
-        okid_structured_solve(config, detrend, S, head, tail, sum, samples - P, theta, innovation, &info, work, bytes);
+    const okid_run_sums_t sums = {S, head, tail, sum, NULL, samples - P};
+    const okid_status_t status = okid_structured_solve(config, detrend, &sums, theta, innovation, &info, work, bytes);
     TEST_ASSERT_EQUAL(77, work[bytes]);
     free(work);
     return status;
@@ -296,22 +296,27 @@ static void numbers_that_are_no_sums_are_refused(void) {
 }
 
 static void wrong_use_is_refused(void) {
-    char work[16];
     const okid_observer_config_t bad = {0, 3, P, 0, 0};
     TEST_ASSERT_EQUAL(0, okid_structured_memsize(&bad));
     TEST_ASSERT_EQUAL(0, okid_structured_memsize(NULL));
-    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_structured_solve(&bad, OKID_DETREND_NONE, S, head, tail, NULL, N, theta, NULL,
-                                                          &info, work, sizeof work));
-    TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_structured_solve(&plain, OKID_DETREND_NONE, S, head, tail, NULL, N, theta,
-                                                             NULL, &info, work, sizeof work));
-    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_structured_solve(&plain, OKID_DETREND_MEAN, S, head, tail, NULL, N, theta,
-                                                           NULL, &info, work, sizeof work));
-    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_structured_solve(&plain, OKID_DETREND_NONE, S, NULL, tail, NULL, N, theta,
-                                                           NULL, &info, work, sizeof work));
+    const okid_run_sums_t sums = {S, head, tail, NULL, NULL, N}, no_head = {S, NULL, tail, NULL, NULL, N},
+                          few = {S, head, tail, NULL, NULL, q - 1};
     const size_t bytes = okid_structured_memsize(&plain);
     void* block = malloc(bytes);
-    TEST_ASSERT_EQUAL(OKID_ERR_TOO_SHORT, okid_structured_solve(&plain, OKID_DETREND_NONE, S, head, tail, NULL, q - 1,
-                                                                theta, NULL, &info, block, bytes));
+    const struct {
+        const okid_observer_config_t* config;
+        okid_detrend_t detrend;
+        const okid_run_sums_t* sums;
+        size_t bytes;
+        okid_status_t expected;
+    } uses[] = {{&bad, OKID_DETREND_NONE, &sums, bytes, OKID_ERR_DIM},
+                {&plain, OKID_DETREND_NONE, &sums, 16, OKID_ERR_MEMORY},
+                {&plain, OKID_DETREND_MEAN, &sums, bytes, OKID_ERR_NULL},
+                {&plain, OKID_DETREND_NONE, &no_head, bytes, OKID_ERR_NULL},
+                {&plain, OKID_DETREND_NONE, &few, bytes, OKID_ERR_TOO_SHORT}};
+    for (int k = 0; k < 5; ++k)
+        TEST_ASSERT_EQUAL(uses[k].expected, okid_structured_solve(uses[k].config, uses[k].detrend, uses[k].sums, theta,
+                                                                  NULL, &info, block, uses[k].bytes));
     free(block);
 }
 

@@ -4,8 +4,8 @@
 #include "tolerance.h"
 
 #include <okid/okid.h>
-#include <okid/steps/subspace.h>
 #include <okid/steps/square_root.h>
+#include <okid/steps/subspace.h>
 #include <unity.h>
 
 enum { I = 10, LAGS = 2 * I - 1, W = 2 * I * RIG_M, N = 4000, TOP = 12, LAST = 40 };
@@ -72,19 +72,24 @@ static void realize(int order) {
     TEST_ASSERT_EQUAL(OKID_OK, okid_subspace_realize(subspace, order, A, B, C, D, K, innovation));
 }
 
-/// Worst relative error of frequency and damping ratio; radius of A.
-static void mode_errors(int order, double* f_error, double* zeta_error, double* radius) {
-    int32_t count = 0;
-    okid_real_t f[TOP], zeta[TOP], mpc[TOP], re[RIG_NY * TOP], im[RIG_NY * TOP];
+static void modes_of(int order, const okid_real_t* a, double dt, okid_modes_t* modes) {
+    const okid_model_t model = {.n_u = RIG_NU, .n_y = RIG_NY, .n_z = order, .A = a, .C = C};
     const size_t bytes = okid_modal_memsize(RIG_NY, order);
     void* work = malloc(bytes);
-    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(RIG_NY, order, 1 / RIG_FS, A, C, &count, f, zeta, mpc, re, im, NULL,
-                                                  NULL, NULL, NULL, radius, work, bytes));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(&model, dt, modes, work, bytes));
     free(work);
+}
+
+/// Worst relative error of frequency and damping ratio; radius of A.
+static void mode_errors(int order, double* f_error, double* zeta_error, double* radius) {
+    okid_real_t f[TOP], zeta[TOP];
+    okid_modes_t modes = {.frequency_hz = f, .damping_ratio = zeta};
+    modes_of(order, A, 1 / RIG_FS, &modes);
+    if (radius) *radius = modes.radius;
     *f_error = *zeta_error = 0;
     for (int k = 0; k < RIG_MODES; ++k) {
         int best = 0;
-        for (int j = 0; j < count; ++j)
+        for (int j = 0; j < modes.count; ++j)
             if (fabs(f[j] - rig_frequency[k]) < fabs(f[best] - rig_frequency[k])) best = j;
         *f_error = fmax(*f_error, fabs(f[best] / rig_frequency[k] - 1));
         *zeta_error = fmax(*zeta_error, fabs(zeta[best] / rig_damping[k] - 1));
@@ -115,20 +120,15 @@ static double markov_error(int order) {
 
 /// Spectral radius of A - K C.
 static double predictor_radius(int order) {
-    okid_real_t closed[TOP * TOP], f[TOP], zeta[TOP], mpc[TOP], re[RIG_NY * TOP], im[RIG_NY * TOP];
+    okid_real_t closed[TOP * TOP];
     for (int j = 0; j < order; ++j)
         for (int i = 0; i < order; ++i) {
             closed[j * order + i] = A[j * order + i];
             for (int o = 0; o < RIG_NY; ++o) closed[j * order + i] -= K[o * order + i] * C[j * RIG_NY + o];
         }
-    int32_t count = 0;
-    double radius = 0;
-    const size_t bytes = okid_modal_memsize(RIG_NY, order);
-    void* work = malloc(bytes);
-    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(RIG_NY, order, 1, closed, C, &count, f, zeta, mpc, re, im, NULL, NULL,
-                                                  NULL, NULL, &radius, work, bytes));
-    free(work);
-    return radius;
+    okid_modes_t modes = {0};
+    modes_of(order, closed, 1, &modes);
+    return modes.radius;
 }
 
 // Without noise every covariance is singular: the Gram matrix (trap 5), that of the future outputs (trap 7), the past of
@@ -211,17 +211,12 @@ static void emac_tells_modes_from_noise(void) {
         create(&config);
         TEST_ASSERT_EQUAL(OKID_OK, okid_subspace_decompose(subspace, gram, rows, &info));
         realize(TOP);
-        int32_t count = 0;
-        okid_real_t f[TOP], zeta[TOP], mpc[TOP], re[RIG_NY * TOP], im[RIG_NY * TOP], emac[TOP];
-        okid_real_t mu_re[TOP], mu_im[TOP], psi_re[TOP * TOP], psi_im[TOP * TOP];
-        const size_t bytes = okid_modal_memsize(RIG_NY, TOP);
-        void* work = malloc(bytes);
-        TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(RIG_NY, TOP, 1 / RIG_FS, A, C, &count, f, zeta, mpc, re, im,
-                                                      mu_re, mu_im, psi_re, psi_im, NULL, work, bytes));
-        free(work);
-        TEST_ASSERT_EQUAL(OKID_OK, okid_subspace_emac(subspace, TOP, count, C, mu_re, mu_im, psi_re, psi_im, emac));
-        TEST_ASSERT_TRUE(count > RIG_MODES);
-        for (int j = 0; j < count; ++j) {
+        okid_real_t f[TOP], emac[TOP], mu_re[TOP], mu_im[TOP], psi_re[TOP * TOP], psi_im[TOP * TOP];
+        okid_modes_t modes = {.frequency_hz = f, .mu_re = mu_re, .mu_im = mu_im, .psi_re = psi_re, .psi_im = psi_im};
+        modes_of(TOP, A, 1 / RIG_FS, &modes);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_subspace_emac(subspace, TOP, C, &modes, emac));
+        TEST_ASSERT_TRUE(modes.count > RIG_MODES);
+        for (int j = 0; j < modes.count; ++j) {
             int real = 0;
             for (int mode = 0; mode < RIG_MODES; ++mode) real |= fabs(f[j] / rig_frequency[mode] - 1) < 0.01;
             TEST_ASSERT_TRUE_MESSAGE(emac[j] >= 0 && emac[j] <= 1, names[k]);
@@ -252,8 +247,9 @@ static void output_only_records_give_modes(void) {
 static okid_status_t output_error(int order, int records, const int32_t* counts, const double* v, okid_real_t* x0) {
     const size_t bytes = okid_subspace_output_error_memsize(RIG_NU, RIG_NY, order, records);
     void* work = malloc(bytes);
-    const okid_status_t status =
-        okid_subspace_output_error(RIG_NU, RIG_NY, order, A, C, records, counts, v, B, D, x0, work, bytes);
+    const okid_model_t model = {.n_u = RIG_NU, .n_y = RIG_NY, .n_z = order, .A = A, .C = C};
+    const okid_records_t given = {records, counts, v};
+    const okid_status_t status = okid_subspace_output_error(&model, &given, B, D, x0, work, bytes);
     free(work);
     return status;
 }
@@ -392,13 +388,17 @@ static void wrong_use_is_refused(void) {
     TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_subspace_realize(subspace, TOP + 1, A, B, C, D, K, NULL));
     TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_subspace_realize(subspace, 0, A, B, C, D, K, NULL));
     TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_subspace_realize(subspace, 2, A, B, C, NULL, K, NULL));
-    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_subspace_emac(subspace, 2, 1, C, NULL, NULL, NULL, NULL, NULL));
-    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_subspace_emac(subspace, 0, 1, C, A, A, A, A, A));
+    okid_modes_t modes = {.count = 1};
+    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_subspace_emac(subspace, 2, C, &modes, A));
+    modes.mu_re = modes.mu_im = modes.psi_re = modes.psi_im = A;
+    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_subspace_emac(subspace, 0, C, &modes, A));
     const int32_t count = N, negative = -1;
+    const okid_model_t model = {.n_u = 1, .n_y = 3, .n_z = 6, .A = A, .C = C};
+    const okid_records_t one = {1, &count, v}, wrong = {1, &negative, v};
     TEST_ASSERT_EQUAL(0, okid_subspace_output_error_memsize(-1, 3, 6, 1));
-    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_subspace_output_error(1, 3, 6, A, C, 1, &count, v, NULL, D, NULL, small, 16));
-    TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_subspace_output_error(1, 3, 6, A, C, 1, &count, v, B, D, NULL, small, 16));
-    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_subspace_output_error(1, 3, 6, A, C, 1, &negative, v, B, D, NULL, small, 16));
+    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_subspace_output_error(&model, &one, NULL, D, NULL, small, 16));
+    TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_subspace_output_error(&model, &one, B, D, NULL, small, 16));
+    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_subspace_output_error(&model, &wrong, B, D, NULL, small, 16));
     free(v);
 }
 

@@ -417,13 +417,12 @@ static void a_replicate_is_the_model_of_the_rest(void) {
         okid_identified_t exact;
         TEST_ASSERT_GREATER_OR_EQUAL(OKID_OK, okid_identify_run(d.identify, rest, &exact));
         TEST_ASSERT_GREATER_OR_EQUAL(OKID_OK, okid_identify_order(d.identify, order, &exact));
-        okid_real_t f[RIG_NZ / 2], z[RIG_NZ / 2], mpc[RIG_NZ / 2], re[RIG_NY * RIG_NZ / 2], im[RIG_NY * RIG_NZ / 2];
+        okid_real_t f[RIG_NZ / 2], z[RIG_NZ / 2];
         const size_t bytes = okid_modal_memsize(RIG_NY, RIG_NZ);
         void* work = malloc(bytes);
-        int32_t count = 0;
-        TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(RIG_NY, RIG_NZ, 1 / RIG_FS, model.A, model.C, &count, f, z, mpc,
-                                                      re, im, NULL, NULL, NULL, NULL, NULL, work, bytes));
-        TEST_ASSERT_EQUAL(RIG_MODES, count);
+        okid_modes_t modes = {.frequency_hz = f, .damping_ratio = z};
+        TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(&model, 1 / RIG_FS, &modes, work, bytes));
+        TEST_ASSERT_EQUAL(RIG_MODES, modes.count);
         const double part_of_change = methods[i] == OKID_METHOD_OKID_ERA ? 1e-4 : 1e-6;
         for (int k = 0; k < RIG_MODES; ++k) {
             const double floor = TOLERANCE(1e-12, 1e-5);

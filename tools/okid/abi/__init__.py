@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from okid._errors import Error, IdentificationError, InputError
 from okid.abi.layout import *  # noqa: F403
-from okid.abi.layout import ERR_DIM, ERR_FORMAT, ERR_MISMATCH, ERR_RANGE, ERR_TOO_SHORT, doubles
+from okid.abi.layout import ABI, ERR_DIM, ERR_FORMAT, ERR_MISMATCH, ERR_RANGE, ERR_TOO_SHORT, doubles
 from okid.abi.signatures import SIGNATURES
 
 
@@ -40,8 +40,12 @@ def library() -> Any:
     else:
         places = ", ".join(str(path) for path in tried)
         raise OSError(f"libokid.so not found in {places}: run `make build`, or set OKID_LIBRARY to the file")
+    if not hasattr(loaded, f"okid_accumulator_create_{ABI}_double"):
+        raise OSError(f"{path}: not libokid of interface {ABI} in double precision: run `make build` again")
     for name, (result, arguments) in SIGNATURES.items():
-        function = getattr(loaded, name)
+        linked = f"{name}_{ABI}_double"  # lib/include/okid/abi.h
+        function = loaded[linked] if hasattr(loaded, linked) else loaded[name]
+        setattr(loaded, name, function)
         function.restype = result
         function.argtypes = arguments
     return loaded

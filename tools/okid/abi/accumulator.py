@@ -133,8 +133,8 @@ class Accumulator(Sums):
         """
         m, p = self.channels, self.lags
         sums, head, tail, total = np.empty((p + 1, m, m)), np.empty((p, m)), np.empty((p, m)), np.empty(m)
-        pointers = [abi.pointer(array) for array in (sums, head, tail, total)]
-        abi.check(self._call("run", self.handle, self._detrend(detrend), *pointers, None), "run_sums")
+        out = abi.RunSums(*map(abi.pointer, (sums, head, tail, total)))
+        abi.check(self._call("run", self.handle, self._detrend(detrend), out), "run_sums")
         return sums.transpose(0, 2, 1), head, tail, total
 
     def to_bytes(self) -> bytes:

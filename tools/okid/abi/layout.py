@@ -42,6 +42,8 @@ MKR_COMPLEX = 1 << 6
 MKR_SPREAD = 1 << 7
 MKR_CLOSE = 1 << 8
 
+ABI = 2
+
 doubles = POINTER(c_double)
 int32s = POINTER(c_int32)
 int16s = POINTER(c_int16)
@@ -101,6 +103,37 @@ class ModelView(Structure):
     """okid_model_t."""
 
     _fields_ = [(name, c_int32) for name in ("n_u", "n_y", "n_z")] + [(name, doubles) for name in "ABCDK"]
+
+
+class Modes(Structure):
+    """okid_modes_t."""
+
+    _fields_ = [("count", c_int32), ("radius", c_double)] + [
+        (name, doubles)
+        for name in (
+            "frequency_hz",
+            "damping_ratio",
+            "mpc",
+            "shape_re",
+            "shape_im",
+            "mu_re",
+            "mu_im",
+            "psi_re",
+            "psi_im",
+        )
+    ]
+
+
+class Records(Structure):
+    """okid_records_t."""
+
+    _fields_ = [("count", c_int32), ("counts", int32s), ("samples", doubles)]
+
+
+class RunSums(Structure):
+    """okid_run_sums_t."""
+
+    _fields_ = [(name, doubles) for name in ("S", "head", "tail", "sum", "mean")] + [("rows", c_int64)]
 
 
 class Mechanics(Structure):
@@ -333,6 +366,9 @@ class JackknifeConfig(Structure):
 STRUCTS: dict[str, type[Structure]] = {
     "okid_accumulator_config_t": AccumulatorConfig,
     "okid_accumulator_stats_t": AccumulatorStats,
+    "okid_modes_t": Modes,
+    "okid_records_t": Records,
+    "okid_run_sums_t": RunSums,
     "okid_cluster_t": Cluster,
     "okid_era_config_t": EraConfig,
     "okid_identify_config_t": IdentifyConfig,

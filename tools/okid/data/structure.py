@@ -85,20 +85,18 @@ class Structure:
     def modes(self, damped: bool = True) -> list[Mode]:
         """Underdamped modes, ascending in frequency, shapes (n_x,) of the displacements with the largest entry 1."""
         n, library = self.n_x, abi.library()
-        matrices = [np.asfortranarray(one) for one in (self.M, self.R, self.K)]
-        pointers = [abi.pointer(one) for one in matrices]
-        if not damped:
-            pointers[1] = None
-        count, size = ctypes.c_int32(0), int(library.okid_mechanics_memsize(n, n))
+        M, K, R = (np.asfortranarray(one) for one in (self.M, self.K, self.R))
+        given = abi.Mechanics(n, M=abi.pointer(M), R=abi.pointer(R if damped else None), K=abi.pointer(K))
+        size = int(library.okid_mechanics_memsize(n, n))
         frequency, ratio, real, imaginary = np.empty(n), np.empty(n), np.empty((n, n)), np.empty((n, n))
+        out = abi.Modes(
+            0, 0.0, abi.pointer(frequency), abi.pointer(ratio), None, abi.pointer(real), abi.pointer(imaginary)
+        )
         work = abi.block(size)
-        status = library.okid_mechanics_modes(
-            n, *pointers, ctypes.byref(count), *map(abi.pointer, (frequency, ratio, real, imaginary)),
-            work.ctypes.data, size,
-        )  # fmt: skip
+        status = library.okid_mechanics_modes(given, out, work.ctypes.data, size)
         abi.check(status, "the modes of M, R and K")
         shapes = real + 1j * imaginary
-        return [Mode(float(frequency[k]), float(ratio[k]), shapes[k], 1.0, 1.0) for k in range(count.value)]
+        return [Mode(float(frequency[k]), float(ratio[k]), shapes[k], 1.0, 1.0) for k in range(out.count)]
 
     def model(
         self,

@@ -6,7 +6,7 @@
 #ifndef OKID_STEPS_ERA_H
 #define OKID_STEPS_ERA_H
 
-#include <okid/types.h>
+#include <okid/modal.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -22,6 +22,12 @@ typedef struct okid_era_config_t {
     int32_t zeta; ///< ERA/DC: zeta + 1 block columns, 0..64; ERA: 0
     int32_t tau;  ///< ERA/DC: lag between the correlations, 1..min(r, c); 0 = ERA
 } okid_era_config_t;
+
+/// ERA with a square Hankel matrix.
+static inline okid_era_config_t okid_era_defaults(int32_t n_u, int32_t n_y, int32_t rows) {
+    const okid_era_config_t config = {n_u, n_y, rows, rows, 0, 0, 0};
+    return config;
+}
 
 /// The last Markov parameter that is needed: Y_0 .. Y_n with n = r + c + (xi + zeta) tau.
 OKID_API int32_t okid_era_markov_last(const okid_era_config_t* config);
@@ -71,10 +77,9 @@ OKID_NODISCARD OKID_API okid_status_t okid_era_realize(okid_era_t* self, int32_t
 
 /// EMAC of eigenvectors (Pappa, Elliott, Schenk 1993, output side): how well C A^k psi at the last block row of the
 /// identified observability matrix agrees with its prediction from the first; 0..1 per eigenvector.
-/// @param psi_re, psi_im  in, n_z x count eigenvectors of A; lambda likewise count numbers; emac out, count numbers
-OKID_NODISCARD OKID_API okid_status_t okid_era_emac(okid_era_t* self, int32_t order, int32_t count,
-                                                    const okid_real_t* lambda_re, const okid_real_t* lambda_im,
-                                                    const okid_real_t* psi_re, const okid_real_t* psi_im,
+/// @param modes  in, count, eigenvalues mu and eigenvectors psi of A, by okid_modal_analyse()
+/// @param emac   out, count numbers
+OKID_NODISCARD OKID_API okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_modes_t* modes,
                                                     okid_real_t* emac);
 
 #ifdef __cplusplus

@@ -22,6 +22,12 @@ typedef struct okid_observer_config_t {
     int32_t unstable;
 } okid_observer_config_t;
 
+/// The smallest ridge that makes the ARX model stable.
+static inline okid_observer_config_t okid_observer_defaults(int32_t n_u, int32_t n_y, int32_t p) {
+    const okid_observer_config_t config = {n_u, n_y, p, 0, 0};
+    return config;
+}
+
 /// Bytes of work okid_observer_solve() needs; 0 when the configuration is invalid.
 OKID_API size_t okid_observer_memsize(const okid_observer_config_t* config);
 
@@ -95,11 +101,7 @@ OKID_API size_t okid_structured_memsize(const okid_observer_config_t* config);
 /// Double in every build; theta is rounded at the end. An offset far above the rms costs the digits it has in S: give sums
 /// of samples less a constant, as okid_accumulator_run() does.
 /// @param detrend     OKID_DETREND_MEAN centres each lag row by its own mean, exactly
-/// @param S           in, m x m(p+1) column-major: S_0 .. S_p side by side, S_b(r, c) = sum over rows of v_n[r] v_(n-b)[c]
-/// @param head        in, m x p: column a is v_(f-1-a), f the first regression row
-/// @param tail        in, m x p: column a is v_(l-a), l the last regression row
-/// @param sum         in, m numbers: sum over rows of v_n; not read (may be NULL) with OKID_DETREND_NONE
-/// @param rows        in, regression rows behind the sums
+/// @param sums        in, of okid_accumulator_run(); `sum` is not read (may be NULL) with OKID_DETREND_NONE, `mean` never
 /// @param theta       out, n_y x q column-major: [D, Ybar_1 .. Ybar_p], each Ybar_h n_y x m = [Ybar^I_h, -Ybar^II_h]
 /// @param innovation  out, n_y x n_y covariance of the residual, may be NULL
 /// @param work        caller's block of okid_structured_memsize() bytes
@@ -107,8 +109,7 @@ OKID_API size_t okid_structured_memsize(const okid_observer_config_t* config);
 ///         OKID_ERR_EXCITATION, OKID_ERR_NUMERIC, OKID_ERR_UNSTABLE
 /// Cost about (6 m + 14 n_y + 40) n^2 flop for each ridge tried, n = m(p+1): as the dense solver at p near 40, more below.
 OKID_NODISCARD OKID_API okid_status_t okid_structured_solve(const okid_observer_config_t* config,
-                                                            okid_detrend_t detrend, const double* S, const double* head,
-                                                            const double* tail, const double* sum, int64_t rows,
+                                                            okid_detrend_t detrend, const okid_run_sums_t* sums,
                                                             okid_real_t* theta, okid_real_t* innovation,
                                                             okid_observer_info_t* info, void* work, size_t bytes);
 

@@ -27,6 +27,13 @@ typedef struct okid_skew_config_t {
     const okid_mkr_config_t* mkr; ///< where the channels stand; used until the last call, not copied
 } okid_skew_config_t;
 
+/// Room for 20 replicates.
+static inline okid_skew_config_t okid_skew_defaults(int32_t n_u, int32_t n_y, int32_t n_z,
+                                                    const okid_mkr_config_t* mkr) {
+    const okid_skew_config_t config = {n_u, n_y, n_z, 20, mkr};
+    return config;
+}
+
 /// The delays; the arrays live in the object.
 typedef struct okid_skew_result_t {
     int32_t n_y;              ///< outputs

@@ -42,6 +42,12 @@ typedef struct okid_square_root_config_t {
     double forgetting;   ///< lambda in (0, 1] per sample, applied between blocks; 1 = infinite memory. Needs block
 } okid_square_root_config_t;
 
+/// Growing, no window.
+static inline okid_square_root_config_t okid_square_root_defaults(int32_t n_u, int32_t n_y, int32_t lags) {
+    const okid_square_root_config_t config = {n_u, n_y, lags, 0, 0, 0, 0, 1};
+    return config;
+}
+
 /// Bytes okid_square_root_create() needs (alignment slack included); 0 when the configuration is invalid or too large for
 /// the address space. One triangle of N^2/2 okid_real_t; forgetting 3; window slots + spare_slots + 2.
 OKID_API size_t okid_square_root_memsize(const okid_square_root_config_t* config);

@@ -13,7 +13,7 @@
 #ifndef OKID_STEPS_SUBSPACE_H
 #define OKID_STEPS_SUBSPACE_H
 
-#include <okid/types.h>
+#include <okid/modal.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -36,6 +36,12 @@ typedef struct okid_subspace_config_t {
     int32_t factor;    ///< 1 = room for okid_subspace_decompose_factor(): 2 (i m)^2 numbers more
     double ridge;      ///< on the unit-diagonal Gram, 0..1; 0 = what rounding needs: 1e-13, from a factor eps
 } okid_subspace_config_t;
+
+/// MOESP with 30 block rows.
+static inline okid_subspace_config_t okid_subspace_defaults(int32_t n_u, int32_t n_y) {
+    const okid_subspace_config_t config = {n_u, n_y, 30, OKID_SUBSPACE_MOESP, 0, 0, 0};
+    return config;
+}
 
 /// What the decomposition found, beside the factors.
 typedef struct okid_subspace_info_t {
@@ -97,12 +103,12 @@ OKID_NODISCARD OKID_API okid_status_t okid_subspace_realize(okid_subspace_t* sel
 
 /// EMAC of eigenvectors (Pappa, Elliott, Schenk 1993, output side): how well C A^(i-1) psi agrees with the last block
 /// row of the identified observability matrix; 0..1 per eigenvector.
-/// @param C  in, n_y x n_z of the realization; @param psi_re, psi_im  in, n_z x count eigenvectors of its A;
-/// lambda likewise count eigenvalues; emac out, count numbers. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM
-OKID_NODISCARD OKID_API okid_status_t okid_subspace_emac(const okid_subspace_t* self, int32_t order, int32_t count,
-                                                         const okid_real_t* C, const okid_real_t* lambda_re,
-                                                         const okid_real_t* lambda_im, const okid_real_t* psi_re,
-                                                         const okid_real_t* psi_im, okid_real_t* emac);
+/// @param C      in, n_y x n_z of the realization
+/// @param modes  in, count, eigenvalues mu and eigenvectors psi of its A, by okid_modal_analyse()
+/// @param emac   out, count numbers. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM
+OKID_NODISCARD OKID_API okid_status_t okid_subspace_emac(const okid_subspace_t* self, int32_t order,
+                                                         const okid_real_t* C, const okid_modes_t* modes,
+                                                         okid_real_t* emac);
 
 /// Bytes of work of okid_subspace_output_error(), O((n_z + n_y)^2 (n_u + 1)^2) and n_z n_u (n_z + n_y) numbers a
 /// record; 0 when a size is invalid.
@@ -112,20 +118,18 @@ OKID_API size_t okid_subspace_output_error_memsize(int32_t n_u, int32_t n_y, int
 /// squares through modal filters, normal equations summed sample by sample. Memory does not grow with the length of a
 /// record. A sample with a missing output (NaN or infinite) is left out. After a missing input the state is unknown: a
 /// new initial state is estimated from there on (and not returned).
-/// @param A, C     in, n_z x n_z and n_y x n_z; the eigenvectors of A must be independent
-/// @param records  in, >= 1; @param counts  in, samples of each
-/// @param samples  in, column-major m x (sum of counts), inputs, then outputs; the records one after the other
+/// @param model    in, A, C and the sizes; the eigenvectors of A must be independent; the rest is not read
+/// @param records  in, the records one after the other
 /// @param B, D     out, n_z x n_u and n_y x n_u; not touched when n_u = 0
 /// @param x0       out, n_z x records: the state at the first sample of each; may be NULL
 /// @param work     caller's block of okid_subspace_output_error_memsize() bytes
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY, OKID_ERR_TOO_SHORT, OKID_ERR_NUMERIC (also when an
 ///         unstable A runs out of range)
 /// Cost (n_z n_u + n_z + n_u)^2 flop a sample. Source: docs/numerics.md, output error.
-OKID_NODISCARD OKID_API okid_status_t okid_subspace_output_error(int32_t n_u, int32_t n_y, int32_t n_z,
-                                                                 const okid_real_t* A, const okid_real_t* C,
-                                                                 int32_t records, const int32_t* counts,
-                                                                 const double* samples, okid_real_t* B, okid_real_t* D,
-                                                                 okid_real_t* x0, void* work, size_t bytes);
+OKID_NODISCARD OKID_API okid_status_t okid_subspace_output_error(const okid_model_t* model,
+                                                                 const okid_records_t* records, okid_real_t* B,
+                                                                 okid_real_t* D, okid_real_t* x0, void* work,
+                                                                 size_t bytes);
 
 #ifdef __cplusplus
 }
