@@ -48,7 +48,8 @@ test-embedded: ## firmware on Cortex-M in QEMU, the library on Arm boards, the i
 bench: build ## speed of the kernels and of whole identifications as ratios within one run
 	@tools/setup.sh bench || echo "bench: going on without SLICOT"
 	@tools/setup.sh test
-	@OPENBLAS_NUM_THREADS=1 build/okid bench --save build/bench.json
+	@OPENBLAS_NUM_THREADS=1 build/okid bench --only kernels --save build/bench.json
+	@cmake --build build --target bench_slicot -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_slicot build/bench.json
 	@$(PYTHON) tests/bench/python_call.py build/bench.json
 	@$(PYTHON) tests/bench/campaign.py 1000 5 build/bench.json
 	@PYTHONPATH=tests/support OPENBLAS_NUM_THREADS=1 $(PYTHON) tests/bench/live_latency.py

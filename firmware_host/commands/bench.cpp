@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // okid bench: what a sample costs in the recursive kernel, beside textbook RLS, the same product by OpenBLAS, and LAPACK
-// least squares on the whole record; and what whole identifications cost, beside SLICOT (bench_identify.cpp). All in one
+// least squares on the whole record; and what whole identifications cost (bench_identify.cpp). All in one
 // run, one thread: the ratios count, not the times.
 #include "bench_identify.hpp"
 #include "commands.hpp"
@@ -272,7 +272,7 @@ void run_bench(const bench_options& options) {
     std::vector<row> rows;
     nlohmann::ordered_json ratios = nlohmann::ordered_json::object(), list = nlohmann::ordered_json::array();
     if (options.only != "identifications") rows = bench_kernels(list, ratios);
-    if (options.only != "kernels") bench_identifications(list, ratios);
+    if (options.only != "kernels") bench_identifications(list);
     const nlohmann::ordered_json machine{
         {"backend", okid_backend()}, {"threads", 1}, {"pointer_bits", 8 * sizeof(void*)}};
     const nlohmann::ordered_json all{

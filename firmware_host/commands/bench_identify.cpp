@@ -3,9 +3,6 @@
 // Times are those of the thread's own clock: what other programs take of the processor is not in them.
 #include "bench_identify.hpp"
 
-#include "bench_record.hpp"
-#include "bench_slicot.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -18,13 +15,6 @@
 namespace okid_host {
 namespace {
 
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
-
-struct bench_size {
-    int structure, samples;
-    int block_rows; ///< s of SLICOT, i of the n4sid methods, p of okid
-    int era_rows;   ///< of okid
-};
 // The first three are those of comparisons between programs, the others okid's own: long horizons, short records.
 constexpr bench_size sizes[] = {{0, 10000, 10, 20}, {1, 20000, 15, 30}, {2, 100000, 22, 44},
                                 {0, 10000, 40, 80}, {1, 10000, 30, 60}, {2, 10000, 25, 50}};
@@ -41,25 +31,7 @@ constexpr method_name methods[] = {{OKID_METHOD_OKID_ERA, "okid-era"},
 
 enum class input { doubles, codes, doubles_qr };
 
-double now() {
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-/// One way of identifying one record: all memory is taken at construction, run() only works.
-class contender {
-  public:
-    virtual ~contender() = default;
-    /// false: no model
-    virtual bool run() = 0;
-
-    std::string kernel, sample = "double";
-    std::vector<double> seconds, update; ///< of each run; of them what an update of a live model takes
-    mode_error error{nothing, nothing};
-};
-
-class okid_contender : public contender {
+class okid_contender : public bench_contender {
   public:
     okid_contender(const bench_record& record, const bench_size& size, const method_name& how, input from,
                    bool output_error)
@@ -86,14 +58,14 @@ class okid_contender : public contender {
 
     bool run() override {
         if (!ready_) return false;
-        const double begin = now();
+        const double begin = bench_seconds();
         absorb();
-        const double absorbed = now();
+        const double absorbed = bench_seconds();
         bool good = (from_ == input::doubles_qr ? okid_identify_run_factor(identify_, square_root_, &found_)
                                                 : okid_identify_run(identify_, accumulator_, &found_)) >= 0;
-        const double end = now();
+        const double end = bench_seconds();
         good = good && (!output_error_ || fit_inputs());
-        seconds.push_back(now() - begin);
+        seconds.push_back(bench_seconds() - begin);
         update.push_back(end - absorbed);
         if (good) error = compare_modes(record_.truth, found_.frequency_hz, found_.damping_ratio, found_.mode_count);
         return good;
@@ -157,46 +129,9 @@ class okid_contender : public contender {
     okid_identified_t found_{};
 };
 
-class slicot_contender : public contender {
-  public:
-    slicot_contender(const bench_record& record, std::shared_ptr<slicot> library, slicot_method method,
-                     slicot_factor factor)
-        : record_(record), library_(std::move(library)), method_(method), factor_(factor),
-          work_(okid_modal_memsize(record.n_y, record.order)) {
-        kernel = fmt::format("slicot-{}{}", method == slicot_method::moesp ? "moesp" : "n4sid",
-                             factor == slicot_factor::qr ? "+qr" : "");
-        const auto modes = static_cast<std::size_t>(record.order / 2), outputs = static_cast<std::size_t>(record.n_y);
-        for (auto* each : {&frequency_, &damping_, &mpc_}) each->resize(modes);
-        for (auto* each : {&shape_re_, &shape_im_}) each->resize(modes * outputs);
-    }
-
-    bool run() override {
-        const double begin = now();
-        if (!library_->run(method_, factor_)) return false;
-        std::int32_t count = 0;
-        const okid_status_t status =
-            okid_modal_analyse(record_.n_y, record_.order, 1 / record_.rate_hz, library_->A(), library_->C(), &count,
-                               frequency_.data(), damping_.data(), mpc_.data(), shape_re_.data(), shape_im_.data(),
-                               nullptr, nullptr, nullptr, nullptr, nullptr, work_.data(), work_.size());
-        seconds.push_back(now() - begin);
-        if (status >= 0) error = compare_modes(record_.truth, frequency_.data(), damping_.data(), count);
-        return status >= 0;
-    }
-
-  private:
-    const bench_record& record_;
-    std::shared_ptr<slicot> library_; ///< one workspace for all of a size
-    const slicot_method method_;
-    const slicot_factor factor_;
-    std::vector<char> work_;
-    std::vector<double> frequency_, damping_, mpc_, shape_re_, shape_im_;
-};
-
-using contenders = std::vector<std::unique_ptr<contender>>;
-
-/// Noise-free records have a singular Gram matrix: both sides go by QR of the data there.
-contenders enter(const bench_record& record, const bench_size& size, bool noise_free) {
-    contenders all;
+/// Noise-free records have a singular Gram matrix: they go by QR of the data.
+bench_contenders enter(const bench_record& record, const bench_size& size, bool noise_free) {
+    bench_contenders all;
     const auto okid = [&](const method_name& how, input from, bool output_error = false) {
         all.push_back(std::make_unique<okid_contender>(record, size, how, from, output_error));
     };
@@ -205,22 +140,20 @@ contenders enter(const bench_record& record, const bench_size& size, bool noise_
         okid(methods[2], input::codes);
         okid(methods[2], input::doubles, true);
     }
-    if (const std::shared_ptr<slicot> library = slicot::load(record, size.block_rows))
-        for (const slicot_method method : {slicot_method::moesp, slicot_method::n4sid})
-            all.push_back(std::make_unique<slicot_contender>(record, library, method,
-                                                             noise_free ? slicot_factor::qr : slicot_factor::cholesky));
     return all;
 }
 
-void take_turns(contenders& all, int least, int most, double budget) {
-    const double begin = now();
-    for (int round = 0; round < most && (round < least || now() - begin < budget); ++round)
+void take_turns(bench_contenders& all, int least, int most, double budget) {
+    const double begin = bench_seconds();
+    for (int round = 0; round < most && (round < least || bench_seconds() - begin < budget); ++round)
         for (const auto& each : all)
             if (!each->run()) {
                 each->seconds.clear();
                 each->update.clear();
             }
 }
+
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 double smallest(const std::vector<double>& v) { return v.empty() ? nothing : *std::min_element(v.begin(), v.end()); }
 
@@ -230,7 +163,7 @@ double median(std::vector<double> v) {
     return v[v.size() / 2];
 }
 
-nlohmann::ordered_json describe(const bench_size& size, double noise, const contender& c) {
+nlohmann::ordered_json describe(const bench_size& size, double noise, const bench_contender& c) {
     return {{"name", "identify"},
             {"case", bench_structures()[static_cast<std::size_t>(size.structure)].name},
             {"p", size.block_rows},
@@ -252,27 +185,24 @@ std::string cell(const nlohmann::ordered_json& value, double unit) {
 
 } // namespace
 
-void bench_identifications(nlohmann::ordered_json& rows, nlohmann::ordered_json& ratios) {
+double bench_seconds() {
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+void bench_identifications(nlohmann::ordered_json& rows, const bench_entrants& others) {
     for (const bench_size& size : sizes)
         for (const double noise : {1.0, 5.0, 0.0}) {
             const bench_structure& from = bench_structures()[static_cast<std::size_t>(size.structure)];
             const bench_record record = make_record(from, size.samples, noise);
-            contenders all = enter(record, size, noise == 0);
+            bench_contenders all = enter(record, size, noise == 0);
+            if (others) others(record, size, all);
             if (noise == 1)
                 take_turns(all, 5, 25, 2);
             else
                 take_turns(all, 1, 1, 0);
-            double slicot_best = nothing;
-            for (const auto& each : all) {
-                rows.push_back(describe(size, noise, *each));
-                if (each->kernel == "slicot-moesp") slicot_best = smallest(each->seconds);
-            }
-            if (noise != 1 || std::isnan(slicot_best)) continue;
-            for (const auto& each : all)
-                if (each->kernel.find("slicot") != 0)
-                    ratios[fmt::format("slicot_moesp_over_{}{}_{}_s{}", each->kernel,
-                                       each->sample == "int16" ? "_i16" : "", from.name, size.block_rows)] =
-                        slicot_best / smallest(each->seconds);
+            for (const auto& each : all) rows.push_back(describe(size, noise, *each));
         }
 }
 
@@ -283,17 +213,14 @@ void print_identifications(const nlohmann::ordered_json& rows) {
         "\nwhole identifications, samples in memory to A, B, C, D, K and modes (least of the runs, thread time; "
         "update: the model from the sums)\n{:4} {:>3} {:>7} {:>5}  {:26} {:6} {:>10} {:>10} {:>10} {:>10} {:>10}\n",
         "case", "s", "samples", "noise", "method", "sample", "ms", "median ms", "update ms", "f error", "zeta error");
-    bool slicot_seen = false;
     for (const nlohmann::ordered_json& r : rows) {
         if (!identifies(r)) continue;
         const auto kernel = r["kernel"].get<std::string>();
-        slicot_seen = slicot_seen || kernel.find("slicot") == 0;
         fmt::print("{:4} {:3} {:7} {:4g}%  {:26} {:6} {} {} {} {} {}\n", r["case"].get<std::string>(),
                    r["p"].get<int>(), r["samples"].get<int>(), r["noise_percent"].get<double>(), kernel,
                    r["sample"].get<std::string>(), cell(r["seconds"], 1e3), cell(r["seconds_median"], 1e3),
                    cell(r["seconds_update"], 1e3), cell(r["frequency_error"], 1), cell(r["damping_error"], 1));
     }
-    if (!slicot_seen) fmt::print("SLICOT not installed (Debian package libslicot0): nothing to compare with\n");
 }
 
 } // namespace okid_host

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bench_slicot.hpp"
+#include "slicot.hpp"
 
 #include <algorithm>
 #include <cstddef>

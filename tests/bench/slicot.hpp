@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// SLICOT's subspace identification (IB01AD, IB01BD) for okid bench, from the Debian package libslicot0 at run time: the
-// program neither needs it nor is linked with it.
+// SLICOT's subspace identification (IB01AD, IB01BD), from the Debian package libslicot0 at run time.
 #pragma once
-#include "bench_record.hpp"
+#include "commands/bench_record.hpp"
 
 #include <memory>
 #include <vector>
