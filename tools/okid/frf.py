@@ -98,6 +98,17 @@ def _segment_length(records: Sequence[Real]) -> int:
     return length
 
 
+def solve_h1(guu: Complex, gyu: Complex, gyy: Real, count: int) -> tuple[Complex, Real]:
+    """H1 (F, n_y, n_u) and multiple coherence (F, n_y) of sums (or means) of `count` segments: guu (F, n_u, n_u), gyu
+    (F, n_y, n_u), gyy (F, n_y). The coherence is NaN while there are not more segments than inputs."""
+    response: Complex = np.matmul(gyu, np.linalg.pinv(guu, rcond=1e-10, hermitian=True), dtype=np.complex128)
+    coherence = np.full(gyy.shape, np.nan)
+    if count > guu.shape[-1]:
+        explained = np.einsum("fij,fij->fi", response, gyu.conj()).real
+        np.divide(explained, gyy, out=coherence, where=gyy > 0.0)
+    return response, np.clip(coherence, 0.0, 1.0)
+
+
 def h1(
     u: ArrayLike | Sequence[ArrayLike],
     y: ArrayLike | Sequence[ArrayLike],
@@ -141,13 +152,8 @@ def h1(
             count += 1
     if count == 0:
         raise InputError(f"no {nperseg} consecutive complete samples for a response function: shorten nperseg")
-    response: Complex = np.matmul(gyu, np.linalg.pinv(guu, rcond=1e-10, hermitian=True), dtype=np.complex128)
-    coherence = np.full(gyy.shape, np.nan)
-    if count > n_u:
-        explained = np.einsum("fij,fij->fi", response, gyu.conj()).real
-        np.divide(explained, gyy, out=coherence, where=gyy > 0.0)
     spacing = fs / nperseg
-    return Frf(np.arange(lines, dtype=np.float64) * spacing, response, np.clip(coherence, 0.0, 1.0), count, spacing)
+    return Frf(np.arange(lines, dtype=np.float64) * spacing, *solve_h1(guu, gyu, gyy, count), count, spacing)
 
 
 def synthesise(A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike, dt: float, frequency_hz: ArrayLike) -> Complex:

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from okid.frf import solve_h1
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 SHORTEST, LONGEST = 64, 4096  # samples of a segment
@@ -136,11 +138,6 @@ class Averages:
         count = int(self._paired[output])
         if count == 0:
             return None
-        guu, gyu = self._guu[output], self._gyu[output]
-        inverse = np.linalg.pinv(guu, rcond=1e-10, hermitian=True)
-        response = np.einsum("fi,fij->fj", gyu, inverse)
-        coherence = np.full(len(gyu), np.nan)
-        if count > self.n_u:
-            explained = np.einsum("fi,fi->f", response, gyu.conj()).real
-            np.divide(explained, self._gyy[output], out=coherence, where=self._gyy[output] > 0.0)
-        return Response(response[:, given], np.clip(coherence, 0.0, 1.0), count)
+        of_one = self._gyu[output][:, None], self._gyy[output][:, None]
+        response, coherence = solve_h1(self._guu[output], *of_one, count)
+        return Response(response[:, 0, given], coherence[:, 0], count)
