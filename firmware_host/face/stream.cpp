@@ -4,8 +4,10 @@
 #include "live/stream.hpp"
 
 #include "config/config_identification.hpp"
+#include "files.hpp"
 #include "guard.hpp"
 #include "options.hpp"
+#include "result/method.hpp"
 #include "result_handle.hpp"
 
 #include <okid_host/stream.h>
@@ -17,9 +19,11 @@
 
 struct okid_host_stream {
     okid_host::stream stream;
+    std::string json;
     std::vector<std::byte> state;
 
-    explicit okid_host_stream(okid_host::stream_config config) : stream(std::move(config)) {}
+    okid_host_stream(const okid_host::stream_config& config, std::string text)
+        : stream(config), json(std::move(text)) {}
     std::int64_t now() {
         const okid_accumulator_stats_t counts = stream.sums().stats();
         return counts.samples + counts.missing;
@@ -71,10 +75,19 @@ okid_sample_t sample_of(const std::string& codes) {
     refuse("codes", codes, "the bits of an ADC code: 16, 24 or 32, or 0 for real numbers");
 }
 
+int bits_of(okid_sample_t sample) {
+    switch (sample) {
+    case OKID_SAMPLE_INT16: return 16;
+    case OKID_SAMPLE_INT24: return 24;
+    case OKID_SAMPLE_INT32: return 32;
+    default: return 0;
+    }
+}
+
 struct stream_request {
     record_request record;
     std::string window_s, forgetting, update_s, codes, scale, offset, saturated = "keep";
-    bool restart_on_change = true;
+    bool restart_on_change = true, states_only = false;
 };
 
 void take_memory(const stream_request& given, stream_config& config) {
@@ -93,6 +106,7 @@ void take_memory(const stream_request& given, stream_config& config) {
 void take_samples(const stream_request& given, stream_config& config) {
     config.sample = sample_of(given.codes);
     config.bulk = true;
+    config.states_only = given.states_only;
     if (given.saturated != "keep" && given.saturated != "missing")
         refuse("saturated", '"' + given.saturated + '"', "keep or missing");
     config.saturated_missing = given.saturated == "missing";
@@ -102,8 +116,56 @@ void take_samples(const stream_request& given, stream_config& config) {
         if (scale == 0) throw failure(exit_usage, "scale: found 0: a channel times 0 measures nothing");
 }
 
-stream_config read_stream(const char* text) {
+std::string text_of(const std::optional<double>& number) { return number ? fmt::format("{}", *number) : ""; }
+
+/// What a configuration says, as texts that the options may replace.
+void start_from(const live_config& config, stream_request& to) {
+    require_identifiable(config);
+    const identification_config& wanted = config.identification;
+    record_request& r = to.record;
+    for (std::size_t i = 0; i < config.n_u + config.n_y; ++i)
+        (i < config.n_u ? r.inputs : r.outputs).push_back(config.channels[i].name);
+    r.fs = text_of(config.rate_hz);
+    r.method = wanted.method;
+    r.hankel = wanted.hankel;
+    r.hold = wanted.hold;
+    r.detrend = wanted.detrend;
+    r.p = std::to_string(wanted.p);
+    if (wanted.rows > 0) r.rows = std::to_string(wanted.rows);
+    if (wanted.order > 0) r.order = std::to_string(wanted.order);
+    r.sigma_blocks = std::to_string(wanted.sigma_blocks);
+    to.window_s = text_of(wanted.window_s);
+    to.forgetting = text_of(wanted.forgetting);
+    to.update_s = text_of(wanted.update_s);
+    to.restart_on_change = wanted.restart_on_change;
+}
+
+std::string stream_json(const stream_config& config) {
+    using nlohmann::ordered_json;
+    const identification_config& wanted = config.wanted;
+    const auto or_null = [](const std::optional<double>& x) { return x ? ordered_json(*x) : ordered_json(nullptr); };
+    return ordered_json{{"inputs", config.inputs},
+                        {"outputs", config.outputs},
+                        {"fs", config.rate_hz},
+                        {"method", wanted.method},
+                        {"p", wanted.p},
+                        {"rows", rows_used(method_of(wanted.method), config.inputs.size(), wanted.p, wanted.rows)},
+                        {"order", wanted.order == 0 ? ordered_json("auto") : ordered_json(wanted.order)},
+                        {"hankel", wanted.hankel},
+                        {"hold", wanted.hold},
+                        {"detrend", wanted.detrend},
+                        {"window_s", or_null(wanted.window_s)},
+                        {"forgetting", or_null(wanted.forgetting)},
+                        {"update_s", wanted.update_s},
+                        {"sigma_blocks", wanted.sigma_blocks},
+                        {"restart_on_change", wanted.restart_on_change},
+                        {"codes", bits_of(config.sample)}}
+        .dump();
+}
+
+stream_config read_stream(const char* text, const live_config* config) {
     stream_request given;
+    if (config) start_from(*config, given);
     option_places places = places_of(given.record);
     for (const auto& [name, place] :
          {std::pair{"window_s", &given.window_s}, std::pair{"forgetting", &given.forgetting},
@@ -111,6 +173,7 @@ stream_config read_stream(const char* text) {
           std::pair{"offset", &given.offset}, std::pair{"saturated", &given.saturated}})
         places.texts.emplace_back(name, place);
     places.flags.emplace_back("restart_on_change", &given.restart_on_change);
+    places.flags.emplace_back("states_only", &given.states_only);
     read_options(text, places);
     const record_options checked = check_request(given.record);
     if (checked.detrend == "linear") refuse("detrend", "\"linear\"", "none or mean: a stream has no line of its own");
@@ -125,6 +188,13 @@ stream_config read_stream(const char* text) {
     out.rate_hz = check_rate(given.record.fs);
     out.max_order = checked.max_order;
     out.mass = checked.mass;
+    if (config) {
+        out.where = config->path + ": [identification]: ";
+        const bool own = !given.record.input_dofs.empty() || !given.record.output_dofs.empty();
+        if (!own && checked.inputs.size() == config->n_u && checked.outputs.size() == config->n_y)
+            out.mass = live_mass_plan(*config);
+        out.mass.hold = checked.hold;
+    }
     identification_config& wanted = out.wanted;
     wanted.method = checked.method;
     wanted.hankel = checked.hankel;
@@ -154,6 +224,7 @@ okid_host_result_t* result_of(stream& from, result_context about) {
     okid_host_result_t* const out = make_result(from.model(), std::move(about));
     out->found.config = from.sums().config();
     out->found.identifier = from.sums().decomposition();
+    out->found.realised = from.model();
     return out;
 }
 
@@ -162,10 +233,15 @@ okid_host_result_t* result_of(stream& from, result_context about) {
 
 using namespace okid_host;
 
-int32_t okid_host_stream_create(const char* options, okid_host_stream_t** out) {
+int32_t okid_host_stream_create(const char* options, const okid_host_config_t* config, okid_host_stream_t** out) {
     *out = nullptr;
-    return face::guard([&] { *out = new okid_host_stream(face::read_stream(options)); });
+    return face::guard([&] {
+        const stream_config wanted = face::read_stream(options, config ? &config->config : nullptr);
+        *out = new okid_host_stream(wanted, face::stream_json(wanted));
+    });
 }
+
+const char* okid_host_stream_json(const okid_host_stream_t* self) { return self->json.c_str(); }
 
 int32_t okid_host_stream_add(okid_host_stream_t* self, int32_t kind, const void* rows, size_t count) {
     okid_status_t status = OKID_OK;

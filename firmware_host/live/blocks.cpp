@@ -32,7 +32,8 @@ owned_sums::owned_sums(const okid_accumulator_config_t& config) {
     if (block && okid_accumulator_create(&sums, &config, block.get(), bytes) != OKID_OK) sums = nullptr;
 }
 
-live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks)
+live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks,
+                         bool states_only)
     : whole_(whole), sums_(whole), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),
       blocks_(static_cast<std::size_t>(blocks)), n_u_(whole.n_u), n_y_(whole.n_y),
       most_states_(okid_identify_max_order(&identify)), dt_(1 / identify.fs_hz) {
@@ -47,7 +48,7 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
         length_ = std::max<std::int64_t>(1, std::llround(rows / whole.block)) * whole.block;
     }
     const std::size_t count = window() ? 2 : fading() ? 2 * blocks_ + 1 : 2 * blocks_;
-    for (std::size_t k = 0; k < count; ++k) parts_.push_back(make());
+    for (std::size_t k = 0; k < count && !states_only; ++k) parts_.push_back(make());
     const okid_jackknife_config_t config{identify, sums_};
     const std::size_t bytes = okid_jackknife_memsize(&config);
     jackknife_block_ = allocate(bytes, blocks);
@@ -161,7 +162,7 @@ void live_blocks::leave_out(okid_accumulator_t* one, double weight, replicate_st
 void live_blocks::delete_parts(okid_accumulator_t* whole, replicate_statistics& to) {
     const std::int64_t closed =
         okid_accumulator_rows(whole) - okid_accumulator_slot_rows(whole, okid_accumulator_slots(whole) - 1);
-    for (std::size_t k = 0; k <= open_; ++k) {
+    for (std::size_t k = 0; k <= open_ && k < parts_.size(); ++k) {
         const double age = k < open_ ? static_cast<double>(closed - parts_[k].closed_at) : 0;
         leave_out(parts_[k].sums, fading() ? std::pow(whole_.forgetting, age) : 1, to);
     }

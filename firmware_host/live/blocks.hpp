@@ -45,7 +45,9 @@ class live_blocks {
     /// @param blocks  to leave out: a window has about so many, a growing memory from so many to twice as many, a fading
     ///                one twice as many, because the young ones weigh most. Throws `failure` (exit 2) when the memory
     ///                does not suffice
-    live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks);
+    /// @param states_only  only take() is called: there is no memory for other blocks
+    live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks,
+                bool states_only = false);
 
     void set_units(const std::vector<double>& scale, const std::vector<double>& offset);
 

@@ -51,7 +51,8 @@ const char* sample_text(okid_sample_t sample) {
 } // namespace
 
 identifier::identifier(const stream_config& config)
-    : where_(config.where), m_(config.channels()), scale_(config.scale), offset_(config.offset) {
+    : where_(config.where), m_(config.channels()), states_only_(config.states_only), scale_(config.scale),
+      offset_(config.offset) {
     create_identifier(config);
     create_accumulator(config);
     create_watch(config);
@@ -73,7 +74,8 @@ void identifier::create_accumulator(const stream_config& config) {
         throw failure(exit_usage, where_ + "the accumulator cannot be made");
     okid_accumulator_set_units(accumulator_, scale_.data(), offset_.data());
     if (config.wanted.sigma_blocks == 0) return;
-    blocks_ = std::make_unique<live_blocks>(sums_config_, identify_config_, config.wanted.sigma_blocks);
+    blocks_ =
+        std::make_unique<live_blocks>(sums_config_, identify_config_, config.wanted.sigma_blocks, config.states_only);
     blocks_->set_units(scale_, offset_);
 }
 
@@ -218,6 +220,7 @@ template <class Number> okid_status_t identifier::add_rows(const Number* rows, s
         throw failure(exit_usage,
                       fmt::format("the stream takes {}, found {} of {} bytes", sample_text(sums_config_.sample),
                                   std::is_floating_point_v<Number> ? "real numbers" : "codes", sizeof(Number)));
+    if (states_only_) throw failure(exit_usage, "the stream takes states only, found samples");
     flush();
     okid_status_t worst = OKID_OK;
     while (count > 0) {
@@ -238,6 +241,7 @@ template okid_status_t identifier::add_rows(const std::int16_t*, std::size_t);
 template okid_status_t identifier::add_rows(const std::int32_t*, std::size_t);
 
 void identifier::add_missing(std::int64_t count) {
+    if (states_only_) throw failure(exit_usage, "the stream takes states only, found a gap");
     flush();
     samples_ += count;
     okid_watch_gap(watch_);

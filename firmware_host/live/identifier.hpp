@@ -79,6 +79,7 @@ class identifier {
 
     std::string where_;
     std::size_t m_;
+    bool states_only_;
     std::int64_t q_ = 0, memory_samples_ = 0; ///< 0 = everything is kept
     std::vector<double> scale_, offset_, doubles_;
     std::vector<std::int16_t> codes_;

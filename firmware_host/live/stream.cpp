@@ -29,6 +29,7 @@ void stream::restore(const void* state, std::size_t bytes) {
 
 void stream::forget_updates() {
     settling_.reset();
+    settled_ = false;
     tracks_.jump();
     changed_at_ = restarted_at_ = restarts_told_ = 0;
 }
@@ -47,6 +48,7 @@ stream_update stream::update(std::int64_t now) {
     }
     out.rows = identifier_.rows();
     if (out.rows >= needed()) out.status = identifier_.run();
+    settled_ = false;
     if (out.status < 0) {
         settling_.reset();
         return out;
@@ -54,7 +56,7 @@ stream_update stream::update(std::int64_t now) {
     static const std::vector<double> unknown;
     out.sigma = identifier_.sigma({});
     out.tracks = &tracks_.update(model());
-    out.settled = settling_.add(model(), *out.tracks, out.sigma ? out.sigma->frequency_hz : unknown);
+    out.settled = settled_ = settling_.add(model(), *out.tracks, out.sigma ? out.sigma->frequency_hz : unknown);
     if (out.settled) identifier_.watch_model();
     return out;
 }

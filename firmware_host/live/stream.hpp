@@ -31,6 +31,7 @@ class stream {
     /// Throws `failure` (exit 2) as identifier does.
     explicit stream(stream_config config);
 
+    const stream_config& config() const { return config_; }
     identifier& sums() { return identifier_; }
     const okid_identified_t& model() const { return identifier_.model(); }
     /// Equations an update needs: with fewer a model only repeats the noise.
@@ -39,6 +40,7 @@ class stream {
     /// Identify, follow the modes, and watch what comes from a model at rest on. Nothing in the sums changes.
     /// @param now  samples of the stream so far, as messages count them
     stream_update update(std::int64_t now);
+    bool settled() const { return settled_; }                                ///< at the last update
     bool at_rest(std::size_t mode) const { return settling_.at_rest(mode); } ///< of the last update
     void reset();
     /// As identifier::restore().
@@ -63,6 +65,7 @@ class stream {
     identifier identifier_;
     settling settling_;
     mode_tracks tracks_;
+    bool settled_ = false;
     std::int64_t changed_at_ = 0, restarted_at_ = 0, restarts_told_ = 0;
 };
 

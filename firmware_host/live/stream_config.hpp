@@ -20,6 +20,7 @@ struct stream_config {
     okid_sample_t sample = OKID_SAMPLE_DOUBLE; ///< what is added
     bool saturated_missing = false;            ///< codes: a sample with one at full scale is missing
     bool bulk = false;                         ///< long calls of 16-bit codes go through an FFT (the same bits)
+    bool states_only = false;                  ///< samples come as states to merge, none are added
     std::vector<double> scale, offset;         ///< of each channel: value = scale * sample + offset
     mass_plan mass;                            ///< M, K and R with a result, when it wants them
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import pathlib
 import re
 from typing import Any
@@ -33,37 +32,10 @@ def samples(rig: pathlib.Path) -> Real:
     return okid.read_csv(rig / "decoded.csv").samples
 
 
-def with_memory(rig: pathlib.Path, memory: dict[str, float]) -> pathlib.Path:
-    text = re.sub(r"(?m)^(window_s|forgetting) .*\n", "", (rig / "a.toml").read_text())
-    lines = "".join(f"{key} = {value}\n" for key, value in memory.items())
-    (rig / "b.toml").write_text(text.replace("[identification]\n", "[identification]\n" + lines))
-    return rig / "b.toml"
-
-
 def fed(session: okid.Session, samples: Real, size: int = 125) -> okid.Session:
     for first in range(0, len(samples), size):
         session.feed(samples[first : first + size])
     return session
-
-
-@pytest.mark.parametrize("memory", list(MEMORIES))
-def test_session_is_replay(rig: pathlib.Path, samples: Real, memory: str) -> None:
-    """Modes, matrices and their standard deviations of the program, from the samples it decoded."""
-    config = with_memory(rig, MEMORIES[memory])
-    done = run_okid("replay", rig / "a.log", "-c", config, "--json", rig / "r.json")
-    assert done.returncode == 0, done.stderr
-    truth = json.loads((rig / "r.json").read_text())
-    mine = fed(okid.Session.from_config(config), samples).identify().to_dict()
-    for key in ("samples", "inputs", "outputs", "p", "rows", "order", "hold", "detrend", "fs_hz", "method"):
-        assert mine[key] == truth[key], key
-    assert len(mine["modes"]) == len(truth["modes"])
-    for a, b in zip(mine["modes"], truth["modes"], strict=True):
-        assert a["frequency_hz"] == pytest.approx(b["frequency_hz"], rel=1e-9)
-        assert a["damping_ratio"] == pytest.approx(b["damping_ratio"], rel=1e-6)
-        assert a["frequency_std_hz"] == pytest.approx(b["frequency_std_hz"], rel=1e-4)
-        assert a["damping_ratio_std"] == pytest.approx(b["damping_ratio_std"], rel=1e-4)
-    for name in ("M", "K", "R", "M_std", "K_std"):
-        np.testing.assert_allclose(mine["mkr"][name], truth["mkr"][name], rtol=1e-3 if "std" in name else 1e-5)
 
 
 @settings(max_examples=15, deadline=None)
@@ -150,13 +122,13 @@ def test_ambient_session() -> None:
     ("wrong", "text"),
     [
         ({"window_s": 2.0, "forgetting": 0.99}, "exclude each other"),
-        ({"detrend": "linear"}, "'none' or 'mean'"),
+        ({"detrend": "linear"}, "none or mean"),
         ({"sigma_blocks": 3}, "8 to 100"),
-        ({"forgetting": -0.5}, "forgetting is -0.5"),
-        ({"method": "okid"}, "method is 'okid'"),
+        ({"forgetting": -0.5}, "forgetting: found -0.5, expected a factor above 0 to 1"),
+        ({"method": "okid"}, 'method: found "okid"'),
         ({"inputs": ["y1"]}, "name of its own"),
-        ({"p": 5000}, "do not go together"),
-        ({"codes": 12}, "codes is 12"),
+        ({"p": 5000}, "from 1 to 4096"),
+        ({"codes": 12}, "codes: found 12"),
     ],
 )
 def test_wrong_arguments(wrong: dict[str, Any], text: str) -> None:
@@ -167,12 +139,11 @@ def test_wrong_arguments(wrong: dict[str, Any], text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (None, "No such file"),
-        ("a = [", "not TOML: "),
-        ("[acquisition]\nrate_hz = 100\n", "no [[channel]]"),
-        ('[[channel]]\nname = "a"\nrole = "acceleration"\n', 'key "rate_hz" is missing'),
-        ('[acquisition]\nrate_hz = 100\n[[channel]]\nrole = "force"\n', "not a config of okid (KeyError('name')"),
-        ('[acquisition]\nrate_hz = "x"\n[[channel]]\nname = "a"\nrole = "acceleration"\n', "fs is 'x'"),
+        (None, "no such file"),
+        ("a = [", "line 1"),
+        ("[acquisition]\nrate_hz = 100\n", "no [[bus]]"),
+        ('[[channel]]\nname = "a"\nrole = "acceleration"\n', '"rate_hz" is missing'),
+        ('[acquisition]\nrate_hz = "x"\n', 'found "x", expected a number above 0'),
     ],
 )
 def test_wrong_configs(tmp_path: pathlib.Path, text: str | None, says: str) -> None:

@@ -4,18 +4,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 import systems
 from numpy.typing import NDArray
-from okid import identify
-from okid.abi.accumulator import Accumulator
-from okid.abi.identifier import Identified, Identifier
-from okid.result.model import Model
+from okid import Session, identify
 from okid.result.result import Result
-from okid.result.uncertainty import Jackknife, Replicates, Uncertainty
 
 Array = NDArray[np.float64]
 SLOW = os.environ.get("OKID_SLOW") == "1"
@@ -131,56 +127,20 @@ def test_merged_records_with_gaps() -> None:
     assert all(0.7 < x < 1.4 for x in size.values()), size
 
 
-def _deviate(identifier: Identifier, whole: Accumulator, parts: list[tuple[Accumulator, float]]) -> Uncertainty:
-    found = identifier.run(whole)
-    replicates, jackknife = Replicates(_model(found)), Jackknife(identifier, whole)
-    for part, weight in parts:
-        replicates.add(*jackknife.delete(part, weight))
-    return replicates.finish()
-
-
-def _model(found: Identified) -> Model:
-    return Model(found.A, found.B, found.C, found.D, found.K, found.dt)
-
-
-def _windowed(v: Array, identifier: Identifier) -> tuple[Identified, Uncertainty]:
-    """A window of 4000 samples at the end of a stream; its slots are the parts."""
-    window = Accumulator(1, 3, identifier.lags, block=200, slots=20, spare_slots=4)
-    window.add(v)
-    whole, parts = Accumulator(1, 3, identifier.lags), []
-    whole.take_slots(window, 0, window.slots)
-    for k in range(window.slots):
-        if window.slot_rows(k) > 0:
-            part = Accumulator(1, 3, identifier.lags)
-            part.take_slots(window, k, 1)
-            parts.append((part, 1.0))
-    return identifier.run(window), _deviate(identifier, whole, parts)
-
-
-def _forgetting(v: Array, identifier: Identifier) -> tuple[Identified, Uncertainty]:
-    """lambda = 0.9995: parts of 250 rows that fade with their age, 40 of them, because the young ones weigh most."""
-    forgetting, block, rows, lags = 0.9995, 50, 250, identifier.lags
-    whole = Accumulator(1, 3, lags, block=block, forgetting=forgetting)
-    whole.add(v)
-    last = lags + (len(v) - lags) // block * block
-    parts = []
-    for k in range(40):
-        end = last - rows * k
-        part = Accumulator(1, 3, lags, block=block, forgetting=forgetting)
-        part.add(v[end - rows - lags : end if k else len(v)])
-        parts.append((part, forgetting ** float(rows * k)))
-    return identifier.run(whole), _deviate(identifier, whole, parts)
-
-
-@pytest.mark.parametrize("memory", [_windowed, _forgetting])
-def test_live_memories(memory: Callable[[Array, Identifier], tuple[Identified, Uncertainty]]) -> None:
-    """Frequencies and damping ratios of a window and of a fading memory."""
+@pytest.mark.parametrize("memory", [{"window_s": 4000 / W1.fs, "update_s": 200 / W1.fs}, {"forgetting": 0.9995}])
+def test_live_memories(memory: dict[str, float]) -> None:
+    """Frequencies and damping ratios of a window of 4000 samples and of a fading memory."""
     scores: dict[str, list[Array]] = {"f": [], "zeta": []}
     for u, y in _records(200 if SLOW else 60, 12000):
-        identifier = Identifier(1, 3, fs=W1.fs, p=40, order=6)
-        found, sigma = memory(np.hstack([u, y]), identifier)
-        scores["f"].append((found.frequency_hz - TRUTH["f"]) / sigma.frequency_hz)
-        scores["zeta"].append((found.damping_ratio - TRUTH["zeta"]) / sigma.damping_ratio)
+        session = Session(1, 3, fs=W1.fs, p=40, order=6, **memory)
+        session.feed(np.hstack([u, y]))
+        modes = session.modes()
+        for kind, name in (("f", "frequency_hz"), ("zeta", "damping_ratio")):
+            std = {"f": "frequency_std_hz", "zeta": "damping_ratio_std"}[kind]
+            z = [
+                (getattr(mode, name) - true) / getattr(mode, std) for mode, true in zip(modes, TRUTH[kind], strict=True)
+            ]
+            scores[kind].append(np.array(z))
     for kind, z in scores.items():
         assert 85.0 <= 100.0 * np.mean(np.abs(np.array(z)) <= 1.96) <= 99.5, kind
         assert 0.75 < np.sqrt(np.mean(np.array(z) ** 2)) < 1.3, kind

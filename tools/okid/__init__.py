@@ -13,9 +13,9 @@ from okid._errors import Error, IdentificationError, InputError
 from okid.abi.accumulator import Accumulator
 from okid.abi.identifier import Identified, Identifier, usable_p
 from okid.abi.square_root import SquareRoot
+from okid.abi.sums import Stats
 from okid.data.records import Record, read_csv
 from okid.data.structure import Structure
-from okid.data.sums import Stats
 from okid.demo import demo, demo_frame, demo_record
 from okid.identify import identify
 from okid.result.modal_table import ModalTable

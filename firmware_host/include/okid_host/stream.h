@@ -9,13 +9,15 @@
 #ifndef OKID_HOST_STREAM_H
 #define OKID_HOST_STREAM_H
 
-#include <okid_host/record.h>
+#include <okid_host.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 typedef struct okid_host_stream okid_host_stream_t;
+struct okid_host_config; /* okid_host/files.h */
+struct okid_host_result; /* okid_host/record.h */
 
 /**
  * Make a stream.
@@ -23,11 +25,16 @@ typedef struct okid_host_stream okid_host_stream_t;
  *                 detrend (none or mean), sigma_blocks, sensing, input_dofs, output_dofs as for okid_host_identify();
  *                 window_s, forgetting, update_s, restart_on_change as in [identification] of a CONFIG.toml; codes (0 real
  *                 numbers, or the bits of ADC codes: 16, 24, 32), scale and offset (one number, or one a channel: value =
- *                 scale * sample + offset), saturated (keep, missing: samples with a code at full scale). null = as if not
- *                 given
+ *                 scale * sample + offset), saturated (keep, missing: samples with a code at full scale); states_only
+ *                 (true: nothing is added but states, so no memory for further blocks is needed). null = as if not given
+ * @param config   NULL; or what stands for the options that are not given. Samples are then in the SI units of its channels
  * @return 0 and the stream; else 2, and `*out` is NULL
  */
-OKID_HOST_API int32_t okid_host_stream_create(const char* options, okid_host_stream_t** out);
+OKID_HOST_API int32_t okid_host_stream_create(const char* options, const struct okid_host_config* config,
+                                              okid_host_stream_t** out);
+
+/** The options in force as JSON, with those that were not given. */
+OKID_HOST_API const char* okid_host_stream_json(const okid_host_stream_t* self);
 
 /** What samples are. Real numbers go to a stream with codes = 0, codes to one with codes of their size. */
 typedef enum okid_host_sample {
@@ -61,6 +68,7 @@ typedef struct okid_host_stream_counts {
     int64_t restarts;  /**< changes of the structure after which what was before was forgotten */
     int64_t bytes;     /**< of the sums of the whole */
     int64_t unknowns;  /**< of the regression; modes are shown from twice as many equations on */
+    int64_t settled;   /**< 1: the modal table of the last update has come to rest */
 } okid_host_stream_counts_t;
 OKID_HOST_API int32_t okid_host_stream_stats(okid_host_stream_t* self, okid_host_stream_counts_t* out);
 
@@ -70,11 +78,11 @@ OKID_HOST_API int32_t okid_host_stream_stats(okid_host_stream_t* self, okid_host
  * memory has then forgotten what was before (restart_on_change).
  * @return 0 and the result, NULL while there is no model to be had; or 2, 3, 4
  */
-OKID_HOST_API int32_t okid_host_stream_update(okid_host_stream_t* self, okid_host_result_t** result);
+OKID_HOST_API int32_t okid_host_stream_update(okid_host_stream_t* self, struct okid_host_result** result);
 
 /** Everything the samples tell by now. The decomposition of the result is the stream's: it is gone with the next update or
  * result of the stream. @return 0; 3: no model can be had; 4 */
-OKID_HOST_API int32_t okid_host_stream_identify(okid_host_stream_t* self, okid_host_result_t** result);
+OKID_HOST_API int32_t okid_host_stream_identify(okid_host_stream_t* self, struct okid_host_result** result);
 
 /** The sums as bytes, for a file or another machine (format: okid/accumulator.h); the bytes are the stream's until its next
  * call. Every release reads those of earlier ones. @return 0 or 4 */

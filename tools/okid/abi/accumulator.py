@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
-from okid.data.sums import Sums
+from okid.abi.sums import Sums
 
 _SAMPLE = {0: abi.SAMPLE_DOUBLE, 16: abi.SAMPLE_INT16, 24: abi.SAMPLE_INT24, 32: abi.SAMPLE_INT32}
 

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from okid._errors import IdentificationError, InputError
+from okid._errors import InputError
 
 
 def choice(name: str, value: str, allowed: Sequence[str]) -> str:
@@ -55,17 +56,6 @@ def channel_names(given: Sequence[str] | None, values: Any, letter: str, count: 
     return out
 
 
-def with_name(fault: IdentificationError, inputs: Sequence[str], outputs: Sequence[str]) -> IdentificationError:
-    """The same fault with the name of the channel it lies in, where the library says which."""
-    channel = getattr(fault, "channel", -1)
-    if channel < 0:
-        return fault
-    kind, name = ("input", inputs[channel]) if channel < len(inputs) else ("output", outputs[channel - len(inputs)])
-    out = IdentificationError(f"{str(fault).split(' (channel ')[0]} ({kind} {name!r})", fault.status)
-    out.channel = channel  # type: ignore[attr-defined]
-    return out
-
-
 def frame_names(values: Any) -> list[str] | None:
     """Column names of a pandas frame (or of the first of several), None where there are none that say something."""
     first = values[0] if isinstance(values, list | tuple) and values else values
@@ -74,3 +64,19 @@ def frame_names(values: Any) -> list[str] | None:
         return None
     found = list(columns)
     return found if all(isinstance(name, str) for name in found) and len(set(found)) == len(found) else None
+
+
+def unmasked(values: ArrayLike) -> NDArray[Any]:
+    """As an array; what a masked array hides is missing (NaN), what pandas holds as missing too."""
+    if isinstance(values, np.ma.MaskedArray):
+        return np.ma.filled(values.astype(np.float64), np.nan) if np.ma.is_masked(values) else values.filled()
+    to_numpy = getattr(values, "to_numpy", None)
+    if to_numpy is not None and not isinstance(values, np.ndarray):  # nullable columns of pandas come as objects
+        plain = to_numpy()
+        if plain.dtype == object:
+            try:
+                return np.asarray(to_numpy(dtype=np.float64, na_value=np.nan))
+            except (TypeError, ValueError):
+                pass
+        return np.asarray(plain)
+    return np.asarray(values)

@@ -74,6 +74,18 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
         _size,
         [_status, _size, _size, ctypes.c_uint32, ctypes.c_uint32, _handle, _handle, _size],
     ),
+    "okid_host_stream_create": (_status, [_text, _handle, _out]),
+    "okid_host_stream_json": (_text, [_handle]),
+    "okid_host_stream_add": (_status, [_handle, _status, _handle, ctypes.c_size_t]),
+    "okid_host_stream_gap": (_status, [_handle, ctypes.c_int64]),
+    "okid_host_stream_reset": (None, [_handle]),
+    "okid_host_stream_stats": (_status, [_handle, _handle]),
+    "okid_host_stream_update": (_status, [_handle, _out]),
+    "okid_host_stream_identify": (_status, [_handle, _out]),
+    "okid_host_stream_state": (_status, [_handle, _out, _sizes]),
+    "okid_host_stream_restore": (_status, [_handle, ctypes.c_char_p, ctypes.c_size_t]),
+    "okid_host_stream_merge": (_status, [_handle, ctypes.c_char_p, ctypes.c_size_t]),
+    "okid_host_stream_delete": (None, [_handle]),
 }
 ABI = 1
 _ERRORS: dict[int, type[Error]] = {2: InputError, 3: IdentificationError}
@@ -105,13 +117,18 @@ def library() -> Any:
     return loaded
 
 
-def call(name: str, *arguments: Any) -> int:
-    """`okid_host_NAME(...)`. Raises InputError (exit code 2), IdentificationError (3) or Error with its sentence."""
-    status: int = getattr(library(), f"okid_host_{name}")(*arguments)
-    if status == 0:
-        return 0
+def error(code: int) -> Error:
+    """What the last failed call said, as InputError (exit code 2), IdentificationError (3) or Error."""
     text: bytes = library().okid_host_error()
-    raise _ERRORS.get(status, Error)(text.decode("utf-8", "replace"), library().okid_host_error_status())
+    return _ERRORS.get(code, Error)(text.decode("utf-8", "replace"), library().okid_host_error_status())
+
+
+def call(name: str, *arguments: Any) -> int:
+    """`okid_host_NAME(...)`. Raises error()."""
+    code: int = getattr(library(), f"okid_host_{name}")(*arguments)
+    if code != 0:
+        raise error(code)
+    return code
 
 
 def config(path: str | Path, text: str | None = None) -> dict[str, Any]:

@@ -34,11 +34,16 @@ def _plain(value: Any) -> Any:
     return value if value is None or isinstance(value, bool | int | float | str) else repr(value)
 
 
-class HostResult:
-    """An okid_host_result_t, deleted with this object."""
+def options_text(options: Mapping[str, Any]) -> bytes:
+    """For the library."""
+    return json.dumps(_plain(options)).encode()
 
-    def __init__(self, handle: ctypes.c_void_p) -> None:
-        self.handle = handle
+
+class HostResult:
+    """An okid_host_result_t, deleted with this object; `owner`: whose memory its decomposition is."""
+
+    def __init__(self, handle: ctypes.c_void_p, owner: object = None) -> None:
+        self.handle, self._owner = handle, owner
         weakref.finalize(self, host.library().okid_host_result_delete, handle)
 
     def _text(self, what: str) -> str:
@@ -88,6 +93,5 @@ def identify(options: Mapping[str, Any], records: Sequence[Real]) -> HostResult:
     samples = (ctypes.c_void_p * count)(*(one.ctypes.data for one in rows))
     counts = (ctypes.c_size_t * count)(*map(len, rows))
     names = (ctypes.c_char_p * count)(*(f"record {k} (counted from 0)".encode() for k in range(count)))
-    text = json.dumps(_plain(options)).encode()
-    host.call("identify", text, count, samples, counts, names, None, None, ctypes.byref(handle))
+    host.call("identify", options_text(options), count, samples, counts, names, None, None, ctypes.byref(handle))
     return HostResult(handle)

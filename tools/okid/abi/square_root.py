@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
-from okid.data.sums import Sums
+from okid.abi.sums import Sums
 
 
 class Observer(NamedTuple):

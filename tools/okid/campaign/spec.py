@@ -14,8 +14,8 @@ from typing import Any
 
 from okid._errors import InputError
 from okid.campaign.spec_keys import Place, check_keys, nearest
-from okid.result.uncertainty import FEWEST, GROUPS
 
+GROUPS, FEWEST = 20, 8  # parts that are left out in turn; below 8 a standard deviation says nothing
 TIME_KEYS = ("hour", "day", "week", "month", "year")
 BAND = "temperature_band"
 _ALONE = "record"  # a group key: every record by itself

@@ -90,7 +90,7 @@ def run_batch(spec: CampaignSpec, slices: Sequence[Slice]) -> list[SliceDone]:
             done.sums.parts = into.parts()
             continue
         parts = into.accumulators()
-        done.sums.result = identify_group(spec, done.sums.lags, parts)
+        done.sums.result = identify_group(spec, parts)
         if _keeps_parts(spec, done.sums, parts):
             done.sums.parts = into.parts()
         else:
@@ -107,7 +107,7 @@ def finish_group(spec: CampaignSpec, packed: Sequence[bytes]) -> GroupSums:
     """The last node of the tree: everything of a group, identified."""
     sums = merge_sums(spec, [GroupSums.from_bytes(one, "a merge") for one in packed])
     parts = [unpack(data) for _, data in sorted(sums.parts.items())]
-    sums.result = identify_group(spec, sums.lags, parts)
+    sums.result = identify_group(spec, parts)
     if not _keeps_parts(spec, sums, parts):
         _merged(spec, sums, parts)
     return sums

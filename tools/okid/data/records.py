@@ -17,24 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
 from okid.abi import host
+from okid.abi.arguments import unmasked
 
 Real = NDArray[np.float64]
-
-
-def unmasked(values: ArrayLike) -> NDArray[Any]:
-    """As an array; what a masked array hides is missing (NaN), what pandas holds as missing too."""
-    if isinstance(values, np.ma.MaskedArray):
-        return np.ma.filled(values.astype(np.float64), np.nan) if np.ma.is_masked(values) else values.filled()
-    to_numpy = getattr(values, "to_numpy", None)
-    if to_numpy is not None and not isinstance(values, np.ndarray):  # nullable columns of pandas come as objects
-        plain = to_numpy()
-        if plain.dtype == object:
-            try:
-                return np.asarray(to_numpy(dtype=np.float64, na_value=np.nan))
-            except (TypeError, ValueError):
-                pass
-        return np.asarray(plain)
-    return np.asarray(values)
 
 
 def _one(values: ArrayLike, what: str) -> Real:

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
-from okid.result.mkr import SENSING
 from okid.result.model import Model
 from okid.result.parts import Mode
 
 Real = NDArray[np.float64]
+SENSING = ("displacement", "velocity", "acceleration")  # in the order of okid_sensing_t
 _HOLDS = {"zoh": abi.HOLD_ZERO, "foh": abi.HOLD_FIRST}
 
 

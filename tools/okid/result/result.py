@@ -35,7 +35,6 @@ class _Parsed(NamedTuple):
 
     raw: dict[str, Any]
     text: str
-    decomposition: Identifier | None = None
 
     def json(self) -> str:
         return json.dumps(self.raw, allow_nan=False) + "\n"
@@ -53,7 +52,7 @@ class _Parsed(NamedTuple):
         return None if part is None else numbers(part)
 
     def identifier(self) -> Identifier | None:
-        return self.decomposition
+        return None
 
 
 @dataclass(repr=False)

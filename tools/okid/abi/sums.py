@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import Error, InputError
-from okid.abi.arguments import whole
-from okid.data.records import unmasked
+from okid.abi.arguments import unmasked, whole
 
 _ADD: dict[np.dtype[Any], str] = {  # what a C-contiguous array of samples goes to as it stands
     np.dtype(np.float64): "add",
