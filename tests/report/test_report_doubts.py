@@ -15,7 +15,6 @@ import pytest
 import report_files
 from okid import report
 from okid.data.records import Record
-from okid.data.units import SI
 from okid.demo import demo_record
 from okid.report.scale import agreement, doubts
 from report_files import FS
@@ -40,13 +39,6 @@ def summary(page: str) -> str:
     found = re.search(r'<div class="verdict.*?</div>', page, re.DOTALL)
     assert found is not None
     return html.unescape(found.group())
-
-
-def test_units_are_those_of_the_program() -> None:
-    text = (Path(__file__).parents[2] / "firmware_host" / "files" / "units.cpp").read_text(encoding="utf-8")
-    rules = re.findall(r'\{"([^"]*)", ([0-9.e-]+), "([^"]*)"\}', text)
-    table = {re.sub(r"\\u00b5", "µ", name): (float(size), si) for name, size, si in rules if float(size) != 1.0}
-    assert table == SI
 
 
 def test_known_units_are_made_those_of_the_model(frame: tuple[Any, Any, Any], tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from okid.abi.host import unit as si_of
 from okid.data.records import Record
-from okid.data.units import SI
 from okid.frf import is_hit
 from okid.report.answers import detrended, stretches
 from okid.result.model import Model
@@ -59,6 +59,11 @@ def _factors(model: Model, u: Real, y: Real) -> Real:
     return out
 
 
+def _factor(unit: str) -> float:
+    """What makes a known unit SI; 1 for all others."""
+    return (si_of(unit) or (1.0, unit))[0]
+
+
 def _near(factor: float, wanted: float) -> bool:
     return abs(factor / wanted - 1.0) <= TOLERANCE
 
@@ -66,7 +71,7 @@ def _near(factor: float, wanted: float) -> bool:
 def _outputs_made_si(factor: Real, units: Sequence[str]) -> list[bool]:
     """Outputs whose factor is that of their unit, and not 1."""
     return [
-        unit in SI and not _near(one, 1.0) and _near(one, SI[unit][0])
+        _factor(unit) != 1.0 and not _near(one, 1.0) and _near(one, _factor(unit))
         for one, unit in zip(factor.tolist(), units, strict=True)
     ]
 
@@ -74,14 +79,15 @@ def _outputs_made_si(factor: Real, units: Sequence[str]) -> list[bool]:
 def _converted(record: Record, places: Sequence[int]) -> Record:
     samples, units = record.samples.copy(), list(record.units)
     for k in places:
-        samples[:, k] *= SI[units[k]][0]
-        units[k] = SI[units[k]][1]
+        factor, si = si_of(units[k]) or (1.0, units[k])
+        samples[:, k] *= factor
+        units[k] = si
     return replace(record, samples=samples, units=units)
 
 
 def _sentence(record: Record, place: int) -> str:
-    size, si = SI[record.units[place]]
     unit = record.units[place]
+    size, si = si_of(unit) or (1.0, unit)
     return f"{record.names[place]!r} of the record is in {unit}, the model in {si}: 1 {unit} is taken as {size:g} {si}"
 
 
@@ -96,13 +102,13 @@ def agreement(model: Model, record: Record, n_u: int, detrend: str, used: slice)
     if n_u == 0:
         return Agreement(np.full(n_y, np.nan), record, [])
     data = detrended(record.samples[used], detrend)
-    inputs = [k for k in range(n_u) if record.units[k] in SI]
+    inputs = [k for k in range(n_u) if _factor(record.units[k]) != 1.0]
     best: tuple[int, list[int], Real] | None = None
     for turned in ([], inputs) if inputs else ([],):
-        scale = np.array([SI[record.units[k]][0] if k in turned else 1.0 for k in range(n_u)])
+        scale = np.array([_factor(record.units[k]) if k in turned else 1.0 for k in range(n_u)])
         factor = _factors(model, data[:, :n_u] * scale, data[:, n_u:])
         made = _outputs_made_si(factor, record.units[n_u:])
-        sizes = [SI[record.units[n_u + k]][0] if made[k] else 1.0 for k in range(n_y)]
+        sizes = [_factor(record.units[n_u + k]) if made[k] else 1.0 for k in range(n_y)]
         left = factor / np.array(sizes)
         good = int(np.sum(np.abs(left - 1.0) <= TOLERANCE))
         if best is None or good > best[0]:
