@@ -24,8 +24,7 @@ _out, _sizes = ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(ctypes.c_size_t)
 class Array(ctypes.Structure):
     """okid_host_array_t."""
 
-    _fields_ = (("data", ctypes.POINTER(ctypes.c_double)), ("rank", ctypes.c_int32), ("size", ctypes.c_size_t * 3),
-                ("stride", ctypes.c_size_t * 3))  # fmt: skip
+    _fields_ = (("data", _handle), ("rank", _status), ("size", _size * 3), ("stride", _size * 3))
 
 
 class Decomposition(ctypes.Structure):

@@ -74,8 +74,8 @@ class HostResult:
         if 0 in shape:
             return np.zeros(shape)
         count = 1 + sum((n - 1) * step for n, step in zip(shape, strides, strict=True))
-        flat = np.ctypeslib.as_array(view.data, (count,))
-        return np.array(np.lib.stride_tricks.as_strided(flat, shape, [8 * step for step in strides]), order="C")
+        memory = (ctypes.c_char * (8 * count)).from_address(view.data)
+        return np.array(np.ndarray(shape, np.float64, memory, 0, [8 * step for step in strides]), order="C")
 
     def identifier(self) -> Identifier | None:
         """The decomposition, for models of other orders; it keeps this object alive. None: there is none."""

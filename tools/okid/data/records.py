@@ -26,7 +26,7 @@ def _one(values: ArrayLike, what: str) -> Real:
     given = unmasked(values)
     if given.dtype.kind not in "fiub":
         raise InputError(f"{what} is of type {given.dtype}, expected real numbers")
-    real = np.array(given, dtype=np.float64)  # a copy: the caller's array is never modified
+    real = np.asarray(given, dtype=np.float64)  # perhaps the caller's own: nobody may modify it
     if real.ndim == 1:
         real = real[:, None]
     if real.ndim != 2 or real.shape[1] == 0:
@@ -50,7 +50,7 @@ def _many(values: ArrayLike | Sequence[ArrayLike], what: str) -> list[Real]:
 def paired(
     u: ArrayLike | Sequence[ArrayLike] | None, y: ArrayLike | Sequence[ArrayLike]
 ) -> tuple[list[Real], list[Real]]:
-    """Records as two lists of float64 copies (N, n_u) and (N, n_y) of matching lengths; u None = no inputs.
+    """Records as two lists of float64 (N, n_u) and (N, n_y) of matching lengths, to be read only; u None = no inputs.
 
     A list or tuple of NumPy arrays or pandas frames is several records; everything else is one. InputError names what
     does not fit.
