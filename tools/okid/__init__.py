@@ -17,12 +17,12 @@ from okid.abi.sums import Stats
 from okid.data.records import Record, read_csv
 from okid.data.structure import Structure
 from okid.demo import demo, demo_frame, demo_record
-from okid.identify import identify
+from okid.identify import identify, stabilization
 from okid.result.modal_table import ModalTable
 from okid.result.model import Model
 from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping
 from okid.result.result import Result
-from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization, stabilization
+from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization
 from okid.session import Session
 
 __all__ = [

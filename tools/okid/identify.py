@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from okid._errors import InputError
 from okid.abi import host_result
 from okid.abi.arguments import channel_names
 from okid.data.records import paired
 from okid.result.result import Result
+from okid.result.stabilization import Criteria, Stabilization, of_identifiers
 
 
 def identify(
@@ -86,3 +89,43 @@ def identify(
         "sensing": sensing, "refine": refine, "sigma_blocks": sigma_blocks, "units": units,
     }  # fmt: skip
     return Result.of_host(host_result.identify(options, records))
+
+
+def stabilization(
+    u: ArrayLike | Sequence[ArrayLike] | None,
+    y: ArrayLike | Sequence[ArrayLike],
+    *,
+    fs: float,
+    horizons: Sequence[int] | None = None,
+    orders: Iterable[int] | None = None,
+    criteria: Criteria | None = None,
+    **options: Any,
+) -> Stabilization:
+    """Identify at several horizons and orders and gather the poles into modes: no order has to be chosen.
+
+    `horizons`: values of p, or of the block rows for methods without observer (default: a half, three quarters and all
+    of what okid.identify() would take); `orders` default: all even ones the data carry. Other arguments are those of
+    okid.identify(), u and y too. Result: `modes`, `clusters`, and the rows of the diagram.
+
+    >>> import okid
+    >>> found = okid.stabilization(*okid.demo_record(), fs=1000.0)
+    >>> [round(mode.frequency_hz, 1) for mode in found.modes]
+    [11.0, 31.8, 45.7]
+    """
+    if "order" in options:
+        raise InputError("order is not an argument of stabilization(): it looks at many, give orders=[...]")
+    subspace = str(options.get("method", "okid-era")).startswith("n4sid")
+    key = "rows" if u is None or subspace else "p"
+    asked = None if orders is None else sorted(set(orders))
+    if asked:
+        options.setdefault("max_order", max(asked))
+    if horizons is None:
+        first = identify(u, y, fs=fs, **options)
+        reach = first.p
+        results = [first] + [
+            identify(u, y, fs=fs, **{**options, key: n}) for n in sorted({reach // 2, 3 * reach // 4} - {0, 1, reach})
+        ]
+    else:
+        results = [identify(u, y, fs=fs, **{**options, key: int(n)}) for n in sorted(set(horizons))]
+    results.sort(key=lambda result: result.p)
+    return of_identifiers([result.identifier for result in results if result.identifier is not None], asked, criteria)

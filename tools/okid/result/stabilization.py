@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from okid import abi
 from okid._errors import Error, InputError
@@ -199,45 +199,3 @@ def of_identifiers(
     for one, each in zip(identifiers, wanted, strict=True):
         collector.add_orders(one, each)
     return collector.find()
-
-
-def stabilization(
-    u: ArrayLike | Sequence[ArrayLike] | None,
-    y: ArrayLike | Sequence[ArrayLike],
-    *,
-    fs: float,
-    horizons: Sequence[int] | None = None,
-    orders: Iterable[int] | None = None,
-    criteria: Criteria | None = None,
-    **options: Any,
-) -> Stabilization:
-    """Identify at several horizons and orders and gather the poles into modes: no order has to be chosen.
-
-    `horizons`: values of p, or of the block rows for methods without observer (default: a half, three quarters and all
-    of what okid.identify() would take); `orders` default: all even ones the data carry. Other arguments are those of
-    okid.identify(), u and y too. Result: `modes`, `clusters`, and the rows of the diagram.
-
-    >>> import okid
-    >>> found = okid.stabilization(*okid.demo_record(), fs=1000.0)
-    >>> [round(mode.frequency_hz, 1) for mode in found.modes]
-    [11.0, 31.8, 45.7]
-    """
-    from okid.identify import identify
-
-    if "order" in options:
-        raise InputError("order is not an argument of stabilization(): it looks at many, give orders=[...]")
-    subspace = str(options.get("method", "okid-era")).startswith("n4sid")
-    key = "rows" if u is None or subspace else "p"
-    asked = None if orders is None else sorted(set(orders))
-    if asked:
-        options.setdefault("max_order", max(asked))
-    if horizons is None:
-        first = identify(u, y, fs=fs, **options)
-        reach = first.p
-        results = [first] + [
-            identify(u, y, fs=fs, **{**options, key: n}) for n in sorted({reach // 2, 3 * reach // 4} - {0, 1, reach})
-        ]
-    else:
-        results = [identify(u, y, fs=fs, **{**options, key: int(n)}) for n in sorted(set(horizons))]
-    results.sort(key=lambda result: result.p)
-    return of_identifiers([result.identifier for result in results if result.identifier is not None], asked, criteria)
