@@ -115,7 +115,7 @@ def graph() -> dict[str, set[str]]:
     return {name: {one for one in imports(file, known) if one in known and one != name} for name, file in known.items()}
 
 
-# As rooms these still lean on one another (sums.py and structure.py of data/, model.py of result/); as modules they do not.
+# As rooms these still lean on one another (data/sums.py, data/structure.py, result/model.py); as modules they do not.
 OPEN = {"abi", "data", "frf", "result"}
 
 
