@@ -26,7 +26,7 @@ struct identify_arguments {
     record_request wanted;
     std::vector<std::string> records;
     std::string inputs, outputs, range, json, model;
-    bool quiet = false;
+    bool quiet = false, all_modes = false;
 };
 
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
@@ -118,6 +118,7 @@ void identify(identify_arguments given) {
         progress display(!given.quiet);
         options.stage = [&](const char* stage) { display.stage(stage); };
         result = identify_records(read_records(given, options, display), options);
+        result.context.all_modes = given.all_modes;
     }
     const okid_identified_t& model = result.model.view();
     if (!given.model.empty()) write_whole_file(given.model, mat_file(model));
@@ -138,8 +139,10 @@ void add_identify(CLI::App& app) {
         ->type_name("NAMES");
     command->add_option("--outputs", given->outputs, "response columns, with commas between")->type_name("NAMES");
     command->add_option("--fs", given->wanted.fs, "sample rate; default: what the file says")->type_name("HZ");
-    command->add_option("--method", given->wanted.method, "how the model is found (default okid-era)")
-        ->type_name(fmt::format("{}", fmt::join(method_names(), "|")));
+    command
+        ->add_option("--method", given->wanted.method,
+                     "how the model is found: auto, what several methods agree on, or one of them")
+        ->type_name(fmt::format("auto|{}", fmt::join(method_names(), "|")));
     command->add_option("--p", given->wanted.p, "observer order in samples (default 40; not for n4sid)")
         ->type_name("N");
     command
@@ -153,8 +156,23 @@ void add_identify(CLI::App& app) {
         ->type_name(fmt::format("{}", fmt::join(hankel_names(), "|")));
     command->add_option("--order", given->wanted.order, "number of states, or auto (default)")->type_name("N|auto");
     command->add_option("--max-order", given->wanted.max_order, "largest order that auto may choose")->type_name("N");
-    command->add_option("--hold", given->wanted.hold, "force between samples: held (zoh, default) or linear (foh)")
-        ->type_name("zoh|foh");
+    command
+        ->add_option(
+            "--hold", given->wanted.hold,
+            "force between samples: held (zoh), linear (foh) or band-limited, as a load cell behind an anti-alias "
+            "filter gives it (band); auto (default of --method auto) tells it from the record")
+        ->type_name("auto|zoh|foh|band");
+    command->add_option("--band", given->wanted.band, "only modes in this band, Hz (--method auto)")
+        ->type_name("LO:HI");
+    command
+        ->add_option("--decimate", given->wanted.decimate,
+                     "--method auto looks at no higher rate than one Nth of the record's (default auto: all rates)")
+        ->type_name("N|auto");
+    command->add_flag("--all-modes", given->all_modes, "the table also lists the modes that are not signed, and why");
+    command
+        ->add_option("--modes", given->wanted.modes,
+                     "only these modes, numbered as --all-modes lists them (--method auto)")
+        ->type_name("1,3-5");
     command->add_option("--detrend", given->wanted.detrend, "what is taken out of every channel first (default mean)")
         ->type_name("none|mean|linear");
     command

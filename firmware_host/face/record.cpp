@@ -24,6 +24,9 @@ asked read_record(const char* text) {
     asked out;
     option_places places = places_of(out.request);
     places.texts.emplace_back("start", &out.request.start);
+    places.texts.emplace_back("band", &out.request.band);
+    places.texts.emplace_back("decimate", &out.request.decimate);
+    places.texts.emplace_back("modes", &out.request.modes);
     places.flags = {{"refine", &out.request.refine}, {"stabilization", &out.request.stabilization}};
     places.lists.emplace_back("units", &out.units);
     read_options(text, places);

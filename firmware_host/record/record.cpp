@@ -4,8 +4,10 @@
 #include "record.hpp"
 
 #include "error.hpp"
+#include "record_auto.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
+#include "record_hold.hpp"
 #include "record_horizon.hpp"
 #include "record_refine.hpp"
 #include "record_uncertainty.hpp"
@@ -13,7 +15,6 @@
 #include "result/method.hpp"
 
 #include <okid/steps/square_root.h>
-#include <okid/steps/subspace.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,14 +24,6 @@
 
 namespace okid_host {
 namespace {
-
-void detrend_linear(record_set& set, const record_options& options) {
-    for (const record_data& record : set.records) {
-        const std::vector<double> before = largest_of(set, record);
-        remove_lines(set.rows(record), set.channels(), record.count);
-        check_not_a_line(set, record, before, options);
-    }
-}
 
 /// Bytes for one object of the library; refuses before the machine runs out.
 std::unique_ptr<std::byte[]> library_memory(std::size_t bytes, const okid_identify_config_t& config) {
@@ -113,23 +106,6 @@ okid_status_t refine_by_factor(okid_accumulator_t* accumulator, okid_status_t st
     return found;
 }
 
-/// B and D that make the simulated outputs of A and C fit the records best.
-okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const double* C, std::vector<double>& B,
-                          std::vector<double>& D) {
-    const auto n_u = static_cast<std::int32_t>(set.n_u), n_y = static_cast<std::int32_t>(set.n_y);
-    std::vector<std::int32_t> counts;
-    for (const record_data& record : set.records) counts.push_back(static_cast<std::int32_t>(record.count));
-    const auto count = static_cast<std::int32_t>(counts.size());
-    B.resize(static_cast<std::size_t>(n_z) * set.n_u);
-    D.resize(set.n_y * set.n_u);
-    const std::size_t bytes = okid_subspace_output_error_memsize(n_u, n_y, n_z, count);
-    if (bytes == 0) return OKID_ERR_DIM;
-    std::vector<std::byte> block(bytes);
-    const okid_model_t model{n_u, n_y, n_z, A, nullptr, C, nullptr, nullptr};
-    const okid_records_t records{count, counts.data(), set.samples.data()};
-    return okid_subspace_output_error(&model, &records, B.data(), D.data(), nullptr, block.data(), bytes);
-}
-
 /// B and D of a subspace model from the records. Where that fails, those of the subspace equations stay.
 void fit_inputs(record_work& work) {
     std::vector<double> B, D;
@@ -171,7 +147,9 @@ void find_matrices(const std::vector<replicate_model>& replicates, const record_
     if (!options.mass.wanted()) return;
     okid_identified_t structure = work.model;
     if (work.context.refined) structure = without_skew(replicates, options.mass, work);
-    work.context.mass = find_mass_matrices(structure, options.mass, said);
+    mass_plan plan = options.mass;
+    if (plan.hold == "auto") plan.hold = work.context.hold = told_hold(work.set, structure, plan);
+    work.context.mass = find_mass_matrices(structure, plan, said);
 }
 
 /// The same records identified with other settings. Throws `failure` where there is no memory for it.
@@ -204,28 +182,6 @@ void find_deviations(long long rows, const std::vector<replicate_model>& replica
     if (!work.context.refined) // the likelihood knows no p
         remark_finite_p(work.config, rows, work.model, *work.context.sigma, again_with(work.set, work.at_rest),
                         work.context.warnings);
-}
-
-result_context describe(const record_set& set, const record_options& options, const missing_count& missing) {
-    const std::size_t total = set.count();
-    result_context context;
-    context.method = options.method;
-    if (!looks_back_rows(method_of(options.method), options.inputs.size())) context.hankel = options.hankel;
-    context.fs_hz = options.fs_hz;
-    context.samples = static_cast<long long>(total);
-    context.records = static_cast<int>(set.records.size());
-    context.gaps = missing.gaps;
-    context.inputs = options.inputs;
-    context.outputs = options.outputs;
-    context.hold = options.hold;
-    context.detrend = options.detrend;
-    context.start = options.start;
-    if (missing.samples)
-        context.warnings.emplace_back("missing_samples",
-                                      fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was "
-                                                  "interpolated; the lags start anew after each gap",
-                                                  missing.samples, total, missing.gaps, missing.gaps == 1 ? "" : "s"));
-    return context;
 }
 
 /// What the library is asked for, with the horizon that the records bear.
@@ -294,12 +250,44 @@ void check_fit(result_context& context) {
 
 } // namespace
 
+void detrend_linear(record_set& set, const record_options& options) {
+    for (const record_data& record : set.records) {
+        const std::vector<double> before = largest_of(set, record);
+        remove_lines(set.rows(record), set.channels(), record.count);
+        check_not_a_line(set, record, before, options);
+    }
+}
+
+result_context describe_records(const record_set& set, const record_options& options, const missing_count& missing) {
+    const std::size_t total = set.count();
+    result_context context;
+    context.method = options.method;
+    if (options.method != "auto" && !looks_back_rows(method_of(options.method), options.inputs.size()))
+        context.hankel = options.hankel;
+    context.fs_hz = options.fs_hz;
+    context.samples = static_cast<long long>(total);
+    context.records = static_cast<int>(set.records.size());
+    context.gaps = missing.gaps;
+    context.inputs = options.inputs;
+    context.outputs = options.outputs;
+    context.hold = options.hold;
+    context.detrend = options.detrend;
+    context.start = options.start;
+    if (missing.samples)
+        context.warnings.emplace_back("missing_samples",
+                                      fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was "
+                                                  "interpolated; the lags start anew after each gap",
+                                                  missing.samples, total, missing.gaps, missing.gaps == 1 ? "" : "s"));
+    return context;
+}
+
 record_result identify_records(record_set records, const record_options& options) {
+    if (options.method == "auto") return identify_auto(std::move(records), options);
     record_work work;
     work.set = std::move(records);
     work.at_rest = options.start == "rest";
     const missing_count missing = count_missing(work.set);
-    work.context = describe(work.set, options, missing);
+    work.context = describe_records(work.set, options, missing);
     check_moving(work.set, options);
     check_different_inputs(work.set, options);
     if (options.detrend == "linear") detrend_linear(work.set, options);

@@ -8,7 +8,9 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace okid_host {
@@ -27,7 +29,10 @@ struct record_options {
     remarks said;               ///< known before the data are seen
     bool stabilization = false; ///< look at all orders and some horizons too
     int sigma_blocks = 20;      ///< blocks left out in turn for the standard deviations; 0 = none
-    std::function<void(const char* stage)> stage; ///< told what begins; may be empty
+    std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
+    int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
+    std::vector<int> modes;                        ///< numbers of the modes picked by hand (auto); empty: all
+    std::function<void(const char* stage)> stage;  ///< told what begins; may be empty
 };
 
 /// A model with what is known about it, and the decomposition it was realised from.

@@ -6,6 +6,7 @@
 #include "error.hpp"
 
 #include <okid/model.h>
+#include <okid/steps/subspace.h>
 
 #include <algorithm>
 #include <cmath>
@@ -108,6 +109,22 @@ void fit_ambient(const record_set& set, fit_run& run, result_context& context) {
 }
 
 } // namespace
+
+okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const double* C, std::vector<double>& B,
+                          std::vector<double>& D) {
+    const auto n_u = static_cast<std::int32_t>(set.n_u), n_y = static_cast<std::int32_t>(set.n_y);
+    std::vector<std::int32_t> counts;
+    for (const record_data& record : set.records) counts.push_back(static_cast<std::int32_t>(record.count));
+    const auto count = static_cast<std::int32_t>(counts.size());
+    B.resize(static_cast<std::size_t>(n_z) * set.n_u);
+    D.resize(set.n_y * set.n_u);
+    const std::size_t bytes = okid_subspace_output_error_memsize(n_u, n_y, n_z, count);
+    if (bytes == 0) return OKID_ERR_DIM;
+    std::vector<std::byte> block(bytes);
+    const okid_model_t model{n_u, n_y, n_z, A, nullptr, C, nullptr, nullptr};
+    const okid_records_t given{count, counts.data(), set.samples.data()};
+    return okid_subspace_output_error(&model, &given, B.data(), D.data(), nullptr, block.data(), bytes);
+}
 
 std::vector<stretch> stretches_of(const record_set& set, const record_data& record, std::size_t least) {
     std::vector<stretch> out;

@@ -14,6 +14,10 @@ struct stretch {
 /// tell their initial state from the noise, are left out; a record without missing inputs is one stretch.
 std::vector<stretch> stretches_of(const record_set& set, const record_data& record, std::size_t least);
 
+/// B (n_z x n_u) and D (n_y x n_u) that make the simulated outputs of A and C fit the records best.
+okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const double* C, std::vector<double>& B,
+                          std::vector<double>& D);
+
 /// Fill x0, simulation_percent and prediction_percent of the context. The records are in the model's own terms
 /// (detrended); missing inputs are taken as 0. Without inputs: prediction_percent only.
 void fit_records(const record_set& set, const okid_identified_t& model, result_context& context);

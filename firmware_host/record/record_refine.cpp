@@ -93,21 +93,6 @@ class refiner {
     okid_refine_t* refine_ = nullptr;
 };
 
-/// D, C B, C A B …
-void find_markov(const okid_model_t& m, int count, std::vector<double>& out) {
-    std::vector<double> u(size_of(m.n_u) * size_of(count)), y(size_of(m.n_y) * size_of(count));
-    std::vector<double> work(okid_model_workspace(&m));
-    const std::size_t block = size_of(m.n_y) * size_of(m.n_u);
-    out.assign(block * size_of(count), 0);
-    for (int c = 0; c < m.n_u; ++c) { // the answer to a unit impulse at each input
-        std::fill(u.begin(), u.end(), 0.0);
-        u[size_of(c)] = 1;
-        if (okid_model_simulate(&m, u.data(), size_of(count), nullptr, y.data(), work.data()) < 0) return;
-        for (std::size_t k = 0; k < size_of(count); ++k)
-            std::copy_n(&y[k * size_of(m.n_y)], m.n_y, &out[k * block + size_of(c) * size_of(m.n_y)]);
-    }
-}
-
 std::complex<double> pole_of(double frequency, double damping) {
     return std::polar(frequency, std::acos(-std::clamp(damping, -1.0, 1.0)));
 }
@@ -221,6 +206,20 @@ refinement report(const okid_refined_t& found, int n_y) {
 }
 
 } // namespace
+
+void find_markov(const okid_model_t& m, int count, std::vector<double>& out) {
+    std::vector<double> u(size_of(m.n_u) * size_of(count)), y(size_of(m.n_y) * size_of(count));
+    std::vector<double> work(okid_model_workspace(&m));
+    const std::size_t block = size_of(m.n_y) * size_of(m.n_u);
+    out.assign(block * size_of(count), 0);
+    for (int c = 0; c < m.n_u; ++c) { // the answer to a unit impulse at each input
+        std::fill(u.begin(), u.end(), 0.0);
+        u[size_of(c)] = 1;
+        if (okid_model_simulate(&m, u.data(), size_of(count), nullptr, y.data(), work.data()) < 0) return;
+        for (std::size_t k = 0; k < size_of(count); ++k)
+            std::copy_n(&y[k * size_of(m.n_y)], m.n_y, &out[k * block + size_of(c) * size_of(m.n_y)]);
+    }
+}
 
 std::vector<replicate_model> refine_model(bool constants, record_work& result) {
     const okid_identified_t start = result.model;

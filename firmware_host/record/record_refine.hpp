@@ -12,6 +12,9 @@ namespace okid_host {
 /// @return models without one of twenty blocks each, of the refined model; none when nothing was refined
 std::vector<replicate_model> refine_model(bool constants, record_work& result);
 
+/// The first `count` Markov parameters D, C B, C A B … of a model.
+void find_markov(const okid_model_t& model, int count, std::vector<double>& out);
+
 /// The model as M, K and R want it: without the delays of its outputs, where they are known. What is found goes into
 /// result.context, the new C and D into result.refined.
 okid_identified_t without_skew(const std::vector<replicate_model>& replicates, const mass_plan& plan,

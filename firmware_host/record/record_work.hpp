@@ -28,4 +28,10 @@ struct record_work {
     std::unique_ptr<refined_arrays> refined;
 };
 
+/// What is known of a result before anything is computed.
+result_context describe_records(const record_set& set, const record_options& options, const missing_count& missing);
+
+/// Take its own line out of each channel of each record; refuses a channel that is nothing else.
+void detrend_linear(record_set& set, const record_options& options);
+
 } // namespace okid_host

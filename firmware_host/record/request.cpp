@@ -16,6 +16,8 @@
 namespace okid_host {
 namespace {
 
+constexpr const char* default_method = "okid-era";
+
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
 
 void one_of(const std::string& option, const std::string& value, const std::vector<std::string>& choices) {
@@ -75,14 +77,80 @@ mass_plan check_dofs(const record_request& given, const record_options& options,
     return plan;
 }
 
+/// An option of one method alone means the method that release 0.1 took by default.
+std::string chosen_method(const record_request& given) {
+    if (!given.method.empty()) return given.method;
+    const bool single = !given.p.empty() || !given.rows.empty() || !given.max_order.empty() || given.order != "auto" ||
+                        given.hankel != "system" || given.refine || given.stabilization;
+    return single ? "okid-era" : default_method;
+}
+
+double hertz(const std::string& option, const std::string& text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !(value >= 0) || !std::isfinite(value))
+        usage(fmt::format("{}: found \"{}\", expected a frequency in Hz", option, printable(text)));
+    return value;
+}
+
+/// "1,3-5" as numbers.
+std::vector<int> numbers_of(const std::string& option, const std::string& text) {
+    std::vector<int> out;
+    for (std::size_t at = 0; at <= text.size();) {
+        const std::size_t comma = std::min(text.find(',', at), text.size());
+        const std::string part = text.substr(at, comma - at);
+        const std::size_t dash = part.find('-');
+        const long long first = whole_number(option, part.substr(0, dash), 1, 10000);
+        const long long last =
+            dash == std::string::npos ? first : whole_number(option, part.substr(dash + 1), first, 10000);
+        for (long long k = first; k <= last; ++k) out.push_back(static_cast<int>(k));
+        at = comma + 1;
+    }
+    return out;
+}
+
+/// The options of method auto, and those that are none.
+void check_agreement(const record_request& given, record_options& options) {
+    const bool agreed = options.method == "auto";
+    for (const auto& [option, text] : {std::pair{"--band", &given.band}, std::pair{"--decimate", &given.decimate},
+                                       std::pair{"--modes", &given.modes}})
+        if (!agreed && !text->empty())
+            usage(fmt::format("{} belongs to --method auto, {} takes the record as it is", option, options.method));
+    for (const auto& [option, there] :
+         {std::pair{"--p", !given.p.empty()}, std::pair{"--rows", !given.rows.empty()},
+          std::pair{"--order", given.order != "auto"}, std::pair{"--max-order", !given.max_order.empty()},
+          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--refine", given.refine},
+          std::pair{"--stabilization", given.stabilization}})
+        if (agreed && there)
+            usage(
+                fmt::format("{} belongs to one method, --method auto agrees over many: leave one of them out", option));
+    if (!given.band.empty()) {
+        const std::size_t colon = given.band.find(':');
+        if (colon == std::string::npos)
+            usage(fmt::format("--band: found \"{}\", expected LO:HI in Hz", printable(given.band)));
+        options.band = {hertz("--band", given.band.substr(0, colon)), hertz("--band", given.band.substr(colon + 1))};
+        if (!(options.band->first < options.band->second))
+            usage(fmt::format("--band: found \"{}\", expected the lower frequency first", printable(given.band)));
+    }
+    if (!given.decimate.empty() && given.decimate != "auto")
+        options.decimate = static_cast<int>(whole_number("--decimate", given.decimate, 1, 1000));
+    if (!given.modes.empty()) options.modes = numbers_of("--modes", given.modes);
+}
+
 } // namespace
 
 record_options check_request(const record_request& given) {
     record_options options;
-    one_of("--method", given.method, method_names());
+    options.method = chosen_method(given);
+    std::vector<std::string> known = method_names();
+    known.insert(known.begin(), "auto");
+    one_of("--method", options.method, known);
     one_of("--hankel", given.hankel, hankel_names());
     check_refine(given);
-    one_of("--hold", given.hold, {"zoh", "foh"});
+    const bool agreed = options.method == "auto";
+    options.hold = !given.hold.empty() ? given.hold : agreed ? "auto" : "zoh";
+    one_of("--hold", options.hold, {"auto", "zoh", "foh", "band"});
+    check_agreement(given, options);
     one_of("--detrend", given.detrend, {"none", "mean", "linear"});
     one_of("--start", given.start, {"moving", "rest"});
     options.p_given = !given.p.empty();
@@ -101,17 +169,15 @@ record_options check_request(const record_request& given) {
         usage(fmt::format("--sigma-blocks: found {}, expected 0 (no standard deviations) or {} to {}",
                           options.sigma_blocks, fewest_blocks, most_blocks));
     options.stabilization = given.stabilization;
-    options.method = given.method;
     options.hankel = given.hankel;
     options.refine = given.refine;
-    options.hold = given.hold;
     options.detrend = given.detrend;
     options.start = given.start;
     check_channels(given);
     options.inputs = given.inputs;
     options.outputs = given.outputs;
-    if (const std::string fault = hankel_fault(given.hankel, given.method, options.inputs.size()); !fault.empty())
-        usage("--hankel: " + fault);
+    const std::string fault = agreed ? "" : hankel_fault(given.hankel, options.method, options.inputs.size());
+    if (!fault.empty()) usage("--hankel: " + fault);
     options.mass = check_dofs(given, options, check_sensing(given.sensing, options.outputs.size()));
     return options;
 }

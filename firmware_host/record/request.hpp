@@ -11,10 +11,10 @@ namespace okid_host {
 /// What was asked for, as text; "" = not given.
 struct record_request {
     std::vector<std::string> inputs, outputs; ///< names of the channels
-    std::string method = "okid-era", hankel = "system", order = "auto", hold = "zoh", detrend = "mean",
-                start = "moving";
+    std::string method, hankel = "system", order = "auto", hold, detrend = "mean", start = "moving";
     std::string sensing = "acceleration", input_dofs, output_dofs; ///< lists with commas between
     std::string fs, p, rows, max_order, sigma_blocks;
+    std::string band, decimate, modes; ///< of method auto
     bool refine = false, stabilization = false;
 };
 

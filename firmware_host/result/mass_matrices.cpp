@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "mass_matrices.hpp"
 
+#include "deviations.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "files/units.hpp"
+#include "hold.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -32,19 +34,22 @@ double gain_of(const mass_channel& channel) { return (channel.reversed ? -1 : 1)
 
 attempt try_plan(const okid_identified_t& model, const mass_plan& plan) {
     const mkr_arguments given(plan, model.dt);
-    okid_model_t view{};
-    view.n_u = model.n_u;
-    view.n_y = model.n_y;
-    view.n_z = model.n_z;
-    view.A = model.A;
-    view.B = model.B;
-    view.C = model.C;
-    view.D = model.D;
+    held_model held;
+    const bool band = plan.hold == "band" && as_if_held(model, given.sensing, held);
+    const okid_model_t view = model_view(band ? held.view : model);
     attempt out;
-    const std::size_t bytes = okid_mkr_memsize(model.n_u, model.n_y, model.n_z, given.config.n_x);
+    const std::size_t bytes = okid_mkr_memsize(view.n_u, view.n_y, view.n_z, given.config.n_x);
     out.work = std::make_unique<std::byte[]>(bytes);
     out.status = okid_mkr_identify(&view, &given.config, &out.result, out.work.get(), bytes);
     return out;
+}
+
+int nearest_mode(const okid_identified_t& model, double frequency_hz) {
+    const auto* end = model.frequency_hz + model.mode_count;
+    return static_cast<int>(
+        std::min_element(model.frequency_hz, end,
+                         [&](double a, double b) { return std::abs(a - frequency_hz) < std::abs(b - frequency_hz); }) -
+        model.frequency_hz);
 }
 
 /// The plans a slip of the hand away, each with what it changes.
@@ -246,6 +251,8 @@ mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan
     const attempt tried = try_plan(model, plan);
     if (tried.status < 0) throw_no_matrices(tried, model, plan);
     mass_matrices found = take(tried.result, plan);
+    if (plan.hold == "band") // the modes of another realization: those of this model by their frequency
+        for (mass_mode& mode : found.modes) mode.number = nearest_mode(model, mode.frequency_hz) + 1;
     const remarks notes = mass_remarks(found);
     said.insert(said.end(), notes.begin(), notes.end());
     const bool misread =

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace okid_host {
 namespace {
@@ -140,10 +141,13 @@ std::string fit_text(const result_context& context) {
 constexpr int most_shape_columns = 6; // more would not stand side by side on a screen
 
 std::string mode_rows(const okid_identified_t& model, const result_context& context) {
+    const bool agreed = !context.verdicts.empty();
     const bool shapes = model.n_y > 1 && model.n_y <= most_shape_columns;
-    bool any_doubtful = false;
+    const std::vector<mode_verdict> verdicts = mode_verdicts(model, context);
+    int left_out = 0;
     std::vector<std::size_t> width;
-    std::string out = "   #       f [Hz]       ± σ     ζ [%]       ± σ     MPC    EMAC     CMI";
+    std::string out = fmt::format("   #       f [Hz]       ± σ     ζ [%]       ± σ     MPC    EMAC     CMI{}",
+                                  agreed ? "  found in" : "");
     for (int i = 0; shapes && i < model.n_y; ++i) {
         const auto at = static_cast<std::size_t>(i);
         const std::string name = at < context.outputs.size() ? context.outputs[at] : fmt::format("y{}", i + 1);
@@ -152,21 +156,27 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
     }
     out += "\n";
     for (int k = 0; k < model.mode_count; ++k) {
-        const bool doubtful = !(model.emac[k] >= doubtful_emac);
-        any_doubtful = any_doubtful || doubtful;
         const auto at_mode = static_cast<std::size_t>(k);
+        const mode_verdict& verdict = verdicts[at_mode];
+        const bool hidden = agreed && !verdict.confident && !context.all_modes;
+        left_out += hidden;
+        if (hidden) continue;
         const double std_f = context.sigma ? context.sigma->frequency_hz[at_mode] : NAN,
                      std_zeta = context.sigma ? context.sigma->damping_ratio[at_mode] : NAN;
         out += fmt::format("{:>4}{}{:>12.5f} {:>9} {:>9.4f} {:>9} {:>7.4f} {:>7.4f} {:>7.4f}", k + 1,
-                           doubtful ? '?' : ' ', model.frequency_hz[k], plus_minus(std_f), 100 * model.damping_ratio[k],
-                           plus_minus(100 * std_zeta), model.mpc[k], model.emac[k], model.cmi[k]);
+                           verdict.confident ? ' ' : '?', model.frequency_hz[k], plus_minus(std_f),
+                           100 * model.damping_ratio[k], plus_minus(100 * std_zeta), model.mpc[k], model.emac[k],
+                           model.cmi[k]);
+        if (agreed) out += fmt::format(" {:>7.0f} %", 100 * verdict.found_in);
         for (int i = 0; shapes && i < model.n_y; ++i)
             out += fmt::format("  {:>{}.3f}", model.shape_re[i + static_cast<std::ptrdiff_t>(k) * model.n_y],
                                width[static_cast<std::size_t>(i)]);
+        if (agreed && !verdict.confident) out += fmt::format("  {}", fmt::join(verdict.why, ", "));
         out += "\n";
     }
-    if (any_doubtful)
+    if (!agreed && std::any_of(verdicts.begin(), verdicts.end(), [](const mode_verdict& v) { return !v.confident; }))
         out += fmt::format("   ? EMAC below {:g}: probably noise, not a mode of the structure\n", doubtful_emac);
+    if (left_out) out += fmt::format("   {} not signed, listed with --all-modes\n", counted(left_out, "doubtful mode"));
     return out;
 }
 
@@ -199,6 +209,26 @@ nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviatio
     return out;
 }
 
+std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const result_context& context) {
+    if (!context.verdicts.empty()) return context.verdicts;
+    std::vector<mode_verdict> out;
+    for (int k = 0; k < model.mode_count; ++k) {
+        mode_verdict& verdict = out.emplace_back();
+        verdict.confident = model.emac[k] >= doubtful_emac;
+        if (!verdict.confident) verdict.why.emplace_back("noise_shape");
+    }
+    return out;
+}
+
+/// {"confident": …, "found_in": …, "why": […]} of every mode.
+static ordered_json verdicts_json(const okid_identified_t& model, const result_context& context) {
+    ordered_json out = ordered_json::array();
+    for (const mode_verdict& verdict : mode_verdicts(model, context))
+        out.push_back(
+            {{"confident", verdict.confident}, {"found_in", number_json(verdict.found_in)}, {"why", verdict.why}});
+    return out;
+}
+
 nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context, bool arrays) {
     ordered_json out;
     out["schema"] = "okid.result/1";
@@ -210,17 +240,28 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["gaps"] = context.gaps;
     out["inputs"] = context.inputs;
     out["outputs"] = context.outputs;
-    out["p"] = model.p;
-    out["rows"] = model.rows;
+    const bool agreed = context.method == "auto"; // of many horizons
+    out["p"] = agreed ? ordered_json(nullptr) : ordered_json(model.p);
+    out["rows"] = agreed ? ordered_json(nullptr) : ordered_json(model.rows);
     out["hankel"] = context.hankel ? ordered_json(*context.hankel) : ordered_json(nullptr);
     out["order"] = model.n_z;
     out["hold"] = context.hold;
     out["detrend"] = context.detrend;
     out["start"] = context.start;
-    if (arrays) out["singular_values"] = vector_json(model.singular_values, model.singular_count);
+    if (arrays)
+        out["singular_values"] =
+            agreed ? ordered_json(nullptr) : vector_json(model.singular_values, model.singular_count);
     out["singular_noise"] = number_json(model.noise_level);
     if (arrays) put_arrays_json(model, context, out);
     out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
+    if (agreed) {
+        out["band_hz"] = context.band_hz
+                             ? ordered_json{number_json(context.band_hz->first), number_json(context.band_hz->second)}
+                             : ordered_json(nullptr);
+        out["rates_hz"] = context.rates_hz;
+    }
+    const ordered_json verdicts = verdicts_json(model, context);
+    for (std::size_t k = 0; k < verdicts.size(); ++k) out["modes"][k].update(verdicts[k]);
     out["fit"]["simulation_percent"] = percent_json(context.simulation_percent, context.outputs);
     out["fit"]["prediction_percent"] = percent_json(context.prediction_percent, context.outputs);
     if (context.stable) out["stabilization"] = stabilization_json(*context.stable);
@@ -248,8 +289,13 @@ std::string result_table(const okid_identified_t& model, const result_context& c
                     counted(model.n_y, "output"), counted(context.samples, "sample"), context.fs_hz,
                     static_cast<double>(context.samples) / context.fs_hz, counted(context.records, "record"));
     if (context.gaps) out += ", " + counted(context.gaps, "gap");
-    out += fmt::format("\n{}{} block rows, order {}, detrend {}\n\n",
-                       model.observer ? fmt::format("p {}, ", model.p) : "", model.rows, model.n_z, context.detrend);
+    const std::string horizon = context.method == "auto" ? "agreement of several methods, horizons and rates"
+                                : model.observer         ? fmt::format("p {}, {} block rows", model.p, model.rows)
+                                                         : fmt::format("{} block rows", model.rows);
+    if (context.band_hz)
+        out += fmt::format("\nmodes sought between {:.3g} and {:.4g} Hz, at rates down to {:.4g} Hz",
+                           context.band_hz->first, context.band_hz->second, context.rates_hz.back());
+    out += fmt::format("\n{}, order {}, detrend {}\n\n", horizon, model.n_z, context.detrend);
     out += mode_rows(model, context) + fit_text(context);
     if (context.stable) out += stabilization_text(*context.stable);
     if (context.refined) out += refinement_text(*context.refined, context.outputs);

@@ -7,6 +7,7 @@
 
 #include <okid/identify.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -15,6 +16,13 @@
 namespace okid_host {
 
 constexpr double doubtful_emac = 0.5; ///< below this a mode seldom belongs to the structure
+
+/// Would an expert sign a mode?
+struct mode_verdict {
+    bool confident = false;
+    double found_in = NAN;        ///< share of the runs that could have seen it and did; NaN for a named method
+    std::vector<std::string> why; ///< codes of what speaks against it
+};
 
 /// What the library does not know about a result.
 struct result_context {
@@ -30,6 +38,10 @@ struct result_context {
     std::optional<std::vector<double>> simulation_percent;     ///< per output; absent live (null)
     std::optional<std::vector<double>> prediction_percent;     ///< per output; absent = null
     std::optional<deviations> sigma;                           ///< of the modes; absent = null
+    std::optional<std::pair<double, double>> band_hz;          ///< where auto looked for modes
+    std::vector<double> rates_hz;                              ///< at which rates
+    bool all_modes = false;                                    ///< the table lists the doubtful modes of auto too
+    std::vector<mode_verdict> verdicts;                        ///< of the modes, of method auto; else by EMAC
     std::optional<stabilization> stable;                       ///< where it was asked for
     std::optional<refinement> refined;                         ///< of a model that was refined
     std::optional<channel_skew> skew;                          ///< delays of the outputs, of a refined model
@@ -40,6 +52,9 @@ struct result_context {
 /// {"frequency_hz": …, "damping_ratio": …, "shape_re": […], "shape_im": […], "mpc": …, "emac": …, "cmi": …} of every mode.
 /// @param sigma  their standard deviations, or nullptr (null)
 nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma);
+
+/// Of every mode: those of the context, or by EMAC for a named method.
+std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const result_context& context);
 
 /// The whole okid.result/1 object. @param arrays  false: without singular_values, model and markov
 nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context, bool arrays = true);

@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  what a mode of the structure is, decided by agreement
+// METHOD   poles of each run (method, horizon, rate) are linked over the orders by frequency, damping and shape; the tracks of
+//          all runs are gathered into clusters by frequency and shape; a cluster's vote counts the runs that could have seen it.
+//          agreement = found_in x EMAC x (1 + MPC)/2 / (1 + (scatter of damping / 0.6)^2): a mode is believed from one half on
+#include "consensus.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace okid_host {
+namespace {
+
+constexpr double most_damping = 0.25;   // a pole above is no vibration to an engineer
+constexpr double overdamped = 0.2;      // a mode above is listed, not signed
+constexpr double same_frequency = 0.01; // within a run, and between runs (numerics.md section 5)
+constexpr double same_damping = 0.3;    // from one order to the next
+constexpr double same_shape_run = 0.9;  // MAC from one order to the next
+constexpr double same_shape = 0.8;      // MAC between runs
+constexpr int fewest_orders = 4;        // a track shorter than this is chance
+constexpr double share_of_orders = 0.4; // of the orders from its first on
+constexpr int order_reach = 8;          // a pole may be missing for this many states
+constexpr double periods_seen = 0.75;   // of a mode within the horizon
+constexpr double periods_well = 1.5;    // where its damping is sharp
+constexpr double one_half = 0.5;        // votes and agreement
+constexpr double scatter_scale = 0.6;   // relative scatter of damping over the runs that halves the agreement
+constexpr int fewest_runs = 3;
+
+double median(std::vector<double> values) {
+    if (values.empty()) return NAN;
+    const std::size_t n = values.size(), k = n / 2;
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
+    const double high = values[k];
+    if (n % 2) return high;
+    return (high + *std::max_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k))) / 2;
+}
+
+template <class Item, class Of> double median_of(const std::vector<Item>& items, Of of) {
+    std::vector<double> values;
+    for (const auto& item : items) values.push_back(of(item));
+    return median(std::move(values));
+}
+
+double relative_spread(const std::vector<double>& values, double about) {
+    double mean = 0, square = 0;
+    for (const double v : values) mean += v / static_cast<double>(values.size());
+    for (const double v : values) square += (v - mean) * (v - mean);
+    return std::sqrt(square / static_cast<double>(values.size())) / about;
+}
+
+using chain = std::vector<const run_pole*>;
+
+/// Distance of a pole from the end of a chain; infinite when they are not the same.
+double link_cost(const run_pole& pole, const run_pole& last) {
+    if (last.order < pole.order - order_reach) return INFINITY;
+    const double e = std::abs(pole.frequency_hz / last.frequency_hz - 1);
+    const double narrow = std::min(pole.damping_ratio, last.damping_ratio),
+                 wide = std::max(pole.damping_ratio, last.damping_ratio);
+    if (e >= std::max(same_frequency, narrow) || e >= 3 * same_frequency) return INFINITY;
+    const double dz = std::abs(pole.damping_ratio - last.damping_ratio);
+    if (dz >= std::max(same_damping * wide, 1e-3)) return INFINITY;
+    const double mac = shape_mac(pole.shape, last.shape);
+    return mac > same_shape_run ? e / same_frequency + 5 * (1 - mac) + dz / wide : INFINITY;
+}
+
+/// Continue the chains with the poles of the next order, each by at most one, the nearest first.
+void extend(std::vector<chain>& chains, const std::vector<const run_pole*>& next) {
+    struct link {
+        double cost;
+        std::size_t chain, pole;
+    };
+    std::vector<link> links;
+    for (std::size_t j = 0; j < next.size(); ++j)
+        for (std::size_t t = 0; t < chains.size(); ++t)
+            if (const double cost = link_cost(*next[j], *chains[t].back()); std::isfinite(cost))
+                links.push_back({cost, t, j});
+    std::sort(links.begin(), links.end(), [](const link& a, const link& b) {
+        return a.cost != b.cost ? a.cost < b.cost : a.chain != b.chain ? a.chain < b.chain : a.pole < b.pole;
+    });
+    std::vector<bool> taken(next.size()), continued(chains.size());
+    for (const link& l : links) {
+        if (continued[l.chain] || taken[l.pole]) continue;
+        continued[l.chain] = taken[l.pole] = true;
+        chains[l.chain].push_back(next[l.pole]);
+    }
+    for (std::size_t j = 0; j < next.size(); ++j)
+        if (!taken[j]) chains.push_back({next[j]});
+}
+
+run_track track_of(const chain& poles) {
+    run_track out;
+    const auto med = [&](auto of) { return median_of(poles, of); };
+    out.frequency_hz = med([](const run_pole* p) { return p->frequency_hz; });
+    out.damping_ratio = med([](const run_pole* p) { return p->damping_ratio; });
+    out.mpc = med([](const run_pole* p) { return p->mpc; });
+    out.emac = med([](const run_pole* p) { return p->emac; });
+    std::vector<double> f, z;
+    const run_pole* best = nullptr;
+    double nearest = INFINITY;
+    for (const run_pole* p : poles) {
+        f.push_back(p->frequency_hz);
+        z.push_back(p->damping_ratio);
+        out.orders.push_back(p->order);
+        const double d = std::abs(p->frequency_hz / out.frequency_hz - 1) / 1e-3 +
+                         std::abs(p->damping_ratio / out.damping_ratio - 1) / 2e-2;
+        if (d < nearest) nearest = d, best = p;
+    }
+    out.frequency_spread = relative_spread(f, out.frequency_hz);
+    out.damping_spread = relative_spread(z, out.damping_ratio);
+    out.length = static_cast<int>(poles.size());
+    out.shape = best->shape;
+    return out;
+}
+
+struct member {
+    int run, track;
+    const run_track* found;
+    double rank; // best first
+};
+
+/// Every track of every run, those that can be seen first, the steady and long ones before the others.
+std::vector<member> ranked(const std::vector<consensus_run>& runs) {
+    std::vector<member> out;
+    for (std::size_t r = 0; r < runs.size(); ++r)
+        for (std::size_t t = 0; t < runs[r].tracks.size(); ++t) {
+            const run_track& track = runs[r].tracks[t];
+            if (track.frequency_hz >= runs[r].top * runs[r].fs_hz || track.damping_ratio >= overdamped) continue;
+            const double rank = (can_see(runs[r], track.frequency_hz) ? 0.0 : 1e3) + track.damping_spread +
+                                100 * track.frequency_spread - 0.02 * track.length;
+            out.push_back({static_cast<int>(r), static_cast<int>(t), &track, rank});
+        }
+    std::stable_sort(out.begin(), out.end(), [](const member& a, const member& b) { return a.rank < b.rank; });
+    return out;
+}
+
+struct cluster {
+    std::vector<member> members;
+    double frequency_hz = 0, damping_ratio = 0;
+
+    bool holds(int run) const {
+        return std::any_of(members.begin(), members.end(), [&](const member& m) { return m.run == run; });
+    }
+    double cost(const member& m) const {
+        const run_track& t = *m.found;
+        const double e = std::abs(t.frequency_hz / frequency_hz - 1);
+        if (e > std::max(same_frequency, 0.5 * std::min(t.damping_ratio, damping_ratio)) || holds(m.run))
+            return INFINITY;
+        const double mac = shape_mac(t.shape, members.front().found->shape);
+        if (mac < same_shape) return INFINITY;
+        return e / same_frequency + 3 * (1 - mac) + 0.3 * std::abs(std::log(t.damping_ratio / damping_ratio));
+    }
+    void add(const member& m) {
+        members.push_back(m);
+        frequency_hz = median_of(members, [](const member& x) { return x.found->frequency_hz; });
+        damping_ratio = median_of(members, [](const member& x) { return x.found->damping_ratio; });
+    }
+};
+
+std::vector<cluster> gather(const std::vector<consensus_run>& runs) {
+    std::vector<cluster> clusters;
+    for (const member& m : ranked(runs)) {
+        cluster* best = nullptr;
+        double least = INFINITY;
+        for (cluster& c : clusters)
+            if (const double cost = c.cost(m); cost < least) least = cost, best = &c;
+        if (!best) best = &clusters.emplace_back();
+        best->add(m);
+    }
+    return clusters;
+}
+
+bool sharp(const consensus_run& run, double f) {
+    return (run.method == OKID_METHOD_N4SID_CVA || run.method == OKID_METHOD_N4SID_MOESP) && f < run.top * run.fs_hz &&
+           f * run.rows / run.fs_hz >= periods_well;
+}
+
+/// Frequency, damping, shape and level from the runs that are sharp there, else from all that see it.
+void set_values(const std::vector<consensus_run>& runs, const std::vector<member>& seen, consensus_mode& mode) {
+    std::vector<member> use;
+    for (const member& m : seen)
+        if (sharp(runs[static_cast<std::size_t>(m.run)], mode.frequency_hz)) use.push_back(m);
+    if (use.empty()) use = seen;
+    mode.frequency_hz = median_of(use, [](const member& m) { return m.found->frequency_hz; });
+    mode.damping_ratio = median_of(use, [](const member& m) { return m.found->damping_ratio; });
+    const member* best = &use.front();
+    for (const member& m : use)
+        if (m.found->damping_spread < best->found->damping_spread) best = &m;
+    mode.shape = best->found->shape;
+    mode.level = runs[static_cast<std::size_t>(use.front().run)].level;
+    for (const member& m : use) mode.level = std::min(mode.level, runs[static_cast<std::size_t>(m.run)].level);
+}
+
+consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c) {
+    consensus_mode mode;
+    mode.frequency_hz = c.frequency_hz;
+    for (const consensus_run& run : runs) mode.could += can_see(run, mode.frequency_hz);
+    std::vector<member> seen;
+    for (const member& m : c.members) {
+        mode.members.emplace_back(m.run, m.track);
+        if (can_see(runs[static_cast<std::size_t>(m.run)], mode.frequency_hz)) seen.push_back(m);
+    }
+    mode.hits = static_cast<int>(seen.size());
+    mode.found_in = mode.could ? static_cast<double>(mode.hits) / mode.could : 0;
+    if (seen.empty()) seen = c.members;
+    const auto med = [&](auto of) { return median_of(seen, of); };
+    mode.frequency_hz = med([](const member& m) { return m.found->frequency_hz; });
+    mode.damping_ratio = med([](const member& m) { return m.found->damping_ratio; });
+    mode.mpc = med([](const member& m) { return m.found->mpc; });
+    mode.emac = med([](const member& m) { return m.found->emac; });
+    const double zeta = mode.damping_ratio;
+    mode.damping_spread = 1.4826 * med([&](const member& m) { return std::abs(m.found->damping_ratio / zeta - 1); });
+    const double scatter = mode.damping_spread / scatter_scale;
+    mode.agreement = mode.found_in * mode.emac * (1 + mode.mpc) / 2 / (1 + scatter * scatter);
+    set_values(runs, seen, mode);
+    if (mode.hits < fewest_runs || mode.found_in < one_half) mode.why.emplace_back("few_runs");
+    if (mode.agreement < one_half) mode.why.emplace_back("noise_shape");
+    return mode;
+}
+
+/// A weaker cluster beside a stronger one of the same shape: one mode of a structure that changes with its amplitude.
+void mark_split(std::vector<consensus_mode>& modes) {
+    std::vector<std::size_t> split;
+    for (std::size_t i = 0; i < modes.size(); ++i)
+        for (const consensus_mode& other : modes) {
+            const consensus_mode& mode = modes[i];
+            if (&other == &mode || other.agreement <= mode.agreement || !other.confident()) continue;
+            const double apart = std::abs(mode.frequency_hz - other.frequency_hz);
+            const double widths = mode.frequency_hz * mode.damping_ratio + other.frequency_hz * other.damping_ratio;
+            if (apart < std::max(2.5 * widths, same_frequency * other.frequency_hz) &&
+                shape_mac(mode.shape, other.shape) > same_shape_run) {
+                split.push_back(i);
+                break;
+            }
+        }
+    for (const std::size_t i : split) modes[i].why.emplace_back("split");
+}
+
+} // namespace
+
+double shape_mac(const std::vector<std::complex<double>>& a, const std::vector<std::complex<double>>& b) {
+    std::complex<double> dot = 0;
+    double aa = 0, bb = 0;
+    for (std::size_t i = 0; i < a.size() && i < b.size(); ++i) {
+        dot += std::conj(a[i]) * b[i];
+        aa += std::norm(a[i]);
+        bb += std::norm(b[i]);
+    }
+    return aa * bb > 0 ? std::norm(dot) / (aa * bb) : 0;
+}
+
+std::vector<int> consensus_orders(int most) {
+    std::vector<int> out;
+    for (int n = 4; n <= most; n += n < 24 ? 2 : 4) out.push_back(n);
+    return out;
+}
+
+void collect_poles(okid_identify_t* identifier, okid_identified_t& model, consensus_run& run) {
+    for (const int order : run.orders) {
+        if (okid_identify_poles(identifier, order, &model) < 0) continue;
+        for (int k = 0; k < model.mode_count; ++k) {
+            run_pole pole{order, model.frequency_hz[k], model.damping_ratio[k], model.mpc[k], model.emac[k], {}};
+            for (int i = 0; i < model.n_y; ++i) {
+                const auto at = i + static_cast<std::ptrdiff_t>(k) * model.n_y;
+                pole.shape.emplace_back(model.shape_re[at], model.shape_im[at]);
+            }
+            run.poles.push_back(std::move(pole));
+        }
+    }
+}
+
+void link_tracks(consensus_run& run) {
+    std::vector<chain> chains;
+    for (const int order : run.orders) {
+        std::vector<const run_pole*> next;
+        for (const run_pole& pole : run.poles)
+            if (pole.order == order && pole.damping_ratio > 1e-7 && pole.damping_ratio < most_damping)
+                next.push_back(&pole);
+        extend(chains, next);
+    }
+    for (const chain& poles : chains) {
+        const auto possible = std::count_if(run.orders.begin(), run.orders.end(),
+                                            [&](int order) { return order >= poles.front()->order; });
+        if (poles.size() >= fewest_orders &&
+            static_cast<double>(poles.size()) >= share_of_orders * static_cast<double>(possible))
+            run.tracks.push_back(track_of(poles));
+    }
+}
+
+bool can_see(const consensus_run& run, double frequency_hz) {
+    return frequency_hz <= run.top * run.fs_hz && frequency_hz >= periods_seen * run.fs_hz / run.rows;
+}
+
+std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs) {
+    std::vector<consensus_mode> modes;
+    for (const cluster& c : gather(runs)) modes.push_back(mode_of(runs, c));
+    std::sort(modes.begin(), modes.end(),
+              [](const consensus_mode& a, const consensus_mode& b) { return a.frequency_hz < b.frequency_hz; });
+    mark_split(modes);
+    return modes;
+}
+
+} // namespace okid_host

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// Modes that several methods, horizons, rates and orders agree on: the numerics behind `--method auto`.
+#pragma once
+#include <okid/identify.h>
+
+#include <complex>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+/// One pole of one model.
+struct run_pole {
+    int order;
+    double frequency_hz, damping_ratio, mpc, emac;
+    std::vector<std::complex<double>> shape; ///< n_y
+};
+
+/// The same pole over the orders of one run: medians, and relative spreads over the orders.
+struct run_track {
+    double frequency_hz = 0, damping_ratio = 0, mpc = 0, emac = 0;
+    double frequency_spread = 0, damping_spread = 0;
+    int length = 0;                          ///< orders it was found at
+    std::vector<std::complex<double>> shape; ///< of the order nearest the medians
+    std::vector<int> orders;
+};
+
+/// One method with one horizon at one rate, over many orders from one decomposition.
+struct consensus_run {
+    okid_method_t method{};
+    int level = 0;    ///< 0: the record's own rate, k: a 2^k-th of it
+    double fs_hz = 0; ///< of this level
+    int rows = 0;     ///< samples it looks back on
+    double top = 0;   ///< modes above this share of fs_hz are not seen
+    std::vector<int> orders;
+    std::vector<run_pole> poles;
+    std::vector<run_track> tracks;
+};
+
+/// A cluster of tracks, at most one of each run.
+struct consensus_mode {
+    double frequency_hz = 0, damping_ratio = 0, mpc = 0, emac = 0;
+    double damping_spread = 0; ///< relative, robust, over the runs
+    int hits = 0, could = 0;   ///< runs that found it, of those that could have seen it
+    double found_in = 0;       ///< hits / could
+    double agreement = 0;      ///< 0..1: found_in, consistency, phase and scatter together
+    int level = 0;             ///< the highest rate that sees it well
+    std::vector<std::complex<double>> shape;
+    std::vector<std::pair<int, int>> members; ///< run, track
+    std::vector<std::string> why;             ///< what speaks against it; empty: confident
+    bool confident() const { return why.empty(); }
+};
+
+/// Orders of a run with room for `most` states: every second one up to 24, then every fourth.
+std::vector<int> consensus_orders(int most);
+
+/// The poles of all orders of the identifier's last run().
+void collect_poles(okid_identify_t* identifier, okid_identified_t& model, consensus_run& run);
+
+/// Link the poles of a run over its orders.
+void link_tracks(consensus_run& run);
+
+/// Can this run see a mode at f Hz: in its band, and with at least three quarters of a period in its horizon?
+bool can_see(const consensus_run& run, double frequency_hz);
+
+/// Clusters over the runs (tracks linked), ascending in frequency, with votes, values and first codes in `why`.
+std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs);
+
+/// |a^H b|^2 / (a^H a)(b^H b).
+double shape_mac(const std::vector<std::complex<double>>& a, const std::vector<std::complex<double>>& b);
+
+} // namespace okid_host

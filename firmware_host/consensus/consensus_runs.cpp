@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  the runs of a consensus over one set of records
+// METHOD   at each rate MOESP and CVA with a long and a short horizon, SSARX between them, and OKID-ERA with the innovations in
+//          its Hankel matrix (ERA on covariances without inputs); every order from the one decomposition of a run
+#include "consensus_runs.hpp"
+
+#include "result/method.hpp"
+
+#include <algorithm>
+#include <new>
+
+namespace okid_host {
+namespace {
+
+constexpr int long_rows = 30, lags_of_observer = 40, most_order = 64;
+constexpr int most_unknowns = 450; ///< block rows x channels: the decomposition costs their third power
+constexpr double short_share = 0.6, middle_share = 0.8;
+constexpr int fewest_rows = 4;
+
+std::unique_ptr<std::byte[]> memory(std::size_t bytes) {
+    return std::unique_ptr<std::byte[]>(bytes ? new (std::nothrow) std::byte[bytes] : nullptr);
+}
+
+consensus_run run_of(okid_method_t method, int rows) {
+    consensus_run run;
+    run.method = method;
+    run.rows = rows;
+    return run;
+}
+
+bool find_poles(const okid_identify_config_t& config, const level_sums& sums, consensus_run& run) {
+    const std::size_t bytes = okid_identify_memsize(&config);
+    const auto block = memory(bytes);
+    okid_identify_t* identifier = nullptr;
+    okid_identified_t model{};
+    if (!block || !sums.handle() || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK)
+        return false;
+    if (okid_identify_run(identifier, sums.handle(), &model) < 0) return false;
+    collect_poles(identifier, model, run);
+    link_tracks(run);
+    return true;
+}
+
+} // namespace
+
+std::vector<consensus_run> plan_runs(int n_u, int n_y, int level, double fs_hz, double top, long long samples) {
+    const int m = n_u + n_y;
+    const int borne = static_cast<int>(std::min<long long>(long_rows, samples / 10 / (n_y + 2LL * n_u)));
+    const int rows = std::min(borne, std::max(6, most_unknowns / m));
+    const int less = std::max(fewest_rows, static_cast<int>(short_share * rows + 0.5));
+    const int middle = std::max(fewest_rows, static_cast<int>(middle_share * rows + 0.5));
+    std::vector<consensus_run> out;
+    if (rows >= fewest_rows)
+        out = {run_of(OKID_METHOD_N4SID_MOESP, rows), run_of(OKID_METHOD_N4SID_MOESP, less),
+               run_of(OKID_METHOD_N4SID_CVA, rows), run_of(OKID_METHOD_N4SID_CVA, less),
+               run_of(OKID_METHOD_N4SID_SSARX, middle)};
+    int p = n_u > 0 ? okid_identify_usable_p(n_u, n_y, lags_of_observer, samples)
+                    : static_cast<int>(std::min<long long>(lags_of_observer, samples / 20));
+    p = std::min(p, std::max(8, most_unknowns / m));
+    if (p * n_y >= fewest_rows) out.push_back(run_of(OKID_METHOD_OKID_ERA, p));
+    for (consensus_run& run : out) {
+        run.level = level;
+        run.fs_hz = fs_hz;
+        run.top = top;
+        const okid_identify_config_t config = run_config(run, n_u, n_y);
+        const int most = is_subspace(run.method) ? (run.rows - 1) * n_y : run.rows * n_y;
+        run.orders = consensus_orders(std::min({most_order, most, okid_identify_max_order(&config)}));
+    }
+    return out;
+}
+
+okid_identify_config_t run_config(const consensus_run& run, int n_u, int n_y) {
+    okid_identify_config_t config{};
+    config.n_u = n_u;
+    config.n_y = n_y;
+    config.method = run.method;
+    if (is_subspace(run.method))
+        config.rows = run.rows;
+    else
+        config.p = run.rows;
+    if (n_u > 0 && !is_subspace(run.method)) config.hankel = OKID_HANKEL_INNOVATIONS;
+    config.order = fewest_rows;
+    const int most = is_subspace(run.method) ? (run.rows - 1) * n_y : run.rows * n_y;
+    config.max_order = std::min(most_order, most - most % 2);
+    config.fs_hz = run.fs_hz;
+    config.detrend = OKID_DETREND_NONE; // levels are centred
+    return config;
+}
+
+level_sums::level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest) {
+    okid_accumulator_config_t shape{};
+    shape.n_u = n_u;
+    shape.n_y = n_y;
+    shape.lags = lags;
+    shape.sample = OKID_SAMPLE_DOUBLE;
+    shape.forgetting = 1;
+    shape.edges = 1;
+    const std::size_t bytes = okid_accumulator_memsize(&shape);
+    block_ = memory(bytes);
+    if (!block_ || okid_accumulator_create(&accumulator_, &shape, block_.get(), bytes) != OKID_OK) {
+        accumulator_ = nullptr;
+        return;
+    }
+    const auto m = static_cast<std::size_t>(n_u + n_y);
+    const std::vector<double> silence(at_rest ? static_cast<std::size_t>(lags) * m : 0);
+    for (const auto& rows : level.records) {
+        okid_accumulator_gap(accumulator_, 0);
+        okid_status_t status = OKID_OK;
+        if (at_rest) status = okid_accumulator_add(accumulator_, silence.data(), static_cast<std::size_t>(lags));
+        if (status >= 0) status = okid_accumulator_add(accumulator_, rows.data(), rows.size() / m);
+        if (status < 0) accumulator_ = nullptr;
+        if (status < 0) return;
+    }
+}
+
+std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest) {
+    std::vector<consensus_run> out;
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        const record_level& level = levels[k];
+        std::vector<consensus_run> runs =
+            plan_runs(n_u, n_y, static_cast<int>(k), level.fs_hz, level.top, level.samples);
+        int lags = -1;
+        std::unique_ptr<level_sums> sums;
+        std::stable_sort(runs.begin(), runs.end(), [&](const consensus_run& a, const consensus_run& b) {
+            const auto ca = run_config(a, n_u, n_y), cb = run_config(b, n_u, n_y);
+            return okid_identify_lags(&ca) < okid_identify_lags(&cb);
+        });
+        for (consensus_run& run : runs) {
+            const okid_identify_config_t config = run_config(run, n_u, n_y);
+            if (const int needed = okid_identify_lags(&config); needed != lags)
+                sums = std::make_unique<level_sums>(level, n_u, n_y, lags = needed, at_rest);
+            if (find_poles(config, *sums, run)) out.push_back(std::move(run));
+        }
+    }
+    return out;
+}
+
+} // namespace okid_host

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// The runs behind `--method auto`: which methods, horizons and rates look at a record, and what each of them finds.
+#pragma once
+#include "consensus.hpp"
+#include "levels.hpp"
+
+#include <okid/accumulator.h>
+
+#include <cstddef>
+#include <memory>
+
+namespace okid_host {
+
+/// The runs that a level bears, without poles.
+std::vector<consensus_run> plan_runs(int n_u, int n_y, int level, double fs_hz, double top, long long samples);
+
+/// What the library is asked for by a run.
+okid_identify_config_t run_config(const consensus_run& run, int n_u, int n_y);
+
+/// Sums of a level for runs with so many lags.
+class level_sums {
+  public:
+    level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest);
+    okid_accumulator_t* handle() const { return accumulator_; }
+
+  private:
+    std::unique_ptr<std::byte[]> block_;
+    okid_accumulator_t* accumulator_ = nullptr;
+};
+
+/// All runs of all levels with their poles linked. Runs that find no model are left out.
+std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest);
+
+} // namespace okid_host

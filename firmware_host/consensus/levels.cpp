@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  records at several rates
+// METHOD   halved again and again behind the linear-phase filter of fir_kernel.hpp, the same for forces and responses: what
+//          lies between both stays the structure. A sample whose filter meets a missing one is missing
+#include "levels.hpp"
+
+#include "align/fir_kernel.hpp"
+#include "spectrum.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace okid_host {
+namespace {
+
+constexpr long long fewest_samples = 700; // numerics.md section 5
+constexpr std::size_t most_levels = 7;
+constexpr double top_decimated = 0.42; // inside the pass band of the filter
+constexpr double top_full = 0.48;      // where the record has no filter of its own
+constexpr double edge_power = 0.1;     // of the usual power, above top_decimated: less means an anti-alias filter
+constexpr double no_power = 1e-3;      // of the usual power, below: nothing is excited there
+constexpr double band_step = 0.02;
+constexpr std::size_t spectrum_size = 256;
+
+/// Every factor-th sample behind the filter. Silence, where the record began in it, stands before the first.
+sample_rows thinned(const fir_kernel& kernel, std::size_t factor, const sample_rows& rows, std::size_t m,
+                    bool at_rest) {
+    const std::size_t taps = 2 * kernel.half(), lead = at_rest ? kernel.half() : 0, count = lead + rows.size() / m;
+    Eigen::VectorXd weights(static_cast<Eigen::Index>(taps)), channel(static_cast<Eigen::Index>(count));
+    kernel.weights(0, weights.data());
+    const std::size_t out_count = count < taps ? 0 : (count - taps) / factor + 1;
+    sample_rows out(out_count * m);
+    for (std::size_t k = 0; k < m; ++k) {
+        channel.head(static_cast<Eigen::Index>(lead)).setZero();
+        for (std::size_t i = lead; i < count; ++i) channel[static_cast<Eigen::Index>(i)] = rows[(i - lead) * m + k];
+        for (std::size_t i = 0; i < out_count; ++i)
+            out[i * m + k] = weights.dot(channel.segment(static_cast<Eigen::Index>(factor * i), weights.size()));
+    }
+    return out;
+}
+
+long long complete(const std::vector<sample_rows>& records, std::size_t m) {
+    long long out = 0;
+    for (const sample_rows& rows : records)
+        for (std::size_t n = 0; n + m <= rows.size(); n += m) {
+            double check = 0;
+            for (std::size_t k = 0; k < m; ++k) check += rows[n + k] * 0.0;
+            out += check == 0;
+        }
+    return out;
+}
+
+/// Each record less its own means, all channels in units of their spread.
+void normalise(std::vector<sample_rows>& records, std::size_t m, std::vector<double>& scale) {
+    scale.assign(m, 1.0);
+    for (std::size_t k = 0; k < m; ++k) {
+        double square = 0, total = 0;
+        for (sample_rows& rows : records) {
+            double sum = 0, count = 0;
+            for (std::size_t i = k; i < rows.size(); i += m)
+                if (!std::isnan(rows[i])) sum += rows[i], count += 1;
+            for (std::size_t i = k; count > 0 && i < rows.size(); i += m) {
+                rows[i] -= sum / count;
+                if (!std::isnan(rows[i])) square += rows[i] * rows[i];
+            }
+            total += count;
+        }
+        if (square > 0) scale[k] = std::sqrt(square / total);
+        for (sample_rows& rows : records)
+            for (std::size_t i = k; i < rows.size(); i += m) rows[i] /= scale[k];
+    }
+}
+
+/// The share of the rate up to which the forces, without any the responses, have power.
+double top_of(const std::vector<sample_rows>& records, std::size_t n_u, std::size_t m) {
+    double top = top_full;
+    for (std::size_t k = 0; k < (n_u > 0 ? n_u : m); ++k) {
+        const std::vector<double> power = power_spectrum(records, m, k, spectrum_size);
+        if (power.empty()) return top_decimated;
+        const double usual = median_power(power, 0.05, 0.40);
+        for (double low = 0.30; low < top; low += band_step) {
+            const double here = mean_power(power, low, low + band_step);
+            if (here >= (low < top_decimated - 1e-9 ? no_power : edge_power) * usual) continue;
+            top = std::min(top, low);
+            break;
+        }
+    }
+    return top;
+}
+
+} // namespace
+
+std::vector<record_level> make_levels(std::vector<sample_rows> records, std::size_t n_u, std::size_t n_y, double fs_hz,
+                                      bool at_rest, int decimate, std::vector<double>& scale) {
+    const std::size_t m = n_u + n_y;
+    const fir_kernel kernel(2);
+    std::vector<record_level> out(1);
+    out[0].fs_hz = fs_hz;
+    out[0].records = std::move(records);
+    if (decimate > 1) {
+        const fir_kernel first(decimate);
+        for (sample_rows& rows : out[0].records)
+            rows = thinned(first, static_cast<std::size_t>(decimate), rows, m, at_rest);
+        out[0].fs_hz /= decimate;
+    }
+    normalise(out[0].records, m, scale);
+    out[0].top = decimate > 1 ? top_decimated : top_of(out[0].records, n_u, m);
+    out[0].samples = complete(out[0].records, m);
+    while (out.size() < most_levels) {
+        record_level next;
+        next.fs_hz = out.back().fs_hz / 2;
+        next.top = std::min(top_decimated, 2 * out.back().top);
+        for (const sample_rows& rows : out.back().records) next.records.push_back(thinned(kernel, 2, rows, m, at_rest));
+        next.samples = complete(next.records, m);
+        if (next.samples < fewest_samples) break;
+        out.push_back(std::move(next));
+    }
+    return out;
+}
+
+} // namespace okid_host

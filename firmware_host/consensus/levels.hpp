@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// The same records at their own rate, half of it, a quarter …: no single rate suits all modes of a structure.
+#pragma once
+#include <cstddef>
+#include <vector>
+
+namespace okid_host {
+
+using sample_rows = std::vector<double>; ///< rows [u; y] of one record, n_u + n_y numbers a sample, NaN = missing
+
+/// Every record at one rate.
+struct record_level {
+    double fs_hz = 0;
+    double top = 0; ///< modes above this share of fs_hz are not seen
+    std::vector<sample_rows> records;
+    long long samples = 0; ///< complete ones
+};
+
+/// The records and their halves, while enough samples stay; each record centred, each channel scaled to unit spread.
+/// @param decimate  the first rate is so many times lower than fs_hz
+/// @param at_rest  the records begin in silence, which the filters are given too
+/// @param scale    out, n_u + n_y: what one unit of a level is in the record
+std::vector<record_level> make_levels(std::vector<sample_rows> records, std::size_t n_u, std::size_t n_y, double fs_hz,
+                                      bool at_rest, int decimate, std::vector<double>& scale);
+
+} // namespace okid_host

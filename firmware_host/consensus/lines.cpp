@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  tell lines from modes
+// METHOD   the amplitude of a response at the mode's frequency, block by block: that of a vibration driven by chance wanders
+//          (its spread is half its mean), that of a line stays. A multiple of a stronger vibration moves in phase with the power
+//          of that vibration (Kim & Powers 1979, in the time domain)
+#include "lines.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace okid_host {
+namespace {
+
+using complex = std::complex<double>;
+
+constexpr double steady = 0.25;          // spread over mean of an amplitude; 0.52 for noise in a narrow band
+constexpr std::size_t fewest_blocks = 8; // to speak of a spread
+constexpr std::size_t line_blocks = 64;
+constexpr double line_periods = 8;    // at least so many in a block
+constexpr double line_damping = 0.01; // a pole damped more is no line
+constexpr double unresolved = 2;      // decay times in the record below which nobody can tell
+constexpr double mains_tolerance = 0.003;
+constexpr double multiple_tolerance = 0.015;
+constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / sqrt(blocks)
+constexpr double stronger = 10; // amplitude of the vibration over that of its multiple
+constexpr double coupled_periods = 6;
+constexpr int most_multiple = 5;
+
+/// Amplitudes at a frequency, block by block under a Hann window.
+std::vector<complex> amplitudes(const record_level& level, std::size_t m, std::size_t channel, double frequency_hz,
+                                std::size_t block) {
+    std::vector<complex> out;
+    const complex turn = std::polar(1.0, -2 * M_PI * frequency_hz / level.fs_hz);
+    for (const sample_rows& rows : level.records) {
+        const std::size_t count = rows.size() / m;
+        complex phase = 1;
+        for (std::size_t first = 0; first + block <= count; first += block) {
+            complex sum = 0;
+            for (std::size_t i = 0; i < block; ++i, phase *= turn) {
+                const double hann = 1 - std::cos(2 * M_PI * static_cast<double>(i) / static_cast<double>(block));
+                sum += hann * rows[(first + i) * m + channel] * phase;
+            }
+            phase /= std::abs(phase);
+            if (!std::isnan(sum.real())) out.push_back(sum / static_cast<double>(block));
+        }
+    }
+    return out;
+}
+
+double spread_over_mean(const std::vector<complex>& a) {
+    double mean = 0, square = 0;
+    for (const complex& x : a) mean += std::abs(x) / static_cast<double>(a.size());
+    for (const complex& x : a) square += (std::abs(x) - mean) * (std::abs(x) - mean);
+    return std::sqrt(square / static_cast<double>(a.size())) / mean;
+}
+
+double strength(const std::vector<complex>& a) {
+    double square = 0;
+    for (const complex& x : a) square += std::norm(x);
+    return std::sqrt(square / static_cast<double>(std::max<std::size_t>(a.size(), 1)));
+}
+
+std::size_t largest(const std::vector<complex>& shape) {
+    const auto at = std::max_element(shape.begin(), shape.end(),
+                                     [](const complex& a, const complex& b) { return std::norm(a) < std::norm(b); });
+    return static_cast<std::size_t>(at - shape.begin());
+}
+
+bool near_multiple(double frequency_hz, double base, double tolerance) {
+    const double n = std::round(frequency_hz / base);
+    return n >= 1 && std::abs(frequency_hz - n * base) < tolerance * base;
+}
+
+/// Does the response at n f follow the n-th power of that at f?
+bool follows(const record_level& level, std::size_t m, std::size_t channel, double base, int n) {
+    const auto block = static_cast<std::size_t>(coupled_periods * level.fs_hz / base) + 1;
+    const std::vector<complex> a = amplitudes(level, m, channel, base, block),
+                               b = amplitudes(level, m, channel, n * base, block);
+    if (a.size() < 2 * fewest_blocks || b.size() != a.size() || strength(a) < stronger * strength(b)) return false;
+    complex sum = 0;
+    double both = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        const complex power = std::pow(a[i], n);
+        sum += b[i] * std::conj(power);
+        both += std::abs(b[i]) * std::abs(power);
+    }
+    return both > 0 && std::abs(sum) > coupled * both;
+}
+
+const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
+    std::size_t k = 0; // the lowest rate that shows it: fewest samples
+    while (k + 1 < levels.size() && frequency_hz < levels[k + 1].top * levels[k + 1].fs_hz) ++k;
+    return levels[k];
+}
+
+bool is_line(const record_level& level, std::size_t m, std::size_t channel, const consensus_mode& mode) {
+    std::size_t longest = 0;
+    for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
+    const double seconds = static_cast<double>(longest) / level.fs_hz;
+    if (2 * M_PI * mode.damping_ratio * mode.frequency_hz * seconds < unresolved) return true;
+    if (mode.damping_ratio > line_damping) return false;
+    const auto periods = static_cast<std::size_t>(line_periods * level.fs_hz / mode.frequency_hz) + 1;
+    const std::vector<complex> a =
+        amplitudes(level, m, channel, mode.frequency_hz, std::max(periods, longest / line_blocks));
+    return a.size() >= fewest_blocks && spread_over_mean(a) < steady;
+}
+
+} // namespace
+
+void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::size_t n_y,
+                std::vector<consensus_mode>& modes) {
+    const std::size_t m = n_u + n_y;
+    for (consensus_mode& mode : modes) {
+        const std::size_t channel = n_u + largest(mode.shape);
+        const record_level& level = seen_by(levels, mode.frequency_hz);
+        if (is_line(level, m, channel, mode)) {
+            const bool mains = near_multiple(mode.frequency_hz, 50, mains_tolerance) ||
+                               near_multiple(mode.frequency_hz, 60, mains_tolerance);
+            mode.why.emplace_back(mains ? "pickup" : "tone");
+            continue;
+        }
+        for (const consensus_mode& base : modes) {
+            const int n = static_cast<int>(std::lround(mode.frequency_hz / base.frequency_hz));
+            if (n < 2 || n > most_multiple || base.agreement < 0.5 ||
+                std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > multiple_tolerance ||
+                !follows(level, m, channel, base.frequency_hz, n))
+                continue;
+            mode.why.emplace_back("harmonic");
+            break;
+        }
+    }
+}
+
+} // namespace okid_host

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  standard deviations of the modes of a consensus
+// METHOD   CVA with the long horizon at one rate, at the order where the consensus found all modes of that rate; the same without
+//          one block each (jackknife)
+#include "carrier.hpp"
+
+#include "record_work.hpp"
+#include "result/method.hpp"
+
+#include <okid/steps/square_root.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+namespace okid_host {
+namespace {
+
+constexpr double carried_shape = 0.8, carried_frequency = 0.01;
+
+std::unique_ptr<std::byte[]> carrier_memory(std::size_t bytes) {
+    return std::unique_ptr<std::byte[]>(bytes ? new (std::nothrow) std::byte[bytes] : nullptr);
+}
+
+/// The run of CVA with the longest horizon at a level.
+const consensus_run* long_run(const std::vector<consensus_run>& runs, int level) {
+    const consensus_run* out = nullptr;
+    for (const consensus_run& run : runs)
+        if (run.level == level && run.method == OKID_METHOD_N4SID_CVA && (!out || run.rows > out->rows)) out = &run;
+    return out;
+}
+
+/// The lowest order at which this run found most of the modes.
+int order_with_all(const std::vector<consensus_run>& runs, const consensus_run& run,
+                   const std::vector<consensus_mode>& modes) {
+    int best = 0;
+    std::size_t most = 0;
+    for (const int order : run.orders) {
+        std::size_t count = 0;
+        for (const consensus_mode& mode : modes)
+            for (const auto& [r, t] : mode.members) {
+                if (&runs[static_cast<std::size_t>(r)] != &run || mode.level != run.level || !mode.confident())
+                    continue;
+                const auto& orders = run.tracks[static_cast<std::size_t>(t)].orders;
+                count += std::find(orders.begin(), orders.end(), order) != orders.end();
+            }
+        if (count > most) most = count, best = order;
+    }
+    return best;
+}
+
+record_set set_of(const record_level& level, std::size_t n_u, std::size_t n_y) {
+    record_set out;
+    out.n_u = n_u;
+    out.n_y = n_y;
+    for (const sample_rows& rows : level.records) out.add({}, rows.data(), rows.size() / out.channels());
+    return out;
+}
+
+/// The model from the QR factor of the level: nearly noise-free data lose half their digits in a Gram matrix.
+bool run_factor(const record_level& level, const okid_identify_config_t& config, bool at_rest,
+                okid_identify_t* identifier, okid_identified_t& model) {
+    okid_square_root_config_t shape{};
+    shape.n_u = config.n_u;
+    shape.n_y = config.n_y;
+    shape.lags = okid_identify_lags(&config);
+    shape.forgetting = 1;
+    const std::size_t bytes = okid_square_root_memsize(&shape), m = static_cast<std::size_t>(config.n_u + config.n_y);
+    const auto block = carrier_memory(bytes);
+    okid_square_root_t* factor = nullptr;
+    if (!block || okid_square_root_create(&factor, &shape, block.get(), bytes) != OKID_OK) return false;
+    const auto lags = static_cast<std::size_t>(shape.lags);
+    const std::vector<double> silence(at_rest ? lags * m : 0);
+    for (const sample_rows& rows : level.records) {
+        okid_square_root_gap(factor, 0);
+        if (at_rest && okid_square_root_add(factor, silence.data(), lags) < 0) return false;
+        if (okid_square_root_add(factor, rows.data(), rows.size() / m) < 0) return false;
+    }
+    return okid_identify_run_factor(identifier, factor, &model) >= 0;
+}
+
+/// Place of a mode in the model, or -1.
+int place_of(const okid_identified_t& model, const consensus_mode& mode) {
+    int best = -1;
+    double least = INFINITY;
+    for (int k = 0; k < model.mode_count; ++k) {
+        const double e = std::abs(model.frequency_hz[k] / mode.frequency_hz - 1);
+        if (e > std::max(carried_frequency, mode.damping_ratio)) continue;
+        std::vector<std::complex<double>> shape;
+        for (int i = 0; i < model.n_y; ++i)
+            shape.emplace_back(model.shape_re[k * model.n_y + i], model.shape_im[k * model.n_y + i]);
+        const double mac = shape_mac(shape, mode.shape);
+        const double cost = e / carried_frequency + 3 * (1 - mac) +
+                            0.3 * std::abs(std::log(model.damping_ratio[k] / mode.damping_ratio));
+        if (mac > carried_shape && cost < least) least = cost, best = k;
+    }
+    return best;
+}
+
+carried_mode carried(const okid_identified_t& model, const std::optional<deviations>& sigma, int k, bool exact) {
+    carried_mode out;
+    const auto at = static_cast<std::size_t>(k), n_y = static_cast<std::size_t>(model.n_y);
+    out.frequency_hz = model.frequency_hz[k];
+    out.damping_ratio = model.damping_ratio[k];
+    out.exact = exact;
+    for (std::size_t i = 0; i < n_y; ++i)
+        out.shape.emplace_back(model.shape_re[at * n_y + i], model.shape_im[at * n_y + i]);
+    if (!sigma) return out;
+    out.frequency_std_hz = sigma->frequency_hz[at];
+    out.damping_std = sigma->damping_ratio[at];
+    const auto first = static_cast<std::ptrdiff_t>(at * n_y), last = static_cast<std::ptrdiff_t>((at + 1) * n_y);
+    out.shape_re_std.assign(sigma->shape_re.begin() + first, sigma->shape_re.begin() + last);
+    out.shape_im_std.assign(sigma->shape_im.begin() + first, sigma->shape_im.begin() + last);
+    return out;
+}
+
+} // namespace
+
+std::vector<std::optional<carried_mode>> carry(const record_level& level, int number,
+                                               const std::vector<consensus_run>& runs,
+                                               const std::vector<consensus_mode>& modes, int n_u, int n_y, bool at_rest,
+                                               int blocks) {
+    std::vector<std::optional<carried_mode>> out(modes.size());
+    const consensus_run* run = long_run(runs, number);
+    const int order = run ? order_with_all(runs, *run, modes) : 0;
+    if (order == 0) return out;
+    okid_identify_config_t config = run_config(*run, n_u, n_y);
+    config.order = config.max_order = order;
+    const level_sums sums(level, n_u, n_y, okid_identify_lags(&config), at_rest);
+    const std::size_t bytes = okid_identify_memsize(&config);
+    const auto block = carrier_memory(bytes);
+    okid_identify_t* identifier = nullptr;
+    okid_identified_t model{};
+    if (!sums.handle() || !block || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK ||
+        okid_identify_run(identifier, sums.handle(), &model) < 0)
+        return out;
+    const bool nearly_singular = (model.warnings & OKID_NOTE_ILL_CONDITIONED) && model.observer_info.ridge <= 1e-10;
+    const bool exact = nearly_singular && run_factor(level, config, at_rest, identifier, model);
+    if (nearly_singular && !exact && okid_identify_run(identifier, sums.handle(), &model) < 0) return out;
+    std::optional<deviations> sigma;
+    if (blocks > 0) {
+        record_work work;
+        work.set = set_of(level, static_cast<std::size_t>(n_u), static_cast<std::size_t>(n_y));
+        work.at_rest = at_rest;
+        work.config = config;
+        work.model = model;
+        const auto replicates = leave_out_blocks(work, sums.handle(), blocks);
+        if (!replicates.empty()) sigma = deviations_of(model, replicates, {});
+    }
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+        if (modes[i].level != number || !modes[i].confident()) continue;
+        if (const int k = place_of(model, modes[i]); k >= 0) out[i] = carried(model, sigma, k, exact);
+    }
+    return out;
+}
+
+} // namespace okid_host

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// One model that carries the modes of one rate: their standard deviations, and sharper values of nearly noise-free records.
+#pragma once
+#include "consensus/consensus_runs.hpp"
+#include "record.hpp"
+#include "record_uncertainty.hpp"
+
+#include <optional>
+#include <vector>
+
+namespace okid_host {
+
+/// What a carrier says of one mode.
+struct carried_mode {
+    double frequency_hz = 0, damping_ratio = 0;
+    double frequency_std_hz = NAN, damping_std = NAN;
+    std::vector<std::complex<double>> shape;        ///< as the level has it, largest entry 1
+    std::vector<double> shape_re_std, shape_im_std; ///< empty: not known
+    bool exact = false;                             ///< from the QR factor of nearly noise-free records
+};
+
+/// The modes of `modes` that belong to this level, from one CVA model of the lowest order that has them all; none where the
+/// model lacks them. @param blocks  left out in turn for the standard deviations, 0 = none
+std::vector<std::optional<carried_mode>> carry(const record_level& level, int number,
+                                               const std::vector<consensus_run>& runs,
+                                               const std::vector<consensus_mode>& modes, int n_u, int n_y, bool at_rest,
+                                               int blocks);
+
+} // namespace okid_host

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  the model of a set of modes
+// METHOD   x = modal coordinates: [Re mu, -Im mu; Im mu, Re mu], mu = exp(lambda dt); y = Re of shape times coordinate; B and D
+//          by output error over the records (okid_subspace_output_error)
+#include "modal_model.hpp"
+
+#include "record_fit.hpp"
+#include "record_refine.hpp"
+#include "result/deviations.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+constexpr int markov_blocks = 61; // as 30 block rows give
+
+std::complex<double> discrete_pole(const listed_mode& mode, double dt) {
+    const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
+    return std::exp(std::complex<double>(-zeta * w, w * std::sqrt(1 - zeta * zeta)) * dt);
+}
+
+void put_modes(const std::vector<listed_mode>& modes, refined_arrays& to, okid_identified_t& model) {
+    for (const listed_mode& mode : modes) {
+        to.frequency.push_back(mode.frequency_hz);
+        to.damping.push_back(mode.damping_ratio);
+        to.mpc.push_back(mode.mpc);
+        to.emac.push_back(mode.emac);
+        to.cmi.push_back(mode.emac * mode.mpc);
+        for (const auto& entry : mode.shape) {
+            to.shape_re.push_back(entry.real());
+            to.shape_im.push_back(entry.imag());
+        }
+    }
+    model.mode_count = static_cast<std::int32_t>(modes.size());
+    model.frequency_hz = to.frequency.data();
+    model.damping_ratio = to.damping.data();
+    model.mpc = to.mpc.data();
+    model.emac = to.emac.data();
+    model.cmi = to.cmi.data();
+    model.shape_re = to.shape_re.data();
+    model.shape_im = to.shape_im.data();
+}
+
+void put_states(const std::vector<listed_mode>& modes, refined_arrays& to, okid_identified_t& model) {
+    const auto n_y = static_cast<std::size_t>(model.n_y);
+    std::vector<const listed_mode*> in;
+    for (const listed_mode& mode : modes)
+        if (mode.in_model) in.push_back(&mode);
+    const std::size_t n = 2 * in.size();
+    to.A.assign(n * n, 0.0);
+    to.C.assign(n_y * n, 0.0);
+    to.K.assign(n * n_y, 0.0);
+    model.model_radius = 0;
+    for (std::size_t k = 0; k < in.size(); ++k) {
+        const std::complex<double> mu = discrete_pole(*in[k], model.dt);
+        const std::size_t a = 2 * k, b = a + 1;
+        to.A[a * n + a] = to.A[b * n + b] = mu.real();
+        to.A[b * n + a] = -mu.imag();
+        to.A[a * n + b] = mu.imag();
+        for (std::size_t i = 0; i < n_y; ++i) {
+            to.C[a * n_y + i] = in[k]->shape[i].real();
+            to.C[b * n_y + i] = -in[k]->shape[i].imag();
+        }
+        model.model_radius = std::max(model.model_radius, std::abs(mu));
+    }
+    model.n_z = static_cast<std::int32_t>(n);
+    model.A = to.A.data();
+    model.C = to.C.data();
+    model.K = to.K.data();
+}
+
+} // namespace
+
+void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, record_work& work) {
+    work.refined = std::make_unique<refined_arrays>();
+    refined_arrays& arrays = *work.refined;
+    okid_identified_t& model = work.model = {};
+    model.n_u = static_cast<std::int32_t>(work.set.n_u);
+    model.n_y = static_cast<std::int32_t>(work.set.n_y);
+    model.dt = 1 / fs_hz;
+    model.noise_level = NAN;
+    put_modes(modes, arrays, model);
+    put_states(modes, arrays, model);
+    if (model.n_u == 0) return;
+    const okid_status_t status = fit_outputs(work.set, model.n_z, model.A, model.C, arrays.B, arrays.D);
+    if (status < 0) {
+        std::fill(arrays.B.begin(), arrays.B.end(), 0.0);
+        std::fill(arrays.D.begin(), arrays.D.end(), 0.0);
+        work.context.warnings.emplace_back(
+            "no_inputs_fitted",
+            fmt::format("B and D could not be fitted to the record ({}): they are zero", okid_status_text(status)));
+    }
+    model.B = arrays.B.data();
+    model.D = arrays.D.data();
+    model.markov_count = markov_blocks;
+    find_markov(model_view(model), markov_blocks, arrays.markov);
+    model.markov = arrays.markov.data();
+}
+
+void put_back_outputs(const std::vector<bool>& kept, record_work& work) {
+    refined_arrays& arrays = *work.refined;
+    okid_identified_t& model = work.model;
+    const std::size_t n_y = kept.size(), n_z = static_cast<std::size_t>(model.n_z);
+    const auto spread = [&](std::vector<double>& values, double missing) { // columns of outputs
+        std::vector<double> out;
+        for (auto from = values.begin(); from != values.end();)
+            for (std::size_t i = 0; i < n_y; ++i) out.push_back(kept[i] ? *from++ : missing);
+        values = std::move(out);
+    };
+    for (auto* values : {&arrays.shape_re, &arrays.shape_im, &arrays.C, &arrays.D, &arrays.markov})
+        spread(*values, NAN);
+    arrays.K.assign(n_z * n_y, 0.0);
+    for (auto* percent : {&work.context.simulation_percent, &work.context.prediction_percent})
+        if (*percent) spread(**percent, NAN);
+    if (work.context.sigma)
+        for (auto* values : {&work.context.sigma->shape_re, &work.context.sigma->shape_im}) spread(*values, NAN);
+    model.n_y = static_cast<std::int32_t>(n_y);
+    model.shape_re = arrays.shape_re.data();
+    model.shape_im = arrays.shape_im.data();
+    model.C = arrays.C.data();
+    model.K = arrays.K.data();
+    if (model.n_u == 0) return;
+    model.D = arrays.D.data();
+    model.markov = arrays.markov.data();
+}
+
+} // namespace okid_host

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// A state-space model whose poles are given modes: one block of two states each.
+#pragma once
+#include "record_work.hpp"
+
+#include <complex>
+#include <vector>
+
+namespace okid_host {
+
+/// A mode as it goes into a model and into the result.
+struct listed_mode {
+    double frequency_hz, damping_ratio, mpc, emac;
+    std::vector<std::complex<double>> shape; ///< in units of the outputs, largest entry 1
+    bool in_model;
+};
+
+/// work.model: the modes of `modes` (ascending), the states of those in the model, B and D from the records, K 0.
+void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, record_work& work);
+
+/// The model and what is known of it with all outputs again: what belongs to one that was left out is NaN.
+void put_back_outputs(const std::vector<bool>& kept, record_work& work);
+
+} // namespace okid_host

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  the default identification of measured records
+// METHOD   docs/how-okid-decides.md: levels, runs and clusters (consensus/), lines, standard deviations from one carrier a rate,
+//          then the modal model of what is confident
+#include "record_auto.hpp"
+
+#include "carrier.hpp"
+#include "consensus/lines.hpp"
+#include "error.hpp"
+#include "modal_model.hpp"
+#include "record_check.hpp"
+#include "record_fit.hpp"
+#include "record_hold.hpp"
+#include "screening.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/ranges.h>
+
+namespace okid_host {
+namespace {
+
+constexpr double worth_listing = 0.25; // agreement, or share of the runs, below which a cluster is not even doubtful
+constexpr double widest_damping = 1;   // sigma of damping over damping
+constexpr double widest_frequency = 0.05;
+constexpr double silence_share = 0.03; // of the spread after the hit
+constexpr double begun = 0.05;         // of the largest force
+constexpr std::size_t fewest_silent = 3;
+constexpr double fewest_periods = 8;         // of a mode in the record: fewer are a trend
+constexpr double periods_of_horizon = 0.025; // 0.75 of a period in 30 samples
+
+using listed_pair = std::pair<consensus_mode, std::optional<carried_mode>>;
+
+/// Spread of a channel over samples first .. last-1 of a record.
+double spread_within(const record_set& set, const record_data& record, std::size_t channel, std::size_t first,
+                     std::size_t last) {
+    const double* rows = set.rows(record);
+    double sum = 0, square = 0, count = 0;
+    for (std::size_t i = first; i < last; ++i)
+        if (const double x = rows[i * set.channels() + channel]; !std::isnan(x)) sum += x, square += x * x, ++count;
+    return count > 0 ? std::sqrt(std::max(0.0, square / count - sum * sum / count / count)) : 0;
+}
+
+double middle_of(const record_set& set, const record_data& record, std::size_t channel) {
+    std::vector<double> values;
+    const double* rows = set.rows(record);
+    for (std::size_t i = 0; i < record.count; ++i)
+        if (const double x = rows[i * set.channels() + channel]; !std::isnan(x)) values.push_back(x);
+    if (values.empty()) return 0;
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+}
+
+/// The sample at which the force of a record sets in.
+std::size_t onset(const record_set& set, const record_data& record) {
+    std::size_t first = record.count;
+    const double* rows = set.rows(record);
+    for (std::size_t k = 0; k < set.n_u; ++k) {
+        const double rest = middle_of(set, record, k);
+        const auto away = [&](std::size_t i) { return std::abs(rows[i * set.channels() + k] - rest); };
+        double largest = 0;
+        for (std::size_t i = 0; i < record.count; ++i) largest = std::fmax(largest, away(i));
+        for (std::size_t i = 0; i < first; ++i)
+            if (away(i) > begun * largest) first = i;
+    }
+    return first;
+}
+
+/// A record that is silent before its force sets in begins at rest.
+bool begins_at_rest(const record_set& set, const record_data& record) {
+    const std::size_t hit = onset(set, record);
+    if (hit < fewest_silent || hit >= record.count) return false;
+    const std::size_t last = std::min(record.count, hit + std::max<std::size_t>(64, (record.count - hit) / 10));
+    for (std::size_t k = set.n_u; k < set.channels(); ++k)
+        if (spread_within(set, record, k, 0, hit) > silence_share * spread_within(set, record, k, hit, last))
+            return false;
+    return true;
+}
+
+bool begin_at_rest(const record_set& set, const record_options& options) {
+    return options.start == "rest" ||
+           (set.n_u > 0 && std::all_of(set.records.begin(), set.records.end(),
+                                       [&](const record_data& record) { return begins_at_rest(set, record); }));
+}
+
+std::vector<consensus_mode> worth_telling(std::vector<consensus_mode> modes) {
+    modes.erase(std::remove_if(modes.begin(), modes.end(),
+                               [](const consensus_mode& mode) {
+                                   return !mode.confident() && std::max(mode.agreement, mode.found_in) < worth_listing;
+                               }),
+                modes.end());
+    return modes;
+}
+
+/// Standard deviations and, of nearly noise-free records, sharper values, from one carrier for each rate.
+std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, const std::vector<consensus_run>& runs,
+                                   const std::vector<consensus_mode>& modes, const record_options& options, bool rest) {
+    std::vector<listed_pair> out;
+    for (const consensus_mode& mode : modes) out.emplace_back(mode, std::nullopt);
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        const bool any = std::any_of(modes.begin(), modes.end(), [&](const consensus_mode& mode) {
+            return mode.confident() && mode.level == static_cast<int>(k);
+        });
+        if (!any) continue;
+        const auto found = carry(levels[k], static_cast<int>(k), runs, modes, static_cast<int>(options.inputs.size()),
+                                 static_cast<int>(options.outputs.size()), rest, options.sigma_blocks);
+        for (std::size_t i = 0; i < modes.size(); ++i)
+            if (found[i]) out[i].second = found[i];
+    }
+    for (auto& [mode, carried] : out) {
+        if (!carried) continue;
+        if (carried->exact) {
+            mode.frequency_hz = carried->frequency_hz;
+            mode.damping_ratio = carried->damping_ratio;
+        }
+        mode.shape = carried->shape;
+        if (carried->frequency_std_hz > widest_frequency * mode.frequency_hz ||
+            carried->damping_std > widest_damping * mode.damping_ratio)
+            mode.why.emplace_back("wide_sigma");
+    }
+    return out;
+}
+
+/// The shape in the units of the outputs; `largest` is what its entries were divided by.
+std::vector<std::complex<double>> in_units(const std::vector<std::complex<double>>& shape, const double* scale,
+                                           std::complex<double>& largest) {
+    std::vector<std::complex<double>> out;
+    largest = 0;
+    for (std::size_t i = 0; i < shape.size(); ++i) {
+        out.push_back(shape[i] * scale[i]);
+        if (std::abs(out.back()) > std::abs(largest)) largest = out.back();
+    }
+    for (auto& entry : out) entry /= largest;
+    return out;
+}
+
+void describe_modes(const std::vector<listed_pair>& found, const std::vector<double>& scale, std::size_t n_u,
+                    std::vector<listed_mode>& modes, result_context& context) {
+    deviations sigma;
+    for (const auto& [mode, carried] : found) {
+        std::complex<double> largest;
+        auto shape = in_units(mode.shape, scale.data() + n_u, largest);
+        const std::size_t n_y = shape.size();
+        modes.push_back(
+            {mode.frequency_hz, mode.damping_ratio, mode.mpc, mode.emac, std::move(shape), mode.confident()});
+        context.verdicts.push_back({mode.confident(), mode.found_in, mode.why});
+        sigma.frequency_hz.push_back(carried ? carried->frequency_std_hz : NAN);
+        sigma.damping_ratio.push_back(carried ? carried->damping_std : NAN);
+        for (std::size_t i = 0; i < n_y; ++i) {
+            const bool known = carried && !carried->shape_re_std.empty();
+            const double unit = scale[n_u + i] / std::abs(largest);
+            sigma.shape_re.push_back(known ? carried->shape_re_std[i] * unit : NAN);
+            sigma.shape_im.push_back(known ? carried->shape_im_std[i] * unit : NAN);
+        }
+    }
+    if (std::any_of(sigma.frequency_hz.begin(), sigma.frequency_hz.end(), [](double s) { return std::isfinite(s); }))
+        context.sigma = std::move(sigma);
+}
+
+[[noreturn]] void throw_no_modes(const std::vector<listed_pair>& found, std::size_t runs) {
+    std::string seen;
+    for (const auto& [mode, carried] : found)
+        if (mode.agreement > worth_listing)
+            seen +=
+                fmt::format("{}{:.4g} Hz ({})", seen.empty() ? "" : ", ", mode.frequency_hz, fmt::join(mode.why, ", "));
+    throw failure(
+        exit_no_model,
+        fmt::format("no model: none of {} runs of several methods, horizons and rates agree on a mode{}. Record "
+                    "longer, excite more, or look at one method with --method n4sid-cva",
+                    runs, seen.empty() ? std::string() : "; doubtful: " + seen));
+}
+
+/// Numbers of M, K, R's modes count the confident ones: here they count those listed.
+void renumber(const std::vector<mode_verdict>& verdicts, mass_matrices& mass) {
+    std::vector<int> place;
+    for (std::size_t i = 0; i < verdicts.size(); ++i)
+        if (verdicts[i].confident) place.push_back(static_cast<int>(i) + 1);
+    for (mass_mode& mode : mass.modes)
+        if (mode.number >= 1 && static_cast<std::size_t>(mode.number) <= place.size())
+            mode.number = place[static_cast<std::size_t>(mode.number) - 1];
+}
+
+/// The band and the modes picked by hand.
+void keep_wanted(const record_options& options, std::vector<consensus_mode>& modes) {
+    if (!options.band) return;
+    const auto [low, high] = *options.band;
+    modes.erase(std::remove_if(modes.begin(), modes.end(),
+                               [low = low, high = high](const consensus_mode& mode) {
+                                   return mode.frequency_hz < low || mode.frequency_hz > high;
+                               }),
+                modes.end());
+}
+
+void keep_picked(const std::vector<int>& numbers, std::vector<listed_pair>& found) {
+    if (numbers.empty()) return;
+    std::vector<listed_pair> picked;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        if (std::find(numbers.begin(), numbers.end(), static_cast<int>(i) + 1) == numbers.end()) continue;
+        picked.push_back(std::move(found[i]));
+        picked.back().first.why.clear();
+    }
+    if (const auto most = *std::max_element(numbers.begin(), numbers.end()); most > static_cast<int>(found.size()))
+        throw failure(exit_usage,
+                      fmt::format("--modes: found {}, expected numbers of the {} modes that --all-modes lists", most,
+                                  found.size()));
+    found = std::move(picked);
+}
+
+/// Slow trends: a vibration that the record holds only a few times.
+void mark_slow(const record_set& set, double fs_hz, std::vector<consensus_mode>& modes) {
+    std::size_t longest = 0;
+    for (const record_data& record : set.records) longest = std::max(longest, record.count);
+    const double seconds = static_cast<double>(longest) / fs_hz;
+    for (consensus_mode& mode : modes)
+        if (mode.frequency_hz * seconds < fewest_periods || mode.could == 0) mode.why.emplace_back("band_edge");
+}
+
+/// Everything up to the modes, their standard deviations and the shapes.
+std::vector<listed_mode> find_modes_agreed(const record_options& options, record_work& work) {
+    const auto tell = [&](const char* stage) {
+        if (options.stage) options.stage(stage);
+    };
+    const record_set& set = work.set;
+    const auto n_u = static_cast<int>(set.n_u), n_y = static_cast<int>(set.n_y);
+    std::vector<sample_rows> rows;
+    for (const record_data& record : set.records)
+        rows.emplace_back(set.rows(record), set.rows(record) + record.count * set.channels());
+    tell("making streams of lower rates");
+    std::vector<double> scale;
+    const auto levels =
+        make_levels(std::move(rows), set.n_u, set.n_y, options.fs_hz, work.at_rest, options.decimate, scale);
+    tell("looking with several methods, horizons and rates");
+    const auto runs = look_at(levels, n_u, n_y, work.at_rest);
+    auto modes = find_agreement(runs);
+    mark_lines(levels, set.n_u, set.n_y, modes);
+    mark_slow(set, options.fs_hz, modes);
+    keep_wanted(options, modes);
+    modes = worth_telling(std::move(modes));
+    tell("leaving out one block after the other");
+    auto found = carry_all(levels, runs, modes, options, work.at_rest);
+    keep_picked(options.modes, found);
+    if (std::none_of(found.begin(), found.end(), [](const listed_pair& one) { return one.first.confident(); }))
+        throw_no_modes(found, runs.size());
+    work.context.band_hz = {found.empty() ? 0.0 : periods_of_horizon * levels.back().fs_hz,
+                            levels[0].top * levels[0].fs_hz};
+    if (options.band) work.context.band_hz = *options.band;
+    for (const record_level& level : levels) work.context.rates_hz.push_back(level.fs_hz);
+    std::vector<listed_mode> listed;
+    describe_modes(found, scale, set.n_u, listed, work.context);
+    return listed;
+}
+
+void find_matrices_agreed(const record_options& options, record_work& work) {
+    remarks& said = work.context.warnings;
+    said.insert(said.end(), options.said.begin(), options.said.end());
+    mass_plan plan = options.mass;
+    if (plan.outputs.empty()) plan.outputs.resize(work.set.n_y);
+    if (work.set.n_u > 0 && options.hold == "auto") work.context.hold = told_hold(work.set, work.model, plan);
+    if (options.hold == "auto" && work.set.n_u == 0) work.context.hold = "zoh";
+    plan.hold = work.context.hold;
+    if (!options.mass.wanted()) return;
+    work.context.mass = find_mass_matrices(work.model, plan, said);
+    renumber(work.context.verdicts, *work.context.mass);
+}
+
+/// The options without the outputs that are left out.
+record_options without_outputs(record_options options, const std::vector<bool>& kept) {
+    std::vector<std::string> outputs;
+    std::vector<mass_channel> places;
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+        if (!kept[k]) continue;
+        outputs.push_back(options.outputs[k]);
+        if (!options.mass.outputs.empty()) places.push_back(options.mass.outputs[k]);
+    }
+    options.outputs = std::move(outputs);
+    options.mass.outputs = std::move(places);
+    return options;
+}
+
+} // namespace
+
+record_result identify_auto(record_set records, const record_options& given) {
+    record_work work;
+    work.set = std::move(records);
+    check_moving(work.set, given);
+    check_different_inputs(work.set, given);
+    const long long asked_gaps = count_missing(work.set).gaps;
+    screened_outputs screened = screen_outputs(work.set, given.outputs);
+    const bool all = std::all_of(screened.kept.begin(), screened.kept.end(), [](bool kept) { return kept; });
+    if (!all) work.set = without_outputs(work.set, screened.kept);
+    const record_options options = all ? given : without_outputs(given, screened.kept);
+    const missing_count missing = count_missing(work.set);
+    work.context = describe_records(work.set, options, missing);
+    if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened
+    work.context.warnings.insert(work.context.warnings.end(), screened.said.begin(), screened.said.end());
+    work.at_rest = begin_at_rest(work.set, options);
+    if (work.at_rest) work.context.start = "rest";
+    if (options.detrend == "linear") detrend_linear(work.set, options);
+    const std::vector<listed_mode> listed = find_modes_agreed(options, work);
+    if (options.stage) options.stage("simulating the model");
+    if (options.detrend != "none") remove_means(work.set);
+    make_modal_model(listed, options.fs_hz, work);
+    if (work.set.n_u > 0) fit_records(work.set, work.model, work.context);
+    find_matrices_agreed(options, work);
+    if (!all) put_back_outputs(screened.kept, work);
+    work.context.outputs = given.outputs;
+    record_result result;
+    result.model = kept_model(work.model);
+    result.context = std::move(work.context);
+    return result;
+}
+
+} // namespace okid_host

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+// `--method auto`: the modes that several methods, horizons and rates agree on, and the modal model of them.
+#pragma once
+#include "record.hpp"
+
+namespace okid_host {
+
+/// Identify from all records together. Throws `failure`: exit 3 when no mode can be signed.
+record_result identify_auto(record_set records, const record_options& options);
+
+} // namespace okid_host

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  bad samples found before they become modes
+// METHOD   clipped: far more samples at the very extreme than just below it; frozen: one value for longer than the channel ever
+//          keeps one, while it moves before and after; dropped: the same at zero, between two jumps; spikes: single samples far
+//          beyond all neighbours
+#include "screening.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+constexpr double share_lost = 0.3;     // of the samples with clean lags behind them: more, and the output goes
+constexpr std::size_t clean_lags = 60; // what a long horizon needs in one piece
+constexpr double extreme_bin = 0.01;   // of the range, just below the extreme
+constexpr double extreme_ratio = 3;    // at the extreme over just below it; 2.4 for a sampled sine
+constexpr std::size_t fewest_extreme = 10, extreme_run = 3, fewest_extreme_runs = 3;
+constexpr std::size_t frozen_run = 32, zero_run = 6;
+constexpr double usual_runs = 8;     // times the longest of all but the rarest thousandth of runs
+constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
+constexpr double spike_spreads = 15, spike_ratio = 5;
+constexpr std::size_t spike_reach = 6;
+
+struct stretch_of_equal {
+    std::size_t first, count;
+    double value;
+};
+
+/// One output of one record.
+struct output_view {
+    const record_data& record;
+    double* first;
+    std::size_t stride;
+    double at(std::size_t i) const { return first[i * stride]; }
+    void drop(std::size_t i) const { first[i * stride] = NAN; }
+    std::size_t size() const { return record.count; }
+};
+
+std::vector<stretch_of_equal> equal_stretches(const output_view& y) {
+    std::vector<stretch_of_equal> out;
+    for (std::size_t i = 0; i < y.size();) {
+        std::size_t last = i + 1;
+        while (last < y.size() && y.at(last) == y.at(i)) ++last;
+        if (!std::isnan(y.at(i))) out.push_back({i, last - i, y.at(i)});
+        i = last;
+    }
+    return out;
+}
+
+double spread_of(const output_view& y, std::size_t first, std::size_t last) {
+    double sum = 0, square = 0, n = 0;
+    for (std::size_t i = first; i < last; ++i)
+        if (!std::isnan(y.at(i))) sum += y.at(i), square += y.at(i) * y.at(i), ++n;
+    return n > 1 ? std::sqrt(std::max(0.0, square / n - sum * sum / n / n)) : 0;
+}
+
+struct fault {
+    const char* kind;
+    std::vector<std::size_t> samples;
+};
+
+/// Samples at one extreme, where they are a flat top.
+void find_clipped(const output_view& y, double extreme, double range, const std::vector<stretch_of_equal>& runs,
+                  fault& found) {
+    std::size_t at = 0, below = 0, long_runs = 0;
+    for (const stretch_of_equal& run : runs) {
+        if (run.value == extreme) {
+            at += run.count;
+            long_runs += run.count >= extreme_run;
+        } else if (std::abs(run.value - extreme) <= extreme_bin * range) {
+            below += run.count;
+        }
+    }
+    if (at < fewest_extreme || long_runs < fewest_extreme_runs ||
+        static_cast<double>(at) < extreme_ratio * static_cast<double>(below))
+        return;
+    for (std::size_t i = 0; i < y.size(); ++i)
+        if (y.at(i) == extreme) found.samples.push_back(i);
+}
+
+/// The channel moves beside a stretch as it usually does.
+bool moves_beside(const output_view& y, const stretch_of_equal& run, double usual) {
+    const std::size_t last = run.first + run.count, width = std::max<std::size_t>(run.count, frozen_run);
+    const std::size_t before = run.first > width ? run.first - width : 0, after = std::min(y.size(), last + width);
+    const bool any_before = run.first >= frozen_run, any_after = y.size() - last >= frozen_run;
+    return (any_before || any_after) && (!any_before || spread_of(y, before, run.first) > moving_share * usual) &&
+           (!any_after || spread_of(y, last, after) > moving_share * usual);
+}
+
+void find_frozen(const output_view& y, const std::vector<stretch_of_equal>& runs, double usual, double low, double high,
+                 fault& frozen, fault& zeros) {
+    std::vector<std::size_t> lengths;
+    for (const stretch_of_equal& run : runs) lengths.push_back(run.count);
+    if (lengths.empty()) return;
+    const auto rare = lengths.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(lengths.size() - 1));
+    std::nth_element(lengths.begin(), rare, lengths.end());
+    const double long_run = usual_runs * static_cast<double>(*rare);
+    for (const stretch_of_equal& run : runs) {
+        const bool zero = run.value == 0;
+        const bool extreme = run.value == low || run.value == high;
+        if (extreme && run.count < frozen_run) continue; // a flat top
+        if (static_cast<double>(run.count) < std::max(long_run, static_cast<double>(zero ? zero_run : frozen_run)) ||
+            !moves_beside(y, run, usual))
+            continue;
+        for (std::size_t i = 0; i < run.count; ++i) (zero ? zeros : frozen).samples.push_back(run.first + i);
+    }
+}
+
+void find_spikes(const output_view& y, fault& found) {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < y.size(); ++i)
+        if (!std::isnan(y.at(i))) values.push_back(y.at(i));
+    if (values.size() < 100) return;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    const double centre = *middle;
+    for (double& v : values) v = std::abs(v - centre);
+    std::nth_element(values.begin(), middle, values.end());
+    const double spread = 1.4826 * *middle;
+    if (!(spread > 0)) return;
+    for (std::size_t i = spike_reach; i + spike_reach < y.size(); ++i) {
+        const double here = std::abs(y.at(i) - centre);
+        if (!(here > spike_spreads * spread)) continue;
+        double beside = 0;
+        for (std::size_t d = 2; d <= spike_reach; ++d)
+            beside = std::fmax(beside, std::fmax(std::abs(y.at(i - d) - centre), std::abs(y.at(i + d) - centre)));
+        if (here > spike_ratio * beside) found.samples.push_back(i);
+    }
+}
+
+/// Samples with so many complete ones behind them, as if this output stood alone.
+std::size_t usable(const output_view& y) {
+    std::size_t run = 0, out = 0;
+    for (std::size_t i = 0; i < y.size(); ++i) {
+        run = std::isnan(y.at(i)) ? 0 : run + 1;
+        out += run > clean_lags;
+    }
+    return out;
+}
+
+std::string fault_text(const std::string& output, const record_data& record, const fault& found) {
+    return fmt::format("output \"{}\"{}: {} ({} sample{}, the first is number {})", output,
+                       record.path.empty() ? "" : " of " + record.path, found.kind, found.samples.size(),
+                       found.samples.size() == 1 ? "" : "s", found.samples.front());
+}
+
+/// Faults of one output of one record; their samples become missing.
+std::vector<std::string> screen(const output_view& y, const std::string& name) {
+    const std::vector<stretch_of_equal> runs = equal_stretches(y);
+    if (runs.size() < 3) return {};
+    double low = INFINITY, high = -INFINITY;
+    for (const stretch_of_equal& run : runs) low = std::min(low, run.value), high = std::max(high, run.value);
+    fault clipped{"clipped", {}}, frozen{"frozen at one value", {}}, zeros{"dropped to zero", {}}, spikes{"spikes", {}};
+    find_clipped(y, high, high - low, runs, clipped);
+    find_clipped(y, low, high - low, runs, clipped);
+    find_frozen(y, runs, spread_of(y, 0, y.size()), low, high, frozen, zeros);
+    find_spikes(y, spikes);
+    std::vector<std::string> out;
+    for (fault* found : {&clipped, &frozen, &zeros, &spikes}) {
+        if (found->samples.empty()) continue;
+        std::sort(found->samples.begin(), found->samples.end());
+        out.push_back(fault_text(name, y.record, *found));
+        for (const std::size_t i : found->samples) y.drop(i);
+    }
+    return out;
+}
+
+} // namespace
+
+screened_outputs screen_outputs(record_set& set, const std::vector<std::string>& outputs) {
+    screened_outputs out;
+    out.kept.assign(outputs.size(), true);
+    for (std::size_t k = 0; k < outputs.size(); ++k) {
+        std::vector<std::string> faults;
+        std::size_t before = 0, after = 0;
+        for (const record_data& record : set.records) {
+            const output_view view{record, set.rows(record) + set.n_u + k, set.channels()};
+            before += usable(view);
+            for (std::string& text : screen(view, outputs[k])) faults.push_back(std::move(text));
+            after += usable(view);
+        }
+        const bool lost = static_cast<double>(after) < (1 - share_lost) * static_cast<double>(before);
+        if (!faults.empty() && lost) out.kept[k] = false;
+        for (const std::string& text : faults)
+            out.said.emplace_back("screened",
+                                  text + (lost ? ": the whole output is left out, its shape entries are empty. "
+                                                 "Look at its sensor, range and cable"
+                                               : ": left out as gaps, nothing is interpolated"));
+    }
+    if (std::none_of(out.kept.begin(), out.kept.end(), [](bool kept) { return kept; }))
+        out.kept.assign(outputs.size(), true); // nothing else is there: the clean samples have to do
+    return out;
+}
+
+record_set without_outputs(const record_set& set, const std::vector<bool>& kept) {
+    record_set out;
+    out.n_u = set.n_u;
+    out.n_y = static_cast<std::size_t>(std::count(kept.begin(), kept.end(), true));
+    out.records = set.records;
+    out.samples.reserve(set.count() * out.channels());
+    for (std::size_t n = 0; n < set.count(); ++n)
+        for (std::size_t k = 0; k < set.channels(); ++k)
+            if (k < set.n_u || kept[k - set.n_u]) out.samples.push_back(set.samples[n * set.channels() + k]);
+    return out;
+}
+
+} // namespace okid_host

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// What a force did between samples: held, linear, or band-limited as a load cell behind an anti-alias filter gives it.
+#pragma once
+#include <okid/identify.h>
+
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+/// How well continuous modes explain the response of a discrete model, when the force is taken to be so between samples.
+struct hold_fit {
+    double misfit = 1; ///< of the response in the band, relative
+    double phase = 1;  ///< share of the residues out of phase: 0 for normal modes and the right hold
+};
+hold_fit fit_hold(const okid_identified_t& model, const std::vector<int>& sensing, const std::string& hold);
+
+/// "zoh", "foh" or "band", told from the model and from whether the force's spectrum falls towards Nyquist.
+std::string tell_hold(const okid_identified_t& model, const std::vector<int>& sensing, bool falls);
+
+/// The same modes with B and D as a held force would have given them.
+struct held_model {
+    std::vector<double> A, B, C, D;
+    okid_identified_t view{};
+};
+
+/// From a model identified under a band-limited force. @return false: no modes, or they do not explain its response
+bool as_if_held(const okid_identified_t& model, const std::vector<int>& sensing, held_model& out);
+
+} // namespace okid_host
