@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo check test test-slow test-wheel test-embedded test-package package docs bench bench-check bench-peers \
+.PHONY: help setup build demo check test test-slow test-wheel test-embedded test-package package docs score bench bench-check bench-peers \
 	fuzz lint format sanitize sanitize-all coverage sbom clean
 
 help: ## this list
@@ -44,6 +44,9 @@ test-wheel: ## the Python package as a stranger installs it: source distribution
 test-embedded: ## firmware on Cortex-M in QEMU, the library on Arm boards, the installed package
 	@tools/setup.sh embedded
 	@tests/embedded/run
+
+score: build ## the default identification on measured records ($OKID_DATA), beside release 0.1's figures
+	@$(PYTHON) tools/score.py build/okid
 
 bench: build ## speed of the kernels and of whole identifications as ratios within one run
 	@tools/setup.sh bench || echo "bench: going on without SLICOT"

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""--method auto: the modes of laboratory-like records are found, nothing else is signed, bad channels are named."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from laboratory import Laboratory, ambient, chain, forced
+from program import okid
+
+
+def identify(lab: Laboratory, folder: Path, *options: str) -> dict[str, Any]:
+    channels = lab.write(folder / "record.csv")
+    done = okid("identify", folder / "record.csv", *channels, "--method", "auto", "--json", "-", *options)
+    assert done.returncode == 0, done.stderr
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
+def confident(result: dict[str, Any]) -> list[dict[str, Any]]:
+    return [mode for mode in result["modes"] if mode["confident"]]
+
+
+def matched(lab: Laboratory, result: dict[str, Any]) -> dict[int, dict[str, Any]]:
+    """True mode to confident mode, the best pairs first."""
+    modes = confident(result)
+    pairs = sorted(
+        (abs(m["frequency_hz"] / f - 1) + 0.02 * abs(np.log(m["damping_ratio"] / z)), i, j)
+        for i, (f, z) in enumerate(zip(lab.frequency_hz, lab.damping_ratio, strict=True))
+        for j, m in enumerate(modes)
+        if abs(m["frequency_hz"] / f - 1) < 0.01
+    )
+    out: dict[int, int] = {}
+    for _, i, j in pairs:
+        if i not in out and j not in out.values():
+            out[i] = j
+    return {i: modes[j] for i, j in out.items()}
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_forced_structure_with_a_close_pair(seed: int, tmp_path: Path) -> None:
+    lab = forced(seed)
+    result = identify(lab, tmp_path)
+    found = matched(lab, result)
+    assert len(found) == len(lab.frequency_hz), [m["frequency_hz"] for m in confident(result)]
+    assert len(confident(result)) == len(found)
+    errors = np.array([found[i]["damping_ratio"] / z - 1 for i, z in enumerate(lab.damping_ratio)])
+    assert np.median(np.abs(errors)) < 0.0025
+    sigma = np.array([found[i]["damping_ratio_std"] for i in range(len(errors))], float)
+    assert np.mean(np.abs(errors) * lab.damping_ratio < 2 * sigma) >= 0.7
+    poles = np.linalg.eigvals(np.array(result["model"]["A"]))
+    for mode in confident(result):  # each confident mode is a pole of the model
+        w, zeta = 2 * np.pi * mode["frequency_hz"], mode["damping_ratio"]
+        pole = np.exp((-zeta + 1j * np.sqrt(1 - zeta**2)) * w / lab.fs)
+        assert np.min(np.abs(poles - pole)) < 1e-9
+    assert len(poles) == 2 * len(found)
+    assert (result["method"], result["p"], result["rows"]) == ("auto", None, None)
+
+
+@pytest.mark.parametrize(("seed", "hum"), [(21, False), (22, True)])
+def test_ambient_colour_and_hum(seed: int, hum: bool, tmp_path: Path) -> None:
+    lab = ambient(seed, hum)
+    result = identify(lab, tmp_path)
+    assert len(matched(lab, result)) >= 8
+    assert len(confident(result)) - len(matched(lab, result)) == 0
+    at_hum = [mode for mode in result["modes"] if abs(mode["frequency_hz"] - 50) < 0.1]
+    assert all("pickup" in mode["why"] for mode in at_hum)
+
+
+def clip(y: np.ndarray) -> np.ndarray:
+    return np.clip(y, -1.5 * y.std(), 1.5 * y.std())
+
+
+def spike(y: np.ndarray) -> np.ndarray:
+    out = y.copy()
+    out[len(y) // 3] = 200 * y.std()
+    return out
+
+
+def zeros(y: np.ndarray) -> np.ndarray:
+    out = y.copy()
+    for first in np.linspace(500, len(y) - 500, 12).astype(int):
+        out[first : first + 40] = 0.0
+    return out
+
+
+def frozen(y: np.ndarray) -> np.ndarray:
+    out = y.copy()
+    out[len(y) // 2 :] = y[len(y) // 2]
+    return out
+
+
+@pytest.mark.parametrize(
+    ("damage", "word", "whole"),
+    [(clip, "clipped", True), (spike, "spikes", False), (zeros, "zero", False), (frozen, "frozen", True)],
+)
+def test_a_bad_channel_is_named_and_makes_no_modes(damage: Any, word: str, whole: bool, tmp_path: Path) -> None:
+    lab = forced(14)
+    bad = lab.n_u + 2
+    samples = lab.samples.copy()
+    samples[:, bad] = damage(samples[:, bad])
+    result = identify(lab._replace(samples=samples), tmp_path)
+    said = [w["text"] for w in result["warnings"] if w["code"] == "screened"]
+    assert len(said) == 1
+    assert '"y2"' in said[0]
+    assert word in said[0]
+    found = matched(lab, result)
+    assert len(confident(result)) == len(found) == len(lab.frequency_hz)
+    for mode in confident(result):
+        assert (mode["shape_re"][2] is None) == whole
+        assert all(entry is not None for k, entry in enumerate(mode["shape_re"]) if k != 2)
+
+
+@pytest.mark.parametrize("seed", [31, 32])
+def test_band_limited_force_gives_mass_and_stiffness(seed: int, tmp_path: Path) -> None:
+    structure = chain(seed)
+    dofs = ["--input-dofs", ",".join(map(str, structure.force_dofs)), "--output-dofs", "1,2,3,4,5"]
+    result = identify(structure.lab, tmp_path, *dofs)
+    assert result["hold"] == "band"
+    for name, truth in (("M", structure.M), ("K", structure.K)):
+        error = np.linalg.norm(np.array(result["mkr"][name]) - truth) / np.linalg.norm(truth)
+        assert error < 0.005, (name, error)
+
+
+def test_modes_are_picked_by_hand_and_by_band(tmp_path: Path) -> None:
+    lab = forced(15)
+    every = identify(lab, tmp_path)["modes"]
+    picked = identify(lab, tmp_path, "--modes", "2-3")["modes"]
+    assert [m["frequency_hz"] for m in picked] == [m["frequency_hz"] for m in every[1:3]]
+    assert all(m["confident"] for m in picked)
+    high = identify(lab, tmp_path, "--band", "30:90")["modes"]
+    assert [m["frequency_hz"] for m in high] == [m["frequency_hz"] for m in every if 30 <= m["frequency_hz"] <= 90]
+
+
+def test_options_of_one_method_do_not_go_with_auto(tmp_path: Path) -> None:
+    channels = forced(16, count=2000).write(tmp_path / "record.csv")
+    done = okid("identify", tmp_path / "record.csv", *channels, "--method", "auto", "--p", "30")
+    assert done.returncode == 2
+    assert "--p belongs to one method" in done.stderr
