@@ -99,7 +99,7 @@ const std::vector<section_rule> schema = {
       {"rows", kind::whole, 2, 100000},
       {"hankel", kind::choice, 0, 0, {"system", "innovations", "literal"}},
       {"order", kind::order, 1, 10000},
-      {"hold", kind::choice, 0, 0, {"zoh", "foh"}},
+      {"hold", kind::choice, 0, 0, {"zoh", "foh", "band"}},
       {"detrend", kind::choice, 0, 0, {"none", "mean", "linear"}},
       {"window_s", kind::positive, 0, 1e6},
       {"forgetting", kind::positive, 0, 1},

@@ -16,7 +16,7 @@ constexpr double share_lost = 0.3;     // of the samples with clean lags behind 
 constexpr std::size_t clean_lags = 60; // what a long horizon needs in one piece
 constexpr double extreme_bin = 0.01;   // of the range, just below the extreme
 constexpr double extreme_ratio = 3;    // at the extreme over just below it; 2.4 for a sampled sine
-constexpr std::size_t fewest_extreme = 10, extreme_run = 3, fewest_extreme_runs = 3;
+constexpr std::size_t fewest_extreme = 10;
 constexpr std::size_t frozen_run = 32, zero_run = 6;
 constexpr double usual_runs = 8;     // times the longest of all but the rarest thousandth of runs
 constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
@@ -61,20 +61,21 @@ struct fault {
     std::vector<std::size_t> samples;
 };
 
-/// Samples at one extreme, where they are a flat top.
+/// Samples at one extreme, where they are a flat top: far more than just below it, and than at the next value below it.
 void find_clipped(const output_view& y, double extreme, double range, const std::vector<stretch_of_equal>& runs,
                   fault& found) {
-    std::size_t at = 0, below = 0, long_runs = 0;
+    double next = NAN;
+    for (const stretch_of_equal& run : runs)
+        if (run.value != extreme && !(std::abs(run.value - extreme) > std::abs(next - extreme))) next = run.value;
+    std::size_t at = 0, below = 0, at_next = 0;
     for (const stretch_of_equal& run : runs) {
-        if (run.value == extreme) {
+        if (run.value == extreme)
             at += run.count;
-            long_runs += run.count >= extreme_run;
-        } else if (std::abs(run.value - extreme) <= extreme_bin * range) {
+        else if (std::abs(run.value - extreme) <= extreme_bin * range)
             below += run.count;
-        }
+        if (run.value == next) at_next += run.count;
     }
-    if (at < fewest_extreme || long_runs < fewest_extreme_runs ||
-        static_cast<double>(at) < extreme_ratio * static_cast<double>(below))
+    if (at < fewest_extreme || static_cast<double>(at) < extreme_ratio * static_cast<double>(std::max(below, at_next)))
         return;
     for (std::size_t i = 0; i < y.size(); ++i)
         if (y.at(i) == extreme) found.samples.push_back(i);
