@@ -141,7 +141,9 @@ void add_identify(CLI::App& app) {
     command->add_option("--fs", given->wanted.fs, "sample rate; default: what the file says")->type_name("HZ");
     command
         ->add_option("--method", given->wanted.method,
-                     "how the model is found: auto, what several methods agree on, or one of them")
+                     "how the model is found: auto (default), what several methods agree on, or one of them. With an "
+                     "option of one "
+                     "method alone (--p, --rows, --order, --max-order, --hankel, --refine, --stabilization) okid-era")
         ->type_name(fmt::format("auto|{}", fmt::join(method_names(), "|")));
     command->add_option("--p", given->wanted.p, "observer order in samples (default 40; not for n4sid)")
         ->type_name("N");

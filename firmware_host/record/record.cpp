@@ -215,6 +215,13 @@ long long find_model(const record_options& options, okid_accumulator_t*& accumul
     check_status(okid_identify_create(&work.identifier, &work.config, work.memory.get(), bytes), "identifier");
     okid_status_t status = okid_identify_run(work.identifier, accumulator, &work.model);
     status = refine_by_factor(accumulator, status, work);
+    if (status == OKID_ERR_NO_MODES && options.order > 0 && work.model.n_z == options.order &&
+        work.model.mode_count == 0 && !options.mass.wanted()) {
+        work.context.warnings.emplace_back(
+            "no_modes",
+            fmt::format("the model of order {} as asked for has no vibration mode (0 < ζ < 1)", options.order));
+        return rows;
+    }
     if (status < 0) throw_identify_failure(status, work.model, work.config, work.context);
     work.realised = work.model;
     return rows;

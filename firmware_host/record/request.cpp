@@ -16,7 +16,7 @@
 namespace okid_host {
 namespace {
 
-constexpr const char* default_method = "okid-era";
+constexpr const char* default_method = "auto";
 
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
 

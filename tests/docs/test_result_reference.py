@@ -41,8 +41,10 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
     python = package.identify(u, y, fs=250.0, p=12, input_dofs=[1], output_dofs=[1, 2], refine=True)
     # a remark, for its keys: p is too long for a record so short
     remarked = identified(rig, "--inputs", "force1", "--range", "0:300")
+    agreed = okid("identify", rig / "a.csv", "--inputs", "force1", "--outputs", "acc1,acc2", "--json", "-")
+    assert agreed.returncode == 0, agreed.stderr
     return [
-        identified(rig, *full), identified(rig, "--method", "n4sid-cva"), remarked, python.to_dict(),
+        json.loads(agreed.stdout), identified(rig, *full), identified(rig, "--method", "n4sid-cva"), remarked, python.to_dict(),
         json.loads((rig / "live.json").read_text()),
     ]  # fmt: skip
 

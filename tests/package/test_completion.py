@@ -17,9 +17,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 OKID = os.environ.get("OKID_PROGRAM", str(ROOT / "build" / "okid"))
 COMMANDS = ["identify", "run", "record", "replay", "simulate", "convert", "check", "doctor", "bench", "completion"]
 FIXED = {  # options of okid identify with fixed choices
-    "--method": ["okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"],
+    "--method": ["auto", "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"],
     "--hankel": ["system", "innovations", "literal"],
-    "--hold": ["zoh", "foh"],
+    "--hold": ["auto", "zoh", "foh", "band"],
     "--detrend": ["none", "mean", "linear"],
     "--start": ["moving", "rest"],
     "--sensing": ["acceleration", "velocity", "displacement"],

@@ -37,7 +37,8 @@ def identify(tmp_path: pathlib.Path, values: np.ndarray, *more: str) -> subproce
     with path.open("w") as file:
         file.write("# fs_hz: 250\nforce1,acc1,acc2,acc3\n")
         np.savetxt(file, values, delimiter=",", fmt="%.12g")
-    return okid("identify", path, "--inputs", "force1", "--outputs", "acc1,acc2,acc3", "--json", "-", *more)
+    method = [] if "--method" in more else ["--method", "okid-era"]
+    return okid("identify", path, "--inputs", "force1", "--outputs", "acc1,acc2,acc3", "--json", "-", *method, *more)
 
 
 def replay(rig: pathlib.Path, tmp_path: pathlib.Path, edit: tuple[str, str]) -> tuple[int, str, dict]:
@@ -127,7 +128,7 @@ def test_what_comes_instead_is_named(rig: pathlib.Path, tmp_path: pathlib.Path) 
 def test_exchanged_columns_are_said(rig: pathlib.Path) -> None:
     said = []
     for inputs, outputs in (("acc1", "force1,acc2,acc3"), ("force1", "acc1,acc2,acc3")):
-        done = okid("identify", rig / "rig.csv", "--inputs", inputs, "--outputs", outputs, "--json", "-")
+        done = okid("identify", rig / "rig.csv", "--inputs", inputs, "--outputs", outputs, "--method", "okid-era", "--json", "-")
         assert done.returncode == 0, done.stderr
         said.append({each["code"]: each["text"] for each in json.loads(done.stdout)["warnings"]})
     assert 'output "force1" is a force by its name or unit, input "acc1" is not' in said[0]["exchanged"]
@@ -184,7 +185,7 @@ def test_a_free_decay_is_for_the_subspace_methods(tmp_path: pathlib.Path) -> Non
     with (tmp_path / "decay.csv").open("w") as file:
         file.write("# fs_hz: 250\na1,a2\n")
         np.savetxt(file, values, delimiter=",", fmt="%.9g")
-    done = okid("identify", tmp_path / "decay.csv", "--outputs", "a1,a2")
+    done = okid("identify", tmp_path / "decay.csv", "--outputs", "a1,a2", "--method", "okid-era")
     assert done.returncode == 3 and "A free decay (ring-down) wants method n4sid-cva" in done.stderr
     done = okid("identify", tmp_path / "decay.csv", "--outputs", "a1,a2", "--method", "n4sid-cva", "--json", "-")
     assert done.returncode == 0, done.stderr
