@@ -2,7 +2,7 @@
 // One sample out for every `factor` that come in, behind a linear-phase anti-alias filter (fir_kernel.hpp), the same for
 // all channels and without delay. A sample whose filter meets a missing one is missing.
 #pragma once
-#include "fir_kernel.hpp"
+#include "consensus/fir_kernel.hpp"
 #include "gap_marker.hpp"
 
 #include <cstdint>

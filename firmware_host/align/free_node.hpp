@@ -6,7 +6,7 @@
 // bends no sine; the samples there come out of a band-limited filter (fir_kernel.hpp). Nothing is made up: where the
 // filter meets a missing sample, the result is missing.
 #pragma once
-#include "fir_kernel.hpp"
+#include "consensus/fir_kernel.hpp"
 #include "gap_marker.hpp"
 
 #include <drv/clock_fit.h>

@@ -4,7 +4,7 @@
 //          lies between both stays the structure. A sample whose filter meets a missing one is missing
 #include "levels.hpp"
 
-#include "align/fir_kernel.hpp"
+#include "fir_kernel.hpp"
 #include "spectrum.hpp"
 
 #include <Eigen/Dense>
