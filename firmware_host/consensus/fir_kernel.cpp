@@ -9,13 +9,15 @@ namespace {
 
 constexpr std::size_t phases = 512; // linear between two of them errs by (pi / 512)^2 / 8 = 5e-6
 constexpr double zero_crossings = 32;
-constexpr double shape = 10.06; // 0.1102 (100 dB - 8.7)
+constexpr double kaiser_shape = 10.06; // 0.1102 (100 dB - 8.7)
 constexpr double pi = 3.14159265358979323846;
 
 double sinc(double x) { return x == 0 ? 1 : std::sin(pi * x) / (pi * x); }
 
 double kaiser(double x) {
-    return std::abs(x) >= 1 ? 0 : std::cyl_bessel_i(0.0, shape * std::sqrt(1 - x * x)) / std::cyl_bessel_i(0.0, shape);
+    return std::abs(x) >= 1
+               ? 0
+               : std::cyl_bessel_i(0.0, kaiser_shape * std::sqrt(1 - x * x)) / std::cyl_bessel_i(0.0, kaiser_shape);
 }
 
 } // namespace
