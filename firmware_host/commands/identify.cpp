@@ -113,6 +113,7 @@ void identify(identify_arguments given) {
     choose_columns(given);
     record_options options = check_request(given.wanted);
     check_targets(given);
+    options.all_modes = given.all_modes;
     record_result result;
     {
         progress display(!given.quiet);
@@ -173,7 +174,7 @@ void add_identify(CLI::App& app) {
     command->add_flag("--all-modes", given->all_modes, "the table also lists the modes that are not signed, and why");
     command
         ->add_option("--modes", given->wanted.modes,
-                     "only these modes, numbered as --all-modes lists them (--method auto)")
+                     "only these modes, by their numbers in the table (--method auto)")
         ->type_name("1,3-5");
     command->add_option("--detrend", given->wanted.detrend, "what is taken out of every channel first (default mean)")
         ->type_name("none|mean|linear");

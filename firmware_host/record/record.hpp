@@ -31,6 +31,7 @@ struct record_options {
     int sigma_blocks = 20;      ///< blocks left out in turn for the standard deviations; 0 = none
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
+    bool all_modes = false;                        ///< auto lists also what few runs found
     std::vector<int> modes;                        ///< numbers of the modes picked by hand (auto); empty: all
     std::function<void(const char* stage)> stage;  ///< told what begins; may be empty
 };

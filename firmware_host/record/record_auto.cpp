@@ -20,6 +20,7 @@
 namespace okid_host {
 namespace {
 
+constexpr double doubtful_share = 0.5; // of the runs: fewer is not even doubtful
 constexpr double worth_listing = 0.25; // agreement, or share of the runs, below which a cluster is not even doubtful
 constexpr double widest_damping = 1;   // sigma of damping over damping
 constexpr double widest_frequency = 0.05;
@@ -84,12 +85,12 @@ bool begin_at_rest(const record_set& set, const record_options& options) {
                                        [&](const record_data& record) { return begins_at_rest(set, record); }));
 }
 
-std::vector<consensus_mode> worth_telling(std::vector<consensus_mode> modes) {
-    modes.erase(std::remove_if(modes.begin(), modes.end(),
-                               [](const consensus_mode& mode) {
-                                   return !mode.confident() && std::max(mode.agreement, mode.found_in) < worth_listing;
-                               }),
-                modes.end());
+std::vector<consensus_mode> worth_telling(std::vector<consensus_mode> modes, bool all) {
+    const auto chance = [all](const consensus_mode& mode) {
+        return !mode.confident() &&
+               (all ? std::max(mode.agreement, mode.found_in) < worth_listing : mode.found_in < doubtful_share);
+    };
+    modes.erase(std::remove_if(modes.begin(), modes.end(), chance), modes.end());
     return modes;
 }
 
@@ -202,7 +203,7 @@ void keep_picked(const std::vector<int>& numbers, std::vector<listed_pair>& foun
     }
     if (const auto most = *std::max_element(numbers.begin(), numbers.end()); most > static_cast<int>(found.size()))
         throw failure(exit_usage,
-                      fmt::format("--modes: found {}, expected numbers of the {} modes that --all-modes lists", most,
+                      fmt::format("--modes: found {}, expected numbers of the {} modes listed", most,
                                   found.size()));
     found = std::move(picked);
 }
@@ -236,7 +237,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     mark_lines(levels, set.n_u, set.n_y, modes);
     mark_slow(set, options.fs_hz, modes);
     keep_wanted(options, modes);
-    modes = worth_telling(std::move(modes));
+    modes = worth_telling(std::move(modes), options.all_modes);
     tell("leaving out one block after the other");
     auto found = carry_all(levels, runs, modes, options, work.at_rest);
     keep_picked(options.modes, found);

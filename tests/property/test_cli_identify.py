@@ -550,8 +550,8 @@ def test_simulated_rig_is_identified(tmp_path: Path, seed: int) -> None:
             "-",
         )
     )
-    assert len(result["modes"]) == 3
-    for mode, frequency, damping in zip(result["modes"], truth["frequency_hz"], truth["damping_ratio"], strict=True):
+    modes = [mode for mode in result["modes"] if mode["confident"]]
+    for mode, frequency, damping in zip(modes, truth["frequency_hz"], truth["damping_ratio"], strict=True):
         assert mode["frequency_hz"] == pytest.approx(frequency, rel=5e-4)
         assert mode["damping_ratio"] == pytest.approx(damping, rel=0.05)
 
@@ -686,7 +686,8 @@ def test_changed_rig(tmp_path: Path) -> None:
     channels = ["--inputs", "force1", "--outputs", "acc1,acc2,acc3", "--json", "-"]
     for part, true in ((":2500", truth), ("2500:", truth["changes"][0])):
         modes = result_of(okid("identify", csv, *channels, "--range", part))["modes"]
-        assert [m["frequency_hz"] for m in modes] == pytest.approx(true["frequency_hz"], rel=1e-3)
+        sure = [m["frequency_hz"] for m in modes if m["confident"]]
+        assert sure == pytest.approx(true["frequency_hz"], rel=1e-3)
 
 
 def test_alias_warning(tmp_path: Path) -> None:

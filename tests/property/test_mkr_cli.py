@@ -61,7 +61,8 @@ class Bench:
 
     def run(self, *options: str, dofs: list[str] | None = None) -> subprocess.CompletedProcess[str]:
         channels = [f"--inputs={','.join(self.inputs)}", f"--outputs={','.join(self.outputs)}"]
-        return run("identify", self.path, *channels, *(self.dofs if dofs is None else dofs), *options)
+        method = [] if "--method" in options else ["--method", "okid-era"]
+        return run("identify", self.path, *channels, *(self.dofs if dofs is None else dofs), *method, *options)
 
     def result(self, *options: str, dofs: list[str] | None = None) -> dict[str, Any]:
         done = self.run("--json", "-", *options, dofs=dofs)
