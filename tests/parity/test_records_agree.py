@@ -53,6 +53,7 @@ def both(
         option = f"--{name.replace('_', '-')}"
         text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
         options += [option] if value is True else [f"{option}={text}"]
+    options += [] if "method" in arguments else ["--method=okid-era"]
     chosen = ["--inputs", ",".join(inputs)] if inputs else []
     done = okid(
         "identify",
@@ -328,6 +329,8 @@ def test_the_table_is_that_of_the_program(tmp_path: Path) -> None:
         1,
         "--output-dofs",
         "1,2,3",
+        "--method",
+        "okid-era",
     )
     result = package.identify(
         one[:, :1],
