@@ -15,13 +15,15 @@
 
 enum { READS_A_CALL = 4, READS_BETWEEN_COUNTS = 64 };
 
-static const int64_t byte_ns = 250; // apart, so that packets read together differ
+static const int64_t byte_ns = 250;       // apart, so that packets read together differ
+static const int64_t clock_set = 1000000000; // ns: so far back is no order of packets but a clock that was set
 
 typedef struct serial_t {
     line_link_t link;
     drv_decoder_t decoder;
     double period_ns;
     int64_t arrived_ns;     ///< of the bytes in the decoder
+    int64_t stamped_ns;     ///< the newest stamp handed out
     unsigned sample, field; ///< of the packet at hand, next to go out
     int open_packet;
     unsigned reads;
@@ -102,6 +104,9 @@ static void next_frame(drv_source_t* self, serial_t* state, drv_frame_t* frame) 
         frame, (packet->first_field + state->field) / together, packet->counted ? packet->sequence + state->sample : 0,
         packet->values + (size_t)state->sample * packet->fields + state->field, left < together ? left : together);
     frame->time_ns = stamp(state, packet);
+    if (frame->time_ns < state->stamped_ns && state->stamped_ns - frame->time_ns < clock_set)
+        frame->time_ns = state->stamped_ns; // bytes that waited through two reads are not earlier for it
+    state->stamped_ns = frame->time_ns;
     if (packet->timed) {
         frame->hw_time_ns = (int64_t)(state->device_ns + (uint64_t)((double)state->sample * state->period_ns));
         if (frame->hw_time_ns == 0) frame->hw_time_ns = 1; // 0 means none

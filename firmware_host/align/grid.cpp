@@ -24,6 +24,10 @@ std::int64_t power_of_two(std::int64_t least) {
     return value;
 }
 
+constexpr double decision_s = 0.7;          // a frame that is late waits for so long before a loss is believed
+constexpr std::int64_t most_late = 400000;  // frames of all lanes that may wait behind a stall
+constexpr std::int64_t least_decision = 32; // and for so many periods
+
 } // namespace
 
 const char* gap_cause_name(gap_cause cause) {
@@ -36,15 +40,19 @@ grid::grid(const live_config& config, grid_sink& sink)
       width_(config.channels.size()), buses_(config.buses.size()) {
     build_lanes(config);
     window_ = std::clamp<std::int64_t>(std::llround(rate_hz_ / 4), 4 * reorder_, 4096);
-    lag_ = std::clamp<std::int64_t>(std::llround(rate_hz_), window_, 16384);
+    const double row_bytes = 8.0 * static_cast<double>(width_ + 2) + static_cast<double>(lanes_.size());
+    const std::int64_t room = std::llround(most_rows_bytes / row_bytes / 4);
+    lag_ = std::clamp<std::int64_t>(std::llround(silence_patience_s * rate_hz_), window_, std::max(room, window_));
     mask_ = power_of_two(2 * lag_) - 1;
-    hold_ = window_ / 2;
+    hold_ = std::clamp<std::int64_t>(std::llround(decision_s * rate_hz_), least_decision, lag_ / 4);
+    most_held_ = static_cast<std::size_t>(hold_ + std::min<std::int64_t>(lag_, most_late / static_cast<std::int64_t>(lanes_.size()))) + 64;
     const auto rows = static_cast<std::size_t>(mask_ + 1);
     values_.assign(rows * width_, missing_sample);
     present_.assign(rows * lanes_.size(), 0);
     slots_.assign(rows, 0);
     times_.assign(rows, 0);
-    held_.reserve(lanes_.size() * 64 + 256);
+    most_before_ = lanes_.size() * static_cast<std::size_t>(64 + std::llround(gather_ns() / period_ns_)) + 256;
+    held_.reserve(most_before_);
 }
 
 void grid::build_lanes(const live_config& config) {
@@ -162,6 +170,7 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
     l.last = std::max(l.last, index);
     l.recent[l.recent_at++ % l.recent.size()] = index;
     if (l.recent_at >= l.recent.size()) l.passed = *std::min_element(l.recent.begin(), l.recent.end());
+    l.gone = false;
     if (index < next_) {
         if (index < 0) return; // before the grid begins
         const bool remembered = opened_ - index <= mask_;
@@ -186,11 +195,11 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
     drain(false);
 }
 
-/// May the lane still bring the sample that goes out next? One that is silent has `lag` samples for it, one that
-/// jumped over it until its newest frames all lie beyond: during an outage they may be few.
+/// May the lane still bring the sample that goes out next? One that is silent has `lag` samples for it unless it is gone,
+/// one that jumped over it until its newest frames all lie beyond: during an outage they may be few.
 bool grid::may_come(const lane& l) const {
     const std::int64_t ahead = opened_ - next_;
-    if (!l.heard || l.last < next_) return ahead <= lag_;
+    if (!l.heard || l.last < next_) return !l.gone && ahead <= lag_;
     return l.passed <= next_ && ahead <= mask_;
 }
 
@@ -202,9 +211,18 @@ void grid::drain(bool all) {
             const std::uint8_t* have = present(next_);
             for (std::size_t i = 0; i < lanes_.size(); ++i)
                 if (!have[i] && may_come(lanes_[i])) return;
+            leave_behind();
         }
         emit_front();
     }
+}
+
+/// Lanes that lack the sample at the front and were waited for in vain.
+void grid::leave_behind() {
+    if (opened_ - next_ <= lag_) return;
+    const std::uint8_t* have = present(next_);
+    for (std::size_t i = 0; i < lanes_.size(); ++i)
+        if (!have[i] && (!lanes_[i].heard || lanes_[i].last < next_) && lanes_[i].late.empty()) lanes_[i].gone = true;
 }
 
 void grid::emit_front() {
@@ -249,7 +267,10 @@ void grid::close_gap(lane& l, bool resumed) {
     gap.last = gap.first + gap.count - 1;
     gap.cause = resumed || gap.count <= reorder_ ? gap_cause::sequence : gap_cause::stall;
     for (const cause_mark& mark : l.marks)
-        if (mark.first <= gap.last && mark.last >= gap.first) gap.cause = mark.cause;
+        if (mark.first <= gap.last && mark.last >= gap.first) {
+            gap.cause = mark.cause;
+            gap.within = mark.within;
+        }
     if (!resumed && (l.loss & DRV_LOSS_LINK)) gap.cause = gap_cause::link_down;
     buses_[l.bus].lost[static_cast<std::size_t>(gap.cause)] += static_cast<std::uint64_t>(gap.count);
     l.gap_count = 0;
@@ -262,6 +283,7 @@ void grid::close_gap(lane& l, bool resumed) {
 void grid::finish() {
     if (!anchored_ && heard_ > 0) anchor();
     for (lane& l : lanes_) {
+        if (!l.heard && !l.late.empty()) end_joining(l);
         settle(l, 0, true);
         end_suspicion(l);
     }

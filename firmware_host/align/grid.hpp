@@ -2,11 +2,12 @@
 // Channels of several messages onto one sample grid: by sequence counter where a message has one, else by the cadence of
 // its time stamps. Nothing is interpolated: a sample that did not arrive is NaN and part of a marked gap.
 //
-// Frames of one message (and multiplexor value) are a lane. Counters of all lanes count the same samples when they stand
-// close together at the start; a lane whose counter is unrelated is placed by time once, then counts on. The grid begins
-// with the first sample for which every lane has been heard, so a stream may be joined in the middle. A sample goes out
-// when it is complete, or when the newest nine frames of every lane that lacks it lie beyond it, or when any lane is a
-// second ahead of those that are silent: for so long an adapter may hold its frames back, and nothing is lost.
+// Frames of one message (and multiplexor value) are a lane. The order in which its frames arrive is the order of its
+// samples. Counters of all lanes count the same samples when they stand close together at the start; a lane whose counter
+// is unrelated, or that has none, is placed by the line of its earliest arrivals. The grid begins with the first sample
+// for which every lane has been heard, so a stream may be joined in the middle. A sample goes out when it is complete, or
+// when the newest nine frames of every lane that lacks it lie beyond it, or when the others are silence_patience_s ahead of
+// a lane that is silent: then that lane is gone, and nobody waits for it until it is heard again.
 #pragma once
 #include "config/config.hpp"
 
@@ -31,6 +32,7 @@ struct grid_gap {
     std::size_t channel = 0;
     std::int64_t first = 0, last = 0, count = 0;
     gap_cause cause = gap_cause::sequence;
+    std::int64_t within = 0; ///< the gap may lie up to so many samples later: frames without a counter came together
 };
 
 /// Where samples go. The row holds one number a channel, raw (before scale and offset), NaN where missing.
@@ -43,6 +45,11 @@ class grid_sink {
     virtual void on_gap(const grid_gap& gap) = 0;
 };
 
+/// For so long a silent lane is waited for: an adapter, a sender or this computer may be late by so much, and nothing is
+/// lost. Less at high rates with many channels, for which there is no memory (most_rows_bytes).
+constexpr double silence_patience_s = 6;
+constexpr double most_rows_bytes = 64e6;
+
 /// A stamp further ahead is no time but an error.
 constexpr double longest_silence_ns = 400 * 86400e9;
 
@@ -54,6 +61,24 @@ struct grid_bus_counts {
 
 struct grid_channel_counts {
     std::int64_t expected = 0, received = 0;
+};
+
+/// What the first frames of a lane tell of its place.
+struct lane_start {
+    const drv_frame_t* frame = nullptr; ///< the first one
+    std::size_t family = 0;             ///< the lane whose counter its counter is compared with; its own number if none
+    std::int64_t index = 0;             ///< of the first frame, beside those of its family
+    std::vector<std::int64_t> before;   ///< frames of each lane that had come
+    std::int64_t first_ns = 0, newest_ns = 0, frames = 0;
+    std::int64_t close = 0, shared = 0, ends = 0; ///< frames close behind one of the lane, of the bus; bursts
+    double end_ns = 0;
+    std::array<double, 2> spread_ns{}; ///< how late the last frames of bursts were behind their numbers: least and most
+    std::array<double, 2> least_ns{}; ///< of each half: by how much the earliest arrival was behind its number
+    std::array<std::int64_t, 2> count{};
+
+    void add(std::int64_t number, std::int64_t time_ns, std::int64_t middle_ns, double period_ns);
+    double due_ns(double period_ns) const;
+    bool bursty() const;
 };
 
 class grid {
@@ -79,8 +104,12 @@ class grid {
 
   private:
     struct cause_mark {
-        std::int64_t first = 0, last = -1;
+        std::int64_t first = 0, last = -1, within = 0;
         gap_cause cause = gap_cause::sequence;
+    };
+    /// One that waits; how long the lane was heard until it came, silences left out.
+    struct late_frame : drv_frame_t {
+        std::int64_t heard_ns = 0;
     };
     struct lane {
         std::uint32_t key = 0, mask = 0; ///< mask: which bits of the identifier are in the key, 0 = all
@@ -91,6 +120,7 @@ class grid {
         std::vector<multiplexor> selectors;
         // Where the lane stands on the grid.
         bool waiting = false, heard = false;
+        bool gone = false; ///< silent for longer than others wait
         std::uint64_t counter = 0; ///< as last received
         std::int64_t last = 0;     ///< unwrapped place of the newest frame
         std::int64_t time_ns = 0;  ///< its stamp
@@ -99,16 +129,24 @@ class grid {
         bool suspected = false;
         std::int64_t suspect_age = 0; ///< frames that came in their places since
         drv_frame_t suspect{};
-        // Without a counter: the line of least delays, when the newest frame was due on it, frames that wait, in the
-        // order of their stamps, and the newest that were placed.
+        // The line of least delays: when the newest frame was due on it.
+        double phase_ns = 0;
+        // Without a counter: the fit of that line, frames that wait in the order of their arrival, and what is known of
+        // how late they are.
         drv_clock_fit_t clock{};
-        double phase_ns = 0, beat_ns = 0;
-        double usual = 0;   ///< how late frames were, of late, before which nothing was lost, periods
+        double beat_ns = 0;
         double early = 0;   ///< of the line the earliest was, of late, periods
         double on_time = 0; ///< of a period; what is later was held up, or a sample before it is missing
-        std::vector<drv_frame_t> late;
-        std::array<drv_frame_t, 9> beats{};
-        std::size_t beat_at = 0;
+        std::vector<late_frame> late;
+        std::int64_t heard_ns = 0; ///< as late_frame has it, of the newest
+        std::size_t placed = 0;              ///< of `late`: they are on the grid already
+        std::size_t seen = 0, which = 0;     ///< of `late`: looked at; the last one that was about as early as any
+        double least = 0;                    ///< how late the earliest of those was, periods
+        double patience = 0;                 ///< periods for which the oldest waits before a loss is believed
+        std::int64_t newest_ns = 0;          ///< stamp of the newest frame that came
+        double spread = 0, tail_late = 0;    ///< how late the last frame of a burst was, of late and now, periods
+        std::int64_t tail = 0, tail_ns = 0;  ///< place and stamp of the newest frame placed, for the line
+        std::int64_t ahead = 0;              ///< frames in a row that came before their time
         // The newest frames: what lies before all of them does not come any more (a frame may be eight places late).
         std::array<std::int64_t, 9> recent{};
         std::size_t recent_at = 0;
@@ -125,13 +163,20 @@ class grid {
     bool decode(lane& l, const drv_frame_t& frame);
     bool read_counter(const lane& l, const drv_frame_t& frame, std::uint64_t& counter) const;
 
-    void hear_first(lane& l, const drv_frame_t& frame);
     void hold_until_anchored(lane& l, const drv_frame_t& frame);
+    bool placed_by_time() const;
+    void gather_starts(std::vector<lane_start>& starts);
+    std::int64_t start_offset(const std::vector<lane_start>& starts, std::size_t l, std::size_t root) const;
+    void settle_start(lane& l, const lane_start& start);
     void anchor();
-    bool place_by_kin(const lane& l, std::uint64_t counter, std::int64_t& index) const;
+    void join(lane& l, const drv_frame_t& frame);
+    void end_joining(lane& l);
+    double gather_ns() const;
+    const lane* kin_of(const lane& l, std::uint64_t counter, std::int64_t& index) const;
+    void follow_counted(lane& l, std::int64_t time_ns, std::int64_t step);
     void place(lane& l, const drv_frame_t& frame);
     void place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter);
-    void move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool pause);
+    void move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool pause, std::int64_t within = 0);
     bool count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& step) const;
     void doubt_suspect(lane& l);
     void drop_suspect(lane& l);
@@ -140,21 +185,25 @@ class grid {
     void end_suspicion(lane& l);
     void judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter);
     std::int64_t place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const;
-    void begin_cadence(lane& l, std::int64_t time_ns);
+    void begin_cadence(lane& l, double due_ns);
     void place_by_cadence(lane& l, const drv_frame_t& frame);
     double lateness(const lane& l, const drv_frame_t& frame, std::size_t before) const;
-    bool is_double(const lane& l, const drv_frame_t& frame, bool early) const;
-    bool overtaken(lane& l, const drv_frame_t& frame);
-    void follow_line(lane& l, const drv_frame_t& frame, std::int64_t expected);
     void settle_overdue(std::int64_t now_ns);
     void settle(lane& l, std::int64_t now_ns, bool all);
-    std::size_t place_after_loss(lane& l, std::size_t first, std::size_t last, std::int64_t lost);
-    void beat(lane& l, const drv_frame_t& frame, std::int64_t step);
+    void look_at_late(lane& l);
+    void place_late(lane& l, std::size_t count);
+    bool catches_up(const lane& l) const;
+    bool only_late(const lane& l, bool ended) const;
+    void judge_late(lane& l, bool ended);
+    void place_after_loss(lane& l, std::int64_t lost);
+    void beat(lane& l, const drv_frame_t& frame, std::int64_t step, std::int64_t within = 0);
+    void follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, double late_ns);
     bool awaited(const lane& l, std::int64_t index) const;
-    void note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause);
+    void note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause, std::int64_t within);
     void insert(lane& l, std::int64_t index, const drv_frame_t& frame);
 
     bool may_come(const lane& l) const;
+    void leave_behind();
     void drain(bool all);
     void emit_front();
     void skip_to(std::int64_t index);
@@ -179,7 +228,8 @@ class grid {
     std::vector<std::uint32_t> masks_; ///< of identifiers that stand for many, the strictest first
     std::size_t width_ = 0;
     std::int64_t reorder_ = 16, window_ = 0, mask_ = 0;
-    std::int64_t lag_ = 0;       ///< samples by which a silent lane may be behind: a second
+    std::int64_t lag_ = 0;       ///< samples by which a silent lane may be behind
+    std::size_t most_held_ = 0;  ///< frames without a counter that may wait: those of a stall that is made up for
     std::int64_t hold_ = 0;      ///< periods a frame without a counter may wait for those that tell its place
     std::size_t late_lanes_ = 0; ///< lanes with such frames
     std::vector<double> values_, decoded_;
@@ -189,7 +239,9 @@ class grid {
     std::int64_t limit_ = std::numeric_limits<std::int64_t>::max();
     std::int64_t next_ = 0, opened_ = 0; ///< next row to go out; rows below opened_ are laid out in the ring
     bool anchored_ = false;
-    std::size_t heard_ = 0;
+    std::size_t heard_ = 0, most_before_ = 0; ///< lanes heard; frames that may wait before the grid begins
+    bool by_time_ = false;                    ///< the place of some lane depends on stamps
+    std::int64_t all_heard_ns_ = 0;           ///< when the last lane was heard for the first time
     std::vector<std::pair<int, drv_frame_t>> held_; ///< frames before the grid begins
     std::vector<grid_bus_counts> buses_;
 };

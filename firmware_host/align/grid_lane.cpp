@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Where a lane stands on the grid: the first alignment, counters unwrapped, jumps believed or not.
+// Where a lane stands on the grid once it has begun: counters unwrapped, jumps believed or not.
 #include "grid.hpp"
+
+#include "wrapped_step.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,16 +10,6 @@
 
 namespace okid_host {
 namespace {
-
-/// Difference of two counters of `bits` bits, the short way round.
-std::int64_t wrapped_step(std::uint64_t from, std::uint64_t to, unsigned bits) {
-    const std::uint64_t range = std::uint64_t{1} << bits, step = (to - from) & (range - 1);
-    return step < range / 2 ? static_cast<std::int64_t>(step)
-                            : static_cast<std::int64_t>(step) - static_cast<std::int64_t>(range);
-}
-
-/// Two counters this close at the start count the same samples.
-std::int64_t kinship(unsigned bits) { return bits >= 9 ? 64 : std::max<std::int64_t>(1, std::int64_t{1} << bits >> 3); }
 
 constexpr double longest_pause_s = 5; // beyond it the clock says how often a counter went round
 
@@ -30,90 +22,12 @@ bool grid::read_counter(const lane& l, const drv_frame_t& frame, std::uint64_t& 
     return true;
 }
 
-/// Before the grid begins frames wait until every lane was heard, or until no more can wait.
-void grid::hold_until_anchored(lane& l, const drv_frame_t& frame) {
-    heard_ += !l.waiting;
-    l.waiting = true;
-    held_.emplace_back(static_cast<int>(&l - lanes_.data()), frame);
-    if (heard_ == lanes_.size() || held_.size() == held_.capacity()) anchor();
-}
-
-/// The place of a counter beside the lanes whose counters count the same samples.
-bool grid::place_by_kin(const lane& l, std::uint64_t counter, std::int64_t& index) const {
-    for (const lane& other : lanes_) {
-        if (!other.heard || &other == &l || !other.sequence) continue;
-        const unsigned bits = std::min(l.sequence->length, other.sequence->length);
-        const std::int64_t apart = wrapped_step(other.counter, counter, bits);
-        if (std::abs(apart) > kinship(bits)) continue;
-        index = other.last + apart;
-        return true;
-    }
-    return false;
-}
-
-/// Give a lane its place from its first frame; lanes heard before are the reference.
-void grid::hear_first(lane& l, const drv_frame_t& frame) {
-    l.time_ns = frame.time_ns;
-    if (!l.sequence) begin_cadence(l, frame.time_ns);
-    l.loss = 0;
-    l.last = 0;
-    const bool counted = read_counter(l, frame, l.counter);
-    if (!counted || !place_by_kin(l, l.counter, l.last))
-        for (const lane& other : lanes_) {
-            if (!other.heard) continue;
-            l.last = other.last + std::llround(static_cast<double>(frame.time_ns - other.time_ns) / period_ns_);
-            break;
-        }
-    l.heard = true;
-}
-
-/// All lanes were heard (or waiting has no end): sample 0 is the first one that every lane can have.
-void grid::anchor() {
-    anchored_ = true;
-    std::vector<std::pair<std::int64_t, const drv_frame_t*>> first(lanes_.size(), {0, nullptr});
-    std::int64_t begin = std::numeric_limits<std::int64_t>::min();
-    for (const auto& [which, frame] : held_) { // first pass: where each lane's first frame stands
-        lane& l = lanes_[static_cast<std::size_t>(which)];
-        if (!l.heard) {
-            hear_first(l, frame);
-            first[static_cast<std::size_t>(which)] = {l.last, &frame};
-            begin = std::max(begin, l.last);
-            continue;
-        }
-        std::uint64_t counter = 0; // the reference of the lanes to come moves on
-        const std::int64_t step = read_counter(l, frame, counter)
-                                      ? wrapped_step(l.counter, counter, l.sequence->length)
-                                      : std::llround(static_cast<double>(frame.time_ns - l.time_ns) / period_ns_);
-        if (step <= 0 || step > window_) continue;
-        l.counter = counter;
-        l.last += step;
-        l.time_ns = frame.time_ns;
-    }
-    for (std::size_t i = 0; i < lanes_.size(); ++i) { // every lane back to just its first frame
-        lane& l = lanes_[i];
-        if (!l.heard) continue;
-        l.last = first[i].first - begin;
-        l.time_ns = first[i].second->time_ns;
-        read_counter(l, *first[i].second, l.counter);
-    }
-    for (const auto& [which, frame] : held_) { // second pass: for good
-        lane& l = lanes_[static_cast<std::size_t>(which)];
-        decode(l, frame);
-        if (first[static_cast<std::size_t>(which)].second == &frame)
-            insert(l, l.last, frame);
-        else
-            place(l, frame);
-    }
-    held_.clear();
-}
-
 void grid::place(lane& l, const drv_frame_t& frame) {
+    std::uint64_t counter = 0;
     if (!l.heard) {
-        hear_first(l, frame);
-        insert(l, l.last, frame);
+        join(l, frame);
         return;
     }
-    std::uint64_t counter = 0;
     if (read_counter(l, frame, counter)) {
         place_by_counter(l, frame, counter);
         return;
@@ -122,9 +36,10 @@ void grid::place(lane& l, const drv_frame_t& frame) {
 }
 
 /// The lane's newest frame is now at `index`; what it jumped over is lost unless it still comes.
-void grid::move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool pause) {
-    if (index > l.last + 1) note_loss(l, l.last + 1, index - 1, pause);
+void grid::move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool pause, std::int64_t within) {
+    if (index > l.last + 1) note_loss(l, l.last + 1, index - 1, pause, within);
     l.loss = 0;
+    if (l.sequence) follow_counted(l, frame.time_ns, index - l.last);
     l.time_ns = frame.time_ns;
     insert(l, index, frame);
 }
@@ -242,7 +157,7 @@ void grid::end_suspicion(lane& l) {
 /// The sender's counter began anew: beside lanes that did so already, else by time, at least one sample apart.
 std::int64_t grid::place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const {
     std::int64_t index = 0;
-    if (place_by_kin(l, counter, index) && index > l.last + 1) return index;
+    if (kin_of(l, counter, index) && index > l.last + 1) return index;
     const double pause = static_cast<double>(frame.time_ns - l.time_ns) / period_ns_;
     return l.last + (pause > 2 && pause < longest_silence_ns / period_ns_ ? std::llround(pause) : 2);
 }
@@ -257,10 +172,11 @@ bool grid::awaited(const lane& l, std::int64_t index) const {
     return true;
 }
 
-void grid::note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause) {
+void grid::note_loss(lane& l, std::int64_t from, std::int64_t to, bool pause, std::int64_t within) {
     cause_mark& mark = l.marks[l.mark_count++ % l.marks.size()];
     mark.first = from;
     mark.last = to;
+    mark.within = within;
     mark.cause = l.loss & DRV_LOSS_LINK       ? gap_cause::link_down
                  : l.loss & DRV_LOSS_OVERFLOW ? gap_cause::socket_overflow
                  : l.loss & DRV_LOSS_DRIVER   ? gap_cause::driver

@@ -231,13 +231,15 @@ lamp_state session::lamps() const {
 void session::on_gap(const grid_gap& gap) {
     ++gaps_;
     if (options_.listener) options_.listener->on_gap(gap);
-    tell({{"type", "gap"},
-          {"t", seconds(std::max(now_, gap.last + 1))},
-          {"channel", config_.channels[gap.channel].name},
-          {"first", gap.first},
-          {"last", gap.last},
-          {"count", gap.count},
-          {"cause", gap_cause_name(gap.cause)}});
+    ordered_json event{{"type", "gap"},
+                       {"t", seconds(std::max(now_, gap.last + 1))},
+                       {"channel", config_.channels[gap.channel].name},
+                       {"first", gap.first},
+                       {"last", gap.last},
+                       {"count", gap.count},
+                       {"cause", gap_cause_name(gap.cause)}};
+    if (gap.within > 0) event["within"] = gap.within;
+    tell(std::move(event));
 }
 
 /// Frames missing on the grid are booked under what the devices counted first; the rest was lost before it reached us.

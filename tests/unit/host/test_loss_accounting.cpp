@@ -205,6 +205,8 @@ static void check_mixture(bool counted, unsigned clock_per_mille) {
         fault_plan_t plan = plan_of(seed);
         for (const fault_kind_t kind : {FAULT_DROP, FAULT_TRUNCATE, FAULT_FOREIGN, FAULT_DUPLICATE, FAULT_REORDER})
             plan.per_mille[kind] = seed * 31 % 40;
+        if (!counted) // the order of arrival is that of the samples, and each frame is one
+            plan.per_mille[FAULT_DUPLICATE] = plan.per_mille[FAULT_REORDER] = 0;
         for (const fault_kind_t kind : {FAULT_OVERFLOW, FAULT_DOWN, FAULT_GONE}) plan.per_mille[kind] = 3;
         plan.per_mille[FAULT_CLOCK] = clock_per_mille;
         const auto o = std::make_unique<outcome>();
