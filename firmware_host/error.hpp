@@ -2,6 +2,8 @@
 // What a command may end with: one clear message and the exit code of docs (0 done, 2 usage/input, 3 no honest model,
 // 4 device, 130 interrupted).
 #pragma once
+#include "files/shown_text.hpp"
+
 #include <cstdio>
 #include <fmt/format.h>
 #include <stdexcept>
@@ -22,7 +24,7 @@ struct failure : std::runtime_error {
 
 /// A line for people on stderr. One that cannot be written (a full disk, a terminal that hung up) ends nothing.
 template <class... Parts> void say(fmt::format_string<Parts...> text, Parts&&... parts) {
-    const std::string line = fmt::format(text, std::forward<Parts>(parts)...);
+    const std::string line = shown(fmt::format(text, std::forward<Parts>(parts)...));
     (void)std::fwrite(line.data(), 1, line.size(), stderr);
 }
 

@@ -50,10 +50,10 @@ int explain(CLI::App& app, const CLI::ParseError& error, int argc, char** argv) 
         if (argc < 2) return std::fputs(app.help().c_str(), stderr), exit_usage;
         const std::string word = argv[1], known = list_names(names_of(app));
         if (word.front() == '-')
-            std::fprintf(stderr, "okid: %s; expected a command first: %s\n", error.what(), known.c_str());
+            say("okid: {}; expected a command first: {}\n", error.what(), known);
         else
-            std::fprintf(stderr, "okid: no command \"%s\"%s; the commands are: %s\n", printable(word).c_str(),
-                         did_you_mean(word, names_of(app)).c_str(), known.c_str());
+            say("okid: no command \"{}\"{}; the commands are: {}\n", printable(word), did_you_mean(word, names_of(app)),
+                known);
         return exit_usage;
     }
     CLI::App& command = *parsed.front();
@@ -68,8 +68,8 @@ int explain(CLI::App& app, const CLI::ParseError& error, int argc, char** argv) 
         const auto extra = app.remaining(true);
         if (!extra.empty()) near = did_you_mean(extra.front(), options);
     }
-    std::fprintf(stderr, "okid %s: %s%s\n%s\nAll options: okid %s --help\n", command.get_name().c_str(), text.c_str(),
-                 near.c_str(), command.get_footer().c_str(), command.get_name().c_str());
+    say("okid {}: {}{}\n{}\nAll options: okid {} --help\n", command.get_name(), text, near, command.get_footer(),
+        command.get_name());
     return exit_usage;
 }
 
@@ -110,13 +110,13 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return error.get_exit_code() == 0 ? app.exit(error) : explain(app, error, argc, argv);
     } catch (const okid_host::failure& error) {
-        if (*error.what()) std::fprintf(stderr, "okid: %s\n", error.what());
+        if (*error.what()) okid_host::say("okid: {}\n", error.what());
         return error.code;
     } catch (const std::bad_alloc&) {
         std::fprintf(stderr, "okid: out of memory\n");
         return okid_host::exit_device;
     } catch (const std::exception& error) {
-        std::fprintf(stderr, "okid: internal error: %s\n", error.what());
+        okid_host::say("okid: internal error: {}\n", error.what());
         return okid_host::exit_device;
     }
 }

@@ -63,6 +63,10 @@ static int frames_make_sense(const drv_journal_chunk_t* chunk) {
     return at == chunk->bytes;
 }
 
+static drv_journal_kind_t kind_of(uint8_t byte) {
+    return byte >= DRV_JOURNAL_TEXT && byte <= DRV_JOURNAL_END ? (drv_journal_kind_t)byte : DRV_JOURNAL_OTHER;
+}
+
 /// What stands at `begin`. @return bytes of the chunk, 0 when it is none, -errno
 static long look(drv_journal_reader_t* self, drv_journal_chunk_t* chunk) {
     int code = fill(self, DRV_JOURNAL_HEADER);
@@ -81,7 +85,7 @@ static long look(drv_journal_reader_t* self, drv_journal_chunk_t* chunk) {
     if (self->end - self->begin < DRV_JOURNAL_HEADER + chunk->bytes ||
         get_number(header + CHUNK_PAYLOAD_CRC, 4) != drv_crc32(0, chunk->payload, chunk->bytes))
         return 0;
-    chunk->kind = (drv_journal_kind_t)header[CHUNK_KIND];
+    chunk->kind = kind_of(header[CHUNK_KIND]);
     chunk->more = (get_number(header + CHUNK_FLAGS, 2) & CHUNK_MORE) != 0;
     chunk->run = get_number(header + CHUNK_RUN, 8);
     chunk->sequence = (uint32_t)get_number(header + CHUNK_SEQUENCE, 4);

@@ -3,14 +3,13 @@
 // METHOD   chunk by chunk; where one is missing the next frame of every bus says so. At the end of a file the next
 //          segment is opened when it is there
 #include <drv/journal.h>
+#include <drv/input_file.h>
 #include <drv/source.h>
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 enum { PATH_BYTES = 4096 };
@@ -45,19 +44,14 @@ int drv_journal_next_name(const char* path, char* out, size_t capacity) {
 }
 
 static int fail(drv_source_t* self, const char* path, int code) {
-    snprintf(self->error, sizeof self->error, "%.200s: cannot be read: %s", path, strerror(code));
+    snprintf(self->error, sizeof self->error, "%.200s: cannot be read: %s", path, drv_input_fault(code));
     return -code;
 }
 
 /// @return 0 or -errno
 static int open_file(journal_t* state) {
-    struct stat status;
-    const int fd = open(state->path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) return -errno;
-    if (fstat(fd, &status) == 0 && S_ISDIR(status.st_mode)) {
-        close(fd);
-        return -EISDIR;
-    }
+    const int fd = drv_input_open(state->path);
+    if (fd < 0) return fd;
     if (state->fd >= 0) close(state->fd);
     state->fd = fd;
     ++state->segments;

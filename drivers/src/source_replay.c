@@ -3,14 +3,13 @@
 // METHOD   large reads into one buffer, lines cut in place; a line that does not parse ends the replay and names itself
 #include <drv/can_error.h>
 #include <drv/candump.h>
+#include <drv/input_file.h>
 #include <drv/source.h>
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 enum { BUFFER_BYTES = 1 << 18, LONGEST_LINE = 1024 };
@@ -31,14 +30,12 @@ static int replay_open(drv_source_t* self, const drv_source_config_t* config) {
     memset(&self->counts, 0, sizeof self->counts);
     self->error[0] = '\0';
     self->state = NULL;
-    struct stat status;
-    int fd = open(config->path, O_RDONLY | O_CLOEXEC);
-    int code = fd < 0 ? errno : 0;
-    if (fd >= 0 && fstat(fd, &status) == 0 && S_ISDIR(status.st_mode)) code = EISDIR;
+    const int fd = drv_input_open(config->path);
+    int code = fd < 0 ? -fd : 0;
     replay_t* state = code == 0 ? malloc(sizeof *state) : NULL;
     if (code == 0 && !state) code = ENOMEM;
     if (code) {
-        snprintf(self->error, sizeof self->error, "%s: cannot be read: %s", config->path, strerror(code));
+        snprintf(self->error, sizeof self->error, "%s: cannot be read: %s", config->path, drv_input_fault(code));
         if (fd >= 0) close(fd);
         return -code;
     }

@@ -7,10 +7,11 @@
 #include "config/presets.hpp"
 #include "error.hpp"
 #include "files/whole_file.hpp"
-#include "live/identifier.hpp"
+#include "live/stream_memory.hpp"
 #include "result/method.hpp"
 #include "result/result.hpp"
 
+#include <cmath>
 #include <fmt/format.h>
 #include <memory>
 
@@ -39,8 +40,8 @@ std::string start_text(const live_config& config) {
     return out;
 }
 
-std::string summary(const live_config& config, bool exact) {
-    const identification_config& id = config.identification;
+std::string summary(const live_config& config, const stream_config& stream) {
+    const identification_config& id = stream.wanted;
     std::string out = fmt::format("{}: well\n\n{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", config.path, "channel",
                                   "role", "unit", "bus", "identifier", "bits", "samples counted by");
     for (const channel_config& channel : config.channels) {
@@ -54,12 +55,15 @@ std::string summary(const live_config& config, bool exact) {
             channel.sequence ? fmt::format("{}-bit counter", channel.sequence->length) : "time stamps");
     }
     out += fmt::format("\n{:g} Hz, {} force and {} response channel{}{}\n", config.rate_hz, config.n_u, config.n_y,
-                       config.n_y == 1 ? "" : "s", exact ? ", 16-bit codes summed exactly" : "");
+                       config.n_y == 1 ? "" : "s", stream.sample == OKID_SAMPLE_INT16 ? ", 16-bit codes summed exactly" : "");
     const okid_method_t method = method_of(id.method);
     out += fmt::format("{}, {}{} block rows, an update each {:g} s, memory: {}\n", id.method,
                        looks_back_rows(method, config.n_u) ? "" : fmt::format("p {}, ", id.p),
                        rows_used(method, config.n_u, id.p, id.rows), id.update_s, memory_text(config));
+    out += fmt::format("needs {:.0f} MB of memory, at most {:g} are allowed\n", std::ceil(stream_bytes(stream) / 1e6),
+                       id.max_memory_mb);
     out += start_text(config);
+    for (const auto& [code, text] : stream.said) out += fmt::format("remark: {}\n", text);
     for (const std::string& text : config.warnings) out += fmt::format("remark: {}\n", text);
     return out;
 }
@@ -88,11 +92,12 @@ void add_check(CLI::App& app) {
                           "the presets there are");
         const live_config config = load_config(given->config);
         require_identifiable(config);
-        const bool exact = identifier(stream_of(config)).exact(); // its memory is proved here, not in the lab
+        const stream_config stream = stream_of(config);
+        require_memory(stream); // computed, none of it is taken
         write_whole_file(
             "-", given->json
                      ? config_json(config).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"
-                     : summary(config, exact));
+                     : shown(summary(config, stream)));
     });
 }
 

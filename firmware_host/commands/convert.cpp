@@ -11,6 +11,7 @@
 #include "live/playback.hpp"
 #include "record/csv.hpp"
 #include "record/csv_header.hpp"
+#include "record/line_reader.hpp"
 #include "result/result.hpp"
 
 #include <algorithm>
@@ -20,7 +21,6 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <fstream>
 #include <iterator>
 #include <memory>
 #include <okid/types.h>
@@ -99,8 +99,7 @@ void frames_to_csv(const convert_arguments& given, const live_config& config) {
         throw failure(exit_no_model, fmt::format("{}: no sample: it holds no usable frame of the channels of {}",
                                                  given.from, config.path));
     for (const std::size_t index : samples.silent_channels())
-        std::fprintf(stderr, "okid: channel \"%s\" has no frame in %s: its column is all nan\n",
-                     config.channels[index].name.c_str(), given.from.c_str());
+        say("okid: channel \"{}\" has no frame in {}: its column is all nan\n", config.channels[index].name, given.from);
     out.commit();
     say("{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(), config.channels.size(),
         table.missing());
@@ -108,10 +107,10 @@ void frames_to_csv(const convert_arguments& given, const live_config& config) {
 
 /// What the comment lines of the table say about its rate must agree with the config.
 void check_csv_rate(const std::string& path, const live_config& config) {
-    std::ifstream input(path);
-    std::string line;
+    line_reader lines(path);
     csv_header header;
-    for (std::size_t number = 1; std::getline(input, line) && (line.empty() || line[0] == '#'); ++number)
+    std::string_view line;
+    for (std::size_t number = 1; lines.next(line) && (line.empty() || line[0] == '#'); ++number)
         read_csv_comment(path, number, line, header);
     if (header.fs_hz && std::abs(*header.fs_hz - config.rate_hz) > 1e-6 * config.rate_hz)
         throw failure(exit_usage, fmt::format("{}: found a sample rate of {:g} Hz, expected {:g} Hz as in {}", path,

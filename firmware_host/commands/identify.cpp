@@ -125,7 +125,7 @@ void identify(identify_arguments given) {
     if (!given.model.empty()) write_whole_file(given.model, mat_file(model));
     if (!given.json.empty()) write_whole_file(given.json, result_text(result_json(model, result.context)));
     if (given.json != "-" && given.model != "-" && !given.quiet)
-        write_whole_file("-", result_table(model, result.context));
+        write_whole_file("-", shown(result_table(model, result.context)));
 }
 
 } // namespace

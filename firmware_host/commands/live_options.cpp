@@ -5,6 +5,7 @@
 #include "files/nearest_name.hpp"
 #include "files/whole_file.hpp"
 #include "live/playback.hpp"
+#include "live/stream_memory.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -74,6 +75,8 @@ bool plays_a_log(const live_config& config) {
 
 session_options check_live(const live_arguments& given, const live_config& config, const std::string& log) {
     require_identifiable(config);
+    const stream_config stream = stream_of(config);
+    require_memory(stream);
     session_options options;
     options.duration_s = parse_seconds("--duration", given.duration);
     options.events = given.events;
@@ -88,8 +91,9 @@ session_options check_live(const live_arguments& given, const live_config& confi
         check_other_file(target, config.path);
         check_other_file(target, log);
     }
+    for (const auto& [code, text] : stream.said) say("okid: {}: {}\n", config.path, text);
     for (const std::string& text : config.warnings)
-        std::fprintf(stderr, "okid: %s: %s\n", config.path.c_str(), text.c_str());
+        say("okid: {}: {}\n", config.path, text);
     return options;
 }
 

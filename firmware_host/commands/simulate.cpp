@@ -65,7 +65,7 @@ void check_targets(const simulate_arguments& given, const std::string& dbc) {
 }
 
 void warn(const simulate_arguments& given, const std::string& text) {
-    if (!given.quiet) std::fprintf(stderr, "okid: %s: %s\n", given.rig.c_str(), text.c_str());
+    if (!given.quiet) say("okid: {}: {}\n", given.rig, text);
 }
 
 void check_line(const simulate_arguments& given, const rig_run& run) {
@@ -122,7 +122,7 @@ void simulate(const simulate_arguments& given) {
     }
     const bool to_stdout =
         given.log == "-" || given.truth == "-" || given.csv == "-" || given.dbc == "-" || given.config == "-";
-    if (!given.quiet && !to_stdout) write_whole_file("-", summary(rig, run));
+    if (!given.quiet && !to_stdout) write_whole_file("-", shown(summary(rig, run)));
     if (given.to.empty()) return;
     play_rig(run, given.to, given.baud);
     if (stop_requested()) throw failure(exit_interrupted, "interrupted before the record ended");

@@ -16,18 +16,20 @@
 #include "config_trigger.hpp"
 #include "error.hpp"
 #include "files/file_kind.hpp"
+#include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
 #include "files/units.hpp"
 #include "presets.hpp"
+#include "secrets.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
 #include <map>
-#include <sstream>
+#include <unordered_map>
+#include <unordered_set>
 
 namespace okid_host {
 namespace {
@@ -40,20 +42,9 @@ namespace {
     refuse_file(place.path, fmt::format("line {}, {}: {}", table.source().begin.line, place.section, text));
 }
 
-std::string read_config_text(const std::string& path) {
-    std::error_code ignored;
-    std::ifstream input(path, std::ios::binary);
-    if (!input || std::filesystem::is_directory(path, ignored))
-        refuse_file(path, input ? "cannot be read: it is a folder, expected a CONFIG.toml"
-                                : "cannot be read: no such file or no permission");
-    std::stringstream text;
-    text << input.rdbuf();
-    return text.str();
-}
-
 toml::table parse(const std::string& path, const std::string& text) {
     try {
-        return toml::parse(text, path);
+        return parse_toml(text, path);
     } catch (const toml::parse_error& error) {
         const file_kind kind = kind_of_text(text);
         if (kind != file_kind::unknown && kind != file_kind::toml)
@@ -160,24 +151,41 @@ std::size_t bus_of(const config_place& place, const toml::table& table, const li
     return static_cast<std::size_t>(found - names.begin());
 }
 
-bool same_bits(const std::optional<drv_signal_t>& a, const std::optional<drv_signal_t>& b) {
-    return a && b && a->start_bit == b->start_bit && a->length == b->length && a->big_endian == b->big_endian;
+/// The channels that came before, so that each is compared with few.
+struct known_channels {
+    struct message {
+        std::vector<std::size_t> channels;
+        std::optional<std::size_t> counted; ///< one whose counter is that of all
+    };
+    std::unordered_set<std::string> names;
+    std::unordered_map<std::string, message> messages;
+};
+
+std::string frame_key(const channel_config& channel) {
+    return fmt::format("{}/{}/{}/{}", channel.bus, channel.frame.id, channel.frame.extended, channel.frame.mask);
+}
+
+std::string bits_key(const drv_signal_t& signal) {
+    return fmt::format(":{}/{}/{}", signal.start_bit, signal.length, signal.big_endian);
 }
 
 /// One message has one counter; a channel that names none takes that of its neighbours in the message.
-void share_sequence(const config_place& place, const toml::table& table, live_config& config, channel_config& channel) {
-    for (channel_config& other : config.channels) {
-        if (other.name == channel.name)
-            refuse_key(place, *table.get("name"), "name", "another [[channel]] has this name");
-        if (other.bus != channel.bus || other.frame.id != channel.frame.id ||
-            other.frame.extended != channel.frame.extended || other.frame.mask != channel.frame.mask)
-            continue;
-        if (channel.sequence && other.sequence && !same_bits(channel.sequence, other.sequence))
+void share_sequence(const config_place& place, const toml::table& table, std::vector<channel_config>& channels,
+                    channel_config& channel, known_channels& known) {
+    if (!known.names.insert(channel.name).second)
+        refuse_key(place, *table.get("name"), "name", "another [[channel]] has this name");
+    known_channels::message& message = known.messages[frame_key(channel)];
+    if (message.counted) {
+        const channel_config& other = channels[*message.counted];
+        if (channel.sequence && !same_bits(*channel.sequence, *other.sequence))
             refuse_key(place, *table.get("sequence"), "sequence",
                        fmt::format("channel \"{}\" of the same message names another counter", other.name));
         if (!channel.sequence) channel.sequence = other.sequence;
-        if (!other.sequence) other.sequence = channel.sequence;
+    } else if (channel.sequence) {
+        message.counted = channels.size();
+        for (const std::size_t index : message.channels) channels[index].sequence = channel.sequence;
     }
+    message.channels.push_back(channels.size());
 }
 
 std::string dbc_text_of(const std::string& config, const bus_config& bus) {
@@ -208,6 +216,7 @@ void read_channels(const std::string& path, const toml::table& file, const std::
                    live_config& config) {
     const toml::array* entries = file["channel"].as_array();
     if (!entries || entries->empty()) refuse_file(path, "no [[channel]], expected at least one");
+    known_channels known;
     for (std::size_t i = 0; i < entries->size(); ++i) {
         const toml::table& table = *entries->get_as<toml::table>(i);
         const config_place place{path, entry_name("channel", table, i)};
@@ -222,7 +231,7 @@ void read_channels(const std::string& path, const toml::table& file, const std::
         const bus_config& bus = config.buses[channel.bus];
         const auto dbc = dbcs.find(bus.dbc);
         resolve_channel(place, table, bus, dbc == dbcs.end() ? nullptr : &dbc->second, channel);
-        share_sequence(place, table, config, channel);
+        share_sequence(place, table, config.channels, channel, known);
         config.channels.push_back(std::move(channel));
     }
     const auto rank = [](const channel_config& c) {
@@ -269,15 +278,21 @@ void compare_units(live_config& config, const channel_config& channel) {
 
 /// Two channels that read the same number are one sensor taken twice.
 void check_same_bits(live_config& config) {
-    for (std::size_t i = 0; i < config.channels.size(); ++i)
-        for (std::size_t k = 0; k < i; ++k) {
-            const channel_config &a = config.channels[k], &b = config.channels[i];
-            if (a.bus != b.bus || a.field != b.field || !same_frames(a.frame, b.frame) ||
-                !same_bits(a.layout, b.layout) || a.selectors != b.selectors)
-                continue;
-            config.warnings.push_back(fmt::format(
-                "[[channel]] \"{}\" reads the same bits as \"{}\": is its signal or start_bit right?", b.name, a.name));
+    std::unordered_map<std::string, std::size_t> first;
+    for (std::size_t i = 0; i < config.channels.size(); ++i) {
+        const channel_config& channel = config.channels[i];
+        std::string key = frame_key(channel) + bits_key(channel.layout);
+        if (channel.field) key += fmt::format("#{}", *channel.field);
+        for (const multiplexor& selector : channel.selectors) {
+            key += bits_key(selector.layout);
+            for (const auto& [low, high] : selector.values) key += fmt::format(",{}-{}", low, high);
         }
+        const auto [other, fresh] = first.emplace(std::move(key), i);
+        if (!fresh)
+            config.warnings.push_back(
+                fmt::format("[[channel]] \"{}\" reads the same bits as \"{}\": is its signal or start_bit right?",
+                            channel.name, config.channels[other->second].name));
+    }
 }
 
 void check_units(live_config& config) {
@@ -322,12 +337,13 @@ static live_config make_config(const std::string& path, config_texts texts, bool
     check_units(config);
     check_same_bits(config);
     config.texts = std::move(texts);
+    config.texts.config = without_passwords(config.texts.config);
     return config;
 }
 
 live_config load_config(const std::string& path) {
     config_texts texts;
-    texts.config = read_config_text(path);
+    texts.config = read_input(path, "a CONFIG.toml");
     return make_config(path, std::move(texts), true);
 }
 

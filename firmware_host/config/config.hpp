@@ -82,6 +82,8 @@ struct identification_config {
     int sigma_blocks = 20;         ///< blocks left out for the standard deviations; 0 = none
     bool restart_on_change = true; ///< window and forgetting: samples from before a change of the structure are dropped
     bool mkr = false;              ///< M, K and R with the final result
+    double max_memory_mb = 8192;   ///< of the identification
+    bool horizon_given = false;    ///< the config names p or rows, whichever decides how far the method looks back
 };
 
 /// A GPIO line as the config names it.
@@ -142,6 +144,7 @@ struct net_address {
 struct broker_address {
     net_address at;
     std::string user, password, prefix = "okid";
+    std::string password_file; ///< read_password() finds it
 };
 
 /// [publish]: where events and modes go besides the events file and the terminal.

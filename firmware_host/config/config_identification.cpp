@@ -57,6 +57,7 @@ void read_identification(const toml::table& file, live_config& config) {
                    "window_s is given too; a window and forgetting together are not available, choose one");
     const okid_method_t method = method_of(out.method);
     const bool by_rows = looks_back_rows(method, config.n_u);
+    out.horizon_given = is_subspace(method) ? t.contains("rows") : t.contains("p") || (by_rows && t.contains("rows"));
     if (by_rows && t.contains("p") && (is_subspace(method) || out.rows > 0))
         config.warnings.push_back(
             fmt::format("[identification] p belongs to the observer of the okid methods: {} looks back {} block rows "
@@ -70,6 +71,7 @@ void read_identification(const toml::table& file, live_config& config) {
             fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
     out.restart_on_change = t["restart_on_change"].value_or(true);
     out.mkr = t["mkr"].value_or(false);
+    out.max_memory_mb = t["max_memory_mb"].value_or(out.max_memory_mb);
     if (out.mkr && config.n_u == 0)
         config.warnings.emplace_back(
             "[identification] mkr: no [[channel]] has the role force, so there is no M, K and R");

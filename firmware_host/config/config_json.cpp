@@ -139,7 +139,7 @@ ordered_json geometry_json(const live_config& config, const toml::table& file) {
 } // namespace
 
 ordered_json config_json(const live_config& config) {
-    const toml::table file = toml::parse(config.texts.config, config.path);
+    const toml::table file = parse_toml(config.texts.config, config.path);
     ordered_json out{{"schema", "okid.check/1"},   {"config", config.path}, {"rate_hz", config.rate_hz},
                      {"inputs", config.n_u},       {"outputs", config.n_y}, {"channels", ordered_json::array()},
                      {"warnings", config.warnings}};

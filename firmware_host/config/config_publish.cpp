@@ -3,11 +3,13 @@
 
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "secrets.hpp"
 
 #include <arpa/inet.h>
 #include <charconv>
 #include <filesystem>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 
 namespace okid_host {
@@ -53,7 +55,8 @@ bool numeric(const std::string& host) {
 
 [[noreturn]] void refuse_address(const config_place& place, const toml::node& node, const char* key,
                                  const char* expected) {
-    refuse_key(place, node, key, fmt::format("found {}, expected {}", found_value(node), expected));
+    const std::string found = node.value_or(std::string());
+    refuse_key(place, node, key, fmt::format("found \"{}\", expected {}", printable(without_password(found)), expected));
 }
 
 std::string socket_of(const config_place& place, const toml::node& node) {
@@ -75,7 +78,10 @@ broker_address broker_of(const config_place& place, const toml::node& node) {
     if (text.compare(0, scheme.size(), scheme) != 0) refuse_address(place, node, "mqtt", expected);
     text.erase(0, scheme.size());
     broker_address out;
-    if (const std::size_t slash = text.find('/'); slash != std::string::npos) {
+    const std::size_t slash = text.find('/'), last_at = text.rfind('@');
+    if (slash != std::string::npos && last_at != std::string::npos && last_at > slash)
+        refuse_key(place, node, "mqtt", "found an @ behind a /: a password with a / in it belongs into a password_file");
+    if (slash != std::string::npos) {
         if (slash + 1 < text.size()) out.prefix = text.substr(slash + 1);
         text.resize(slash);
     }
@@ -91,6 +97,20 @@ broker_address broker_of(const config_place& place, const toml::node& node) {
         refuse_address(place, node, "mqtt", expected);
     out.at = *address;
     return out;
+}
+
+void read_password_file(const config_place& place, const toml::node& node, publish_config& out) {
+    const bool named = out.mqtt && !out.mqtt->user.empty();
+    if (!named || !out.mqtt->password.empty())
+        refuse_key(place, node, "password_file",
+                   named ? "mqtt has a password too, expected one of the two"
+                         : "it is the password of the user of mqtt, expected mqtt = \"mqtt://user@host\" beside it");
+    out.mqtt->password_file = *node.value<std::string>();
+}
+
+bool everybody_reads(const std::string& path) {
+    struct stat status{};
+    return stat(path.c_str(), &status) == 0 && (status.st_mode & S_IROTH);
 }
 
 /// What a build may leave out.
@@ -149,6 +169,10 @@ void read_publish(const toml::table& file, live_config& config) {
                             out.prometheus->text()));
     }
     if (const toml::node* node = table->get("mqtt")) out.mqtt = broker_of(place, *node);
+    if (const toml::node* node = table->get("password_file")) read_password_file(place, *node, out);
+    if (out.mqtt && !out.mqtt->password.empty() && everybody_reads(config.path))
+        config.warnings.emplace_back("[publish] mqtt holds a password, and every user of this computer can read the config: "
+                                     "chmod o-r, or use password_file");
     for (const auto& [what, address] :
          {std::pair{"udp", out.udp}, std::pair{"mqtt", out.mqtt ? std::optional(out.mqtt->at) : std::nullopt}})
         if (address && !address->loopback())

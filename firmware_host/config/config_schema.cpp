@@ -106,7 +106,8 @@ const std::vector<section_rule> schema = {
       {"update_s", kind::positive, 0, 1e5},
       {"sigma_blocks", kind::whole, 0, 100},
       {"restart_on_change", kind::flag},
-      {"mkr", kind::flag}}},
+      {"mkr", kind::flag},
+      {"max_memory_mb", kind::positive, 0, 1e6}}},
     {"alarm",
      false,
      {{"enabled", kind::flag},
@@ -145,7 +146,8 @@ const std::vector<section_rule> schema = {
       {"samples", kind::flag},
       {"udp", kind::text},
       {"prometheus", kind::text},
-      {"mqtt", kind::text}}},
+      {"mqtt", kind::text},
+      {"password_file", kind::text}}},
     {"realtime", false, {{"priority", kind::whole, 0, 99}, {"lock_memory", kind::flag}, {"cpus", kind::array}}},
     {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
 

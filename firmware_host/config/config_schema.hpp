@@ -3,7 +3,7 @@
 #pragma once
 #include <string>
 #include <string_view>
-#include <toml++/toml.h>
+#include "toml_parser.hpp"
 
 namespace okid_host {
 

@@ -4,6 +4,7 @@
 #include "dbc.hpp"
 
 #include "error.hpp"
+#include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
 
 #include <algorithm>
@@ -11,9 +12,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
 #include <sstream>
 #include <string_view>
 
@@ -315,16 +314,7 @@ bool toggles_string(std::string_view text) {
 
 } // namespace
 
-std::string read_dbc_text(const std::string& path) {
-    std::ifstream input(path, std::ios::binary);
-    std::error_code ignored;
-    if (!input || std::filesystem::is_directory(path, ignored))
-        throw failure(exit_usage,
-                      fmt::format("{}: cannot be read: {}", path, input ? "it is a folder" : std::strerror(errno)));
-    std::stringstream text;
-    text << input.rdbuf();
-    return text.str();
-}
+std::string read_dbc_text(const std::string& path) { return read_input(path, "a DBC"); }
 
 dbc_file read_dbc(const std::string& path) { return read_dbc(path, read_dbc_text(path)); }
 

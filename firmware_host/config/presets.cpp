@@ -39,7 +39,7 @@ toml::table find_preset(const std::string& name, bool bus, std::map<std::string,
     const auto found = texts.find(file);
     if (found == texts.end()) return {};
     try {
-        const toml::table preset = toml::parse(found->second);
+        const toml::table preset = parse_toml(found->second);
         const toml::table* keys = bus ? preset["bus"].as_table() : preset["channel"][channel].as_table();
         return keys ? *keys : toml::table{};
     } catch (const toml::parse_error& error) { // one out of a journal

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 #include <string_view>
-#include <toml++/toml.h>
+#include "toml_parser.hpp"
 #include <utility>
 #include <vector>
 

@@ -29,6 +29,15 @@ volatile std::sig_atomic_t writing = 0;
 
 constexpr std::size_t buffer_bytes = std::size_t{1} << 20;
 
+/// A link that somebody else put into a folder where many may write: what it leads to is not meant.
+bool planted_link(const std::string& path) {
+    struct stat link{}, folder{};
+    const std::string parent = std::filesystem::path(path).parent_path().string();
+    return lstat(path.c_str(), &link) == 0 && S_ISLNK(link.st_mode) && link.st_uid != geteuid() &&
+           stat(parent.empty() ? "." : parent.c_str(), &folder) == 0 && link.st_uid != folder.st_uid &&
+           (folder.st_mode & (S_IWGRP | S_IWOTH));
+}
+
 /// The file a symbolic link leads to, so that the link stays.
 std::string resolved(const std::string& path) {
     char* real = realpath(path.c_str(), nullptr);
@@ -70,6 +79,9 @@ whole_file::whole_file(std::string path) : path_(std::move(path)) {
         return;
     }
     if (path_.empty()) throw failure(exit_usage, "the name of a file to write is empty");
+    if (planted_link(path_))
+        throw failure(exit_usage, fmt::format("{}: is a link of another user in a folder for all, expected a file or nothing",
+                                              path_));
     struct stat status{};
     const bool exists = stat(path_.c_str(), &status) == 0;
     if (exists && S_ISDIR(status.st_mode)) cannot_write(path_, EISDIR);

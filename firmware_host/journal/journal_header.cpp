@@ -40,7 +40,7 @@ toml::table header_table(const journal_header& header) {
 void read_table(const std::string& text, journal_header& out) {
     toml::table table;
     try {
-        table = toml::parse(text);
+        table = parse_toml(text);
     } catch (const toml::parse_error&) {
         out.whole = false;
         return;

@@ -4,6 +4,7 @@
 #include "blocks.hpp"
 
 #include "error.hpp"
+#include "stream_memory.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +18,7 @@ std::unique_ptr<std::byte[]> allocate(std::size_t bytes, int blocks) {
     std::unique_ptr<std::byte[]> block(bytes > 0 ? new (std::nothrow) std::byte[bytes] : nullptr);
     if (!block)
         throw failure(
-            exit_usage,
+            exit_device,
             fmt::format("[identification]: the sums of {} blocks for standard deviations need {:.1f} GB each; "
                         "lower p or rows, or set sigma_blocks = 0",
                         blocks, static_cast<double>(bytes) / 1e9));
@@ -34,10 +35,9 @@ owned_sums::owned_sums(const okid_accumulator_config_t& config) {
 
 live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks,
                          bool states_only)
-    : whole_(whole), sums_(whole), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),
+    : whole_(whole), sums_(block_sums(whole)), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),
       blocks_(static_cast<std::size_t>(blocks)), n_u_(whole.n_u), n_y_(whole.n_y),
       most_states_(okid_identify_max_order(&identify)), dt_(1 / identify.fs_hz) {
-    if (window()) sums_.block = sums_.slots = sums_.spare_slots = 0;
     length_ = whole.lags;
     const std::size_t most = window() ? 0 : static_cast<std::size_t>(whole.lags) * m_;
     history_.reserve(most);
@@ -47,8 +47,8 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
         const double rows = std::log(1 - remembered) / std::log(whole.forgetting) / (2 * blocks);
         length_ = std::max<std::int64_t>(1, std::llround(rows / whole.block)) * whole.block;
     }
-    const std::size_t count = window() ? 2 : fading() ? 2 * blocks_ + 1 : 2 * blocks_;
-    for (std::size_t k = 0; k < count && !states_only; ++k) parts_.push_back(make());
+    const std::size_t count = states_only ? 0 : block_sums_held(whole, blocks);
+    for (std::size_t k = 0; k < count; ++k) parts_.push_back(make());
     const okid_jackknife_config_t config{identify, sums_};
     const std::size_t bytes = okid_jackknife_memsize(&config);
     jackknife_block_ = allocate(bytes, blocks);

@@ -5,7 +5,7 @@
 #include "identifier.hpp"
 
 #include "error.hpp"
-#include "result/method.hpp"
+#include "stream_memory.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,17 +18,13 @@ namespace okid_host {
 namespace {
 
 constexpr std::size_t chunk = 256; // samples handed over at a time
-constexpr std::int32_t watch_block = 32,
-                       watch_blocks = 3; // samples whose errors are averaged; so many high ones are a change
 
 std::unique_ptr<std::byte[]> allocate(const stream_config& config, std::size_t bytes, const char* what) {
-    if (bytes == 0)
-        throw failure(exit_usage, fmt::format("{}p, rows, order or window_s do not go together with {} channels ({})",
-                                              config.where, config.channels(), what));
     std::unique_ptr<std::byte[]> block(new (std::nothrow) std::byte[bytes]);
     if (!block)
-        throw failure(exit_usage, fmt::format("{}{} needs {:.1f} GB; lower p, rows or window_s", config.where, what,
-                                              static_cast<double>(bytes) / 1e9));
+        throw failure(exit_device,
+                      fmt::format("{}{} needs {:.0f} MB, which this machine does not give; lower p, rows or window_s",
+                                  config.where, what, static_cast<double>(bytes) / 1e6));
     return block;
 }
 
@@ -53,6 +49,7 @@ const char* sample_text(okid_sample_t sample) {
 identifier::identifier(const stream_config& config)
     : where_(config.where), m_(config.channels()), states_only_(config.states_only), scale_(config.scale),
       offset_(config.offset) {
+    require_memory(config);
     create_identifier(config);
     create_accumulator(config);
     create_watch(config);
@@ -92,13 +89,7 @@ void identifier::create_identifier(const stream_config& config) {
 void identifier::create_watch(const stream_config& config) {
     const identification_config& wanted = config.wanted;
     restart_on_change_ = wanted.restart_on_change && (wanted.window_s || wanted.forgetting);
-    okid_watch_config_t c{};
-    c.n_u = identify_config_.n_u;
-    c.n_y = identify_config_.n_y;
-    c.max_order = okid_identify_max_order(&identify_config_);
-    c.lead = okid_identify_lags(&identify_config_);
-    c.block = watch_block;
-    c.confirm = watch_blocks;
+    const okid_watch_config_t c = watch_config_of(config);
     change_samples_ = std::int64_t{c.block} * c.confirm;
     const std::size_t bytes = okid_watch_memsize(&c);
     watch_block_ = allocate(config, bytes, "the watch over the model");

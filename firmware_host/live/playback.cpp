@@ -8,12 +8,14 @@
 #include "recording_link.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
+#include <limits>
 #include <utility>
 
 namespace okid_host {
@@ -66,8 +68,13 @@ std::vector<std::string> interfaces_of(const std::string& log) {
     std::error_code ignored;
     if (!std::filesystem::is_regular_file(log, ignored)) return out; // a pipe can be read only once
     std::ifstream input(log);
-    std::string line;
-    while (std::getline(input, line)) {
+    std::array<char, 4096> bytes{}; // beyond this a line is no frame
+    while (input.getline(bytes.data(), bytes.size()) || input.gcount() > 0) {
+        const std::string line = bytes.data();
+        if (!input.eof() && input.fail()) {
+            input.clear();
+            input.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+        }
         const std::size_t close = line.find(')'),
                           begin = line.find_first_not_of(" \t", close == std::string::npos ? close : close + 1);
         if (close == std::string::npos || begin == std::string::npos) continue;

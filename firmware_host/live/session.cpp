@@ -419,7 +419,7 @@ void session::finish() {
     publisher_.finish();
     if (!options_.json.empty() && !to_file) write_whole_file("-", text);
     if (options_.table && !publisher_.events_on_stdout() && options_.json != "-")
-        write_whole_file("-", result_table(identifier_.model(), about));
+        write_whole_file("-", shown(result_table(identifier_.model(), about)));
 }
 
 } // namespace okid_host

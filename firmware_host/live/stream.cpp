@@ -70,6 +70,7 @@ result_context stream::context(remarks said) {
     const okid_accumulator_stats_t stats = identifier_.stats();
     result_context out;
     out.warnings = std::move(said);
+    out.warnings.insert(out.warnings.end(), config_.said.begin(), config_.said.end());
     out.method = config_.wanted.method;
     if (!looks_back_rows(method_of(out.method), config_.inputs.size())) out.hankel = config_.wanted.hankel;
     out.fs_hz = config_.rate_hz;

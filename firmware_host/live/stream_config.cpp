@@ -4,12 +4,16 @@
 #include "stream_config.hpp"
 
 #include "result/method.hpp"
+#include "stream_memory.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 namespace okid_host {
 namespace {
+
+constexpr std::int32_t watch_block = 32,
+                       watch_blocks = 3; // samples whose errors are averaged; so many high ones are a change
 
 /// Do the raw numbers of every channel fit int16 as they are?
 bool fits_codes(const live_config& config) {
@@ -37,6 +41,7 @@ stream_config stream_of(const live_config& config) {
         out.offset.push_back(channel.layout.offset * channel.si_factor());
     }
     out.mass = live_mass_plan(config);
+    fit_memory(out);
     return out;
 }
 
@@ -83,6 +88,18 @@ okid_accumulator_config_t sums_config_of(const stream_config& config) {
         a.bulk = config.bulk && a.sample == OKID_SAMPLE_INT16 ? 1 : 0;
     }
     return a;
+}
+
+okid_watch_config_t watch_config_of(const stream_config& config) {
+    const okid_identify_config_t identify = identify_config_of(config);
+    okid_watch_config_t c{};
+    c.n_u = identify.n_u;
+    c.n_y = identify.n_y;
+    c.max_order = okid_identify_max_order(&identify);
+    c.lead = okid_identify_lags(&identify);
+    c.block = watch_block;
+    c.confirm = watch_blocks;
+    return c;
 }
 
 } // namespace okid_host

@@ -5,6 +5,7 @@
 
 #include <okid/accumulator.h>
 #include <okid/identify.h>
+#include <okid/watch.h>
 
 #include <string>
 #include <vector>
@@ -23,11 +24,13 @@ struct stream_config {
     bool states_only = false;                  ///< samples come as states to merge, none are added
     std::vector<double> scale, offset;         ///< of each channel: value = scale * sample + offset
     mass_plan mass;                            ///< M, K and R with a result, when it wants them
+    remarks said;                              ///< what was chosen for it: goes into the result
 
     std::size_t channels() const { return inputs.size() + outputs.size(); }
 };
 
 /// The force and response channels of a CONFIG.toml as the grid delivers them: raw numbers, exact codes where they fit.
+/// A config that names no horizon gets the longest that fits its memory (fit_memory()).
 stream_config stream_of(const live_config& config);
 
 /// What the library identifies.
@@ -36,5 +39,8 @@ okid_identify_config_t identify_config_of(const stream_config& config);
 /// Where the sums are kept: growing, window or fading. A window moves in whole blocks: about a twentieth of it, or one
 /// update where that is finer.
 okid_accumulator_config_t sums_config_of(const stream_config& config);
+
+/// The watch over the model.
+okid_watch_config_t watch_config_of(const stream_config& config);
 
 } // namespace okid_host

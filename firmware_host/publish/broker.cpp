@@ -1,18 +1,25 @@
 // SPDX-License-Identifier: MIT
 #include "broker.hpp"
 
+#include "config/secrets.hpp"
 #include "error.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>
 
 #ifdef OKID_MQTT
+#include <array>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <condition_variable>
 #include <mosquitto.h>
 #include <mutex>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
 #include <thread>
+#include <unistd.h>
 #endif
 
 namespace okid_host {
@@ -46,12 +53,13 @@ constexpr std::chrono::seconds retry(2), farewell(1);
 /// The connection, shared with the thread that keeps it up: that one may still look for the host's address when okid ends.
 class connection {
   public:
-    explicit connection(const broker_address& to) : to_(to), client_(mosquitto_new(nullptr, true, this)) {
+    connection(const broker_address& to, const std::string& password)
+        : to_(to), client_(mosquitto_new(nullptr, true, this)) {
         if (!client_) throw failure(exit_device, "[publish] mqtt: no memory for a client");
         (void)mosquitto_threaded_set(client_, true);
         if (!to.user.empty())
             (void)mosquitto_username_pw_set(client_, to.user.c_str(),
-                                            to.password.empty() ? nullptr : to.password.c_str());
+                                            password.empty() ? nullptr : password.c_str());
         (void)mosquitto_reconnect_delay_set(client_, retry.count(), retry.count(), false);
         mosquitto_connect_callback_set(client_, [](mosquitto*, void* self, int result) {
             if (result != 0) static_cast<connection*>(self)->complain(mosquitto_connack_string(result));
@@ -60,7 +68,10 @@ class connection {
             if (result != 0) static_cast<connection*>(self)->complain("the connection was lost");
         });
     }
-    ~connection() { mosquitto_destroy(client_); }
+    ~connection() {
+        mosquitto_destroy(client_);
+        if (wake_fd_ >= 0) close(wake_fd_);
+    }
     connection(const connection&) = delete;
     connection& operator=(const connection&) = delete;
 
@@ -72,7 +83,7 @@ class connection {
             if (result != MOSQ_ERR_SUCCESS)
                 complain(mosquitto_strerror(result));
             else
-                (void)mosquitto_loop_forever(client_, -1, 1); // comes back when it is hopeless, or at the end
+                converse();
             lock.lock();
             changed_.wait_for(lock, retry, [&] { return ending_; });
         }
@@ -86,12 +97,56 @@ class connection {
         changed_.notify_all();
         lock.unlock();
         (void)mosquitto_disconnect(client_);
+        wake();
         lock.lock();
         return changed_.wait_for(lock, farewell, [&] { return ended_; });
     }
     mosquitto* client() const { return client_; }
+    /// There is something to send.
+    void wake() const {
+        const std::uint64_t one = 1;
+        (void)!write(wake_fd_, &one, sizeof one);
+    }
 
   private:
+    enum class incoming { nothing, packet, torn, foreign };
+
+    /// Until the connection ends. Nothing is subscribed to, so a broker has little to say: the library, which takes the room
+    /// that a packet announces, is let at the socket only when a whole short packet waits there.
+    void converse() {
+        incoming waits = incoming::nothing;
+        for (int result = MOSQ_ERR_SUCCESS; result == MOSQ_ERR_SUCCESS;) {
+            const int fd = mosquitto_socket(client_);
+            if (fd < 0) return;
+            const bool torn = waits == incoming::torn; // the rest of it cannot be waited for by poll()
+            const auto wanted = static_cast<short>((torn ? 0 : POLLIN) | (mosquitto_want_write(client_) ? POLLOUT : 0));
+            std::array<pollfd, 2> polls{{{fd, wanted, 0}, {wake_fd_, POLLIN, 0}}};
+            (void)poll(polls.data(), polls.size(), torn ? 20 : 1000);
+            std::uint64_t count = 0;
+            (void)!read(wake_fd_, &count, sizeof count);
+            waits = look_at(fd);
+            if (waits == incoming::foreign) {
+                complain("the broker announced a packet that no publisher is sent; the connection was closed");
+                (void)shutdown(fd, SHUT_RDWR);
+                (void)mosquitto_disconnect(client_);
+                return;
+            }
+            if (waits == incoming::packet) result = mosquitto_loop_read(client_, 1);
+            if (result == MOSQ_ERR_SUCCESS && mosquitto_want_write(client_)) result = mosquitto_loop_write(client_, 1);
+            if (result == MOSQ_ERR_SUCCESS) result = mosquitto_loop_misc(client_);
+        }
+    }
+
+    /// MQTT: a byte of kind and flags, then the length, seven bits a byte. What a publisher is sent is below 128 bytes.
+    static incoming look_at(int fd) {
+        std::array<unsigned char, 130> bytes{};
+        const ssize_t got = recv(fd, bytes.data(), bytes.size(), MSG_PEEK | MSG_DONTWAIT);
+        if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == ENOTCONN)) return incoming::nothing;
+        if (got <= 0) return incoming::packet; // the end, or an error: the library's to find
+        if (got >= 2 && bytes[1] >= 0x80) return incoming::foreign;
+        return got >= 2 && got >= 2 + bytes[1] ? incoming::packet : incoming::torn;
+    }
+
     /// Once is enough.
     void complain(const char* why) {
         if (told_.exchange(true)) return;
@@ -100,6 +155,7 @@ class connection {
 
     broker_address to_;
     mosquitto* client_;
+    int wake_fd_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     std::atomic<bool> told_{false};
     std::mutex mutex_;
     std::condition_variable changed_;
@@ -110,7 +166,9 @@ class broker : public event_sink {
   public:
     explicit broker(const live_config& config) : topic_(config.publish.mqtt->prefix + "/" + topic_level(config)) {
         mosquitto_lib_init();
-        link_ = std::make_shared<connection>(*config.publish.mqtt);
+        const broker_address& to = *config.publish.mqtt;
+        link_ = std::make_shared<connection>(
+            to, to.password_file.empty() ? to.password : read_password(to.password_file, config.path));
         thread_ = std::thread([link = link_] { link->keep_up(); });
     }
     ~broker() override {
@@ -127,6 +185,7 @@ class broker : public event_sink {
         const bool newest_counts = one.type == "modes" || one.type == "result";
         (void)mosquitto_publish(link_->client(), nullptr, topic.c_str(), static_cast<int>(one.line->size()) - 1,
                                 one.line->data(), 0, newest_counts);
+        link_->wake();
     }
     bool finished() override { return !mosquitto_want_write(link_->client()); }
 

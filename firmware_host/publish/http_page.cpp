@@ -3,6 +3,8 @@
 
 #include "error.hpp"
 
+#include <algorithm>
+#include <arpa/inet.h>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -40,7 +42,7 @@ std::string response(const char* status, const char* type, const std::string& bo
 
 http_page::http_page(const std::string& what, const net_address& at, std::string path, const char* type,
                      std::function<std::string()> text)
-    : path_(std::move(path)), type_(type), text_(std::move(text)), fd_(listen_at(at)) {
+    : path_(std::move(path)), type_(type), loopback_(at.loopback()), text_(std::move(text)), fd_(listen_at(at)) {
     if (fd_ < 0)
         throw failure(exit_device, fmt::format("{} {}: cannot listen there ({}); is the port taken, and is the address "
                                                "one of this computer?",
@@ -53,7 +55,7 @@ http_page::~http_page() {
 }
 
 void http_page::add_polls(std::vector<pollfd>& polls) const {
-    polls.push_back({fd_, POLLIN, 0});
+    polls.push_back({fd_, static_cast<short>(full_ ? 0 : POLLIN), 0});
     for (const visitor& each : all_)
         polls.push_back({each.fd, static_cast<short>(each.sent < each.answer.size() ? POLLOUT : POLLIN), 0});
 }
@@ -69,6 +71,28 @@ void http_page::welcome() {
         fresh.fd = fd;
         fresh.until = clock::now() + patience;
     }
+    full_ = errno != EAGAIN && errno != EWOULDBLOCK; // out of descriptors: the next tick looks again, nobody spins meanwhile
+}
+
+/// A page of another site whose name was turned to this address (DNS rebinding) sends that name: an address is not one.
+bool http_page::meant_for_us(const std::string& request) const {
+    constexpr std::string_view key = "\nhost:";
+    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
+    std::string text;
+    std::transform(request.begin(), request.end(), std::back_inserter(text), lower);
+    const std::size_t at = text.find(key);
+    if (at == std::string::npos) return true; // no browser
+    if (text.find(key, at + 1) != std::string::npos) return false;
+    std::string host = text.substr(at + key.size(), text.find_first_of("\r\n", at + key.size()) - at - key.size());
+    host.erase(0, host.find_first_not_of(" \t"));
+    host.erase(host.find_last_not_of(" \t") + 1);
+    if (!host.empty() && host.front() == '[')
+        host = host.substr(1, host.find(']') - 1);
+    else
+        host = host.substr(0, host.find(':'));
+    std::array<unsigned char, 16> bytes{};
+    return host == "localhost" || inet_pton(AF_INET, host.c_str(), bytes.data()) == 1 ||
+           inet_pton(AF_INET6, host.c_str(), bytes.data()) == 1 || (!loopback_ && !host.empty());
 }
 
 std::string http_page::answer_to(const std::string& request) const {
@@ -81,6 +105,7 @@ std::string http_page::answer_to(const std::string& request) const {
     const bool get = method == "GET";
     if (!get && method != "HEAD")
         return response("405 Method Not Allowed", plain, "GET or HEAD\n", true, "Allow: GET, HEAD\r\n");
+    if (!meant_for_us(request)) return response("403 Forbidden", plain, "this name does not belong to okid\n", get);
     if (target != path_) return response("404 Not Found", plain, fmt::format("there is only {}\n", path_), get);
     return response("200 OK", type_, text_(), get);
 }

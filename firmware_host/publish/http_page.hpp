@@ -40,9 +40,11 @@ class http_page {
     void welcome();
     bool attend(visitor& to) const;
     std::string answer_to(const std::string& request) const;
+    bool meant_for_us(const std::string& request) const;
 
     std::string path_;
     const char* type_;
+    bool loopback_, full_ = false;
     std::function<std::string()> text_;
     int fd_ = -1;
     std::list<visitor> all_;

@@ -95,6 +95,7 @@ void subscribers::welcome() {
         fresh.fd = fd;
         if (start_) append(fresh, start_);
     }
+    full_ = errno != EAGAIN && errno != EWOULDBLOCK; // out of descriptors: the next tick looks again
 }
 
 /// As much as it takes now. @return false: it is gone
@@ -135,7 +136,7 @@ void subscribers::send_all() {
 }
 
 void subscribers::add_polls(std::vector<pollfd>& polls) const {
-    polls.push_back({fd_, POLLIN, 0});
+    polls.push_back({fd_, static_cast<short>(full_ ? 0 : POLLIN), 0});
     for (const subscriber& each : all_) polls.push_back({each.fd, static_cast<short>(each.idle() ? 0 : POLLOUT), 0});
 }
 

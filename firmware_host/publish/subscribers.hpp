@@ -44,6 +44,7 @@ class subscribers : public event_sink {
 
     std::string path_;
     int fd_ = -1;
+    bool full_ = false; ///< no descriptor was left for the next one
     json_line start_;
     std::list<subscriber> all_;
 };

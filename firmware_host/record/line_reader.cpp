@@ -2,10 +2,10 @@
 #include "line_reader.hpp"
 
 #include "error.hpp"
+#include "files/input_file.hpp"
 
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -20,12 +20,10 @@ constexpr std::size_t longest_line = std::size_t{1} << 26; // 64 MiB: beyond thi
 
 line_reader::line_reader(std::string path) : path_(std::move(path)) {
     if (path_.empty()) throw failure(exit_usage, "the name of the record is empty, expected a CSV file");
-    fd_ = open(path_.c_str(), O_RDONLY | O_CLOEXEC);
-    if (fd_ < 0) throw failure(exit_usage, fmt::format("{}: cannot be opened: {}", path_, std::strerror(errno)));
+    fd_ = open_input(path_, "a CSV file");
     struct stat status{};
     if (fstat(fd_, &status) == 0 && S_ISREG(status.st_mode)) size_ = static_cast<std::size_t>(status.st_size);
     try {
-        if (S_ISDIR(status.st_mode)) throw failure(exit_usage, fmt::format("{}: is a folder, expected a file", path_));
         buffer_.resize(read_bytes);
         fill();
         if (end_ == 0) throw failure(exit_usage, fmt::format("{}: the file is empty", path_));

@@ -2,16 +2,13 @@
 // RIG.toml: every key checked, each complaint with line and column.
 #include "config/toml_parser.hpp"
 #include "error.hpp"
+#include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
 #include "rig.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
 #include <limits>
 #include <sstream>
 
@@ -267,15 +264,9 @@ rig read_rig(const std::string& path, const toml::table& file) {
 } // namespace
 
 rig load_rig(const std::string& path) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored))
-        throw failure(exit_usage, fmt::format("{}: is a folder, expected a RIG.toml", path));
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw failure(exit_usage, fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
-    std::ostringstream text;
-    text << file.rdbuf();
+    const std::string text = read_input(path, "a RIG.toml");
     try {
-        return read_rig(path, toml::parse(text.str(), path));
+        return read_rig(path, parse_toml(text, path));
     } catch (const toml::parse_error& error) {
         const auto& at = error.source().begin;
         throw failure(exit_usage, fmt::format("{}, line {}, column {}: {}", path, at.line, at.column,

@@ -240,7 +240,7 @@ def test_unit_file() -> None:
     complaints = [text for text in done.stderr.splitlines() if "is not executable" not in text and "okid" in text]
     assert not complaints
     done = subprocess.run(
-        [analyse, "security", "--offline=true", "--threshold=25", unit],
+        [analyse, "security", "--offline=true", "--threshold=20", unit],
         capture_output=True,
         text=True,
         timeout=60,

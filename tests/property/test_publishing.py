@@ -243,7 +243,7 @@ def test_other_requests_get_an_answer_and_harm_nothing(rig: pathlib.Path) -> Non
 
         def page() -> bytes | None:
             with contextlib.suppress(OSError):
-                return ask(port, b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n")
+                return ask(port, b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n")
             return None
 
         whole = until(page)
@@ -257,6 +257,11 @@ def test_other_requests_get_an_answer_and_harm_nothing(rig: pathlib.Path) -> Non
             (b"HEAD / HTTP/1.1\r\n\r\n", b"404"),
             (b"\xff\x00\r\n\r\n", b"400"),
             (b"GET /metrics?a=b HTTP/1.1\r\n\r\n", b"200"),
+            (b"GET /metrics HTTP/1.1\r\nhost:  127.0.0.1:99 \r\n\r\n", b"200"),
+            (b"GET /metrics HTTP/1.1\r\nHost: [::1]:9273\r\n\r\n", b"200"),
+            (b"GET /metrics HTTP/1.1\r\nHost: rebound.example:9273\r\n\r\n", b"403"),  # DNS rebinding
+            (b"GET /metrics HTTP/1.1\r\nHost: localhost.evil\r\n\r\n", b"403"),
+            (b"GET /metrics HTTP/1.1\r\nHost: localhost\r\nHost: a\r\n\r\n", b"403"),
             (b"GET /" + b"x" * 5000, b"431"),
         ]:
             assert ask(port, request).split()[1] == status, request

@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
+from okid._shown import shown
+
 
 class Error(ValueError):
-    """Base of every error of this package. `status` is the code of the C library, 0 when Python found the fault."""
+    """Base of every error of this package. `status` is the code of the C library, 0 when Python found the fault.
+
+    Control characters in the message are escaped: it is shown on terminals."""
 
     def __init__(self, message: str, status: int = 0) -> None:
-        super().__init__(message)
+        super().__init__(shown(message))
         self.status = status
 
 

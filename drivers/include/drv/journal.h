@@ -25,6 +25,7 @@ enum {
 
 /// What a chunk holds.
 typedef enum drv_journal_kind_t {
+    DRV_JOURNAL_OTHER = 0,  ///< of a later version, to be passed over
     DRV_JOURNAL_TEXT = 1,   ///< a piece of a named text: what the frames mean
     DRV_JOURNAL_FRAMES = 2, ///< frames as they came
     DRV_JOURNAL_END = 3     ///< the file was closed in order
@@ -92,7 +93,7 @@ typedef long (*drv_journal_read_t)(void* context, uint8_t* bytes, size_t count);
 
 /// A whole and valid chunk.
 typedef struct drv_journal_chunk_t {
-    drv_journal_kind_t kind; ///< or another number: of a later version, to be passed over
+    drv_journal_kind_t kind; ///< checked: a byte that is none of them is DRV_JOURNAL_OTHER
     uint32_t sequence;       ///< number of the chunk in the run
     uint32_t frames;         ///< in the payload
     uint64_t run;            ///< which run it belongs to

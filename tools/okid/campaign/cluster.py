@@ -9,6 +9,7 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from okid._errors import InputError
@@ -31,15 +32,18 @@ def _deaf() -> Iterator[None]:
 
 
 def _local(workers: int, memory_mb: float, folder: str) -> Any:
-    """The embedded cluster, begun."""
+    """The embedded cluster, begun: TLS on the loopback, with certificates made for this run and kept in memory."""
     from distributed import LocalCluster
+    from distributed.security import Security
 
+    # Whoever can speak to a scheduler runs code as its owner: other users of this computer have no certificate.
+    security = Security.temporary()  # type: ignore[no-untyped-call]
     single = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
     with _deaf():
         return LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-            host="127.0.0.1", memory_limit=round(memory_mb * 1e6), local_directory=folder, env=single,
-            silence_logs=logging.CRITICAL,
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
+            host="127.0.0.1", protocol="tls://", security=security, memory_limit=round(memory_mb * 1e6),
+            local_directory=folder, env=single, silence_logs=logging.CRITICAL,
         )  # fmt: skip
 
 
@@ -53,8 +57,12 @@ def connected(workers: int, address: str | None, memory_mb: float) -> Iterator[A
     try:
         import dask
         from distributed import Client
+
+        import_module("cryptography")  # for the certificates
     except ImportError:
-        raise InputError("a campaign needs Dask, which is not installed: pip install 'okid[campaign]'") from None
+        raise InputError(
+            "a campaign needs Dask and cryptography, which are not installed: pip install 'okid[campaign]'"
+        ) from None
     settings = {
         "distributed.admin.large-graph-warning-threshold": "4GB",
         "distributed.comm.timeouts.connect": f"{_CONNECT_S}s",

@@ -20,6 +20,7 @@ from okid.campaign.pieces import make_identifier
 from okid.campaign.record_list import list_records
 from okid.campaign.spec import CampaignSpec, Trend, load_spec
 from okid.campaign.virtual_year import Year, simulate_year
+from okid.data.input_file import parse_json, read_input
 from okid.data.whole_file import whole_file
 from okid.report.written_line import written_line
 
@@ -98,7 +99,7 @@ def _save_about(folder: Path, about: dict[str, Any]) -> None:
 def _load_about(folder: Path) -> tuple[dict[str, Any], Trend]:
     path = folder / "campaign.json"
     try:
-        about = json.loads(path.read_text("utf-8"))
+        about = parse_json(read_input(path).decode("utf-8"))
         if about["schema"] != "okid.campaign/1":
             raise ValueError(f"schema is {about['schema']!r}, expected 'okid.campaign/1'")
         given = dict(about["trend"])
@@ -106,8 +107,8 @@ def _load_about(folder: Path) -> tuple[dict[str, Any], Trend]:
         given["training_until"] = None if until is None else datetime.fromisoformat(until)
         given["series"] = None if given["series"] is None else tuple(given["series"])
         return about, Trend(**given)
-    except OSError as fault:
-        raise InputError(f"{path}: {fault.strerror}; expected the output folder of okid-campaign run") from None
+    except InputError as fault:
+        raise InputError(f"{fault}; expected the output folder of okid-campaign run") from None
     except (ValueError, KeyError, TypeError) as fault:
         raise InputError(f"{path}: damaged: {fault}") from None
 

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from okid._errors import InputError
 from okid.campaign.spec import CampaignSpec
+from okid.data.input_file import read_input
 
 Real = NDArray[np.float64]
+_LARGEST = 4 << 30  # bytes of one record
 _WHOLE = 0.02  # of a code: how far a decoded number may lie from one
 _RANGE = {16: (-(2**15), 2**15 - 1), 24: (-(2**23), 2**23 - 1), 32: (-(2**31), 2**31 - 1)}
 
@@ -39,11 +41,13 @@ class ReadRecord:
 
 def _fetch(url: str, storage: dict[str, Any]) -> bytes:
     if "://" not in url:
-        return Path(url).read_bytes()
+        return read_input(url, _LARGEST)
     import fsspec
 
     with fsspec.open(url, "rb", **storage) as file:
-        data: bytes = file.read()
+        data: bytes = file.read(_LARGEST + 1)
+    if len(data) > _LARGEST:
+        raise InputError(f"larger than {_LARGEST} bytes")
     return data
 
 

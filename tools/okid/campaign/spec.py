@@ -14,6 +14,7 @@ from typing import Any
 
 from okid._errors import InputError
 from okid.campaign.spec_keys import Place, check_keys, nearest
+from okid.data.input_file import parse_toml, read_input
 
 GROUPS, FEWEST = 20, 8  # parts that are left out in turn; below 8 a standard deviation says nothing
 TIME_KEYS = ("hour", "day", "week", "month", "year")
@@ -151,10 +152,8 @@ def load_spec(path: str | Path, **changes: Any) -> CampaignSpec:
     """
     source = Path(path)
     try:
-        text = source.read_bytes().decode("utf-8")
-        file = tomllib.loads(text)
-    except OSError as fault:
-        raise InputError(f"{source}: {fault.strerror or fault}") from None
+        text = read_input(source).decode("utf-8")
+        file = parse_toml(text)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
         raise InputError(f"{source}: not a TOML file: {fault}") from None
     check_keys(source, text, file)

@@ -19,6 +19,7 @@ from okid._errors import InputError
 from okid.abi.accumulator import Accumulator
 from okid.campaign.pieces import empty_sums, fold, folds
 from okid.campaign.spec import CampaignSpec
+from okid.data.whole_file import safe_part
 
 _MAGIC, HEAD = b"OKIDSUM1", struct.Struct("<8sII")
 _LIVE = 64 << 20  # bytes of accumulators that stay unpacked while parts are collected
@@ -162,6 +163,5 @@ def whole_of(spec: CampaignSpec, lags: int, parts: Iterable[Accumulator]) -> Acc
 
 def write_sums(path: Path, sums: GroupSums) -> None:
     """Whole or not at all: temporary file, then rename."""
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(sums.to_bytes())
-    part.replace(path)
+    with safe_part(path) as part:
+        part.write_bytes(sums.to_bytes())

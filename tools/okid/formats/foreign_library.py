@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from okid._errors import Error, InputError
+from okid.data.input_file import check_input
 from okid.data.whole_file import whole_file
 
 
@@ -26,8 +27,7 @@ def library(name: str, purpose: str) -> Any:
 def reading(path: str | Path, kind: str) -> Iterator[None]:
     """Everything that goes wrong while `path` is read becomes an InputError of one line that names the file."""
     try:
-        if Path(path).is_dir():
-            raise InputError("is a folder, expected a file")
+        check_input(path)
         if Path(path).stat().st_size == 0:
             raise InputError(f"is empty, expected {kind}")
         yield

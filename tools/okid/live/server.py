@@ -6,7 +6,10 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import json
+import math
 import socket
+import threading
+import time
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -28,6 +31,7 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 REQUEST_S, STALLED_S, HEARTBEAT_S = 10.0, 20.0, 5.0
+MOST_VISITORS = 48  # connections at a time: 16 pages and what they fetch
 MOST_SPECTRA = 8
 
 
@@ -61,6 +65,8 @@ class PageServer(ThreadingHTTPServer):
         family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
         self.address_family = family
         self.allowed = {"127.0.0.1", "localhost", "::1", host.lower()}
+        self._visitors: dict[socket.socket, float] = {}  # when their time to ask is over; inf: a page, which stays
+        self._door = threading.Lock()
         super().__init__(address[:2], _Handler)
 
     def server_bind(self) -> None:
@@ -74,6 +80,51 @@ class PageServer(ThreadingHTTPServer):
     def url(self) -> str:
         """Where the page is."""
         return f"http://{f'[{self.host}]' if ':' in self.host else self.host}:{self.server_port}/"
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """A thread for each visitor, MOST_VISITORS at most: then the one that has taken longest to ask makes room, and
+        when all of them are pages the new one is turned away."""
+        with self._door:
+            full = len(self._visitors) >= MOST_VISITORS
+            oldest = min(self._visitors, key=lambda one: self._visitors[one]) if full else None
+            if oldest is not None and self._visitors[oldest] < math.inf:
+                self._end(oldest)
+            elif full:
+                oldest = request
+            if oldest is not request:
+                self._visitors[request] = time.monotonic() + REQUEST_S
+        if oldest is request:
+            self.shutdown_request(request)
+            return
+        try:
+            super().process_request(request, client_address)
+        except RuntimeError:  # no thread can be begun
+            self.shutdown_request(request)
+
+    def _end(self, visitor: socket.socket) -> None:
+        """Its thread hears the end of the connection."""
+        self._visitors.pop(visitor, None)
+        with contextlib.suppress(OSError):
+            visitor.shutdown(socket.SHUT_RDWR)
+
+    def shutdown_request(self, request: Any) -> None:
+        """The end of a visit."""
+        with self._door:
+            self._visitors.pop(request, None)
+        super().shutdown_request(request)
+
+    def service_actions(self) -> None:
+        """Twice a second: who has not asked within REQUEST_S, byte by byte or not, goes."""
+        now = time.monotonic()
+        with self._door:
+            for visitor in [one for one, until in self._visitors.items() if until < now]:
+                self._end(visitor)
+
+    def stays(self, visitor: socket.socket) -> None:
+        """It opened a page: its time is not over until it goes."""
+        with self._door:
+            if visitor in self._visitors:
+                self._visitors[visitor] = math.inf
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that goes away in the middle is no news."""
@@ -156,6 +207,7 @@ class _Handler(BaseHTTPRequestHandler):
             for name, value in {**HEADERS, "Content-Type": "text/event-stream", "Cache-Control": "no-store"}.items():
                 self.send_header(name, value)
             self.end_headers()
+            self.server.stays(self.connection)
             self.connection.settimeout(STALLED_S)
             self.wfile.write(b"retry: 1000\n\n")
             while not outbox.closed:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from okid._errors import InputError
+from okid.data.input_file import LONGEST_LINE, open_input, parse_json
 
 ENDS = ("link_up", "restarted")  # events of a bus
 
@@ -92,12 +93,15 @@ def _lines(path: str | Path) -> Iterator[tuple[int, dict[str, Any]]]:
     """The events with their line numbers; a last line that was cut off (a killed run) is left out."""
     source = str(path)
     try:
-        with Path(path).open(encoding="utf-8") as file:
-            for number, text in enumerate(file, 1):
+        with open_input(path) as file:
+            for number, line in enumerate(iter(lambda: file.readline(LONGEST_LINE + 1), b""), 1):
+                if len(line) > LONGEST_LINE:
+                    raise InputError(f"{source}:{number}: longer than {LONGEST_LINE} bytes, expected an event")
+                text = line.decode("utf-8")
                 if not text.strip():
                     continue
                 try:
-                    event = json.loads(text)
+                    event = parse_json(text)
                 except json.JSONDecodeError as fault:
                     if not text.endswith("\n") and number > 1:
                         return

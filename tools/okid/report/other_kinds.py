@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 from typing import NamedTuple
 
 from okid._errors import InputError
+from okid.data.input_file import parse_json
 from okid.formats.log_names import FRAME_CSV_HEAD
 
 LOOKED_AT = 65536  # bytes
@@ -73,7 +73,7 @@ _BYTES = (
 def _json_kind(text: str) -> Kind | None:
     """Of text that begins with a brace: by its schema, or events by their first line."""
     try:
-        first = json.loads(text.partition("\n")[0])
+        first = parse_json(text.partition("\n")[0])
     except ValueError:
         first = None
     if isinstance(first, dict) and isinstance(first.get("type"), str):

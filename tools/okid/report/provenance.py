@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 
 from okid._errors import InputError
+from okid.data.input_file import open_input
 from okid.report import page
 from okid.report.material import Material, Source
 
@@ -19,7 +20,7 @@ def source_of(kind: str, path: str | Path) -> Source:
     """Name, SHA-256 and size of a file. InputError when it cannot be read."""
     digest, size = hashlib.sha256(), 0
     try:
-        with Path(path).open("rb") as file:
+        with open_input(path) as file:
             while block := file.read(CHUNK):
                 digest.update(block)
                 size += len(block)
@@ -30,7 +31,7 @@ def source_of(kind: str, path: str | Path) -> Source:
 
 def without_passwords(text: str) -> str:
     """The text with user names and passwords of addresses taken out: mqtt://user:secret@host becomes mqtt://…@host."""
-    return re.sub(r"://[^/\s\"'@]*@", "://…@", text)
+    return re.sub(r"://[^\n]*@", "://…@", text)
 
 
 def provenance_section(m: Material, written: str | None) -> page.Section:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import os
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from pathlib import Path
 
 from okid._errors import InputError
 from okid.data.interrupt import halt_if_interrupted
+from okid.data.whole_file import safe_part
 
 Place = str | Path
 _READ = {
@@ -87,18 +87,13 @@ def write_whole(path: Place, text: str) -> None:
     A device or pipe (/dev/stdout) is written to as it is. After Ctrl-C: KeyboardInterrupt, and no file.
     """
     target = Path(path)
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
     halt_if_interrupted()
     try:
         if target.exists() and not target.is_file() and not target.is_dir():
             target.write_text(text, encoding="utf-8")
             return
-        part.write_text(text, encoding="utf-8")
-        halt_if_interrupted()
-        part.replace(target)
-    except BaseException as fault:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
-        if isinstance(fault, OSError):
-            raise OSError(fault.errno, fault.strerror, str(target)) from None
-        raise
+        with safe_part(target) as part:
+            part.write_text(text, encoding="utf-8")
+            halt_if_interrupted()
+    except OSError as fault:
+        raise OSError(fault.errno, fault.strerror, str(target)) from None

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from okid._errors import InputError
+from okid.data.input_file import parse_json, read_input
 
 
 def read_result(path: str | Path) -> dict[str, Any]:
     """The object an okid.result/1 file holds. InputError of one line names the file, and line and column of a fault."""
     try:
-        raw = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise InputError(f"{path}: {fault.strerror or fault}") from None
+        raw = parse_json(read_input(path).decode("utf-8"))
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text, expected an okid.result/1 JSON file") from None
     except json.JSONDecodeError as fault:

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  how much memory an identification takes, told before a byte is taken
+// METHOD   the sizes the library tells for each object, added up; nothing depends on how much memory the machine has or how
+//          much of it is free, so that a config means the same on every machine
+#pragma once
+#include "stream_config.hpp"
+
+#include <cstddef>
+
+namespace okid_host {
+
+/// The sums of one block that is left out for the standard deviations, and how many of them are held at once.
+okid_accumulator_config_t block_sums(const okid_accumulator_config_t& whole);
+std::size_t block_sums_held(const okid_accumulator_config_t& whole, int blocks);
+
+/// Bytes of all of it; 0 when p, rows, order or window are outside what the library takes.
+double stream_bytes(const stream_config& stream);
+
+/// Where neither p nor rows is named and the defaults take more than max_memory_mb: the longest horizon that fits, said.
+void fit_memory(stream_config& stream);
+
+/// Throws `failure` (exit 2) when the identification takes more than max_memory_mb: says what would fit.
+void require_memory(const stream_config& stream);
+
+} // namespace okid_host

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""Those who connect and do no good: too many, too slow, a broker that announces 256 MB, no descriptors left."""
+
+from __future__ import annotations
+
+import contextlib
+import pathlib
+import resource
+import socket
+import struct
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+from okid.live.server import MOST_VISITORS, PageServer
+from program import PROGRAM
+from two_masses import rig_text, simulate_rig
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    return simulate_rig(tmp_path_factory.mktemp("rig"), rig_text(120.0))
+
+
+@contextlib.contextmanager
+def publishing(rig: pathlib.Path, lines: str, descriptors: int | None = None) -> Iterator[subprocess.Popen[str]]:
+    (rig / "p.toml").write_text((rig / "a.toml").read_text() + f"[publish]\n{lines}\n")
+    limit = (lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))) if descriptors else None
+    with subprocess.Popen(
+        [PROGRAM, "replay", rig / "a.log", "-c", rig / "p.toml", "--speed", "4"], preexec_fn=limit,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    ) as run:  # fmt: skip
+        yield run
+        run.terminate()
+
+
+def free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+def status(run: subprocess.Popen[str], key: str) -> int:
+    text = pathlib.Path(f"/proc/{run.pid}/status").read_text()
+    return next(int(line.split()[1]) for line in text.splitlines() if line.startswith(key))
+
+
+def cpu_s(run: subprocess.Popen[str]) -> float:
+    fields = pathlib.Path(f"/proc/{run.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / 100
+
+
+def connected(port: int) -> socket.socket:
+    for _ in range(200):
+        with contextlib.suppress(OSError):
+            return socket.create_connection(("127.0.0.1", port), timeout=5)
+        time.sleep(0.05)
+    raise AssertionError("nobody listens")
+
+
+def test_no_descriptors_left(rig: pathlib.Path) -> None:
+    """Release 0.1 went round accept() with a whole processor."""
+    port = free_port()
+    with publishing(rig, f'prometheus = "127.0.0.1:{port}"\nsocket = "s"', descriptors=16) as run:
+        connected(port).close()
+        crowd = []
+        for _ in range(40):
+            one = socket.socket(socket.AF_UNIX)
+            one.connect(str(rig / "s"))
+            crowd.append(one)
+        time.sleep(0.5)
+        before, at = cpu_s(run), time.monotonic()
+        time.sleep(2)
+        spent = (cpu_s(run) - before) / (time.monotonic() - at)
+        assert spent < 0.5 and run.poll() is None
+        for one in crowd:
+            one.close()
+        time.sleep(0.5)
+        with connected(port) as wire:
+            wire.sendall(b"GET /metrics HTTP/1.0\r\n\r\n")
+            assert wire.recv(100).startswith(b"HTTP/1.1 200")
+
+
+@pytest.mark.parametrize("piecewise", [False, True])
+def test_a_broker_that_announces_256_mb(rig: pathlib.Path, piecewise: bool) -> None:
+    """Release 0.1 took the room for it: 540 MB."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(20)
+        with publishing(rig, f'mqtt = "mqtt://127.0.0.1:{server.getsockname()[1]}"') as run:
+            wire, _ = server.accept()
+            with wire:
+                wire.settimeout(10)
+                assert wire.recv(1000)[0] == 0x10  # CONNECT
+                wire.sendall(b"\x20\x02\x00\x00")
+                announced = b"\x30\xff\xff\xff\x7f" + struct.pack(">H", 1) + b"t"
+                for k in range(len(announced)) if piecewise else [None]:
+                    with contextlib.suppress(OSError):
+                        wire.sendall(announced if k is None else announced[k : k + 1])
+                    time.sleep(0.1)
+                with contextlib.suppress(OSError):
+                    for _ in range(50):
+                        wire.sendall(bytes(1 << 20))
+                time.sleep(0.5)
+            assert status(run, "VmPeak") < 1_500_000 and status(run, "VmHWM") < 150_000
+            assert run.poll() is None
+            run.terminate()
+            assert "announced a packet" in run.communicate(timeout=60)[1]
+
+
+def test_slow_visitors_do_not_pile_up() -> None:
+    """740 of them left 337 threads in release 0.1."""
+
+    class Quiet:
+        hub = None
+
+    server = PageServer(Quiet(), "127.0.0.1", 0)  # type: ignore[arg-type]
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True)
+    thread.start()
+    before, crowd = threading.active_count(), []
+    try:
+        for _ in range(300):
+            one = socket.create_connection(("127.0.0.1", server.server_port), timeout=5)
+            one.sendall(b"GET / HT")
+            crowd.append(one)
+        time.sleep(0.5)
+        assert threading.active_count() - before <= MOST_VISITORS
+        with socket.create_connection(("127.0.0.1", server.server_port), timeout=10) as wire:
+            wire.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
+            assert wire.recv(15).startswith(b"HTTP/1.0 200")
+    finally:
+        for one in crowd:
+            one.close()
+        server.shutdown()
+        server.server_close()
