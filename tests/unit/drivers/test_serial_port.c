@@ -340,7 +340,7 @@ static void test_slcan_sources_that_are_refused(void) {
     line.bitrate = 500000;
     line.device = far_too_long;
     refused_by_slcan(line, -EINVAL, "a device has a path of 1 to 255 characters");
-    line.device = NULL;
+    line.device = "";
     refused_by_slcan(line, -EINVAL, "a device has a path of 1 to 255 characters");
 }
 
