@@ -112,7 +112,7 @@ def print_stacks(folder: Path) -> None:
         if wrong or loops:
             raise SystemExit(f"table: {name}: {'; '.join([*wrong, *loops])}")
         depths.append(depth)
-    headers = (HERE.parents[1] / "lib" / "include" / "okid").glob("*.h")
+    headers = (HERE.parents[1] / "lib" / "include" / "okid").rglob("*.h")
     public = set(re.findall(r"\b(okid_\w+)\s*\(", "".join(p.read_text("utf-8") for p in headers)))
     names = sorted(
         (n for n in depths[0] if n in public and depths[0][n] >= SMALL_STACK), key=lambda n: (-depths[0][n], n)
