@@ -108,19 +108,18 @@ class ModelView(Structure):
 class Modes(Structure):
     """okid_modes_t."""
 
-    _fields_ = [("count", c_int32), ("radius", c_double)] + [
-        (name, doubles)
-        for name in (
-            "frequency_hz",
-            "damping_ratio",
-            "mpc",
-            "shape_re",
-            "shape_im",
-            "mu_re",
-            "mu_im",
-            "psi_re",
-            "psi_im",
-        )
+    _fields_ = [
+        ("count", c_int32),
+        ("radius", c_double),
+        ("frequency_hz", doubles),
+        ("damping_ratio", doubles),
+        ("mpc", doubles),
+        ("shape_re", doubles),
+        ("shape_im", doubles),
+        ("mu_re", doubles),
+        ("mu_im", doubles),
+        ("psi_re", doubles),
+        ("psi_im", doubles),
     ]
 
 
