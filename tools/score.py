@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Scores the default identification on measured records whose modes experts signed, beside release 0.1's figures.
 
-`tools/score.py [PROGRAM]` reads measured/reference.json below $OKID_DATA, else ../shared/data. A signed mode is found when
-a confident mode lies within its tolerance, one to one; a confident mode that is neither signed nor optional is false.
+`tools/score.py [PROGRAM]` reads measured/reference.json below $OKID_DATA, else ../shared/data. A signed mode is found
+when a confident mode lies within its tolerance, one to one; one that is neither signed nor optional is false.
 """
 
 from __future__ import annotations
@@ -53,7 +53,9 @@ def identify(program: str, record: dict[str, Any], *options: str) -> tuple[list[
         command = [program, "identify", str(corpus() / record["file"]), "--outputs", ",".join(record["outputs"])]
         command += ["--inputs", ",".join(record["inputs"])] if record["inputs"] else []
         begun = time.monotonic()
-        done = subprocess.run([*command, "--quiet", "--json", str(out), *options], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [*command, "--quiet", "--json", str(out), *options], capture_output=True, text=True, check=False
+        )
         seconds = time.monotonic() - begun
         if done.returncode not in (0, 3):
             raise SystemExit(f"{record['id']}: {done.stderr.strip()}")

@@ -2,8 +2,8 @@
 // PURPOSE  frames out of a journal, as fast as they are asked for; pacing is the caller's
 // METHOD   chunk by chunk; where one is missing the next frame of every bus says so. At the end of a file the next
 //          segment is opened when it is there
-#include <drv/journal.h>
 #include <drv/input_file.h>
+#include <drv/journal.h>
 #include <drv/source.h>
 
 #include <errno.h>

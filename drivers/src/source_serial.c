@@ -15,7 +15,7 @@
 
 enum { READS_A_CALL = 4, READS_BETWEEN_COUNTS = 64 };
 
-static const int64_t byte_ns = 250;       // apart, so that packets read together differ
+static const int64_t byte_ns = 250;          // apart, so that packets read together differ
 static const int64_t clock_set = 1000000000; // ns: so far back is no order of packets but a clock that was set
 
 typedef struct serial_t {

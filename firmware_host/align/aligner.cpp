@@ -42,13 +42,13 @@ aligner::aligner(const live_config& config, grid_sink& sink)
     reference_.reset(new grid(part_of(config, counted_, rate_hz), *this)); // make_unique cannot see the base
     if (domains.size() == 1) return;
     const double ahead_s = std::max(1.25, 64 / rate_hz); // the reference may be ahead of a node
-    const double kept_s = (silence_patience_s + ahead_s) / 2; // of it a node keeps four times: the reference may wait, too
+    const double kept_s =
+        (silence_patience_s + ahead_s) / 2; // of it a node keeps four times: the reference may wait, too
     double filter_s = 0;
     for (std::size_t d = 1; d < domains.size(); ++d) {
         const double own_hz = rate_of(config, domains[d]);
         filter_s = std::max(filter_s, 33 * std::max(1 / own_hz, 1 / rate_hz));
-        nodes_.push_back(
-            std::make_unique<free_node>(part_of(config, domains[d], own_hz), domains[d], rate_hz, kept_s));
+        nodes_.push_back(std::make_unique<free_node>(part_of(config, domains[d], own_hz), domains[d], rate_hz, kept_s));
     }
     wait_ = std::llround((ahead_s + filter_s) * rate_hz);
     patience_ = std::llround(begin_patience_s * rate_hz);

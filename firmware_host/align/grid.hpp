@@ -73,7 +73,7 @@ struct lane_start {
     std::int64_t close = 0, shared = 0, ends = 0; ///< frames close behind one of the lane, of the bus; bursts
     double end_ns = 0;
     std::array<double, 2> spread_ns{}; ///< how late the last frames of bursts were behind their numbers: least and most
-    std::array<double, 2> least_ns{}; ///< of each half: by how much the earliest arrival was behind its number
+    std::array<double, 2> least_ns{};  ///< of each half: by how much the earliest arrival was behind its number
     std::array<std::int64_t, 2> count{};
 
     void add(std::int64_t number, std::int64_t time_ns, std::int64_t middle_ns, double period_ns);
@@ -120,7 +120,7 @@ class grid {
         std::vector<multiplexor> selectors;
         // Where the lane stands on the grid.
         bool waiting = false, heard = false;
-        bool gone = false; ///< silent for longer than others wait
+        bool gone = false;         ///< silent for longer than others wait
         std::uint64_t counter = 0; ///< as last received
         std::int64_t last = 0;     ///< unwrapped place of the newest frame
         std::int64_t time_ns = 0;  ///< its stamp
@@ -138,15 +138,15 @@ class grid {
         double early = 0;   ///< of the line the earliest was, of late, periods
         double on_time = 0; ///< of a period; what is later was held up, or a sample before it is missing
         std::vector<late_frame> late;
-        std::int64_t heard_ns = 0; ///< as late_frame has it, of the newest
-        std::size_t placed = 0;              ///< of `late`: they are on the grid already
-        std::size_t seen = 0, which = 0;     ///< of `late`: looked at; the last one that was about as early as any
-        double least = 0;                    ///< how late the earliest of those was, periods
-        double patience = 0;                 ///< periods for which the oldest waits before a loss is believed
-        std::int64_t newest_ns = 0;          ///< stamp of the newest frame that came
-        double spread = 0, tail_late = 0;    ///< how late the last frame of a burst was, of late and now, periods
-        std::int64_t tail = 0, tail_ns = 0;  ///< place and stamp of the newest frame placed, for the line
-        std::int64_t ahead = 0;              ///< frames in a row that came before their time
+        std::int64_t heard_ns = 0;          ///< as late_frame has it, of the newest
+        std::size_t placed = 0;             ///< of `late`: they are on the grid already
+        std::size_t seen = 0, which = 0;    ///< of `late`: looked at; the last one that was about as early as any
+        double least = 0;                   ///< how late the earliest of those was, periods
+        double patience = 0;                ///< periods for which the oldest waits before a loss is believed
+        std::int64_t newest_ns = 0;         ///< stamp of the newest frame that came
+        double spread = 0, tail_late = 0;   ///< how late the last frame of a burst was, of late and now, periods
+        std::int64_t tail = 0, tail_ns = 0; ///< place and stamp of the newest frame placed, for the line
+        std::int64_t ahead = 0;             ///< frames in a row that came before their time
         // The newest frames: what lies before all of them does not come any more (a frame may be eight places late).
         std::array<std::int64_t, 9> recent{};
         std::size_t recent_at = 0;
@@ -239,9 +239,9 @@ class grid {
     std::int64_t limit_ = std::numeric_limits<std::int64_t>::max();
     std::int64_t next_ = 0, opened_ = 0; ///< next row to go out; rows below opened_ are laid out in the ring
     bool anchored_ = false;
-    std::size_t heard_ = 0, most_before_ = 0; ///< lanes heard; frames that may wait before the grid begins
-    bool by_time_ = false;                    ///< the place of some lane depends on stamps
-    std::int64_t all_heard_ns_ = 0;           ///< when the last lane was heard for the first time
+    std::size_t heard_ = 0, most_before_ = 0;       ///< lanes heard; frames that may wait before the grid begins
+    bool by_time_ = false;                          ///< the place of some lane depends on stamps
+    std::int64_t all_heard_ns_ = 0;                 ///< when the last lane was heard for the first time
     std::vector<std::pair<int, drv_frame_t>> held_; ///< frames before the grid begins
     std::vector<grid_bus_counts> buses_;
 };

@@ -71,7 +71,8 @@ void grid::place_by_cadence(lane& l, const drv_frame_t& frame) {
     late_frame& held = l.late.back();
     held.time_ns = std::max(frame.time_ns, l.newest_ns); // stamps of one lane never run backwards
     // A silence is no evidence: it counts as much as that between two bursts.
-    l.heard_ns += std::min<std::int64_t>(held.time_ns - l.newest_ns, std::llround(a_silence * static_cast<double>(hold_) * period_ns_));
+    l.heard_ns += std::min<std::int64_t>(held.time_ns - l.newest_ns,
+                                         std::llround(a_silence * static_cast<double>(hold_) * period_ns_));
     held.heard_ns = l.heard_ns;
     l.newest_ns = held.time_ns;
     held.loss = l.loss; // it tells where something was lost, and why

@@ -15,16 +15,17 @@
 namespace okid_host {
 namespace {
 
-constexpr double gather_s = 0.5;        // frames of so long tell where a lane stands
-constexpr double gather_periods = 8;    // and of at least so many periods
-constexpr double agree = 0.3;           // periods: the two halves of the gathered frames tell the same line
-constexpr double together = 0.25;       // periods: frames so close were handed over together
-constexpr double bursty_share = 0.1;    // of a lane's frames: from then on its stamps are those of bursts
-constexpr double burst_offset = 1.25;   // periods by which the lines of two bursty lanes may differ and count as one
-constexpr double looks_late = 0.35;     // of a period: less than half, for some adapters wait for the last sample of a burst
+constexpr double gather_s = 0.5;      // frames of so long tell where a lane stands
+constexpr double gather_periods = 8;  // and of at least so many periods
+constexpr double agree = 0.3;         // periods: the two halves of the gathered frames tell the same line
+constexpr double together = 0.25;     // periods: frames so close were handed over together
+constexpr double bursty_share = 0.1;  // of a lane's frames: from then on its stamps are those of bursts
+constexpr double burst_offset = 1.25; // periods by which the lines of two bursty lanes may differ and count as one
+constexpr double looks_late =
+    0.35; // of a period: less than half, for some adapters wait for the last sample of a burst
 constexpr std::int64_t one_read = 30000; // ns: two frames of one bus so close came with one read, no bus is so fast
-constexpr double counted_drift = 5e-4;  // by which a line through the earliest stamps may turn later
-constexpr std::int64_t half_least = 4;  // frames that a half needs to have a say
+constexpr double counted_drift = 5e-4;   // by which a line through the earliest stamps may turn later
+constexpr std::int64_t half_least = 4;   // frames that a half needs to have a say
 
 /// Two counters this close at the start count the same samples.
 std::int64_t kinship(unsigned bits) { return bits >= 9 ? 64 : std::max<std::int64_t>(1, std::int64_t{1} << bits >> 3); }

@@ -55,7 +55,8 @@ std::string summary(const live_config& config, const stream_config& stream) {
             channel.sequence ? fmt::format("{}-bit counter", channel.sequence->length) : "time stamps");
     }
     out += fmt::format("\n{:g} Hz, {} force and {} response channel{}{}\n", config.rate_hz, config.n_u, config.n_y,
-                       config.n_y == 1 ? "" : "s", stream.sample == OKID_SAMPLE_INT16 ? ", 16-bit codes summed exactly" : "");
+                       config.n_y == 1 ? "" : "s",
+                       stream.sample == OKID_SAMPLE_INT16 ? ", 16-bit codes summed exactly" : "");
     const okid_method_t method = method_of(id.method);
     out += fmt::format("{}, {}{} block rows, an update each {:g} s, memory: {}\n", id.method,
                        looks_back_rows(method, config.n_u) ? "" : fmt::format("p {}, ", id.p),

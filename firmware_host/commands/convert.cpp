@@ -99,7 +99,8 @@ void frames_to_csv(const convert_arguments& given, const live_config& config) {
         throw failure(exit_no_model, fmt::format("{}: no sample: it holds no usable frame of the channels of {}",
                                                  given.from, config.path));
     for (const std::size_t index : samples.silent_channels())
-        say("okid: channel \"{}\" has no frame in {}: its column is all nan\n", config.channels[index].name, given.from);
+        say("okid: channel \"{}\" has no frame in {}: its column is all nan\n", config.channels[index].name,
+            given.from);
     out.commit();
     say("{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(), config.channels.size(),
         table.missing());

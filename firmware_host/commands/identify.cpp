@@ -173,8 +173,7 @@ void add_identify(CLI::App& app) {
         ->type_name("N|auto");
     command->add_flag("--all-modes", given->all_modes, "the table also lists the modes that are not signed, and why");
     command
-        ->add_option("--modes", given->wanted.modes,
-                     "only these modes, by their numbers in the table (--method auto)")
+        ->add_option("--modes", given->wanted.modes, "only these modes, by their numbers in the table (--method auto)")
         ->type_name("1,3-5");
     command->add_option("--detrend", given->wanted.detrend, "what is taken out of every channel first (default mean)")
         ->type_name("none|mean|linear");

@@ -92,8 +92,7 @@ session_options check_live(const live_arguments& given, const live_config& confi
         check_other_file(target, log);
     }
     for (const auto& [code, text] : stream.said) say("okid: {}: {}\n", config.path, text);
-    for (const std::string& text : config.warnings)
-        say("okid: {}: {}\n", config.path, text);
+    for (const std::string& text : config.warnings) say("okid: {}: {}\n", config.path, text);
     return options;
 }
 

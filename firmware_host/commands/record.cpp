@@ -21,8 +21,7 @@ void record(const record_arguments& given) {
     live_config config = load_config(given.config);
     if (!given.directory.empty()) config.record.directory = given.directory;
     const std::optional<double> duration_s = parse_seconds("--duration", given.duration);
-    for (const std::string& text : config.warnings)
-        say("okid: {}: {}\n", config.path, text);
+    for (const std::string& text : config.warnings) say("okid: {}: {}\n", config.path, text);
     const recorder_options recording{duration_s};
     const bool from_log = plays_a_log(config);
     catch_stop_signals();

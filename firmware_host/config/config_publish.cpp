@@ -56,7 +56,8 @@ bool numeric(const std::string& host) {
 [[noreturn]] void refuse_address(const config_place& place, const toml::node& node, const char* key,
                                  const char* expected) {
     const std::string found = node.value_or(std::string());
-    refuse_key(place, node, key, fmt::format("found \"{}\", expected {}", printable(without_password(found)), expected));
+    refuse_key(place, node, key,
+               fmt::format("found \"{}\", expected {}", printable(without_password(found)), expected));
 }
 
 std::string socket_of(const config_place& place, const toml::node& node) {
@@ -80,7 +81,8 @@ broker_address broker_of(const config_place& place, const toml::node& node) {
     broker_address out;
     const std::size_t slash = text.find('/'), last_at = text.rfind('@');
     if (slash != std::string::npos && last_at != std::string::npos && last_at > slash)
-        refuse_key(place, node, "mqtt", "found an @ behind a /: a password with a / in it belongs into a password_file");
+        refuse_key(place, node, "mqtt",
+                   "found an @ behind a /: a password with a / in it belongs into a password_file");
     if (slash != std::string::npos) {
         if (slash + 1 < text.size()) out.prefix = text.substr(slash + 1);
         text.resize(slash);
@@ -171,8 +173,9 @@ void read_publish(const toml::table& file, live_config& config) {
     if (const toml::node* node = table->get("mqtt")) out.mqtt = broker_of(place, *node);
     if (const toml::node* node = table->get("password_file")) read_password_file(place, *node, out);
     if (out.mqtt && !out.mqtt->password.empty() && everybody_reads(config.path))
-        config.warnings.emplace_back("[publish] mqtt holds a password, and every user of this computer can read the config: "
-                                     "chmod o-r, or use password_file");
+        config.warnings.emplace_back(
+            "[publish] mqtt holds a password, and every user of this computer can read the config: "
+            "chmod o-r, or use password_file");
     for (const auto& [what, address] :
          {std::pair{"udp", out.udp}, std::pair{"mqtt", out.mqtt ? std::optional(out.mqtt->at) : std::nullopt}})
         if (address && !address->loopback())

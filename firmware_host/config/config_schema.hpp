@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Which keys a CONFIG.toml may hold, of which type and in which range; checked before anything is made of them.
 #pragma once
+#include "toml_parser.hpp"
 #include <string>
 #include <string_view>
-#include "toml_parser.hpp"
 
 namespace okid_host {
 

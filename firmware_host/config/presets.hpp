@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // drivers/presets/*.toml, built into the program: keys that a [[bus]] or [[channel]] takes over with preset = "…".
 #pragma once
+#include "toml_parser.hpp"
 #include <map>
 #include <string>
 #include <string_view>
-#include "toml_parser.hpp"
 #include <utility>
 #include <vector>
 

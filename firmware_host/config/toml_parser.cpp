@@ -50,7 +50,8 @@ std::size_t toml_string_end(std::string_view text, std::size_t at) {
             return i + 1;
         } else if (text[i] == quote && text.substr(i, 3) == three) {
             i += 3;
-            for (int more = 0; more < 2 && i < text.size() && text[i] == quote; ++more) ++i; // quotes before the last three
+            for (int more = 0; more < 2 && i < text.size() && text[i] == quote; ++more)
+                ++i; // quotes before the last three
             return i;
         }
     }

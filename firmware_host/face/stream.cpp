@@ -175,7 +175,8 @@ stream_config read_stream(const char* text, const live_config* config) {
     places.flags.emplace_back("restart_on_change", &given.restart_on_change);
     places.flags.emplace_back("states_only", &given.states_only);
     read_options(text, places);
-    if (given.record.method == "auto") refuse("method", "\"auto\"", "one method: what several agree on takes the record");
+    if (given.record.method == "auto")
+        refuse("method", "\"auto\"", "one method: what several agree on takes the record");
     if (given.record.method.empty()) given.record.method = "okid-era";
     if (given.record.hold == "auto") refuse("hold", "\"auto\"", "zoh, foh or band");
     const record_options checked = check_request(given.record);

@@ -26,8 +26,9 @@ std::size_t letter_at(std::string_view text, std::size_t at, unsigned& letter) {
 /// C0 and C1 controls, and what turns or hides text: U+200E/F, U+2028 to U+202E, U+2066 to U+2069, U+FEFF.
 bool hidden(unsigned letter) {
     if (letter == '\n' || letter == '\t') return false;
-    return letter < 0x20 || (letter >= 0x7F && letter < 0xA0) || letter == 0x061C || letter == 0x200E || letter == 0x200F ||
-           (letter >= 0x2028 && letter <= 0x202E) || (letter >= 0x2066 && letter <= 0x2069) || letter == 0xFEFF;
+    return letter < 0x20 || (letter >= 0x7F && letter < 0xA0) || letter == 0x061C || letter == 0x200E ||
+           letter == 0x200F || (letter >= 0x2028 && letter <= 0x202E) || (letter >= 0x2066 && letter <= 0x2069) ||
+           letter == 0xFEFF;
 }
 
 } // namespace

@@ -80,8 +80,9 @@ whole_file::whole_file(std::string path) : path_(std::move(path)) {
     }
     if (path_.empty()) throw failure(exit_usage, "the name of a file to write is empty");
     if (planted_link(path_))
-        throw failure(exit_usage, fmt::format("{}: is a link of another user in a folder for all, expected a file or nothing",
-                                              path_));
+        throw failure(
+            exit_usage,
+            fmt::format("{}: is a link of another user in a folder for all, expected a file or nothing", path_));
     struct stat status{};
     const bool exists = stat(path_.c_str(), &status) == 0;
     if (exists && S_ISDIR(status.st_mode)) cannot_write(path_, EISDIR);

@@ -45,8 +45,7 @@ template <class Bytes> int largest(int most, double limit, Bytes&& bytes) {
 }
 
 int largest_horizon(const stream_config& sizes, double limit) {
-    return largest(horizon_of(sizes), limit,
-                   [&](int horizon) { return stream_bytes(with_horizon(sizes, horizon)); });
+    return largest(horizon_of(sizes), limit, [&](int horizon) { return stream_bytes(with_horizon(sizes, horizon)); });
 }
 
 int most_channels(const stream_config& sizes, double limit) {

@@ -58,8 +58,7 @@ class connection {
         if (!client_) throw failure(exit_device, "[publish] mqtt: no memory for a client");
         (void)mosquitto_threaded_set(client_, true);
         if (!to.user.empty())
-            (void)mosquitto_username_pw_set(client_, to.user.c_str(),
-                                            password.empty() ? nullptr : password.c_str());
+            (void)mosquitto_username_pw_set(client_, to.user.c_str(), password.empty() ? nullptr : password.c_str());
         (void)mosquitto_reconnect_delay_set(client_, retry.count(), retry.count(), false);
         mosquitto_connect_callback_set(client_, [](mosquitto*, void* self, int result) {
             if (result != 0) static_cast<connection*>(self)->complain(mosquitto_connack_string(result));

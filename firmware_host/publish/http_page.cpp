@@ -71,7 +71,8 @@ void http_page::welcome() {
         fresh.fd = fd;
         fresh.until = clock::now() + patience;
     }
-    full_ = errno != EAGAIN && errno != EWOULDBLOCK; // out of descriptors: the next tick looks again, nobody spins meanwhile
+    full_ = errno != EAGAIN &&
+            errno != EWOULDBLOCK; // out of descriptors: the next tick looks again, nobody spins meanwhile
 }
 
 /// A page of another site whose name was turned to this address (DNS rebinding) sends that name: an address is not one.

@@ -203,8 +203,7 @@ void keep_picked(const std::vector<int>& numbers, std::vector<listed_pair>& foun
     }
     if (const auto most = *std::max_element(numbers.begin(), numbers.end()); most > static_cast<int>(found.size()))
         throw failure(exit_usage,
-                      fmt::format("--modes: found {}, expected numbers of the {} modes listed", most,
-                                  found.size()));
+                      fmt::format("--modes: found {}, expected numbers of the {} modes listed", most, found.size()));
     found = std::move(picked);
 }
 

@@ -28,7 +28,7 @@ class slicot_contender : public bench_contender {
     bool run() override {
         const double begin = bench_seconds();
         if (!library_->run(method_, factor_)) return false;
-        const okid_model_t model{record_.n_u, record_.n_y,     record_.order, library_->A(),
+        const okid_model_t model{record_.n_u, record_.n_y,   record_.order, library_->A(),
                                  nullptr,     library_->C(), nullptr,       nullptr};
         okid_modes_t modes{};
         modes.frequency_hz = frequency_.data();

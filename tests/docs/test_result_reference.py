@@ -44,9 +44,13 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
     agreed = okid("identify", rig / "a.csv", "--inputs", "force1", "--outputs", "acc1,acc2", "--json", "-")
     assert agreed.returncode == 0, agreed.stderr
     return [
-        json.loads(agreed.stdout), identified(rig, *full), identified(rig, "--method", "n4sid-cva"), remarked, python.to_dict(),
+        json.loads(agreed.stdout),
+        identified(rig, *full),
+        identified(rig, "--method", "n4sid-cva"),
+        remarked,
+        python.to_dict(),
         json.loads((rig / "live.json").read_text()),
-    ]  # fmt: skip
+    ]
 
 
 def test_keys_both_ways(rig: pathlib.Path) -> None:

@@ -44,7 +44,16 @@ def test_okid_identify_finds_the_same_as_identify(tmp_path: Path, ending: str) -
     write_record(tmp_path / f"a.{ending}", record)
     write_csv(tmp_path / "b.csv", read_record(tmp_path / f"a.{ending}"))
     done = okid_program(
-        "identify", tmp_path / "b.csv", "--inputs", NAMES[0], "--outputs", ",".join(NAMES[1:]), "--method", "okid-era", "--json", "-"
+        "identify",
+        tmp_path / "b.csv",
+        "--inputs",
+        NAMES[0],
+        "--outputs",
+        ",".join(NAMES[1:]),
+        "--method",
+        "okid-era",
+        "--json",
+        "-",
     )
     assert done.returncode == 0, done.stderr
     found, expected = json.loads(done.stdout), okid.identify(u, y, fs=1000.0).to_dict()

@@ -99,7 +99,16 @@ def test_result_has_what_identify_model_writes(tmp_path: Path) -> None:
     u, y = shaken_frame()
     okid.formats.write_csv(tmp_path / "a.csv", Record(["u", "y1", "y2", "y3"], np.hstack([u, y]), 1000.0))
     done = okid_program(
-        "identify", tmp_path / "a.csv", "--inputs", "u", "--outputs", "y1,y2,y3", "--method", "okid-era", "--model", tmp_path / "m.mat"
+        "identify",
+        tmp_path / "a.csv",
+        "--inputs",
+        "u",
+        "--outputs",
+        "y1,y2,y3",
+        "--method",
+        "okid-era",
+        "--model",
+        tmp_path / "m.mat",
     )
     assert done.returncode == 0, done.stderr
     model = loadmat(tmp_path / "m.mat", squeeze_me=True)

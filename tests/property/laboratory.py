@@ -117,7 +117,7 @@ class Chain(NamedTuple):
 
 
 def chain(seed: int, fs: float = 200.0, count: int = 20000) -> Chain:
-    """Five masses, all accelerations, forces at the ends behind an anti-alias filter at 0.38-0.42 fs; last mode 38 Hz."""
+    """Five masses, accelerations, forces at the ends behind an anti-alias filter at 0.38-0.42 fs; last mode 38 Hz."""
     rng = np.random.default_rng(seed)
     M, springs = np.diag(rng.uniform(1, 3, 5)), rng.uniform(0.6, 1.4, 5)
     K = np.diag(springs + np.append(springs[1:], 0)) - np.diag(springs[1:], 1) - np.diag(springs[1:], -1)

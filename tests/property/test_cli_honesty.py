@@ -128,7 +128,9 @@ def test_what_comes_instead_is_named(rig: pathlib.Path, tmp_path: pathlib.Path) 
 def test_exchanged_columns_are_said(rig: pathlib.Path) -> None:
     said = []
     for inputs, outputs in (("acc1", "force1,acc2,acc3"), ("force1", "acc1,acc2,acc3")):
-        done = okid("identify", rig / "rig.csv", "--inputs", inputs, "--outputs", outputs, "--method", "okid-era", "--json", "-")
+        done = okid(
+            "identify", rig / "rig.csv", "--inputs", inputs, "--outputs", outputs, "--method", "okid-era", "--json", "-"
+        )
         assert done.returncode == 0, done.stderr
         said.append({each["code"]: each["text"] for each in json.loads(done.stdout)["warnings"]})
     assert 'output "force1" is a force by its name or unit, input "acc1" is not' in said[0]["exchanged"]

@@ -85,7 +85,19 @@ def test_hammer_from_rest(tmp_path: pathlib.Path) -> None:
     channels = ["--inputs", "force_N", "--outputs", "acc1_g,acc2_g,acc3_g", "--hold", "foh"]
     results = {}
     for start in ("moving", "rest"):
-        okid("identify", path, *channels, "--method", "okid-era", "--start", start, "--quiet", "--json", tmp_path / f"{start}.json", status=0)
+        okid(
+            "identify",
+            path,
+            *channels,
+            "--method",
+            "okid-era",
+            "--start",
+            start,
+            "--quiet",
+            "--json",
+            tmp_path / f"{start}.json",
+            status=0,
+        )
         results[start] = json.loads((tmp_path / f"{start}.json").read_text())
         assert found(results[start], HAMMER_POLES, 0.5) == HAMMER_POLES
     codes = {start: {w["code"] for w in result["warnings"]} for start, result in results.items()}

@@ -64,7 +64,7 @@ OKID_HOST_API int32_t okid_host_result_array(const okid_host_result_t* self, con
 
 /** Of a result of records: an okid_identify_t with its okid_identify_config_t, and the okid_identified_t it gave. */
 typedef struct okid_host_decomposition {
-    void* identifier;   /**< for okid_identify_order() and okid_identify_poles(), which do not change the result */
+    void* identifier; /**< for okid_identify_order() and okid_identify_poles(), which do not change the result */
     const void* config;
     const void* model;
 } okid_host_decomposition_t;

@@ -8,10 +8,10 @@
 #include "identify/identify.hpp"
 
 #include <okid/modal.h>
-#include <okid/steps/observer.h>
 #include <okid/steps/era.h>
-#include <okid/steps/subspace.h>
+#include <okid/steps/observer.h>
 #include <okid/steps/square_root.h>
+#include <okid/steps/subspace.h>
 
 #include "linalg/linalg.hpp"
 

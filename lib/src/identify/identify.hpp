@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    what the parts of okid_identify_run() share: the object, and one function for each step
 #pragma once
-#include <okid/steps/era.h>
 #include <okid/identify.h>
-#include <okid/steps/subspace.h>
+#include <okid/steps/era.h>
 #include <okid/steps/observer.h>
 #include <okid/steps/square_root.h>
+#include <okid/steps/subspace.h>
 
 #include "identify/noise_level.hpp"
 #include "linalg/arena.hpp"

@@ -6,8 +6,8 @@
 // NUMERICS   works at cond(V), nothing is squared. The floor of the ridge stands well above the rounding noise of a
 //            rank-deficient factor and well below its smallest singular value that means something
 // WORKSPACE  two triangles, a batch of rows, n n_u (p+1) numbers of inputs, the Arnoldi basis; 2/3 q^3 flop a ridge
-#include <okid/steps/square_root.h>
 #include <okid/steps/observer.h>
+#include <okid/steps/square_root.h>
 
 #include "accumulate/householder.h"
 #include "identify/companion.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The compile-time sizes of static arrays are never less than what the library asks for, and not much more (Eigen backend).
-#include <okid/steps/era.h>
 #include <okid/modal.h>
+#include <okid/steps/era.h>
 #include <okid/steps/observer.h>
 #include <unity.h>
 

@@ -126,8 +126,7 @@ law scheduled(double short_s, double long_s, double often, std::mt19937& random)
 law polled(double every_s, double late_s, double phase, std::mt19937& random) {
     return [=, &random, poll = std::make_shared<std::pair<double, double>>(-1e9, 0.0)](double t) {
         const double due = (std::ceil(t / every_s - phase) + phase) * every_s;
-        if (due > poll->first)
-            *poll = {due, due + late_s * std::uniform_real_distribution<double>(0, 1)(random)};
+        if (due > poll->first) *poll = {due, due + late_s * std::uniform_real_distribution<double>(0, 1)(random)};
         return poll->second;
     };
 }
@@ -259,10 +258,10 @@ static void test_polls_and_losses() {
         made[fast] += static_cast<std::int64_t>(lost.size());
         found[fast] += std::min<std::int64_t>(out.marked, static_cast<std::int64_t>(lost.size()));
     }
-    std::printf("polls: %lld of %lld losses found, above 800 Hz %lld of %lld; there %lld of %lld runs with a false gap\n",
-                static_cast<long long>(found[0]), static_cast<long long>(made[0]), static_cast<long long>(found[1]),
-                static_cast<long long>(made[1]), static_cast<long long>(runs_false),
-                static_cast<long long>(runs));
+    std::printf(
+        "polls: %lld of %lld losses found, above 800 Hz %lld of %lld; there %lld of %lld runs with a false gap\n",
+        static_cast<long long>(found[0]), static_cast<long long>(made[0]), static_cast<long long>(found[1]),
+        static_cast<long long>(made[1]), static_cast<long long>(runs_false), static_cast<long long>(runs));
     TEST_ASSERT_TRUE(4 * runs_false <= 2 * runs); // a slip of the poll past a sample looks like a loss: docs/limits.md
     TEST_ASSERT_TRUE(static_cast<double>(found[0]) >= 0.99 * static_cast<double>(made[0]));
 }
@@ -273,7 +272,8 @@ static void test_losses_among_stalls() {
     for (unsigned seed = 1; seed <= seeds(); ++seed) {
         std::mt19937 random(seed);
         std::vector<stall> stalls;
-        for (double t = pick(random, 1, 3); t < 26; t += pick(random, 2, 6)) stalls.push_back({t, pick(random, 0.1, 0.6), 0});
+        for (double t = pick(random, 1, 3); t < 26; t += pick(random, 2, 6))
+            stalls.push_back({t, pick(random, 0.1, 0.6), 0});
         std::set<int> lost;
         for (double t = 1.5; t < 28; t += pick(random, 1.5, 4)) lost.insert(static_cast<int>(t * 1000));
         rows out(1);
@@ -281,7 +281,8 @@ static void test_losses_among_stalls() {
         made += static_cast<std::int64_t>(lost.size());
         wrong += std::abs(out.marked - static_cast<std::int64_t>(lost.size()));
     }
-    std::printf("stalls: %lld losses, number wrong by %lld\n", static_cast<long long>(made), static_cast<long long>(wrong));
+    std::printf("stalls: %lld losses, number wrong by %lld\n", static_cast<long long>(made),
+                static_cast<long long>(wrong));
     TEST_ASSERT_TRUE(static_cast<double>(wrong) <= 0.01 * static_cast<double>(made));
 }
 

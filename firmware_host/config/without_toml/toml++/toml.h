@@ -98,10 +98,11 @@ inline std::ostream& operator<<(std::ostream& out, const table&) { return out; }
 inline table parse(std::string_view, std::string_view path = "TOML text") {
     throw okid_host::failure(
         okid_host::exit_usage,
-        fmt::format("{}: this build of okid reads no TOML, because it was built without the headers of toml++. What to do: "
-                    "install them (Debian: libtomlplusplus-dev) and build okid again (Python: pip install "
-                    "--force-reinstall --no-deps ./tools)",
-                    path));
+        fmt::format(
+            "{}: this build of okid reads no TOML, because it was built without the headers of toml++. What to do: "
+            "install them (Debian: libtomlplusplus-dev) and build okid again (Python: pip install "
+            "--force-reinstall --no-deps ./tools)",
+            path));
 }
 
 } // namespace toml
