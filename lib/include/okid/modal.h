@@ -26,11 +26,11 @@ typedef struct okid_modes_t {
     okid_real_t* damping_ratio; ///< -Re lambda/|lambda|
     okid_real_t* mpc;           ///< modal phase collinearity of the shape, 0..1
     okid_real_t* shape_re;      ///< n_y x modes: C psi, the largest entry scaled to 1; both or neither NULL
-    okid_real_t* shape_im;
-    okid_real_t* mu_re; ///< eigenvalue of A
-    okid_real_t* mu_im;
-    okid_real_t* psi_re; ///< n_z x modes: eigenvector of A
-    okid_real_t* psi_im;
+    okid_real_t* shape_im;      ///< its imaginary part
+    okid_real_t* mu_re;         ///< eigenvalue of A
+    okid_real_t* mu_im;         ///< its imaginary part
+    okid_real_t* psi_re;        ///< n_z x modes: eigenvector of A
+    okid_real_t* psi_im;        ///< its imaginary part
 } okid_modes_t;
 
 /// The underdamped pairs 0 < zeta < 1 below Nyquist, ascending in frequency. Real poles, unstable poles and pairs within

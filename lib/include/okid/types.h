@@ -14,9 +14,9 @@
 
 /// Version of these headers; okid_version() is that of the library.
 #define OKID_VERSION_MAJOR 0
-#define OKID_VERSION_MINOR 2
-#define OKID_VERSION_PATCH 0
-#define OKID_VERSION "0.2.0"
+#define OKID_VERSION_MINOR 2 ///< as OKID_VERSION_MAJOR
+#define OKID_VERSION_PATCH 0 ///< as OKID_VERSION_MAJOR
+#define OKID_VERSION "0.2.0" ///< the three together
 
 /// What a program that links with the library may call.
 #if defined(_WIN32)
