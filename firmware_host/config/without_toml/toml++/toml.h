@@ -5,6 +5,7 @@
 #pragma once
 #include "error.hpp"
 
+#include <memory>
 #include <optional>
 #include <ostream>
 #include <stdexcept>
@@ -15,32 +16,34 @@
 
 namespace toml {
 
-struct position {
-    unsigned line = 0, column = 0;
-    bool operator<(const position& other) const { return line < other.line; }
+using source_index = unsigned;
+struct source_position {
+    source_index line = 0, column = 0;
+    bool operator<(const source_position& other) const { return line < other.line; }
 };
 struct region {
-    position begin;
+    source_position begin;
 };
 struct parse_error : std::runtime_error {
     using std::runtime_error::runtime_error;
+    parse_error(const char* what, source_position, std::shared_ptr<const std::string>) : std::runtime_error(what) {}
     region source() const { return {}; }
     std::string_view description() const { return what(); }
 };
 enum class node_type { table };
 struct table;
 struct array;
+struct node_view;
 template <class T> struct box {
     T content{};
     const T& get() const { return content; }
 };
 
-/// A node, and also what table["key"] gives.
 struct node {
     template <class T> std::optional<T> value() const { return std::nullopt; }
     template <class T> std::optional<T> value_exact() const { return std::nullopt; }
     template <class T> T value_or(T otherwise) const { return otherwise; }
-    const node& operator[](std::string_view) const { return *this; }
+    node_view operator[](std::string_view) const;
     region source() const { return {}; }
     explicit operator bool() const { return false; }
     const toml::table* as_table() const { return nullptr; }
@@ -58,6 +61,11 @@ struct node {
     bool is_integer() const { return false; }
     bool is_number() const { return false; }
 };
+/// What table["key"] gives.
+struct node_view : node {
+    toml::node* node() const { return nullptr; }
+};
+inline node_view node::operator[](std::string_view) const { return {}; }
 struct key {
     std::string_view str() const { return {}; }
     region source() const { return {}; }
@@ -71,11 +79,11 @@ struct table : node {
     using entries = std::vector<std::pair<key, node>>;
     entries::const_iterator begin() const { return none().begin(); }
     entries::const_iterator end() const { return none().end(); }
-    node operator[](std::string_view) const { return {}; }
     const node* get(std::string_view) const { return nullptr; }
     bool contains(std::string_view) const { return false; }
     bool empty() const { return true; }
     template <class K, class T> void insert(K&&, T&&) {}
+    template <class K, class T> void insert_or_assign(K&&, T&&) {}
 
   private:
     static const entries& none() {
@@ -94,6 +102,11 @@ struct array : node {
     const node* end() const { return nullptr; }
 };
 inline std::ostream& operator<<(std::ostream& out, const table&) { return out; }
+
+struct json_formatter {
+    explicit json_formatter(const table&) {}
+};
+inline std::ostream& operator<<(std::ostream& out, const json_formatter&) { return out; }
 
 inline table parse(std::string_view, std::string_view path = "TOML text") {
     throw okid_host::failure(
