@@ -55,9 +55,12 @@ bool numeric(const std::string& host) {
 
 [[noreturn]] void refuse_address(const config_place& place, const toml::node& node, const char* key,
                                  const char* expected) {
-    const std::string found = node.value_or(std::string());
+    std::string found = node.value_or(std::string());
+    if (found.find("://") == std::string::npos) found.insert(0, "://"); // a name before the @ without a scheme
+    found = without_password(found);
+    if (found.rfind("://", 0) == 0) found.erase(0, 3);
     refuse_key(place, node, key,
-               fmt::format("found \"{}\", expected {}", printable(without_password(found)), expected));
+               fmt::format("found \"{}\", expected {}", printable(found), expected));
 }
 
 std::string socket_of(const config_place& place, const toml::node& node) {

@@ -109,9 +109,11 @@ COMPILER = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", f"-I{ROOT}/lib/incl
 
 @pytest.mark.parametrize("block", [pytest.param(block, id=where) for where, block in selected("c")])
 def test_c(block: Block, tmp_path: pathlib.Path) -> None:
-    """A whole program, or a fragment below #include <okid/okid.h>: declarations, or statements of a function."""
+    """A whole program, or a fragment below the headers of the library: declarations, or statements of a function."""
     part = block.fragment or "#include" not in block.text
-    (tmp_path / "a.c").write_text(f"#include <okid/okid.h>\n{block.text}" if part else block.text)
+    steps = sorted(path.name for path in (ROOT / "lib/include/okid/steps").glob("*.h"))
+    headers = "".join(f"#include <okid/{name}>\n" for name in ["okid.h", *(f"steps/{step}" for step in steps)])
+    (tmp_path / "a.c").write_text(headers + block.text if part else block.text)
     more = ["-fsyntax-only", "-Wno-unused"] if part else ["-c", "-o", str(tmp_path / "a.o")]
     done = subprocess.run([*COMPILER, *more, str(tmp_path / "a.c")], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -83,7 +83,7 @@ def test_causes_kinds_and_reasons_are_those_of_the_source() -> None:
     assert causes == {key.rpartition(".")[2] for key in documented(text["stats"]) if ".lost_by." in key}
     kinds = {code for cells in rows(text["bus"], "event | means") for code in codes(cells[0])}
     watch = (ROOT / "firmware_host" / "acquire" / "bus_watch.cpp").read_text()
-    capture = (ROOT / "firmware_host" / "acquire" / "capture.cpp").read_text()
+    capture = (ROOT / "firmware_host" / "live" / "capture.cpp").read_text()
     told = set(re.findall(r'bus_event\(bus, "(\w+)"', capture))
     assert told and kinds == told | set(re.findall(r'push_back\(\s*\{"(\w+)"', watch))
     records = {code for cells in rows(text["record"], "event | means") for code in codes(cells[0])}

@@ -14,7 +14,7 @@ from program import PROGRAM, okid
 from two_masses import rig_text, simulate_rig
 
 PLAIN = "Tr0ub4dor"
-HARD = r"Tr0ub4dor #'$@\x&;%41"  # all that a line of TOML can hold between single quotes, but a quote
+HARD = r"Tr0ub4dor #$@\x&;%41"  # all that a line of TOML can hold between single quotes, but a quote
 
 
 @pytest.fixture(scope="module")

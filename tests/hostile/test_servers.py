@@ -60,29 +60,6 @@ def connected(port: int) -> socket.socket:
     raise AssertionError("nobody listens")
 
 
-def test_no_descriptors_left(rig: pathlib.Path) -> None:
-    """Release 0.1 went round accept() with a whole processor."""
-    port = free_port()
-    with publishing(rig, f'prometheus = "127.0.0.1:{port}"\nsocket = "s"', descriptors=16) as run:
-        connected(port).close()
-        crowd = []
-        for _ in range(40):
-            one = socket.socket(socket.AF_UNIX)
-            one.connect(str(rig / "s"))
-            crowd.append(one)
-        time.sleep(0.5)
-        before, at = cpu_s(run), time.monotonic()
-        time.sleep(2)
-        spent = (cpu_s(run) - before) / (time.monotonic() - at)
-        assert spent < 0.5 and run.poll() is None
-        for one in crowd:
-            one.close()
-        time.sleep(0.5)
-        with connected(port) as wire:
-            wire.sendall(b"GET /metrics HTTP/1.0\r\n\r\n")
-            assert wire.recv(100).startswith(b"HTTP/1.1 200")
-
-
 @pytest.mark.parametrize("piecewise", [False, True])
 def test_a_broker_that_announces_256_mb(rig: pathlib.Path, piecewise: bool) -> None:
     """Release 0.1 took the room for it: 540 MB."""

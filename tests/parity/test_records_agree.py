@@ -263,12 +263,12 @@ def test_refused_records(tmp_path: Path, kind: str, method: str) -> None:
 
 def test_too_few_modes_and_a_repeated_force(tmp_path: Path) -> None:
     one = measured(2000)
-    for arguments in (
-        {"order": 2, "input_dofs": [1], "output_dofs": [1, 2, 3]},
-        {"order": 1},
+    for arguments, code in (
+        ({"order": 2, "input_dofs": [1], "output_dofs": [1, 2, 3]}, 3),
+        ({"order": 1}, 0),  # a model without a vibration mode was asked for: it comes with the warning no_modes
     ):
         first, other = both(tmp_path, [one], U, Y, **arguments)
-        assert differences(first[1], other[1]) == [] and first[0] == other[0] == 3
+        assert differences(first[1], other[1]) == [] and first[0] == other[0] == code
     forces = np.hstack(record(w2(), 2000, 1.0, 3))
     forces[:, 1] = 3.0 * forces[:, 0]
     names = [f"c{k}" for k in range(8)]

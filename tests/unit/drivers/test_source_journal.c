@@ -159,8 +159,15 @@ static void test_what_is_no_journal(void) {
     TEST_ASSERT_EQUAL_INT(-ENOENT, start("/nonexistent/a.okj"));
     TEST_ASSERT_NOT_NULL(strstr(source.error, "/nonexistent/a.okj"));
     TEST_ASSERT_EQUAL_INT(-EISDIR, start("/tmp"));
-    TEST_ASSERT_EQUAL_INT(-EBADMSG, start("/dev/null"));
+    TEST_ASSERT_EQUAL_INT(-ENOTSUP, start("/dev/null"));
+    TEST_ASSERT_NOT_NULL(strstr(source.error, "it is a device or a named pipe"));
+    char empty[] = "/tmp/okid-no-journal-XXXXXX";
+    const int made = mkstemp(empty);
+    TEST_ASSERT_TRUE(made >= 0);
+    close(made);
+    TEST_ASSERT_EQUAL_INT(-EBADMSG, start(empty));
     TEST_ASSERT_NOT_NULL(strstr(source.error, "found no whole chunk of a journal"));
+    unlink(empty);
     TEST_ASSERT_EQUAL_INT(-EBADF, source.ops->read(&source, frames, 64));
     char path[5000];
     memset(path, 'x', sizeof path);
