@@ -232,18 +232,18 @@ static void poles_that_are_no_modes_are_left_out(void) {
         A[(i + 1) * NZ + i] = -A[i * NZ + i + 1];
     }
     for (int i = 0; i < NZ; ++i) C[i] = 1;
-    const okid_model_t model = {.n_u = 1, .n_y = 1, .n_z = NZ, .A = A, .C = C};
+    const okid_model_t given = {.n_u = 1, .n_y = 1, .n_z = NZ, .A = A, .C = C};
     okid_modes_t modes = {.frequency_hz = f, .damping_ratio = z, .mpc = mpc, .shape_re = re, .shape_im = im};
     const size_t bytes = okid_modal_memsize(1, NZ);
     void* work = malloc(bytes);
-    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(&model, 0.01, &modes, work, bytes));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(&given, 0.01, &modes, work, bytes));
     TEST_ASSERT_EQUAL(1, modes.count);
     TEST_ASSERT_DOUBLE_WITHIN(pole_limit, 100 * hypot(log(0.98), 0.7) / 6.283185307179586, f[0]);
     TEST_ASSERT_DOUBLE_WITHIN(pole_limit, -log(0.98) / hypot(log(0.98), 0.7), z[0]);
     TEST_ASSERT_DOUBLE_WITHIN(unit_limit, 1.01, modes.radius);
-    TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_modal_analyse(&model, 0.01, &modes, work, 8));
+    TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_modal_analyse(&given, 0.01, &modes, work, 8));
     modes.shape_im = NULL;
-    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_modal_analyse(&model, 0.01, &modes, work, bytes));
+    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_modal_analyse(&given, 0.01, &modes, work, bytes));
     const okid_real_t a[2] = {1, 1}, b[2] = {1, -1}, zero[2] = {0, 0};
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1, okid_modal_mac(2, a, zero, zero, a));
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, okid_modal_mac(2, a, zero, b, zero));
