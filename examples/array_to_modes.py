@@ -19,6 +19,6 @@ result = okid.identify(
     output_dofs=list(range(1, len(responses) + 1)),
 )
 for mode in result.modes:
-    if mode.emac > 0.5:
+    if mode.confident:
         print(f"{mode.frequency_hz:.4f} ± {mode.frequency_std_hz:.4f} Hz, damping {100 * mode.damping_ratio:.3f} %")
 print("M, kg:", *(f"{value:.3f}" for value in result.mkr.M.diagonal()))

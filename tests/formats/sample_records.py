@@ -53,7 +53,8 @@ def identified() -> okid.Result:
     """The demo's frame identified, with M, K, R."""
     u, y = shaken_frame()
     dofs = {"input_dofs": [1], "output_dofs": [1, 2, 3]}
-    return okid.identify(u, y, fs=1000.0, input_names=NAMES[:1], output_names=NAMES[1:], **dofs)
+    names = {"input_names": NAMES[:1], "output_names": NAMES[1:]}
+    return okid.identify(u, y, fs=1000.0, method="okid-era", **names, **dofs)
 
 
 letters = st.characters(codec="utf-8", categories=["L", "N", "P", "S", "Zs"])

@@ -56,7 +56,7 @@ def test_okid_identify_finds_the_same_as_identify(tmp_path: Path, ending: str) -
         "-",
     )
     assert done.returncode == 0, done.stderr
-    found, expected = json.loads(done.stdout), okid.identify(u, y, fs=1000.0).to_dict()
+    found, expected = json.loads(done.stdout), okid.identify(u, y, fs=1000.0, method="okid-era").to_dict()
     assert (found["fs_hz"], found["samples"], found["order"]) == (1000.0, len(u), expected["order"])
     for key in ("frequency_hz", "damping_ratio"):
         np.testing.assert_allclose(

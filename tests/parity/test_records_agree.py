@@ -46,14 +46,18 @@ def both(
     outputs: list[str],
     **arguments: Any,
 ) -> tuple[tuple[int, Any], tuple[int, Any]]:
-    """Exit code and result (or sentence) of the program and of Python, for records of inputs and outputs."""
+    """Exit code and result (or sentence) of the program and of Python, for records of inputs and outputs.
+
+    By okid-era unless a method is named; method=None: neither is told one."""
+    arguments = {"method": "okid-era", **arguments}
+    if arguments["method"] is None:
+        del arguments["method"]
     files = [write(tmp_path / f"record{k}.csv", one, inputs + outputs) for k, one in enumerate(records)]
     options: list[str] = []
     for name, value in arguments.items():
         option = f"--{name.replace('_', '-')}"
         text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
         options += [option] if value is True else [f"{option}={text}"]
-    options += [] if "method" in arguments else ["--method=okid-era"]
     chosen = ["--inputs", ",".join(inputs)] if inputs else []
     done = okid(
         "identify",
@@ -124,6 +128,34 @@ def test_every_method(tmp_path: Path, method: str, ambient: bool) -> None:
         found = same(tmp_path, [one], method=method, input_dofs=[1], output_dofs=[1, 2, 3])
         assert found["mkr"]["M_std"] is not None
     assert len(found["modes"]) >= 3 and found["modes"][0]["frequency_std_hz"] > 0
+
+
+@pytest.mark.parametrize("arguments", [{}, {"input_dofs": [1], "output_dofs": [1, 2, 3]}, {"hold": "foh"}], ids=str)
+def test_the_default_method(tmp_path: Path, arguments: dict[str, Any]) -> None:
+    """No method named, here or there: "auto", with what it says of every mode."""
+    found = same(tmp_path, [measured()], method=None, **arguments)
+    assert found["method"] == "auto" and found["hold"] == arguments.get("hold", "zoh")
+    assert [mode["confident"] for mode in found["modes"]].count(True) == 3
+    assert all(mode["why"] for mode in found["modes"] if not mode["confident"])
+
+
+def test_the_default_method_without_a_force(tmp_path: Path) -> None:
+    found = same(tmp_path, [measured(8000)[:, 1:]], [], Y, method=None)
+    assert found["method"] == "auto" and found["fit"]["simulation_percent"] is None
+
+
+@pytest.mark.parametrize("arguments", [{"p": 20}, {"rows": 30}, {"order": 6}, {"max_order": 10}, {"hankel": "innovations"},
+                                       {"refine": True}], ids=str)  # fmt: skip
+def test_an_option_of_one_method_means_okid_era(tmp_path: Path, arguments: dict[str, Any]) -> None:
+    assert same(tmp_path, [measured(1500)], method=None, sigma_blocks=0, **arguments)["method"] == "okid-era"
+
+
+@pytest.mark.parametrize("arguments", [
+    {"method": "auto", "p": 5}, {"method": "auto", "refine": True}, {"method": "okid-era", "decimate": 4},
+    {"decimate": 0}, {"modes": [0]}, {"modes": [40]}], ids=str)  # fmt: skip
+def test_arguments_that_do_not_go_with_the_method(tmp_path: Path, arguments: dict[str, Any]) -> None:
+    one, other = both(tmp_path, [measured(1000)], U, Y, **{"method": None, **arguments})
+    assert one == other and one[0] == 2
 
 
 def gaps(one: Real) -> Real:
@@ -338,6 +370,7 @@ def test_the_table_is_that_of_the_program(tmp_path: Path) -> None:
         fs=S.fs,
         input_names=U,
         output_names=Y,
+        method="okid-era",
         input_dofs=[1],
         output_dofs=[1, 2, 3],
     )

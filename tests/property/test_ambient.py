@@ -77,7 +77,7 @@ def test_p_is_the_default_of_rows() -> None:
     short = okid.identify(None, y[:600], fs=s.fs, order=6)
     assert short.rows < 40 and "rows_reduced" in [w.code for w in short.warnings]
     with pytest.raises(okid.IdentificationError, match="too few samples"):
-        okid.identify(None, y[:50], fs=s.fs)
+        okid.identify(None, y[:50], fs=s.fs, method="okid-era")
     with pytest.raises(okid.InputError, match="needs a force"):
         okid.identify(None, y, fs=s.fs, hankel="innovations")
 

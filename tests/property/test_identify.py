@@ -33,7 +33,7 @@ def mode_errors(result: okid.Result, s: systems.Structure) -> tuple[float, float
 @pytest.fixture(scope="module")
 def result() -> okid.Result:
     u, y = w1_record(1.0, 1)
-    return okid.identify(u, y, fs=systems.w1().fs)
+    return okid.identify(u, y, fs=systems.w1().fs, method="okid-era")
 
 
 @pytest.mark.parametrize("noise", [1.0, 5.0])
@@ -91,7 +91,7 @@ def test_missing_samples_are_left_out() -> None:
     u, y = (a.copy() for a in w1_record(1.0, 3))
     y[2000:2050, 1] = np.nan
     u[5000] = np.nan
-    result = okid.identify(u, y, fs=s.fs)
+    result = okid.identify(u, y, fs=s.fs, method="okid-era")
     assert result.gaps == 2
     assert "missing_samples" in [w.code for w in result.warnings]
     f_error, z_error = mode_errors(result, s)
@@ -180,7 +180,7 @@ def test_fits_start_anew_after_missing_inputs() -> None:
     u, y = (a.copy() for a in w1_record(1.0, 12, 6000))
     u[0:3], u[2000:2500], u[2510], u[4000] = np.nan, np.nan, np.nan, np.nan  # nine samples alone: left out
     y[3000:3005, 1] = np.nan
-    result = okid.identify(u + 7.0, y - 9.0, fs=s.fs)
+    result = okid.identify(u + 7.0, y - 9.0, fs=s.fs, method="okid-era")
     m = result.model
     assert m.x0 is not None
     centred_u, centred_y = u - np.nanmean(u, axis=0), y - np.nanmean(y, axis=0)
@@ -328,14 +328,16 @@ def test_stabilization(result: okid.Result) -> None:
 def test_one_dimensional_and_named_channels() -> None:
     s = systems.w1()
     u, y = w1_record(1.0, 8)
-    result = okid.identify(u[:, 0], y[:, 0], fs=s.fs, input_names=["hammer"], output_names=["tip [m/s^2]"])
+    result = okid.identify(
+        u[:, 0], y[:, 0], fs=s.fs, method="okid-era", input_names=["hammer"], output_names=["tip [m/s^2]"]
+    )
     assert (result.inputs, result.outputs) == (["hammer"], ["tip [m/s^2]"])
     assert [m.shape.shape for m in result.modes] == [(1,)] * len(result.modes)
 
 
 def test_short_records_reduce_p_and_say_so() -> None:
     u, y = w1_record(1.0, 9)
-    result = okid.identify(u[:600], y[:600], fs=100.0)
+    result = okid.identify(u[:600], y[:600], fs=100.0, method="okid-era")
     assert result.p == okid.usable_p(1, 3, 40, 600) == 14
     assert "p_reduced" in [w.code for w in result.warnings]
 

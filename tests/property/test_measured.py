@@ -37,7 +37,7 @@ def plane() -> list[np.ndarray]:
 def test_steel_frame_with_28_redundant_accelerometers(frame: okid.Record, options: dict[str, int]) -> None:
     assert frame.fs_hz == 1024.0
     assert frame.samples.shape == (8523, 30)
-    result = okid.identify(frame.samples[:, :2], frame.samples[:, 2:], fs=frame.fs_hz, **options)
+    result = okid.identify(frame.samples[:, :2], frame.samples[:, 2:], fs=frame.fs_hz, method="okid-era", **options)
     assert len(found(result, FRAME_HZ, 1.0)) >= 13, result.table()
     assert result.model.radius() < 1.0
     codes = [w.code for w in result.warnings]
@@ -51,7 +51,7 @@ def test_steel_frame_with_28_redundant_accelerometers(frame: okid.Record, option
 @pytest.mark.parametrize("chosen", [(0,), (1,), (0, 1)], ids=["record 1", "record 2", "1 and 2 merged"])
 def test_struck_plane_from_rest(plane: list[np.ndarray], chosen: tuple[int, ...]) -> None:
     forces, answers = [plane[k][:, :1] for k in chosen], [plane[k][:, 1:] for k in chosen]
-    result = okid.identify(forces, answers, fs=512.0, start="rest", hold="foh")
+    result = okid.identify(forces, answers, fs=512.0, method="okid-era", start="rest", hold="foh")
     assert found(result, PLANE_HZ, 0.5) == PLANE_HZ, result.table()
     assert len(found(result, PLANE_ALL_HZ, 0.5)) >= 11
     assert result.model.radius() < 1.0
@@ -61,7 +61,8 @@ def test_struck_plane_from_rest(plane: list[np.ndarray], chosen: tuple[int, ...]
 @pytest.mark.parametrize(("chosen", "clear"), [(0, PLANE_HZ), (1, PLANE_HZ[:-1])], ids=["record 1", "record 2"])
 def test_struck_plane_without_the_silent_past(plane: list[np.ndarray], chosen: int, clear: list[float]) -> None:
     """The hit is lost (and that is said): in record 2 the mode at 166 Hz is then too weak to hold."""
-    result = okid.identify(plane[chosen][:, :1], plane[chosen][:, 1:], fs=512.0, start="moving", hold="foh")
+    u, y = plane[chosen][:, :1], plane[chosen][:, 1:]
+    result = okid.identify(u, y, fs=512.0, method="okid-era", start="moving", hold="foh")
     assert set(clear) <= set(found(result, PLANE_HZ, 0.5)), result.table()
     assert len(found(result, PLANE_ALL_HZ, 0.5)) >= 8  # from rest: 11, the hit is then in the sums
     assert result.model.radius() < 1.0
@@ -69,7 +70,7 @@ def test_struck_plane_without_the_silent_past(plane: list[np.ndarray], chosen: i
 
 
 def test_a_hit_lost_in_the_first_samples_is_said(plane: list[np.ndarray]) -> None:
-    result = okid.identify(plane[0][:, :1], plane[0][:, 1:], fs=512.0)
+    result = okid.identify(plane[0][:, :1], plane[0][:, 1:], fs=512.0, method="okid-era")
     assert "hit_at_start" in [w.code for w in result.warnings]
 
 

@@ -328,7 +328,7 @@ def test_python_agrees_with_the_program(tmp_path: Path) -> None:
     s, (u, y) = SYSTEMS["w1"], measure(SYSTEMS["w1"], 1.0, 9)
     bench = Bench(tmp_path, s, u, y)
     theirs = bench.result()
-    ours = okid.identify(u, y, fs=s.fs, input_dofs=[1], output_dofs=[1, 2, 3])
+    ours = okid.identify(u, y, fs=s.fs, method="okid-era", input_dofs=[1], output_dofs=[1, 2, 3])
     assert isinstance(ours.mkr, okid.MassMatrices) and isinstance(ours.pdc, okid.ProportionalDamping)
     data = ours.to_dict()
     assert list(data["mkr"]) == list(theirs["mkr"]) and list(data["pdc"]) == list(theirs["pdc"])
@@ -347,12 +347,12 @@ def test_python_names_a_slip(slip: str, code: str, words: str, cause: str) -> No
     kind = [slip] * 3 if slip in KINDS else None
     u, y = measure(SYSTEMS["w1"], 1.0, 8, kind, "foh" if slip == "foh" else "zoh")
     result = okid.identify(
-        -u if slip == "swapped" else u, y, fs=SYSTEMS["w1"].fs, input_dofs=[1], output_dofs=[1, 2, 3]
+        -u if slip == "swapped" else u, y, fs=SYSTEMS["w1"].fs, method="okid-era", input_dofs=[1], output_dofs=[1, 2, 3]
     )
     said = dict(result.warnings)
     assert words in said[code] and cause in said["mkr_likely_cause"]
     mended = okid.identify(
-        u, y, fs=SYSTEMS["w1"].fs, input_dofs=[1], output_dofs=[1, 2, 3],
+        u, y, fs=SYSTEMS["w1"].fs, method="okid-era", input_dofs=[1], output_dofs=[1, 2, 3],
         sensing=slip if slip in KINDS else "acceleration", hold="foh" if slip == "foh" else "zoh",
     )  # fmt: skip
     assert mended.mkr is not None and mended.mkr.checks["notes"] == []

@@ -202,7 +202,7 @@ def late_record(s: systems.Structure, shares: Array, noise: float, seed: int) ->
 
 def mass(s: systems.Structure, u: Array, y: Array, **more: Any) -> okid.Result:
     where = {"input_dofs": [d + 1 for d in s.force_dofs], "output_dofs": [d + 1 for d in s.sense_dofs]}
-    return okid.identify(u, y, fs=s.fs, **where, **more)
+    return okid.identify(u, y, fs=s.fs, **{"method": "okid-era", **where, **more})
 
 
 def error(a: Array, b: Array) -> float:

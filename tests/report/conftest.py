@@ -57,7 +57,7 @@ def _ambient(folder: Path) -> Path:
     """A result without inputs."""
     y = demo_record(6000)[1]
     names = ["storey 1", "storey 2", "storey 3"]
-    result = okid.identify(None, y, fs=1000.0, output_names=names, sigma_blocks=0)
+    result = okid.identify(None, y, fs=1000.0, method="okid-era", output_names=names, sigma_blocks=0)
     result.save(folder / "ambient.json")
     record = write_csv(folder / "ambient.csv", names, y, 1000.0)
     target = folder / "ambient.html"

@@ -34,7 +34,7 @@ def demo(verbose: bool = True) -> Result:
     """Shake the frame, identify it, print the modal table beside the truth; returns the Result."""
     force, acceleration = demo_record()
     names = [f"storey{k}" for k in (1, 2, 3)]
-    result = identify(force, acceleration, fs=1000.0, input_names=["shaker"], output_names=names)
+    result = identify(force, acceleration, fs=1000.0, method="okid-era", input_names=["shaker"], output_names=names)
     if verbose:
         print(result.table())
         truth = [f"{mode.frequency_hz:.5f} Hz {100 * mode.damping_ratio:.4f} %" for mode in demo_frame().modes()]

@@ -22,14 +22,14 @@ def identify(
     y: ArrayLike | Sequence[ArrayLike],
     *,
     fs: float,
-    method: str = "okid-era",
+    method: str | None = None,
     p: int | None = None,
     rows: int | None = None,
     order: int | str = "auto",
     max_order: int | None = None,
     hankel: str = "system",
     detrend: str = "mean",
-    hold: str = "zoh",
+    hold: str | None = None,
     start: str = "moving",
     input_names: Sequence[str] | None = None,
     output_names: Sequence[str] | None = None,
@@ -39,6 +39,9 @@ def identify(
     refine: bool = False,
     sigma_blocks: int | None = None,
     units: Sequence[str] | None = None,
+    band: tuple[float, float] | None = None,
+    decimate: int | None = None,
+    modes: Sequence[int] | None = None,
 ) -> Result:
     """Identify a structure from measured inputs and outputs.
 
@@ -46,14 +49,18 @@ def identify(
     centred by itself. Frames of pandas give the channels their names. NaN (or masked) = missing sample: the regression
     leaves it out and re-arms, nothing is interpolated; the fits and model.x0 are those of the record less its own mean
     (or line) and start anew after missing inputs. The arrays are never modified.
-    `method` "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx".
+    `method` "auto": the modes that several methods, horizons and rates agree on, each with mode.confident, .found_in
+    and .why (docs/how-okid-decides.md); the doubtful ones are listed with them. Or one method: "okid-era", "okid-era-dc",
+    "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx". Default: "auto"; "okid-era" when an option of one method is given (p,
+    rows, order, max_order, hankel, refine).
     u None = no measured force (ambient): modes and predictor only, there is no simulation fit; the okid methods then
     realize the covariances of the outputs.
     `p` ARX horizon of the okid methods (default 40), reduced with a warning when there are fewer than 10 samples an
     unknown; `rows` block rows of the Hankel matrices (default 2 p, n4sid 30, okid without u p, or what the record
     bears); `order` a number or "auto" (up to `max_order`); `hankel` what the Hankel matrix of the okid methods holds:
     "system" Markov parameters, those of the "innovations" too (weighted, free of units), or "literal" eq. 42 (warns);
-    `detrend` "none", "mean" or "linear"; `hold` "zoh" or "foh": how the force behaved between samples.
+    `detrend` "none", "mean" or "linear"; `hold` "zoh", "foh", "band" (band-limited) or "auto": how the force behaved
+    between samples; default "auto" of method "auto", else "zoh".
     `start` "rest" says that every record begins just before the structure is struck: the silent past is then used
     (paper eq. 38), without it the hit itself would be lost with the first p samples. "moving" assumes nothing.
 
@@ -69,12 +76,15 @@ def identify(
     `sigma_blocks`: blocks of the record that are left out in turn for the standard deviations, 8 to 100 (default 20);
     0 = none. They cost some 3 (okid-era) to 20 identifications.
 
+    Of "auto" alone: `band` (low, high) in Hz where modes are sought; `decimate` the largest factor of the lower rates;
+    `modes` the numbers, from 1, of the listed modes that are kept: picked by hand they count as confident.
+
     Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
 
     >>> import okid
     >>> force, acceleration = okid.demo_record()
     >>> result = okid.identify(force, acceleration, fs=1000.0, input_dofs=[1], output_dofs=[1, 2, 3])
-    >>> [f"{mode.frequency_hz:.2f} Hz {100 * mode.damping_ratio:.2f} %" for mode in result.modes]
+    >>> [f"{mode.frequency_hz:.2f} Hz {100 * mode.damping_ratio:.2f} %" for mode in result.modes if mode.confident]
     ['10.96 Hz 0.90 %', '31.84 Hz 0.75 %', '45.66 Hz 0.89 %']
     >>> result.mkr.M.diagonal().round(2).tolist()  # kg
     [1.0, 0.8, 1.2]
@@ -87,6 +97,7 @@ def identify(
         "fs": fs, "method": method, "p": p, "rows": rows, "order": order, "max_order": max_order, "hankel": hankel,
         "detrend": detrend, "hold": hold, "start": start, "input_dofs": input_dofs, "output_dofs": output_dofs,
         "sensing": sensing, "refine": refine, "sigma_blocks": sigma_blocks, "units": units,
+        "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
     }  # fmt: skip
     return Result.of_host(host_result.identify(options, records))
 
@@ -105,7 +116,8 @@ def stabilization(
 
     `horizons`: values of p, or of the block rows for methods without observer (default: a half, three quarters and all
     of what okid.identify() would take); `orders` default: all even ones the data carry. Other arguments are those of
-    okid.identify(), u and y too. Result: `modes`, `clusters`, and the rows of the diagram.
+    okid.identify(), u and y too; `method` one method, default "okid-era". Result: `modes`, `clusters`, and the rows of
+    the diagram.
 
     >>> import okid
     >>> found = okid.stabilization(*okid.demo_record(), fs=1000.0)
@@ -114,18 +126,21 @@ def stabilization(
     """
     if "order" in options:
         raise InputError("order is not an argument of stabilization(): it looks at many, give orders=[...]")
-    subspace = str(options.get("method", "okid-era")).startswith("n4sid")
+    options["method"] = options.get("method") or "okid-era"
+    if options["method"] == "auto":
+        raise InputError('method is "auto", which has no orders to look at: name one method, such as "okid-era"')
+    subspace = str(options["method"]).startswith("n4sid")
     key = "rows" if u is None or subspace else "p"
     asked = None if orders is None else sorted(set(orders))
     if asked:
         options.setdefault("max_order", max(asked))
     if horizons is None:
         first = identify(u, y, fs=fs, **options)
-        reach = first.p
+        reach = first.p or 0
         results = [first] + [
             identify(u, y, fs=fs, **{**options, key: n}) for n in sorted({reach // 2, 3 * reach // 4} - {0, 1, reach})
         ]
     else:
         results = [identify(u, y, fs=fs, **{**options, key: int(n)}) for n in sorted(set(horizons))]
-    results.sort(key=lambda result: result.p)
+    results.sort(key=lambda result: result.p or 0)
     return of_identifiers([result.identifier for result in results if result.identifier is not None], asked, criteria)

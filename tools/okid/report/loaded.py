@@ -22,7 +22,10 @@ Complex = NDArray[np.complex128]
 
 @dataclass
 class Loaded:
-    """The parts of a result file as arrays: shapes (modes, n_y), singular_values (s,), markov (count, n_y, n_u)."""
+    """The parts of a result file as arrays: shapes (modes, n_y), singular_values (s,), markov (count, n_y, n_u).
+
+    Of method "auto" there are no singular values.
+    """
 
     raw: dict[str, Any]
     matrices: dict[str, Real]
@@ -88,7 +91,7 @@ def loaded_from(raw: Any, source: str) -> Loaded:
         [np.array(m["shape_re"], float) + 1j * np.array(m["shape_im"], float) for m in raw["modes"]], np.complex128
     ).reshape(len(raw["modes"]), n_y)
     frequency = np.array([float(m["frequency_hz"]) for m in raw["modes"]], dtype=np.float64)
-    values = np.array(raw["singular_values"], dtype=np.float64)
+    values = np.array(raw["singular_values"] or [], dtype=np.float64)
     return Loaded(raw, model, shapes, frequency, values, _markov(raw, n_y, n_u, source))
 
 

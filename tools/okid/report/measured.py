@@ -85,15 +85,17 @@ def _channels(result: Loaded, record: Record, source: str) -> Record:
 
 
 def _poles(result: Loaded, u: Real, y: Real, source: str) -> Stabilization:
-    """The poles over all orders, identified anew with the settings of the result. Errors name `source` and channel."""
+    """The poles over all orders, identified anew with the settings of the result, of "auto" by okid-era. Errors name
+    `source` and channel."""
     raw = result.raw
     method = str(raw.get("method", "okid-era"))
-    reach: dict[str, Any] = {} if method.startswith("n4sid") or not result.inputs else {"p": int(raw["p"])}
+    method = "okid-era" if method == "auto" else method
+    keys = ("rows",) if method.startswith("n4sid") or not result.inputs else ("rows", "p")
+    reach: dict[str, Any] = {key: int(raw[key]) for key in keys if raw[key] is not None}
     reach.update({"input_names": result.inputs} if result.inputs else {})
     try:
         return identify(
-            u if result.inputs else None, y, fs=result.fs, method=method, **reach, rows=int(raw["rows"]),
-            output_names=result.outputs,
+            u if result.inputs else None, y, fs=result.fs, method=method, **reach, output_names=result.outputs,
             detrend=str(raw.get("detrend", "mean")), start=str(raw.get("start", "moving")), order=int(raw["order"]),
             max_order=max(int(raw["order"]) + 20, min(80, 3 * int(raw["order"]))), sigma_blocks=0,
         ).stabilization()  # fmt: skip
@@ -140,7 +142,7 @@ def _residual(result: Loaded, answered: list[Answer]) -> tuple[Whiteness | None,
     e = np.vstack([error for error, _ in pieces])
     whole = e[np.all(np.isfinite(e), axis=1)]
     covariance = np.atleast_2d(np.cov(whole, rowvar=False)) if len(whole) > e.shape[1] + 1 else None
-    lags = int(min(max(SHORTEST_LAGS, int(result.raw["p"])), LONGEST_LAGS, len(e) // 10))
+    lags = int(min(max(SHORTEST_LAGS, int(result.raw["p"] or 0)), LONGEST_LAGS, len(e) // 10))
     return whiteness(pieces, lags), covariance
 
 

@@ -22,7 +22,10 @@ LINES = 1200  # of a synthesised response
 
 
 def singular_section(m: Material) -> page.Section:
-    """Singular values with the order."""
+    """Singular values with the order; why there are none of method "auto"."""
+    if len(m.result.singular_values) == 0:
+        why = "Method auto compares many models: there is no one Hankel matrix. Its modes are those they agree on."
+        return page.section("Singular values", page.absent(why))
     drawing = figures.figure(9.6, 3.0)
     figures.draw_singular_values(drawing.add_subplot(), m.result.singular_values, int(m.result.raw["order"]))
     words = (

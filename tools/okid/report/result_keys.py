@@ -14,15 +14,15 @@ NEEDED = (
 # Key -> kind; "?" behind a kind: null and absent are fine too.
 _TOP = {
     "fs_hz": "rate", "samples": "count", "records": "count?", "gaps": "count?", "inputs": "names", "outputs": "names",
-    "p": "count", "rows": "count", "order": "count", "method": "text?", "hold": "text?", "detrend": "text?",
-    "start": "text?", "version": "text?", "singular_values": "numbers", "model": "object", "markov": "object?",
+    "p": "count?", "rows": "count?", "order": "count", "method": "text?", "hold": "text?", "detrend": "text?",
+    "start": "text?", "version": "text?", "singular_values": "numbers?", "model": "object", "markov": "object?",
     "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
 }  # fmt: skip
 _MODEL = {"dt": "rate", "A": "matrix", "B": "matrix", "C": "matrix", "D": "matrix", "K": "loose matrix?"}
 _MODE = {
     "frequency_hz": "number", "damping_ratio": "number", "shape_re": "numbers", "shape_im": "numbers",
     "frequency_std_hz": "number?", "damping_ratio_std": "number?", "mpc": "number?", "emac": "number?",
-    "cmi": "number?",
+    "cmi": "number?", "confident": "flag?", "found_in": "number?", "why": "list?",
 }  # fmt: skip
 _FIT = {"simulation_percent": "by name?", "prediction_percent": "by name?"}
 _MKR = {
@@ -90,7 +90,7 @@ def check_keys(raw: Any, source: str) -> None:
     if missing:
         raise InputError(f"{source}: key {missing[0]!r} is missing")
     _check(raw, _TOP, "", source)
-    if not raw["outputs"] or not raw["singular_values"]:
+    if not raw["outputs"] or raw["singular_values"] == []:
         empty = "singular_values" if raw["outputs"] else "outputs"
         raise InputError(f"{source}: {empty} is [], expected at least one")
     model = dict(raw["model"])

@@ -21,6 +21,8 @@ def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
             "mpc": known(mode.mpc),
             "emac": known(mode.emac),
             "cmi": known(mode.cmi),
+            "confident": mode.confident,
+            "found_in": mode.found_in,
         }
         for k, mode in enumerate(modes, 1)
     ]
@@ -28,7 +30,8 @@ def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
 
 class ModalTable(list[dict[str, Any]]):
     """A row a mode, ascending in frequency: mode (from 1), frequency_hz, frequency_std_hz, damping_ratio,
-    damping_ratio_std, mpc, emac, cmi; None = not known. str() and notebooks show it with the warnings of the result.
+    damping_ratio_std, mpc, emac, cmi, confident, found_in; None = not known. str() and notebooks show it with the
+    warnings of the result, and without the modes that "auto" lists as doubtful.
 
     >>> import okid
     >>> table = okid.ModalTable([okid.Mode(10.96, 0.012, None, 0.99, 0.98)], "one mode")
@@ -38,16 +41,17 @@ class ModalTable(list[dict[str, Any]]):
 
     def __init__(self, modes: Sequence[Mode], text: str, warnings: Sequence[str] = ()) -> None:
         super().__init__(_rows(modes))
-        self._text, self._warnings = text, list(warnings)
+        self._text, self._warnings, self._doubtful = text, list(warnings), [mode.doubtful for mode in modes]
 
     def __str__(self) -> str:
         return self._text
 
     def _repr_html_(self) -> str:
-        with_std = [any(row[key] is not None for row in self) for key in ("frequency_std_hz", "damping_ratio_std")]
+        shown = [row for row, doubtful in zip(self, self._doubtful, strict=True) if not doubtful]
+        with_std = [any(row[key] is not None for row in shown) for key in ("frequency_std_hz", "damping_ratio_std")]
         head = ["mode", "f [Hz]", *["± [Hz]"] * with_std[0], "ζ [%]", *["± [%]"] * with_std[1], "MPC", "EMAC", "CMI"]
         lines = []
-        for row in self:
+        for row in shown:
             cells = [str(row["mode"]), f"{row['frequency_hz']:.5f}"]
             cells += [_short(row["frequency_std_hz"], 1.0)] * with_std[0]
             cells += [f"{100.0 * row['damping_ratio']:.4f}"]

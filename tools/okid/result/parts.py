@@ -30,7 +30,11 @@ def _optional(nested: Any) -> Real | None:
 
 
 class Mode(NamedTuple):
-    """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known."""
+    """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known.
+
+    confident: an expert would sign it; found_in: share of the runs of "auto" that could have seen it and did; why:
+    codes of what speaks against it. None: not judged, or by EMAC alone (found_in of a named method).
+    """
 
     frequency_hz: float
     damping_ratio: float
@@ -41,6 +45,14 @@ class Mode(NamedTuple):
     damping_ratio_std: float | None = None
     shape_re_std: Real | None = None
     shape_im_std: Real | None = None
+    confident: bool | None = None
+    found_in: float | None = None
+    why: tuple[str, ...] = ()
+
+    @property
+    def doubtful(self) -> bool:
+        """Listed by "auto", but not signed: tables leave it out."""
+        return self.found_in is not None and not self.confident
 
     @property
     def cmi(self) -> float:
@@ -53,7 +65,8 @@ class Mode(NamedTuple):
         f, zeta, mpc, emac = numbers([one[key] for key in ("frequency_hz", "damping_ratio", "mpc", "emac")]).tolist()
         shape = numbers(one["shape_re"]) + 1j * numbers(one["shape_im"])
         return cls(f, zeta, shape, mpc, emac, one.get("frequency_std_hz"), one.get("damping_ratio_std"),
-                   _optional(one.get("shape_re_std")), _optional(one.get("shape_im_std")))  # fmt: skip
+                   _optional(one.get("shape_re_std")), _optional(one.get("shape_im_std")),
+                   one.get("confident"), one.get("found_in"), tuple(one.get("why") or ()))  # fmt: skip
 
 
 class Fit(NamedTuple):

@@ -60,6 +60,9 @@ class Result:
     """What identify() returns. singular_values (s,) of H(0), the correlations (ERA/DC) or the projection (n4sid);
     markov (count, n_y, n_u) Y_0 .. by eq. 40, n4sid of the model.
 
+    Of method "auto": p and rows None, no singular values, K zero, no decomposition; `modes` lists doubtful ones too
+    (mode.confident False), the model has the confident ones.
+
     mkr and pdc: mass, stiffness and damping where the channels have degrees of freedom, else None.
     """
 
@@ -70,8 +73,8 @@ class Result:
     gaps: int
     inputs: list[str]
     outputs: list[str]
-    p: int
-    rows: int
+    p: int | None
+    rows: int | None
     order: int
     hold: str
     detrend: str
@@ -176,8 +179,8 @@ class Result:
         )
 
     def __repr__(self) -> str:
-        found = ", ".join(f"{mode.frequency_hz:.4g}" for mode in self.modes[:12])
-        return f"<Result of {self._head()}, modes at {found}{' ..' * (len(self.modes) > 12)} Hz>"
+        shown = [f"{mode.frequency_hz:.4g}" for mode in self.modes if not mode.doubtful]
+        return f"<Result of {self._head()}, modes at {', '.join(shown[:12])}{' ..' * (len(shown) > 12)} Hz>"
 
     def _repr_html_(self) -> str:
         return f"<p>{escape(self._head())}</p>" + self.table()._repr_html_()
@@ -186,8 +189,14 @@ class Result:
         """Poles of other orders from the same decomposition, each compared with the order before, and their clusters.
 
         Default: every even order the data carry. Orders they cannot carry are left out. Several horizons:
-        okid.stabilization(). Raises Error on a result that was unpickled: it has no decomposition any more.
+        okid.stabilization(). Raises Error on a result that was unpickled: it has no decomposition any more; and on one
+        of method "auto", which has none.
         """
+        if self.method == "auto":
+            raise Error(
+                'a result of method "auto" has no decomposition of its own: name a method for a stabilization diagram, '
+                'as in okid.identify(u, y, fs=fs, method="okid-era"), or call okid.stabilization()'
+            )
         if self.identifier is None:
             raise Error("this result no longer holds its decomposition: identify again for a stabilization diagram")
         return of_identifiers([self.identifier], orders, criteria)

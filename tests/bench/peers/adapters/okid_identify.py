@@ -3,7 +3,7 @@
 
 Settings: the true order, p = s lags and 2 s block rows for the okid methods, s block rows for the n4sid methods, no
 detrending as no peer does it. "p = 2 s": the observer order of those peers whose OKID cannot set it apart from the
-number of Markov parameters. "with sigma": standard deviations too. "as it comes": okid.identify(u, y, fs=fs), order
+number of Markov parameters. "with sigma": standard deviations too. "as it comes": okid-era, order
 found by itself, mean removed, p = 40, 80 block rows, standard deviations from 20 blocks. "outputs only": the force is
 not given; s or 4 s block rows.
 """
@@ -51,7 +51,9 @@ WAYS = {
     "n4sid-moesp with sigma": _same("n4sid-moesp", sigma_blocks=20),
     "okid-era, outputs only": _ambient(1),
     "okid-era, outputs only, 4 s": _ambient(4),
-    "as it comes": lambda problem: found_modes(okid.identify(problem.u, problem.y, fs=problem.fs).modes),
+    "as it comes": lambda problem: found_modes(
+        okid.identify(problem.u, problem.y, fs=problem.fs, method="okid-era").modes
+    ),
     "as it comes, refine": lambda problem: found_modes(
         okid.identify(problem.u, problem.y, fs=problem.fs, refine=True).modes
     ),
