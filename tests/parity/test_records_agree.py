@@ -144,8 +144,8 @@ def test_the_default_method_without_a_force(tmp_path: Path) -> None:
     assert found["method"] == "auto" and found["fit"]["simulation_percent"] is None
 
 
-@pytest.mark.parametrize("arguments", [{"p": 20}, {"rows": 30}, {"order": 6}, {"max_order": 10}, {"hankel": "innovations"},
-                                       {"refine": True}], ids=str)  # fmt: skip
+@pytest.mark.parametrize("arguments", [{"p": 20}, {"rows": 30}, {"order": 6}, {"max_order": 10},
+                                       {"hankel": "innovations"}, {"refine": True}], ids=str)  # fmt: skip
 def test_an_option_of_one_method_means_okid_era(tmp_path: Path, arguments: dict[str, Any]) -> None:
     assert same(tmp_path, [measured(1500)], method=None, sigma_blocks=0, **arguments)["method"] == "okid-era"
 

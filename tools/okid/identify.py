@@ -50,8 +50,8 @@ def identify(
     leaves it out and re-arms, nothing is interpolated; the fits and model.x0 are those of the record less its own mean
     (or line) and start anew after missing inputs. The arrays are never modified.
     `method` "auto": the modes that several methods, horizons and rates agree on, each with mode.confident, .found_in
-    and .why (docs/how-okid-decides.md); the doubtful ones are listed with them. Or one method: "okid-era", "okid-era-dc",
-    "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx". Default: "auto"; "okid-era" when an option of one method is given (p,
+    and .why (docs/how-okid-decides.md); the doubtful ones are listed with them. Or one method: "okid-era",
+    "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx". Default: "auto"; "okid-era" when an option of one method is given (p,
     rows, order, max_order, hankel, refine).
     u None = no measured force (ambient): modes and predictor only, there is no simulation fit; the okid methods then
     realize the covariances of the outputs.
