@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 
 namespace okid_host {
 namespace {
@@ -68,7 +69,7 @@ double link_cost(const run_pole& pole, const run_pole& last) {
 void extend(std::vector<chain>& chains, const std::vector<const run_pole*>& next) {
     struct link {
         double cost;
-        std::size_t chain, pole;
+        std::size_t track, pole;
     };
     std::vector<link> links;
     for (std::size_t j = 0; j < next.size(); ++j)
@@ -76,13 +77,13 @@ void extend(std::vector<chain>& chains, const std::vector<const run_pole*>& next
             if (const double cost = link_cost(*next[j], *chains[t].back()); std::isfinite(cost))
                 links.push_back({cost, t, j});
     std::sort(links.begin(), links.end(), [](const link& a, const link& b) {
-        return a.cost != b.cost ? a.cost < b.cost : a.chain != b.chain ? a.chain < b.chain : a.pole < b.pole;
+        return std::tie(a.cost, a.track, a.pole) < std::tie(b.cost, b.track, b.pole);
     });
     std::vector<bool> taken(next.size()), continued(chains.size());
     for (const link& l : links) {
-        if (continued[l.chain] || taken[l.pole]) continue;
-        continued[l.chain] = taken[l.pole] = true;
-        chains[l.chain].push_back(next[l.pole]);
+        if (continued[l.track] || taken[l.pole]) continue;
+        continued[l.track] = taken[l.pole] = true;
+        chains[l.track].push_back(next[l.pole]);
     }
     for (std::size_t j = 0; j < next.size(); ++j)
         if (!taken[j]) chains.push_back({next[j]});

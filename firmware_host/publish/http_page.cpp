@@ -90,7 +90,7 @@ bool http_page::meant_for_us(const std::string& request) const {
     if (!host.empty() && host.front() == '[')
         host = host.substr(1, host.find(']') - 1);
     else
-        host = host.substr(0, host.find(':'));
+        host.resize(std::min(host.size(), host.find(':')));
     std::array<unsigned char, 16> bytes{};
     return host == "localhost" || inet_pton(AF_INET, host.c_str(), bytes.data()) == 1 ||
            inet_pton(AF_INET6, host.c_str(), bytes.data()) == 1 || (!loopback_ && !host.empty());
