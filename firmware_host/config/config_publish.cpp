@@ -59,8 +59,7 @@ bool numeric(const std::string& host) {
     if (found.find("://") == std::string::npos) found.insert(0, "://"); // a name before the @ without a scheme
     found = without_password(found);
     if (found.rfind("://", 0) == 0) found.erase(0, 3);
-    refuse_key(place, node, key,
-               fmt::format("found \"{}\", expected {}", printable(found), expected));
+    refuse_key(place, node, key, fmt::format("found \"{}\", expected {}", printable(found), expected));
 }
 
 std::string socket_of(const config_place& place, const toml::node& node) {
