@@ -345,7 +345,8 @@ def test_refinement_needs_a_force(tmp_path: Path) -> None:
 def test_measured_records_are_not_simulated_worse(path: str, n_u: int, settings: dict[str, Any]) -> None:
     samples = okid.read_csv(data_file(path)).samples
     u, y = samples[:, :n_u], samples[:, n_u:]
-    before, after = (
+    settings = {"method": "okid-era", **settings}
+    before, after = okid.identify(u, y, fs=100.0, **settings), okid.identify(u, y, fs=100.0, refine=True, **settings)
         okid.identify(u, y, fs=100.0, **settings),
         okid.identify(u, y, fs=100.0, refine=True, **{"method": "okid-era", **settings}),
     )
