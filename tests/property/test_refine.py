@@ -347,9 +347,6 @@ def test_measured_records_are_not_simulated_worse(path: str, n_u: int, settings:
     u, y = samples[:, :n_u], samples[:, n_u:]
     settings = {"method": "okid-era", **settings}
     before, after = okid.identify(u, y, fs=100.0, **settings), okid.identify(u, y, fs=100.0, refine=True, **settings)
-        okid.identify(u, y, fs=100.0, **settings),
-        okid.identify(u, y, fs=100.0, refine=True, **{"method": "okid-era", **settings}),
-    )
     codes = [w.code for w in after.warnings]
     was, now = (
         np.mean([x for x in r.fit.simulation_percent.values() if x is not None] or [-np.inf]) for r in (before, after)
