@@ -36,7 +36,6 @@ int drv_input_open(const char* path) {
 
 const char* drv_input_fault(int code) {
     const int reason = code < 0 ? -code : code;
-    if (reason == ENOENT) return "no such file";
     return reason == ENOTSUP ? "it is a device or a named pipe, expected a file (a pipe can be given as /dev/stdin)"
                              : strerror(reason);
 }

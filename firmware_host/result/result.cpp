@@ -21,9 +21,9 @@ ordered_json vector_json(const double* values, int count) {
     return out;
 }
 
-/// Column-major in, rows of rows out.
+/// Column-major in, rows of rows out; without columns (ambient B and D) as many empty rows.
 ordered_json matrix_json(const double* values, int rows, int columns) {
-    if (!values) return nullptr;
+    if (!values && columns > 0) return nullptr;
     ordered_json out = ordered_json::array();
     for (int i = 0; i < rows; ++i) {
         ordered_json row = ordered_json::array();

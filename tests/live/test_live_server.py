@@ -169,7 +169,7 @@ def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
         ("[publish]\n", (), 2, '[publish] "socket" is missing'),
         ("[publish\n", (), 2, "a.toml: line "),
         ("", ("--port", "70000"), 2, "--port is 70000"),
-        (None, (), 2, "no such file"),
+        (None, (), 2, "No such file or directory"),
         ('[publish]\nsocket = "s"\n', ("--host", "192.0.2.1"), 4, "--host 192.0.2.1: Cannot assign"),
         ('[publish]\nsocket = "s"\n', ("--host", "no.such.host.invalid"), 4, "no.such.host.invalid"),
     ],

@@ -55,7 +55,7 @@ def test_csv_faults_are_named(tmp_path: Path, text: bytes, words: str) -> None:
 
 
 def test_csv_absent_file_and_column(tmp_path: Path) -> None:
-    with pytest.raises(okid.InputError, match="no such file"):
+    with pytest.raises(okid.InputError, match="No such file or directory"):
         read_csv(tmp_path / "none.csv")
     (tmp_path / "r.csv").write_text("a,b\n1,2\n", encoding="utf-8")
     with pytest.raises(okid.InputError, match="'c'.*a, b"):

@@ -139,7 +139,7 @@ def test_wrong_arguments(wrong: dict[str, Any], text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (None, "no such file"),
+        (None, "No such file or directory"),
         ("a = [", "line 1"),
         ("[acquisition]\nrate_hz = 100\n", "no [[bus]]"),
         ('[[channel]]\nname = "a"\nrole = "acceleration"\n', '"rate_hz" is missing'),
