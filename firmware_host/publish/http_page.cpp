@@ -2,6 +2,7 @@
 #include "http_page.hpp"
 
 #include "error.hpp"
+#include "next_visitor.hpp"
 
 #include <algorithm>
 #include <arpa/inet.h>
@@ -62,7 +63,7 @@ void http_page::add_polls(std::vector<pollfd>& polls) const {
 
 /// The oldest makes room.
 void http_page::welcome() {
-    for (int fd; (fd = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
+    for (int fd; (fd = next_visitor(fd_)) >= 0;) {
         if (all_.size() == most) {
             close(all_.front().fd);
             all_.pop_front();

@@ -3,6 +3,7 @@
 
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "next_visitor.hpp"
 
 #include <array>
 #include <cerrno>
@@ -86,7 +87,7 @@ void subscribers::take_samples(const json_line& block) {
 }
 
 void subscribers::welcome() {
-    for (int fd; (fd = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
+    for (int fd; (fd = next_visitor(fd_)) >= 0;) {
         if (all_.size() >= most) {
             close(fd);
             continue;

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import pathlib
 import resource
 import socket
@@ -15,8 +16,9 @@ from collections.abc import Iterator
 
 import pytest
 from okid.live.server import MOST_VISITORS, PageServer
-from program import PROGRAM
+from program import PROGRAM, okid
 from two_masses import rig_text, simulate_rig
+from waiting import until
 
 
 @pytest.fixture(scope="module")
@@ -25,11 +27,17 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
 
 
 @contextlib.contextmanager
-def publishing(rig: pathlib.Path, lines: str, descriptors: int | None = None) -> Iterator[subprocess.Popen[str]]:
+def publishing(
+    rig: pathlib.Path, lines: str, descriptors: int | None = None, speed: str = "4"
+) -> Iterator[subprocess.Popen[str]]:
     (rig / "p.toml").write_text((rig / "a.toml").read_text() + f"[publish]\n{lines}\n")
-    limit = (lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))) if descriptors else None
+    limit = (
+        (lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors)))
+        if descriptors
+        else None
+    )
     with subprocess.Popen(
-        [PROGRAM, "replay", rig / "a.log", "-c", rig / "p.toml", "--speed", "4"], preexec_fn=limit,
+        [PROGRAM, "replay", rig / "a.log", "-c", rig / "p.toml", "--speed", speed, "--json", rig / "r.json"], preexec_fn=limit,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     ) as run:  # fmt: skip
         yield run
@@ -44,7 +52,9 @@ def free_port() -> int:
 
 def status(run: subprocess.Popen[str], key: str) -> int:
     text = pathlib.Path(f"/proc/{run.pid}/status").read_text()
-    return next(int(line.split()[1]) for line in text.splitlines() if line.startswith(key))
+    return next(
+        int(line.split()[1]) for line in text.splitlines() if line.startswith(key)
+    )
 
 
 def cpu_s(run: subprocess.Popen[str]) -> float:
@@ -60,12 +70,52 @@ def connected(port: int) -> socket.socket:
     raise AssertionError("nobody listens")
 
 
+def test_no_descriptors_left(rig: pathlib.Path) -> None:
+    """Release 0.1 went round accept() with a whole processor, and had no descriptor left for its result: exit 2."""
+    assert (
+        okid(
+            "replay", rig / "a.log", "-c", rig / "a.toml", "--json", rig / "calm.json"
+        ).returncode
+        == 0
+    )
+    port = free_port()
+    with (
+        publishing(
+            rig,
+            f'prometheus = "127.0.0.1:{port}"\nsocket = "s"',
+            descriptors=16,
+            speed="20",
+        ) as run,
+        contextlib.ExitStack() as crowd,
+    ):
+        connected(port).close()
+        for _ in range(45):
+            one = crowd.enter_context(socket.socket(socket.AF_UNIX))
+            one.setblocking(False)
+            until(
+                lambda one=one: one.connect_ex(str(rig / "s")) == 0, 5
+            )  # nobody is left standing at the door
+        before, at = cpu_s(run), time.monotonic()
+        time.sleep(2)
+        assert (cpu_s(run) - before) / (time.monotonic() - at) < 0.5
+        with connected(port) as wire:
+            wire.sendall(b"GET /metrics HTTP/1.0\r\n\r\n")
+            with contextlib.suppress(ConnectionResetError):
+                assert wire.recv(15) in (b"", b"HTTP/1.1 200 OK")
+        assert run.poll() is None
+        _, told = run.communicate(timeout=60)
+        assert run.returncode == 0, told
+    assert (rig / "r.json").read_bytes() == (rig / "calm.json").read_bytes()
+
+
 @pytest.mark.parametrize("piecewise", [False, True])
 def test_a_broker_that_announces_256_mb(rig: pathlib.Path, piecewise: bool) -> None:
     """Release 0.1 took the room for it: 540 MB."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(20)
-        with publishing(rig, f'mqtt = "mqtt://127.0.0.1:{server.getsockname()[1]}"') as run:
+        with publishing(
+            rig, f'mqtt = "mqtt://127.0.0.1:{server.getsockname()[1]}"'
+        ) as run:
             wire, _ = server.accept()
             with wire:
                 wire.settimeout(10)
@@ -93,7 +143,9 @@ def test_slow_visitors_do_not_pile_up() -> None:
         hub = None
 
     server = PageServer(Quiet(), "127.0.0.1", 0)  # type: ignore[arg-type]
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True)
+    thread = threading.Thread(
+        target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
+    )
     thread.start()
     before, crowd = threading.active_count(), []
     try:
@@ -103,7 +155,9 @@ def test_slow_visitors_do_not_pile_up() -> None:
             crowd.append(one)
         time.sleep(0.5)
         assert threading.active_count() - before <= MOST_VISITORS
-        with socket.create_connection(("127.0.0.1", server.server_port), timeout=10) as wire:
+        with socket.create_connection(
+            ("127.0.0.1", server.server_port), timeout=10
+        ) as wire:
             wire.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
             assert wire.recv(15).startswith(b"HTTP/1.0 200")
     finally:
@@ -111,3 +165,33 @@ def test_slow_visitors_do_not_pile_up() -> None:
             one.close()
         server.shutdown()
         server.server_close()
+
+
+def test_the_page_without_descriptors_does_not_spin() -> None:
+    """Release 0.1 asked for the visitor it could not take without a pause."""
+
+    class Quiet:
+        hub = None
+
+    server = PageServer(Quiet(), "127.0.0.1", 0)  # type: ignore[arg-type]
+    visitor = socket.socket()
+    threading.Thread(
+        target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
+    ).start()
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    free = os.open("/dev/null", os.O_RDONLY)
+    os.close(free)
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (free, limits[1]))
+        visitor.connect(("127.0.0.1", server.server_port))
+        before = time.process_time()
+        time.sleep(1)
+        assert time.process_time() - before < 0.3
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+    visitor.settimeout(10)
+    visitor.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
+    assert visitor.recv(15).startswith(b"HTTP/1.0 200")
+    visitor.close()
+    server.shutdown()
+    server.server_close()

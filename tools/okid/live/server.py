@@ -81,6 +81,14 @@ class PageServer(ThreadingHTTPServer):
         """Where the page is."""
         return f"http://{f'[{self.host}]' if ':' in self.host else self.host}:{self.server_port}/"
 
+    def get_request(self) -> tuple[socket.socket, Any]:
+        """Who waits at the door; without a descriptor for him he waits on, and nobody spins meanwhile."""
+        try:
+            return super().get_request()
+        except OSError:
+            time.sleep(0.1)
+            raise
+
     def process_request(self, request: Any, client_address: Any) -> None:
         """A thread for each visitor, MOST_VISITORS at most: then the one that has taken longest to ask makes room, and
         when all of them are pages the new one is turned away."""
