@@ -94,12 +94,12 @@ double top_of(const std::vector<sample_rows>& records, std::size_t n_u, std::siz
 std::vector<record_level> make_levels(std::vector<sample_rows> records, std::size_t n_u, std::size_t n_y, double fs_hz,
                                       bool at_rest, int decimate, std::vector<double>& scale) {
     const std::size_t m = n_u + n_y;
-    const fir_kernel kernel(2);
+    const fir_kernel kernel(2, 1);
     std::vector<record_level> out(1);
     out[0].fs_hz = fs_hz;
     out[0].records = std::move(records);
     if (decimate > 1) {
-        const fir_kernel first(decimate);
+        const fir_kernel first(decimate, 1);
         for (sample_rows& rows : out[0].records)
             rows = thinned(first, static_cast<std::size_t>(decimate), rows, m, at_rest);
         out[0].fs_hz /= decimate;
