@@ -109,8 +109,9 @@ def print_stacks(folder: Path) -> None:
     for name in ("m4-double", "m4-float", "m7-double"):
         frames, calls, wrong = stack_depth.read([folder / name / "okid" / "lib"])
         depth, _, loops = stack_depth.deepest(frames, calls)
-        if wrong or loops:
-            raise SystemExit(f"table: {name}: {'; '.join([*wrong, *loops])}")
+        if wrong or loops or not frames:
+            found = "; ".join([*wrong, *loops]) or "no frame: the library was built without -fstack-usage"
+            raise SystemExit(f"table: {name}: {found}")
         depths.append(depth)
     headers = (HERE.parents[1] / "lib" / "include" / "okid").rglob("*.h")
     public = set(re.findall(r"\b(okid_\w+)\s*\(", "".join(p.read_text("utf-8") for p in headers)))

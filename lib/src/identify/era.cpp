@@ -178,25 +178,27 @@ okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_mo
     const int ny = e.config.n_y, last = e.height - ny;
     constexpr okid_real_t quarter_pi = static_cast<okid_real_t>(0.78539816339744831);
     for (int k = 0; k < modes->count; ++k) {
-        const okid_real_t* re = modes->psi_re + static_cast<size_t>(k) * static_cast<size_t>(order);
-        const okid_real_t* im = modes->psi_im + static_cast<size_t>(k) * static_cast<size_t>(order);
-        const int block_rows = e.height / ny;
-        const auto steps = static_cast<okid_real_t>(block_rows - 1);
-        const okid_real_t radius = std::pow(std::hypot(modes->mu_re[k], modes->mu_im[k]), steps);
-        const okid_real_t angle = steps * std::atan2(modes->mu_im[k], modes->mu_re[k]);
+        const size_t at = static_cast<size_t>(k) * static_cast<size_t>(order);
+        const okid_real_t *re = modes->psi_re + at, *im = modes->psi_im + at;
+        okid_real_t power_re = 1, power_im = 0; // mu to the number of rows between the first and the last block
+        for (int n = 1; n < e.height / ny; ++n) {
+            const okid_real_t turned = power_re * modes->mu_re[k] - power_im * modes->mu_im[k];
+            power_im = power_re * modes->mu_im[k] + power_im * modes->mu_re[k];
+            power_re = turned;
+        }
         okid_real_t weighted = 0, total = 0;
         for (int o = 0; o < ny; ++o) {
             okid_real_t first_re = 0, first_im = 0, end_re = 0, end_im = 0;
-            for (int i = 0; i < order; ++i) {
-                const okid_real_t* column = e.left + static_cast<size_t>(i) * static_cast<size_t>(e.height);
-                const okid_real_t root = std::sqrt(e.values[i]);
-                first_re += root * column[o] * re[i];
-                first_im += root * column[o] * im[i];
-                end_re += root * column[last + o] * re[i];
-                end_im += root * column[last + o] * im[i];
+            const okid_real_t* column = e.left + o;
+            for (int i = 0; i < order; ++i, column += e.height) {
+                const okid_real_t root = std::sqrt(e.values[i]), first = root * column[0], end = root * column[last];
+                first_re += first * re[i];
+                first_im += first * im[i];
+                end_re += end * re[i];
+                end_im += end * im[i];
             }
-            const okid_real_t expected_re = radius * (first_re * std::cos(angle) - first_im * std::sin(angle));
-            const okid_real_t expected_im = radius * (first_re * std::sin(angle) + first_im * std::cos(angle));
+            const okid_real_t expected_re = power_re * first_re - power_im * first_im;
+            const okid_real_t expected_im = power_im * first_re + power_re * first_im;
             const okid_real_t a = std::hypot(expected_re, expected_im), b = std::hypot(end_re, end_im);
             const okid_real_t weight = first_re * first_re + first_im * first_im;
             total += weight;
