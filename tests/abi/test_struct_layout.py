@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from okid import abi
+from okid.abi.shared_object import candidates
 
 ROOT = Path(__file__).resolve().parents[2]
 INCLUDE = ROOT / "lib" / "include"
@@ -159,7 +160,7 @@ def test_a_library_of_another_number_type_does_not_link(tmp_path: Path, name: st
         "-I",
         str(INCLUDE),
         str(source),
-        str(abi.candidates()[-1]),
+        str(candidates("libokid.so", "OKID_LIBRARY")[-1]),
         "-o",
         str(tmp_path / "use"),
     ]

@@ -6,9 +6,7 @@
 from __future__ import annotations
 
 import ctypes
-import os
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,29 +15,14 @@ from numpy.typing import NDArray
 from okid._errors import Error, IdentificationError, InputError
 from okid.abi.layout import *  # noqa: F403
 from okid.abi.layout import ABI, ERR_DIM, ERR_FORMAT, ERR_MISMATCH, ERR_RANGE, ERR_TOO_SHORT, doubles
+from okid.abi.shared_object import load
 from okid.abi.signatures import SIGNATURES
-
-
-def candidates() -> list[Path]:
-    """Where the shared object may be, in the order of trust."""
-    given = os.environ.get("OKID_LIBRARY")
-    if given:
-        return [Path(given)]
-    here = Path(__file__).resolve().parents[1]
-    return [here / "libokid.so", here.parents[1] / "build" / "libokid.so"]
 
 
 @lru_cache(maxsize=1)
 def library() -> Any:
     """The loaded shared object with typed functions. OSError names every place that was tried."""
-    tried = candidates()
-    for path in tried:
-        if path.is_file():
-            loaded = ctypes.CDLL(str(path))
-            break
-    else:
-        places = ", ".join(str(path) for path in tried)
-        raise OSError(f"libokid.so not found in {places}: run `make build`, or set OKID_LIBRARY to the file")
+    loaded, path = load("libokid.so", "OKID_LIBRARY")
     if not hasattr(loaded, f"okid_accumulator_create_{ABI}_double"):
         raise OSError(f"{path}: not libokid of interface {ABI} in double precision: run `make build` again")
     for name, (result, arguments) in SIGNATURES.items():

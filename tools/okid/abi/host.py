@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import Error, IdentificationError, InputError
+from okid.abi.shared_object import load
 
 _text, _handle, _status, _size = ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int32, ctypes.c_size_t
 _out, _sizes = ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(ctypes.c_size_t)
@@ -90,24 +91,10 @@ ABI = 1
 _ERRORS: dict[int, type[Error]] = {2: InputError, 3: IdentificationError}
 
 
-def candidates() -> list[Path]:
-    """Where the shared object may be, in the order of trust."""
-    given = os.environ.get("OKID_HOST_LIBRARY")
-    if given:
-        return [Path(given)]
-    here = Path(__file__).resolve().parents[1]
-    return [here / "libokid_host.so", here.parents[1] / "build" / "libokid_host.so"]
-
-
 @lru_cache(maxsize=1)
 def library() -> Any:
     """The loaded shared object with typed functions. OSError names every place that was tried."""
-    tried = candidates()
-    path = next((one for one in tried if one.is_file()), None)
-    if path is None:
-        places = ", ".join(map(str, tried))
-        raise OSError(f"libokid_host.so not found in {places}: run `make build`, or set OKID_HOST_LIBRARY to the file")
-    loaded = ctypes.CDLL(str(path))
+    loaded, path = load("libokid_host.so", "OKID_HOST_LIBRARY")
     for name, (result, arguments) in SIGNATURES.items():
         function = getattr(loaded, name)
         function.restype, function.argtypes = result, arguments
