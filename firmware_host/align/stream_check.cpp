@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "stream_check.hpp"
 
+#include "config/config_channel.hpp"
+
 #include <algorithm>
 #include <cstdlib>
 #include <fmt/format.h>
@@ -40,7 +42,7 @@ stream_check::stream_check(const live_config& config)
         };
         auto found = std::find_if(messages_.begin(), messages_.end(), same);
         if (found == messages_.end()) {
-            messages_.push_back({channel.bus, channel.frame, channel.selectors, channel.sequence, {}, 0, 0, 0, 0});
+            messages_.push_back({channel.bus, channel.frame, channel.selectors, channel.sequence, {}, 0, 0, 0, 0, {}});
             found = messages_.end() - 1;
         }
         message_of_[c] = static_cast<std::size_t>(found - messages_.begin());
@@ -57,25 +59,25 @@ bool stream_check::asked_for(const message& one, const drv_frame_t& frame) const
 
 void stream_check::add(const drv_frame_t& frame) {
     if (left_ == 0 || (frame.flags & (DRV_FRAME_ERROR | DRV_FRAME_REMOTE))) return;
-    // An exact identifier comes before one that stands for many.
-    if (!add_to(frame, false) && !add_to(frame, true)) note_other(frame);
-}
-
-/// @param alike  look among the identifiers that stand for many. @return it was asked for
-bool stream_check::add_to(const drv_frame_t& frame, bool alike) {
-    bool known = false;
+    // An exact identifier comes before one that stands for many, a group of one sender before that of all.
+    const auto bits = [](const message& one) {
+        return one.frame.mask ? std::bitset<32>(one.frame.mask).count() : std::size_t{32};
+    };
+    std::size_t best = 0;
+    for (const message& one : messages_)
+        if (asked_for(one, frame)) best = std::max(best, bits(one));
+    if (best == 0) return note_other(frame);
     for (message& one : messages_) {
-        if ((one.frame.mask != 0) != alike || !asked_for(one, frame)) continue;
-        known = true;
+        if (bits(one) != best || !asked_for(one, frame)) continue;
         ++one.frames;
         if (one.judged < enough_frames) judge(one, frame);
     }
-    return known;
 }
 
 void stream_check::judge(message& one, const drv_frame_t& frame) {
     if (!std::all_of(one.selectors.begin(), one.selectors.end(), [&](const multiplexor& m) { return m.holds(frame); }))
         return;
+    one.senders.set(frame.id & 0xFF);
     std::int64_t raw = 0;
     if (one.sequence && drv_signal_raw(&*one.sequence, frame.data, frame.len, &raw)) {
         const auto counter = static_cast<std::uint64_t>(raw);
@@ -128,9 +130,26 @@ std::string stream_check::unheard(std::size_t bus) const {
         if (one.bus != bus || one.frames > 0) continue;
         std::string names;
         for (const std::size_t channel : one.channels) names = append(names, config_.channels[channel].name);
-        out = append(out, fmt::format("{} ({})", identifier_text(one.frame.id, one.frame.extended != 0), names));
+        out = append(out, fmt::format("{} ({}{})", identifier_text(one.frame.id, one.frame.extended != 0), names,
+                                      same_group(one).empty() ? "" : "; " + same_group(one)));
     }
     return out;
+}
+
+/// An extended identifier that did not come, while another of its parameter group did: a J1939 message taken for one of a
+/// fixed sender and priority.
+std::string stream_check::same_group(const message& one) const {
+    const auto group = [](std::uint32_t id) { return j1939_group(id >> 8 & 0x3FFFF); };
+    const stranger* const end = strangers_.data() + stranger_count_;
+    const stranger* found = std::find_if(strangers_.data(), end, [&](const stranger& each) {
+        return each.extended && each.bus == one.bus && group(each.id) == group(one.frame.id);
+    });
+    if (!one.frame.extended || found == end) return "";
+    if (one.frame.mask)
+        return fmt::format("address {:#x} sends this group: is source_address right?", found->id & 0xFF);
+    return fmt::format("{:#x} came of the same J1939 group: give pgn = {}, or mark the message VFrameFormat J1939PG "
+                       "in the dbc",
+                       found->id, group(found->id));
 }
 
 std::string stream_check::others(std::size_t bus) const {
@@ -180,9 +199,23 @@ void stream_check::remark_code(const message& one, std::size_t channel, remarks&
             its.signal.empty() ? "" : fmt::format(" ({} of {})", its.signal, its.message)));
 }
 
+/// A parameter group that several nodes send is as many sensors in one channel.
+void stream_check::remark_senders(const message& one, remarks& out) const {
+    if (one.frame.mask == 0 || (one.frame.mask & 0xFF) || one.senders.count() < 2) return;
+    std::string addresses;
+    for (std::size_t k = 0; k < one.senders.size(); ++k)
+        if (one.senders[k]) addresses = append(addresses, fmt::format("{:#x}", k));
+    const channel_config& channel = config_.channels[one.channels.front()];
+    out.emplace_back("several_senders",
+                     fmt::format("parameter group {} of \"{}\" is sent by the addresses {}: their samples are mixed. "
+                                 "Give its channels the source_address of one",
+                                 j1939_group(one.frame.id >> 8 & 0x3FFFF), channel.name, addresses));
+}
+
 remarks stream_check::doubts() const {
     remarks out;
     for (const message& one : messages_) {
+        remark_senders(one, out);
         remark_counter(one, out);
         for (const std::size_t channel : one.channels)
             if (config_.channels[channel].role != channel_role::aux) remark_code(one, channel, out);

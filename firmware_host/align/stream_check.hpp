@@ -7,6 +7,7 @@
 #include "config/config.hpp"
 
 #include <array>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -29,6 +30,8 @@ class stream_check {
     std::string unheard(std::size_t bus) const;
     /// Identifiers that came and that no channel asks for, with the number of frames; "" when none did.
     std::string others(std::size_t bus) const;
+    /// What to write when frames of a silent channel's J1939 group came under another identifier; "" when none did.
+    std::string same_group(std::size_t channel) const { return same_group(messages_[message_of_[channel]]); }
     /// Frames that came with the identifier of a channel.
     std::int64_t frames_of(std::size_t channel) const { return messages_[message_of_[channel]].frames; }
 
@@ -44,6 +47,7 @@ class stream_check {
         std::vector<std::size_t> channels;
         std::int64_t frames = 0, judged = 0, counted = 0; ///< received; of them looked at; whose counter rose by one
         std::uint64_t counter = 0;
+        std::bitset<256> senders; ///< of a J1939 group
     };
     struct code {
         std::int64_t last = 0, jumps = 0, middle = 0; ///< steps of more than half the range; codes in its middle half
@@ -54,10 +58,11 @@ class stream_check {
         std::int64_t frames = 0;
     };
     bool asked_for(const message& one, const drv_frame_t& frame) const;
-    bool add_to(const drv_frame_t& frame, bool alike);
     void note_other(const drv_frame_t& frame);
     void judge(message& one, const drv_frame_t& frame);
+    std::string same_group(const message& one) const;
     void remark_counter(const message& one, remarks& out) const;
+    void remark_senders(const message& one, remarks& out) const;
     void remark_code(const message& one, std::size_t channel, remarks& out) const;
 
     const live_config& config_;

@@ -200,14 +200,20 @@ std::string dbc_text_of(const std::string& config, const bus_config& bus) {
 }
 
 /// Every DBC once, by its path. Those that `texts` does not hold yet are read, when there are files to read.
-std::map<std::string, dbc_file> read_dbcs(const live_config& config, bool from_files, config_texts& texts) {
+std::map<std::string, dbc_file> read_dbcs(live_config& config, bool from_files, config_texts& texts) {
     std::map<std::string, dbc_file> out;
     for (const bus_config& bus : config.buses) {
         if (bus.dbc.empty() || out.count(bus.dbc)) continue;
         const auto [text, fresh] = texts.dbcs.try_emplace(bus.dbc_name);
         if (fresh && !from_files) refuse_file(config.path, fmt::format("\"{}\" is not in it", bus.dbc_name));
         if (fresh) text->second = dbc_text_of(config.path, bus);
-        out.emplace(bus.dbc, read_dbc(bus.dbc, text->second));
+        const dbc_file& dbc = out.emplace(bus.dbc, read_dbc(bus.dbc, text->second)).first->second;
+        constexpr std::size_t most_told = 4;
+        for (std::size_t i = 0; i < std::min(dbc.faults.size(), most_told); ++i)
+            config.warnings.push_back(dbc.faults[i]);
+        if (dbc.faults.size() > most_told)
+            config.warnings.push_back(
+                fmt::format("{}: {} more lines could not be read", dbc.path, dbc.faults.size() - most_told));
     }
     return out;
 }

@@ -22,8 +22,13 @@ const dbc_message& find_message(const config_place& place, const toml::node& nod
                                 const std::string& name) {
     std::vector<std::string> names;
     for (const dbc_message& message : dbc.messages) {
-        if (message.name == name || message.long_name == name) return message;
-        names.push_back(message.name);
+        if (message.name != name && message.long_name != name) {
+            if (message.fault.empty()) names.push_back(message.name);
+            continue;
+        }
+        if (message.fault.empty()) return message;
+        refuse_key(place, node, "message",
+                   fmt::format("message {} cannot be used: {}", printable(name), message.fault));
     }
     refuse_key(place, node, "message",
                fmt::format("found \"{}\"{}, expected a message of {}: {}", printable(name), did_you_mean(name, names),
@@ -87,9 +92,6 @@ drv_signal_t sequence_of_table(const config_place& place, const toml::table& tab
     return signal;
 }
 
-/// The group number: the destination of a message to one address (PDU1) is not part of it.
-std::uint32_t j1939_group(std::uint32_t number) { return (number >> 8 & 0xFF) < 240 ? number & 0x3FF00 : number; }
-
 /// Frames of a parameter group, whatever their priority and destination, of one sender or of all.
 drv_filter_t match_pgn(std::uint32_t number, const std::optional<int>& source) {
     const std::uint32_t group = j1939_group(number), bits = (number >> 8 & 0xFF) < 240 ? 0x03FF0000u : 0x03FFFF00u;
@@ -135,6 +137,16 @@ void resolve_selectors(const config_place& place, const toml::node& node, const 
     }
 }
 
+/// A DBC with one message of a parameter group means it of every sender; with more than one, their addresses tell them
+/// apart. 254 is nobody's address.
+std::optional<int> sender_in(const dbc_file& dbc, const dbc_message& message) {
+    const std::uint32_t group = match_pgn(message.id >> 8 & 0x3FFFF, std::nullopt).id, sender = message.id & 0xFF;
+    const auto alike = std::count_if(dbc.messages.begin(), dbc.messages.end(), [&](const dbc_message& each) {
+        return each.j1939 && match_pgn(each.id >> 8 & 0x3FFFF, std::nullopt).id == group && (each.id & 0xFF) != sender;
+    });
+    return alike > 0 && sender != 254 ? std::optional<int>(sender) : std::nullopt;
+}
+
 void resolve_by_name(const config_place& place, const toml::table& table, const bus_config& bus, const dbc_file* dbc,
                      channel_config& channel) {
     for (const char* key : {"can_id", "pgn", "extended", "start_bit", "length", "byte_order", "signed", "value"})
@@ -154,12 +166,14 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
     const dbc_message& message = find_message(place, *message_node, *dbc, channel.message);
     const dbc_signal& signal = find_signal(place, *signal_node, "signal", *dbc, message, channel.signal);
     channel.frame = {message.id, static_cast<std::uint8_t>(message.extended), 0};
+    const toml::node* source = table.get("source_address");
     if (message.j1939)
-        channel.frame = match_pgn(message.id >> 8 & 0x3FFFF, table["source_address"].value<int>());
-    else if (const toml::node* node = table.get("source_address"))
-        refuse_key(place, *node, "source_address",
-                   fmt::format("message {} is no J1939 message: {} gives it no VFrameFormat J1939PG", message.name,
-                               dbc->path));
+        channel.frame = match_pgn(message.id >> 8 & 0x3FFFF, source ? source->value<int>() : sender_in(*dbc, message));
+    else if (source)
+        refuse_key(place, *source, "source_address",
+                   fmt::format("message {} is no J1939 message: {} gives it no VFrameFormat J1939PG. Mark it so, or "
+                               "leave the key out: its identifier {:#x} is taken as it stands, that of one sender",
+                               message.name, dbc->path, message.id));
     channel.length = message.length;
     channel.layout = signal.layout;
     channel.dbc_unit = signal.unit;
@@ -215,6 +229,8 @@ void resolve_by_bits(const config_place& place, const toml::table& table, channe
 
 } // namespace
 
+std::uint32_t j1939_group(std::uint32_t number) { return (number >> 8 & 0xFF) < 240 ? number & 0x3FF00 : number; }
+
 bool multiplexor::holds(const drv_frame_t& frame) const {
     std::int64_t raw = 0;
     if (!drv_signal_raw(&layout, frame.data, frame.len, &raw)) return false;
@@ -239,7 +255,13 @@ bool multiplexor::operator==(const multiplexor& other) const {
 static void check_length(const config_place& place, const toml::table& table, const bus_config& bus,
                          const channel_config& channel) {
     const std::size_t bytes = std::max<std::size_t>(channel.length, drv_signal_bytes(&channel.layout));
-    if (bytes <= 8 || bus.fd || (bus.type != "socketcan" && bus.type != "slcan")) return;
+    const bool can = bus.type == "socketcan" || bus.type == "slcan";
+    if (!can || bytes <= (bus.fd ? 64u : 8u)) return;
+    if (bytes > 64 || channel.frame.mask)
+        refuse_table(place, table,
+                     fmt::format("its message has {} bytes, which {}: a transport protocol sends it in pieces, and "
+                                 "those are not put together here; take another message",
+                                 bytes, bytes > 64 ? "no CAN frame has" : "no J1939 frame has"));
     refuse_table(
         place, table,
         fmt::format("its frame has {} bytes or more, which only CAN FD has: write fd = true in [[bus]] \"{}\", or "

@@ -7,6 +7,9 @@
 
 namespace okid_host {
 
+/// The J1939 group of bits 8 to 25 of an identifier: the destination of a message to one address (PDU1) is not part of it.
+std::uint32_t j1939_group(std::uint32_t number);
+
 /// Fill frame, length, layout, selector, sequence and unit of `channel`. `dbc` is that of the channel's bus, or NULL.
 void resolve_channel(const config_place& place, const toml::table& table, const bus_config& bus, const dbc_file* dbc,
                      channel_config& channel);

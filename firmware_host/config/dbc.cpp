@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
+#include <optional>
 #include <sstream>
 #include <string_view>
 
@@ -94,16 +95,38 @@ class dbc_line {
         if (at_ == text_.size()) refuse("'\"' after the unit");
         return std::string(text_.substr(begin, at_++ - begin));
     }
-    std::uint32_t message_id() {
-        return static_cast<std::uint32_t>(whole("the identifier of the message", 0xFFFFFFFFu));
+    /// As refuse(), of what stands `letters` before.
+    [[noreturn]] void refuse_word(std::size_t letters, const std::string& expected) {
+        at_ -= letters;
+        refuse(expected);
     }
+    /// A number nobody needs: one beyond the range of a double will do.
+    void bound(const char* expected) {
+        blanks();
+        double value = 0;
+        const auto [end, error] = std::from_chars(text_.data() + at_, text_.data() + text_.size(), value);
+        boundless_ = boundless_ || error == std::errc::result_out_of_range;
+        if (error == std::errc::result_out_of_range)
+            at_ = static_cast<std::size_t>(end - text_.data());
+        else
+            number(expected);
+    }
+    bool boundless() const { return boundless_; } ///< it had such a number
+    std::uint32_t message_id() {
+        id_ = static_cast<std::uint32_t>(whole("the identifier of the message", 0xFFFFFFFFu));
+        return *id_;
+    }
+    std::optional<std::uint32_t> id() const { return id_; } ///< of the message the line is about, once it was read
     std::size_t number_of_line() const { return number_; }
+    std::size_t at() const { return at_; }
 
   private:
     const std::string& path_;
     std::size_t number_;
     std::string_view text_;
     std::size_t at_ = 0;
+    std::optional<std::uint32_t> id_;
+    bool boundless_ = false;
 };
 
 bool is_utf8(const std::string& text) {
@@ -137,22 +160,23 @@ std::string to_utf8(const std::string& text) {
     return out;
 }
 
-/// `BO_ 256 Name: 8 Sender`
-void read_message(dbc_line& line, dbc_file& file, bool& kept) {
-    dbc_message message;
+/// `BO_ 256 Name: 8 Sender`. @return false: its signals belong to no frame
+bool read_message(dbc_line& line, dbc_message& message) {
     const std::uint32_t id = line.message_id();
+    const std::size_t behind = line.at();
     message.name = line.name("the name of the message");
-    line.need(':', "after the name of the message");
-    message.length = static_cast<unsigned>(line.whole("the length of the message in bytes", 65535));
     message.extended = (id & extended_bit) != 0;
     message.id = id & ~extended_bit;
     message.line = line.number_of_line();
-    kept = id != no_message_id;
-    if (!kept) return;
-    if (message.id > (message.extended ? 0x1FFFFFFFu : 0x7FFu))
-        line.refuse(fmt::format("an identifier that fits {} bits (extended ones have 2147483648 added), found {}",
-                                message.extended ? 29 : 11, id));
-    file.messages.push_back(std::move(message));
+    if (id == no_message_id) return false;
+    const std::size_t back = line.at() - behind + fmt::formatted_size("{}", id);
+    if (message.id > 0x1FFFFFFFu) line.refuse_word(back, "an identifier of 29 bits, with 2147483648 added");
+    if (!message.extended && message.id > 0x7FF)
+        line.refuse_word(back, fmt::format("an identifier of 11 bits; as an extended one (29 bits) it is written {}",
+                                           id | extended_bit));
+    line.need(':', "after the name of the message");
+    message.length = static_cast<unsigned>(line.whole("the length of the message in bytes", 65535));
+    return true;
 }
 
 /// The optional `M`, `m3` or `m3M` between name and colon.
@@ -167,8 +191,7 @@ void read_multiplexing(dbc_line& line, dbc_signal& signal) {
     const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value);
     const std::string_view rest(end, static_cast<std::size_t>(text.data() + text.size() - end));
     if (text[0] != 'm' || error != std::errc{} || (!rest.empty() && rest != "M"))
-        line.refuse(fmt::format("M, m<number> or ':' after the name of the signal, found \"{}\"",
-                                printable(std::string(text))));
+        line.refuse_word(text.size(), "M, m<number> or ':' after the name of the signal");
     signal.mux_values = {{value, value}};
     signal.multiplexor = !rest.empty();
 }
@@ -198,9 +221,9 @@ dbc_signal read_signal(dbc_line& line) {
     signal.layout.offset = line.number("the offset, a number");
     line.need(')', "after the offset");
     line.need('[', "before the range");
-    line.number("the minimum, a number");
+    line.bound("the minimum, a number");
     line.need('|', "between minimum and maximum");
-    line.number("the maximum, a number");
+    line.bound("the maximum, a number");
     line.need(']', "after the range");
     signal.unit = to_utf8(line.quoted());
     // What does not fit a frame of 64 bytes may still be carried by another transport: refused only when it is used.
@@ -312,6 +335,89 @@ bool toggles_string(std::string_view text) {
     return odd;
 }
 
+/// The file, line by line.
+class dbc_reading {
+  public:
+    explicit dbc_reading(const std::string& path) { file_.path = path; }
+
+    void take(std::size_t number, std::string_view text) {
+        dbc_line line(file_.path, number, text);
+        const std::string_view keyword = line.word();
+        try {
+            read(line, keyword);
+        } catch (const failure& fault) {
+            set_aside(line, keyword, fault.what());
+        }
+    }
+
+    dbc_file finish() {
+        apply_default_format(formats_, file_);
+        const auto usable = [](const dbc_message& message) { return message.fault.empty(); };
+        if (std::none_of(file_.messages.begin(), file_.messages.end(), usable))
+            throw failure(exit_usage, first_fault_.empty() ? fmt::format("{}: found no message, expected a DBC file "
+                                                                         "with lines that begin with BO_",
+                                                                         file_.path)
+                                                           : first_fault_);
+        return std::move(file_);
+    }
+
+  private:
+    void read(dbc_line& line, std::string_view keyword) {
+        if (keyword == "BO_") {
+            in_message_ = true;
+            kept_ = false;
+            fresh_ = {};
+            kept_ = read_message(line, fresh_);
+            if (kept_) file_.messages.push_back(fresh_);
+        } else if (keyword == "SG_") {
+            if (!in_message_) line.refuse("a message (BO_) before its first signal");
+            dbc_signal signal = read_signal(line);
+            if (line.boundless())
+                file_.faults.push_back(
+                    fmt::format("{}: line {}: the range of signal {} is beyond any number; it is not "
+                                "used",
+                                file_.path, signal.line, printable(signal.name)));
+            if (kept_) file_.messages.back().signals.push_back(std::move(signal));
+        } else if (!keyword.empty() && line.done()) {
+            in_message_ = false; // the section NS_ lists keywords, one a line
+        } else if (keyword == "SIG_VALTYPE_") {
+            read_value_type(line, file_);
+        } else if (keyword == "SG_MUL_VAL_") {
+            read_extended_multiplexing(line, file_);
+        } else if (!keyword.empty()) {
+            in_message_ = false;
+            if (keyword.substr(0, 3) == "BA_") read_attribute(line, keyword, file_, formats_);
+        }
+    }
+
+    /// The message of a line that cannot be read is left out, the rest of the file is not.
+    void set_aside(const dbc_line& line, std::string_view keyword, const std::string& fault) {
+        if (first_fault_.empty()) first_fault_ = fault;
+        std::string names;
+        const auto leave_out = [&](dbc_message& message) {
+            message.fault = fault;
+            if (!message.name.empty()) names = message.name;
+        };
+        if (keyword == "BO_") {
+            leave_out(fresh_);
+            file_.messages.push_back(fresh_);
+        } else if (keyword == "SG_" && kept_) {
+            leave_out(file_.messages.back());
+        } else if (line.id()) {
+            for (dbc_message& message : file_.messages)
+                if (has_id(message, *line.id())) leave_out(message);
+        }
+        file_.faults.push_back(names.empty() ? fault + "; the line is left out"
+                                             : fmt::format("{}; message {} is left out", fault, printable(names)));
+    }
+
+    dbc_file file_;
+    dbc_message fresh_; ///< the one read last
+    frame_formats formats_;
+    std::string first_fault_;
+    bool in_message_ = false, kept_ = false; ///< signals that come belong to the last message of the file
+};
+
 } // namespace
 
 std::string read_dbc_text(const std::string& path) { return read_input(path, "a DBC"); }
@@ -319,44 +425,19 @@ std::string read_dbc_text(const std::string& path) { return read_input(path, "a 
 dbc_file read_dbc(const std::string& path) { return read_dbc(path, read_dbc_text(path)); }
 
 dbc_file read_dbc(const std::string& path, const std::string& text_of_file) {
-    dbc_file file;
-    file.path = path;
+    dbc_reading reading(path);
     std::istringstream input(text_of_file);
     std::string whole_line;
-    frame_formats formats;
-    bool in_string = false, in_message = false, message_kept = false;
+    bool in_string = false;
     for (std::size_t number = 1; std::getline(input, whole_line); ++number) {
         std::string_view text = whole_line;
         if (number == 1 && text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
         if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
         const bool continued = in_string;
         if (toggles_string(text)) in_string = !in_string;
-        if (continued) continue;
-        dbc_line line(path, number, text);
-        const std::string_view keyword = line.word();
-        if (keyword == "BO_") {
-            read_message(line, file, message_kept);
-            in_message = true;
-        } else if (keyword == "SG_") {
-            if (!in_message) line.refuse("a message (BO_) before its first signal");
-            dbc_signal signal = read_signal(line);
-            if (message_kept) file.messages.back().signals.push_back(std::move(signal));
-        } else if (!keyword.empty() && line.done()) {
-            in_message = false; // the section NS_ lists keywords, one a line
-        } else if (keyword == "SIG_VALTYPE_") {
-            read_value_type(line, file);
-        } else if (keyword == "SG_MUL_VAL_") {
-            read_extended_multiplexing(line, file);
-        } else if (!keyword.empty()) {
-            in_message = false;
-            if (keyword.substr(0, 3) == "BA_") read_attribute(line, keyword, file, formats);
-        }
+        if (!continued) reading.take(number, text);
     }
-    apply_default_format(formats, file);
-    if (file.messages.empty())
-        throw failure(exit_usage,
-                      fmt::format("{}: found no message, expected a DBC file with lines that begin with BO_", path));
-    return file;
+    return reading.finish();
 }
 
 } // namespace okid_host

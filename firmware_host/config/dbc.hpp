@@ -28,15 +28,17 @@ struct dbc_message {
     unsigned length = 0; ///< bytes
     std::size_t line = 0;
     std::vector<dbc_signal> signals;
+    std::string fault; ///< file, line and what is wrong: the message cannot be used; "" = it can
 };
 
 struct dbc_file {
     std::string path;
     std::vector<dbc_message> messages;
+    std::vector<std::string> faults; ///< lines that could not be read, each with what it costs
 };
 
-/// Read a DBC. Sections that do not place signals are skipped. Throws `failure` (exit 2) naming file, line, what was
-/// found and what was expected.
+/// Read a DBC. Sections that do not place signals are skipped; a line that cannot be read costs its message. Throws
+/// `failure` (exit 2) naming file, line, what was found and what was expected when no message is left.
 dbc_file read_dbc(const std::string& path);
 /// The two halves of it: the text of the file, and what it says. @param path  for messages
 std::string read_dbc_text(const std::string& path);

@@ -309,6 +309,7 @@ std::string session::silence(std::size_t index) const {
                                ? "is long enough for the signal"
                                : "carries the signal (its multiplexor has other values, or the frames are short)",
                            config_.path);
+    if (const std::string other = check_.same_group(index); !other.empty()) return other;
     return fmt::format("{}is the sensor on, and are {} and bus right in {}?",
                        others.empty() ? "" : "it carries " + others + "; ", channel.field ? "field" : "identifier",
                        config_.path);
