@@ -18,7 +18,6 @@ result = okid.identify(
     input_dofs=[1],
     output_dofs=list(range(1, len(responses) + 1)),
 )
-for mode in result.modes:
-    if mode.confident:
-        print(f"{mode.frequency_hz:.4f} ± {mode.frequency_std_hz:.4f} Hz, damping {100 * mode.damping_ratio:.3f} %")
+for mode in result.confident_modes:
+    print(f"{mode.frequency_hz:.4f} ± {mode.frequency_std_hz:.4f} Hz, damping {100 * mode.damping_ratio:.3f} %")
 print("M, kg:", *(f"{value:.3f}" for value in result.mkr.M.diagonal()))

@@ -27,6 +27,5 @@ with okid.Session(names[:1], names[1:], fs=float(rate_hz), window_s=20.0) as ses
                 del block[:-1]
                 print(", ".join(f"{mode.frequency_hz:.3f} Hz" for mode in session.modes() if mode.emac > 0.9))
     session.feed([[row[name] for name in names] for row in block])
-    for mode in session.identify().modes:
-        if mode.emac > 0.5:
-            print(f"{mode.frequency_hz:.4f} Hz, damping {100 * mode.damping_ratio:.3f} %")
+    for mode in session.identify().confident_modes:
+        print(f"{mode.frequency_hz:.4f} Hz, damping {100 * mode.damping_ratio:.3f} %")

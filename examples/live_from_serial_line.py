@@ -26,6 +26,5 @@ with okid.Session(["force"], ["a1", "a2", "a3"], fs=float(rate_hz)) as session:
                 print(", ".join(f"{mode.frequency_hz:.3f} Hz" for mode in session.modes() if mode.emac > 0.9))
     if block:
         session.feed(block)
-    for mode in session.identify().modes:
-        if mode.emac > 0.5:
-            print(f"{mode.frequency_hz:.4f} Hz, damping {100 * mode.damping_ratio:.3f} %")
+    for mode in session.identify().confident_modes:
+        print(f"{mode.frequency_hz:.4f} Hz, damping {100 * mode.damping_ratio:.3f} %")

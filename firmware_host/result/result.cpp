@@ -144,7 +144,7 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
     const bool agreed = !context.verdicts.empty();
     const bool shapes = model.n_y > 1 && model.n_y <= most_shape_columns;
     const std::vector<mode_verdict> verdicts = mode_verdicts(model, context);
-    int left_out = 0;
+    std::vector<std::string> left_out;
     std::vector<std::size_t> width;
     std::string out = fmt::format("   #       f [Hz]       ± σ     ζ [%]       ± σ     MPC    EMAC     CMI{}",
                                   agreed ? "  found in" : "");
@@ -159,7 +159,8 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
         const auto at_mode = static_cast<std::size_t>(k);
         const mode_verdict& verdict = verdicts[at_mode];
         const bool hidden = agreed && !verdict.confident && !context.all_modes;
-        left_out += hidden;
+        if (hidden)
+            left_out.push_back(fmt::format("{:.4g} Hz ({})", model.frequency_hz[k], fmt::join(verdict.why, ", ")));
         if (hidden) continue;
         const double std_f = context.sigma ? context.sigma->frequency_hz[at_mode] : NAN,
                      std_zeta = context.sigma ? context.sigma->damping_ratio[at_mode] : NAN;
@@ -176,7 +177,11 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
     }
     if (!agreed && std::any_of(verdicts.begin(), verdicts.end(), [](const mode_verdict& v) { return !v.confident; }))
         out += fmt::format("   ? EMAC below {:g}: probably noise, not a mode of the structure\n", doubtful_emac);
-    if (left_out) out += fmt::format("   {} not signed, listed with --all-modes\n", counted(left_out, "doubtful mode"));
+    if (!left_out.empty())
+        out +=
+            fmt::format("   {} not signed, listed with --all-modes: {}\n",
+                        counted(static_cast<long long>(left_out.size()), "doubtful mode"), fmt::join(left_out, ", "));
+    if (agreed) out += why_legend(verdicts);
     return out;
 }
 
@@ -206,26 +211,6 @@ nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviatio
         mode["cmi"] = number_json(model.cmi[k]);
         out.push_back(std::move(mode));
     }
-    return out;
-}
-
-std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const result_context& context) {
-    if (!context.verdicts.empty()) return context.verdicts;
-    std::vector<mode_verdict> out;
-    for (int k = 0; k < model.mode_count; ++k) {
-        mode_verdict& verdict = out.emplace_back();
-        verdict.confident = model.emac[k] >= doubtful_emac;
-        if (!verdict.confident) verdict.why.emplace_back("noise_shape");
-    }
-    return out;
-}
-
-/// {"confident": …, "found_in": …, "why": […]} of every mode.
-static ordered_json verdicts_json(const okid_identified_t& model, const result_context& context) {
-    ordered_json out = ordered_json::array();
-    for (const mode_verdict& verdict : mode_verdicts(model, context))
-        out.push_back(
-            {{"confident", verdict.confident}, {"found_in", number_json(verdict.found_in)}, {"why", verdict.why}});
     return out;
 }
 
@@ -260,8 +245,8 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
                              : ordered_json(nullptr);
         out["rates_hz"] = context.rates_hz;
     }
-    const ordered_json verdicts = verdicts_json(model, context);
-    for (std::size_t k = 0; k < verdicts.size(); ++k) out["modes"][k].update(verdicts[k]);
+    const std::vector<mode_verdict> verdicts = mode_verdicts(model, context);
+    for (std::size_t k = 0; k < verdicts.size(); ++k) out["modes"][k].update(verdict_json(verdicts[k]));
     out["fit"]["simulation_percent"] = percent_json(context.simulation_percent, context.outputs);
     out["fit"]["prediction_percent"] = percent_json(context.prediction_percent, context.outputs);
     if (context.stable) out["stabilization"] = stabilization_json(*context.stable);

@@ -2,6 +2,7 @@
 // An identified model as people and programs see it: okid.result/1 and the modal table.
 #pragma once
 #include "deviations.hpp"
+#include "mode_verdict.hpp"
 #include "refinement.hpp"
 #include "stabilization.hpp"
 
@@ -14,15 +15,6 @@
 #include <vector>
 
 namespace okid_host {
-
-constexpr double doubtful_emac = 0.5; ///< below this a mode seldom belongs to the structure
-
-/// Would an expert sign a mode?
-struct mode_verdict {
-    bool confident = false;
-    double found_in = NAN;        ///< share of the runs that could have seen it and did; NaN for a named method
-    std::vector<std::string> why; ///< codes of what speaks against it
-};
 
 /// What the library does not know about a result.
 struct result_context {
@@ -52,9 +44,6 @@ struct result_context {
 /// {"frequency_hz": …, "damping_ratio": …, "shape_re": […], "shape_im": […], "mpc": …, "emac": …, "cmi": …} of every mode.
 /// @param sigma  their standard deviations, or nullptr (null)
 nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma);
-
-/// Of every mode: those of the context, or by EMAC for a named method.
-std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const result_context& context);
 
 /// The whole okid.result/1 object. @param arrays  false: without singular_values, model and markov
 nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context, bool arrays = true);

@@ -31,11 +31,7 @@ def publishing(
     rig: pathlib.Path, lines: str, descriptors: int | None = None, speed: str = "4"
 ) -> Iterator[subprocess.Popen[str]]:
     (rig / "p.toml").write_text((rig / "a.toml").read_text() + f"[publish]\n{lines}\n")
-    limit = (
-        (lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors)))
-        if descriptors
-        else None
-    )
+    limit = (lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))) if descriptors else None
     with subprocess.Popen(
         [PROGRAM, "replay", rig / "a.log", "-c", rig / "p.toml", "--speed", speed, "--json", rig / "r.json"], preexec_fn=limit,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
@@ -52,9 +48,7 @@ def free_port() -> int:
 
 def status(run: subprocess.Popen[str], key: str) -> int:
     text = pathlib.Path(f"/proc/{run.pid}/status").read_text()
-    return next(
-        int(line.split()[1]) for line in text.splitlines() if line.startswith(key)
-    )
+    return next(int(line.split()[1]) for line in text.splitlines() if line.startswith(key))
 
 
 def cpu_s(run: subprocess.Popen[str]) -> float:
@@ -72,12 +66,7 @@ def connected(port: int) -> socket.socket:
 
 def test_no_descriptors_left(rig: pathlib.Path) -> None:
     """Release 0.1 went round accept() with a whole processor, and had no descriptor left for its result: exit 2."""
-    assert (
-        okid(
-            "replay", rig / "a.log", "-c", rig / "a.toml", "--json", rig / "calm.json"
-        ).returncode
-        == 0
-    )
+    assert okid("replay", rig / "a.log", "-c", rig / "a.toml", "--json", rig / "calm.json").returncode == 0
     port = free_port()
     with (
         publishing(
@@ -92,9 +81,7 @@ def test_no_descriptors_left(rig: pathlib.Path) -> None:
         for _ in range(45):
             one = crowd.enter_context(socket.socket(socket.AF_UNIX))
             one.setblocking(False)
-            until(
-                lambda one=one: one.connect_ex(str(rig / "s")) == 0, 5
-            )  # nobody is left standing at the door
+            until(lambda one=one: one.connect_ex(str(rig / "s")) == 0, 5)  # nobody is left standing at the door
         before, at = cpu_s(run), time.monotonic()
         time.sleep(2)
         assert (cpu_s(run) - before) / (time.monotonic() - at) < 0.5
@@ -113,9 +100,7 @@ def test_a_broker_that_announces_256_mb(rig: pathlib.Path, piecewise: bool) -> N
     """Release 0.1 took the room for it: 540 MB."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(20)
-        with publishing(
-            rig, f'mqtt = "mqtt://127.0.0.1:{server.getsockname()[1]}"'
-        ) as run:
+        with publishing(rig, f'mqtt = "mqtt://127.0.0.1:{server.getsockname()[1]}"') as run:
             wire, _ = server.accept()
             with wire:
                 wire.settimeout(10)
@@ -143,9 +128,7 @@ def test_slow_visitors_do_not_pile_up() -> None:
         hub = None
 
     server = PageServer(Quiet(), "127.0.0.1", 0)  # type: ignore[arg-type]
-    thread = threading.Thread(
-        target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
-    )
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True)
     thread.start()
     before, crowd = threading.active_count(), []
     try:
@@ -155,9 +138,7 @@ def test_slow_visitors_do_not_pile_up() -> None:
             crowd.append(one)
         time.sleep(0.5)
         assert threading.active_count() - before <= MOST_VISITORS
-        with socket.create_connection(
-            ("127.0.0.1", server.server_port), timeout=10
-        ) as wire:
+        with socket.create_connection(("127.0.0.1", server.server_port), timeout=10) as wire:
             wire.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
             assert wire.recv(15).startswith(b"HTTP/1.0 200")
     finally:
@@ -175,9 +156,7 @@ def test_the_page_without_descriptors_does_not_spin() -> None:
 
     server = PageServer(Quiet(), "127.0.0.1", 0)  # type: ignore[arg-type]
     visitor = socket.socket()
-    threading.Thread(
-        target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True
-    ).start()
+    threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True).start()
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
     free = os.open("/dev/null", os.O_RDONLY)
     os.close(free)

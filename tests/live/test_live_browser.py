@@ -170,6 +170,11 @@ def check_words(page: Page) -> None:
     told = page.text("#result-parts")
     assert "M positive definite" in told and "residual of W Wᵀ = 0 (doubtful above 0.03)" in told
     assert "_positive_definite" not in told and "ww_residual" not in told and "true" not in told
+    page.tab.uncheck("#modes-table tbody tr:first-child input")
+    with page.tab.expect_download() as waiting:
+        page.tab.click("#modes-save button[data-save='csv']")
+    saved = waiting.value.path().read_text(encoding="utf-8").splitlines()
+    assert len(saved) == 2 and saved[1].startswith("2,") and page.text("#modes-note").startswith("result: 2 confident")
     lines = page.tab.evaluate("document.querySelector('#diagram .plot').layout.shapes.length")
     assert lines == 2 and page.text("#diagram-note").endswith("2 modes hold")
 

@@ -22,7 +22,7 @@ RESULT_KEYS = [
 ]  # fmt: skip
 MODE_KEYS = [
     "frequency_hz", "damping_ratio", "shape_re", "shape_im", "frequency_std_hz", "damping_ratio_std", "shape_re_std",
-    "shape_im_std", "mpc", "emac", "cmi", "confident", "found_in", "why",
+    "shape_im_std", "mpc", "emac", "cmi", "confident", "found_in", "why", "why_text",
 ]  # fmt: skip
 
 

@@ -271,7 +271,7 @@ def test_okid_result_1(result: okid.Result, tmp_path) -> None:
     assert [len(m["shape_re"]) for m in data["modes"]] == [3, 3, 3]
     assert list(data["modes"][0]) == (
         "frequency_hz damping_ratio shape_re shape_im frequency_std_hz damping_ratio_std shape_re_std shape_im_std "
-        "mpc emac cmi confident found_in why".split()
+        "mpc emac cmi confident found_in why why_text".split()
     )
     assert 0.0 < data["modes"][0]["frequency_std_hz"] < 1e-3 * data["modes"][0]["frequency_hz"]
     assert min(data["modes"][0]["shape_re_std"]) == 0.0  # the entry that is 1 by scaling

@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
+import csv
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import okid
 import pytest
+from okid import report
+from okid.demo import demo_record
 
 OVERLAPS = """() => [...document.querySelectorAll('svg')].flatMap((svg) => {
   const all = [...svg.querySelectorAll('text')].map((e) => [e.getBoundingClientRect(), e.textContent]);
@@ -88,7 +93,7 @@ def test_a_narrow_window_scrolls_tables_not_the_page(browser: Any, pages: dict[s
 def test_names_are_text_everywhere(browser: Any, pages: dict[str, Path]) -> None:
     with opened(browser, pages["frame"]) as page:
         kinds = page.evaluate("[...document.scripts].map((s) => s.type || 'code')")
-        assert kinds == ["application/json", "code"]
+        assert kinds == ["application/json", "application/json", "code"]
         assert page.query_selector_all("img, link, iframe, main b, main i, main u") == []
         assert page.title() == "<u>A</u> & B"
         text = page.inner_text("#summary")
@@ -102,7 +107,7 @@ def test_names_are_text_everywhere(browser: Any, pages: dict[str, Path]) -> None
 def test_what_the_sections_say(browser: Any, pages: dict[str, Path]) -> None:
     with opened(browser, pages["frame"]) as page:
         verdict = page.inner_text(".verdict")
-        assert verdict.startswith("3 modes from ")
+        assert verdict.startswith("3 confident modes from ")
         assert "samples are missing at 1 channel, at most 0.013 %" in verdict
         assert "1 alarm" in verdict
         assert "29996" in page.inner_text("#summary")
@@ -199,3 +204,41 @@ def test_stills_take_the_place_of_the_animation(browser: Any, pages: dict[str, P
             assert page.locator(".player").is_visible() == moving
             assert page.locator("svg.still").is_visible() == (not moving)
         context.close()
+
+
+def test_what_is_selected_is_what_is_saved(browser: Any, tmp_path: Path) -> None:
+    """Three modes, one of them doubtful: it stands apart with its reason, and is saved when it is chosen."""
+    u, y = demo_record(3000)
+    raw = okid.identify(u, y, fs=1000.0, method="n4sid-moesp", order=6, sigma_blocks=0).to_dict()
+    raw["modes"][1].update(confident=False, why=["tone"], why_text=["a steady line"], found_in=0.75)
+    report.write_report(raw, tmp_path / "r.html")
+    with opened(browser, tmp_path / "r.html") as page:
+        assert "2 confident modes from " in page.inner_text(".verdict")
+        assert "1 doubtful mode listed apart" in page.inner_text(".verdict")
+        assert "tone: a steady line" in page.inner_text("#modes table.words")
+        assert page.inner_text(".save .chosen") == "2 of 3 modes selected"
+        page.uncheck("input[data-mode='1']")
+        page.check("input[data-mode='2']")
+        saved = {}
+        for kind in ("csv", "json", "uff"):
+            with page.expect_download() as waiting:
+                page.click(f"button[data-save='{kind}']")
+            saved[kind] = tmp_path / f"modes.{kind}"
+            waiting.value.save_as(saved[kind])
+            assert waiting.value.suggested_filename == f"modes.{kind}"
+        page.uncheck("input[data-mode='2']")
+        page.uncheck("input[data-mode='3']")
+        assert page.is_disabled("button[data-save='uff']")
+    wanted = [raw["modes"][k]["frequency_hz"] for k in (1, 2)]
+    rows = list(csv.DictReader(saved["csv"].read_text(encoding="utf-8").splitlines()))
+    assert [(row["mode"], float(row["frequency_hz"])) for row in rows] == [
+        ("2", wanted[0]),
+        ("3", wanted[1]),
+    ]
+    assert [float(row["y3 re"]) for row in rows] == [raw["modes"][k]["shape_re"][2] for k in (1, 2)]
+    found = okid.Result.from_dict(json.loads(saved["json"].read_text(encoding="utf-8")))
+    assert [mode.frequency_hz for mode in found.confident_modes] == wanted
+    assert found.warnings[-1].code == "modes_chosen"
+    modes = okid.read_uff(saved["uff"]).modes
+    assert [(mode.number, mode.confident) for mode in modes] == [(2, False), (3, True)]
+    assert [mode.frequency_hz for mode in modes] == pytest.approx(wanted, rel=1e-5)

@@ -139,13 +139,14 @@ def test_every_doubt_leaves_room_for_the_remarks(raw: dict[str, Any], tmp_path: 
         for line in (
             {"type": "change", "t": 1.0},
             {"type": "alarm", "t": 1.0, "mode": 1, "frequency_hz": 1.0, "baseline_hz": 2.0},
+            {"type": "bus", "t": 1.5, "bus": "can9", "event": "unheard", "text": "nothing"},
             {"type": "bus", "t": 2.0, "bus": "can0", "event": "unheard", "text": "no frame of 0x101 <acc1>"},
             {"type": "bus", "t": 3.0, "bus": "can0", "event": "unheard", "text": "again"},
             {"type": "bus", "t": 4.0, "bus": "can1", "event": "link_up", "text": "there again"},
         ):
             file.write(json.dumps(line) + "\n")
     told = shown(poor, events=path)
-    assert told.index("by the time stamps 498 samples") < told.index("with EMAC below 0.5")
+    assert told.index("by the time stamps 498 samples") < told.index("the simulation explains only")
     assert (
         "bus can0: unheard (in Frequencies over time); 1 alarm; and more below; the remark below (saturated)." in told
     )

@@ -17,12 +17,15 @@ Complex = NDArray[np.complex128]
 def mac_matrix(a: ArrayLike, b: ArrayLike | None = None) -> Real:
     """Modal assurance criterion of every shape in `a` (modes, n_y) with every shape in `b` (default: a itself).
 
-    |a^H b|^2 / (a^H a)(b^H b), 0..1; a zero shape gives 0. Raises InputError when the lengths differ.
+    |a^H b|^2 / (a^H a)(b^H b), 0..1; a zero shape gives 0, and an entry that is missing (NaN) in one of them counts in
+    none. Raises InputError when the lengths differ.
     """
     first = np.atleast_2d(np.asarray(a, dtype=np.complex128))
     second = first if b is None else np.atleast_2d(np.asarray(b, dtype=np.complex128))
     if first.shape[1] != second.shape[1]:
         raise InputError(f"shapes have {first.shape[1]} and {second.shape[1]} entries: they cannot be compared")
+    there = np.all(np.isfinite(first), axis=0) & np.all(np.isfinite(second), axis=0)
+    first, second = first[:, there], second[:, there]
     cross = np.abs(first.conj() @ second.T) ** 2
     power = np.outer(np.sum(np.abs(first) ** 2, axis=1), np.sum(np.abs(second) ** 2, axis=1))
     return np.asarray(np.divide(cross, power, out=np.zeros_like(cross), where=power > 0.0), dtype=np.float64)
@@ -44,6 +47,7 @@ def mpc(shape: ArrayLike) -> float:
     ((Sxx - Syy)^2 + 4 Sxy^2) / (Sxx + Syy)^2 with the sums of real and imaginary parts about zero.
     """
     x = np.asarray(shape, dtype=np.complex128)
+    x = x[np.isfinite(x)]
     sxx, syy, sxy = float(x.real @ x.real), float(x.imag @ x.imag), float(x.real @ x.imag)
     total = sxx + syy
     return ((sxx - syy) ** 2 + 4.0 * sxy**2) / total**2 if total > 0.0 else 0.0
@@ -52,7 +56,7 @@ def mpc(shape: ArrayLike) -> float:
 def normalised(shape: ArrayLike) -> Complex:
     """The shape scaled so that its largest entry is 1 (a zero shape stays)."""
     x = np.asarray(shape, dtype=np.complex128)
-    largest = x[np.argmax(np.abs(x))]
+    largest = x[np.argmax(np.nan_to_num(np.abs(x)))]
     return x / largest if largest != 0.0 else x
 
 

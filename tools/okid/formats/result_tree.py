@@ -14,7 +14,8 @@ from okid._errors import InputError
 from okid.result.result import Result
 from okid.result.result_file import read_result
 
-_NUMBERS = ("frequency_hz", "damping_ratio", "frequency_std_hz", "damping_ratio_std", "mpc", "emac", "cmi")
+_NUMBERS = ("frequency_hz", "damping_ratio", "frequency_std_hz", "damping_ratio_std", "mpc", "emac", "cmi",
+            "confident", "found_in")  # fmt: skip
 
 
 def result_dict(result: Result | Mapping[str, Any]) -> dict[str, Any]:
@@ -52,7 +53,7 @@ def _matrices(part: Mapping[str, Any] | None) -> dict[str, Any]:
 
 
 def mode_arrays(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """frequency_hz, damping_ratio, their std, mpc, emac, cmi (n,) and shapes (n_y, n) complex of the modes."""
+    """frequency_hz, damping_ratio, their std, mpc, emac, cmi, confident (1 or 0), found_in (n,), shapes (n_y, n)."""
     modes = raw["modes"]
     out: dict[str, Any] = {key: np.array([_float(mode.get(key)) for mode in modes]) for key in _NUMBERS}
     shapes = [np.array(mode["shape_re"], float) + 1j * np.array(mode["shape_im"], float) for mode in modes]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -33,9 +33,11 @@ from okid.formats.uff_model import (
     read_units,
     units_text,
 )
+from okid.result.left_out import without_left_out
 from okid.result.result import Result
 
 FRF_LINES = 1025
+Place = tuple[int, int, int]  # node, axis 0..2, sign
 _SENSING = {"acceleration": (12, "m/s^2"), "velocity": (11, "m/s"), "displacement": (8, "m")}
 
 
@@ -178,40 +180,58 @@ def _record_bytes(record: Record, binary: bool) -> list[bytes]:
     return out
 
 
-def _place(name: str, number: int, geometry: Geometry | None) -> tuple[int, int, int]:
-    return (number, 0, 1) if geometry is None else geometry.place(name, number)
+def _places(names: Sequence[str], geometry: Geometry | None) -> dict[str, Place]:
+    """Of each channel; without a geometry channel k is at node k along x."""
+    return {name: (k, 0, 1) if geometry is None else geometry.place(name, k) for k, name in enumerate(names, 1)}
 
 
-def _mode_bytes(raw: dict[str, Any], geometry: Geometry | None, sensing: str) -> list[bytes]:
-    """The modes as data sets 55; without a geometry output k moves node k along x."""
+def _chosen(texts: list[str], modes: Sequence[int] | None) -> list[str]:
+    wrong = [number for number in modes or () if not 1 <= number <= len(texts)]
+    if wrong:
+        raise InputError(f"modes has {wrong[0]}, expected numbers from 1 to {len(texts)}")
+    return texts if modes is None else [texts[number - 1] for number in sorted(set(modes))]
+
+
+def _judgement(mode: Mapping[str, Any]) -> str:
+    """What is known of the trust in a mode: nothing of results before 0.2."""
+    if mode.get("confident") is None:
+        return ""
+    share = mode.get("found_in")
+    found = "" if share is None else f" (found in {100.0 * share:.0f} % of the runs that could see it)"
+    why = "; ".join(mode.get("why_text") or mode.get("why") or ())
+    return f"confident{found}" if mode["confident"] else f"doubtful: {', '.join(mode.get('why') or ())}: {why}"
+
+
+def mode_sets(raw: Mapping[str, Any], places: Sequence[Place | None], sensing: str = "acceleration") -> list[str]:
+    """The modes as data sets 55, a text each; places: node, axis 0..2 and sign of each output, None = nowhere."""
     arrays = mode_arrays(raw)
-    places = [_place(name, k, geometry) for k, name in enumerate(raw["outputs"], 1)]
-    nodes = sorted({node for node, _, _ in places})
+    nodes = sorted({place[0] for place in places if place is not None})
     out = []
-    for k in range(len(raw["modes"])):
+    for k, one in enumerate(raw["modes"]):
         shape = np.zeros((len(nodes), 3), dtype=np.complex128)
-        for value, (node, axis, sign) in zip(arrays["shapes"][:, k], places, strict=True):
-            shape[nodes.index(node), axis] = sign * value
+        for value, place in zip(arrays["shapes"][:, k], places, strict=True):
+            if place is not None:
+                shape[nodes.index(place[0]), place[1]] = place[2] * value
         f, z = float(arrays["frequency_hz"][k]), float(arrays["damping_ratio"][k])
         remark = f"okid mode {k + 1}: {f!r} Hz, damping ratio {z!r}"
-        mode = UffMode(k + 1, f, z, nodes, shape, f"{raw.get('title') or 'okid'} {raw.get('method', '')}".strip())
-        out.append(mode_text(mode, _SENSING[sensing][0], remark).encode())
+        title = f"{raw.get('title') or 'okid'} {raw.get('method', '')}".strip()
+        mode = UffMode(k + 1, f, z, nodes, shape, title, _judgement(one))
+        out.append(mode_text(mode, _SENSING[sensing][0], remark))
     return out
 
 
-def _frf_bytes(raw: dict[str, Any], geometry: Geometry | None, binary: bool, sensing: str) -> list[bytes]:
+def _frf_bytes(
+    raw: dict[str, Any], outputs: list[Place], inputs: list[Place], binary: bool, sensing: str
+) -> list[bytes]:
     """The responses of the model at FRF_LINES even lines from 0 Hz to Nyquist, output over input."""
-    model, inputs = result_tree(raw)["model"], list(raw["inputs"])
+    model = result_tree(raw)["model"]
     step = float(raw["fs_hz"]) / 2.0 / (FRF_LINES - 1)
     response = frf.synthesise(model["A"], model["B"], model["C"], model["D"], model["dt"], step * np.arange(FRF_LINES))
     code, unit = _SENSING[sensing]
     out = []
     for o, name in enumerate(raw["outputs"]):
-        for i, other in enumerate(inputs):
-            ends = []
-            for channel, number in ((name, o + 1), (other, i + 1)):
-                node, axis, sign = _place(channel, number, geometry)
-                ends.append((node, sign * (axis + 1)))
+        for i, other in enumerate(raw["inputs"]):
+            ends = [(node, sign * (axis + 1)) for node, axis, sign in (outputs[o], inputs[i])]
             one = UffFunction(
                 f"{name} / {other}", FRF, response[:, o, i], 0.0, step, None, unit, "N", ends[0], ends[1],
                 title=str(raw.get("title") or ""), known={"df_hz": step},
@@ -227,13 +247,16 @@ def write_uff(
     geometry: Geometry | None = None,
     binary: bool = True,
     sensing: str = "acceleration",
+    modes: Sequence[int] | None = None,
 ) -> None:
     """Write a record, or a result (Result or okid.result/1 dictionary), as a universal file.
 
     Both begin with data sets 151 (header) and 164 (SI). Record: a time history (58) a channel; NaN stays NaN.
-    Result: 55 for each mode, 58 for each modelled FRF, and 15 and 82 of `geometry`. binary: samples exact (58b), else
-    ASCII with 12 digits. sensing: what the outputs of the result are. InputError when a name or unit is too long,
-    the rate is not known, a channel has no place in the geometry, or the file cannot be written.
+    Result: 55 for each mode, or those numbered in `modes` (from 1), with "confident .." or "doubtful: why" on its third
+    ID line; 58 for each modelled FRF, and 15 and 82 of `geometry`; outputs that were left out are not in it. binary:
+    samples exact (58b), else ASCII with 12 digits. sensing: what the outputs of the result are. InputError when a name
+    or unit is too long, the rate is not known, a channel has no place in the geometry, a number of `modes` is not
+    there, or the file cannot be written.
     """
     if sensing not in _SENSING:
         raise InputError(f"sensing is {sensing!r}, expected {', '.join(_SENSING)}")
@@ -247,7 +270,12 @@ def write_uff(
             raw = result_dict(what)
             if geometry is not None:
                 parts += [nodes_text(geometry.nodes).encode(), lines_text(geometry.lines).encode()]
-            parts += _mode_bytes(raw, geometry, sensing) + _frf_bytes(raw, geometry, binary, sensing)
+            places = _places(raw["outputs"], geometry)
+            raw, _ = without_left_out(raw)
+            outputs = [places[name] for name in raw["outputs"]]
+            inputs = list(_places(raw["inputs"], geometry).values())
+            parts += [text.encode() for text in _chosen(mode_sets(raw, outputs, sensing), modes)]
+            parts += _frf_bytes(raw, outputs, inputs, binary, sensing)
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None
     with whole_file(path) as part, part.open("wb") as out:

@@ -27,6 +27,13 @@ class UffMode:
     nodes: list[int]
     shape: NDArray[np.complex128]
     title: str = ""
+    judgement: str = ""  # of okid: "confident ..." or "doubtful: why", on the third ID line
+
+    @property
+    def confident(self) -> bool | None:
+        """As okid judged it; None: the file does not say."""
+        word = self.judgement.partition(" ")[0].rstrip(":")
+        return {"confident": True, "doubtful": False}.get(word)
 
 
 def read_mode(block: Block) -> UffMode | None:
@@ -45,7 +52,9 @@ def read_mode(block: Block) -> UffMode | None:
         frequency, damping = size / (2.0 * np.pi), -values[0] / size if size > 0.0 else 0.0
     nodes, shape = _shape(block, width, data == 5)
     title = block.lines[0][:80].strip()
-    return UffMode(number, frequency, damping, nodes, shape, "" if title.upper() == "NONE" else title)
+    told = block.lines[2][:80].strip()
+    judged = told if told.startswith(("confident", "doubtful")) else ""
+    return UffMode(number, frequency, damping, nodes, shape, "" if title.upper() == "NONE" else title, judged)
 
 
 def _shape(block: Block, width: int, complex_values: bool) -> tuple[list[int], NDArray[np.complex128]]:
@@ -143,7 +152,7 @@ def lines_text(lines: Sequence[tuple[int, int]]) -> str:
 def mode_text(mode: UffMode, kind: int, remark: str) -> str:
     """Data set 55, normal mode with complex values; kind: code of what the shape is (8 displacement, 12 ..)."""
     head = opening(55) + text_line(mode.title[:80], "title") + text_line(remark[:80], "remark")
-    head += "".join(text_line("", "ID line") for _ in range(3))
+    head += text_line(mode.judgement[:80], "ID line") + "".join(text_line("", "ID line") for _ in range(2))
     head += "".join(f"{n:10d}" for n in (1, 2, 2, kind, 5, 3)) + "\n"
     head += "".join(f"{n:10d}" for n in (2, 4, 1, mode.number)) + "\n"
     head += "".join(short_number(value) for value in (mode.frequency_hz, 0.0, mode.damping_ratio, 0.0)) + "\n"

@@ -20,6 +20,7 @@ FILES = {
     "/plots.js": ("plots.js", SCRIPT),
     "/tables.js": ("tables.js", SCRIPT),
     "/shapes.js": ("shapes.js", SCRIPT),
+    "/selection.js": ("selection.js", SCRIPT),
 }
 PLOTLY = "/plotly.js"
 

@@ -35,7 +35,8 @@ def _change(event: dict[str, Any]) -> tuple[str, str]:
 
 def _result(event: dict[str, Any]) -> tuple[str, str]:
     result = event.get("result") or {}
-    return "good", f"result: order {result.get('order')}, {len(result.get('modes') or [])} modes"
+    sure = [mode for mode in result.get("modes") or [] if mode.get("confident") is not False]
+    return "good", f"result: order {result.get('order')}, {len(sure)} confident modes"
 
 
 def describe(event: dict[str, Any]) -> tuple[str, str] | None:

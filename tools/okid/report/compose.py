@@ -103,7 +103,7 @@ def build(
     with matplotlib.rc_context(cast(Any, figures.STYLE)):
         sections = [one for one in _sections(m, written) if one is not None]
     raw = result.raw
-    subtitle = f"{count_of(len(raw['modes']), 'mode')}, {count_of(len(result.inputs), 'input')}, "
+    subtitle = f"{count_of(len(result.confident), 'confident mode')}, {count_of(len(result.inputs), 'input')}, "
     subtitle += count_of(len(result.outputs), "output")
     foot = f"okid {raw.get('version', '')}, schema {raw['schema']}. SI units unless the channel names say otherwise."
     known = m.events.notes.get("title") if m.events is not None else None

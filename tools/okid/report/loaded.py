@@ -13,18 +13,21 @@ from numpy.typing import NDArray
 from okid._errors import InputError
 from okid.report.other_kinds import MADE_BY, check_kind
 from okid.report.result_keys import check_keys
+from okid.result.left_out import without_left_out
 from okid.result.model import Model
 from okid.result.result_file import read_result
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+LEAST_EMAC = 0.5
 
 
 @dataclass
 class Loaded:
     """The parts of a result file as arrays: shapes (modes, n_y), singular_values (s,), markov (count, n_y, n_u).
 
-    Of method "auto" there are no singular values.
+    Of method "auto" there are no singular values. Outputs that were left out (remark "screened") are in `left_out` and
+    in `whole`, the result as it came, alone.
     """
 
     raw: dict[str, Any]
@@ -33,6 +36,13 @@ class Loaded:
     frequency_hz: Real
     singular_values: Real
     markov: Real
+    left_out: list[str]
+    whole: dict[str, Any]
+
+    @property
+    def confident(self) -> list[int]:
+        """Which modes, from 0, an expert would sign: as the result says, of one before release 0.2 by EMAC."""
+        return [k for k, mode in enumerate(self.raw["modes"]) if mode.get("confident", _consistent(mode))]
 
     @property
     def fs(self) -> float:
@@ -67,6 +77,10 @@ class Loaded:
         return Model(m["A"], m["B"], m["C"], m["D"], gain if usable else np.zeros((n_z, n_y)), 1.0 / self.fs), usable
 
 
+def _consistent(mode: dict[str, Any]) -> bool:
+    return mode.get("emac") is None or float(mode["emac"]) >= LEAST_EMAC
+
+
 def load_result(path: str | Path) -> Loaded:
     """Read and check an okid.result/1 file. InputError names file and key, and what the file is when it is none."""
     check_kind(path, "result")
@@ -85,6 +99,7 @@ def load_result(path: str | Path) -> Loaded:
 def loaded_from(raw: Any, source: str) -> Loaded:
     """An okid.result/1 that is already parsed. InputError names `source` and the key."""
     check_keys(raw, source)
+    whole, (raw, left) = raw, without_left_out(raw)
     n_y, n_u = len(raw["outputs"]), len(raw["inputs"])
     model = _matrices(raw, source)
     shapes = np.array(
@@ -92,7 +107,7 @@ def loaded_from(raw: Any, source: str) -> Loaded:
     ).reshape(len(raw["modes"]), n_y)
     frequency = np.array([float(m["frequency_hz"]) for m in raw["modes"]], dtype=np.float64)
     values = np.array(raw["singular_values"] or [], dtype=np.float64)
-    return Loaded(raw, model, shapes, frequency, values, _markov(raw, n_y, n_u, source))
+    return Loaded(raw, model, shapes, frequency, values, _markov(raw, n_y, n_u, source), left, whole)
 
 
 def _matrices(raw: dict[str, Any], source: str) -> dict[str, Real]:

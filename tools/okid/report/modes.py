@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+from okid.data.geometry import AXES
+from okid.formats.uff import mode_sets
+from okid.formats.uff_model import lines_text, nodes_text, units_text
 from okid.report import drawings, page
 from okid.report.material import Material
 from okid.result import figures
@@ -18,35 +22,79 @@ def plain(value: Any, digits: str, factor: float = 1.0) -> str:
 
 
 def table_section(m: Material) -> page.Section:
-    """Frequencies, damping ratios, their deviations and the indicators."""
-    modes = m.result.raw["modes"]
+    """Frequencies, damping ratios, their deviations and the indicators; doubtful modes apart, with the reason."""
+    modes, sure = m.result.raw["modes"], m.result.confident
     if not modes:
         return page.section("Modes", page.absent("The result holds no underdamped mode."))
-    f_std = any(one.get("frequency_std_hz") is not None for one in modes)
-    z_std = any(one.get("damping_ratio_std") is not None for one in modes)
+    parts = [_table(modes, sure, True) if sure else page.absent("No mode of this result would be signed.")]
+    doubtful = [k for k in range(len(modes)) if k not in sure]
+    if doubtful:
+        words = "Not counted as modes of the structure, and not in the pictures below."
+        parts += [page.heading("Doubtful"), _table(modes, doubtful, False), page.note(words)]
+    return page.section("Modes", *parts, _save(m), page.note(
+        "MPC: phase collinearity of the shape; EMAC: consistency of the mode over the Hankel matrix; CMI: MPC times "
+        "EMAC. 1 is best for all three; below 0.5 a mode is probably noise."))  # fmt: skip
+
+
+def _table(modes: Sequence[dict[str, Any]], shown: Sequence[int], sure: bool) -> str:
+    """The modes numbered in `shown`, from 0; not sure: with why."""
+    f_std = any(modes[k].get("frequency_std_hz") is not None for k in shown)
+    z_std = any(modes[k].get("damping_ratio_std") is not None for k in shown)
+    voted = any(modes[k].get("found_in") is not None for k in shown)
     head = ["mode", "f [Hz]", *(["± σ [Hz]"] if f_std else []), "ζ [%]", *(["± σ [%]"] if z_std else [])]
+    head += ["MPC", "EMAC", "CMI", *(["found in"] if voted else []), *([] if sure else ["what speaks against it"])]
     rows = []
-    for k, one in enumerate(modes, 1):
-        row = [str(k), plain(one["frequency_hz"], ".4f")]
+    for k in shown:
+        one = modes[k]
+        row = [str(k + 1), plain(one["frequency_hz"], ".4f")]
         row += [plain(one.get("frequency_std_hz"), ".2g")] if f_std else []
         row.append(plain(one["damping_ratio"], ".4f", 100.0))
         row += [plain(one.get("damping_ratio_std"), ".2g", 100.0)] if z_std else []
         both = one.get("mpc") is not None and one.get("emac") is not None
         cmi = one.get("cmi", float(one["mpc"]) * float(one["emac"]) if both else None)
-        rows.append([*row, plain(one.get("mpc"), ".4f"), plain(one.get("emac"), ".4f"), plain(cmi, ".4f")])
-    return page.section("Modes", page.table([*head, "MPC", "EMAC", "CMI"], rows), page.note(
-        "MPC: phase collinearity of the shape; EMAC: consistency of the mode over the Hankel matrix; CMI: MPC times "
-        "EMAC. 1 is best for all three; below 0.5 a mode is probably noise."))  # fmt: skip
+        row += [plain(one.get("mpc"), ".4f"), plain(one.get("emac"), ".4f"), plain(cmi, ".4f")]
+        row += [f"{plain(one.get('found_in'), '.0f', 100.0)} %"] if voted else []
+        rows.append(row if sure else [*row, against(one)])
+    return page.table(head, rows, "" if sure else "words", [(k + 1, sure) for k in shown])
 
 
-def _best(m: Material, most: int) -> list[int]:
-    """The modes with the highest EMAC, ascending in frequency."""
-    quality = [float(one.get("emac") or 0.0) for one in m.result.raw["modes"]]
-    return sorted(sorted(range(len(quality)), key=lambda k: -quality[k])[:most])
+def against(mode: dict[str, Any]) -> str:
+    """The codes of what speaks against a mode, with their words."""
+    codes = [str(code) for code in mode.get("why") or ["noise_shape"]]
+    texts = [str(text) for text in mode.get("why_text") or ()]
+    return (
+        "; ".join(f"{c}: {t}" for c, t in zip(codes, texts, strict=True))
+        if len(texts) == len(codes)
+        else ", ".join(codes)
+    )
+
+
+def _save(m: Material) -> str:
+    """Buttons that save the chosen modes, and what they save."""
+    whole = {**m.result.whole, "markov": None, "singular_values": None}
+    geometry, count = m.geometry, len(m.result.outputs)
+    dofs = [(k + 1, "x") for k in range(count)] if geometry is None else geometry.dofs
+    places = [None if dof is None else (dof[0], AXES.index(dof[1][-1]), -1 if dof[1][0] == "-" else 1) for dof in dofs]
+    head = units_text() + ("" if geometry is None else nodes_text(geometry.nodes) + lines_text(geometry.lines))
+    sets = mode_sets(m.result.raw, places)
+    buttons = "".join(
+        f'<button type="button" data-save="{kind}">{kind.upper()}</button>' for kind in ("csv", "json", "uff")
+    )
+    return (
+        f'<div class="save"><span class="chosen" role="status"></span><span>Download selected:</span>{buttons}</div>\n'
+        + page.data("modes-data", {"result": whole, "uff": {"head": head, "modes": sets}})
+    )
+
+
+def _shown(m: Material, most: int) -> list[int]:
+    """The confident modes (without any: all) with the highest EMAC, ascending in frequency."""
+    modes = m.result.raw["modes"]
+    among = m.result.confident or list(range(len(modes)))
+    return sorted(sorted(among, key=lambda k: -float(modes[k].get("emac") or 0.0))[:most])
 
 
 def _sticks(m: Material) -> list[str]:
-    shown = _best(m, MOST_SHAPES)
+    shown = _shown(m, MOST_SHAPES)
     columns = min(4, len(shown)) if len(m.result.outputs) <= 12 else min(2, len(shown))
     bands = -(-len(shown) // columns)
     letters = max(len(figures.short(name)) for name in m.result.outputs)
@@ -57,9 +105,9 @@ def _sticks(m: Material) -> list[str]:
         title = f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz, {damping:.2f} %"
         figures.draw_shape(drawing.add_subplot(bands, columns, place), m.result.shapes[k], m.result.outputs, title)
     words = "Sign from the real part, largest entry 1, outputs in their order."
-    count = len(m.result.shapes)
+    count = len(m.result.confident)
     if count > len(shown):
-        words += f" The {len(shown)} of {count} modes with the highest EMAC are shown."
+        words += f" The {len(shown)} of {count} confident modes with the highest EMAC are shown."
     return [m.pictures.inline(drawing, "mode shapes against the outputs"), page.note(words)]
 
 
@@ -67,11 +115,12 @@ def _player(m: Material) -> list[str]:
     """Moving shapes on the screen, all modes; on paper a still picture of each."""
     geometry, result = m.geometry, m.result
     assert geometry is not None
-    count = len(result.shapes)
+    chosen = _shown(m, len(result.shapes))
+    count = len(chosen)
     buttons = "\n".join(
-        f'<button type="button" data-mode="{k}" aria-pressed="{"true" if k == 0 else "false"}">'
+        f'<button type="button" data-mode="{place}" aria-pressed="{"false" if place else "true"}">'
         f"{k + 1}: {result.frequency_hz[k]:.2f} Hz</button>"
-        for k in range(count)
+        for place, k in enumerate(chosen)
     )
     payload = {
         "geometry": {
@@ -79,7 +128,7 @@ def _player(m: Material) -> list[str]:
         },
         "shapes": [
             {"re": [round(float(x), 5) for x in shape.real], "im": [round(float(x), 5) for x in shape.imag]}
-            for shape in result.shapes
+            for shape in result.shapes[chosen]
         ],
     }  # fmt: skip
     live = (
@@ -92,8 +141,8 @@ def _player(m: Material) -> list[str]:
     columns = min(4, count)
     bands = -(-count // columns)
     drawing = figures.figure(2.4 * columns, 2.2 * bands)
-    for k in range(count):
-        ax = drawing.add_subplot(bands, columns, k + 1)
+    for place, k in enumerate(chosen, 1):
+        ax = drawing.add_subplot(bands, columns, place)
         drawings.draw_at_rest_and_moved(ax, geometry, result.shapes[k])
         ax.set_title(f"{k + 1}: {result.frequency_hz[k]:.2f} Hz")
     absent = [name for name, dof in zip(result.outputs, geometry.dofs, strict=True) if dof is None]
@@ -114,7 +163,7 @@ def shape_sections(m: Material) -> list[page.Section]:
 
 
 def _complexity(m: Material) -> page.Section:
-    shown = _best(m, MOST_SHAPES)
+    shown = _shown(m, MOST_SHAPES)
     columns = min(6, len(shown))
     bands = -(-len(shown) // columns)
     drawing = figures.figure(1.6 * columns, 1.75 * bands)
@@ -128,7 +177,7 @@ def _complexity(m: Material) -> page.Section:
 
 
 def _automac(m: Material) -> page.Section:
-    shown = _best(m, MOST_SQUARES)
+    shown = _shown(m, MOST_SQUARES)
     size = min(6.6, 1.9 + 0.5 * len(shown))
     drawing = figures.figure(size + 0.8, size)
     drawing.set_layout_engine("constrained", w_pad=0.12)  # the square is fitted after the layout

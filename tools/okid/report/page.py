@@ -22,10 +22,18 @@ class Section(NamedTuple):
     body: str
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> str:
-    """A table of numbers; cells are escaped."""
-    top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
-    body = "\n".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "", boxes: Sequence[tuple[int, bool]] = ()
+) -> str:
+    """A table of numbers; cells are escaped. boxes: of each row the number of its mode, and whether it is chosen."""
+    top = ('<th class="pick"></th>' if boxes else "") + "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    picks = [
+        f'<td class="pick"><input type="checkbox" data-mode="{number}" aria-label="mode {number}"'
+        f"{' checked' if chosen else ''}></td>"
+        for number, chosen in boxes
+    ]
+    lines = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows]
+    body = "\n".join(f"<tr>{pick}{line}</tr>" for pick, line in zip(picks or [""] * len(lines), lines, strict=True))
     name = f' class="{kind}"' if kind else ""
     whole = f"<table{name}><thead><tr>{top}</tr></thead><tbody>\n{body}\n</tbody></table>"
     return f'<div class="scroll" tabindex="0">{whole}</div>'
@@ -93,8 +101,11 @@ def page(title: str, subtitle: str, sections: Iterable[Section], foot: str) -> s
     body = "\n".join(one.body for one in listed)
     links = "\n".join(f'<a href="#{anchor(one.name)}">{escape(one.name)}</a>' for one in listed)
     script, shut = "", "script-src 'none'"
-    if "<canvas" in body:
-        code = "\n" + _asset("web", "shapes.js") + _asset("report", "player.js")
+    wanted = [("web", "shapes.js"), ("report", "player.js")] if "<canvas" in body else []
+    if 'id="modes-data"' in body:
+        wanted += [("web", "selection.js"), ("report", "selection_buttons.js")]
+    if wanted:
+        code = "\n" + "".join(_asset(*place) for place in wanted)
         digest = base64.b64encode(hashlib.sha256(code.encode("utf-8")).digest()).decode("ascii")
         script, shut = f"<script>{code}</script>\n", f"script-src 'sha256-{digest}'"
     policy = f"default-src 'none'; style-src 'unsafe-inline'; {shut}"
@@ -103,7 +114,7 @@ def page(title: str, subtitle: str, sections: Iterable[Section], foot: str) -> s
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{escape(title)}</title>\n'
         f"<style>\n{_asset('report', 'page.css')}</style>\n"
-        '<noscript><style>.player { display: none; } .still { display: block; }</style></noscript>\n'
+        "<noscript><style>.player, .pick, .save { display: none; } .still { display: block; }</style></noscript>\n"
         f"</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n"
         f'<p class="sub">{escape(subtitle)}</p>\n<nav aria-label="contents">\n{links}\n</nav>\n{body}\n'
         f"<footer>{escape(foot)}</footer>\n</main>\n{script}</body>\n</html>\n"

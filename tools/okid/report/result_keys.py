@@ -18,11 +18,12 @@ _TOP = {
     "start": "text?", "version": "text?", "singular_values": "numbers?", "model": "object", "markov": "object?",
     "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
 }  # fmt: skip
-_MODEL = {"dt": "rate", "A": "matrix", "B": "matrix", "C": "matrix", "D": "matrix", "K": "loose matrix?"}
+_MODEL = {"dt": "rate", "A": "matrix", "B": "matrix", "C": "loose matrix", "D": "loose matrix", "K": "loose matrix?"}
 _MODE = {
-    "frequency_hz": "number", "damping_ratio": "number", "shape_re": "numbers", "shape_im": "numbers",
+    "frequency_hz": "number", "damping_ratio": "number", "shape_re": "maybe", "shape_im": "maybe",
     "frequency_std_hz": "number?", "damping_ratio_std": "number?", "mpc": "number?", "emac": "number?",
     "cmi": "number?", "confident": "flag?", "found_in": "number?", "why": "list?",
+    "why_text": "list?",
 }  # fmt: skip
 _FIT = {"simulation_percent": "by name?", "prediction_percent": "by name?"}
 _MKR = {
@@ -37,7 +38,8 @@ _CHECKS = {
 }  # fmt: skip
 _WORDS = {
     "rate": "a number above 0", "count": "a whole number from 0 on", "number": "a number", "text": "text",
-    "flag": "true or false", "names": "a list of names", "numbers": "a list of numbers", "list": "a list",
+    "flag": "true or false", "names": "a list of names", "numbers": "a list of numbers",
+    "maybe": "a list of numbers or null", "list": "a list",
     "matrix": "a list of rows of finite numbers", "loose matrix": "a list of rows of numbers or null",
     "object": "an object", "objects": "a list of objects", "by name": "an object of numbers by output",
 }  # fmt: skip

@@ -22,6 +22,12 @@ def _notes(m: Material) -> dict[str, str]:
     return {**out, **(m.events.notes if m.events is not None else {})}
 
 
+def _method(r: dict[str, Any]) -> str:
+    if r["p"] is None and r["rows"] is None:
+        return f"{r.get('method', '–')}: what several methods, horizons and rates agree on; order {r['order']}"
+    return f"{r.get('method', '–')}, p = {r['p']}, {r['rows']} block rows, order {r['order']}"
+
+
 def _facts(m: Material) -> list[tuple[str, str]]:
     r: dict[str, Any] = m.result.raw
     notes = _notes(m)
@@ -44,7 +50,8 @@ def _facts(m: Material) -> list[tuple[str, str]]:
         ("Gaps", f"{r.get('gaps', 0)}"),
         ("Inputs", ", ".join(m.result.inputs) or "none: ambient"),
         ("Outputs", ", ".join(m.result.outputs)),
-        ("Method", f"{r.get('method', '–')}, p = {r['p']}, {r['rows']} block rows, order {r['order']}"),
+        *([("Left out", f"{', '.join(m.result.left_out)} (screened: see the remarks)")] if m.result.left_out else []),
+        ("Method", _method(r)),
         ("Treatment", f"hold {r.get('hold', '–')}, detrend {r.get('detrend', '–')}, start {r.get('start', 'moving')}"),
     ]
     if m.measured is not None:

@@ -21,18 +21,22 @@ MOST_WORDS = 4  # doubts that are named in the verdict, besides those on the tim
 
 def headline(m: Material) -> str:
     """How many modes, where, how sure."""
-    modes = m.result.raw["modes"]
-    if not modes:
+    listed, sure = m.result.raw["modes"], m.result.confident
+    if not listed:
         return "No underdamped mode was found."
-    f = m.result.frequency_hz
+    more = len(listed) - len(sure)
+    apart = f"{count_of(more, 'doubtful mode')} listed apart" if more else ""
+    if not sure:
+        return f"No mode to sign; {apart}."
+    modes, f = [listed[k] for k in sure], m.result.frequency_hz[sure]
     zeta = [100.0 * float(mode["damping_ratio"]) for mode in modes]
     where = f"at {f[0]:.4g} Hz" if len(f) == 1 else f"from {f[0]:.4g} to {f[-1]:.4g} Hz"
     damping = f"{min(zeta):.3g} %" if len(zeta) == 1 else f"{min(zeta):.3g} to {max(zeta):.3g} %"
-    text = f"{count_of(len(modes), 'mode')} {where}, damping {damping}"
+    text = f"{count_of(len(modes), 'confident mode')} {where}, damping {damping}"
     spread = [mode.get("frequency_std_hz") for mode in modes]
     if all(isinstance(one, int | float) for one in spread):
         text += f"; frequencies to ±{100.0 * max(s / x for s, x in zip(spread, f, strict=True)):.2g} % or better (1 σ)"
-    return f"{text}."
+    return f"{text}; {apart}." if apart else f"{text}."
 
 
 def _simulated(m: Material) -> list[float | None]:
@@ -59,6 +63,8 @@ def _order_doubts(m: Material) -> list[str]:
         return []
     where = ", ".join(f"{m.measured.rows.clusters[k].frequency_hz:.4g}" for k in lost)
     text = f"the diagram holds {'a mode' if len(lost) == 1 else 'modes'} at {where} Hz that the model of order {order} "
+    if m.result.raw.get("method") == "auto":
+        return [f"{text}does not have"]
     better = next((row.order for row in m.measured.rows if row.order > order and set(lost) <= set(row.cluster)), None)
     return [f"{text}does not have" + ("" if better is None else f": try --order {better}")]
 
@@ -66,10 +72,6 @@ def _order_doubts(m: Material) -> list[str]:
 def _model_doubts(m: Material) -> list[str]:
     raw = m.result.raw
     out = _scale_doubts(m) + _order_doubts(m)
-    weak = [str(k) for k, mode in enumerate(raw["modes"], 1) if (mode.get("emac") or 0.0) < 0.5]
-    if weak:
-        shown = ", ".join(weak[:6]) + (" …" if len(weak) > 6 else "")
-        out.append(f"mode{'' if len(weak) == 1 else 's'} {shown} with EMAC below 0.5: probably noise")
     fits = [value for value in _simulated(m) if value is not None]
     if fits and min(fits) < 80.0:
         out.append(f"the simulation explains only {min(fits):.1f} % of an output")

@@ -33,7 +33,8 @@ class Mode(NamedTuple):
     """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known.
 
     confident: an expert would sign it; found_in: share of the runs of "auto" that could have seen it and did; why:
-    codes of what speaks against it. None: not judged, or by EMAC alone (found_in of a named method).
+    codes of what speaks against it, why_text the same in words. None: not judged, or by EMAC alone (found_in of a
+    named method). Entries of outputs that were left out (remark "screened") are NaN.
     """
 
     frequency_hz: float
@@ -48,6 +49,7 @@ class Mode(NamedTuple):
     confident: bool | None = None
     found_in: float | None = None
     why: tuple[str, ...] = ()
+    why_text: tuple[str, ...] = ()
 
     @property
     def doubtful(self) -> bool:
@@ -66,7 +68,8 @@ class Mode(NamedTuple):
         shape = numbers(one["shape_re"]) + 1j * numbers(one["shape_im"])
         return cls(f, zeta, shape, mpc, emac, one.get("frequency_std_hz"), one.get("damping_ratio_std"),
                    _optional(one.get("shape_re_std")), _optional(one.get("shape_im_std")),
-                   one.get("confident"), one.get("found_in"), tuple(one.get("why") or ()))  # fmt: skip
+                   one.get("confident"), one.get("found_in"), tuple(one.get("why") or ()),
+                   tuple(one.get("why_text") or one.get("why") or ()))  # fmt: skip
 
 
 class Fit(NamedTuple):

@@ -144,6 +144,11 @@ class Result:
     def __reduce__(self) -> Any:  # what holds memory of the C library cannot be pickled
         return Result._read, (self.to_dict(), self._source.table())
 
+    @property
+    def confident_modes(self) -> list[Mode]:
+        """The modes an expert would sign: the poles of the model of "auto"; of a named method EMAC from 0.5 on."""
+        return [mode for mode in self.modes if mode.confident is not False]
+
     @cached_property
     def identifier(self) -> Identifier | None:
         """The decomposition of the library, for models of other orders; None: there is none."""

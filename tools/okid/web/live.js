@@ -3,7 +3,7 @@
 
 import { Lanes, numbers } from "./lanes.js";
 import { Plot, diagram, frf, spectra, tracking } from "./plots.js";
-import { Log, showHits, showModes, showResult, showStats } from "./tables.js";
+import { Log, pickedModes, showHits, showModes, showResult, showStats } from "./tables.js";
 
 const by = (id) => document.getElementById(id);
 const MOST_SPECTRA = 8, MOST_UPDATES = 1000;
@@ -289,6 +289,12 @@ by("lanes-pause").addEventListener("click", (event) => {
 });
 by("tracking-kind").addEventListener("change", () => plots.tracking.want());
 for (const id of ["frf-output", "frf-input"]) by(id).addEventListener("change", fetchSpectra);
+for (const button of document.querySelectorAll("#modes-save button")) {
+  button.addEventListener("click", () => {
+    const kind = button.dataset.save, numbers = [...pickedModes(page.result)].sort((a, b) => a - b);
+    window.okidSelection.save(`modes.${kind}`, kind === "csv" ? "text/csv" : "application/json", window.okidSelection[kind](page.result, numbers));
+  });
+}
 by("shape-mode").addEventListener("change", (event) => shape && shape.show(event.target.selectedIndex));
 by("shape-play").addEventListener("click", () => shape && (shape.playing ? shape.pause() : shape.play()));
 by("shape-canvas").addEventListener("okid-shapes", playing);

@@ -12,7 +12,7 @@ function element(kind, text, ...classes) {
   return out;
 }
 
-// head: names, a leading "<" for a column of text; rows: {cells, away} or cells; a cell is a text or [text, class]
+// head: names, a leading "<" for a column of text; rows: {cells, away} or cells; a cell is a text, an element or [either, class]
 function fill(table, head, rows) {
   const left = head.map((name) => name.startsWith("<"));
   const top = element("tr");
@@ -21,7 +21,8 @@ function fill(table, head, rows) {
     const line = element("tr", undefined, row.away && "away");
     (row.cells || row).forEach((cell, k) => {
       const [text, kind] = Array.isArray(cell) ? cell : [cell];
-      line.append(element("td", text, left[k] && "text", kind));
+      line.append(element("td", text instanceof Node ? undefined : text, left[k] && "text", kind));
+      if (text instanceof Node) line.lastElementChild.append(text);
     });
     return line;
   });
@@ -41,21 +42,47 @@ export function measured(value, deviation) {
   return [value.toFixed(places), `±${deviation.toFixed(places)}`];
 }
 
+// "3 confident modes, 1 doubtful"
+export function counted(result) {
+  const doubtful = result.modes.filter((mode) => mode.confident === false).length, sure = result.modes.length - doubtful;
+  return `${sure} confident mode${sure === 1 ? "" : "s"}${doubtful ? `, ${doubtful} doubtful` : ""}`;
+}
+
+// The modes of a result that are saved, by number: the confident ones until somebody chooses.
+let pickedOf = null, picked = new Set();
+export function pickedModes(result) {
+  if (pickedOf !== result) picked = new Set(result.modes.flatMap((mode, k) => (mode.confident === false ? [] : [k + 1])));
+  pickedOf = result;
+  return picked;
+}
+
+function box(chosen, number) {
+  const out = element("label"), tick = element("input");
+  Object.assign(tick, { type: "checkbox", checked: chosen.has(number) });
+  tick.addEventListener("change", () => (tick.checked ? chosen.add(number) : chosen.delete(number)));
+  out.append(tick, ` ${number}`);
+  return out;
+}
+
 export function showModes(event, result) {
   const table = document.getElementById("modes-table"), note = document.getElementById("modes-note");
   const source = result && result.modes ? result : event;
   document.querySelector("#modes .absent").textContent = source ? (source.modes.length ? "" : "no mode yet") : "no modes yet";
   if (!source) return void table.replaceChildren();
+  const all = source === result, picked = all ? pickedModes(result) : null;
   const rows = source.modes.map((mode, k) => {
     const [f, df] = measured(mode.frequency_hz, mode.frequency_std_hz);
     const percent = known(mode.damping_ratio_std) ? 100 * mode.damping_ratio_std : null;
     const [z, dz] = measured(100 * mode.damping_ratio, percent);
-    const name = source === result ? String(k + 1) : known(mode.track) ? String(mode.track) : "new";
+    const name = known(mode.track) ? String(mode.track) : "new";
     const mpc = known(mode.mpc) ? mode.mpc.toFixed(4) : "–";
-    return { away: mode.alarm, cells: [name, f, df, z, dz, mpc, mode.alarm ? "alarm" : ""] };
+    const told = mode.alarm ? "alarm" : mode.confident === false ? `doubtful: ${(mode.why_text || mode.why || []).join("; ")}` : "";
+    return { away: mode.alarm, doubtful: mode.confident === false, cells: [all ? box(picked, k + 1) : name, f, df, z, dz, mpc, told] };
   });
-  fill(table, [source === result ? "#" : "track", "f [Hz]", "± σ", "ζ [%]", "± σ", "MPC", "<"], rows);
-  note.textContent = source === result ? `result, order ${result.order}, ${result.samples} samples` :
+  rows.sort((a, b) => Boolean(a.doubtful) - Boolean(b.doubtful)); // stable: the doubtful ones last
+  fill(table, [all ? "#" : "track", "f [Hz]", "± σ", "ζ [%]", "± σ", "MPC", "<"], rows);
+  document.getElementById("modes-save").hidden = !all || !result.modes.length;
+  note.textContent = all ? `result: ${counted(result)}, order ${result.order}, ${result.samples} samples` :
     `${event.samples} samples, ${short(event.window_s)} s${event.settled ? ", settled" : ""}`;
 }
 
@@ -178,5 +205,5 @@ export function showResult(result) {
   document.getElementById("result-parts").replaceChildren(...parts);
   document.getElementById("result-warnings").replaceChildren(...(result.warnings || []).map((one) => element("li", `${one.code}: ${one.text}`)));
   document.getElementById("result-note").textContent =
-    `${result.method}, order ${result.order}, p ${result.p}, ${result.samples} samples, ${result.gaps} gaps, ${result.modes.length} modes`;
+    `${result.method}, order ${result.order}${known(result.p) ? `, p ${result.p}` : ""}, ${result.samples} samples, ${result.gaps} gaps, ${counted(result)}`;
 }

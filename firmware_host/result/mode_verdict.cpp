@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  the one table of what speaks against modes, and the judgement as okid.result/1 and the modal table hold it
+#include "mode_verdict.hpp"
+
+#include "json_number.hpp"
+#include "result.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <utility>
+
+namespace okid_host {
+namespace {
+
+constexpr std::array<std::pair<const char*, const char*>, 9> words{{
+    {"few_runs", "fewer than half of the runs that could see it found it"},
+    {"noise_shape", "short-lived, complex or scattering: probably noise"},
+    {"split", "beside a stronger one of the same shape: one mode whose frequency changes with amplitude"},
+    {"tone", "a steady line, not a vibration that dies away"},
+    {"pickup", "a steady line at a multiple of the mains frequency"},
+    {"harmonic", "a multiple of a stronger vibration, in phase with it"},
+    {"wide_sigma", "its standard deviation is too wide"},
+    {"band_edge", "too slow for the record, or at the edge of the band"},
+    {"overdamped", "damped too much to vibrate"},
+}};
+
+} // namespace
+
+std::string why_text(const std::string& code) {
+    const auto* at = std::find_if(words.begin(), words.end(), [&](const auto& one) { return code == one.first; });
+    return at == words.end() ? code : at->second;
+}
+
+std::string why_legend(const std::vector<mode_verdict>& verdicts) {
+    std::string out;
+    for (const auto& [code, text] : words)
+        if (std::any_of(verdicts.begin(), verdicts.end(), [code = std::string(code)](const mode_verdict& one) {
+                return std::find(one.why.begin(), one.why.end(), code) != one.why.end();
+            }))
+            out += fmt::format("   {}: {}\n", code, text);
+    return out;
+}
+
+std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const result_context& context) {
+    if (!context.verdicts.empty()) return context.verdicts;
+    std::vector<mode_verdict> out;
+    for (int k = 0; k < model.mode_count; ++k) {
+        mode_verdict& verdict = out.emplace_back();
+        verdict.confident = model.emac[k] >= doubtful_emac;
+        if (!verdict.confident) verdict.why.emplace_back("noise_shape");
+    }
+    return out;
+}
+
+nlohmann::ordered_json verdict_json(const mode_verdict& verdict) {
+    std::vector<std::string> texts;
+    for (const std::string& code : verdict.why) texts.push_back(why_text(code));
+    return {{"confident", verdict.confident},
+            {"found_in", number_json(verdict.found_in)},
+            {"why", verdict.why},
+            {"why_text", std::move(texts)}};
+}
+
+} // namespace okid_host

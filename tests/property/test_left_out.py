@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""A clipped channel from the record to the report: its shape entries are missing everywhere, nothing else is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import okid
+import pandas as pd
+import pytest
+from laboratory import forced
+from okid import modal, report
+from okid.data.records import Record
+
+NAMES = [f"y{k}" for k in range(8)]
+
+
+@pytest.fixture(scope="module")
+def clipped() -> tuple[okid.Result, Record]:
+    lab = forced(14, count=10000)
+    samples = lab.samples.copy()
+    bad = samples[:, lab.n_u + 2]
+    bad[:] = np.clip(bad, -1.5 * bad.std(), 1.5 * bad.std())
+    forces = [f"u{k}" for k in range(lab.n_u)]
+    result = okid.identify(
+        samples[:, : lab.n_u],
+        samples[:, lab.n_u :],
+        fs=lab.fs,
+        input_names=forces,
+        output_names=NAMES,
+    )
+    assert [w.code for w in result.warnings] == ["screened"]
+    assert len(result.confident_modes) == len(lab.frequency_hz)
+    return result, Record(forces + NAMES, samples, lab.fs)
+
+
+@pytest.mark.filterwarnings("error")
+def test_report(clipped: tuple[okid.Result, Record], tmp_path: Path) -> None:
+    result, record = clipped
+    report.write_report(result, tmp_path / "r.html", record)
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "<tr><th>Left out</th><td>y2 (screened: see the remarks)</td></tr>" in page
+    assert f"<p>{len(result.confident_modes)} confident modes from " in page
+    assert "7 outputs" in page
+    assert "NaN" not in page and ">nan<" not in page
+
+
+def test_universal_file(clipped: tuple[okid.Result, Record], tmp_path: Path) -> None:
+    result, _ = clipped
+    okid.write_uff(tmp_path / "r.uff", result)
+    found = okid.read_uff(tmp_path / "r.uff")
+    assert len(found.modes) == len(result.modes)
+    for mode, own in zip(found.modes, result.modes, strict=True):
+        assert mode.nodes == [1, 2, 4, 5, 6, 7, 8]
+        np.testing.assert_allclose(mode.shape[:, 0], np.delete(own.shape, 2), atol=1e-5)
+        assert mode.confident == own.confident
+    assert {one.name.split(" / ")[0] for one in found.frfs} == set(NAMES) - {"y2"}
+    okid.write_uff(tmp_path / "two.uff", result, modes=[1, 3])
+    assert [mode.number for mode in okid.read_uff(tmp_path / "two.uff").modes] == [1, 3]
+    with pytest.raises(okid.InputError, match="modes has 99, expected numbers from 1 to"):
+        okid.write_uff(tmp_path / "no.uff", result, modes=[99])
+
+
+def test_python(clipped: tuple[okid.Result, Record], tmp_path: Path) -> None:
+    result, _ = clipped
+    shapes = np.array([mode.shape for mode in result.modes])
+    assert np.all(np.isnan(shapes[:, 2])) and np.all(np.isfinite(np.delete(shapes, 2, axis=1)))
+    np.testing.assert_allclose(np.diag(modal.mac_matrix(shapes)), 1.0)
+    assert modal.mpc(shapes[0]) > 0.99 and modal.normalised(shapes[0])[np.nanargmax(np.abs(shapes[0]))] == 1.0
+    frame = pd.DataFrame(result.table())
+    assert list(frame.confident) == [mode.confident for mode in result.modes]
+    assert list(frame.why) == [", ".join(mode.why) for mode in result.modes]
+    okid.write_mat(tmp_path / "r.mat", result)
+    okid.write_hdf5(tmp_path / "r.h5", result)
+    again = okid.Result.from_dict(result.to_dict())
+    assert [mode.frequency_hz for mode in again.confident_modes] == [m.frequency_hz for m in result.confident_modes]
