@@ -15,6 +15,7 @@
 #include <fstream>
 #include <net/if_arp.h>
 #include <poll.h>
+#include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -29,10 +30,12 @@ constexpr int batches_between_looks = 64;
 
 } // namespace
 
-bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_event& wake)
+std::size_t bus_reader::most_waiting() { return ring_frames / 4 * 3; }
+
+bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_event& wake, watermark& mark)
     : interface_(config_of_all.buses[bus].on_line() ? config_of_all.buses[bus].device
                                                     : config_of_all.buses[bus].interface),
-      bus_(static_cast<std::uint8_t>(bus)), wake_(wake), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      bus_(static_cast<std::uint8_t>(bus)), wake_(wake), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), mark_(mark),
       block_(new std::byte[drv_ring_memsize(ring_frames)]()), batch_(64) {
     ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));
     const bus_config& mine = config_of_all.buses[bus];
@@ -54,12 +57,14 @@ bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_e
         if (mine.on_line()) throw_line_failure(-code, interface_, source_.error);
         throw_interface_failure(-code, interface_, source_.error);
     }
+    queue_fd_ = epoll_create1(EPOLL_CLOEXEC);
     publish_stats();
 }
 
 bus_reader::~bus_reader() {
     stop();
     source_.ops->close(&source_);
+    close(queue_fd_);
     close(stop_fd_);
 }
 
@@ -74,6 +79,7 @@ void bus_reader::stop() {
     const std::uint64_t one = 1;
     (void)!write(stop_fd_, &one, sizeof one);
     thread_.join();
+    mark_.ended();
 }
 
 /// One read of the source. @return frames moved, negative when it failed
@@ -81,6 +87,7 @@ int bus_reader::drain_once() {
     const int count = source_.ops->read(&source_, batch_.data(), static_cast<int>(batch_.size()));
     if (count <= 0) return count;
     for (int i = 0; i < count; ++i) batch_[static_cast<std::size_t>(i)].bus = bus_;
+    mark_.saw(batch_.front().time_ns);
     drv_ring_push(ring_, batch_.data(), static_cast<std::size_t>(count));
     if (second_ring_) drv_ring_push(second_ring_, batch_.data(), static_cast<std::size_t>(count));
     wake_.signal();
@@ -99,19 +106,41 @@ drv_stats_t bus_reader::stats() const {
     return seen_;
 }
 
+/// Until the queue is empty, or often enough for now. @return frames moved, negative when the source failed
+int bus_reader::drain() {
+    int total = 0;
+    for (int i = 0; i < batches_between_looks && !stopping_; ++i) {
+        const std::int64_t began_ns = drv_host_time_ns();
+        const int moved = drain_once();
+        total += std::max(moved, 0);
+        if (moved > 0) continue;
+        mark_.emptied(began_ns);
+        return moved < 0 ? moved : total;
+    }
+    return total;
+}
+
+/// Until something can be read, the end is wanted, or look_ms have passed: a source that fails has only the time.
+void bus_reader::wait(bool failed) {
+    epoll_event readable{};
+    readable.events = EPOLLIN;
+    const int fd = source_.ops->fd(&source_); // a line that was plugged in again has a new one
+    if (fd >= 0) (void)epoll_ctl(queue_fd_, EPOLL_CTL_ADD, fd, &readable);
+    pollfd waits[2] = {{stop_fd_, POLLIN, 0}, {queue_fd_, POLLIN, 0}};
+    mark_.idle(queue_fd_);
+    (void)poll(waits, failed ? 1 : 2, look_ms);
+    mark_.at_work();
+}
+
 void bus_reader::run() {
     using clock = std::chrono::steady_clock;
-    const int whole = static_cast<int>(batch_.size());
     // The kernel stamps CAN frames: on a busy bus many are taken at once instead of one at a time. A line is stamped here.
     const bool may_rest = source_.ops == &drv_source_socketcan;
     int moved = 0;
     auto published = clock::now(), before = published;
     while (!stopping_) {
-        pollfd waits[2] = {{stop_fd_, POLLIN, 0}, {source_.ops->fd(&source_), POLLIN, 0}};
-        // A negative fd is left out, and so is a source that fails: then only the time runs.
-        (void)poll(waits, moved < 0 ? 1 : 2, look_ms);
-        for (int i = 0; i < batches_between_looks && !stopping_; ++i)
-            if ((moved = drain_once()) < whole) break;
+        wait(moved < 0);
+        moved = drain();
         const auto now = clock::now();
         if (now - published >= publish_every) {
             published = now;

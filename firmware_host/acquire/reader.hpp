@@ -3,6 +3,7 @@
 #pragma once
 #include "config/config.hpp"
 #include "wake_event.hpp"
+#include "watermark.hpp"
 
 #include <drv/ring.h>
 #include <drv/source.h>
@@ -21,7 +22,8 @@ class bus_reader {
   public:
     /// Opens the interface or the serial line. Throws `failure` (exit 4) that says what is there and what to do.
     /// @param bus  number given to every frame; @param wake  signalled when frames wait
-    bus_reader(const live_config& config, std::size_t bus, wake_event& wake);
+    /// @param mark  how far the bus was read, for whoever merges; ended when the thread has
+    bus_reader(const live_config& config, std::size_t bus, wake_event& wake, watermark& mark);
     ~bus_reader();
     bus_reader(const bus_reader&) = delete;
     bus_reader& operator=(const bus_reader&) = delete;
@@ -32,6 +34,7 @@ class bus_reader {
     /// End the thread; frames still in the socket and in the ring can be taken afterwards.
     void stop();
     drv_ring_t* ring() { return ring_; }
+    static std::size_t most_waiting(); ///< frames in the ring that may wait for other buses
 
     /// Counts of the source and of the ring, as of the last time the thread looked (at most 0.1 s ago).
     drv_stats_t stats() const;
@@ -42,13 +45,16 @@ class bus_reader {
   private:
     void run();
     int drain_once();
+    int drain();
+    void wait(bool failed);
     void publish_stats();
 
     std::string interface_;
     std::uint8_t bus_;
     bool filtered_ = false;
     wake_event& wake_;
-    int stop_fd_;
+    int stop_fd_, queue_fd_ = -1; ///< queue_fd_: an epoll set of what the source reads, open as long as this lives
+    watermark& mark_;
     drv_source_t source_{};
     std::unique_ptr<std::byte[]> block_;
     drv_ring_t *ring_ = nullptr, *second_ring_ = nullptr;

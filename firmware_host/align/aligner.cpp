@@ -208,6 +208,7 @@ grid_bus_counts aligner::bus(std::size_t index) const {
         const grid_bus_counts& more = node->samples().bus(index);
         out.received += more.received;
         out.out_of_order += more.out_of_order;
+        out.too_late += more.too_late;
         out.duplicate += more.duplicate;
         out.decode_errors += more.decode_errors;
         for (std::size_t i = 0; i < out.lost.size(); ++i) out.lost[i] += more.lost[i];

@@ -176,10 +176,10 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
     if (index < next_) {
         if (index < 0) return; // before the grid begins
         const bool remembered = opened_ - index <= mask_;
-        if (remembered && present(index)[which])
-            ++counts.duplicate;
-        else
-            ++counts.out_of_order; // too late: the sample has gone out without it
+        const bool twice = remembered && present(index)[which];
+        counts.duplicate += twice;
+        counts.out_of_order += !twice;
+        counts.too_late += !twice;
         return;
     }
     open_rows(index);

@@ -53,9 +53,10 @@ constexpr double most_rows_bytes = 64e6;
 /// A stamp further ahead is no time but an error.
 constexpr double longest_silence_ns = 400 * 86400e9;
 
-/// Counts of one bus. lost: frames missing on the grid, by cause.
+/// Counts of one bus. too_late: of those out of order, the frames whose sample had gone out without them. lost: frames
+/// missing on the grid, by cause.
 struct grid_bus_counts {
-    std::uint64_t received = 0, out_of_order = 0, duplicate = 0, decode_errors = 0;
+    std::uint64_t received = 0, out_of_order = 0, too_late = 0, duplicate = 0, decode_errors = 0;
     std::array<std::uint64_t, 6> lost{};
 };
 

@@ -25,6 +25,8 @@ namespace {
 constexpr std::size_t ring_frames = 1 << 16; // 8 s of 8,000 frames a second
 constexpr auto look_every = std::chrono::milliseconds(20);
 constexpr std::int64_t chunk_ns = 100000000; // a chunk is written so long after its first frame came
+constexpr std::int64_t patience_ns =
+    2000000000; // a frame waits for the reader of another bus: no more is lost by a kill
 constexpr int last_segment = 9999;
 constexpr std::uint64_t megabyte = 1000000;
 constexpr std::int64_t no_trigger = std::numeric_limits<std::int64_t>::min();
@@ -105,7 +107,7 @@ void background_sync::run() {
 }
 
 recorder::recorder(const live_config& config, const recorder_options& options)
-    : wanted_(config.record), realtime_(config.realtime), stem_(name_stem(title_of(config))),
+    : wanted_(config.record), realtime_(config.realtime), stem_(name_stem(title_of(config))), merge_(patience_ns),
       missed_(config.buses.size(), 0), batch_(256), waits_(config.trigger.source != trigger_source::immediate),
       trigger_ns_(no_trigger), writer_(std::make_unique<drv_journal_writer_t>()) {
     prepare_folder(wanted_.directory);
@@ -113,7 +115,7 @@ recorder::recorder(const live_config& config, const recorder_options& options)
     for (std::size_t i = 0; i < config.buses.size(); ++i) {
         blocks_.emplace_back(new std::byte[drv_ring_memsize(ring_frames)]());
         rings_.push_back(drv_ring_create(ring_frames, blocks_.back().get(), drv_ring_memsize(ring_frames)));
-        merge_.add(rings_.back());
+        merge_.add(rings_.back(), ring_frames / 4 * 3, options.marks.empty() ? nullptr : options.marks[i]);
     }
     if (waits_) waiting_.resize(config.record.pretrigger_frames);
     header_.version = OKID_VERSION;

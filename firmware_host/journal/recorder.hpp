@@ -22,7 +22,8 @@
 namespace okid_host {
 
 struct recorder_options {
-    std::optional<double> duration_s; ///< of the run; a journal that begins with it says how long it was
+    std::optional<double> duration_s;      ///< of the run; a journal that begins with it says how long it was
+    std::vector<const watermark*> marks{}; ///< of each bus, for the order of frames; empty: they come in order
 };
 
 /// Something to be told: started, segment, lost, deleted, stopped, finished.

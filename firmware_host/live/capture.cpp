@@ -8,6 +8,7 @@
 #include "acquire/sender.hpp"
 #include "acquire/stop_signal.hpp"
 #include "acquire/threads.hpp"
+#include "align/grid.hpp"
 #include "error.hpp"
 #include "gpio_lines.hpp"
 #include "recording_link.hpp"
@@ -30,16 +31,20 @@ class pump {
     pump(const live_config& config, stream_target& target, const std::optional<recorder_options>& recording)
         : target_(target), config_(config), lines_(config), frames_(256) {
         for (std::size_t i = 0; i < config.buses.size(); ++i)
-            readers_.push_back(std::make_unique<bus_reader>(config, i, wake_));
-        for (const auto& reader : readers_) {
-            watches_.emplace_back(reader->interface());
-            merge_.add(reader->ring());
+            readers_.push_back(
+                std::make_unique<bus_reader>(config, i, wake_, *marks_.emplace_back(std::make_unique<watermark>())));
+        for (std::size_t i = 0; i < readers_.size(); ++i) {
+            watches_.emplace_back(readers_[i]->interface());
+            merge_.add(readers_[i]->ring(), bus_reader::most_waiting(), marks_[i].get());
         }
         senders_.resize(readers_.size());
         for (std::size_t i = 0; i < config.buses.size(); ++i)
             if (config.buses[i].sync_hz || !config.buses[i].start_frames.empty())
                 senders_[i] = std::make_unique<sync_sender>(config.buses[i]);
-        recording_.emplace(config, recording); // a file appears only once there is something to record
+        std::optional<recorder_options> recorded = recording;
+        for (const auto& mark : marks_)
+            if (recorded) recorded->marks.push_back(mark.get());
+        recording_.emplace(config, recorded); // a file appears only once there is something to record
         for (std::size_t i = 0; i < config.buses.size() && recording_->get(); ++i)
             readers_[i]->also_into(recording_->get()->ring(i));
         lock_memory(config_.realtime);
@@ -53,10 +58,11 @@ class pump {
         const auto begin = clock_type::now();
         auto heard = begin;
         while (!target_.done() && !stop_requested()) {
-            wake_.wait(100, stop_fd(), target_.triggered() ? -1 : lines_.fd());
+            wake_.wait(merge_.waiting() ? 1 : 100, stop_fd(), target_.triggered() ? -1 : lines_.fd());
             target_.alive();
             lines_.serve(target_);
             if (move_frames(true)) heard = clock_type::now();
+            tell_hurry();
             recording_->serve(target_);
             report_buses();
             look_for_unheard(seconds_since(begin));
@@ -91,6 +97,20 @@ class pump {
     void tell_losses() {
         for (std::size_t i = 0; i < readers_.size(); ++i)
             target_.set_losses(i, {readers_[i]->stats().lost_overflow, readers_[i]->ring_overrun()});
+    }
+
+    /// A reader is so far behind that the memory for the frames of the others is used up.
+    void tell_hurry() {
+        if (merge_.hurried() == 0 || merge_.hurried() < 2 * hurried_) return;
+        const bool first = hurried_ == 0;
+        hurried_ = merge_.hurried();
+        const std::size_t bus = merge_.waited_for();
+        const std::string text =
+            fmt::format("its reader is too far behind: {} frames of other buses waited for it until their memory was "
+                        "full and went on without; what of it comes {:g} s later than theirs is in the journal alone",
+                        hurried_, silence_patience_s);
+        target_.bus_event(bus, "behind", text);
+        if (first) say("okid: interface {}: {}\n", readers_[bus]->interface(), text);
     }
 
     void report_buses() {
@@ -146,9 +166,11 @@ class pump {
     stream_target& target_;
     const live_config& config_;
     gpio_lines lines_;
-    std::optional<recording_link> recording_; ///< before the readers, which push into its rings
+    std::vector<std::unique_ptr<watermark>> marks_; ///< of the readers; the recorder looks at them, too
+    std::optional<recording_link> recording_;       ///< before the readers, which push into its rings
     std::vector<std::unique_ptr<bus_reader>> readers_;
     ring_merge merge_;
+    std::uint64_t hurried_ = 0;
     std::vector<drv_frame_t> frames_;
     std::vector<bus_watch> watches_;
     std::vector<std::unique_ptr<sync_sender>> senders_;

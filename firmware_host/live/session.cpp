@@ -257,6 +257,7 @@ ordered_json session::bus_stats(std::size_t bus) const {
     out["lost_by"] = {{"socket_overflow", overflow}, {"driver", driver}, {"sequence", sequence}, {"crc", crc},
                       {"link_down", link},           {"stall", stall}};
     out["out_of_order"] = counts.out_of_order;
+    out["too_late"] = counts.too_late;
     out["duplicate"] = counts.duplicate;
     out["decode_errors"] = counts.decode_errors;
     const bool known = config_.buses[bus].bitrate && now_ > 0;

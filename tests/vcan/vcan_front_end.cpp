@@ -28,7 +28,8 @@ int main(int argc, char** argv) try {
     const long long wanted = std::atoll(argv[2]);
     const double quiet_s = std::atof(argv[3]);
     okid_host::wake_event wake;
-    okid_host::bus_reader reader(config, 0, wake);
+    okid_host::watermark mark;
+    okid_host::bus_reader reader(config, 0, wake, mark);
     reader.start(config.realtime);
     std::printf("listening\n");
     std::fflush(stdout);
