@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom, chi2, norm
+from scipy.special import bdtr, chdtrc, ndtri  # scipy.stats takes a second to load
 
 Real = NDArray[np.float64]
-BOUND_95, BOUND_99 = float(norm.ppf(0.975)), float(norm.ppf(0.995))
+BOUND_95, BOUND_99 = float(ndtri(0.975)), float(ndtri(0.995))
 SMALL = 0.1  # a correlation below this explains less than 1 % of the variance
 
 
@@ -44,7 +44,7 @@ class Whiteness(NamedTuple):
     def beyond(self, output: int, into: int) -> tuple[int, int]:
         """Lags >= 0 at which e and u correlate beyond the 99 % bound, and how many chance allows (in 1 of 1000)."""
         past = np.abs(self.cross[self.lags :, output, into])
-        allowed = int(binom.ppf(0.999, len(past), 0.01))
+        allowed = int(np.argmax(bdtr(np.arange(len(past) + 1), len(past), 0.01) >= 0.999))
         return int(np.sum(past > BOUND_99 * self.cross_unit[output, into])), allowed
 
 
@@ -89,4 +89,4 @@ def whiteness(pieces: Sequence[tuple[Real, Real]], lags: int) -> Whiteness | Non
     unit = np.sqrt(np.maximum(spread, 0.05) / count[:, None])
     weights = count * (count + 2.0) / np.maximum(count - np.arange(1, lags + 1)[:, None], 1.0)
     statistic = np.sum(weights * auto[1:] ** 2, axis=0)
-    return Whiteness(auto, cross, count, unit, chi2.sf(statistic, lags), np.sqrt(power / np.maximum(count, 1)))
+    return Whiteness(auto, cross, count, unit, chdtrc(lags, statistic), np.sqrt(power / np.maximum(count, 1)))
