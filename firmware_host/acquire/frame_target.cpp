@@ -15,7 +15,7 @@ constexpr int adapter_baud = 115200; // adapters on USB do not care
 
 } // namespace
 
-frame_target::frame_target(const std::string& name) : name_(name), device_(name.find('/') != std::string::npos) {
+frame_target::frame_target(const std::string& name) : name_(name), device_(is_device(name)) {
     if (device_) {
         drv_line_config_t line{};
         line.device = name_.c_str();

@@ -32,6 +32,11 @@ std::vector<std::string> entries(const std::string& folder, const std::vector<st
 
 } // namespace
 
+bool is_device(const std::string& target) {
+    std::error_code ignored;
+    return target.find('/') != std::string::npos || fs::is_character_file(target, ignored);
+}
+
 drv_line_config_t line_settings(const bus_config& bus, double rate_hz) {
     drv_line_config_t line{};
     line.device = bus.device.c_str();

@@ -18,6 +18,9 @@ nlohmann::ordered_json line_json(const drv_stats_t& counts);
 /// /dev/serial/by-id/… where there are any, else /dev/ttyUSB*, /dev/ttyACM* and their like.
 std::vector<std::string> serial_devices();
 
+/// Does it name a serial device, by a path or by a link to one in this folder, rather than a CAN interface?
+bool is_device(const std::string& target);
+
 /// What to do about a device that cannot be opened. @param code  a positive errno
 std::string line_remedy(int code, const std::string& device);
 

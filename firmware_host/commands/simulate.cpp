@@ -2,6 +2,7 @@
 // okid simulate: a virtual rig with known M, K, R writes the log, record and truth a real one would give.
 #include "commands.hpp"
 
+#include "acquire/serial_line.hpp"
 #include "acquire/stop_signal.hpp"
 #include "error.hpp"
 #include "files/whole_file.hpp"

@@ -112,8 +112,6 @@ timespec later(timespec start, double seconds) {
 
 } // namespace
 
-bool is_device(const std::string& target) { return target.find('/') != std::string::npos; }
-
 void play_rig(const rig_run& run, const std::string& target, int baud) {
     catch_stop_signals();
     timespec start{};

@@ -8,9 +8,6 @@
 
 namespace okid_host {
 
-/// Is it a serial device, or a CAN interface?
-bool is_device(const std::string& target);
-
 /// Sends until the record ends or a signal comes. Throws `failure` (exit 4) when the target cannot be used.
 /// @param baud  of a serial device
 void play_rig(const rig_run& run, const std::string& target, int baud);

@@ -43,7 +43,8 @@ export const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g,
 export const printed = (unit) => plain(unit).replace(/\^2/g, "²").replace(/\^3/g, "³");
 const cut = (text, most = 22) => (text.length > most ? `${text.slice(0, most - 1)}…` : text);
 
-// One panel's plot: drawn when it is on the screen, at most once a second, and again when the colours change.
+// One panel's plot: drawn once wherever it stands, then when it is on the screen, at most once a second, and again when the
+// colours change.
 export class Plot {
   constructor(panel, make) {
     this.panel = document.getElementById(panel);
@@ -68,7 +69,7 @@ export class Plot {
 
   want() {
     this.stale = true;
-    if (!this.visible || this.waiting || document.hidden) return;
+    if ((!this.visible && this.draws > 0) || this.waiting || document.hidden) return;
     this.waiting = setTimeout(() => {
       this.waiting = null;
       this.last = performance.now();
