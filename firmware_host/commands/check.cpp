@@ -54,13 +54,18 @@ std::string summary(const live_config& config, const stream_config& stream) {
             fmt::format("{}{} at {} {}", kind, layout.length, layout.start_bit, layout.big_endian ? "big" : "little"),
             channel.sequence ? fmt::format("{}-bit counter", channel.sequence->length) : "time stamps");
     }
-    out += fmt::format("\n{:g} Hz, {} force and {} response channel{}{}\n", config.rate_hz, config.n_u, config.n_y,
-                       config.n_y == 1 ? "" : "s",
-                       stream.sample == OKID_SAMPLE_INT16 ? ", 16-bit codes summed exactly" : "");
+    out +=
+        fmt::format("\n{:g} Hz, {} force and {} response channel{}{}\n", config.rate_hz, config.n_u, config.n_y,
+                    config.n_y == 1 ? "" : "s",
+                    stream.sample == OKID_SAMPLE_INT16 && id.method != "auto" ? ", 16-bit codes summed exactly" : "");
     const okid_method_t method = method_of(id.method);
-    out += fmt::format("{}, {}{} block rows, an update each {:g} s, memory: {}\n", id.method,
-                       looks_back_rows(method, config.n_u) ? "" : fmt::format("p {}, ", id.p),
-                       rows_used(method, config.n_u, id.p, id.rows), id.update_s, memory_text(config));
+    const std::string horizon =
+        id.method == "auto"
+            ? "several methods, horizons and rates, an update when an eighth of the memory is new, not before"
+            : fmt::format("{}{} block rows, an update each",
+                          looks_back_rows(method, config.n_u) ? "" : fmt::format("p {}, ", id.p),
+                          rows_used(method, config.n_u, id.p, id.rows));
+    out += fmt::format("{}, {} {:g} s, memory: {}\n", id.method, horizon, id.update_s, memory_text(config));
     out += fmt::format("needs {:.0f} MB of memory, at most {:g} are allowed\n", std::ceil(stream_bytes(stream) / 1e6),
                        id.max_memory_mb);
     out += start_text(config);

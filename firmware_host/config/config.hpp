@@ -75,11 +75,13 @@ struct channel_config {
 };
 
 struct identification_config {
-    std::string method = "okid-era", hankel = "system", hold = "zoh", detrend = "mean";
+    std::string method = "auto", hankel = "system", hold = "auto", detrend = "mean";
     int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, n4sid 30, okid without a force p; order 0 = automatic
     std::optional<double> window_s, forgetting;
     double update_s = 0.5;
-    int sigma_blocks = 20;         ///< blocks left out for the standard deviations; 0 = none
+    std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
+    int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
+    int sigma_blocks = 20;                         ///< blocks left out for the standard deviations; 0 = none
     bool restart_on_change = true; ///< window and forgetting: samples from before a change of the structure are dropped
     bool mkr = false;              ///< M, K and R with the final result
     double max_memory_mb = 8192;   ///< of the identification

@@ -7,12 +7,20 @@
 #include "result/method.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 
 namespace okid_host {
 
 std::string window_fault(const identification_config& wanted, std::size_t n_u, std::size_t n_y, double rate_hz) {
     if (!wanted.window_s || n_y == 0) return "";
+    if (wanted.method == "auto") {
+        const double needed = static_cast<double>(fewest_of_auto(n_u, n_y)), kept = *wanted.window_s * rate_hz;
+        if (kept >= needed) return "";
+        return fmt::format("{:g} s are {:.0f} samples at {:g} Hz, but method auto needs {:.0f} of so many channels: "
+                           "expected a longer window",
+                           *wanted.window_s, kept, rate_hz, needed);
+    }
     const okid_method_t method = method_of(wanted.method);
     const bool by_rows = looks_back_rows(method, n_u);
     const int horizon = by_rows ? rows_used(method, n_u, wanted.p, wanted.rows) : wanted.p;
@@ -26,17 +34,61 @@ std::string window_fault(const identification_config& wanted, std::size_t n_u, s
                        horizon, by_rows ? "rows" : "p");
 }
 
+namespace {
+
+/// An option of one method alone means the method that release 0.1 took by default.
+std::string chosen_method(const toml::table& t) {
+    if (const auto named = t["method"].value<std::string>()) return *named;
+    for (const char* key : {"p", "rows", "order", "hankel", "forgetting"})
+        if (t.contains(key) && t[key].value<std::string>() != "auto" && t[key].value<std::string>() != "system")
+            return "okid-era";
+    return "auto";
+}
+
+/// Keys of one method beside auto, and of auto beside one method.
+void check_agreement(const config_place& place, const toml::table& t, const identification_config& wanted) {
+    const bool agreed = wanted.method == "auto";
+    for (const char* key : {"p", "rows", "order", "hankel"})
+        if (agreed && t.contains(key) && t[key].value<std::string>() != "auto" &&
+            t[key].value<std::string>() != "system")
+            refuse_key(place, *t.get(key), key,
+                       "belongs to one method, \"auto\" agrees over many: leave one of them out");
+    if (agreed && wanted.forgetting)
+        refuse_key(place, *t.get("forgetting"), "forgetting",
+                   "\"auto\" keeps the samples of a window, none of them fades: expected window_s, or one method");
+    for (const char* key : {"band", "decimate"})
+        if (!agreed && t.contains(key))
+            refuse_key(place, *t.get(key), key,
+                       fmt::format("belongs to method \"auto\", {} takes the stream as it is", wanted.method));
+    if (!agreed && wanted.hold == "auto")
+        refuse_key(place, *t.get("hold"), "hold",
+                   fmt::format("\"auto\" belongs to method \"auto\"; of {} expected zoh, foh or band", wanted.method));
+}
+
+void read_band(const config_place& place, const toml::table& t, identification_config& out) {
+    const toml::array* band = t["band"].as_array();
+    if (!band) return;
+    const auto hertz = [&](std::size_t k) { return band->size() == 2 ? (*band)[k].value_or(-1.0) : -1.0; };
+    const double low = hertz(0), high = hertz(1);
+    if (!(low >= 0 && high > low && std::isfinite(high)))
+        refuse_key(place, *band, "band", "expected two frequencies in Hz, the lower one first, such as [0.3, 40.0]");
+    out.band = {low, high};
+}
+
+} // namespace
+
 void read_identification(const toml::table& file, live_config& config) {
     identification_config& out = config.identification;
     const toml::table* table = file["identification"].as_table();
     if (!table) return;
     const config_place place{config.path, "[identification]"};
     const toml::table& t = *table;
-    out.method = t["method"].value_or(out.method);
+    out.method = chosen_method(t);
+    const bool agreed = out.method == "auto";
     out.hankel = t["hankel"].value_or(out.hankel);
-    if (const std::string fault = hankel_fault(out.hankel, out.method, config.n_u); !fault.empty())
+    if (const std::string fault = agreed ? "" : hankel_fault(out.hankel, out.method, config.n_u); !fault.empty())
         refuse_key(place, *t.get("hankel"), "hankel", fault);
-    out.hold = t["hold"].value_or(out.hold);
+    out.hold = t["hold"].value_or(std::string(agreed ? "auto" : "zoh"));
     out.detrend = t["detrend"].value_or(out.detrend);
     if (out.detrend == "linear")
         refuse_key(place, *t.get("detrend"), "detrend",
@@ -55,10 +107,13 @@ void read_identification(const toml::table& file, live_config& config) {
     if (out.window_s && out.forgetting)
         refuse_key(place, *t.get("forgetting"), "forgetting",
                    "window_s is given too; a window and forgetting together are not available, choose one");
-    const okid_method_t method = method_of(out.method);
+    check_agreement(place, t, out);
+    read_band(place, t, out);
+    out.decimate = static_cast<int>(t["decimate"].value_or(std::int64_t{1}));
+    const okid_method_t method = method_of(agreed ? "n4sid-cva" : out.method);
     const bool by_rows = looks_back_rows(method, config.n_u);
     out.horizon_given = is_subspace(method) ? t.contains("rows") : t.contains("p") || (by_rows && t.contains("rows"));
-    if (by_rows && t.contains("p") && (is_subspace(method) || out.rows > 0))
+    if (by_rows && t.contains("p") && !agreed && (is_subspace(method) || out.rows > 0))
         config.warnings.push_back(
             fmt::format("[identification] p belongs to the observer of the okid methods: {} looks back {} block rows "
                         "here",

@@ -83,7 +83,7 @@ ordered_json bus_json(const bus_config& bus) {
 
 ordered_json identification_json(const identification_config& id) {
     return {{"method", id.method},
-            {"p", id.p},
+            {"p", id.method == "auto" ? ordered_json(nullptr) : ordered_json(id.p)},
             {"rows", id.rows == 0 ? ordered_json(nullptr) : ordered_json(id.rows)},
             {"hankel", id.hankel},
             {"order", id.order == 0 ? ordered_json("auto") : ordered_json(id.order)},

@@ -130,9 +130,11 @@ void start_from(const live_config& config, stream_request& to) {
     r.hankel = wanted.hankel;
     r.hold = wanted.hold;
     r.detrend = wanted.detrend;
-    r.p = std::to_string(wanted.p);
+    if (wanted.method != "auto") r.p = std::to_string(wanted.p);
     if (wanted.rows > 0) r.rows = std::to_string(wanted.rows);
     if (wanted.order > 0) r.order = std::to_string(wanted.order);
+    if (wanted.band) r.band = fmt::format("{}:{}", wanted.band->first, wanted.band->second);
+    if (wanted.decimate > 1) r.decimate = std::to_string(wanted.decimate);
     r.sigma_blocks = std::to_string(wanted.sigma_blocks);
     to.window_s = text_of(wanted.window_s);
     to.forgetting = text_of(wanted.forgetting);
@@ -143,13 +145,16 @@ void start_from(const live_config& config, stream_request& to) {
 std::string stream_json(const stream_config& config) {
     using nlohmann::ordered_json;
     const identification_config& wanted = config.wanted;
+    const bool agreed = wanted.method == "auto";
     const auto or_null = [](const std::optional<double>& x) { return x ? ordered_json(*x) : ordered_json(nullptr); };
     return ordered_json{{"inputs", config.inputs},
                         {"outputs", config.outputs},
                         {"fs", config.rate_hz},
                         {"method", wanted.method},
-                        {"p", wanted.p},
-                        {"rows", rows_used(method_of(wanted.method), config.inputs.size(), wanted.p, wanted.rows)},
+                        {"p", agreed ? ordered_json(nullptr) : ordered_json(wanted.p)},
+                        {"rows", agreed ? ordered_json(nullptr)
+                                        : ordered_json(rows_used(method_of(wanted.method), config.inputs.size(),
+                                                                 wanted.p, wanted.rows))},
                         {"order", wanted.order == 0 ? ordered_json("auto") : ordered_json(wanted.order)},
                         {"hankel", wanted.hankel},
                         {"hold", wanted.hold},
@@ -175,10 +180,11 @@ stream_config read_stream(const char* text, const live_config* config) {
     places.flags.emplace_back("restart_on_change", &given.restart_on_change);
     places.flags.emplace_back("states_only", &given.states_only);
     read_options(text, places);
-    if (given.record.method == "auto")
-        refuse("method", "\"auto\"", "one method: what several agree on takes the record");
-    if (given.record.method.empty()) given.record.method = "okid-era";
-    if (given.record.hold == "auto") refuse("hold", "\"auto\"", "zoh, foh or band");
+    if (config && config->identification.method != "auto" && given.record.method == "auto") // of the file's own method
+        given.record.p = given.record.rows = "", given.record.order = "auto", given.record.hankel = "system";
+    if (given.record.method.empty() && !given.forgetting.empty()) given.record.method = "okid-era";
+    if (given.record.method == "auto" && !given.forgetting.empty())
+        refuse("forgetting", given.forgetting, "none with method auto, which keeps the samples of a window: window_s");
     const record_options checked = check_request(given.record);
     if (checked.detrend == "linear") refuse("detrend", "\"linear\"", "none or mean: a stream has no line of its own");
     stream_config out;
@@ -207,6 +213,8 @@ stream_config read_stream(const char* text, const live_config* config) {
     wanted.p = checked.p;
     wanted.rows = checked.rows;
     wanted.order = checked.order;
+    wanted.band = checked.band;
+    wanted.decimate = checked.decimate;
     wanted.sigma_blocks = checked.sigma_blocks;
     take_memory(given, out);
     take_samples(given, out);

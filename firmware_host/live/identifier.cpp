@@ -5,6 +5,7 @@
 #include "identifier.hpp"
 
 #include "error.hpp"
+#include "result/method.hpp"
 #include "stream_memory.hpp"
 
 #include <algorithm>
@@ -47,12 +48,20 @@ const char* sample_text(okid_sample_t sample) {
 } // namespace
 
 identifier::identifier(const stream_config& config)
-    : where_(config.where), m_(config.channels()), states_only_(config.states_only), scale_(config.scale),
+    : where_(config.where), m_(config.channels()), states_only_(config.states_only),
+      saturated_missing_(config.saturated_missing), sample_(config.sample), scale_(config.scale),
       offset_(config.offset) {
     require_memory(config);
-    create_identifier(config);
-    create_accumulator(config);
+    if (config.wanted.method == "auto") {
+        agreed_ = std::make_unique<agreement>(config);
+        q_ = fewest_of_auto(config.inputs.size(), config.outputs.size()) / 2;
+        if (config.wanted.window_s) memory_samples_ = kept_samples(config);
+    } else {
+        create_identifier(config);
+        create_accumulator(config);
+    }
     create_watch(config);
+    if (agreed_) return;
     if (sums_config_.sample == OKID_SAMPLE_INT16)
         codes_.resize(chunk * m_);
     else
@@ -90,6 +99,8 @@ void identifier::create_watch(const stream_config& config) {
     const identification_config& wanted = config.wanted;
     restart_on_change_ = wanted.restart_on_change && (wanted.window_s || wanted.forgetting);
     const okid_watch_config_t c = watch_config_of(config);
+    lags_ = c.lead;
+    most_order_ = c.max_order;
     change_samples_ = std::int64_t{c.block} * c.confirm;
     const std::size_t bytes = okid_watch_memsize(&c);
     watch_block_ = allocate(config, bytes, "the watch over the model");
@@ -140,6 +151,7 @@ std::optional<std::int64_t> identifier::take_change() {
 }
 
 std::vector<double> identifier::predicted_percent() {
+    if (agreed_) return agreed_->found().context.prediction_percent.value_or(std::vector<double>());
     const std::size_t size = m_ * static_cast<std::size_t>(lags() + 1), n_u = m_ - static_cast<std::size_t>(model_.n_y);
     std::vector<double> gram(size * size), out;
     const std::int64_t rows = okid_accumulator_rows(accumulator_);
@@ -154,10 +166,36 @@ std::vector<double> identifier::predicted_percent() {
 
 void identifier::restart() {
     if (!restart_on_change_) return;
+    if (agreed_) {
+        ++restarts_;
+        agreed_->forget();
+        return;
+    }
     before_ = stats();
     ++restarts_;
     okid_accumulator_reset(accumulator_);
     if (blocks_) blocks_->reset();
+}
+
+/// A row of raw numbers to those kept for auto, with the watch over it.
+template <class Number> okid_status_t identifier::keep(const Number* row) {
+    const double most = sample_ == OKID_SAMPLE_INT16 ? 32767 : sample_ == OKID_SAMPLE_INT24 ? 8388607 : 2147483647;
+    bool there = true, full = false;
+    for (std::size_t i = 0; i < m_; ++i) {
+        const auto number = static_cast<double>(row[i]);
+        full = full || (sample_ != OKID_SAMPLE_DOUBLE && (number >= most || number < -most));
+        there = there && std::isfinite(number);
+        row_[i] = scale_[i] * number + offset_[i];
+    }
+    if (full) agreed_->saturated();
+    if (full && saturated_missing_) there = false, row_.assign(m_, NAN);
+    agreed_->add(row_.data());
+    ++samples_;
+    if (!there)
+        okid_watch_gap(watch_);
+    else if (watched_ && watch(row_.data()))
+        restart();
+    return !there ? OKID_WARN_MISSING : full ? OKID_WARN_SATURATED : OKID_OK;
 }
 
 /// Samples into the sums, and into those of the blocks beside them.
@@ -186,6 +224,7 @@ void identifier::flush() {
 }
 
 void identifier::add(const double* row) {
+    if (agreed_) return (void)keep(row);
     double check = 0;
     for (std::size_t i = 0; i < m_; ++i) check += row[i] * 0.0;
     if (check != 0) { // NaN
@@ -207,13 +246,14 @@ void identifier::add(const double* row) {
 }
 
 template <class Number> okid_status_t identifier::add_rows(const Number* rows, std::size_t count) {
-    if (!takes<Number>(sums_config_.sample))
+    if (!takes<Number>(sample_))
         throw failure(exit_usage,
-                      fmt::format("the stream takes {}, found {} of {} bytes", sample_text(sums_config_.sample),
+                      fmt::format("the stream takes {}, found {} of {} bytes", sample_text(sample_),
                                   std::is_floating_point_v<Number> ? "real numbers" : "codes", sizeof(Number)));
     if (states_only_) throw failure(exit_usage, "the stream takes states only, found samples");
     flush();
     okid_status_t worst = OKID_OK;
+    for (; agreed_ && count > 0; --count, rows += m_) worst = std::max(worst, keep(rows));
     while (count > 0) {
         const bool watching = watched_;
         const std::size_t n = watching ? rows_until_change(rows, count) : count;
@@ -236,14 +276,22 @@ void identifier::add_missing(std::int64_t count) {
     flush();
     samples_ += count;
     okid_watch_gap(watch_);
+    if (agreed_) return agreed_->add_missing(count);
     okid_accumulator_gap(accumulator_, count);
     if (blocks_) blocks_->gap(accumulator_, count);
 }
 
 void identifier::reset() {
     pending_ = 0;
-    okid_accumulator_reset(accumulator_);
+    if (agreed_)
+        agreed_->reset();
+    else
+        okid_accumulator_reset(accumulator_);
     if (blocks_) blocks_->reset();
+    reset_counts();
+}
+
+void identifier::reset_counts() {
     okid_watch_reset(watch_);
     watched_ = false;
     samples_ = due_ = blind_until_ = restarts_ = 0;
@@ -252,6 +300,7 @@ void identifier::reset() {
 }
 
 std::vector<std::byte> identifier::state() {
+    if (agreed_) return agreed_->state();
     flush();
     std::vector<std::byte> out(okid_accumulator_serialised_size(accumulator_));
     if (okid_accumulator_serialise(accumulator_, out.data(), out.size()) != OKID_OK)
@@ -280,6 +329,12 @@ owned_sums identifier::read_state(const void* state, std::size_t bytes, const ok
 }
 
 void identifier::restore(const void* state, std::size_t bytes) {
+    if (agreed_) {
+        agreed_->restore(state, bytes);
+        reset_counts();
+        samples_ = agreed_->basis();
+        return;
+    }
     owned_sums from = read_state(state, bytes, sums_config_);
     reset();
     if (const okid_status_t status = okid_accumulator_deserialise(accumulator_, state, bytes); status != OKID_OK)
@@ -295,6 +350,11 @@ void identifier::restore(const void* state, std::size_t bytes) {
 }
 
 void identifier::merge(const void* state, std::size_t bytes) {
+    if (agreed_) {
+        agreed_->merge(state, bytes);
+        samples_ = agreed_->basis();
+        return;
+    }
     if (memory_samples_ > 0)
         throw failure(exit_usage, where_ + "a window and a fading memory take no further records, only a growing one");
     owned_sums from = read_state(state, bytes, sums_config_);
@@ -306,17 +366,28 @@ void identifier::merge(const void* state, std::size_t bytes) {
     if (blocks_) blocks_->take(std::move(from));
 }
 
-okid_status_t identifier::run() {
+okid_status_t identifier::run(const mass_plan& mass) {
+    if (agreed_) {
+        const okid_status_t status = agreed_->run(mass);
+        model_ = agreed_->found().model.view();
+        return status;
+    }
     flush();
     return okid_identify_run(identify_, accumulator_, &model_);
 }
 
 std::int64_t identifier::rows() {
+    if (agreed_) return agreed_->rows();
     flush();
     return okid_accumulator_rows(accumulator_);
 }
 
 okid_accumulator_stats_t identifier::stats() {
+    if (agreed_) {
+        okid_accumulator_stats_t out = agreed_->stats();
+        out.rows = agreed_->rows();
+        return out;
+    }
     okid_accumulator_stats_t out = held();
     out.samples += before_.samples;
     out.missing += before_.missing;
@@ -333,6 +404,7 @@ okid_accumulator_stats_t identifier::held() {
 }
 
 std::int64_t identifier::basis() {
+    if (agreed_) return agreed_->basis();
     const okid_accumulator_stats_t counts = held();
     const std::int64_t all = counts.samples + counts.missing; // as in a file: missing samples are samples of the record
     return memory_samples_ > 0 ? std::min(all, memory_samples_) : all;

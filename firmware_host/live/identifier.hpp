@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Samples of the grid into the accumulator, and a model out of it whenever it is asked for. All memory at the start.
 #pragma once
+#include "agreement.hpp"
 #include "blocks.hpp"
 #include "stream_config.hpp"
 
@@ -36,19 +37,25 @@ class identifier {
     /// Add all of a state as further records, and as one block for standard deviations. Not with a window or forgetting.
     void merge(const void* state, std::size_t bytes);
 
-    /// Identify from what is there. @return status of okid_identify_run(); the model stays valid until the next call
-    okid_status_t run();
+    /// Identify from what is there, auto with M, K, R of the plan. @return status of okid_identify_run(); the model stays
+    /// valid until the next call
+    okid_status_t run(const mass_plan& mass = {});
+    /// Method auto of a stream, else none.
+    const agreement* agreed() const { return agreed_.get(); }
+    /// Is an update worth its work? Of a named method always.
+    bool due() const { return !agreed_ || change_at_ || agreed_->due(); }
     const okid_identified_t& model() const { return model_; }
     okid_identify_t* decomposition() { return identify_; } ///< of the last run()
     /// Standard deviations for the model of the last run(), of its modes and what the plan wants; none when sigma_blocks is
     /// 0 or there is too little to cut into blocks.
     std::optional<deviations> sigma(const mass_plan& plan) {
+        if (agreed_) return agreed_->found().context.sigma;
         return blocks_ && samples_ >= blind_until_ ? blocks_->sigma(accumulator_, model_, plan) : std::nullopt;
     }
     /// Of each output 100 (1 - innovation / spread), both RMS: what the model of the last run() says of the next sample.
     std::vector<double> predicted_percent();
     const okid_identify_config_t& config() const { return identify_config_; }
-    int most_modes() const { return okid_identify_max_order(&identify_config_) / 2; }
+    int most_modes() const { return most_order_ / 2; }
 
     /// Compare what comes with the model of the last run(), which is at rest.
     void watch_model();
@@ -57,16 +64,17 @@ class identifier {
     std::optional<std::int64_t> take_change();
     std::int64_t restarts() const { return restarts_; }
 
-    bool exact() const { return sums_config_.sample != OKID_SAMPLE_DOUBLE; } ///< codes, summed exactly
-    std::int64_t lags() const { return okid_identify_lags(&identify_config_); }
-    std::int64_t unknowns() const { return q_; }           ///< regressors q = n_u + lags m
-    std::int64_t rows();                                   ///< regression rows now in the sums
-    std::int64_t basis();                                  ///< samples the model rests on
-    okid_accumulator_stats_t stats();                      ///< since the start, restarts or not
-    std::size_t sums_bytes() const { return sums_bytes_; } ///< of the sums of the whole
+    bool exact() const { return !agreed_ && sums_config_.sample != OKID_SAMPLE_DOUBLE; } ///< codes, summed exactly
+    std::int64_t lags() const { return lags_; }
+    std::int64_t unknowns() const { return q_; } ///< regressors q = n_u + lags m
+    std::int64_t rows();                         ///< regression rows now in the sums
+    std::int64_t basis();                        ///< samples the model rests on
+    okid_accumulator_stats_t stats();            ///< since the start, restarts or not
+    std::size_t sums_bytes() const { return agreed_ ? agreed_->bytes() : sums_bytes_; } ///< of the sums of the whole
 
   private:
     void flush();
+    void reset_counts();
     void create_watch(const stream_config& config);
     bool watch(const double* row);
     template <class Number> std::size_t rows_until_change(const Number* rows, std::size_t count);
@@ -75,11 +83,16 @@ class identifier {
     void create_accumulator(const stream_config& config);
     void create_identifier(const stream_config& config);
     template <class Number> okid_status_t absorb(const Number* samples, std::size_t count);
+    template <class Number> okid_status_t keep(const Number* row);
     owned_sums read_state(const void* state, std::size_t bytes, const okid_accumulator_config_t& shape) const;
 
     std::string where_;
     std::size_t m_;
-    bool states_only_;
+    bool states_only_, saturated_missing_;
+    okid_sample_t sample_;
+    std::int64_t lags_ = 0;
+    int most_order_ = 0;
+    std::unique_ptr<agreement> agreed_;
     std::int64_t q_ = 0, memory_samples_ = 0; ///< 0 = everything is kept
     std::vector<double> scale_, offset_, doubles_;
     std::vector<std::int16_t> codes_;

@@ -393,7 +393,7 @@ void session::finish() {
     grid_.finish();
     if (feed_) send_samples(feed_->end_block());
     start(std::int64_t{std::time(nullptr)} * 1000000000); // nothing was heard at all
-    const okid_status_t status = options_.identify ? identifier_.run() : OKID_OK;
+    const okid_status_t status = options_.identify ? identifier_.run(stream_.config().mass) : OKID_OK;
     tell(stats_event());
     if (!options_.identify) return publisher_.finish();
     check_heard();
@@ -406,7 +406,7 @@ void session::finish() {
     remark_rate();
     if (status < 0) {
         tell_remarks();
-        throw_identify_failure(status, identifier_.model(), identifier_.config(), about);
+        stream_.refuse(status, about);
     }
     stream_.remark_fit(about);
     remark_clocks(about);

@@ -53,6 +53,7 @@ table_state session::table(std::int64_t samples) {
 
 /// Modes are shown once there are twice as many equations as unknowns: below that they only repeat the noise.
 void session::show_modes(std::int64_t samples) {
+    if (!hammer_.wanted() && !stream_.due()) return;
     const stream_update found = stream_.update(samples);
     if (found.changed)
         tell({{"type", "change"},
@@ -101,11 +102,15 @@ void session::follow(std::int64_t samples, const stream_update& found, table_sta
         row.damping_ratio_std = sigma->damping_ratio[k];
     }
     tell_modes(state, sigma);
+    for (std::size_t k = tracks.size(); k-- > 0;)
+        if (stream_.doubtful(k)) state.modes.erase(state.modes.begin() + static_cast<std::ptrdiff_t>(k));
     if (turned) tell_alarm(state.t);
 }
 
 void session::tell_modes(const table_state& state, const deviations* sigma) {
     ordered_json modes = modes_json(identifier_.model(), sigma);
+    const std::vector<mode_verdict> verdicts = stream_.verdicts();
+    for (std::size_t k = 0; k < verdicts.size(); ++k) modes[k].update(verdict_json(verdicts[k]));
     for (std::size_t k = 0; k < state.modes.size(); ++k) {
         modes[k]["track"] = state.modes[k].track > 0 ? ordered_json(state.modes[k].track) : ordered_json(nullptr);
         modes[k]["alarm"] = state.modes[k].alarm;

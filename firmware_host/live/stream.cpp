@@ -55,32 +55,51 @@ stream_update stream::update(std::int64_t now) {
     }
     static const std::vector<double> unknown;
     out.sigma = identifier_.sigma({});
-    out.tracks = &tracks_.update(model());
+    signed_tracks_ = tracks_.update(model());
+    for (std::size_t k = 0; k < signed_tracks_.size(); ++k)
+        if (doubtful(k)) signed_tracks_[k] = 0;
+    out.tracks = &signed_tracks_;
     out.settled = settled_ = settling_.add(model(), *out.tracks, out.sigma ? out.sigma->frequency_hz : unknown);
     if (out.settled) identifier_.watch_model();
     return out;
 }
 
 void stream::identify() {
-    const okid_status_t status = identifier_.run();
-    if (status < 0) throw_identify_failure(status, model(), identifier_.config(), context());
+    const okid_status_t status = identifier_.run(config_.mass);
+    if (status < 0) refuse(status, context());
+}
+
+void stream::refuse(okid_status_t status, const result_context& about) const {
+    if (identifier_.agreed()) identifier_.agreed()->refuse();
+    throw_identify_failure(status, model(), identifier_.config(), about);
 }
 
 result_context stream::context(remarks said) {
     const okid_accumulator_stats_t stats = identifier_.stats();
+    const agreement* agreed = identifier_.agreed();
     result_context out;
-    out.warnings = std::move(said);
-    out.warnings.insert(out.warnings.end(), config_.said.begin(), config_.said.end());
-    out.method = config_.wanted.method;
-    if (!looks_back_rows(method_of(out.method), config_.inputs.size())) out.hankel = config_.wanted.hankel;
-    out.fs_hz = config_.rate_hz;
-    out.samples = identifier_.basis();
-    out.gaps = stats.gaps;
-    out.hold = config_.wanted.hold;
-    out.detrend = config_.wanted.detrend;
-    out.inputs = config_.inputs;
-    out.outputs = config_.outputs;
-    if (stats.missing > 0)
+    if (agreed) {
+        out = agreed->found().context;
+        out.warnings.insert(out.warnings.begin(), said.begin(), said.end());
+        if (agreed->overflowed())
+            out.warnings.emplace_back("memory_full",
+                                      fmt::format("the result rests on the newest {} samples: as many as method auto "
+                                                  "keeps of a growing memory. Set window_s",
+                                                  identifier_.basis()));
+    } else {
+        out.warnings = std::move(said);
+        out.warnings.insert(out.warnings.end(), config_.said.begin(), config_.said.end());
+        out.method = config_.wanted.method;
+        if (!looks_back_rows(method_of(out.method), config_.inputs.size())) out.hankel = config_.wanted.hankel;
+        out.fs_hz = config_.rate_hz;
+        out.samples = identifier_.basis();
+        out.gaps = stats.gaps;
+        out.hold = config_.wanted.hold;
+        out.detrend = config_.wanted.detrend;
+        out.inputs = config_.inputs;
+        out.outputs = config_.outputs;
+    }
+    if (stats.missing > 0 && !agreed)
         out.warnings.emplace_back(
             "missing_samples",
             fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags start "
@@ -104,10 +123,12 @@ result_context stream::context(remarks said) {
     return out;
 }
 
-void stream::remark_fit(result_context& about) { remark_low_fit(identifier_.predicted_percent(), false, about); }
+void stream::remark_fit(result_context& about) {
+    if (!identifier_.agreed()) remark_low_fit(identifier_.predicted_percent(), false, about);
+}
 
 void stream::add_mass(result_context& about) const {
-    if (!config_.mass.wanted()) return;
+    if (!config_.mass.wanted() || identifier_.agreed()) return;
     try {
         about.mass = find_mass_matrices(model(), config_.mass, about.warnings);
     } catch (const failure& why) {
@@ -116,6 +137,7 @@ void stream::add_mass(result_context& about) const {
 }
 
 void stream::add_sigma(result_context& about) {
+    if (identifier_.agreed()) return;
     about.sigma = identifier_.sigma(about.mass ? config_.mass : mass_plan{});
     if (about.mass && about.sigma) add_deviations(*about.sigma, *about.mass);
 }

@@ -48,9 +48,22 @@ class stream {
 
     /// Identify for a result. Throws `failure` (exit 3) when no model can be had.
     void identify();
+    /// Throws `failure` (exit 3): why the last identification gave no model.
+    [[noreturn]] void refuse(okid_status_t status, const result_context& about) const;
+    /// Is an update worth its work? A named method makes one whenever it is asked, auto when an eighth of what it keeps is
+    /// new (agreement::due()).
+    bool due() const { return identifier_.due(); }
     /// What is known of the result of the last identify() or update(), without standard deviations.
     /// @param said  what to say first
     result_context context(remarks said = {});
+    /// Of the modes of the last identify() or update().
+    std::vector<mode_verdict> verdicts() const {
+        return mode_verdicts(model(), identifier_.agreed() ? identifier_.agreed()->found().context : result_context{});
+    }
+    /// Found by auto, but not signed: in the events, not in the table; no track, no alarm.
+    bool doubtful(std::size_t mode) const {
+        return identifier_.agreed() && !identifier_.agreed()->found().context.verdicts[mode].confident;
+    }
     /// Outputs that the model of the last identify() hardly follows.
     void remark_fit(result_context& about);
     /// M, K and R where they are wanted; what stands in their way is no reason to lose the modes.
@@ -65,6 +78,7 @@ class stream {
     identifier identifier_;
     settling settling_;
     mode_tracks tracks_;
+    std::vector<int> signed_tracks_; ///< of the last update, 0 where a mode is doubtful
     bool settled_ = false;
     std::int64_t changed_at_ = 0, restarted_at_ = 0, restarts_told_ = 0;
 };

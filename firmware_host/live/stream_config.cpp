@@ -15,6 +15,8 @@ namespace {
 constexpr std::int32_t watch_block = 32,
                        watch_blocks = 3; // samples whose errors are averaged; so many high ones are a change
 
+constexpr std::int32_t most_agreed = 128, agreed_lead = 60; // states of a model of auto; samples until it predicts
+
 /// Do the raw numbers of every channel fit int16 as they are?
 bool fits_codes(const live_config& config) {
     return !resampled(config) &&
@@ -91,14 +93,21 @@ okid_accumulator_config_t sums_config_of(const stream_config& config) {
 }
 
 okid_watch_config_t watch_config_of(const stream_config& config) {
-    const okid_identify_config_t identify = identify_config_of(config);
     okid_watch_config_t c{};
+    c.block = watch_block;
+    c.confirm = watch_blocks;
+    if (config.wanted.method == "auto") {
+        c.n_u = static_cast<std::int32_t>(config.inputs.size());
+        c.n_y = static_cast<std::int32_t>(config.outputs.size());
+        c.max_order = most_agreed;
+        c.lead = agreed_lead;
+        return c;
+    }
+    const okid_identify_config_t identify = identify_config_of(config);
     c.n_u = identify.n_u;
     c.n_y = identify.n_y;
     c.max_order = okid_identify_max_order(&identify);
     c.lead = okid_identify_lags(&identify);
-    c.block = watch_block;
-    c.confirm = watch_blocks;
     return c;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "stream_memory.hpp"
 
+#include "agreement.hpp"
 #include "error.hpp"
 #include "result/method.hpp"
 
@@ -97,6 +98,10 @@ std::size_t block_sums_held(const okid_accumulator_config_t& whole, int blocks) 
 }
 
 double stream_bytes(const stream_config& stream) {
+    if (stream.wanted.method == "auto") {
+        const okid_watch_config_t watch = watch_config_of(stream);
+        return agreement_bytes(stream) + static_cast<double>(okid_watch_memsize(&watch));
+    }
     const okid_identify_config_t identify = identify_config_of(stream);
     const okid_accumulator_config_t sums = sums_config_of(stream);
     const okid_watch_config_t watch = watch_config_of(stream);
@@ -118,7 +123,7 @@ double stream_bytes(const stream_config& stream) {
 }
 
 void fit_memory(stream_config& stream) {
-    if (stream.outputs.empty() || stream.wanted.horizon_given) return;
+    if (stream.wanted.method == "auto" || stream.outputs.empty() || stream.wanted.horizon_given) return;
     const double bytes = stream_bytes(stream);
     if (bytes <= limit_of(stream)) return;
     const int horizon = largest_horizon(stream, limit_of(stream)), before = horizon_of(stream);
@@ -139,6 +144,12 @@ void require_memory(const stream_config& stream) {
                                               stream.where, stream.channels()));
     if (bytes <= limit_of(stream)) return;
     const identification_config& wanted = stream.wanted;
+    if (wanted.method == "auto")
+        throw failure(exit_usage,
+                      fmt::format("{}method auto keeps {} samples of {} channels and needs {:.0f} MB of memory, "
+                                  "max_memory_mb = {:g}; expected {}a larger max_memory_mb",
+                                  stream.where, kept_samples(stream), stream.channels(), bytes / bytes_a_mb,
+                                  wanted.max_memory_mb, wanted.window_s ? "a shorter window_s, or " : ""));
     const int rows = rows_used(method_of(wanted.method), stream.inputs.size(), wanted.p, wanted.rows);
     throw failure(exit_usage,
                   fmt::format("{}{}{} block rows and {} channels need {:.0f} MB of memory, max_memory_mb = {:g}; "

@@ -32,6 +32,7 @@ struct record_options {
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
     bool all_modes = false;                        ///< auto lists also what few runs found
+    bool modes_without_matrices = false;           ///< auto: what stands in the way of M, K, R is a remark
     std::vector<int> modes;                        ///< numbers of the modes picked by hand (auto); empty: all
     std::function<void(const char* stage)> stage;  ///< told what begins; may be empty
 };

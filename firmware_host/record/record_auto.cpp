@@ -260,7 +260,13 @@ void find_matrices_agreed(const record_options& options, record_work& work) {
     if (options.hold == "auto" && work.set.n_u == 0) work.context.hold = "zoh";
     plan.hold = work.context.hold;
     if (!options.mass.wanted()) return;
-    work.context.mass = find_mass_matrices(work.model, plan, said);
+    try {
+        work.context.mass = find_mass_matrices(work.model, plan, said);
+    } catch (const failure& why) {
+        if (!options.modes_without_matrices) throw;
+        said.emplace_back("mkr_failed", why.what());
+        return;
+    }
     renumber(work.context.verdicts, *work.context.mass);
 }
 

@@ -17,6 +17,8 @@ okid_method_t method_of(const std::string& name) {
     return static_cast<okid_method_t>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
+long long fewest_of_auto(std::size_t n_u, std::size_t n_y) { return 100LL * static_cast<long long>(n_y + 2 * n_u); }
+
 bool is_subspace(okid_method_t method) { return method >= OKID_METHOD_N4SID_MOESP; }
 
 bool looks_back_rows(okid_method_t method, std::size_t n_u) { return is_subspace(method) || n_u == 0; }

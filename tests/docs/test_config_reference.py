@@ -79,7 +79,7 @@ def initialisers(struct: str) -> dict[str, str]:
 IN_CONFIG_HPP = {
     "identification": (
         "method", "p", "hankel", "hold", "detrend", "update_s", "sigma_blocks", "restart_on_change", "mkr",
-        "max_memory_mb",
+        "max_memory_mb", "decimate",
     ),
     "alarm": ("enabled", "k_sigma", "baseline_updates"),
     "trigger": ("pretrigger_s",),

@@ -121,9 +121,8 @@ def test_65536_channels_are_checked_in_a_moment(tmp_path: pathlib.Path) -> None:
 def test_256_channels_are_usable(tmp_path: pathlib.Path) -> None:
     """Without p the horizon is chosen that fits, and said; the modes are right and the memory is kept."""
     limit = 2000
-    (tmp_path / "many.toml").write_text(
-        many_channels(256, f"max_memory_mb = {limit}\nupdate_s = 100.0\n")
-    )
+    settings = f'method = "okid-era"\nmax_memory_mb = {limit}\nupdate_s = 100.0\n'
+    (tmp_path / "many.toml").write_text(many_channels(256, settings))
     write_log(tmp_path / "many.log", 256, 4000)
     done = measured(
         "replay",

@@ -29,6 +29,9 @@ def _named(what: str, given: Sequence[str] | int, letter: str, least: int) -> li
 class Session:
     """Recursive identification of a stream, the same as in `okid run`: fixed memory, however long it runs.
 
+    `method` as in okid.identify(): "auto" by default, "okid-era" when an option of one method is given (p, rows, order,
+    hankel, forgetting). Named methods keep sums of lagged products; "auto" keeps the samples of the window, without one
+    the newest 10 million numbers, and finds in them what okid.identify() finds in the same samples.
     `inputs`, `outputs`: names of the channels, or how many; no inputs = ambient. `fs` Hz. `window_s` forgets what is
     older (in blocks of about a twentieth of it), `forgetting` fades by that factor a sample, neither keeps everything.
     `codes` 16, 24 or 32 takes ADC codes with `scale` and `offset` (value = scale code + offset, one for all channels or
@@ -54,14 +57,16 @@ class Session:
         outputs: Sequence[str] | int,
         *,
         fs: float,
-        method: str = "okid-era",
-        p: int = 40,
+        method: str | None = None,
+        p: int | None = None,
         rows: int | None = None,
         order: int | str = "auto",
         max_order: int | None = None,
         hankel: str = "system",
         detrend: str = "mean",
-        hold: str = "zoh",
+        hold: str | None = None,
+        band: tuple[float, float] | None = None,
+        decimate: int | None = None,
         window_s: float | None = None,
         forgetting: float | None = None,
         update_s: float = 0.5,
@@ -79,11 +84,14 @@ class Session:
         self._open(given, None)
 
     def _open(self, options: Mapping[str, Any], config: str | Path | None) -> None:
-        named = {
+        named: dict[str, Any] = {
             what: _named(what, options[what], letter, least)
             for what, letter, least in (("inputs", "u", 0), ("outputs", "y", 1))
             if what in options
         }
+        band = options.get("band")
+        if band is not None:
+            named["band"] = ":".join(map(str, band))
         self._stream = HostStream({**options, **named}, config)
         used = self._stream.options
         self.inputs, self.outputs = list(used["inputs"]), list(used["outputs"])

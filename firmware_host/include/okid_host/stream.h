@@ -3,8 +3,9 @@
  * @file stream.h
  * @brief Samples as they arrive to modes and results: the recursive identification of `okid run`, fed by the caller.
  *
- * Memory is taken when a stream is made; okid_host_stream_add() takes none. It costs O(m q) a sample, twice that with
- * standard deviations and without a window.
+ * Of a named method memory is taken when a stream is made; okid_host_stream_add() takes none. It costs O(m q) a sample, twice
+ * that with standard deviations and without a window. Method auto (the default, unless an option of one method is given)
+ * keeps the samples of the window, or the newest 10 million numbers; an update identifies from them.
  */
 #ifndef OKID_HOST_STREAM_H
 #define OKID_HOST_STREAM_H
@@ -84,7 +85,7 @@ OKID_HOST_API int32_t okid_host_stream_update(okid_host_stream_t* self, struct o
  * result of the stream. @return 0; 3: no model can be had; 4 */
 OKID_HOST_API int32_t okid_host_stream_identify(okid_host_stream_t* self, struct okid_host_result** result);
 
-/** The sums as bytes, for a file or another machine (format: okid/accumulator.h); the bytes are the stream's until its next
+/** The sums as bytes, for a file or another machine (format: okid/accumulator.h; of method auto the samples); the bytes are the stream's until its next
  * call. Every release reads those of earlier ones. @return 0 or 4 */
 OKID_HOST_API int32_t okid_host_stream_state(okid_host_stream_t* self, const void** state, size_t* bytes);
 

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  method auto of a stream
+// METHOD   rows in one vector, the oldest dropped at its front; identify_records() over what is there
+#include "agreement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+constexpr double most_numbers = 1e7;   // of a growing memory: 80 MB
+constexpr double numbers_a_number = 8; // an identification holds the record, its lower rates and copies of both
+
+struct state_head {
+    char mark[8];
+    std::int64_t n_u, n_y, records, samples;
+};
+constexpr char state_mark[9] = "okid.rec";
+
+record_options options_of(const stream_config& config) {
+    record_options out;
+    out.inputs = config.inputs;
+    out.outputs = config.outputs;
+    out.fs_hz = config.rate_hz;
+    out.method = config.wanted.method;
+    out.hold = config.wanted.hold;
+    out.detrend = config.wanted.detrend;
+    out.sigma_blocks = config.wanted.sigma_blocks;
+    out.band = config.wanted.band;
+    out.decimate = config.wanted.decimate;
+    out.modes_without_matrices = true;
+    return out;
+}
+
+} // namespace
+
+std::int64_t kept_samples(const stream_config& config) {
+    if (config.wanted.window_s)
+        return std::max<std::int64_t>(1, std::llround(*config.wanted.window_s * config.rate_hz));
+    const double numbers = std::min(most_numbers, config.wanted.max_memory_mb * 1e6 / 8 / numbers_a_number);
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(numbers / static_cast<double>(config.channels())));
+}
+
+double agreement_bytes(const stream_config& config) {
+    return 8 * numbers_a_number * static_cast<double>(kept_samples(config)) * static_cast<double>(config.channels());
+}
+
+agreement::agreement(const stream_config& config)
+    : where_(config.where), m_(config.channels()), options_(options_of(config)),
+      window_(config.wanted.window_s.has_value()), most_(kept_samples(config)), starts_{0}, missing_(m_, NAN) {
+    if (window_) rows_.reserve(static_cast<std::size_t>(most_ + most_ / 4 + 1) * m_);
+}
+
+void agreement::push(const double* row) {
+    if (came_ - begin_ == most_) {
+        ++begin_;
+        while (starts_.size() > 1 && starts_[1] <= begin_) starts_.erase(starts_.begin());
+        if (begin_ - base_ > most_ / 4) {
+            rows_.erase(rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>((begin_ - base_)) *
+                                                           static_cast<std::ptrdiff_t>(m_));
+            base_ = begin_;
+        }
+    }
+    rows_.insert(rows_.end(), row, row + m_);
+    ++came_;
+}
+
+void agreement::add(const double* row) {
+    if (std::all_of(row, row + m_, [](double x) { return std::isfinite(x); })) {
+        ++counts_.samples;
+        in_gap_ = false;
+    } else {
+        ++counts_.missing;
+        counts_.gaps += !in_gap_;
+        in_gap_ = true;
+    }
+    push(row);
+}
+
+void agreement::add_missing(std::int64_t count) {
+    if (count == 0) {
+        if (starts_.back() < came_) starts_.push_back(came_);
+        in_gap_ = false;
+        return;
+    }
+    counts_.missing += count;
+    counts_.gaps += !in_gap_;
+    in_gap_ = true;
+    for (std::int64_t k = std::min(count, most_); k > 0; --k) push(missing_.data());
+}
+
+void agreement::forget() {
+    rows_.clear();
+    base_ = begin_ = forgotten_ = came_;
+    starts_ = {came_};
+    run_at_ = came_;
+    in_gap_ = false;
+}
+
+void agreement::reset() {
+    forget();
+    counts_ = {};
+    run_of_.reset();
+}
+
+std::int64_t agreement::rows() const {
+    std::int64_t out = 0;
+    for (std::int64_t k = begin_; k < came_; ++k)
+        out += std::all_of(at(k), at(k) + m_, [](double x) { return std::isfinite(x); });
+    return out;
+}
+
+record_set agreement::records() const {
+    record_set out;
+    out.n_u = options_.inputs.size();
+    out.n_y = options_.outputs.size();
+    for (std::size_t i = 0; i < starts_.size(); ++i) {
+        const std::int64_t first = std::max(starts_[i], begin_), last = i + 1 < starts_.size() ? starts_[i + 1] : came_;
+        if (first < last)
+            out.add(starts_.size() == 1 ? "the stream" : fmt::format("record {} of the stream", i + 1), at(first),
+                    static_cast<std::size_t>(last - first));
+    }
+    return out;
+}
+
+okid_status_t agreement::run(const mass_plan& mass) {
+    const std::pair<std::int64_t, bool> now{came_, mass.wanted()};
+    if (run_of_ == now) return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
+    run_of_ = now;
+    run_at_ = came_;
+    fault_.reset();
+    try {
+        options_.mass = mass;
+        found_ = identify_records(records(), options_);
+        found_.context.x0.reset(); // of the samples of a stream nothing else is told than of its sums
+        found_.context.simulation_percent.reset();
+    } catch (const failure& why) {
+        fault_ = why;
+        found_ = {};
+    }
+    return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
+}
+
+std::vector<std::byte> agreement::state() const {
+    const record_set set = records();
+    state_head head{};
+    std::copy_n(state_mark, sizeof head.mark, head.mark);
+    head.n_u = static_cast<std::int64_t>(set.n_u);
+    head.n_y = static_cast<std::int64_t>(set.n_y);
+    head.records = static_cast<std::int64_t>(set.records.size());
+    head.samples = static_cast<std::int64_t>(set.count());
+    std::vector<std::byte> out;
+    const auto put = [&](const void* from, std::size_t bytes) {
+        const auto* first = static_cast<const std::byte*>(from);
+        out.insert(out.end(), first, first + bytes);
+    };
+    put(&head, sizeof head);
+    for (const record_data& record : set.records) {
+        const auto end = static_cast<std::int64_t>(record.first + record.count);
+        put(&end, sizeof end);
+    }
+    put(set.samples.data(), set.samples.size() * sizeof(double));
+    return out;
+}
+
+agreement::saved agreement::read(const void* state, std::size_t bytes) const {
+    const auto refuse_state = [&](const std::string& why) { throw failure(exit_usage, where_ + "the state " + why); };
+    state_head head{};
+    if (bytes < sizeof head) refuse_state("is damaged: it ends early");
+    std::memcpy(&head, state, sizeof head);
+    if (std::memcmp(head.mark, state_mark, sizeof head.mark) != 0)
+        refuse_state("is none of method auto (which keeps samples), or is damaged");
+    if (head.n_u != static_cast<std::int64_t>(options_.inputs.size()) ||
+        head.n_y != static_cast<std::int64_t>(options_.outputs.size()))
+        refuse_state(fmt::format("is of {} inputs and {} outputs; expected {}, {}", head.n_u, head.n_y,
+                                 options_.inputs.size(), options_.outputs.size()));
+    const std::size_t rest = (bytes - sizeof head) / 8;
+    const auto records = static_cast<std::size_t>(head.records), samples = static_cast<std::size_t>(head.samples);
+    if (records > rest || samples > rest / m_ || bytes != sizeof head + 8 * (records + samples * m_))
+        refuse_state("is damaged: its size is not the one it tells");
+    saved out;
+    out.ends.resize(records);
+    out.rows.resize(samples * m_);
+    const auto* from = static_cast<const std::byte*>(state) + sizeof head;
+    if (records > 0) std::memcpy(out.ends.data(), from, 8 * records);
+    if (samples > 0) std::memcpy(out.rows.data(), from + 8 * records, 8 * samples * m_);
+    if (!std::is_sorted(out.ends.begin(), out.ends.end()) || (records > 0 ? out.ends.back() : 0) != head.samples ||
+        (records > 0 && out.ends.front() < 1))
+        refuse_state("is damaged: its records are not in order");
+    return out;
+}
+
+void agreement::take(const saved& from) {
+    std::size_t first = 0;
+    for (const std::int64_t end : from.ends) {
+        add_missing(0);
+        for (; first < static_cast<std::size_t>(end); ++first) add(from.rows.data() + first * m_);
+    }
+}
+
+void agreement::restore(const void* state, std::size_t bytes) {
+    const saved from = read(state, bytes);
+    reset();
+    take(from);
+}
+
+void agreement::merge(const void* state, std::size_t bytes) {
+    if (window_) throw failure(exit_usage, where_ + "a window takes no further records, only a growing memory");
+    take(read(state, bytes));
+}
+
+} // namespace okid_host

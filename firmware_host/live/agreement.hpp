@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// Method auto of a stream: the samples of its memory, and what identify_records() finds in them.
+//
+// What makes lines, clipping and rest known is not in any sum: so the samples themselves are kept, those of the window, or of
+// a growing memory at most `most_numbers`. A result is then that of the same samples in a file.
+#pragma once
+#include "error.hpp"
+#include "record/record.hpp"
+#include "stream_config.hpp"
+
+#include <okid/accumulator.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+/// Samples that a stream keeps for auto: the window, or the bound of a growing memory.
+std::int64_t kept_samples(const stream_config& config);
+
+/// Bytes that an identification from so many samples takes.
+double agreement_bytes(const stream_config& config);
+
+class agreement {
+  public:
+    explicit agreement(const stream_config& config);
+
+    void add(const double* row);              ///< in engineering units; NaN: missing
+    void add_missing(std::int64_t count);     ///< 0: another record begins
+    void forget();                            ///< all samples; the counts stay
+    void reset();                             ///< counts too
+    void saturated() { ++counts_.saturated; } ///< the row to come has a code at full scale
+
+    /// Identify what is kept, once for the same samples and plan. @return OKID_OK, or a status < 0 and refuse() says why
+    okid_status_t run(const mass_plan& mass);
+    const record_result& found() const { return found_; }
+    [[noreturn]] void refuse() const { throw failure(*fault_); } ///< of the last run()
+    /// An eighth of what is kept came since the last run(): so all updates together cost a few times one result.
+    bool due() const { return 8 * (came_ - run_at_) >= basis(); }
+
+    std::int64_t basis() const { return came_ - begin_; }
+    std::int64_t rows() const; ///< complete ones
+    okid_accumulator_stats_t stats() const { return counts_; }
+    bool overflowed() const { return !window_ && begin_ > forgotten_; } ///< a growing memory has reached its bound
+    std::size_t bytes() const { return rows_.capacity() * sizeof(double); }
+
+    std::vector<std::byte> state() const;
+    void restore(const void* state, std::size_t bytes);
+    void merge(const void* state, std::size_t bytes); ///< as further records
+
+  private:
+    struct saved {
+        std::vector<std::int64_t> ends; ///< of its records
+        std::vector<double> rows;
+    };
+    saved read(const void* state, std::size_t bytes) const;
+    void take(const saved& from);
+    void push(const double* row);
+    const double* at(std::int64_t sample) const { return rows_.data() + static_cast<std::size_t>(sample - base_) * m_; }
+    record_set records() const;
+
+    std::string where_;
+    std::size_t m_;
+    record_options options_;
+    bool window_, in_gap_ = false;
+    std::int64_t most_;
+    std::vector<double> rows_;                                     ///< samples base_ … came_ - 1
+    std::int64_t base_ = 0, begin_ = 0, came_ = 0, forgotten_ = 0; ///< kept: begin_ … came_ - 1
+    std::vector<std::int64_t> starts_;                             ///< of records
+    std::vector<double> missing_;                                  ///< one row
+    okid_accumulator_stats_t counts_{};
+    std::int64_t run_at_ = 0;
+    std::optional<std::pair<std::int64_t, bool>> run_of_; ///< samples and whether M, K, R were wanted
+    record_result found_;
+    std::optional<failure> fault_;
+};
+
+} // namespace okid_host
