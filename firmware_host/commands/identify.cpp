@@ -193,6 +193,11 @@ void add_identify(CLI::App& app) {
                      "--output-dofs: mass, stiffness and damping matrices")
         ->type_name("LIST");
     command
+        ->add_option("--hit-dofs", given->wanted.hit_dofs,
+                     "roving hammer: where each record was struck, one number a record in their order (-3: at 3, "
+                     "direction reversed). Each place becomes an input of its own")
+        ->type_name("LIST");
+    command
         ->add_option("--output-dofs", given->wanted.output_dofs,
                      "where each sensor stands; every degree of freedom needs a force or a sensor, one needs both")
         ->type_name("LIST");

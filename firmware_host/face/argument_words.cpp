@@ -36,6 +36,7 @@ constexpr std::array arguments{argument{"--inputs", "inputs", ""},
                                argument{"--band", "band", ""},
                                argument{"--decimate", "decimate", " N "},
                                argument{"--modes", "modes", ""},
+                               argument{"--hit-dofs", "hit_dofs", ""},
                                argument{"--json", "to_dict()", ""}};
 
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-'; }

@@ -27,6 +27,7 @@ asked read_record(const char* text) {
     places.texts.emplace_back("band", &out.request.band);
     places.texts.emplace_back("decimate", &out.request.decimate);
     places.texts.emplace_back("modes", &out.request.modes);
+    places.texts.emplace_back("hit_dofs", &out.request.hit_dofs);
     places.flags = {{"refine", &out.request.refine}, {"stabilization", &out.request.stabilization}};
     places.lists.emplace_back("units", &out.units);
     read_options(text, places);

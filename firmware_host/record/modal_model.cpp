@@ -15,13 +15,6 @@
 namespace okid_host {
 namespace {
 
-constexpr int markov_blocks = 61; // as 30 block rows give
-
-std::complex<double> discrete_pole(const listed_mode& mode, double dt) {
-    const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
-    return std::exp(std::complex<double>(-zeta * w, w * std::sqrt(1 - zeta * zeta)) * dt);
-}
-
 void put_modes(const std::vector<listed_mode>& modes, refined_arrays& to, okid_identified_t& model) {
     for (const listed_mode& mode : modes) {
         to.frequency.push_back(mode.frequency_hz);
@@ -73,6 +66,11 @@ void put_states(const std::vector<listed_mode>& modes, refined_arrays& to, okid_
 }
 
 } // namespace
+
+std::complex<double> discrete_pole(const listed_mode& mode, double dt) {
+    const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
+    return std::exp(std::complex<double>(-zeta * w, w * std::sqrt(1 - zeta * zeta)) * dt);
+}
 
 void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, record_work& work) {
     work.refined = std::make_unique<refined_arrays>();

@@ -15,6 +15,11 @@ struct listed_mode {
     bool in_model;
 };
 
+constexpr int markov_blocks = 61; // as 30 block rows give
+
+/// exp(lambda dt)
+std::complex<double> discrete_pole(const listed_mode& mode, double dt);
+
 /// work.model: the modes of `modes` (ascending), the states of those in the model, B and D from the records, K 0.
 void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, record_work& work);
 

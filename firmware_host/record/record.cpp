@@ -13,6 +13,7 @@
 #include "record_uncertainty.hpp"
 #include "record_work.hpp"
 #include "result/method.hpp"
+#include "roving.hpp"
 
 #include <okid/steps/square_root.h>
 
@@ -289,7 +290,14 @@ result_context describe_records(const record_set& set, const record_options& opt
 }
 
 record_result identify_records(record_set records, const record_options& options) {
+    check_hits(records, options.hits);
     if (options.method == "auto") return identify_auto(std::move(records), options);
+    if (!options.hits.empty()) {
+        record_options other = options;
+        other.inputs = place_names(options.inputs.front(), options.hits);
+        other.hits.clear();
+        return identify_records(one_column_a_place(records, options.hits), other);
+    }
     record_work work;
     work.set = std::move(records);
     work.at_rest = options.start == "rest";
@@ -319,6 +327,7 @@ record_result identify_records(record_set records, const record_options& options
     if (options.detrend == "mean" && !own_means_first) remove_means(work.set); // the fit is about the record's mean
     replicates = improve(options, std::move(replicates), work);
     check_fit(work.context);
+    remark_contradiction(modes_of(work.model), {}, options.fs_hz, work);
     find_matrices(replicates, options, work);
     find_deviations(rows, replicates, options, work);
     record_result result;

@@ -11,6 +11,7 @@
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_hold.hpp"
+#include "roving.hpp"
 #include "screening.hpp"
 
 #include <algorithm>
@@ -284,6 +285,28 @@ record_options without_outputs(record_options options, const std::vector<bool>& 
     return options;
 }
 
+/// Of records struck at different places: poles and shapes from what follows the blows, B and D from each place's records.
+std::vector<listed_mode> find_struck(const record_options& options, record_work& work) {
+    record_options seen = options;
+    record_set decays = free_decays(work.set);
+    work.context.inputs = place_names(options.inputs.front(), options.hits);
+    if (decays.records.empty()) { // the force never rests
+        work.set = one_column_a_place(work.set, options.hits);
+        seen.inputs = work.context.inputs;
+        return find_modes_agreed(seen, work);
+    }
+    seen.inputs.clear();
+    const bool at_rest = std::exchange(work.at_rest, false);
+    record_set struck = std::exchange(work.set, std::move(decays));
+    std::vector<listed_mode> listed = find_modes_agreed(seen, work);
+    make_modal_model(listed, options.fs_hz, work);
+    work.set = std::move(struck);
+    work.at_rest = at_rest;
+    if (options.detrend != "none") remove_means(work.set);
+    fit_places(listed, options.hits, options.fs_hz, work);
+    return listed;
+}
+
 } // namespace
 
 record_result identify_auto(record_set records, const record_options& given) {
@@ -303,11 +326,14 @@ record_result identify_auto(record_set records, const record_options& given) {
     work.at_rest = begin_at_rest(work.set, options);
     if (work.at_rest) work.context.start = "rest";
     if (options.detrend == "linear") detrend_linear(work.set, options);
-    const std::vector<listed_mode> listed = find_modes_agreed(options, work);
+    const bool roving = !options.hits.empty();
+    const std::vector<listed_mode> listed = roving ? find_struck(options, work) : find_modes_agreed(options, work);
     if (options.stage) options.stage("simulating the model");
-    if (options.detrend != "none") remove_means(work.set);
-    make_modal_model(listed, options.fs_hz, work);
-    if (work.set.n_u > 0) fit_records(work.set, work.model, work.context);
+    const bool placed = work.model.n_u > 0; // by find_struck
+    if (options.detrend != "none" && !placed) remove_means(work.set);
+    if (!placed) make_modal_model(listed, options.fs_hz, work);
+    if (work.set.n_u > 0 && !placed) fit_records(work.set, work.model, work.context);
+    remark_contradiction(listed, options.hits, options.fs_hz, work);
     find_matrices_agreed(options, work);
     if (!all) put_back_outputs(screened.kept, work);
     work.context.outputs = given.outputs;

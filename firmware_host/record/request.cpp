@@ -7,6 +7,7 @@
 #include "files/nearest_name.hpp"
 #include "record_check.hpp"
 #include "result/method.hpp"
+#include "roving.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -59,10 +60,42 @@ std::vector<int> check_sensing(const std::string& sensing, std::size_t outputs) 
     return out;
 }
 
+/// "3,7,-12": where each record was struck.
+std::vector<int> check_hit_dofs(const record_request& given) {
+    std::vector<int> out;
+    if (given.hit_dofs.empty()) return out;
+    if (given.inputs.size() != 1)
+        usage(fmt::format("--hit-dofs: found {} force columns in --inputs, expected one, that of the hammer",
+                          given.inputs.size()));
+    if (!given.input_dofs.empty()) usage("--input-dofs: --hit-dofs says where the forces act, leave one of them out");
+    for (std::size_t at = 0; at <= given.hit_dofs.size();) {
+        const std::size_t comma = std::min(given.hit_dofs.find(',', at), given.hit_dofs.size());
+        out.push_back(
+            static_cast<int>(whole_number("--hit-dofs", given.hit_dofs.substr(at, comma - at), -10000, 10000)));
+        if (out.back() == 0) usage("--hit-dofs: found 0, expected numbers from 1 (-3: at 3, direction reversed)");
+        at = comma + 1;
+    }
+    const std::size_t places = hit_places(out).size();
+    if (places + given.outputs.size() > 256)
+        usage(fmt::format("--hit-dofs: found {} places, with the outputs more than 256 channels", places));
+    return out;
+}
+
 /// The degrees of freedom of the channels, when any are given.
 mass_plan check_dofs(const record_request& given, const record_options& options, const std::vector<int>& sensing) {
     mass_plan plan;
     if (given.input_dofs.empty() && given.output_dofs.empty()) return plan;
+    if (!options.hits.empty()) {
+        for (const int place : hit_places(options.hits))
+            plan.inputs.push_back({fmt::format("{}@{}", options.inputs.front(), place), place});
+        for (const std::string& name : options.outputs) plan.outputs.emplace_back().name = name;
+        for (std::size_t i = 0; i < sensing.size(); ++i) plan.outputs[i].sensing = sensing[i];
+        plan.hold = options.hold;
+        read_dofs("--output-dofs", given.output_dofs, "output", plan.outputs);
+        if (const std::string fault = plan_fault(plan); !fault.empty())
+            usage(fmt::format("--hit-dofs, --output-dofs: {}", fault));
+        return plan;
+    }
     for (const auto& [option, other, list] : {std::tuple{"--input-dofs", "--output-dofs", &given.input_dofs},
                                               std::tuple{"--output-dofs", "--input-dofs", &given.output_dofs}})
         if (list->empty()) usage(fmt::format("{} is missing: {} is given, M, K and R need both", option, other));
@@ -178,6 +211,7 @@ record_options check_request(const record_request& given) {
     options.outputs = given.outputs;
     const std::string fault = agreed ? "" : hankel_fault(given.hankel, options.method, options.inputs.size());
     if (!fault.empty()) usage("--hankel: " + fault);
+    options.hits = check_hit_dofs(given);
     options.mass = check_dofs(given, options, check_sensing(given.sensing, options.outputs.size()));
     return options;
 }
@@ -201,7 +235,11 @@ double check_rate(const std::string& text) {
 
 void take_record_units(const std::vector<std::string>& units, record_options& options) {
     remark_exchanged(units, options, options.said);
-    if (options.mass.wanted()) take_units(units, options.mass, options.said);
+    if (!options.mass.wanted()) return;
+    std::vector<std::string> placed = units; // of roving hits one column a place
+    if (!options.hits.empty() && !units.empty())
+        placed.insert(placed.begin(), options.mass.inputs.size() - 1, units[0]);
+    take_units(placed, options.mass, options.said);
 }
 
 } // namespace okid_host

@@ -15,6 +15,7 @@ struct record_request {
     std::string sensing = "acceleration", input_dofs, output_dofs; ///< lists with commas between
     std::string fs, p, rows, max_order, sigma_blocks;
     std::string band, decimate, modes; ///< of method auto
+    std::string hit_dofs;              ///< one number a record
     bool refine = false, stabilization = false;
 };
 

@@ -42,6 +42,7 @@ def identify(
     band: tuple[float, float] | None = None,
     decimate: int | None = None,
     modes: Sequence[int] | None = None,
+    hit_dofs: Sequence[int] | None = None,
 ) -> Result:
     """Identify a structure from measured inputs and outputs.
 
@@ -79,6 +80,9 @@ def identify(
     Of "auto" alone: `band` (low, high) in Hz where modes are sought; `decimate` the largest factor of the lower rates;
     `modes` the numbers, from 1, of the listed modes that are kept: picked by hand they count as confident.
 
+    `hit_dofs`: where each record was struck (roving hammer), one number a record: each place becomes an input of its
+    own; with `output_dofs` it says where the forces of M, K and R act.
+
     Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
 
     >>> import okid
@@ -98,6 +102,7 @@ def identify(
         "detrend": detrend, "hold": hold, "start": start, "input_dofs": input_dofs, "output_dofs": output_dofs,
         "sensing": sensing, "refine": refine, "sigma_blocks": sigma_blocks, "units": units,
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
+        "hit_dofs": hit_dofs,
     }  # fmt: skip
     return Result.of_host(host_result.identify(options, records))
 

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  B and D of given modes from records, and what other records' B and D would leave of them
+// METHOD   with poles mu and shapes c known, y = sum_k Re(c_k b_k z_k) + D u, z_k+ = mu_k z_k + u, is linear in b and D: one
+//          Gram matrix of [z, u, y] a record holds everything, so that any B and D are judged without another pass
+// NUMERICS normal equations at unit diagonal with a ridge of 1e-10: coefficients that the record does not excite stay small
+#include "residue_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace okid_host {
+namespace {
+
+using complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index block = 256;
+constexpr double ridge = 1e-10;
+
+/// Modes in the model: poles and shapes.
+struct modal_basis {
+    std::vector<complex> mu;
+    std::vector<const listed_mode*> modes;
+};
+
+modal_basis basis_of(const std::vector<listed_mode>& modes, double fs_hz) {
+    modal_basis out;
+    for (const listed_mode& mode : modes) {
+        if (!mode.in_model) continue;
+        out.mu.push_back(discrete_pole(mode, 1 / fs_hz));
+        out.modes.push_back(&mode);
+    }
+    return out;
+}
+
+/// Gram matrix of [Re z, Im z of each mode and drive; u; y]; a drive is an input or, last, the initial state.
+MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_data& record, bool at_rest) {
+    const std::size_t n = basis.mu.size(), drives = set.n_u + (at_rest ? 0 : 1);
+    const auto size = static_cast<Index>(2 * n * drives + set.channels());
+    MatrixXd G = MatrixXd::Zero(size, size), X = MatrixXd::Zero(size, block);
+    std::vector<complex> z(n * drives);
+    if (!at_rest) std::fill(z.begin() + static_cast<std::ptrdiff_t>(n * set.n_u), z.end(), complex(1));
+    Index filled = 0;
+    const auto fold = [&] {
+        G.selfadjointView<Eigen::Lower>().rankUpdate(X.leftCols(filled));
+        filled = 0;
+    };
+    for (std::size_t t = 0; t < record.count; ++t) {
+        const double* row = set.rows(record) + t * set.channels();
+        if (std::any_of(row, row + set.n_u, [](double u) { return std::isnan(u); })) break;
+        if (std::none_of(row + set.n_u, row + set.channels(), [](double y) { return std::isnan(y); })) {
+            auto x = X.col(filled++);
+            for (std::size_t k = 0; k < z.size(); ++k) {
+                x[static_cast<Index>(2 * k)] = z[k].real();
+                x[static_cast<Index>(2 * k) + 1] = z[k].imag();
+            }
+            std::copy_n(row, set.channels(), x.data() + 2 * z.size());
+            if (filled == block) fold();
+        }
+        for (std::size_t j = 0; j < drives; ++j)
+            for (std::size_t k = 0; k < n; ++k)
+                z[j * n + k] = basis.mu[k] * z[j * n + k] + (j < set.n_u ? row[j] : 0.0);
+    }
+    fold();
+    return G.selfadjointView<Eigen::Lower>();
+}
+
+/// What each unknown adds to output o, in the rows of the Gram matrix: modes of each drive, then D.
+MatrixXd map_of(const modal_basis& basis, const record_set& set, std::size_t drives, std::size_t o) {
+    const std::size_t n = basis.mu.size(), states = 2 * n * drives;
+    MatrixXd T =
+        MatrixXd::Zero(static_cast<Index>(states + set.channels()), static_cast<Index>(states + set.n_y * set.n_u));
+    for (std::size_t j = 0; j < drives; ++j)
+        for (std::size_t k = 0; k < n; ++k) {
+            const auto at = static_cast<Index>(2 * (j * n + k));
+            const complex c = basis.modes[k]->shape[o];
+            T.block<2, 2>(at, at) << c.real(), -c.imag(), -c.imag(), -c.real();
+        }
+    for (std::size_t j = 0; j < set.n_u; ++j)
+        T(static_cast<Index>(states + j), static_cast<Index>(states + j * set.n_y + o)) = 1;
+    return T;
+}
+
+/// The unknowns of the initial state out of the equations: those at first .. first + count - 1.
+void eliminate(Index first, Index count, residue_sums& sums) {
+    std::vector<Index> kept, gone;
+    for (Index i = 0; i < sums.h.size(); ++i) (i >= first && i < first + count ? gone : kept).push_back(i);
+    MatrixXd own = sums.N(gone, gone);
+    own.diagonal() *= 1 + ridge;
+    own.diagonal().array() += 1e-300;
+    const Eigen::LDLT<MatrixXd> solver(own);
+    const VectorXd x0 = solver.solve(sums.h(gone));
+    sums.left = sums.energy - sums.h(gone).dot(x0);
+    const MatrixXd cross = sums.N(gone, kept);
+    const MatrixXd reduced = sums.N(kept, kept) - cross.transpose() * solver.solve(cross);
+    const VectorXd rest = sums.h(kept) - cross.transpose() * x0;
+    sums.N = reduced;
+    sums.h = rest;
+}
+
+} // namespace
+
+std::vector<residue_sums> sum_residues(const std::vector<listed_mode>& modes, double fs_hz, const record_set& set,
+                                       bool at_rest) {
+    const modal_basis basis = basis_of(modes, fs_hz);
+    const std::size_t n = basis.mu.size(), drives = set.n_u + (at_rest ? 0 : 1);
+    const auto states = static_cast<Index>(2 * n * drives);
+    std::vector<MatrixXd> grams;
+    VectorXd power = VectorXd::Constant(static_cast<Index>(set.n_y), 1e-300);
+    for (const record_data& record : set.records) {
+        grams.push_back(gram_of(basis, set, record, at_rest));
+        power += grams.back().diagonal().tail(static_cast<Index>(set.n_y));
+    }
+    std::vector<residue_sums> out(grams.size());
+    for (std::size_t o = 0; o < set.n_y; ++o) {
+        const MatrixXd T = map_of(basis, set, drives, o);
+        const auto at = states + static_cast<Index>(set.n_u + o);
+        const double weight = 1 / power[static_cast<Index>(o)];
+        for (std::size_t r = 0; r < grams.size(); ++r) {
+            if (o == 0) out[r].N = MatrixXd::Zero(T.cols(), T.cols()), out[r].h = VectorXd::Zero(T.cols());
+            out[r].N.noalias() += weight * (T.transpose() * (grams[r] * T));
+            out[r].h.noalias() += weight * (T.transpose() * grams[r].col(at));
+            out[r].energy += weight * grams[r](at, at);
+        }
+    }
+    for (residue_sums& sums : out) {
+        sums.left = sums.energy;
+        if (!at_rest) eliminate(static_cast<Index>(2 * n * set.n_u), static_cast<Index>(2 * n), sums);
+    }
+    return out;
+}
+
+VectorXd fit_residues(const std::vector<const residue_sums*>& records) {
+    MatrixXd N = records.front()->N;
+    VectorXd h = records.front()->h;
+    for (std::size_t r = 1; r < records.size(); ++r) N += records[r]->N, h += records[r]->h;
+    const VectorXd scale = N.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    MatrixXd scaled = scale.asDiagonal() * N * scale.asDiagonal();
+    scaled.diagonal().array() += ridge;
+    return scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * h);
+}
+
+double residue_left(const residue_sums& record, const VectorXd& x) {
+    return std::max(0.0, record.left - 2 * record.h.dot(x) + x.dot(record.N * x)) / std::max(record.energy, 1e-300);
+}
+
+} // namespace okid_host

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// B and D of given modes, of each record alone or of several together, and how much of a record they leave.
+#pragma once
+#include "modal_model.hpp"
+
+#include <Eigen/Dense>
+#include <vector>
+
+namespace okid_host {
+
+/// What one record says of B and D: residual(x) = y'y - 2 h'x + x'N x, the initial state eliminated.
+struct residue_sums {
+    Eigen::MatrixXd N;
+    Eigen::VectorXd h;
+    double left = 0;   ///< y'y less what the initial state explains
+    double energy = 0; ///< y'y, each output in units of its spread over all records
+};
+
+/// Of every record. @param at_rest  their initial states are zero
+std::vector<residue_sums> sum_residues(const std::vector<listed_mode>& modes, double fs_hz, const record_set& set,
+                                       bool at_rest);
+
+/// The x that fits these records together: of each input the modes' coefficients (real, imaginary), then D, outputs first.
+Eigen::VectorXd fit_residues(const std::vector<const residue_sums*>& records);
+
+/// What x leaves of a record, over its energy.
+double residue_left(const residue_sums& record, const Eigen::VectorXd& x);
+
+} // namespace okid_host

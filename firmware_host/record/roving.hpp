@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// Several records of one structure: struck at different places (`--hit-dofs`), or contradicting each other.
+#pragma once
+#include "modal_model.hpp"
+#include "record_work.hpp"
+
+#include <vector>
+
+namespace okid_host {
+
+/// Throws `failure` (exit 2) where the numbers do not match the records.
+void check_hits(const record_set& set, const std::vector<int>& hits);
+
+/// The places without repetition, ascending; `-3` is place 3.
+std::vector<int> hit_places(const std::vector<int>& hits);
+
+/// One input a place: the force of each record in its column, zeros in the others.
+record_set one_column_a_place(const record_set& set, const std::vector<int>& hits);
+
+/// Their names: "force@3".
+std::vector<std::string> place_names(const std::string& force, const std::vector<int>& hits);
+
+/// What follows the last sample of each blow, outputs alone; empty where that is less than 30 % of a record.
+record_set free_decays(const record_set& set);
+
+/// B, D and fits of a modal model of which each place has its own records.
+void fit_places(const std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz, record_work& work);
+
+/// The modes of a model, those of little EMAC not in it.
+std::vector<listed_mode> modes_of(const okid_identified_t& model);
+
+/// A remark `records_contradict` where one B and D cannot explain all records, though each has one of its own.
+void remark_contradiction(const std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz,
+                          record_work& work);
+
+} // namespace okid_host
