@@ -123,6 +123,11 @@ def main() -> int:
         "config": [CONFIG.encode(), LINE_CONFIG.encode()],
         "dbc": [DBC.encode(), DBC.replace("\n", "\r\n").encode()],
         "csv": [text.encode() for text in CSV],
+        "face": [
+            *(b"\x00" + text.encode() for text in (CONFIG, LINE_CONFIG)),
+            *(b"\x01" + text.encode() for text in CSV),
+            *(b"\x02" + name for name in (b"acc1 [g]", b"force (kN)", b"x_mm", b"m/s^2")),
+        ],
         "slcan": [text.encode() for text in LINES],
         "journal": journals(),
         "ascii": [b"\x00\x011.23,4.56\r\n7;8;9\nx:1 y:2\n", b"\x01\x081,2,3\n2,4,5\n"],

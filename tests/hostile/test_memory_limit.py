@@ -19,15 +19,9 @@ SIGNALS = 4  # of 16 bits in a frame
 
 def many_channels(count: int, identification: str = "") -> str:
     """One force and count - 1 accelerations."""
-    out = [
-        f'[acquisition]\nrate_hz = {RATE}\n[[bus]]\nname = "can0"\ninterface = "vcan0"\n'
-    ]
+    out = [f'[acquisition]\nrate_hz = {RATE}\n[[bus]]\nname = "can0"\ninterface = "vcan0"\n']
     for k in range(count):
-        role = (
-            'role = "force"\nunit = "N"'
-            if k == 0
-            else 'role = "acceleration"\nunit = "m/s^2"'
-        )
+        role = 'role = "force"\nunit = "N"' if k == 0 else 'role = "acceleration"\nunit = "m/s^2"'
         out.append(
             f'[[channel]]\nname = "c{k}"\n{role}\ncan_id = {0x100 + k // SIGNALS}\n'
             f"start_bit = {16 * (k % SIGNALS)}\nlength = 16\nsigned = true\nscale = 0.001\n"
@@ -41,18 +35,14 @@ def write_log(path: pathlib.Path, channels: int, samples: int) -> None:
     force = draw.standard_normal(samples)
     y = np.zeros((samples, channels - 1))
     for frequency in FREQUENCIES:
-        mu = np.exp(
-            2 * np.pi * frequency / RATE * (-DAMPING + 1j * np.sqrt(1 - DAMPING**2))
-        )
+        mu = np.exp(2 * np.pi * frequency / RATE * (-DAMPING + 1j * np.sqrt(1 - DAMPING**2)))
         state, response = 0j, np.zeros(samples)
         for n in range(samples):
             response[n] = state.imag
             state = mu * state + force[n]
         y += np.outer(response, draw.standard_normal(channels - 1))
     y += 0.02 * draw.standard_normal(y.shape)
-    codes = (
-        np.rint(1000 * np.column_stack([force, y])).clip(-32000, 32000).astype("<i2")
-    )
+    codes = np.rint(1000 * np.column_stack([force, y])).clip(-32000, 32000).astype("<i2")
     with path.open("w") as log:
         for n in range(samples):
             stamp = f"({1764000000 + n / RATE:.6f}) vcan0 "
@@ -62,9 +52,7 @@ def write_log(path: pathlib.Path, channels: int, samples: int) -> None:
 
 
 @pytest.mark.parametrize("command", ["check", "run"])
-def test_a_config_that_asks_for_too_much_is_refused_at_once(
-    tmp_path: pathlib.Path, command: str
-) -> None:
+def test_a_config_that_asks_for_too_much_is_refused_at_once(tmp_path: pathlib.Path, command: str) -> None:
     """24 GB in release 0.1, and killed."""
     (tmp_path / "many.toml").write_text(many_channels(256, "p = 40\n"))
     done = measured(command, tmp_path / "many.toml", seconds=20)
@@ -79,11 +67,7 @@ def test_a_config_that_asks_for_too_much_is_refused_at_once(
     assert said, done.stderr
     need, p, rows, channels, without = map(int, said.groups())
     assert need > 20000 and 10 <= p < without and rows == 2 * p and 60 < channels < 256
-    for wanted, count in (
-        (f"p = {p}\n", 256),
-        ("p = 40\n", channels),
-        (f"p = {without}\nsigma_blocks = 0\n", 256),
-    ):
+    for wanted, count in ((f"p = {p}\n", 256), ("p = 40\n", channels), (f"p = {without}\nsigma_blocks = 0\n", 256)):
         (tmp_path / "fits.toml").write_text(many_channels(count, wanted))
         done = measured("check", tmp_path / "fits.toml", seconds=20)
         assert (done.returncode, done.stderr) == (0, "") and done.peak_mb < 200
@@ -96,25 +80,17 @@ def test_65536_channels_are_checked_in_a_moment(tmp_path: pathlib.Path) -> None:
     """Release 0.1 compared every channel with every other: four times as many took sixteen times as long, 20 s here."""
     spent = []
     for count in (8192, 65536):
-        aux = "".join(
+        channels = "".join(
             f'[[channel]]\nname = "c{k}"\nrole = "{"acceleration" if k < 8 else "aux"}"\ncan_id = {0x1000 + k // 4}\n'
             f"start_bit = {16 * (k % 4)}\nlength = 16\n"
             for k in range(count)
         )
-        (tmp_path / "many.toml").write_text(
-            many_channels(0, "p = 10\n").replace(
-                "[identification]", aux + "[identification]"
-            )
-        )
+        text = many_channels(0, "p = 10\n").replace("[identification]", channels + "[identification]")
+        (tmp_path / "many.toml").write_text(text)
         before = os.times()
         assert measured("check", tmp_path / "many.toml", seconds=60).returncode == 0
         after = os.times()
-        spent.append(
-            after.children_user
-            + after.children_system
-            - before.children_user
-            - before.children_system
-        )
+        spent.append(after.children_user + after.children_system - before.children_user - before.children_system)
     assert spent[1] < 20 * spent[0]  # eight times as many
 
 
@@ -125,26 +101,13 @@ def test_256_channels_are_usable(tmp_path: pathlib.Path) -> None:
     (tmp_path / "many.toml").write_text(many_channels(256, settings))
     write_log(tmp_path / "many.log", 256, 4000)
     done = measured(
-        "replay",
-        tmp_path / "many.log",
-        "-c",
-        tmp_path / "many.toml",
-        "--json",
-        tmp_path / "r.json",
-        seconds=300,
+        "replay", tmp_path / "many.log", "-c", tmp_path / "many.toml", "--json", tmp_path / "r.json", seconds=300
     )
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "r.json").read_text())
     assert len(result["outputs"]) == 255 and result["p"] < 40
     said = {each["code"]: each["text"] for each in result["warnings"]}
-    assert (
-        f"p = {result['p']} is taken, not 40" in said["p_reduced"]
-        and said["p_reduced"] in done.stderr
-    )
-    found = [
-        mode["frequency_hz"]
-        for mode in result["modes"]
-        if mode["emac"] > 0.9 and mode["mpc"] > 0.9
-    ]
+    assert f"p = {result['p']} is taken, not 40" in said["p_reduced"] and said["p_reduced"] in done.stderr
+    found = [mode["frequency_hz"] for mode in result["modes"] if mode["emac"] > 0.9 and mode["mpc"] > 0.9]
     np.testing.assert_allclose(found, FREQUENCIES, rtol=2e-3)
     assert done.peak_mb < limit + 200  # beside the identification: program, log, grid

@@ -33,8 +33,8 @@ def publishing(
     (rig / "p.toml").write_text((rig / "a.toml").read_text() + f"[publish]\n{lines}\n")
     limit = (lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))) if descriptors else None
     with subprocess.Popen(
-        [PROGRAM, "replay", rig / "a.log", "-c", rig / "p.toml", "--speed", speed, "--json", rig / "r.json"], preexec_fn=limit,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        [PROGRAM, "replay", rig / "a.log", "-c", rig / "p.toml", "--speed", speed, "--json", rig / "r.json"],
+        preexec_fn=limit, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     ) as run:  # fmt: skip
         yield run
         run.terminate()

@@ -49,35 +49,18 @@ class Rig:
         dbc = (folder / "can.dbc").read_text()
         signals = {part.split()[0]: part for part in dbc.split(" SG_ ")[1:]}
         self.scales = [
-            float(
-                signals[name.replace("force", "Force").replace("acc", "Accel")]
-                .split("(")[1]
-                .split(",")[0]
-            )
+            float(signals[name.replace("force", "Force").replace("acc", "Accel")].split("(")[1].split(",")[0])
             for name in self.names
         ]
-        self.codes = [
-            [round(v / s) for v, s in zip(row, self.scales, strict=True)]
-            for row in self.values
-        ]
+        self.codes = [[round(v / s) for v, s in zip(row, self.scales, strict=True)] for row in self.values]
 
-    def config(
-        self, name: str, bus: str, *, scaled: bool = True, first_field: int = 0
-    ) -> Path:
-        text = (
-            '[acquisition]\nrate_hz = 250.0\n[[bus]]\nname = "node"\ntype = "serial"\n'
-        )
+    def config(self, name: str, bus: str, *, scaled: bool = True, first_field: int = 0) -> Path:
+        text = '[acquisition]\nrate_hz = 250.0\n[[bus]]\nname = "node"\ntype = "serial"\n'
         text += f'device = "{self.device}"\n{bus}\n'
         for i, (channel, scale) in enumerate(zip(self.names, self.scales, strict=True)):
-            role, unit = (
-                ("force", "N")
-                if channel.startswith("force")
-                else ("acceleration", "m/s^2")
-            )
+            role, unit = ("force", "N") if channel.startswith("force") else ("acceleration", "m/s^2")
             text += f'[[channel]]\nname = "{channel}"\nrole = "{role}"\nunit = "{unit}"\ndof = {channel[-1]}\n'
-            text += f"field = {first_field + i}\n" + (
-                f"scale = {scale!r}\n" if scaled else ""
-            )
+            text += f"field = {first_field + i}\n" + (f"scale = {scale!r}\n" if scaled else "")
         text += "[identification]\np = 30\nrows = 60\nupdate_s = 10.0\nsigma_blocks = 0\nmkr = true\n"
         path = self.folder / f"{name}.toml"
         path.write_text(text)
@@ -85,10 +68,7 @@ class Rig:
 
     def packets(self, size: int = 5) -> list[bytes]:
         rows = self.codes
-        return [
-            packet(n, rows[n : n + size], time_us=n * 4000, size=self.size)
-            for n in range(0, len(rows), size)
-        ]
+        return [packet(n, rows[n : n + size], time_us=n * 4000, size=self.size) for n in range(0, len(rows), size)]
 
 
 def check_modes(result: dict[str, Any], truth: dict[str, Any]) -> None:
@@ -115,52 +95,27 @@ def test_own_stream_gives_what_the_can_log_gives(tmp_path: Path, bits: int) -> N
     assert stats["bus"]["node"]["received"] == len(rig.codes)
     assert stats["bus"]["node"]["lost"] == 0
     assert not of_type(events, "gap")
-    can = (
-        (tmp_path / "can.toml")
-        .read_text()
-        .replace("p = 40", "p = 30")
-        .replace("rows = 80", "rows = 60")
-    )
-    (tmp_path / "can.toml").write_text(
-        can.replace("update_s = 1.0", "update_s = 10.0\nsigma_blocks = 0")
-    )
-    done = program.okid(
-        "replay", tmp_path / "rig.log", "-c", tmp_path / "can.toml", "--json", "-"
-    )
+    can = (tmp_path / "can.toml").read_text().replace("p = 40", "p = 30").replace("rows = 80", "rows = 60")
+    (tmp_path / "can.toml").write_text(can.replace("update_s = 1.0", "update_s = 10.0\nsigma_blocks = 0"))
+    done = program.okid("replay", tmp_path / "rig.log", "-c", tmp_path / "can.toml", "--json", "-")
     by_can = json.loads(done.stdout)
     assert result["mkr"]["M"][0][0] == pytest.approx(rig.truth["M"][0][0], rel=0.05)
     for mode in by_can["modes"]:
-        assert (
-            min(
-                abs(m["frequency_hz"] / mode["frequency_hz"] - 1)
-                for m in result["modes"]
-            )
-            < 5e-3
-        )
+        assert min(abs(m["frequency_hz"] / mode["frequency_hz"] - 1) for m in result["modes"]) < 5e-3
 
 
 def test_lines_of_text(tmp_path: Path) -> None:
     rig = Rig(tmp_path)
-    config = rig.config(
-        "text",
-        'framing = "ascii"\ncounter_field = 0\ncounter_bits = 16',
-        scaled=False,
-        first_field=1,
-    )
+    config = rig.config("text", 'framing = "ascii"\ncounter_field = 0\ncounter_bits = 16', scaled=False, first_field=1)
     draw = random.Random(3)
     lost = {n for n in range(100, len(rig.values) - 100) if draw.random() < 0.002}
-    torn = {
-        n for n in range(100, len(rig.values) - 100) if draw.random() < 0.002
-    } - lost
+    torn = {n for n in range(100, len(rig.values) - 100) if draw.random() < 0.002} - lost
     with line(rig.device) as ours:
         run = Run(config, "--duration", len(rig.values) / 250.0)
         ours.write(b"boot: sensor v1.2\r\n")
         for n, row in enumerate(rig.values):
             cells = [str(65530 + n & 0xFFFF), *(f"{v:.9g}" for v in row)]
-            text = [",".join(cells), " ".join(cells), "; ".join(cells)][n % 3] + [
-                "\n",
-                "\r\n",
-            ][n % 2]
+            text = [",".join(cells), " ".join(cells), "; ".join(cells)][n % 3] + ["\n", "\r\n"][n % 2]
             if n % 50 == 1:
                 text = "n:{} f:{} a1:{} a2:{} a3:{}\n".format(*cells)
             if n in torn:
@@ -171,16 +126,11 @@ def test_lines_of_text(tmp_path: Path) -> None:
     check_modes(events[-1]["result"], rig.truth)
     stats = of_type(events, "stats")[-1]["bus"]["node"]
     marked = {
-        n
-        for gap in of_type(events, "gap")
-        if gap["channel"] == "acc1"
-        for n in range(gap["first"], gap["last"] + 1)
+        n for gap in of_type(events, "gap") if gap["channel"] == "acc1" for n in range(gap["first"], gap["last"] + 1)
     }
     assert marked == lost | torn
     assert stats["lost"] == len(lost | torn)
-    assert stats["lost_by"]["crc"] >= len(torn) and stats["lost_by"]["sequence"] <= len(
-        lost
-    )
+    assert stats["lost_by"]["crc"] >= len(torn) and stats["lost_by"]["sequence"] <= len(lost)
 
 
 @settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -217,9 +167,7 @@ def test_marked_gaps_are_the_injected_losses(tmp_path: Path, seed: int) -> None:
     for channel in rig.names:
         gaps = [gap for gap in of_type(events, "gap") if gap["channel"] == channel]
         assert sum(gap["count"] for gap in gaps) == len(missing)
-        assert {
-            n for gap in gaps for n in range(gap["first"], gap["last"] + 1)
-        } == missing
+        assert {n for gap in gaps for n in range(gap["first"], gap["last"] + 1)} == missing
         for gap in gaps:
             causes = {lost[n // size] for n in range(gap["first"], gap["last"] + 1)}
             assert gap["cause"] == ("crc" if "crc" in causes else "sequence")
@@ -238,9 +186,7 @@ def test_unplugged_and_plugged_in_again(tmp_path: Path) -> None:
         run = Run(config, "--duration", len(rig.codes) / 250.0)
         for piece in pieces[:200]:
             ours.write(piece)
-        while not of_type(
-            run.events(), "stats"
-        ):  # after sample 1000: nothing is on the way any more
+        while not of_type(run.events(), "stats"):  # after sample 1000: nothing is on the way any more
             assert run.process.poll() is None
         ours.unplug()
         ours.plug_in()
@@ -248,9 +194,7 @@ def test_unplugged_and_plugged_in_again(tmp_path: Path) -> None:
             ours.write(piece)
         events = run.finish()
     gaps = [gap for gap in of_type(events, "gap") if gap["channel"] == "force1"]
-    assert [(gap["first"], gap["last"], gap["cause"]) for gap in gaps] == [
-        (1000, 1199, "link_down")
-    ]
+    assert [(gap["first"], gap["last"], gap["cause"]) for gap in gaps] == [(1000, 1199, "link_down")]
     assert of_type(events, "stats")[-1]["bus"]["node"]["lost_by"]["link_down"] == 200
     assert f"{rig.device}: went down or away" in run.stderr
 
@@ -259,14 +203,7 @@ def test_simulate_plays_a_node(tmp_path: Path) -> None:
     rig = Rig(tmp_path, seconds=1.0)
     with line(rig.device) as ours:
         reader = Reader(ours.fd)
-        done = program.okid(
-            "simulate",
-            tmp_path / "rig.toml",
-            "--to",
-            rig.device,
-            "--config",
-            tmp_path / "node.toml",
-        )
+        done = program.okid("simulate", tmp_path / "rig.toml", "--to", rig.device, "--config", tmp_path / "node.toml")
         assert done.returncode == 0, done.stderr
         packets = unpack(reader.packets(250))
     rows = [row for _, _, rows in packets for row in rows]
@@ -280,9 +217,7 @@ def test_simulate_plays_a_node(tmp_path: Path) -> None:
     assert "cobs" in (tmp_path / "node.toml").read_text()
 
 
-def test_a_link_in_this_folder_is_a_device(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_link_in_this_folder_is_a_device(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Release 0.1 took a name without a slash for a CAN interface."""
     rig = Rig(tmp_path, seconds=1.0)
     monkeypatch.chdir(tmp_path)
@@ -291,71 +226,27 @@ def test_a_link_in_this_folder_is_a_device(
         reader = Reader(ours.fd)
         done = program.okid("simulate", "rig.toml", "--to", "node")
         assert done.returncode == 0, done.stderr
-        assert [
-            row for _, _, rows in unpack(reader.packets(250)) for row in rows
-        ] == rig.codes
+        assert [row for _, _, rows in unpack(reader.packets(250)) for row in rows] == rig.codes
 
 
 @pytest.mark.parametrize(
     ("bus", "channel", "expected"),
     [
-        (
-            'framing = "cobs"',
-            "",
-            '"device": is missing: a bus of type serial needs one',
-        ),
+        ('framing = "cobs"', "", '"device": is missing: a bus of type serial needs one'),
         ('device = "/dev/ttyX"', "", '"framing": is missing'),
         ('device = "/dev/ttyX"\nframing = "cob"', "", 'did you mean "cobs"?'),
-        (
-            'device = "/dev/ttyX"\nframing = "cobs"\nbaud = 12',
-            "",
-            "found 12, expected a whole number from 50",
-        ),
-        (
-            'device = "/dev/ttyX"\nframing = "cobs"\nbitrate = 9600',
-            "",
-            "a serial line has a baud",
-        ),
-        (
-            'device = "/dev/ttyX"\nframing = "cobs"\ndbc = "a.dbc"',
-            "",
-            "the channels of a serial bus have a field",
-        ),
-        (
-            'device = "/dev/ttyX"\nframing = "cobs"\ncounter_field = 0',
-            "",
-            "counts samples by itself",
-        ),
-        (
-            'device = "/dev/ttyX"\nframing = "ascii"\ncounter_bits = 8',
-            "",
-            "it needs counter_field",
-        ),
-        (
-            'device = "/dev/ttyX"\nframing = "cobs"',
-            "can_id = 1",
-            "a channel of a serial bus has a field instead",
-        ),
-        (
-            'device = "/dev/ttyX"\nframing = "cobs"',
-            'sequence = "C"',
-            'framing "cobs" counts samples by itself',
-        ),
-        (
-            'device = "/dev/ttyX"\nframing = "witmotion"',
-            "field = 9",
-            "found 9, expected 0 to 8",
-        ),
-        (
-            'device = "/dev/ttyX"\nframing = "vectornav"',
-            "field = 6",
-            "found 6, expected 0 to 5",
-        ),
+        ('device = "/dev/ttyX"\nframing = "cobs"\nbaud = 12', "", "found 12, expected a whole number from 50"),
+        ('device = "/dev/ttyX"\nframing = "cobs"\nbitrate = 9600', "", "a serial line has a baud"),
+        ('device = "/dev/ttyX"\nframing = "cobs"\ndbc = "a.dbc"', "", "the channels of a serial bus have a field"),
+        ('device = "/dev/ttyX"\nframing = "cobs"\ncounter_field = 0', "", "counts samples by itself"),
+        ('device = "/dev/ttyX"\nframing = "ascii"\ncounter_bits = 8', "", "it needs counter_field"),
+        ('device = "/dev/ttyX"\nframing = "cobs"', "can_id = 1", "a channel of a serial bus has a field instead"),
+        ('device = "/dev/ttyX"\nframing = "cobs"', 'sequence = "C"', 'framing "cobs" counts samples by itself'),
+        ('device = "/dev/ttyX"\nframing = "witmotion"', "field = 9", "found 9, expected 0 to 8"),
+        ('device = "/dev/ttyX"\nframing = "vectornav"', "field = 6", "found 6, expected 0 to 5"),
     ],
 )
-def test_what_a_config_cannot_ask_for(
-    tmp_path: Path, bus: str, channel: str, expected: str
-) -> None:
+def test_what_a_config_cannot_ask_for(tmp_path: Path, bus: str, channel: str, expected: str) -> None:
     field = "" if channel.startswith("field") else "field = 0\n"
     (tmp_path / "a.toml").write_text(
         f'[acquisition]\nrate_hz = 100\n[[bus]]\nname = "n"\ntype = "serial"\n{bus}\n'
@@ -367,9 +258,7 @@ def test_what_a_config_cannot_ask_for(
 
 
 def test_the_example_of_the_document_is_a_packet() -> None:
-    text = (
-        Path(__file__).resolve().parents[2] / "docs" / "wire-protocol.md"
-    ).read_text()
+    text = (Path(__file__).resolve().parents[2] / "docs" / "wire-protocol.md").read_text()
     example = text.partition("as bytes on the wire:\n\n```\n")[2].partition("\n")[0]
     assert bytes.fromhex(example) == packet(7, [[100, -100]], time_us=7000)
     assert unpack(bytes.fromhex(example)) == [(7, 7000, [[100, -100]])]
@@ -390,9 +279,7 @@ def test_a_device_that_is_not_there(tmp_path: Path) -> None:
         while not of_type(other.events(), "start"):
             assert other.process.poll() is None
         busy = program.okid("run", config, "--events", tmp_path / "other.jsonl")
-        assert (
-            busy.returncode == 4 and "another program has it open" in busy.stderr
-        ), busy.stderr
+        assert busy.returncode == 4 and "another program has it open" in busy.stderr, busy.stderr
         other.stop()
         other.process.communicate(timeout=60)
 
@@ -402,9 +289,7 @@ def test_doctor_looks_at_the_line(tmp_path: Path) -> None:
     config = rig.config("doctor", 'framing = "cobs"\nbaud = 921600')
     done = program.okid("doctor", config)
     assert done.returncode == 4
-    assert (
-        "bus node (serial)" in done.stdout and "there is no such device" in done.stdout
-    )
+    assert "bus node (serial)" in done.stdout and "there is no such device" in done.stdout
     with line(rig.device):
         done = program.okid("doctor", config)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -423,7 +308,4 @@ def test_bytes_that_are_no_packets_are_told(tmp_path: Path) -> None:
             assert said, "ended without a word"
         run.stop()
         run.finish(status=3)
-    assert (
-        'no usable sample of channel "force1" was received (field 0, bus "node")'
-        in run.stderr
-    )
+    assert 'no usable sample of channel "force1" was received (field 0, bus "node")' in run.stderr

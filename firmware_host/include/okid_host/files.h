@@ -6,14 +6,14 @@
 #ifndef OKID_HOST_FILES_H
 #define OKID_HOST_FILES_H
 
+/** A CONFIG.toml, checked whole. (Above the rest: whichever of these headers comes first, all of them know it.) */
+typedef struct okid_host_config okid_host_config_t;
+
 #include <okid_host.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-/** A CONFIG.toml, checked whole. */
-typedef struct okid_host_config okid_host_config_t;
 
 /**
  * Read and check a CONFIG.toml, with the signal descriptions and presets it names. No device is opened.
