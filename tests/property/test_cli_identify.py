@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 from program import ROOT, okid
+from two_masses import rig_text as two_masses
+from two_masses import simulate_rig
 
 DEMO_RIG = ROOT / "tests" / "replay" / "demo_rig.toml"
 CHANNELS = ["--inputs", "u1", "--outputs", "y1,y2"]
@@ -695,3 +697,16 @@ def test_alias_warning(tmp_path: Path) -> None:
     rig.write_text(rig_text(rate_hz="100.0"))
     done = okid("simulate", rig, "--truth", tmp_path / "t.json")
     assert done.returncode == 0 and "rate_hz" in done.stderr
+
+
+def test_how_many_blocks_the_deviations_rest_on(tmp_path: Path) -> None:
+    found = {}
+    channels = [simulate_rig(tmp_path, two_masses(20.0)) / "a.csv", "--inputs", "force1", "--outputs", "acc1,acc2"]
+    for blocks in (0, 8, 40):
+        out = tmp_path / f"{blocks}.json"
+        okid("identify", *channels, "--p", 10, "--sigma-blocks", blocks, "--json", out, status=0)
+        found[blocks] = [mode["frequency_std_hz"] for mode in json.loads(out.read_text())["modes"]]
+    assert set(found[0]) == {None} and len(found[8]) == len(found[40]) == 2
+    for few, many in zip(found[8], found[40], strict=True):
+        assert few != many and 0.3 < few / many < 3.0
+    refused(okid("identify", *channels, "--sigma-blocks", 7), 2, "--sigma-blocks", "8")

@@ -139,6 +139,14 @@ def test_good_blows_are_added_up_and_faults_are_named(tmp_path: Path) -> None:
     assert not [w for w in result["warnings"] if w["code"] == "missing_samples"]
 
 
+@pytest.mark.parametrize(("percent", "reason"), [(15, "double_hit"), (30, None)])
+def test_how_large_a_second_blow_may_be(tmp_path: Path, percent: int, reason: str | None) -> None:
+    """The second one has 90 N of 400, and the noise some more."""
+    done, events = play(tmp_path, record(["double", "good", "good"]), 2, f"double_percent = {percent}.0")
+    assert done.returncode == 0, done.stderr
+    assert hits_of(events)[0]["reason"] == reason
+
+
 def test_one_blow_is_the_record_of_the_same_samples(tmp_path: Path) -> None:
     """What goes in is just the samples from before the blow to its end: identify says the same of them."""
     codes = record(["good", "good"])

@@ -156,9 +156,12 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_record(tmp_path_factory.mktemp("sends"), 6.0)
 
 
-def test_start_frame_and_sync(record: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("key", "identifier"), [("", "080"), ("sync_id = 66051\n", "00010203")])
+def test_start_frame_and_sync(
+    record: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], key: str, identifier: str
+) -> None:
     text = (record / "a.toml").read_text()
-    keys = 'sync_hz = 50.0\nsync_data = "07"\nstart = ["000#0100"]\n'
+    keys, frame = key + 'sync_hz = 50.0\nsync_data = "07"\nstart = ["000#0100"]\n', f"{identifier}#07"
     (record / "s.toml").write_text(re.sub(r'(interface = "vcan0"\n)', r"\1" + keys, text))
     seen = tmp_path / "seen.log"
     with seen.open("w") as out:
@@ -167,21 +170,21 @@ def test_start_frame_and_sync(record: Path, tmp_path: Path, capfd: pytest.Captur
         time.sleep(0.5)
         live = Run(record, config="s.toml")
         for _ in range(500):  # candump listens already: only the first SYNC says that okid does
-            if "080#07" in seen.read_text():
+            if frame in seen.read_text():
                 break
             time.sleep(0.02)
         play(record / "a.log")
         events = live.stop()
         sync = [e for e in events if e["type"] == "stats"][-1]["bus"]["can0"]["sync"]
         for _ in range(500):  # candump may be behind: what it has not yet read is lost when it is stopped
-            if seen.read_text().count("080#07") >= sync["sent"]:
+            if seen.read_text().count(frame) >= sync["sent"]:
                 break
             time.sleep(0.02)
         watch.send_signal(signal.SIGINT)
         watch.wait(10)
     lines = [line.split() for line in seen.read_text().splitlines()]
     assert lines[0][2] == "000#0100"
-    stamps = [float(line[0].strip("()")) for line in lines if line[2] == "080#07"]
+    stamps = [float(line[0].strip("()")) for line in lines if line[2] == frame]
     with capfd.disabled():
         print(f"\nSYNC: {sync}")
     assert sync["sent"] == len(stamps) > 250

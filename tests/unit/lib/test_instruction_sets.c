@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+// The per-sample kernels of every instruction set this processor has, not only the fastest: sums of products over the
+// lag window, direct and by FFT, against a plain loop in 64-bit integers.
+#include "accumulate/kernel.h"
+#include "accumulate/spectrum.h"
+#include "modal_rig.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <unity.h>
+
+okid_kernel_fn okid_kernel_base;
+okid_kernel_fn okid_kernel_avx2 __attribute__((weak)),
+    okid_kernel_avx512 __attribute__((weak)); // not on every processor
+okid_spectrum_absorb_fn okid_spectrum_absorb_base;
+okid_spectrum_flush_fn okid_spectrum_flush_base;
+okid_spectrum_absorb_fn okid_spectrum_absorb_avx2 __attribute__((weak)),
+    okid_spectrum_absorb_avx512 __attribute__((weak));
+okid_spectrum_flush_fn okid_spectrum_flush_avx2 __attribute__((weak)), okid_spectrum_flush_avx512 __attribute__((weak));
+
+typedef struct kernels_t {
+    const char* name;
+    okid_kernel_fn* direct;
+    okid_spectrum_absorb_fn* absorb;
+    okid_spectrum_flush_fn* flush;
+} kernels_t;
+
+static kernels_t kernels[3];
+static int count_of_kernels;
+
+static void add(const char* name, okid_kernel_fn* direct, okid_spectrum_absorb_fn* absorb,
+                okid_spectrum_flush_fn* flush) {
+    if (direct) kernels[count_of_kernels++] = (kernels_t){name, direct, absorb, flush};
+}
+
+static void find_kernels(void) {
+    add("base", okid_kernel_base, okid_spectrum_absorb_base, okid_spectrum_flush_base);
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        add("avx2", okid_kernel_avx2, okid_spectrum_absorb_avx2, okid_spectrum_flush_avx2);
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
+        add("avx512", okid_kernel_avx512, okid_spectrum_absorb_avx512, okid_spectrum_flush_avx512);
+#endif
+}
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static int16_t* random_codes(size_t count, uint64_t seed) {
+    int16_t* codes = malloc(count * sizeof *codes);
+    for (size_t i = 0; i < count; ++i) codes[i] = (int16_t)lrint(fmax(-32768, fmin(32767, 9000 * rig_normal(&seed))));
+    return codes;
+}
+
+/// S(r, c) = sum_n x[(n + p) m + r] x[n m + c].
+static int64_t plain(const int16_t* x, int m, int p, int count, int r, int c) {
+    int64_t sum = 0;
+    for (int n = 0; n < count; ++n) sum += (int64_t)x[(n + p) * m + r] * x[n * m + c];
+    return sum;
+}
+
+static void expect_sums(const char* name, const double* sums, const int16_t* codes, int m, int p, int count) {
+    char what[80];
+    for (int r = 0; r < m; ++r)
+        for (int c = 0; c < m * (p + 1); ++c) {
+            snprintf(what, sizeof what, "%s, m %d, p %d, count %d, (%d, %d)", name, m, p, count, r, c);
+            TEST_ASSERT_EQUAL_INT64_MESSAGE(plain(codes, m, p, count, r, c), (int64_t)sums[r * m * (p + 1) + c], what);
+        }
+}
+
+/// Every remainder of channels and window widths against the tiles of each kernel; in one call and in two.
+static void direct_sums_are_exact(void) {
+    enum { MOST_M = 11, MOST_P = 9, COUNT = 37 };
+    static double x[MOST_M * (MOST_P + COUNT)], sums[MOST_M * MOST_M * (MOST_P + 1)];
+    int16_t* codes = random_codes(MOST_M * (MOST_P + COUNT), 5);
+    for (int m = 1; m <= MOST_M; ++m)
+        for (int p = 0; p <= MOST_P; p += p < 3 ? 1 : 3)
+            for (int k = 0; k < count_of_kernels; ++k) {
+                for (int i = 0; i < m * (p + COUNT); ++i) x[i] = codes[i];
+                memset(sums, 0, sizeof sums);
+                kernels[k].direct(sums, x, x, m, p, 20);
+                kernels[k].direct(sums, x + 20 * m, x + 20 * m, m, p, COUNT - 20);
+                expect_sums(kernels[k].name, sums, codes, m, p, COUNT);
+            }
+    free(codes);
+}
+
+static void sums_by_fft_are_exact(void) {
+    const int shapes[][2] = {{1, 40}, {4, 30}, {9, 40}};
+    for (size_t s = 0; s < sizeof shapes / sizeof *shapes; ++s) {
+        const int m = shapes[s][0], p = shapes[s][1];
+        const spectrum_plan_t plan = okid_spectrum_plan(m, p);
+        const int count = spectrum_samples(&plan);
+        int16_t* codes = random_codes((size_t)(m * (p + count)), 7 + s);
+        double *memory = malloc(okid_spectrum_doubles(&plan) * sizeof *memory),
+               *history = malloc((size_t)(m * p) * sizeof *history),
+               *sums = malloc((size_t)(m * m * (p + 1)) * sizeof *sums);
+        for (int i = 0; i < m * p; ++i) history[i] = codes[i];
+        for (int k = 0; k < count_of_kernels; ++k) {
+            memset(memory, 0, okid_spectrum_doubles(&plan) * sizeof *memory);
+            okid_spectrum_create(&plan, memory);
+            const double energy = kernels[k].absorb(&plan, memory, history, codes + m * p);
+            TEST_ASSERT_TRUE(energy > 0 && okid_spectrum_error(&plan, energy) < 0.5);
+            kernels[k].flush(&plan, memory, sums);
+            expect_sums(kernels[k].name, sums, codes, m, p, count);
+        }
+        free(sums);
+        free(history);
+        free(memory);
+        free(codes);
+    }
+}
+
+int main(void) {
+    find_kernels();
+    UNITY_BEGIN();
+    RUN_TEST(direct_sums_are_exact);
+    RUN_TEST(sums_by_fft_are_exact);
+    return UNITY_END();
+}
