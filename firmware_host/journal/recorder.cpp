@@ -17,7 +17,6 @@
 #include <limits>
 #include <okid/types.h>
 #include <random>
-#include <regex>
 
 namespace okid_host {
 namespace {
@@ -42,12 +41,6 @@ drv_journal_time_t time_now() { return {clock_ns(CLOCK_REALTIME), clock_ns(CLOCK
 std::uint64_t random_run() {
     std::random_device device;
     return std::uint64_t{device()} << 32 | device();
-}
-
-/// Journals are handed on; who may talk to the broker is nobody's business there.
-std::string without_passwords(const std::string& config) {
-    static const std::regex user("(mqtt://)[^@/\"'\\n]*@");
-    return std::regex_replace(config, user, "$1");
 }
 
 std::string title_of(const live_config& config) {
@@ -124,7 +117,6 @@ recorder::recorder(const live_config& config, const recorder_options& options)
     header_.buses = journal_buses(config);
     if (!waits_) header_.duration_s = options.duration_s;
     header_.texts = config.texts;
-    header_.texts.config = without_passwords(header_.texts.config);
     if (waits_) return;
     if (const int reason = open_segment())
         throw failure(exit_usage,
