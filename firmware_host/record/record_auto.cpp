@@ -13,6 +13,7 @@
 #include "record_hold.hpp"
 #include "roving.hpp"
 #include "screening.hpp"
+#include "steadiness.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -334,6 +335,7 @@ record_result identify_auto(record_set records, const record_options& given) {
     if (!placed) make_modal_model(listed, options.fs_hz, work);
     if (work.set.n_u > 0 && !placed) fit_records(work.set, work.model, work.context);
     remark_contradiction(listed, options.hits, options.fs_hz, work);
+    remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);
     if (!all) put_back_outputs(screened.kept, work);
     work.context.outputs = given.outputs;

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  modes whose frequency depends on the level of vibration or changes while it is recorded
+// METHOD   the frequency of a mode in short blocks, as a straight line over the mode's power and over time. With a force: the
+//          correction of the pole that explains a block's residual best (one Gauss-Newton step, its own initial state free).
+//          Without: the turning of the mode's analytic signal; of a linear structure under Gaussian forces its mean does not
+//          depend on the envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line
+#include "steadiness.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace okid_host {
+namespace {
+
+using complex = std::complex<double>;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double block_periods = 10;
+constexpr std::size_t least_block = 32; // samples
+constexpr double fewest_blocks = 12;    // of equal weight, to speak of a slope
+constexpr double sure = 7;              // slope over its deviation; the largest of linear modes is below 5
+constexpr double worth_saying = 0.02;   // change over the half-power bandwidth
+constexpr double widest = 0.1;          // damping above: nothing repeats over a block
+constexpr double alone = 4;             // bandwidths to the next mode, without a force
+
+/// The frequency of a mode in one block, relative to that of the model.
+struct block_frequency {
+    double change, power, motion, time, weight; ///< power: its own; motion: that of all displacements
+};
+
+struct slopes {
+    double level = 0, level_ratio = 0, drift = 0, drift_ratio = 0; ///< relative changes, each over its deviation
+};
+
+double percentile(std::vector<double> values, double share) {
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+}
+
+/// Weighted line over a power and time; changes from the quietest to the loudest tenth, and from begin to end.
+slopes slopes_of(const std::vector<block_frequency>& over, double block_frequency::* level) {
+    slopes out;
+    std::vector<double> powers, times;
+    Vector3d mean = Vector3d::Zero();
+    double total = 0, squares = 0;
+    for (const block_frequency& b : over) {
+        powers.push_back(b.*level), times.push_back(b.time);
+        mean += b.weight * Vector3d(0, b.*level, b.time);
+        total += b.weight;
+        squares += b.weight * b.weight;
+    }
+    if (!(total * total >= fewest_blocks * squares) || !(total > 0)) return out;
+    mean /= total;
+    Matrix3d N = Matrix3d::Zero();
+    Vector3d h = Vector3d::Zero();
+    for (const block_frequency& b : over) {
+        const Vector3d x = Vector3d(1, b.*level, b.time) - mean;
+        N += b.weight * x * x.transpose();
+        h += b.weight * b.change * x;
+    }
+    const Matrix3d inverse = N.inverse();
+    const Vector3d slope = inverse * h;
+    double scatter = 0;
+    for (const block_frequency& b : over) {
+        const double left = b.change - slope.dot(Vector3d(1, b.*level, b.time) - mean);
+        scatter += b.weight * left * left;
+    }
+    scatter /= static_cast<double>(over.size() - 3);
+    if (!inverse.allFinite() || !(scatter > 0)) return out;
+    out.level = slope[1] * (percentile(powers, 0.9) - percentile(powers, 0.1));
+    out.drift = slope[2] * (percentile(times, 1) - percentile(times, 0));
+    out.level_ratio = std::abs(slope[1]) / std::sqrt(scatter * inverse(1, 1));
+    out.drift_ratio = std::abs(slope[2]) / std::sqrt(scatter * inverse(2, 2));
+    return out;
+}
+
+/// One record run through the model: the states of its modes, and what is left of the outputs.
+struct answered_record {
+    std::vector<std::vector<complex>> states; ///< modes, samples
+    std::vector<double> left;                 ///< samples x n_y, NaN where a sample is missing
+    std::size_t count = 0;
+};
+
+struct steady_search {
+    const record_set& set;
+    std::vector<const listed_mode*> modes; ///< those in the model
+    std::vector<complex> mu;
+    double fs_hz;
+    std::vector<double> spread; ///< of each output's residual
+};
+
+answered_record answer(const steady_search& s, const record_work& work, std::size_t r) {
+    const record_set& set = s.set;
+    const record_data& record = set.records[r];
+    const Eigen::Map<const Eigen::MatrixXd> B(work.model.B, work.model.n_z, work.model.n_u),
+        D(work.model.D, work.model.n_y, work.model.n_u);
+    answered_record out;
+    out.states.resize(s.mu.size());
+    std::vector<complex> q;
+    for (std::size_t k = 0; k < s.mu.size(); ++k)
+        q.emplace_back((*work.context.x0)[r][2 * k], (*work.context.x0)[r][2 * k + 1]);
+    for (std::size_t t = 0; t < record.count; ++t, ++out.count) {
+        const double* row = set.rows(record) + t * set.channels();
+        if (std::any_of(row, row + set.n_u, [](double u) { return std::isnan(u); })) break;
+        for (std::size_t o = 0; o < set.n_y; ++o) {
+            double left = row[set.n_u + o];
+            for (std::size_t k = 0; k < q.size(); ++k) left -= (s.modes[k]->shape[o] * q[k]).real();
+            for (std::size_t j = 0; j < set.n_u; ++j)
+                left -= D(static_cast<Eigen::Index>(o), static_cast<Eigen::Index>(j)) * row[j];
+            out.left.push_back(left);
+        }
+        for (std::size_t k = 0; k < q.size(); ++k) {
+            out.states[k].push_back(q[k]);
+            q[k] *= s.mu[k];
+            for (std::size_t j = 0; j < set.n_u; ++j)
+                q[k] += complex(B(static_cast<Eigen::Index>(2 * k), static_cast<Eigen::Index>(j)),
+                                B(static_cast<Eigen::Index>(2 * k) + 1, static_cast<Eigen::Index>(j))) *
+                        row[j];
+        }
+    }
+    return out;
+}
+
+/// The correction of one pole over samples first … first + length - 1.
+block_frequency corrected(const steady_search& s, const answered_record& record, std::size_t k, std::size_t first,
+                          std::size_t length, double time) {
+    const complex mu = s.mu[k], turn = complex(0, 1) / s.fs_hz * mu;
+    Eigen::Matrix4d N = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d h = Eigen::Vector4d::Zero();
+    complex p = 0, start = 1;
+    double power = 0, motion = 0;
+    const std::size_t n_y = s.set.n_y;
+    for (std::size_t t = first; t < first + length; ++t) {
+        for (std::size_t o = 0; o < n_y; ++o) {
+            const double left = record.left[t * n_y + o];
+            if (std::isnan(left)) continue;
+            const complex c = s.modes[k]->shape[o], a = c * p, b = c * start;
+            const Eigen::Vector4d v(a.real(), -a.imag(), b.real(), -b.imag());
+            N += v * v.transpose() / (s.spread[o] * s.spread[o]);
+            h += v * left / (s.spread[o] * s.spread[o]);
+        }
+        const complex q = record.states[k][t];
+        power += std::norm(q) / static_cast<double>(length);
+        for (std::size_t i = 0; i < s.modes.size(); ++i)
+            motion += std::norm(record.states[i][t]) / std::pow(s.modes[i]->frequency_hz, 4);
+        p = mu * p + turn * q;
+        start *= mu;
+    }
+    const Eigen::Vector4d size = N.diagonal().cwiseMax(1e-300).cwiseSqrt();
+    Eigen::Matrix4d scaled = size.cwiseInverse().asDiagonal() * N * size.cwiseInverse().asDiagonal();
+    scaled.diagonal().array() += 1e-9;
+    const Eigen::Matrix4d inverse = scaled.inverse();
+    const Eigen::Vector4d x = inverse * h.cwiseQuotient(size);
+    const double w = 2 * M_PI * s.modes[k]->frequency_hz;
+    return {x[0] / size[0] / w, power, motion / static_cast<double>(length), time,
+            size[0] * size[0] / inverse(0, 0) * w * w};
+}
+
+std::size_t block_length(const listed_mode& mode, double fs_hz) {
+    return std::max(least_block, static_cast<std::size_t>(block_periods * fs_hz / mode.frequency_hz));
+}
+
+std::vector<std::vector<block_frequency>> with_force(steady_search& s, const record_work& work) {
+    std::vector<std::vector<block_frequency>> out(s.modes.size());
+    double seconds_before = 0;
+    for (std::size_t r = 0; r < s.set.records.size(); ++r) {
+        const answered_record record = answer(s, work, r);
+        s.spread.assign(s.set.n_y, 1e-300);
+        for (std::size_t o = 0; o < s.set.n_y; ++o) {
+            double square = 0, n = 0;
+            for (std::size_t i = o; i < record.left.size(); i += s.set.n_y)
+                if (!std::isnan(record.left[i])) square += record.left[i] * record.left[i], ++n;
+            if (n > 0) s.spread[o] = std::max(1e-300, std::sqrt(square / n));
+        }
+        for (std::size_t k = 0; k < s.modes.size(); ++k) {
+            const std::size_t length = block_length(*s.modes[k], s.fs_hz);
+            for (std::size_t first = 0; first + length <= record.count; first += length)
+                out[k].push_back(
+                    corrected(s, record, k, first, length, seconds_before + static_cast<double>(first) / s.fs_hz));
+        }
+        seconds_before += static_cast<double>(record.count) / s.fs_hz;
+    }
+    return out;
+}
+
+/// Analytic signal of a mode: the outputs along its shape, turned back and smoothed over two inverse bandwidths.
+std::vector<block_frequency> turning(const steady_search& s, std::size_t k) {
+    std::vector<block_frequency> out;
+    const listed_mode& mode = *s.modes[k];
+    for (std::size_t i = 0; i < s.modes.size(); ++i)
+        if (i != k &&
+            std::abs(s.modes[i]->frequency_hz - mode.frequency_hz) < alone * 2 * mode.damping_ratio * mode.frequency_hz)
+            return out;
+    const auto width =
+        std::max(least_block, static_cast<std::size_t>(s.fs_hz / (2 * mode.damping_ratio * mode.frequency_hz)));
+    const std::size_t apart = width / 4;
+    const complex back = std::polar(1.0, -2 * M_PI * mode.frequency_hz / s.fs_hz);
+    double seconds_before = 0;
+    for (const record_data& record : s.set.records) {
+        const auto at = [&](std::size_t first) {
+            complex sum = 0, phase = std::pow(back, static_cast<double>(first % (std::size_t{1} << 40)));
+            for (std::size_t t = 0; t < width; ++t, phase *= back) {
+                const double* y = s.set.rows(record) + (first + t) * s.set.channels();
+                complex along = 0;
+                for (std::size_t o = 0; o < s.set.n_y; ++o) along += std::conj(mode.shape[o]) * y[o];
+                sum += (1 - std::cos(2 * M_PI * (static_cast<double>(t) + 0.5) / static_cast<double>(width))) * along *
+                       phase;
+            }
+            return sum / static_cast<double>(width);
+        };
+        for (std::size_t first = 0; first + width + apart <= record.count; first += width) {
+            const complex a = at(first), b = at(first + apart);
+            const double power = std::norm(a) / 2 + std::norm(b) / 2;
+            const double angle = std::arg(b * std::conj(a)) / (2 * M_PI * static_cast<double>(apart)) * s.fs_hz;
+            if (power > 0)
+                out.push_back({angle / mode.frequency_hz, power, power,
+                               seconds_before + static_cast<double>(first) / s.fs_hz, power});
+        }
+        seconds_before += static_cast<double>(record.count) / s.fs_hz;
+    }
+    return out;
+}
+
+} // namespace
+
+void remark_unsteady(const std::vector<listed_mode>& modes, double fs_hz, record_work& work) {
+    steady_search s{work.set, {}, {}, fs_hz, {}};
+    for (const listed_mode& mode : modes) {
+        if (!mode.in_model) continue;
+        s.modes.push_back(&mode);
+        s.mu.push_back(discrete_pole(mode, 1 / fs_hz));
+    }
+    const bool driven = work.set.n_u > 0;
+    if (driven && (!work.context.x0 || work.model.n_u != static_cast<int>(work.set.n_u))) return;
+    std::vector<std::vector<block_frequency>> told_by;
+    if (driven) told_by = with_force(s, work);
+    std::vector<std::string> levels, drifts;
+    for (std::size_t k = 0; k < s.modes.size(); ++k) {
+        const listed_mode& mode = *s.modes[k];
+        if (mode.damping_ratio > widest) continue;
+        const std::vector<block_frequency> over = driven ? told_by[k] : turning(s, k);
+        slopes found = slopes_of(over, &block_frequency::power);
+        const slopes other = slopes_of(over, &block_frequency::motion);
+        if (other.level_ratio > found.level_ratio) found = other;
+        const double least = worth_saying * 2 * mode.damping_ratio;
+        const auto told = [&](double change, double ratio) {
+            return fmt::format("{:+.2g} % at {:.4g} Hz ({:.0f} σ)", 100 * change, mode.frequency_hz, ratio);
+        };
+        if (found.level_ratio > sure && std::abs(found.level) > least)
+            levels.push_back(told(found.level, found.level_ratio));
+        if (found.drift_ratio > std::max(sure, found.level_ratio) && std::abs(found.drift) > least)
+            drifts.push_back(told(found.drift, found.drift_ratio));
+    }
+    if (!levels.empty())
+        work.context.warnings.emplace_back(
+            "level_dependent",
+            fmt::format("frequencies move with the level of vibration: {}, from the quietest to the loudest "
+                        "tenth. The structure is not linear: the model holds for the level of this record",
+                        fmt::join(levels, ", ")));
+    if (!drifts.empty())
+        work.context.warnings.emplace_back(
+            "time_varying",
+            fmt::format("frequencies drift while they are recorded: {}, from begin to end. Identify shorter "
+                        "parts, with --range",
+                        fmt::join(drifts, ", ")));
+}
+
+} // namespace okid_host

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Structures that are not linear or not steady are said, linear and steady ones never are.
+
+The time integration here (Runge-Kutta, four steps a sample) shares nothing with the program; the linear records come from
+the frequency domain (laboratory).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import okid
+import pytest
+from laboratory import Laboratory, ambient, chain, forced
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+FS = 256.0
+
+
+def integrated(cubic: float, drift: float, count: int = 6000) -> tuple[Real, Real]:
+    """Three masses, a force at the first; its spring to ground is cubic, or all springs lose a share over the record."""
+    rng = np.random.default_rng(4)
+    k = np.array([2.0e4, 2.4e4, 1.8e4])
+    K = np.diag(k + np.append(k[1:], 0)) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
+    C = 0.4 * np.eye(3) + 6e-5 * K
+    steps = 4 * count
+    F = np.fft.rfft(rng.standard_normal(steps))
+    f = np.fft.rfftfreq(steps, 1 / FS / 4)
+    F[(f > 0.4 * FS) | (f < 0.5)] = 0
+    u = np.fft.irfft(F, steps)
+    u /= u.std()
+    dt = 1 / FS / 4
+    out = np.empty((count, 3))
+    x, v = np.zeros(3), np.zeros(3)
+
+    def acceleration(x: Real, v: Real, force: float, share: float) -> Real:
+        a = -C @ v - (1 - drift * share) * (K @ x)
+        a[0] += force - cubic * k[0] * x[0] ** 3
+        return a
+
+    for i in range(steps):
+        share, now, then = i / steps, u[i], u[(i + 1) % steps]
+        a1 = acceleration(x, v, now, share)
+        if i % 4 == 0:
+            out[i // 4] = a1
+        v2 = v + dt / 2 * a1
+        a2 = acceleration(x + dt / 2 * v, v2, (now + then) / 2, share)
+        v3 = v + dt / 2 * a2
+        a3 = acceleration(x + dt / 2 * v2, v3, (now + then) / 2, share)
+        v4 = v + dt * a3
+        a4 = acceleration(x + dt * v3, v4, then, share)
+        x, v = x + dt / 6 * (v + 2 * v2 + 2 * v3 + v4), v + dt / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    return u[::4], out + 0.01 * out.std(0) * rng.standard_normal(out.shape)
+
+
+def codes(lab: Laboratory) -> set[str]:
+    forces = lab.samples[:, : lab.n_u] if lab.n_u else None
+    result = okid.identify(forces, lab.samples[:, lab.n_u :], fs=lab.fs, sigma_blocks=0)
+    return {w.code for w in result.warnings}
+
+
+@pytest.mark.parametrize(
+    ("cubic", "drift", "code"),
+    [(0.0, 0.0, None), (1e6, 0.0, "level_dependent"), (-3e5, 0.0, "level_dependent"), (0.0, 0.01, "time_varying")],
+)
+def test_integrated(cubic: float, drift: float, code: str | None) -> None:
+    u, y = integrated(cubic, drift)
+    said = {w.code: w.text for w in okid.identify(u, y, fs=FS, sigma_blocks=0).warnings}
+    assert set(said) & {"level_dependent", "time_varying"} == ({code} if code else set())
+    if code:
+        sign = "+" if cubic > 0 else "-"
+        assert f": {sign}0." in said[code] and " σ)" in said[code]
+
+
+@pytest.mark.parametrize("seed", range(40, 46))
+def test_linear_and_forced(seed: int) -> None:
+    assert not codes(forced(seed, count=8000)) & {"level_dependent", "time_varying"}
+
+
+def test_linear_and_otherwise() -> None:
+    for lab in (ambient(41, True, seconds=300), chain(42, count=10000).lab):
+        assert not codes(lab) & {"level_dependent", "time_varying"}
