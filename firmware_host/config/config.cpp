@@ -52,7 +52,7 @@ toml::table parse(const std::string& path, const std::string& text) {
                                           "order of the files)",
                                           file_kind_name(kind)));
         refuse_file(path, fmt::format("line {}, column {}: {}", error.source().begin.line, error.source().begin.column,
-                                      error.description()));
+                                      printable(std::string(error.description()), 200)));
     }
 }
 

@@ -44,7 +44,7 @@ toml::table find_preset(const std::string& name, bool bus, std::map<std::string,
         return keys ? *keys : toml::table{};
     } catch (const toml::parse_error& error) { // one out of a journal
         throw failure(exit_usage, fmt::format("preset \"{}\": line {}: {}", printable(file), error.source().begin.line,
-                                              error.description()));
+                                              printable(std::string(error.description()), 200)));
     }
 }
 

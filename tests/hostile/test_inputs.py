@@ -87,6 +87,12 @@ def test_what_is_written_passes(tmp_path: pathlib.Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_a_line_that_ends_too_early_is_refused_in_one(tmp_path: pathlib.Path) -> None:
+    """The TOML parser shows the line feed it met: release 0.1 printed it as it is."""
+    (tmp_path / "c.toml").write_text(CONFIG + CHANNEL + "[identification]\nmkr = t\n")
+    one_line(measured("check", tmp_path / "c.toml"), "c.toml: line 13, column 8", "expected 'true'")
+
+
 def special_files(folder: pathlib.Path) -> list[str]:
     os.mkfifo(folder / "pipe")
     (folder / "link").symlink_to("/dev/zero")

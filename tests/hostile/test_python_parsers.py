@@ -26,7 +26,7 @@ from okid.result.result_file import read_result
 from program import okid
 from two_masses import rig_text, simulate_rig
 
-MORE = 20 if os.environ.get("OKID_SLOW") == "1" else 1
+MORE = 30 if os.environ.get("OKID_SLOW") == "1" else 1
 EXAMPLES = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 GEOMETRY = '[geometry]\nnodes = [[0,0,0],[0,0,1],[0,0,2]]\nlines = [[1,2],[2,3]]\ndofs = [[2,"x"],[3,"x"]]\n'
 SPEC = """[campaign]
@@ -75,14 +75,14 @@ def changed(value: Any, data: st.DataObject) -> Any:
     for _ in range(data.draw(st.integers(1, 3))):
         place = data.draw(st.sampled_from(places(out)[1:] or [()]))
         if not place:
-            return data.draw(ODD)
+            return copy.deepcopy(data.draw(ODD))
         holder = out
         for key in place[:-1]:
             holder = holder[key]
         if data.draw(st.booleans()) and isinstance(holder, dict):
             del holder[place[-1]]
         else:
-            holder[place[-1]] = data.draw(ODD)
+            holder[place[-1]] = copy.deepcopy(data.draw(ODD))  # what is drawn once more must be unchanged
     return out
 
 
@@ -107,7 +107,7 @@ def refused_in_one_line(*arguments: object) -> None:
     assert code in (0, 2) and told.getvalue().count("\n") == (1 if code == 2 else 0), told.getvalue()
 
 
-@settings(EXAMPLES, max_examples=20 * MORE)
+@settings(EXAMPLES, max_examples=10 * MORE)
 @given(data=st.data())
 def test_results(real: pathlib.Path, tmp_path: pathlib.Path, data: st.DataObject) -> None:
     whole = json.loads((real / "r.json").read_text())
@@ -118,7 +118,7 @@ def test_results(real: pathlib.Path, tmp_path: pathlib.Path, data: st.DataObject
         write_result(tmp_path / "r.mat", read_result(tmp_path / "r.json"))
 
 
-@settings(EXAMPLES, max_examples=20 * MORE)
+@settings(EXAMPLES, max_examples=10 * MORE)
 @given(data=st.data())
 def test_events(real: pathlib.Path, tmp_path: pathlib.Path, data: st.DataObject) -> None:
     lines = [json.loads(line) for line in (real / "e.jsonl").read_text().splitlines()]
@@ -129,7 +129,7 @@ def test_events(real: pathlib.Path, tmp_path: pathlib.Path, data: st.DataObject)
     refused_in_one_line(real / "r.json", "--events", tmp_path / "e.jsonl", "--out", tmp_path / "r.html")
 
 
-@settings(EXAMPLES, max_examples=20 * MORE)
+@settings(EXAMPLES, max_examples=10 * MORE)
 @given(data=st.data())
 def test_events_of_a_socket(real: pathlib.Path, data: st.DataObject) -> None:
     """The page goes on whatever a line holds: the lines behind it are shown."""
@@ -141,7 +141,7 @@ def test_events_of_a_socket(real: pathlib.Path, data: st.DataObject) -> None:
         session.line(odd if data.draw(st.booleans()) else damaged(odd, data))
 
 
-@settings(EXAMPLES, max_examples=40 * MORE)
+@settings(EXAMPLES, max_examples=30 * MORE)
 @given(data=st.data())
 @pytest.mark.parametrize("name", ["a.toml", "spec.toml", "r.uff"])
 def test_files(real: pathlib.Path, tmp_path: pathlib.Path, name: str, data: st.DataObject) -> None:
