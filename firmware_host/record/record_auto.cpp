@@ -334,6 +334,7 @@ record_result identify_auto(record_set records, const record_options& given) {
     if (options.detrend != "none" && !placed) remove_means(work.set);
     if (!placed) make_modal_model(listed, options.fs_hz, work);
     if (work.set.n_u > 0 && !placed) fit_records(work.set, work.model, work.context);
+    remark_noisy_output(work.context);
     remark_contradiction(listed, options.hits, options.fs_hz, work);
     remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);

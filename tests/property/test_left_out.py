@@ -75,3 +75,15 @@ def test_python(clipped: tuple[okid.Result, Record], tmp_path: Path) -> None:
     okid.write_hdf5(tmp_path / "r.h5", result)
     again = okid.Result.from_dict(result.to_dict())
     assert [mode.frequency_hz for mode in again.confident_modes] == [m.frequency_hz for m in result.confident_modes]
+
+
+def test_a_noisy_output_is_named() -> None:
+    lab = forced(17, count=10000)
+    said = []
+    for noise in (0.0, 0.4):
+        y = lab.samples[:, lab.n_u :].copy()
+        y[:, 3] += noise * y[:, 3].std() * np.random.default_rng(1).standard_normal(len(y))
+        result = okid.identify(lab.samples[:, : lab.n_u], y, fs=lab.fs, output_names=NAMES, sigma_blocks=0)
+        said.append([w.text for w in result.warnings if w.code == "noisy_output"])
+        assert len(result.confident_modes) == len(lab.frequency_hz)
+    assert said[0] == [] and len(said[1]) == 1 and said[1][0].startswith('output "y3" is much noisier than the rest')

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""The default call on measured records whose modes experts signed: the score, and each remark true or absent.
+
+One process identifies every record once. The references come from other programs and people (README of the records).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from typing import Any
+
+import okid
+import pytest
+from measured_data import data_file
+from program import ROOT
+
+# What may be said of which record, and what is known to be so; docs/how-okid-decides.md has the reasons.
+TRUE = {
+    "level_dependent": {"silverbox_multisine", "silverbox_arrow", "frame3_flex_sine10", "frame3_flex_quake",
+                        "frame3_flex_sine15", "frame3_flex_sine20", "frame3_flex_decay", "ridgecrest_0704",
+                        "ridgecrest_0706", "ridgecrest_0822", "ridgecrest_200604", "ridgecrest_200624"},
+    "screened": {"tower_wn1"},
+}  # fmt: skip
+UNKNOWN = {("level_dependent", f"tower_wn{k}") for k in (1, 2, 3)}  # all three agree in sign
+MUST = {("level_dependent", "silverbox_multisine"), ("level_dependent", "silverbox_arrow"), ("screened", "tower_wn1")}
+
+
+class Found:
+    """A record of the reference with its modes and remarks."""
+
+    def __init__(self, record: dict[str, Any], result: okid.Result) -> None:
+        self.record = record
+        self.modes = result.to_dict()["modes"]
+        self.said = {(warning.code, str(record["id"])) for warning in result.warnings}
+
+
+@pytest.fixture(scope="module")
+def corpus() -> list[Found]:
+    reference = json.loads(data_file("measured", "reference.json").read_text(encoding="utf-8"))
+    found = []
+    for record in reference["records"]:
+        read = okid.read_csv(data_file("measured", record["file"])).select(record["inputs"] + record["outputs"], "r")
+        n_u = len(record["inputs"])
+        u, y = read.samples[:, :n_u] if n_u else None, read.samples[:, n_u:]
+        names = {"input_names": record["inputs"]} if n_u else {}
+        found.append(Found(record, okid.identify(u, y, fs=read.fs_hz, output_names=record["outputs"], **names)))
+    return found
+
+
+def test_score(corpus: list[Found]) -> None:
+    spec = importlib.util.spec_from_file_location("score", ROOT / "tools" / "score.py")
+    assert spec is not None and spec.loader is not None
+    score = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(score)
+    judged = [score.judge(one.record, one.modes) for one in corpus]
+    total = {key: sum(getattr(one, key) for one in judged) for key in judged[0]._fields}
+    assert len(judged) >= 20 and total["signed"] >= 78
+    assert total["found"] >= 0.95 * total["signed"], judged
+    assert total["false"] <= 0.05 * total["confident"], judged
+    assert total["damping_right"] >= 0.9 * total["damping_known"], judged
+
+
+def test_each_remark_is_true_or_absent(corpus: list[Found]) -> None:
+    said = set().union(*(one.said for one in corpus))
+    false = {(code, name) for code, name in said if name not in TRUE.get(code, ())} - UNKNOWN
+    assert not false
+    assert said >= MUST
