@@ -171,7 +171,7 @@ def test_a_journal_tells_no_password_and_opens_nothing(rig: Path) -> None:
     run(rig, section)
     (path,) = journals(rig)
     inside = journal.texts(path)["config"].decode()
-    assert "secret" not in path.read_bytes().decode("latin-1") and 'mqtt = "mqtt://127.0.0.1:1/rig"' in inside
+    assert "secret" not in path.read_bytes().decode("latin-1") and 'mqtt = "mqtt://…@127.0.0.1:1/rig"' in inside
     taken = socket.socket(socket.AF_UNIX)
     taken.bind(str(path.parent / "live.sock"))
     taken.listen(1)
