@@ -11,8 +11,9 @@ import subprocess
 import sys
 from typing import NamedTuple
 
+from program import PROGRAM as OKID
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-OKID = os.environ.get("OKID_PROGRAM", str(ROOT / "build" / "okid"))
 SUBCOMMANDS: dict[str, tuple[str, ...]] = {
     "okid": (),  # those its own --help lists, filled in below
     "okid-capture": ("can", "serial", "sync", "emulate"),

@@ -15,6 +15,7 @@ import pytest
 from measured_run import Measured, measured
 from okid import InputError
 from okid.data.input_file import DEEPEST, check_input, parse_json, parse_toml, read_input
+from program import PROGRAM
 
 DEPTH = 50_000
 CONFIG = '[acquisition]\nrate_hz = 100.0\n[[bus]]\nname = "can0"\ninterface = "vcan0"\n'
@@ -120,9 +121,8 @@ def test_devices_and_pipes_are_refused_by_the_program(tmp_path: pathlib.Path) ->
 
 
 def test_an_open_pipe_is_read(tmp_path: pathlib.Path) -> None:
-    program = os.environ.get("OKID_PROGRAM") or str(pathlib.Path(__file__).resolve().parents[2] / "build" / "okid")
     done = subprocess.run(
-        [program, "check", "/dev/stdin"],
+        [PROGRAM, "check", "/dev/stdin"],
         input=CONFIG + CHANNEL,
         text=True,
         capture_output=True,

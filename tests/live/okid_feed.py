@@ -6,8 +6,6 @@ from __future__ import annotations
 import contextlib
 import json
 import socket
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,17 +31,6 @@ can_id = 1
 start_bit = 16
 length = 16
 """
-
-
-def until(what: Callable[[], Any], seconds: float = 20.0) -> Any:
-    """The first true value of what()."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        found = what()
-        if found:
-            return found
-        time.sleep(0.005)
-    raise AssertionError("it did not come in time")
 
 
 def channel(name: str, role: str, unit: str = "", dof: int | None = None) -> dict[str, Any]:

@@ -19,7 +19,8 @@ from okid.live.config import read_config
 from okid.live.feed import LineSplitter
 from okid.live.hub import Outbox
 from okid.live.session import Session
-from okid_feed import WHOLE, OkidFeed, channel, modes, samples, start, until
+from okid_feed import WHOLE, OkidFeed, channel, modes, samples, start
+from waiting import until
 
 CHANNELS = [
     channel("f", "force", "N", 1),

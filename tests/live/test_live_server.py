@@ -18,7 +18,8 @@ from event_source import Listener, ask
 from live_process import Live
 from okid.live import main
 from okid.live.server import host_of, is_loopback
-from okid_feed import WHOLE, OkidFeed, channel, modes, start, until
+from okid_feed import WHOLE, OkidFeed, channel, modes, start
+from waiting import until
 
 CHANNELS = [channel("f", "force", "N", 1), channel("a", "acceleration", "m/s^2", 1)]
 

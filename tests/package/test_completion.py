@@ -12,9 +12,9 @@ import subprocess
 from collections.abc import Callable
 
 import pytest
+from program import PROGRAM as OKID
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-OKID = os.environ.get("OKID_PROGRAM", str(ROOT / "build" / "okid"))
 COMMANDS = ["identify", "run", "record", "replay", "simulate", "convert", "check", "doctor", "bench", "completion"]
 FIXED = {  # options of okid identify with fixed choices
     "--method": ["auto", "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"],

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import okid as package
 import pytest
+from methods import METHODS
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "property"))
@@ -20,7 +21,6 @@ from systems import record, w1, w2  # noqa: E402
 
 Real = NDArray[np.float64]
 S = w1()
-METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
 U = ["force"]
 Y = ["a1", "a2", "a3"]
 EXIT = {package.InputError: 2, package.IdentificationError: 3}

@@ -11,6 +11,7 @@ import numpy as np
 import okid
 import pytest
 import systems
+from csv_record import write_csv
 from measured_data import data_file
 from methods import METHODS, N4SID
 from numpy.typing import NDArray
@@ -36,12 +37,6 @@ def of_result(s: systems.Structure, result: okid.Result) -> tuple[float, float]:
         np.array([mode.frequency_hz for mode in result.modes]),
         np.array([mode.damping_ratio for mode in result.modes]),
     )
-
-
-def write_csv(path: Path, fs: float, columns: dict[str, Array]) -> Path:
-    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",", fmt="%.17g", comments="",
-               header=f"# fs_hz: {fs!r}\n" + ",".join(columns))  # fmt: skip
-    return path
 
 
 def channels(u: Array, y: Array) -> dict[str, Array]:

@@ -15,6 +15,8 @@ import numpy as np
 import okid
 import pytest
 import systems
+from csv_record import write_csv
+from methods import METHODS
 from numpy.typing import NDArray
 from program import okid as run
 from scipy.linalg import expm
@@ -23,7 +25,6 @@ from test_measured import data_file
 
 SLOW = os.environ.get("OKID_SLOW") == "1"  # the long tier
 Array = NDArray[np.float64]
-METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
 HORIZON = {"w1": (40, 80, 40), "w2": (40, 80, 30), "w3": (40, 60, 25)}  # p, rows of okid, rows of n4sid
 RECORDS = {"w1": 60, "w2": 40, "w3": 20}
 NEVER = 1.3  # times the bound; rms of 20 records is above it by chance once in 35 quantities, of 60 once in 1700
@@ -271,12 +272,6 @@ def test_a_wrong_hold_is_no_delay() -> None:
 
 
 # ---- the program, and measured records
-
-
-def write_csv(path: Path, fs: float, columns: dict[str, Array]) -> Path:
-    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",", fmt="%.17g", comments="",
-               header=f"# fs_hz: {fs!r}\n" + ",".join(columns))  # fmt: skip
-    return path
 
 
 @pytest.mark.parametrize("method", ["okid-era", "n4sid-cva"])

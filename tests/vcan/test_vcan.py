@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import signal
 import subprocess
@@ -12,9 +11,8 @@ import time
 from pathlib import Path
 
 import pytest
+from program import PROGRAM as OKID
 from two_masses import rig_text, simulate_rig
-
-OKID = os.environ.get("OKID_PROGRAM", str(Path(__file__).parents[2] / "build" / "okid"))
 
 
 def sh(*args: str, check: bool = True, seconds: float = 60) -> subprocess.CompletedProcess[str]:
