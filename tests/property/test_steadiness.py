@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Structures that are not linear or not steady are said, linear and steady ones never are.
 
-The time integration here (Runge-Kutta, four steps a sample) shares nothing with the program; the linear records come from
+The time integration here (Runge-Kutta, four steps a sample) shares nothing with the program; linear records come from
 the frequency domain (laboratory).
 """
 
@@ -18,7 +18,7 @@ FS = 256.0
 
 
 def integrated(cubic: float, drift: float, count: int = 6000) -> tuple[Real, Real]:
-    """Three masses, a force at the first; its spring to ground is cubic, or all springs lose a share over the record."""
+    """Three masses, a force at the first; its spring to ground is cubic, or all springs lose a share with time."""
     rng = np.random.default_rng(4)
     k = np.array([2.0e4, 2.4e4, 1.8e4])
     K = np.diag(k + np.append(k[1:], 0)) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
