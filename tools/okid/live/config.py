@@ -16,7 +16,8 @@ LONGEST_SOCKET = 107  # sun_path less its final zero
 
 @dataclass(frozen=True)
 class Identification:
-    """Of [identification]: window_s and forgetting None = everything; rows 0 = the method's default."""
+    """Of [identification], for the diagram: window_s and forgetting None = everything; rows 0 = the method's default.
+    Method auto has no diagram of its own: okid-era draws it, as in the report."""
 
     method: str = "okid-era"
     p: int = 40
@@ -68,8 +69,8 @@ def read_config(path: str | Path, socket: str | None = None) -> PageConfig:
         samples=found["publish"]["samples"],
         title=found["notes"].get("title", ""),
         identification=Identification(
-            wanted["method"], wanted["p"], wanted["rows"] or 0, wanted["detrend"], wanted["window_s"],
-            wanted["forgetting"],
+            "okid-era" if wanted["method"] == "auto" else wanted["method"], wanted["p"] or Identification.p,
+            wanted["rows"] or 0, wanted["detrend"], wanted["window_s"], wanted["forgetting"],
         ),
         geometry=geometry_of({"geometry": found["geometry"], "channel": found["channels"]}, str(file)),
         hammer=hammer is not None,
