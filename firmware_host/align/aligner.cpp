@@ -216,9 +216,19 @@ grid_bus_counts aligner::bus(std::size_t index) const {
     return out;
 }
 
-grid_channel_counts aligner::channel(std::size_t index) const {
+grid_channel_counts aligner::counted(std::size_t index) const {
     if (decimator_) return decimator_->channel(index);
     return nodes_.empty() ? reference_->channel(index) : gaps_.channel(index);
+}
+
+grid_channel_counts aligner::channel(std::size_t index) const {
+    grid_channel_counts out = counted(index);
+    const auto own = std::find(counted_.begin(), counted_.end(), index);
+    if (own == counted_.end()) return out; // on a clock of its own
+    const grid_channel_counts its = reference_->channel(static_cast<std::size_t>(own - counted_.begin()));
+    out.uncertain = its.uncertain;
+    out.place_std_s = its.place_std_s;
+    return out;
 }
 
 std::vector<std::size_t> aligner::silent_channels() const {

@@ -48,6 +48,7 @@ class aligner : private grid_sink, private cause_source {
     void on_sample(std::int64_t index, const double* row) override;
     void on_missing(std::int64_t index, std::int64_t count) override;
     void on_gap(const grid_gap& gap) override;
+    grid_channel_counts counted(std::size_t index) const;
     gap_cause cause_of(std::size_t channel, std::int64_t first, std::int64_t last) const override;
 
     void take(std::int64_t index, const double* row, std::int64_t stamp);

@@ -62,6 +62,8 @@ struct grid_bus_counts {
 
 struct grid_channel_counts {
     std::int64_t expected = 0, received = 0;
+    std::int64_t uncertain = 0; ///< places at which one sample may be missing, unmarked
+    double place_std_s = 0;     ///< by which the place beside channels of other buses is not known
 };
 
 /// What the first frames of a lane tell of its place.
@@ -104,6 +106,7 @@ class grid {
     std::vector<std::size_t> silent_channels() const;
 
   private:
+    static constexpr std::int64_t never = std::numeric_limits<std::int64_t>::min() / 2;
     struct cause_mark {
         std::int64_t first = 0, last = -1, within = 0;
         gap_cause cause = gap_cause::sequence;
@@ -139,15 +142,20 @@ class grid {
         double early = 0;   ///< of the line the earliest was, of late, periods
         double on_time = 0; ///< of a period; what is later was held up, or a sample before it is missing
         std::vector<late_frame> late;
-        std::int64_t heard_ns = 0;          ///< as late_frame has it, of the newest
-        std::size_t placed = 0;             ///< of `late`: they are on the grid already
-        std::size_t seen = 0, which = 0;    ///< of `late`: looked at; the last one that was about as early as any
-        double least = 0;                   ///< how late the earliest of those was, periods
-        double patience = 0;                ///< periods for which the oldest waits before a loss is believed
-        std::int64_t newest_ns = 0;         ///< stamp of the newest frame that came
-        double spread = 0, tail_late = 0;   ///< how late the last frame of a burst was, of late and now, periods
-        std::int64_t tail = 0, tail_ns = 0; ///< place and stamp of the newest frame placed, for the line
-        std::int64_t ahead = 0;             ///< frames in a row that came before their time
+        std::int64_t heard_ns = 0;           ///< as late_frame has it, of the newest
+        std::size_t placed = 0;              ///< of `late`: they are on the grid already
+        std::size_t seen = 0, which = 0;     ///< of `late`: looked at; the last one that was about as early as any
+        double least = 0;                    ///< how late the earliest of those was, periods
+        double patience = 0;                 ///< periods for which the oldest waits before a loss is believed
+        std::int64_t newest_ns = 0;          ///< stamp of the newest frame that came
+        double spread = 0, tail_late = 0;    ///< how late the last frame of a burst was, of late and now, periods
+        std::int64_t tail = 0, tail_ns = 0;  ///< place and stamp of the newest frame placed, for the line
+        std::int64_t ahead = 0;              ///< frames in a row that came before their time
+        std::int64_t in_burst = 0;           ///< frames of the burst at hand
+        std::int64_t frames = 0, bursts = 0; ///< of all bursts, for the share of those that hold several
+        std::int64_t uncertain = 0;          ///< times polls slipped past a sample, unless it was one that is missing
+        std::int64_t slips = 0;              ///< by so many places the line is behind the samples for it
+        std::int64_t slip_at = never, lost_at = never; ///< places of the newest slip and loss
         // The newest frames: what lies before all of them does not come any more (a frame may be eight places late).
         std::array<std::int64_t, 9> recent{};
         std::size_t recent_at = 0;
@@ -196,6 +204,11 @@ class grid {
     bool catches_up(const lane& l) const;
     bool only_late(const lane& l, bool ended) const;
     void judge_late(lane& l, bool ended);
+    bool may_slip(const lane& l) const;
+    bool bursts_alike(const lane& l, std::int64_t& times) const;
+    double place_std_s(const lane& l) const;
+    static void slip(lane& l, std::int64_t by);
+    void end_burst(lane& l, std::int64_t index);
     void place_after_loss(lane& l, std::int64_t lost);
     void beat(lane& l, const drv_frame_t& frame, std::int64_t step, std::int64_t within = 0);
     void follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, double late_ns);

@@ -29,6 +29,9 @@ constexpr double catching_up = 0.5;        // periods by which the newest frames
 constexpr double looks_again = 0.125;      // of the decision time
 constexpr double a_silence = 0.125;        // of the decision time
 constexpr double cut_off = 0.055;          // of the decision time: frames at the end of a stream that tell a loss
+constexpr std::int64_t cut_off_bursts = 8; // and at least so many times something was handed over
+constexpr double ends_alike = 0.75;        // of the bursts have the size of the one before
+constexpr std::int64_t slip_apart = 2500;  // samples: clocks within 400 ppm slip past each other no more often
 constexpr double silent = 0.4;             // of the time a silent lane has: then its last burst is taken for cut off
 constexpr double least_spread = 0.15;      // periods
 constexpr double forgets_spread = 0.998;   // a burst, of how late the last frame of a burst was
@@ -48,7 +51,7 @@ void grid::begin_cadence(lane& l, double due_ns) {
     l.on_time = 0.5 + least_early;
     l.newest_ns = l.tail_ns = std::llround(due_ns);
     l.tail = l.last;
-    l.ahead = 0;
+    l.ahead = l.in_burst = 0;
     l.patience = static_cast<double>(hold_);
     l.late.reserve(most_held_ + 1);
 }
@@ -133,19 +136,25 @@ void grid::judge_late(lane& l, bool ended) {
     const auto hold = static_cast<double>(hold_);
     const double waited = static_cast<double>(l.late.back().heard_ns - l.late[l.placed].heard_ns) / period_ns_;
     const double enough = ended ? cut_off * hold : l.patience;
-    if (waited > enough && only_late(l, ended)) {
+    std::int64_t times = 0;
+    const bool alike = bursts_alike(l, times), seen = !ended || times >= cut_off_bursts;
+    if (seen && waited > enough && only_late(l, ended)) {
         place_late(l, l.which - l.placed + 1);
         return;
     }
-    if (waited > enough && catches_up(l)) {
+    if (seen && waited > enough && catches_up(l)) {
         l.patience = waited + looks_again * hold;
-    } else if (waited > enough) {
-        place_after_loss(l, static_cast<std::int64_t>(l.least + 1 - l.on_time));
+    } else if (seen && waited > enough) {
+        const auto lost = static_cast<std::int64_t>(l.least + 1 - l.on_time);
+        if (lost == 1 && alike && may_slip(l))
+            slip(l, 1), place_late(l, l.which - l.placed + 1);
+        else
+            place_after_loss(l, lost);
         return;
     }
     const std::size_t waiting = l.late.size() - l.placed;
     if (ended)
-        place_late(l, 1); // a burst that was cut off
+        place_late(l, seen && catches_up(l) ? waiting : 1); // a burst that was cut off
     else if (waiting >= most_held_ - 1)
         place_late(l, 1 + waiting / 4); // more than can wait came in less than the decision time: a stall made up for
 }
@@ -158,18 +167,52 @@ bool grid::only_late(const lane& l, bool ended) const {
     return soon && l.least < std::min(l.spread + least_spread, about_one);
 }
 
-/// The newest frames are less late than those before them: whoever was held up is making up for it.
+/// The last quarter is less late than all before it, or the quarters are less and less late behind a stall: whoever was held
+/// up is making up for it.
 bool grid::catches_up(const lane& l) const {
-    const std::size_t count = l.late.size() - l.placed;
-    const std::int64_t begin_ns = l.late[l.placed].heard_ns, end_ns = l.late.back().heard_ns;
-    const std::int64_t part_ns = begin_ns + (end_ns - begin_ns) / 4 * 3;
-    double before = HUGE_VAL, newest = HUGE_VAL;
-    for (std::size_t i = 0; i < count; ++i) {
-        const late_frame& frame = l.late[l.placed + i];
-        double& least = frame.heard_ns < part_ns ? before : newest;
-        least = std::min(least, lateness(l, frame, i));
+    const std::int64_t begin_ns = l.late[l.placed].heard_ns, span_ns = l.late.back().heard_ns - begin_ns;
+    std::array<double, 4> least{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL}; // of each quarter
+    for (std::size_t i = l.placed; i < l.late.size(); ++i) {
+        const std::int64_t heard_ns = l.late[i].heard_ns - begin_ns;
+        double& its =
+            least[span_ns > 0 ? static_cast<std::size_t>(std::min<std::int64_t>(3, 4 * heard_ns / span_ns)) : 3];
+        its = std::min(its, lateness(l, l.late[i], i - l.placed));
     }
-    return newest < before - catching_up;
+    const bool less_and_less = least[3] < least[2] - catching_up && least[2] < least[1] - catching_up;
+    return less_and_less || least[3] < std::min({least[0], least[1], least[2]}) - catching_up;
+}
+
+/// Did those that wait come in bursts of one size? @param times  out: how often something was handed over
+bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
+    std::size_t begin = l.placed, before = 0;
+    std::int64_t same = 0;
+    times = 1;
+    for (std::size_t i = l.placed + 1; i < l.late.size(); ++i) {
+        if (static_cast<double>(l.late[i].time_ns - l.late[i - 1].time_ns) <= same_burst * period_ns_) continue;
+        same += before > 1 && i - begin == before;
+        before = i - begin;
+        begin = i;
+        ++times;
+    }
+    return times >= cut_off_bursts && static_cast<double>(same) > ends_alike * static_cast<double>(times - 2);
+}
+
+/// Bursts that all end alike came a period later: polls have slipped past a sample by drift, or one sample is missing.
+/// Nothing that arrives differs. The first comes by itself again and again, but not again soon, and the second hardly ever,
+/// unless the bus tells of it or the lane loses frames.
+bool grid::may_slip(const lane& l) const {
+    for (std::size_t i = l.placed; i <= l.which; ++i)
+        if (l.late[i].loss) return false;
+    return l.last - std::max(l.slip_at, l.lost_at) > slip_apart;
+}
+
+/// The line stays, the samples on it are others.
+void grid::slip(lane& l, std::int64_t by) {
+    l.slips += by;
+    l.tail -= by;
+    l.phase_ns += static_cast<double>(by) * l.beat_ns;
+    l.uncertain += by;
+    l.slip_at = by > 0 ? l.last : never;
 }
 
 /// `lost` samples are missing no later than before the first frame that is about as early as any. Where the bus told of a
@@ -193,6 +236,11 @@ void grid::place_after_loss(lane& l, std::int64_t lost) {
         place = i;
     }
     place_late(l, place - first);
+    if (l.last - l.slip_at <= slip_apart) { // that was none
+        ++lost;
+        slip(l, -1);
+    }
+    l.lost_at = l.last;
     const std::int64_t step = 1 + std::max<std::int64_t>(1, lost - std::max<std::int64_t>(0, told - 1));
     beat(l, l.late[place], step, told ? 0 : static_cast<std::int64_t>(std::max(last, place) - place));
     l.seen = l.placed = place + 1;
@@ -211,22 +259,40 @@ void grid::beat(lane& l, const drv_frame_t& frame, std::int64_t step, std::int64
     follow_line(l, frame, index, static_cast<double>(frame.time_ns) - l.phase_ns);
 }
 
+/// A burst has ended with the frame before this one.
+void grid::end_burst(lane& l, std::int64_t index) {
+    if (l.tail < index) {
+        (void)drv_clock_fit_add(&l.clock, tick_of(l.tail + l.slips), l.tail_ns);
+        if (l.tail_late < 1) l.spread = std::max(forgets_spread * l.spread, l.tail_late);
+    }
+    l.ahead = l.tail_late < -most_early ? l.ahead + l.in_burst : 0;
+    l.frames += l.in_burst;
+    ++l.bursts;
+    l.in_burst = 0;
+}
+
+/// Bursts end anywhere between two samples. Where all of them end alike, nobody knows where: it is the part of a period
+/// that was never seen between the earliest and the latest end, uniform.
+double grid::place_std_s(const lane& l) const {
+    const bool alone = std::all_of(lanes_.begin(), lanes_.end(), [&](const lane& o) { return o.bus == l.bus; });
+    if (alone || l.sequence || 2 * l.frames < 3 * l.bursts || l.bursts < 8) return 0;
+    return std::max(0.0, 1 - l.early - l.spread) * 1e-9 * period_ns_ / std::sqrt(12.0);
+}
+
 /// Only the last frame of a burst tells the line. An arrival is never early: where arrivals are quantised (USB polls) their
 /// least delay goes slowly to and fro, and the earliest of late tell where it is now, and how far it goes.
 void grid::follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, double late_ns) {
-    if (static_cast<double>(frame.time_ns - l.tail_ns) > same_burst * period_ns_ && l.tail < index) {
-        (void)drv_clock_fit_add(&l.clock, tick_of(l.tail), l.tail_ns);
-        if (l.tail_late < 1) l.spread = std::max(forgets_spread * l.spread, l.tail_late);
-    }
+    if (static_cast<double>(frame.time_ns - l.tail_ns) > same_burst * period_ns_) end_burst(l, index);
+    ++l.in_burst;
     l.tail_late = late_ns / period_ns_;
     const bool tells = late_ns < told_periods * period_ns_ && late_ns > -most_early * period_ns_;
     l.tail = tells || l.clock.points == 0 ? index : index + 1; // one that is too late or too early is no tail
     l.tail_ns = frame.time_ns;
     std::int64_t expected = 0;
-    l.ahead = late_ns < -most_early * period_ns_ ? l.ahead + 1 : 0;
     if (l.ahead > ahead_frames) {
+        l.slip_at = never; // back again
         begin_cadence(l, static_cast<double>(frame.time_ns));
-    } else if (drv_clock_fit_map(&l.clock, tick_of(index), &expected, nullptr) == 0) {
+    } else if (drv_clock_fit_map(&l.clock, tick_of(index + l.slips), &expected, nullptr) == 0) {
         double ppm = 0;
         (void)drv_clock_fit_rate(&l.clock, &ppm, nullptr);
         l.beat_ns = period_ns_ * (1 + 1e-6 * ppm);

@@ -72,7 +72,7 @@ session::session(const live_config& config, const session_options& options)
       grid_(config, *this), check_(config), stream_(stream_of(config)), identifier_(stream_.sums()),
       alarm_(config.alarm), trigger_(config), hammer_(config, identifier_.lags()), losses_(config.buses.size()),
       health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
-      update_samples_(samples_of(config.identification.update_s, config.rate_hz)) {
+      update_samples_(samples_of(config.identification.update_s, config.rate_hz)), rate_(config.rate_hz) {
     if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
     if (config.publish.samples) feed_.emplace(config);
     stats_samples_ =
@@ -131,8 +131,7 @@ void session::frame(const drv_frame_t& frame) {
 void session::on_sample(std::int64_t index, const double* row) {
     if (limit_ > 0 && index >= limit_) return;
     now_ = index + 1;
-    last_ = {index, grid_.time_ns(index)};
-    if (first_.ns == 0) first_ = last_;
+    rate_.add(index, grid_.time_ns(index));
     if (options_.listener) options_.listener->on_sample(index, row);
     if (!options_.identify) return;
     if (feed_) send_samples(feed_->add(index, row));
@@ -291,6 +290,9 @@ ordered_json session::stats_event() const {
                                                       {"received", counts.received},
                                                       {"missing", counts.expected - counts.received},
                                                       {"completeness_percent", percent}};
+        if (counts.uncertain > 0) event["channel"][config_.channels[i].name]["uncertain"] = counts.uncertain;
+        if (counts.place_std_s > 0)
+            event["channel"][config_.channels[i].name]["place_std_us"] = 1e6 * counts.place_std_s;
     }
     for (const clock_skew& skew : grid_.skews())
         event["channel"][config_.channels[skew.channel].name].update(
@@ -331,12 +333,6 @@ result_context session::context() {
     result_context out = stream_.context(config_.unit_remarks);
     for (auto& remark : check_.doubts()) out.warnings.push_back(std::move(remark));
     return out;
-}
-
-/// Samples a second by the time stamps; 0 before it can be told. Counters say how many came, stamps in what time.
-double session::observed_rate_hz() const {
-    const double span_s = static_cast<double>(last_.ns - first_.ns) * 1e-9;
-    return now_ >= 100 && span_s > 0 ? static_cast<double>(last_.index - first_.index) / span_s : 0;
 }
 
 /// A rate_hz that is not that of the stamps scales every frequency. Not part of the result, which is the same for every
@@ -380,6 +376,35 @@ void session::remark_clocks(result_context& about) const {
                                                 config_.decimate, fir_kernel::pass_band * config_.rate_hz));
 }
 
+/// Channels without a counter whose bursts all end alike: what nobody can see in their arrivals.
+void session::remark_places(result_context& about) const {
+    const okid_identified_t& model = identifier_.model();
+    for (std::size_t c = 0; c < config_.channels.size(); ++c) {
+        const grid_channel_counts counts = grid_.channel(c);
+        const std::string& name = config_.channels[c].name;
+        if (config_.channels[c].role == channel_role::aux) continue;
+        if (counts.uncertain > 0)
+            about.warnings.emplace_back(
+                "place_uncertain",
+                fmt::format(
+                    "\"{}\" comes in bursts without a counter: at {} place{} the polls slipped past a sample, or a "
+                    "sample is missing there and the channel is late by it from then on; only a counter tells",
+                    name, counts.uncertain, counts.uncertain == 1 ? "" : "s"));
+        double worst = 0; // of R: the phase of the delay beside that of the damping
+        for (int k = 0; k < model.mode_count; ++k)
+            worst = std::max(worst, 3.14159265 * model.frequency_hz[k] * counts.place_std_s / model.damping_ratio[k]);
+        if (worst < 0.01) continue;
+        about.warnings.emplace_back(
+            "burst_delay",
+            fmt::format("\"{}\" comes in bursts that all end alike: beside channels of other buses its time "
+                        "is known to {:.2g} us (σ) only{}; a counter, or a sensor on the same bus, mends it",
+                        name, 1e6 * counts.place_std_s,
+                        config_.identification.mkr
+                            ? fmt::format(", by which R may be {:.0f} % wrong (σ): do not trust it", 100 * worst)
+                            : ""));
+    }
+}
+
 void session::remark_converted(result_context& about) const {
     if (!config_.identification.mkr || config_.n_u == 0) return;
     for (const channel_config& channel : config_.channels)
@@ -410,6 +435,7 @@ void session::finish() {
     }
     stream_.remark_fit(about);
     remark_clocks(about);
+    remark_places(about);
     remark_converted(about);
     stream_.add_mass(about);
     stream_.add_sigma(about);

@@ -4,6 +4,7 @@
 #pragma once
 #include "alarm.hpp"
 #include "align/aligner.hpp"
+#include "align/rate_meter.hpp"
 #include "align/trigger.hpp"
 #include "config/config.hpp"
 #include "hammer.hpp"
@@ -83,10 +84,11 @@ class session : public stream_target, private grid_sink {
     nlohmann::ordered_json bus_stats(std::size_t bus) const;
     result_context context();
     void remark_converted(result_context& about) const;
-    double observed_rate_hz() const;
+    double observed_rate_hz() const { return now_ >= 100 ? rate_.rate_hz() : 0; }
     void remark_rate() const;
     void tell_remarks();
     void remark_clocks(result_context& about) const;
+    void remark_places(result_context& about) const;
     double seconds(std::int64_t samples) const { return static_cast<double>(samples) / config_.rate_hz; }
 
     const live_config& config_;
@@ -105,9 +107,7 @@ class session : public stream_target, private grid_sink {
     std::vector<drv_clock_fit_t> clocks_; ///< of the devices that stamp frames themselves
     std::vector<double> busy_s_;          ///< time on the wire of each bus, 0 without a bitrate
     std::int64_t update_samples_, stats_samples_, limit_ = 0, now_ = 0;
-    struct stamped_sample {
-        std::int64_t index = 0, ns = 0;
-    } first_, last_;            ///< samples that came, and their time stamps
+    rate_meter rate_;           ///< of the samples that came
     std::int64_t start_ns_ = 0; ///< what t counts from
     std::int64_t gaps_ = 0;
     std::vector<observed_mode> observed_; ///< of the newest update

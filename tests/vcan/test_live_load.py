@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Everything at once: two buses of 8,000 frames/s and a serial line, recorded, while W2 is identified every 0.5 s.
+And the whole program stopped for two seconds in the midst of it.
 
 OKID_SLOW=1: for a minute.
 """
@@ -9,8 +10,10 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import socket
 import struct
+import subprocess
 import tempfile
 import threading
 import time
@@ -32,11 +35,12 @@ NAMES = ["f1", "f2", "a1", "a2", "a3", "a4", "a5", "a6"]  # three a frame, the f
 PLACES = [(0, 0, 0), (0, 0, 1), (0, 0, 2), (0, 1, 0), (0, 1, 1), (1, 0, 0), (1, 0, 1), (1, 0, 2)]
 
 
-def config(folder: Path, disk: Path) -> str:
-    text = f"[acquisition]\nrate_hz = {RATE}\n"
+def config(folder: Path, disk: Path, *, rate_hz: int = RATE, with_line: bool = True) -> str:
+    text = f"[acquisition]\nrate_hz = {rate_hz}\n"
     for bus in (0, 1):
         text += f'[[bus]]\nname = "can{bus}"\ntype = "socketcan"\ninterface = "vcan{bus}"\n'
-    text += f'[[bus]]\nname = "line"\ntype = "serial"\nframing = "cobs"\ndevice = "{folder}/tty"\n'
+    if with_line:
+        text += f'[[bus]]\nname = "line"\ntype = "serial"\nframing = "cobs"\ndevice = "{folder}/tty"\n'
     named = dict(zip(PLACES, NAMES, strict=True))
     for bus in (0, 1):
         for frame in range(FRAMES):
@@ -46,7 +50,8 @@ def config(folder: Path, disk: Path) -> str:
                 text += f'[[channel]]\nname = "{name}"\nrole = "{role}"\nbus = "can{bus}"\n'
                 text += f"can_id = {0x100 + frame}\nstart_bit = {16 + 16 * part}\nlength = 16\nsigned = true\n"
                 text += "sequence = { start_bit = 0, length = 16 }\n"
-    text += '[[channel]]\nname = "temperature"\nrole = "aux"\nbus = "line"\nfield = 0\n'
+    if with_line:
+        text += '[[channel]]\nname = "temperature"\nrole = "aux"\nbus = "line"\nfield = 0\n'
     text += f"[identification]\np = 40\nupdate_s = {UPDATE_S}\nwindow_s = 4.0\n"
     text += f'[record]\ndirectory = "{disk}"\n'
     return text + '[publish]\nsocket = "live.sock"\n'
@@ -98,6 +103,45 @@ def completion(disk: Path, samples: int) -> NDArray[np.float64]:
     return last
 
 
+def nothing_lost(stats: dict, buses: tuple[str, ...]) -> None:
+    for name in buses:
+        counts = stats["bus"][name]
+        assert [counts[key] for key in ("lost", "out_of_order", "too_late", "duplicate", "decode_errors")] == [0] * 5
+
+
+def test_the_program_is_stopped(tmp_path: Path) -> None:
+    """SIGSTOP for two seconds: the kernel keeps the frames, each comes to its place. The journal gives the same."""
+    rate, samples = RATE // 2, SECONDS * RATE // 2
+    sh("ip", "link", "add", "vcan1", "type", "vcan", check=False)
+    sh("ip", "link", "set", "vcan1", "up")
+    disk = Path(tempfile.mkdtemp(dir="/dev/shm"))
+    (tmp_path / "a.toml").write_text(config(tmp_path, disk, rate_hz=rate, with_line=False))
+    for bus in (0, 1):
+        (tmp_path / f"{bus}.bin").write_bytes(can_frames(w2_codes(samples), bus))
+    live = Run(tmp_path)
+    while not list(disk.glob("*.okj")):
+        assert live.process.poll() is None, live.messages()
+        time.sleep(0.01)
+    files = f"{tmp_path}/0.bin,{tmp_path}/1.bin"
+    sender = subprocess.Popen([str(FLOOD), "vcan0,vcan1", str(samples * FRAMES), str(rate * FRAMES), files])
+    time.sleep(1.5)
+    live.process.send_signal(signal.SIGSTOP)
+    time.sleep(2.0)
+    live.process.send_signal(signal.SIGCONT)
+    assert sender.wait(SECONDS * 10) == 0
+    time.sleep(1.0)
+    events = live.stop()
+    last = [event for event in events if event["type"] == "stats"][-1]
+    nothing_lost(last, ("can0", "can1"))
+    assert last["bus"]["can0"]["received"] == last["bus"]["can1"]["received"] == samples * FRAMES
+    assert {channel["received"] for channel in last["channel"].values()} == {samples}
+    assert not [event for event in events if event["type"] == "gap"]
+    (first,) = disk.glob("*-0001.okj")
+    sh(OKID, "replay", str(first), "--json", str(tmp_path / "again.json"), seconds=600)
+    assert (tmp_path / "again.json").read_bytes() == (tmp_path / "r.json").read_bytes()
+    shutil.rmtree(disk)
+
+
 def test_two_buses_and_a_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     samples = SECONDS * RATE
     codes = w2_codes(samples)
@@ -127,9 +171,9 @@ def test_two_buses_and_a_line(tmp_path: Path, capfd: pytest.CaptureFixture[str])
     with capfd.disabled():
         rate = samples * FRAMES / took
         print(f"\n2 x {rate:.0f} frames/s and a line for {took:.1f} s; frame in to modes out: {summary(waits)}")
-    for name in ("can0", "can1", "line"):
-        counts = last["bus"][name]
-        assert (counts["lost"], counts["out_of_order"], counts["duplicate"], counts["decode_errors"]) == (0, 0, 0, 0)
+    assert rate > RATE * FRAMES / 3, "the sender was so slow that this is no load"
+    assert np.percentile(waits, 99) < 2e3 * took, "modes came far later than the whole stream took"
+    nothing_lost(last, ("can0", "can1", "line"))
     assert last["bus"]["can0"]["received"] == last["bus"]["can1"]["received"] == samples * FRAMES
     assert {channel["received"] for channel in last["channel"].values()} == {samples}
     assert not [event for event in events if event["type"] == "gap"]

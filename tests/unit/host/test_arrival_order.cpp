@@ -58,7 +58,7 @@ struct rows : grid_sink {
     explicit rows(std::size_t n) : width(n), previous(n, NAN) {}
     std::size_t width;
     std::vector<double> previous;
-    std::int64_t at = 0, torn = 0, unlike = 0, marked = 0;
+    std::int64_t at = 0, torn = 0, unlike = 0, marked = 0, uncertain = 0;
     std::set<std::int64_t> values; ///< numbers of channel 0 that came out
     void on_sample(std::int64_t, const double* row) override {
         for (std::size_t c = 0; c < width; ++c) {
@@ -92,6 +92,7 @@ void play(double rate_hz, double ppm, int samples, const law& arrival, const std
     }
     on.finish();
     const grid_channel_counts counts = on.channel(0);
+    out.uncertain = counts.uncertain;
     TEST_ASSERT_EQUAL_INT64(counts.expected, counts.received + out.marked);
     TEST_ASSERT_EQUAL_UINT64(0, on.bus(0).duplicate + on.bus(0).out_of_order);
 }
@@ -231,10 +232,35 @@ static void test_stalls_make_no_gap() {
     }
 }
 
-/// Polls of 16 and 32 ms up to 800 Hz: nothing is missing; up to 2 kHz at least 99 % of the losses are found.
+/// Streams that end anywhere, in bursts, behind a stall, or while one is made up for: nothing is missing at the end.
+static void test_any_end() {
+    for (const double rate_hz : {200.0, 800.0, 1000.0, 2000.0})
+        for (const double every_s : {0.0, 0.008, 0.016, 0.032})
+            for (unsigned seed = 1; seed <= 3 * seeds() / 5; ++seed) {
+                std::mt19937 random(seed);
+                const double end_s = pick(random, 3, 6);
+                std::vector<stall> stalls;
+                for (double t = pick(random, 0.5, 2); seed % 3 == 1 && t < end_s; t += pick(random, 0.5, 2))
+                    stalls.push_back({t, random() % 2 ? 0.15 : 0.3, 0});
+                const double length_s = pick(random, 0.05, 0.5);
+                if (seed % 3 == 2)
+                    stalls.push_back({end_s - length_s - pick(random, 0, 0.5), length_s, pick(random, 1.2, 20)});
+                rows out(1);
+                const law usual = every_s > 0 ? polled(every_s, 0.2e-3, pick(random, 0, 1), random)
+                                              : scheduled(0.3e-3, 4e-3, 0.05, random);
+                play(rate_hz, pick(random, -60, 60), static_cast<int>(end_s * rate_hz), behind(stalls, usual), {}, out);
+                char text[80];
+                std::snprintf(text, sizeof text, "seed %u, %g Hz, every %g s, ends at %g s", seed, rate_hz, every_s,
+                              end_s);
+                TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.marked, text);
+            }
+}
+
+/// Polls of 16 and 32 ms up to 2 kHz: nothing is missing, and of the losses at least 99 % are found. Where every poll ends
+/// alike (1 and 2 kHz), a single one cannot be told from a poll that slips past a sample: then it is uncertain.
 static void test_polls_and_losses() {
     std::array<std::int64_t, 2> made{}, found{}; // to 800 Hz, above
-    std::int64_t runs = 0, runs_false = 0;
+    std::int64_t told = 0;
     for (unsigned seed = 1; seed <= seeds(); ++seed) {
         std::mt19937 random(seed);
         const double rate_hz = std::array<double, 5>{100, 200, 800, 1000, 2000}[random() % 5];
@@ -245,9 +271,7 @@ static void test_polls_and_losses() {
         std::snprintf(text, sizeof text, "seed %u, %g Hz, every %g s, %.1f ppm", seed, rate_hz, every_s, ppm);
         rows clean(1);
         play(rate_hz, ppm, samples, polled(every_s, 0.2e-3, phase, random), {}, clean);
-        if (rate_hz <= 800) TEST_ASSERT_EQUAL_INT64_MESSAGE(0, clean.marked, text);
-        runs += rate_hz > 800;
-        runs_false += clean.marked > 0;
+        TEST_ASSERT_EQUAL_INT64_MESSAGE(0, clean.marked, text);
         std::set<int> lost;
         const int count = 1 + static_cast<int>(random() % 3);
         for (int i = 0; i < count; ++i)
@@ -257,13 +281,32 @@ static void test_polls_and_losses() {
         const bool fast = rate_hz > 800;
         made[fast] += static_cast<std::int64_t>(lost.size());
         found[fast] += std::min<std::int64_t>(out.marked, static_cast<std::int64_t>(lost.size()));
+        told += std::min<std::int64_t>(out.marked + out.uncertain, fast ? static_cast<std::int64_t>(lost.size()) : 0);
+        if (!fast) TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.uncertain, text);
     }
-    std::printf(
-        "polls: %lld of %lld losses found, above 800 Hz %lld of %lld; there %lld of %lld runs with a false gap\n",
-        static_cast<long long>(found[0]), static_cast<long long>(made[0]), static_cast<long long>(found[1]),
-        static_cast<long long>(made[1]), static_cast<long long>(runs_false), static_cast<long long>(runs));
-    TEST_ASSERT_TRUE(4 * runs_false <= 2 * runs); // a slip of the poll past a sample looks like a loss: docs/limits.md
+    std::printf("polls: %lld of %lld losses found, above 800 Hz %lld, or uncertain %lld, of %lld\n",
+                static_cast<long long>(found[0]), static_cast<long long>(made[0]), static_cast<long long>(found[1]),
+                static_cast<long long>(told), static_cast<long long>(made[1]));
+    TEST_ASSERT_TRUE(static_cast<double>(told) >= 0.97 * static_cast<double>(made[1])); // a slip back hides one
     TEST_ASSERT_TRUE(static_cast<double>(found[0]) >= 0.99 * static_cast<double>(made[0]));
+}
+
+/// Packets of eight lines that are lost behind such polls: each is found, to the sample.
+static void test_lost_packets() {
+    for (unsigned seed = 1; seed <= seeds(); ++seed) {
+        std::mt19937 random(seed);
+        const double rate_hz = std::array<double, 3>{800, 1000, 2000}[random() % 3],
+                     every_s = random() % 2 ? 0.016 : 0.032;
+        std::set<int> lost;
+        for (double t = pick(random, 1, 2); t < 14; t += pick(random, 1.5, 5))
+            for (int i = 0; i < 8; ++i) lost.insert(static_cast<int>(t * rate_hz) + i);
+        rows out(1);
+        play(rate_hz, 0, static_cast<int>(16 * rate_hz), polled(every_s, 0.2e-3, pick(random, 0, 1), random), lost,
+             out);
+        char text[60];
+        std::snprintf(text, sizeof text, "seed %u, %g Hz, every %g s", seed, rate_hz, every_s);
+        TEST_ASSERT_EQUAL_INT64_MESSAGE(lost.size(), out.marked, text);
+    }
 }
 
 /// Losses on a bus that delivers frame by frame, among stalls that are made up for.
@@ -292,7 +335,9 @@ int main(void) {
     RUN_TEST(test_equal_values_are_samples);
     RUN_TEST(test_bursts_beside_a_punctual_bus);
     RUN_TEST(test_stalls_make_no_gap);
+    RUN_TEST(test_any_end);
     RUN_TEST(test_polls_and_losses);
+    RUN_TEST(test_lost_packets);
     RUN_TEST(test_losses_among_stalls);
     return UNITY_END();
 }
