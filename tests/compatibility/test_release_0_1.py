@@ -95,7 +95,26 @@ def test_identify(name: str, tmp_path: Path) -> None:
     compare(json.loads((tmp_path / "r.json").read_text()), json.loads((OLD / "results" / f"{name}.json").read_text()))
 
 
-@pytest.mark.parametrize("name", [*METHODS, "ambient", "refined"])
+def test_records_merged(tmp_path: Path) -> None:
+    """Two records from rest under a linear force, order and warnings found by itself."""
+    given: list[Any] = [
+        "--inputs",
+        "force1",
+        "--outputs",
+        "acc1,acc2",
+        "--hold",
+        "foh",
+        "--start",
+        "rest",
+        "--rows",
+        10,
+    ]
+    given += ["--method", "n4sid-moesp", "--sigma-blocks", 8, "--input-dofs", "1", "--output-dofs", "1,2", "--quiet"]
+    done("identify", OLD / "record.csv", OLD / "record.csv", *given, "--json", tmp_path / "r.json")
+    compare(json.loads((tmp_path / "r.json").read_text()), json.loads((OLD / "results" / "merged.json").read_text()))
+
+
+@pytest.mark.parametrize("name", [*METHODS, "ambient", "refined", "merged"])
 def test_result_is_reported(name: str, tmp_path: Path) -> None:
     """okid-report reads an old result and shows its modes."""
     path = OLD / "results" / f"{name}.json"
