@@ -229,7 +229,7 @@ def test_names_are_text_and_nothing_else(tmp_path: Path, browser: Any, okid_live
     feed.accept()
     hostile_feed(feed)
     page.wait("() => okidLive.page.spectra && okidLive.page.spectra.averages > 2")
-    page.see_everything()
+    page.scroll_through()
     warning = {"code": HOSTILE[0], "text": HOSTILE[1]}
     result = {
         "order": 4,
@@ -247,7 +247,7 @@ def test_names_are_text_and_nothing_else(tmp_path: Path, browser: Any, okid_live
     feed.send({"type": "result", "t": 9.0, "result": result})
     feed.close()
     page.wait("() => okidLive.page.result")
-    page.see_everything()
+    page.scroll_through()
     page.tab.evaluate("window.scrollTo(0, 0)")
     page.tab.click("#chooser summary")
     for name in HOSTILE:
