@@ -69,8 +69,8 @@ std::string summary(const live_config& config, const stream_config& stream) {
     out += fmt::format("needs {:.0f} MB of memory, at most {:g} are allowed\n", std::ceil(stream_bytes(stream) / 1e6),
                        id.max_memory_mb);
     out += start_text(config);
-    for (const auto& [code, text] : stream.said) out += fmt::format("remark: {}\n", text);
-    for (const std::string& text : config.warnings) out += fmt::format("remark: {}\n", text);
+    for (const auto& [code, text] : stream.said) out += fmt::format("warning: {}\n", text);
+    for (const std::string& text : config.warnings) out += fmt::format("warning: {}\n", text);
     return out;
 }
 

@@ -199,12 +199,12 @@ def test_the_dbc_and_the_config_name_two_units(rig: pathlib.Path) -> None:
     (rig / "two.toml").write_text((rig / "rig.toml").read_text().replace('unit = "m/s^2"', 'unit = "g"', 1))
     done = okid("check", rig / "two.toml")
     assert done.returncode == 0
-    assert 'remark: [[channel]] "acc1": its unit is "g", but signal Accel1 of the dbc is in "m/s^2"' in done.stdout
+    assert 'warning: [[channel]] "acc1": its unit is "g", but signal Accel1 of the dbc is in "m/s^2"' in done.stdout
 
 
 def test_the_same_bits_twice_are_said(rig: pathlib.Path) -> None:
     (rig / "same.toml").write_text((rig / "rig.toml").read_text().replace('signal = "Accel3"', 'signal = "Accel2"'))
-    assert 'remark: [[channel]] "acc3" reads the same bits as "acc2"' in okid("check", rig / "same.toml").stdout
+    assert 'warning: [[channel]] "acc3" reads the same bits as "acc2"' in okid("check", rig / "same.toml").stdout
     assert "same bits" not in okid("check", rig / "rig.toml").stdout
 
 

@@ -109,7 +109,7 @@ def test_a_file_on_a_live_bus(rig: Path) -> None:
 def test_p_of_a_method_without_observer(rig: Path) -> None:
     (rig / "p.toml").write_text((rig / "a.toml").read_text().replace('"okid-era"', '"n4sid-cva"'))
     done = okid("check", rig / "p.toml")
-    assert done.returncode == 0 and "remark: [identification] p belongs to the observer" in done.stdout
+    assert done.returncode == 0 and "warning: [identification] p belongs to the observer" in done.stdout
 
 
 def test_sample_rates_that_disagree(rig: Path) -> None:

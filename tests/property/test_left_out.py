@@ -40,7 +40,7 @@ def test_report(clipped: tuple[okid.Result, Record], tmp_path: Path) -> None:
     result, record = clipped
     report.write_report(result, tmp_path / "r.html", record)
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
-    assert "<tr><th>Left out</th><td>y2 (screened: see the remarks)</td></tr>" in page
+    assert "<tr><th>Left out</th><td>y2 (screened: see the warnings)</td></tr>" in page
     assert f"<p>{len(result.confident_modes)} confident modes from " in page
     assert "7 outputs" in page
     assert "NaN" not in page and ">nan<" not in page

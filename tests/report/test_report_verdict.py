@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The verdict of a report: rate by the time stamps, remarks of every code, events of another run, what was not seen."""
+"""The verdict of a report: rate by the time stamps, warnings of every code, events of another run, what was not seen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 from okid import report
 from okid.demo import demo_record
 from okid.report.events import read_events
-from okid.report.remarks import HARMLESS
+from okid.report.result_warnings import HARMLESS
 from okid.report.stamps import TOLERANCE
 from report_files import FS
 
@@ -82,7 +82,7 @@ def test_the_tolerance_is_that_of_the_program() -> None:
 
 def test_what_was_not_looked_at_is_said(raw: dict[str, Any], tmp_path: Path) -> None:
     bare = shown(raw)
-    assert "Nothing speaks against it in what was looked at: remarks of the identification, consistency" in bare
+    assert "Nothing speaks against it in what was looked at: warnings of the identification, consistency" in bare
     assert "rate by the time stamps (no events given)" in bare
     assert "Not looked at: completeness, units, modes that the order cut off, whiteness of the residual (no rec" in bare
     silent = shown(raw, events=written(tmp_path / "e.jsonl", CHANNELS, None))
@@ -117,20 +117,20 @@ def test_remarks_of_every_code_are_shown_and_named(raw: dict[str, Any]) -> None:
         "<li><code>saturated</code> 12 codes <stood> at full scale</li>",
         "<li><code>of_a_newer_okid</code> something that this report has never heard of</li>",
         '<li class="mild"><code>decimated</code> one sample of 4 is kept</li>',
-        "<li><code>remark</code> only text</li>",
+        "<li><code>warning</code> only text</li>",
         '<li><code>bare</code> {"code": "bare"}</li>',
-        "<li><code>remark</code> no code</li>",
-        "<li><code>remark</code> null</li>",
+        "<li><code>warning</code> no code</li>",
+        "<li><code>warning</code> null</li>",
     ]
     told = shown({**raw, "warnings": given})
-    assert "Look at: the remarks below (saturated, of_a_newer_okid, remark, bare)." in told
+    assert "Look at: the warnings below (saturated, of_a_newer_okid, warning, bare)." in told
     mild = shown({**raw, "warnings": given[2:3]})
     assert 'class="verdict"' in mild
     assert "Nothing speaks against it" in mild
 
 
 def test_every_doubt_leaves_room_for_the_remarks(raw: dict[str, Any], tmp_path: Path) -> None:
-    """However many doubts there are, those on the rate and on the remarks are named."""
+    """However many doubts there are, those on the rate and on the warnings are named."""
     weak = [{**mode, "emac": 0.1} for mode in raw["modes"]]
     poor = {**raw, "modes": weak, "warnings": [{"code": "saturated", "text": "x"}]}
     poor["fit"] = {"simulation_percent": dict.fromkeys(raw["outputs"], 5.0), "prediction_percent": None}
@@ -148,7 +148,7 @@ def test_every_doubt_leaves_room_for_the_remarks(raw: dict[str, Any], tmp_path: 
     told = shown(poor, events=path)
     assert told.index("by the time stamps 498 samples") < told.index("the simulation explains only")
     assert (
-        "bus can0: unheard (in Frequencies over time); 1 alarm; and more below; the remark below (saturated)." in told
+        "bus can0: unheard (in Frequencies over time); 1 alarm; and more below; the warning below (saturated)." in told
     )
     assert "can1" not in told
     page = report.build(report.loaded_from(poor, "r"), events=path)

@@ -26,7 +26,7 @@ LEAST_EMAC = 0.5
 class Loaded:
     """The parts of a result file as arrays: shapes (modes, n_y), singular_values (s,), markov (count, n_y, n_u).
 
-    Of method "auto" there are no singular values. Outputs that were left out (remark "screened") are in `left_out` and
+    Of method "auto" there are no singular values. Outputs that were left out (warning "screened") are in `left_out` and
     in `whole`, the result as it came, alone.
     """
 

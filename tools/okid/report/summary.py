@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The first section: what came out in a few lines, what was measured, whether every channel is complete, remarks."""
+"""The first section: what came out in a few lines, what was measured, whether every channel is complete, warnings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from okid.report import page
 from okid.report.completeness import complete_table, completeness, losses
 from okid.report.material import Material
 from okid.report.page import count_of
-from okid.report.remarks import remark_list
+from okid.report.result_warnings import warning_list
 from okid.report.verdict import verdict
 
 WORDS = ("title", "structure", "operator", "notes")
@@ -50,7 +50,7 @@ def _facts(m: Material) -> list[tuple[str, str]]:
         ("Gaps", f"{r.get('gaps', 0)}"),
         ("Inputs", ", ".join(m.result.inputs) or "none: ambient"),
         ("Outputs", ", ".join(m.result.outputs)),
-        *([("Left out", f"{', '.join(m.result.left_out)} (screened: see the remarks)")] if m.result.left_out else []),
+        *([("Left out", f"{', '.join(m.result.left_out)} (screened: see the warnings)")] if m.result.left_out else []),
         ("Method", _method(r)),
         ("Treatment", f"hold {r.get('hold', '–')}, detrend {r.get('detrend', '–')}, start {r.get('start', 'moving')}"),
     ]
@@ -61,8 +61,8 @@ def _facts(m: Material) -> list[tuple[str, str]]:
 
 
 def summary_section(m: Material) -> page.Section:
-    """Verdict, facts, completeness, remarks."""
-    facts, complete, told = page.facts(_facts(m)), complete_table(m), remark_list(m)
+    """Verdict, facts, completeness, warnings."""
+    facts, complete, told = page.facts(_facts(m)), complete_table(m), warning_list(m)
     if len(completeness(m)) <= 12:
         return page.section("Summary", verdict(m), page.beside(facts, complete), losses(m), told)
     return page.section("Summary", verdict(m), facts, told, complete, losses(m))

@@ -13,10 +13,10 @@ from okid.report.loaded import known_fit
 from okid.report.material import Material
 from okid.report.missed import missed_modes
 from okid.report.page import count_of
-from okid.report.remarks import remark_doubt
+from okid.report.result_warnings import warning_doubt
 from okid.report.stamps import foreign_doubts, rate_doubt, rate_unseen
 
-MOST_WORDS = 4  # doubts that are named in the verdict, besides those on the time stamps and the remarks
+MOST_WORDS = 4  # doubts that are named in the verdict, besides those on the time stamps and the warnings
 
 
 def headline(m: Material) -> str:
@@ -112,13 +112,13 @@ def _doubts(m: Material) -> str:
         first.append("the singular values and the record")
     others = _model_doubts(m) + _data_doubts(m)
     more = "and more below" if len(others) > MOST_WORDS else ""
-    named = [*first, *others[:MOST_WORDS], more, remark_doubt(m)]
+    named = [*first, *others[:MOST_WORDS], more, warning_doubt(m)]
     return "; ".join(one for one in named if one)
 
 
 def _looked_at(m: Material) -> tuple[list[str], dict[str, list[str]]]:
     """What the verdict rests on, and by reason what it does not."""
-    seen, unseen = ["remarks of the identification"], dict[str, list[str]]()
+    seen, unseen = ["warnings of the identification"], dict[str, list[str]]()
 
     def file(what: str, why: str) -> None:
         """Under what was looked at, or under the reason why not."""

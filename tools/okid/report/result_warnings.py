@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The remarks of the identification (`warnings` of the result): all are shown, those that ask for a look are named."""
+"""The warnings of the identification (`warnings` of the result): all are shown, those that ask for a look are named."""
 
 from __future__ import annotations
 
@@ -18,44 +18,44 @@ HARMLESS = frozenset({
 MILD = ' class="mild"'
 
 
-class Remark(NamedTuple):
-    """`code` is "remark" when the result gives none; `harmless`: nothing is to be done about it."""
+class ResultWarning(NamedTuple):
+    """`code` is "warning" when the result gives none; `harmless`: nothing is to be done about it."""
 
     code: str
     text: str
     harmless: bool
 
 
-def _remark(given: Any) -> Remark:
+def _warning(given: Any) -> ResultWarning:
     """An entry of `warnings`; one that is no object with a text is shown as it stands."""
     entry = given if isinstance(given, dict) else {"text": given}
     code, text = entry.get("code"), entry.get("text")
     if not isinstance(text, str):
         text = json.dumps(given if text is None else text, ensure_ascii=False)
-    return Remark(code if isinstance(code, str) and code else "remark", text, code in HARMLESS)
+    return ResultWarning(code if isinstance(code, str) and code else "warning", text, code in HARMLESS)
 
 
-def remarks(m: Material) -> list[Remark]:
+def result_warnings(m: Material) -> list[ResultWarning]:
     """Those of the result in their order, then the units that the report itself converted."""
     converted = [] if m.measured is None else m.measured.converted
-    own = [Remark("unit_converted", text, True) for text in converted]
-    return [_remark(one) for one in m.result.raw["warnings"]] + own
+    own = [ResultWarning("unit_converted", text, True) for text in converted]
+    return [_warning(one) for one in m.result.raw["warnings"]] + own
 
 
-def remark_doubt(m: Material) -> str:
+def warning_doubt(m: Material) -> str:
     """The codes that ask for a look, "" when none does."""
-    codes = list(dict.fromkeys(one.code for one in remarks(m) if not one.harmless))
+    codes = list(dict.fromkeys(one.code for one in result_warnings(m) if not one.harmless))
     if not codes:
         return ""
-    return f"the remark{'' if len(codes) == 1 else 's'} below ({', '.join(codes)})"
+    return f"the warning{'' if len(codes) == 1 else 's'} below ({', '.join(codes)})"
 
 
-def remark_list(m: Material) -> str:
-    """Code and text of every remark."""
+def warning_list(m: Material) -> str:
+    """Code and text of every warning."""
     items = "".join(
         f"<li{MILD if one.harmless else ''}><code>{escape(one.code)}</code> {escape(one.text)}</li>"
-        for one in remarks(m)
+        for one in result_warnings(m)
     )
     if not items:
-        return page.note("The identification has no remarks.")
-    return f'{page.heading("Remarks of the identification")}<ul class="warnings">{items}</ul>'
+        return page.note("The identification has no warnings.")
+    return f'{page.heading("Warnings of the identification")}<ul class="warnings">{items}</ul>'
