@@ -247,6 +247,8 @@ static void poles_that_are_no_modes_are_left_out(void) {
     const okid_real_t a[2] = {1, 1}, b[2] = {1, -1}, zero[2] = {0, 0};
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1, okid_modal_mac(2, a, zero, zero, a));
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0, okid_modal_mac(2, a, zero, b, zero));
+    TEST_ASSERT_DOUBLE_WITHIN(0, 0, okid_modal_mac(2, zero, zero, b, zero)); // a shape of nothing is like no other
+    TEST_ASSERT_DOUBLE_WITHIN(0, 0, okid_modal_mac(2, b, zero, zero, zero));
     free(work);
 }
 
