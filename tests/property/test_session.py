@@ -153,3 +153,27 @@ def test_wrong_configs(tmp_path: pathlib.Path, text: str | None, says: str) -> N
     with pytest.raises(okid.InputError) as fault:
         okid.Session.from_config(path)
     assert str(fault.value).startswith(str(path)) and says in str(fault.value)
+
+
+@pytest.mark.parametrize("memory", list(MEMORIES))
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_ten_gaps_do_not_swell_the_deviations(memory: str, seed: int) -> None:
+    """At every update: what is lost costs its share of the samples and no more, wherever blocks and gaps meet."""
+    draw = np.random.default_rng(seed)
+    force, answer = okid.demo_record(12000)
+    whole = np.hstack([force, answer])
+    holed = whole.copy()
+    for first, count in zip(draw.integers(100, 11900, 10), draw.choice([1, 2, 5, 30, 150, 300], 10), strict=True):
+        holed[first : first + count] = np.nan
+    given: dict[str, Any] = {"window_s": 4.0} if memory == "window" else MEMORIES[memory]
+    gaps, calm = (okid.Session(1, 3, fs=1000.0, method="okid-era", p=20, order=6, **given) for _ in range(2))
+    for first in range(0, 12000, 1000):
+        gaps.feed(holed[first : first + 1000])
+        calm.feed(whole[first : first + 1000])
+        if first < 4000:
+            continue
+        for one, other in zip(gaps.modes(), calm.modes(), strict=True):
+            assert (
+                one.frequency_std_hz < 5 * other.frequency_std_hz
+                and one.damping_ratio_std < 5 * other.damping_ratio_std
+            )
