@@ -96,7 +96,9 @@ std::vector<std::vector<std::size_t>> groups_of(const std::vector<residue_sums>&
         out.push_back(std::move(alike));
         records = std::move(others);
     }
-    std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.size() > b.size(); });
+    std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) {
+        return a.size() != b.size() ? a.size() > b.size() : a.front() < b.front();
+    });
     return out;
 }
 

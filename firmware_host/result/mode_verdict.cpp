@@ -35,8 +35,8 @@ std::string why_text(const std::string& code) {
 std::string why_legend(const std::vector<mode_verdict>& verdicts) {
     std::string out;
     for (const auto& [code, text] : words)
-        if (std::any_of(verdicts.begin(), verdicts.end(), [code = std::string(code)](const mode_verdict& one) {
-                return std::find(one.why.begin(), one.why.end(), code) != one.why.end();
+        if (std::any_of(verdicts.begin(), verdicts.end(), [name = std::string(code)](const mode_verdict& one) {
+                return std::find(one.why.begin(), one.why.end(), name) != one.why.end();
             }))
             out += fmt::format("   {}: {}\n", code, text);
     return out;
