@@ -87,7 +87,7 @@ void identifier::create_accumulator(const stream_config& config) {
 
 void identifier::create_identifier(const stream_config& config) {
     identify_config_ = identify_config_of(config);
-    q_ = identify_config_.n_u + lags() * static_cast<std::int64_t>(m_);
+    q_ = identify_config_.n_u + okid_identify_lags(&identify_config_) * static_cast<std::int64_t>(m_);
     const std::size_t bytes = okid_identify_memsize(&identify_config_);
     identify_block_ = allocate(config, bytes, "the identification");
     if (okid_identify_create(&identify_, &identify_config_, identify_block_.get(), bytes) != OKID_OK)

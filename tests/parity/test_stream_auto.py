@@ -150,3 +150,10 @@ def test_a_window_forgets_and_a_gap_is_marked() -> None:
     file = okid.identify(window[:, :n_u], window[:, n_u:], fs=lab.fs)
     assert [m.frequency_hz for m in session.identify().modes] == [m.frequency_hz for m in file.modes]
     assert (session.stats.missing, session.stats.gaps) == (50, 1)
+
+
+def test_a_named_method_still_waits_for_twice_its_unknowns() -> None:
+    session = okid.Session(1, 2, fs=200.0, p=12)
+    assert session._stream.counts().unknowns == 1 + 12 * 3
+    session.feed(np.random.default_rng(1).standard_normal((80, 3)))  # 68 equations
+    assert session.modes() == []
