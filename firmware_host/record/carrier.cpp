@@ -7,6 +7,7 @@
 #include "record_work.hpp"
 #include "result/method.hpp"
 
+#include <okid/modal.h>
 #include <okid/steps/square_root.h>
 
 #include <algorithm>
@@ -79,22 +80,67 @@ bool run_factor(const record_level& level, const okid_identify_config_t& config,
     return okid_identify_run_factor(identifier, factor, &model) >= 0;
 }
 
-/// Place of a mode in the model, or -1.
-int place_of(const okid_identified_t& model, const consensus_mode& mode) {
+/// The modes of a model, whoever found them.
+std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
+                                 int count, int n_y) {
+    std::vector<mode_shift> out;
+    for (int k = 0; k < count; ++k) {
+        mode_shift& mode = out.emplace_back();
+        mode.frequency_hz = frequency[k];
+        mode.damping_ratio = damping[k];
+        for (int i = 0; i < n_y; ++i) mode.shape.emplace_back(re[k * n_y + i], im[k * n_y + i]);
+    }
+    return out;
+}
+
+std::vector<mode_shift> modes_in(const replicate_model& model, double dt) {
+    const auto most = static_cast<std::size_t>(model.n_z / 2), n_y = static_cast<std::size_t>(model.n_y);
+    std::vector<double> f(most), zeta(most), mpc(most), re(most * n_y), im(most * n_y);
+    std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
+    okid_modes_t modes{};
+    modes.frequency_hz = f.data();
+    modes.damping_ratio = zeta.data();
+    modes.mpc = mpc.data();
+    modes.shape_re = re.data();
+    modes.shape_im = im.data();
+    const okid_model_t view = model.view();
+    if (!model.found() || okid_modal_analyse(&view, dt, &modes, work.data(), work.size()) < 0) return {};
+    return modes_in(f.data(), zeta.data(), re.data(), im.data(), modes.count, model.n_y);
+}
+
+/// Place of a mode among those of a model, or -1.
+template <class Mode> int place_of(const std::vector<mode_shift>& all, const Mode& mode) {
     int best = -1;
     double least = INFINITY;
-    for (int k = 0; k < model.mode_count; ++k) {
-        const double e = std::abs(model.frequency_hz[k] / mode.frequency_hz - 1);
+    for (int k = 0; k < static_cast<int>(all.size()); ++k) {
+        const mode_shift& one = all[static_cast<std::size_t>(k)];
+        const double e = std::abs(one.frequency_hz / mode.frequency_hz - 1);
         if (e > std::max(carried_frequency, mode.damping_ratio)) continue;
-        std::vector<std::complex<double>> shape;
-        for (int i = 0; i < model.n_y; ++i)
-            shape.emplace_back(model.shape_re[k * model.n_y + i], model.shape_im[k * model.n_y + i]);
-        const double mac = shape_mac(shape, mode.shape);
-        const double cost = e / carried_frequency + 3 * (1 - mac) +
-                            0.3 * std::abs(std::log(model.damping_ratio[k] / mode.damping_ratio));
+        const double mac = shape_mac(one.shape, mode.shape);
+        const double cost =
+            e / carried_frequency + 3 * (1 - mac) + 0.3 * std::abs(std::log(one.damping_ratio / mode.damping_ratio));
         if (mac > carried_shape && cost < least) least = cost, best = k;
     }
     return best;
+}
+
+/// How a mode moves from block to block; empty where a replicate lacks it.
+std::vector<mode_shift> shifts_of(const mode_shift& whole, const std::vector<std::vector<mode_shift>>& replicates) {
+    std::vector<mode_shift> out;
+    const auto largest = static_cast<std::size_t>(
+        std::max_element(whole.shape.begin(), whole.shape.end(),
+                         [](const auto& a, const auto& b) { return std::norm(a) < std::norm(b); }) -
+        whole.shape.begin());
+    for (const auto& modes : replicates) {
+        const int k = place_of(modes, whole);
+        if (k < 0) return {};
+        mode_shift& shift = out.emplace_back(modes[static_cast<std::size_t>(k)]);
+        const std::complex<double> unit = shift.shape[largest] / whole.shape[largest];
+        shift.frequency_hz -= whole.frequency_hz;
+        shift.damping_ratio -= whole.damping_ratio;
+        for (std::size_t i = 0; i < shift.shape.size(); ++i) shift.shape[i] = shift.shape[i] / unit - whole.shape[i];
+    }
+    return out;
 }
 
 carried_mode carried(const okid_identified_t& model, const std::optional<deviations>& sigma, int k, bool exact) {
@@ -138,6 +184,7 @@ std::vector<std::optional<carried_mode>> carry(const record_level& level, int nu
     const bool exact = nearly_singular && run_factor(level, config, at_rest, identifier, model);
     if (nearly_singular && !exact && okid_identify_run(identifier, sums.handle(), &model) < 0) return out;
     std::optional<deviations> sigma;
+    std::vector<std::vector<mode_shift>> moved;
     if (blocks > 0) {
         record_work work;
         work.set = set_of(level, static_cast<std::size_t>(n_u), static_cast<std::size_t>(n_y));
@@ -146,10 +193,16 @@ std::vector<std::optional<carried_mode>> carry(const record_level& level, int nu
         work.model = model;
         const auto replicates = leave_out_blocks(work, sums.handle(), blocks);
         if (!replicates.empty()) sigma = deviations_of(model, replicates, {});
+        for (const replicate_model& replicate : replicates) moved.push_back(modes_in(replicate, model.dt));
     }
+    const auto here =
+        modes_in(model.frequency_hz, model.damping_ratio, model.shape_re, model.shape_im, model.mode_count, model.n_y);
     for (std::size_t i = 0; i < modes.size(); ++i) {
         if (modes[i].level != number || !modes[i].confident()) continue;
-        if (const int k = place_of(model, modes[i]); k >= 0) out[i] = carried(model, sigma, k, exact);
+        const int k = place_of(here, modes[i]);
+        if (k < 0) continue;
+        out[i] = carried(model, sigma, k, exact);
+        out[i]->shifts = shifts_of(here[static_cast<std::size_t>(k)], moved);
     }
     return out;
 }

@@ -16,6 +16,7 @@ struct carried_mode {
     double frequency_std_hz = NAN, damping_std = NAN;
     std::vector<std::complex<double>> shape;        ///< as the level has it, largest entry 1
     std::vector<double> shape_re_std, shape_im_std; ///< empty: not known
+    std::vector<mode_shift> shifts;                 ///< a block each, empty: not known
     bool exact = false;                             ///< from the QR factor of nearly noise-free records
 };
 

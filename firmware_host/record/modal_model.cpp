@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 
 namespace okid_host {
 namespace {
@@ -110,7 +111,15 @@ void put_back_outputs(const std::vector<bool>& kept, record_work& work) {
     };
     for (auto* values : {&arrays.shape_re, &arrays.shape_im, &arrays.C, &arrays.D, &arrays.markov})
         spread(*values, NAN);
-    arrays.K.assign(n_z * n_y, 0.0);
+    std::vector<double> gain; // n_z numbers of each output: one that is missing corrects nothing
+    auto column = arrays.K.begin();
+    for (std::size_t i = 0; i < n_y; ++i) {
+        const auto from = kept[i] ? std::exchange(column, column + static_cast<std::ptrdiff_t>(n_z)) : column;
+        gain.insert(gain.end(), n_z, 0.0);
+        if (kept[i]) std::copy(from, column, gain.end() - static_cast<std::ptrdiff_t>(n_z));
+    }
+    arrays.K = std::move(gain);
+    model.innovation = model.mean = nullptr;
     for (auto* percent : {&work.context.simulation_percent, &work.context.prediction_percent})
         if (*percent) spread(**percent, NAN);
     if (work.context.sigma)

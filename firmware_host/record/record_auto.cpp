@@ -7,10 +7,12 @@
 #include "carrier.hpp"
 #include "consensus/lines.hpp"
 #include "error.hpp"
+#include "modal_gain.hpp"
 #include "modal_model.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_hold.hpp"
+#include "result/hold.hpp"
 #include "roving.hpp"
 #include "screening.hpp"
 #include "steadiness.hpp"
@@ -139,7 +141,8 @@ std::vector<std::complex<double>> in_units(const std::vector<std::complex<double
 }
 
 void describe_modes(const std::vector<listed_pair>& found, const std::vector<double>& scale, std::size_t n_u,
-                    std::vector<listed_mode>& modes, result_context& context) {
+                    std::vector<listed_mode>& modes, record_work& work) {
+    result_context& context = work.context;
     deviations sigma;
     for (const auto& [mode, carried] : found) {
         std::complex<double> largest;
@@ -148,6 +151,9 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
         modes.push_back(
             {mode.frequency_hz, mode.damping_ratio, mode.mpc, mode.emac, std::move(shape), mode.confident()});
         context.verdicts.push_back({mode.confident(), mode.found_in, mode.why});
+        auto& shifts = work.shifts.emplace_back(carried ? carried->shifts : std::vector<mode_shift>());
+        for (mode_shift& shift : shifts)
+            for (std::size_t i = 0; i < n_y; ++i) shift.shape[i] *= scale[n_u + i] / largest;
         sigma.frequency_hz.push_back(carried ? carried->frequency_std_hz : NAN);
         sigma.damping_ratio.push_back(carried ? carried->damping_std : NAN);
         for (std::size_t i = 0; i < n_y; ++i) {
@@ -249,7 +255,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     if (options.band) work.context.band_hz = *options.band;
     for (const record_level& level : levels) work.context.rates_hz.push_back(level.fs_hz);
     std::vector<listed_mode> listed;
-    describe_modes(found, scale, set.n_u, listed, work.context);
+    describe_modes(found, scale, set.n_u, listed, work);
     return listed;
 }
 
@@ -270,6 +276,90 @@ void find_matrices_agreed(const record_options& options, record_work& work) {
         return;
     }
     renumber(work.context.verdicts, *work.context.mass);
+}
+
+/// The listed modes without a block, in the model those that are confident.
+std::vector<listed_mode> without_block(std::vector<listed_mode> listed, const record_work& work, std::size_t block) {
+    std::vector<listed_mode> out;
+    for (std::size_t k = 0; k < listed.size(); ++k) {
+        listed_mode& mode = listed[k];
+        if (!mode.in_model) continue;
+        if (block < work.shifts[k].size()) {
+            const mode_shift& shift = work.shifts[k][block];
+            mode.frequency_hz += shift.frequency_hz;
+            mode.damping_ratio += shift.damping_ratio;
+            for (std::size_t i = 0; i < mode.shape.size(); ++i) mode.shape[i] += shift.shape[i];
+        }
+        out.push_back(std::move(mode));
+    }
+    return out;
+}
+
+/// Standard deviations of M, K, R: modes, B and D without one block of the records each.
+void find_matrix_deviations(const std::vector<listed_mode>& listed, const record_options& options, record_work& work) {
+    std::size_t blocks = 0;
+    for (const auto& shifts : work.shifts) blocks = std::max(blocks, shifts.size());
+    if (!work.context.mass || blocks < std::size_t{fewest_blocks}) return;
+    mass_plan plan = options.mass;
+    const bool band = work.context.hold == "band";
+    plan.hold = band ? "zoh" : work.context.hold;
+    std::vector<int> sensing;
+    for (const mass_channel& channel : plan.outputs) sensing.push_back(channel.sensing);
+    const auto as_taken = [&](const okid_identified_t& model, held_model& held) {
+        return model_view(band && as_if_held(model, sensing, held) ? held.view : model);
+    };
+    replicate_statistics statistics(work.model.n_u, work.model.n_y, work.model.n_z, plan, work.model.dt);
+    held_model held;
+    statistics.begin(as_taken(work.model, held));
+    record_work part;
+    for (std::size_t b = 0; b < blocks; ++b) {
+        part.set = work.set;
+        const std::size_t count = part.set.count(), m = part.set.channels();
+        for (std::size_t n = b * count / blocks; n < (b + 1) * count / blocks; ++n)
+            std::fill_n(part.set.samples.begin() + static_cast<std::ptrdiff_t>(n * m + part.set.n_u), part.set.n_y,
+                        NAN);
+        make_modal_model(without_block(listed, work, b), options.fs_hz, part);
+        held_model other;
+        const okid_model_t view = as_taken(part.model, other);
+        statistics.add(&view, 1.0 / static_cast<double>(blocks));
+    }
+    add_deviations(statistics.finish(), *work.context.mass);
+}
+
+/// Of every channel, the mean of the means of the records.
+std::vector<double> means_of(const record_set& set) {
+    std::vector<double> out(set.channels(), 0.0);
+    for (const record_data& record : set.records)
+        for (std::size_t k = 0; k < set.channels(); ++k) {
+            double sum = 0, count = 0;
+            for (std::size_t i = 0; i < record.count; ++i)
+                if (const double x = set.rows(record)[i * set.channels() + k]; !std::isnan(x)) sum += x, ++count;
+            if (count > 0) out[k] += sum / count / static_cast<double>(set.records.size());
+        }
+    return out;
+}
+
+/// M, K, R from the model of the modes that are confident; then the model of all listed, its gain and fits.
+void make_models(std::vector<listed_mode> listed, const record_options& options, record_work& work) {
+    std::vector<double> means(work.set.channels(), 0.0);
+    if (options.detrend != "none") {
+        means = means_of(work.set);
+        remove_means(work.set);
+    }
+    make_modal_model(listed, options.fs_hz, work);
+    if (work.set.n_u > 0) fit_records(work.set, work.model, work.context); // the states it needs to begin with
+    remark_unsteady(listed, options.fs_hz, work);
+    find_matrices_agreed(options, work);
+    find_matrix_deviations(listed, options, work);
+    const bool all = std::all_of(listed.begin(), listed.end(), [](const listed_mode& mode) { return mode.in_model; });
+    for (listed_mode& mode : listed) mode.in_model = true;
+    if (!all) make_modal_model(listed, options.fs_hz, work);
+    work.refined->mean = std::move(means);
+    work.model.mean = work.refined->mean.data();
+    find_gain(work);
+    fit_records(work.set, work.model, work.context);
+    remark_noisy_output(work.context);
+    remark_low_fit(*work.context.prediction_percent, false, work.context); // a simulation has only the modes listed
 }
 
 /// The options without the outputs that are left out.
@@ -331,13 +421,9 @@ record_result identify_auto(record_set records, const record_options& given) {
     const std::vector<listed_mode> listed = roving ? find_struck(options, work) : find_modes_agreed(options, work);
     if (options.stage) options.stage("simulating the model");
     const bool placed = work.model.n_u > 0; // by find_struck
-    if (options.detrend != "none" && !placed) remove_means(work.set);
-    if (!placed) make_modal_model(listed, options.fs_hz, work);
-    if (work.set.n_u > 0 && !placed) fit_records(work.set, work.model, work.context);
-    remark_noisy_output(work.context);
+    if (!placed) make_models(listed, options, work);
     remark_contradiction(listed, options.hits, options.fs_hz, work);
-    remark_unsteady(listed, options.fs_hz, work);
-    find_matrices_agreed(options, work);
+    if (placed) find_matrices_agreed(options, work);
     if (!all) put_back_outputs(screened.kept, work);
     work.context.outputs = given.outputs;
     record_result result;

@@ -63,19 +63,34 @@ struct fit_run {
         : model(of), radius(spectral_radius), predict(with_prediction), work(okid_model_workspace(&of)),
           simulated(static_cast<std::size_t>(of.n_y)), predicted(static_cast<std::size_t>(of.n_y)) {}
 
-    /// One stretch from its own least-squares initial state, which is returned.
-    std::vector<double> add(const record_set& set, const record_data& record, const stretch& piece) {
+    /// Take a stretch. @return its least-squares initial state; without inputs it begins at rest
+    std::vector<double> begin(const record_set& set, const record_data& record, const stretch& piece) {
         const double* row = set.rows(record) + piece.first * set.channels();
         u_.clear(), y_.clear();
         for (std::size_t i = 0; i < piece.count; ++i, row += set.channels()) {
             u_.insert(u_.end(), row, row + set.n_u);
             y_.insert(y_.end(), row + set.n_u, row + set.channels());
         }
-        const double *u = u_.data(), *y = y_.data();
-        std::vector<double> x0(static_cast<std::size_t>(model.n_z)), estimate(piece.count * set.n_y);
+        std::vector<double> x0(static_cast<std::size_t>(model.n_z));
         const std::size_t used = initial_state_samples(radius, piece.count);
-        if (okid_model_initial_state(&model, u, y, used, x0.data(), work.data()) < 0)
+        if (set.n_u == 0 || okid_model_initial_state(&model, u_.data(), y_.data(), used, x0.data(), work.data()) < 0)
             std::fill(x0.begin(), x0.end(), 0.0);
+        return x0;
+    }
+
+    /// What one-step prediction leaves of the stretch taken last.
+    void left(const std::vector<double>& x0, double* out) {
+        const std::size_t count = y_.size() / static_cast<std::size_t>(model.n_y);
+        const double* u = u_.empty() ? y_.data() : u_.data(); // of no inputs no number is read
+        if (okid_model_predict(&model, u, y_.data(), count, x0.data(), out, work.data()) < 0)
+            std::fill_n(out, y_.size(), std::numeric_limits<double>::quiet_NaN());
+        for (std::size_t i = 0; i < y_.size(); ++i) out[i] = y_[i] - out[i];
+    }
+
+    /// One stretch from its own least-squares initial state, which is returned.
+    std::vector<double> add(const record_set& set, const record_data& record, const stretch& piece) {
+        std::vector<double> x0 = begin(set, record, piece), estimate(piece.count * set.n_y);
+        const double *u = u_.data(), *y = y_.data();
         if (okid_model_simulate(&model, u, piece.count, x0.data(), estimate.data(), work.data()) < 0)
             throw failure(exit_no_model,
                           fmt::format("{}: the model cannot be simulated over this record", record.path));
@@ -91,6 +106,9 @@ struct fit_run {
   private:
     std::vector<double> u_, y_; // of the stretch
 };
+
+/// Samples of a stretch that tells its initial state.
+std::size_t shortest_of(int n_z) { return std::max<std::size_t>(20, 2 * static_cast<std::size_t>(n_z)); }
 
 /// Without inputs there is nothing to simulate: prediction from rest.
 void fit_ambient(const record_set& set, fit_run& run, result_context& context) {
@@ -138,12 +156,22 @@ std::vector<stretch> stretches_of(const record_set& set, const record_data& reco
     return out;
 }
 
+std::vector<double> residuals(const record_set& set, const okid_identified_t& found) {
+    const okid_model_t model{found.n_u, found.n_y, found.n_z, found.A, found.B, found.C, found.D, found.K};
+    fit_run run(model, found.model_radius, true);
+    std::vector<double> out(set.count() * set.n_y, std::numeric_limits<double>::quiet_NaN());
+    for (const record_data& record : set.records)
+        for (const stretch& piece : stretches_of(set, record, shortest_of(found.n_z)))
+            run.left(run.begin(set, record, piece), out.data() + (record.first + piece.first) * set.n_y);
+    return out;
+}
+
 void fit_records(const record_set& set, const okid_identified_t& found, result_context& context) {
     const okid_model_t model{found.n_u, found.n_y, found.n_z, found.A, found.B, found.C, found.D, found.K};
     const bool predict = found.K && !(found.warnings & OKID_NOTE_PREDICTOR_UNSTABLE);
     fit_run run(model, found.model_radius, predict);
     if (found.n_u == 0) return fit_ambient(set, run, context);
-    const std::size_t least = std::max<std::size_t>(20, 2 * static_cast<std::size_t>(found.n_z));
+    const std::size_t least = shortest_of(found.n_z);
     std::vector<std::vector<double>> states;
     for (const record_data& record : set.records) {
         std::vector<double> first(static_cast<std::size_t>(found.n_z), 0.0);

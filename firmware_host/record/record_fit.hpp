@@ -18,6 +18,10 @@ std::vector<stretch> stretches_of(const record_set& set, const record_data& reco
 okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const double* C, std::vector<double>& B,
                           std::vector<double>& D);
 
+/// What the model's prediction leaves of each sample, n_y numbers, NaN where there is none to compare; from rest, or the
+/// initial state that fits a stretch best.
+std::vector<double> residuals(const record_set& set, const okid_identified_t& model);
+
 /// Fill x0, simulation_percent and prediction_percent of the context. The records are in the model's own terms
 /// (detrended); missing inputs are taken as 0. Without inputs: prediction_percent only.
 void fit_records(const record_set& set, const okid_identified_t& model, result_context& context);

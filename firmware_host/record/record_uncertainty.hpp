@@ -7,6 +7,7 @@
 
 #include <okid/accumulator.h>
 
+#include <complex>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -26,6 +27,12 @@ struct replicate_model {
     std::vector<double> A, B, C, D;
     bool found() const { return n_z > 0; }
     okid_model_t view() const { return {n_u, n_y, n_z, A.data(), B.data(), C.data(), D.data(), nullptr}; }
+};
+
+/// How far a mode moves without one block; shapes with the largest entry of the whole's held.
+struct mode_shift {
+    double frequency_hz = 0, damping_ratio = 0;
+    std::vector<std::complex<double>> shape;
 };
 
 struct record_work;

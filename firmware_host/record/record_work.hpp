@@ -2,6 +2,7 @@
 // PURPOSE  what the steps of a record identification hand on to each other
 #pragma once
 #include "record.hpp"
+#include "record_uncertainty.hpp"
 
 #include <cstddef>
 #include <memory>
@@ -12,6 +13,7 @@ namespace okid_host {
 /// The memory of a refined model.
 struct refined_arrays {
     std::vector<double> A, B, C, D, K, markov, frequency, damping, mpc, emac, cmi, shape_re, shape_im;
+    std::vector<double> innovation, mean;               ///< of a modal model
     std::vector<double> C_without_skew, D_without_skew; ///< where outputs come late
 };
 
@@ -26,6 +28,7 @@ struct record_work {
     okid_identify_t* identifier = nullptr;
     okid_identified_t realised{}; ///< what it gave, before any refinement
     std::unique_ptr<refined_arrays> refined;
+    std::vector<std::vector<mode_shift>> shifts; ///< auto: of each listed mode, a block each; empty: not known
 };
 
 /// What is known of a result before anything is computed.

@@ -53,11 +53,11 @@ def test_forced_structure_with_a_close_pair(seed: int, tmp_path: Path) -> None:
     sigma = np.array([found[i]["damping_ratio_std"] for i in range(len(errors))], float)
     assert np.mean(np.abs(errors) * lab.damping_ratio < 2 * sigma) >= 0.7
     poles = np.linalg.eigvals(np.array(result["model"]["A"]))
-    for mode in confident(result):  # each confident mode is a pole of the model
+    for mode in result["modes"]:  # each listed mode is a pole of the model
         w, zeta = 2 * np.pi * mode["frequency_hz"], mode["damping_ratio"]
         pole = np.exp((-zeta + 1j * np.sqrt(1 - zeta**2)) * w / lab.fs)
         assert np.min(np.abs(poles - pole)) < 1e-9
-    assert len(poles) == 2 * len(found)
+    assert len(poles) == 2 * len(result["modes"])
     assert (result["method"], result["p"], result["rows"]) == ("auto", None, None)
 
 
@@ -124,6 +124,10 @@ def test_band_limited_force_gives_mass_and_stiffness(seed: int, tmp_path: Path) 
     for name, truth in (("M", structure.M), ("K", structure.K)):
         error = np.linalg.norm(np.array(result["mkr"][name]) - truth) / np.linalg.norm(truth)
         assert error < 0.005, (name, error)
+        sigma = np.array(result["mkr"][f"{name}_std"], float)
+        apart = np.abs(np.array(result["mkr"][name]) - truth) / sigma
+        assert np.all(sigma > 0) and np.median(apart) < 3, (name, np.median(apart))
+        assert np.linalg.norm(sigma) < 0.01 * np.linalg.norm(truth)
 
 
 def test_modes_are_picked_by_hand_and_by_band(tmp_path: Path) -> None:
@@ -141,3 +145,38 @@ def test_options_of_one_method_do_not_go_with_auto(tmp_path: Path) -> None:
     done = okid("identify", tmp_path / "record.csv", *channels, "--method", "auto", "--p", "30")
     assert done.returncode == 2
     assert "--p belongs to one method" in done.stderr
+
+
+def predicted(result: dict[str, Any], samples: np.ndarray, n_u: int) -> np.ndarray:
+    """100 (1 - |y - predicted| / |y|) of every output, by the equations of the result and nothing of okid's."""
+    a, c, gain = (np.array(result["model"][key]) for key in "ACK")
+    rows = samples - samples.mean(axis=0)
+    u, y = rows[:, :n_u], rows[:, n_u:]
+    b, d = (np.array(result["model"][key]).reshape(len(m), n_u) for key, m in (("B", a), ("D", c)))
+    x = np.array(result["model"]["x0"][0]) if n_u else np.zeros(len(a))
+    left = np.empty_like(y)
+    for n in range(len(y)):
+        left[n] = y[n] - c @ x - d @ u[n]
+        x = a @ x + b @ u[n] + gain @ left[n]
+    return 100 * (1 - np.linalg.norm(left, axis=0) / np.linalg.norm(y, axis=0))
+
+
+@pytest.mark.parametrize("lab", [forced(14), ambient(23, False)], ids=["forced", "ambient"])
+def test_the_gain_predicts(lab: Laboratory, tmp_path: Path) -> None:
+    result = identify(lab, tmp_path)
+    a, c, gain = (np.array(result["model"][key]) for key in "ACK")
+    assert np.max(np.abs(np.linalg.eigvals(a - gain @ c))) < 1
+    told = np.array(list(result["fit"]["prediction_percent"].values()))
+    np.testing.assert_allclose(predicted(result, lab.samples, lab.n_u), told, atol=0.5)
+    without = predicted(result | {"model": result["model"] | {"K": np.zeros_like(gain)}}, lab.samples, lab.n_u)
+    assert np.all(told > without + (0 if lab.n_u else 40)), (told, without)
+    assert not {"fit_low"} & {each["code"] for each in result["warnings"]}
+
+
+def test_an_output_that_answers_nothing_is_told(tmp_path: Path) -> None:
+    lab = forced(15)
+    rows = lab.samples.copy()
+    rows[:, -1] = np.random.default_rng(5).standard_normal(len(rows)) * rows[:, -1].std()
+    result = identify(lab._replace(samples=rows), tmp_path)
+    said = {each["code"]: each["text"] for each in result["warnings"]}
+    assert f'"y{rows.shape[1] - lab.n_u - 1}"' in said["fit_low"] and said["fit_low"].count('"') == 2

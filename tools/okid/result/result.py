@@ -60,8 +60,8 @@ class Result:
     """What identify() returns. singular_values (s,) of H(0), the correlations (ERA/DC) or the projection (n4sid);
     markov (count, n_y, n_u) Y_0 .. by eq. 40, n4sid of the model.
 
-    Of method "auto": p and rows None, no singular values, K zero, no decomposition; `modes` lists doubtful ones too
-    (mode.confident False), the model has the confident ones.
+    Of method "auto": p and rows None, no singular values, no decomposition; `modes` lists doubtful ones too
+    (mode.confident False), all of them are poles of the model.
 
     mkr and pdc: mass, stiffness and damping where the channels have degrees of freedom, else None.
     """
