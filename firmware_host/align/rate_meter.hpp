@@ -13,8 +13,9 @@ class rate_meter {
   public:
     explicit rate_meter(double rate_hz) : period_s_(1 / rate_hz) {}
 
-    /// Samples in the order of their numbers; those without a stamp are left out.
+    /// Samples in the order of their numbers; one of which nothing came has the time 0 and is left out.
     void add(std::int64_t index, std::int64_t time_ns) {
+        if (time_ns == 0) return;
         if (count_ == 0) origin_ = {index, 0}, origin_ns_ = time_ns;
         const double late_s =
             static_cast<double>(time_ns - origin_ns_) * 1e-9 - static_cast<double>(index - origin_.index) * period_s_;
