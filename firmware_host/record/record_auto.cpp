@@ -98,6 +98,30 @@ std::vector<consensus_mode> worth_telling(std::vector<consensus_mode> modes, boo
     return modes;
 }
 
+/// A force that is held over a sample is not held over two: the shapes of a lower rate are bent by a percent or so. Those
+/// of modes that the record's own rate sees are taken there, of nearly noise-free records frequency and damping too.
+void shapes_at_own_rate(const std::vector<record_level>& levels, const std::vector<consensus_run>& runs,
+                        std::vector<consensus_mode> modes, const record_options& options, bool rest,
+                        std::vector<listed_pair>& carried) {
+    if (std::none_of(modes.begin(), modes.end(), [](const consensus_mode& mode) { return mode.level > 0; })) return;
+    for (consensus_mode& mode : modes) mode.level = 0; // one order for all of them
+    const auto found =
+        carry(levels[0], 0, runs, modes, static_cast<int>(options.inputs.size()),
+              static_cast<int>(options.outputs.size()), rest, options.mass.wanted() ? options.sigma_blocks : 0);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        auto& to = carried[i].second;
+        if (!found[i] || !to || carried[i].first.level == 0) continue;
+        to->shape = found[i]->shape;
+        if (found[i]->exact) {
+            to->exact = true;
+            to->frequency_hz = found[i]->frequency_hz;
+            to->damping_ratio = found[i]->damping_ratio;
+        }
+        if (to->shifts.size() != found[i]->shifts.size()) continue;
+        for (std::size_t b = 0; b < to->shifts.size(); ++b) to->shifts[b].shape = found[i]->shifts[b].shape;
+    }
+}
+
 /// Standard deviations and, of nearly noise-free records, sharper values, from one carrier for each rate.
 std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, const std::vector<consensus_run>& runs,
                                    const std::vector<consensus_mode>& modes, const record_options& options, bool rest) {
@@ -113,6 +137,7 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
         for (std::size_t i = 0; i < modes.size(); ++i)
             if (found[i]) out[i].second = found[i];
     }
+    if (!options.inputs.empty()) shapes_at_own_rate(levels, runs, modes, options, rest, out);
     for (auto& [mode, carried] : out) {
         if (!carried) continue;
         if (carried->exact) {
