@@ -298,7 +298,8 @@ void grid::finish() {
 
 grid_channel_counts grid::channel(std::size_t index) const {
     for (const lane& l : lanes_)
-        if (std::find(l.channels.begin(), l.channels.end(), index) != l.channels.end()) return {l.expected, l.received, l.uncertain, place_std_s(l)};
+        if (std::find(l.channels.begin(), l.channels.end(), index) != l.channels.end())
+            return {l.expected, l.received, l.uncertain, place_std_s(l)};
     return {};
 }
 

@@ -13,9 +13,7 @@ constexpr double pi = 3.14159265358979323846;
 
 double sinc(double x) { return x == 0 ? 1 : std::sin(pi * x) / (pi * x); }
 
-double kaiser(double x) {
-    return std::abs(x) >= 1 ? 0 : std::cyl_bessel_i(0.0, kaiser_shape * std::sqrt(1 - x * x));
-}
+double kaiser(double x) { return std::abs(x) >= 1 ? 0 : std::cyl_bessel_i(0.0, kaiser_shape * std::sqrt(1 - x * x)); }
 
 } // namespace
 

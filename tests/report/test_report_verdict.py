@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The verdict of a report: rate by the time stamps, warnings of every code, events of another run, what was not seen."""
+"""The verdict of a report: rate by the time stamps, warnings of every code, events of another run, what is unseen."""
 
 from __future__ import annotations
 
