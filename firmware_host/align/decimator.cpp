@@ -20,13 +20,18 @@ decimator::decimator(std::size_t channels, int factor, grid_sink& to)
 /// Behind the length of the filter a pause leaves nothing of what was before: those samples are missing all at once.
 void decimator::on_missing(std::int64_t index, std::int64_t count) {
     const std::int64_t end = index + count, empty = index + 2 * half_;
-    for (std::int64_t i = index; i < std::min(end, empty); ++i) add(i, nothing_.data());
+    for (std::int64_t i = index; i < std::min(end, empty); ++i) {
+        note_time(i, 0);
+        add(i, nothing_.data());
+    }
     if (end <= empty) return;
     // Input i completes output (i - 2 half) / factor.
     const std::int64_t first = (empty - 2 * half_ + factor_ - 1) / factor_;
     const std::int64_t behind = std::min(limit_, (end - 1 - 2 * half_) / factor_ + 1);
-    for (std::int64_t i = std::max(empty, end - static_cast<std::int64_t>(mask_) - 1); i < end; ++i)
+    for (std::int64_t i = std::max(empty, end - static_cast<std::int64_t>(mask_) - 1); i < end; ++i) {
+        note_time(i, 0);
         std::fill_n(&rows_[slot(i) * width_], width_, missing_sample);
+    }
     if (behind <= first) return;
     gaps_.missing(behind - first);
     to_.on_missing(first, behind - first);
