@@ -42,6 +42,7 @@ def _local(workers: int, memory_mb: float, folder: str) -> Any:
     with _deaf():
         return LocalCluster(  # type: ignore[no-untyped-call]
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # of its counters: two campaigns share no port
             host="127.0.0.1", protocol="tls://", security=security, memory_limit=round(memory_mb * 1e6),
             local_directory=folder, env=single, silence_logs=logging.CRITICAL,
         )  # fmt: skip
