@@ -128,7 +128,7 @@ ordered_json record_json(const record_config& record) {
 }
 
 /// Checked and kept as it stands in the file.
-ordered_json geometry_json(const live_config& config, const toml::table& file) {
+ordered_json geometry_json(const toml::table& file) {
     const toml::table* table = file["geometry"].as_table();
     if (!table) return nullptr;
     std::ostringstream text;
@@ -157,7 +157,7 @@ ordered_json config_json(const live_config& config) {
     out["hammer"] = hammer_json(config);
     out["record"] = record_json(config.record);
     out["publish"] = {{"socket", text_or_null(config.publish.socket)}, {"samples", config.publish.samples}};
-    out["geometry"] = geometry_json(config, file);
+    out["geometry"] = geometry_json(file);
     out["sections"] = ordered_json::array();
     for (const auto& [key, node] : file) out["sections"].push_back(key.str());
     return out;

@@ -218,10 +218,9 @@ void renumber(const std::vector<mode_verdict>& verdicts, mass_matrices& mass) {
 /// The band and the modes picked by hand.
 void keep_wanted(const record_options& options, std::vector<consensus_mode>& modes) {
     if (!options.band) return;
-    const auto [low, high] = *options.band;
     modes.erase(std::remove_if(modes.begin(), modes.end(),
-                               [low = low, high = high](const consensus_mode& mode) {
-                                   return mode.frequency_hz < low || mode.frequency_hz > high;
+                               [&band = *options.band](const consensus_mode& mode) {
+                                   return mode.frequency_hz < band.first || mode.frequency_hz > band.second;
                                }),
                 modes.end());
 }
