@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Modes of a group from its parts: identification of all, one part left out in turn for ±, stabilization."""
+"""Modes of a group: from the sums of its parts by one method, or from its samples by method auto."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from okid._errors import Error, IdentificationError
 from okid.abi.accumulator import Accumulator
-from okid.abi.host_result import HostResult
+from okid.abi.host_result import HostResult, identify
 from okid.abi.stream import HostStream
+from okid.campaign.record_read import ReadRecord
 from okid.campaign.spec import FEWEST, CampaignSpec
 from okid.result.stabilization import of_identifiers
 
+MOST_NUMBERS = 10_000_000  # of a group that auto looks at, as live: an identification holds them some 8 times
 _NEAR = 0.01  # relative: a cluster of the stabilization diagram is that of a mode
 _FEWEST_ORDERS = 12
 _KEYS = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac")
@@ -50,6 +53,46 @@ def _held(found: HostResult, order: int, frequencies_hz: Sequence[float]) -> lis
     return [bool(np.any(np.abs(at - f) <= _NEAR * f)) for f in frequencies_hz]
 
 
+def in_units(spec: CampaignSpec, record: ReadRecord) -> tuple[NDArray[np.float64], int]:
+    """Samples in engineering units with NaN where one is missing, and how many have a code at full scale."""
+    c, codes = spec.channels, record.samples
+    rows = np.array(codes, dtype=np.float64)
+    full = np.zeros(len(rows), dtype=bool)
+    if c.codes:
+        full = np.any((codes <= -(2 ** (c.codes - 1))) | (codes >= 2 ** (c.codes - 1) - 1), axis=1)
+        rows = rows * np.array(c.scale) + np.array(c.offset)
+    rows[full if c.saturated == "missing" else []] = np.nan
+    if record.missing is not None:
+        rows[record.missing] = np.nan
+    return rows, int(full.sum())
+
+
+def agree(spec: CampaignSpec, records: Sequence[NDArray[np.float64]]) -> dict[str, Any]:
+    """What method auto finds in the records of a group, as identify_group() tells it; "holds" is its confidence."""
+    c, i = spec.channels, spec.identification
+    whole = hashlib.sha256()
+    for record in records:
+        whole.update(record.tobytes())
+    out: dict[str, Any] = {
+        "model_key": spec.model_key, "rows": sum(int(np.isfinite(one).all(axis=1).sum()) for one in records),
+        "sums_sha256": whole.hexdigest(), "parts": None, "order": None, "fault": None, "modes": [],
+    }  # fmt: skip
+    options = {
+        "inputs": list(c.inputs), "outputs": list(c.outputs), "fs": c.fs_hz, "method": "auto",
+        "sigma_blocks": i.sigma_blocks, "band": ":".join(map(str, i.band)) or None, "decimate": i.decimate or None,
+    }  # fmt: skip
+    try:
+        found = identify(options, records)
+    except Error as fault:
+        return out | {"fault": str(fault)}
+    return out | {"modes": [_listed(mode, mode["confident"]) for mode in found.about()["modes"]]}
+
+
+def _listed(mode: dict[str, Any], holds: bool | None) -> dict[str, Any]:
+    shape = {key: mode[key] for key in ("shape_re", "shape_im")}
+    return {**{key: mode[key] for key in _KEYS}, "holds": holds, **shape}
+
+
 def identify_group(spec: CampaignSpec, parts: Sequence[Accumulator]) -> dict[str, Any]:
     """What the parts of a group tell: plain values for JSON. Without a model "modes" is empty and "fault" says why.
 
@@ -70,13 +113,4 @@ def identify_group(spec: CampaignSpec, parts: Sequence[Accumulator]) -> dict[str
     held: list[bool | None] = [None] * len(modes)
     if spec.identification.stabilization:
         held = _held(found, int(about["order"]), [mode["frequency_hz"] for mode in modes])
-    listed = [
-        {
-            **{key: mode[key] for key in _KEYS},
-            "holds": holds,
-            "shape_re": mode["shape_re"],
-            "shape_im": mode["shape_im"],
-        }
-        for mode, holds in zip(modes, held, strict=True)
-    ]
-    return out | {"order": about["order"], "modes": listed}
+    return out | {"order": about["order"], "modes": [_listed(*one) for one in zip(modes, held, strict=True)]}

@@ -40,6 +40,8 @@ class GroupPlan:
 
 def slices_of(spec: CampaignSpec, plan: GroupPlan) -> list[Slice]:
     """The records to read, those of a part beside each other, in slices of at most `batch_bytes`."""
+    if spec.identification.method == "auto":  # looks at all samples of the group at once
+        return [Slice(plan.group.ident, tuple(plan.todo), True, False)] if plan.todo else []
     many = folds(spec, len(plan.group.records))
     records = sorted(plan.todo, key=lambda ref: (fold(spec, part_of(ref.name, 0)) if many else 0, ref.name))
     cut: list[list[RecordRef]] = []

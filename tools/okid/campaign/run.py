@@ -270,7 +270,10 @@ class _Run:
                 self.submit_batch([one])
             return
         piece, died = slices[0], type(fault).__name__ == "KilledWorker"
-        if len(piece.records) > 1:
+        if len(piece.records) > 1 and self.spec.identification.method == "auto":
+            told = "a worker ended over it: too large for its memory?" if died else reason
+            self.out.faults[piece.group] = f"its records could not be identified, run again to try anew: {told}"
+        elif len(piece.records) > 1:
             self.split(piece)
         elif died and not what[2]:
             self.suspects.append(piece)
@@ -350,7 +353,7 @@ class _Run:
                 other = seen.setdefault(record["sha256"], record["name"])
                 if other != record["name"]:
                     self.out.remarks.append(f"{record['name']}: the same content as {other}; both are counted")
-        few = [ident for ident, sums in self.out.done.items() if sums.result and sums.result["parts"] < 8]
+        few = [ident for ident, sums in self.out.done.items() if sums.result and (sums.result["parts"] or 8) < 8]
         if few and self.spec.identification.sigma_blocks:
             self.out.remarks.append(
                 f"{len(few)} groups have fewer than 8 parts and no ±: more records a group, or [identification] "

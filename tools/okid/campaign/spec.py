@@ -20,6 +20,9 @@ GROUPS, FEWEST = 20, 8  # parts that are left out in turn; below 8 a standard de
 TIME_KEYS = ("hour", "day", "week", "month", "year")
 BAND = "temperature_band"
 _ALONE = "record"  # a group key: every record by itself
+_ONE_METHOD = ("p", "rows", "order", "max_order", "hankel", "pieces", "stabilization")
+_AUTO = ("band", "decimate")
+_WHO = ('only "auto" does', 'name one method, such as "okid-era"')
 
 
 @dataclass(frozen=True)
@@ -43,9 +46,11 @@ class Channels:
 
 @dataclass(frozen=True)
 class Identification:
-    """[identification]: as in CONFIG.toml; `pieces` a record is cut into for the standard deviations."""
+    """[identification]: as in CONFIG.toml; `pieces` a record is cut into for the standard deviations.
 
-    method: str = "okid-era"
+    Method "auto" looks at the samples and not at sums: it has neither orders nor pieces, but `band` and `decimate`."""
+
+    method: str = "auto"
     p: int = 40
     rows: int = 0
     order: int = 0
@@ -55,6 +60,8 @@ class Identification:
     sigma_blocks: int = GROUPS
     pieces: int = 1
     stabilization: bool = True
+    band: tuple[float, ...] = ()
+    decimate: int = 0
 
 
 @dataclass(frozen=True)
@@ -127,6 +134,8 @@ class CampaignSpec:
         """Hash of everything that the sums of a record depend on."""
         i = self.identification
         lags = {"method": i.method, "p": i.p, "rows": i.rows, "pieces": i.pieces, "blocks": i.sigma_blocks}
+        if i.method == "auto":
+            lags = {"method": i.method, "blocks": i.sigma_blocks, "band": i.band, "decimate": i.decimate}
         config = None
         if self.records.config is not None:
             config = hashlib.sha256((self.base / self.records.config).read_bytes()).hexdigest()
@@ -138,7 +147,8 @@ class CampaignSpec:
     @property
     def model_key(self) -> str:
         """Hash of everything that the modes of given sums depend on."""
-        return _digest([self.sums_key, asdict(self.identification)])
+        own = {key: value for key, value in asdict(self.identification).items() if key not in _AUTO}
+        return _digest([self.sums_key, own])
 
 
 def _digest(value: Any) -> str:
@@ -251,13 +261,20 @@ class _Reader:
         return tuple(float(value) for value in (given * count if len(given) == 1 else given))
 
     def identification(self, by: tuple[str, ...]) -> Identification:
-        table = self.table("identification")
+        table, place = self.table("identification"), self.place("identification")
         if table.get("order") == "auto":
             del table["order"]
+        single = [key for key in _ONE_METHOD if key in table]
+        method = table.setdefault("method", "okid-era" if single else "auto")
+        for key in single if method == "auto" else [key for key in _AUTO if key in table]:
+            place.refuse(key, f'method "{method}" does not have it: {_WHO[method == "auto"]}')
+        band = table["band"] = tuple(table.get("band", ()))
+        if band and not (len(band) == 2 and 0 <= band[0] < band[1]):
+            place.refuse("band", f"found {list(band)}, expected [lowest, highest] in Hz")
         blocks = table.get("sigma_blocks", GROUPS)
         table.setdefault("pieces", max(1, blocks) if by == (_ALONE,) else 1)
-        if blocks and by == (_ALONE,) and table["pieces"] < FEWEST:
-            self.place("identification").refuse(
+        if method != "auto" and blocks and by == (_ALONE,) and table["pieces"] < FEWEST:
+            place.refuse(
                 "pieces",
                 f"found {table['pieces']}, expected {FEWEST} or more (or sigma_blocks = 0): every record is a group",
             )

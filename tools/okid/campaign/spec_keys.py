@@ -23,7 +23,7 @@ class Number(NamedTuple):
 
 TEXT, FLAG, TABLE = "text", "true or false", "a table"
 NAMES, TEXTS, NUMBERS = "a list of names", "a list of texts", "a list of numbers"
-METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
+METHODS = ("auto", "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
 
 KEYS: dict[str, dict[str, Any]] = {
     "campaign": {"title": TEXT, "structure": TEXT},
@@ -40,7 +40,7 @@ KEYS: dict[str, dict[str, Any]] = {
         "order": ("auto", Number(1, 4096, whole=True)), "max_order": Number(1, 4096, whole=True),
         "hankel": ("system", "innovations", "literal"), "detrend": ("none", "mean"),
         "sigma_blocks": (0, Number(8, 100, whole=True)), "pieces": Number(1, 100, whole=True),
-        "stabilization": FLAG,
+        "stabilization": FLAG, "band": NUMBERS, "decimate": Number(1, 1000, whole=True),
     },
     "group": {"by": NAMES, "band_c": Number(0, 200, above=True)},
     "temperature": {"channel": TEXT, "scale": Number(-1e9, 1e9), "offset": Number(-1e9, 1e9), "column": TEXT},

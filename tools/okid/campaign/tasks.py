@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from okid._errors import Error
+from okid._errors import Error, InputError
 from okid.abi.accumulator import Accumulator
-from okid.campaign.group_model import identify_group
+from okid.campaign.group_model import MOST_NUMBERS, agree, identify_group, in_units
 from okid.campaign.pieces import fold, make_identifier, part_of, record_sums
 from okid.campaign.record_list import RecordRef, Skipped
-from okid.campaign.record_read import Unreachable, content_hash, read_one
+from okid.campaign.record_read import ReadRecord, Unreachable, content_hash, read_one
 from okid.campaign.spec import CampaignSpec
 from okid.campaign.sums_file import Collector, GroupSums, merge_sums, pack, unpack, whole_of
 
@@ -36,10 +36,46 @@ class SliceDone:
     sums: GroupSums
     skipped: list[Skipped] = field(default_factory=list)
 
+    def skip(self, ref: RecordRef, fault: Error) -> None:
+        """A record that cannot be used; what another try cannot change is kept."""
+        reason, lasting = str(fault).removeprefix(f"{ref.name}: "), not isinstance(fault, Unreachable)
+        self.skipped.append(Skipped(ref.name, reason, lasting))
+        if lasting:
+            self.sums.left_out.append({"name": ref.name, "stamp": ref.stamp, "reason": reason})
+
 
 def _facts(ref: RecordRef, sha256: str, counts: dict[str, int], temperature: float | None) -> dict[str, Any]:
     return {"name": ref.name, "stamp": ref.stamp, "bytes": ref.size, "sha256": sha256, **counts,
             "temperature_c": temperature}  # fmt: skip
+
+
+def _counts(record: ReadRecord) -> dict[str, int]:
+    missing = 0 if record.missing is None else int(record.missing.sum())
+    return {"samples": len(record.samples), "missing": missing, "saturated": 0}
+
+
+def look_at_slice(spec: CampaignSpec, piece: Slice) -> SliceDone:
+    """Read the records of a group and identify them by method auto: as many as it bears, by their names."""
+    done, used, numbers = SliceDone(GroupSums(piece.group, 0, merged=True)), {}, 0
+    for ref in sorted(piece.records, key=lambda ref: (part_of(ref.name, 0), ref.name)):
+        try:
+            if numbers >= MOST_NUMBERS:
+                raise InputError(
+                    f"method auto looks at {MOST_NUMBERS} numbers of a group at most: make groups smaller, or name a "
+                    'method, such as "okid-era", whose sums have no bound'
+                )
+            record = read_one(spec, ref.name, ref.url)
+        except Error as fault:
+            done.skip(ref, fault)
+            continue
+        counts = _counts(record)
+        used[ref.name], counts["saturated"] = in_units(spec, record)
+        numbers += used[ref.name].size
+        done.sums.records.append(_facts(ref, record.sha256, counts, record.temperature_c))
+    done.sums.records.sort(key=lambda record: str(record["name"]))
+    if used:
+        done.sums.result = agree(spec, [used[name] for name in sorted(used)])
+    return done
 
 
 def sum_slice(spec: CampaignSpec, piece: Slice) -> tuple[SliceDone, Collector]:
@@ -51,14 +87,9 @@ def sum_slice(spec: CampaignSpec, piece: Slice) -> tuple[SliceDone, Collector]:
             record = read_one(spec, ref.name, ref.url)
             sums = record_sums(spec, record, lags)
         except Error as fault:
-            reason, lasting = str(fault).removeprefix(f"{ref.name}: "), not isinstance(fault, Unreachable)
-            done.skipped.append(Skipped(ref.name, reason, lasting))
-            if lasting:
-                done.sums.left_out.append({"name": ref.name, "stamp": ref.stamp, "reason": reason})
+            done.skip(ref, fault)
             continue
-        counts = dict.fromkeys(("samples", "missing", "saturated"), 0)
-        counts["samples"] = len(record.samples)
-        counts["missing"] = 0 if record.missing is None else int(record.missing.sum())
+        counts = _counts(record)
         for k, one in enumerate(sums):
             counts["saturated"] += one.stats.saturated
             part = part_of(ref.name, k)
@@ -84,6 +115,9 @@ def run_batch(spec: CampaignSpec, slices: Sequence[Slice]) -> list[SliceDone]:
     """Sum every slice; groups that are complete by that are identified on the spot."""
     out = []
     for piece in slices:
+        if spec.identification.method == "auto":
+            out.append(look_at_slice(spec, piece))
+            continue
         done, into = sum_slice(spec, piece)
         out.append(done)
         if not piece.complete or not done.sums.records:

@@ -227,8 +227,9 @@ def _facts(tables: dict[str, Any], about: dict[str, Any]) -> str:
                     f"channels at {c['fs_hz']:g} Hz, {int(used['bytes'].sum()) / 1e6:.1f} MB"),
         ("groups", f"{len(groups)} by {', '.join(about['by']) or 'nothing'}, "
                    f"{int((groups['modes'] > 0).sum())} with modes"),
-        ("method", f"{i['method']}, p {i['p']}, order {i['order'] or 'auto'}, detrend {i['detrend']}"),
-        ("sums", "exact integers" if c["codes"] else "double precision"),
+        ("method", "auto" if i["method"] == "auto" else f"{i['method']}, p {i['p']}, order {i['order'] or 'auto'}, "
+                                                        f"detrend {i['detrend']}"),
+        *([] if i["method"] == "auto" else [("sums", "exact integers" if c["codes"] else "double precision")]),
     ])  # fmt: skip
 
 

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Method auto of a campaign, the default: the modes of a group are those of okid.identify() on its records."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import okid
+import pytest
+from okid.campaign import tasks
+from okid.campaign.run import run_campaign
+from okid.campaign.spec import CampaignSpec
+from rig_records import SMALL, campaign, facts
+
+NAMED = 'method = "okid-era"\np = 20\npieces = 5             # a record is cut into, for the standard deviations of a day'
+
+
+def default(folder: Path, changes: dict[str, str] | None = None, **own: Any) -> CampaignSpec:
+    return campaign(folder, changes={NAMED: "", **(changes or {})}, **own)
+
+
+def test_modes_of_a_day_are_those_of_identify(tmp_path: Path, client: Any) -> None:
+    spec = default(tmp_path)
+    assert spec.identification.method == "auto"
+    out = run_campaign(spec, client)
+    truth = json.loads((tmp_path / "truth.json").read_text())["frequency_hz_at_15_c"]
+    assert len(out.groups) == 6 and not out.faults and not out.skipped
+    for group in out.groups:
+        modes = [mode for mode in out.done[group.ident].result["modes"] if mode["holds"]]
+        assert [mode["frequency_hz"] for mode in modes] == pytest.approx(truth, rel=0.02)  # temperature moves them
+        assert all(0 < mode["frequency_std_hz"] < 0.01 * mode["frequency_hz"] for mode in modes)
+    first = out.groups[0]
+    records = [np.load(ref.url) * np.array(spec.channels.scale) for ref in sorted(first.records, key=lambda r: r.name)]
+    alone = okid.identify([one[:, :1] for one in records], [one[:, 1:] for one in records], fs=spec.channels.fs_hz)
+    listed = out.done[first.ident].result["modes"]
+    assert [mode["frequency_hz"] for mode in listed] == [mode.frequency_hz for mode in alone.modes]
+    assert [mode["holds"] for mode in listed] == [mode.confident for mode in alone.modes]
+
+
+def test_a_group_that_grows_is_read_again_and_another_is_not(tmp_path: Path, client: Any) -> None:
+    spec = default(tmp_path)
+    last = sorted((tmp_path / "records").iterdir())[-1]
+    last.rename(tmp_path / "later.npy")
+    first = run_campaign(spec, client)
+    assert first.read == SMALL.records - 1 and run_campaign(spec, client).read == 0
+    (tmp_path / "later.npy").rename(last)
+    grown = run_campaign(spec, client)
+    assert grown.read == 4  # the records of that day
+    (tmp_path / "again").mkdir()
+    assert facts(grown) == facts(run_campaign(default(tmp_path / "again"), client))
+
+
+def test_a_group_above_the_bound_says_what_was_left_out(
+    tmp_path: Path, client: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = default(tmp_path, {'by = ["day"]': "by = []"})
+    monkeypatch.setattr(tasks, "MOST_NUMBERS", 10 * 4 * SMALL.samples)
+    out = run_campaign(spec, client)
+    (done,) = out.done.values()
+    assert len(done.records) == 10 and len(out.skipped) == SMALL.records - 10
+    assert "name a method" in out.skipped[0].reason
+    assert sum(mode["holds"] for mode in done.result["modes"]) == 3
+    assert run_campaign(spec, client).read == 0
+
+
+def test_a_bad_record_costs_itself_and_silence_costs_its_group(tmp_path: Path, client: Any) -> None:
+    spec = default(tmp_path, {'by = ["day"]': 'by = ["record"]'})
+    records = sorted((tmp_path / "records").iterdir())
+    records[3].write_bytes(b"no array")
+    np.save(records[5], np.zeros((SMALL.samples, 4), np.int16))
+    out = run_campaign(spec, client)
+    assert [one.name for one in out.skipped] == [f"records/{records[3].name}"]
+    silent = [done.result["fault"] for done in out.done.values() if done.result["fault"]]
+    assert len(silent) == 1 and "\n" not in silent[0]
+    assert sum(bool(done.result["modes"]) for done in out.done.values()) == SMALL.records - 2
+
+
+def test_codes_at_full_scale_are_left_out_when_asked(tmp_path: Path, client: Any) -> None:
+    spec = default(tmp_path, {"fs_hz": 'saturated = "missing"\nfs_hz'})
+    path = sorted((tmp_path / "records").iterdir())[0]
+    codes = np.load(path)
+    codes[700:703, 2] = 32767
+    np.save(path, codes)
+    out = run_campaign(spec, client)
+    (record,) = (one for done in out.done.values() for one in done.records if one["name"].endswith(path.name))
+    assert record["saturated"] == 3
+    assert all(sum(mode["holds"] for mode in done.result["modes"]) == 3 for done in out.done.values())
