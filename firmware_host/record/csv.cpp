@@ -267,9 +267,9 @@ static std::string time_like(const std::vector<std::string>& names) {
     return "";
 }
 
-void check_columns(const std::string& path, const std::vector<std::string>& columns, const double* rows,
-                   std::size_t count) {
-    for (std::size_t k = 0; k < columns.size(); ++k) {
+void check_columns(const std::string& path, const std::vector<std::string>& columns, std::size_t checked,
+                   const double* rows, std::size_t count) {
+    for (std::size_t k = 0; k < checked; ++k) {
         std::size_t i = 0;
         while (i < count && std::isnan(rows[i * columns.size() + k])) ++i;
         if (i == count)
@@ -305,7 +305,7 @@ csv_record read_csv(const std::string& path, const csv_request& asked) {
     if (out.count == 0)
         throw failure(exit_usage,
                       fmt::format("{}: no rows after the column names (line {}), expected samples", path, header.line));
-    if (!request.whole) check_columns(path, out.columns, out.samples.data(), out.count);
+    if (!request.whole) check_columns(path, out.columns, out.columns.size(), out.samples.data(), out.count);
     out.fs_hz = request.fs_hz.value_or(header.fs_hz.value_or(0));
     if (!use_time) return out;
     if (!request.whole) return out.fs_hz = rows.rate_of_time(), out;

@@ -32,9 +32,9 @@ struct csv_record {
 /// Columns that were not asked for are skipped unread.
 csv_record read_csv(const std::string& path, const csv_request& request);
 
-/// Throws (exit 2) where a column of `count` rows is missing throughout.
-void check_columns(const std::string& path, const std::vector<std::string>& columns, const double* rows,
-                   std::size_t count);
+/// Throws (exit 2) where one of the first `checked` columns of `count` rows is missing throughout.
+void check_columns(const std::string& path, const std::vector<std::string>& columns, std::size_t checked,
+                   const double* rows, std::size_t count);
 
 /// Only the column names, for messages.
 std::vector<std::string> read_csv_columns(const std::string& path);

@@ -427,13 +427,13 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
 record_result identify_auto(record_set records, const record_options& given) {
     record_work work;
     work.set = std::move(records);
-    check_moving(work.set, given);
-    check_different_inputs(work.set, given);
     const long long asked_gaps = count_missing(work.set).gaps;
     screened_outputs screened = screen_outputs(work.set, given.outputs);
     const bool all = std::all_of(screened.kept.begin(), screened.kept.end(), [](bool kept) { return kept; });
     if (!all) work.set = without_outputs(work.set, screened.kept);
     const record_options options = all ? given : without_outputs(given, screened.kept);
+    check_moving(work.set, options);
+    check_different_inputs(work.set, options);
     const missing_count missing = count_missing(work.set);
     work.context = describe_records(work.set, options, missing);
     if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened

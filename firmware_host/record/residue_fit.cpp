@@ -44,7 +44,7 @@ MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_d
     if (!at_rest) std::fill(z.begin() + static_cast<std::ptrdiff_t>(n * set.n_u), z.end(), complex(1));
     Index filled = 0;
     const auto fold = [&] {
-        G.selfadjointView<Eigen::Lower>().rankUpdate(X.leftCols(filled));
+        if (filled > 0) G.selfadjointView<Eigen::Lower>().rankUpdate(X.leftCols(filled)); // 0: Eigen 3.4 divides by it
         filled = 0;
     };
     for (std::size_t t = 0; t < record.count; ++t) {

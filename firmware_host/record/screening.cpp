@@ -22,6 +22,8 @@ constexpr double usual_runs = 8;     // times the longest of all but the rarest 
 constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
 constexpr double spike_spreads = 15, spike_ratio = 5;
 constexpr std::size_t spike_reach = 6;
+constexpr const char* lost_words =
+    ": the whole output is left out, its shape entries are empty. Look at its sensor, range and cable";
 
 struct stretch_of_equal {
     std::size_t first, count;
@@ -141,6 +143,16 @@ std::size_t usable(const output_view& y) {
     return out;
 }
 
+/// An output that never moves in any record.
+bool is_dead(const record_set& set, std::size_t output) {
+    double low = INFINITY, high = -INFINITY;
+    for (std::size_t i = 0; i < set.count(); ++i) {
+        const double x = set.samples[i * set.channels() + set.n_u + output];
+        low = std::fmin(low, x), high = std::fmax(high, x);
+    }
+    return !(high > low);
+}
+
 std::string fault_text(const std::string& output, const record_data& record, const fault& found) {
     return fmt::format("output \"{}\"{}: {} ({} sample{}, the first is number {})", output,
                        record.path.empty() ? "" : " of " + record.path, found.kind, found.samples.size(),
@@ -150,6 +162,10 @@ std::string fault_text(const std::string& output, const record_data& record, con
 /// Faults of one output of one record; their samples become missing.
 std::vector<std::string> screen(const output_view& y, const std::string& name) {
     const std::vector<stretch_of_equal> runs = equal_stretches(y);
+    if (runs.size() == 1 && y.size() >= frozen_run) { // of one of several records: is_dead() has seen the others
+        for (std::size_t i = 0; i < y.size(); ++i) y.drop(i);
+        return {fmt::format("output \"{}\" of {} never moves", name, y.record.path)};
+    }
     if (runs.size() < 3) return {};
     double low = INFINITY, high = -INFINITY;
     for (const stretch_of_equal& run : runs) low = std::min(low, run.value), high = std::max(high, run.value);
@@ -168,12 +184,32 @@ std::vector<std::string> screen(const output_view& y, const std::string& name) {
     return out;
 }
 
+/// An output whose missing samples would cost the others theirs, since only complete rows with complete lags are used.
+void leave_out_sparse(const std::vector<std::string>& outputs, const std::vector<std::size_t>& usable_of,
+                      screened_outputs& out) {
+    const double best = static_cast<double>(*std::max_element(usable_of.begin(), usable_of.end()));
+    for (std::size_t k = 0; k < outputs.size(); ++k) {
+        if (!out.kept[k] || static_cast<double>(usable_of[k]) >= (1 - share_lost) * best) continue;
+        out.kept[k] = false;
+        out.said.emplace_back("screened", fmt::format("output \"{}\": samples missing so often that only {} have {} "
+                                                      "complete ones before them, of another output {}{}",
+                                                      outputs[k], usable_of[k], clean_lags, best, lost_words));
+    }
+}
+
 } // namespace
 
 screened_outputs screen_outputs(record_set& set, const std::vector<std::string>& outputs) {
     screened_outputs out;
     out.kept.assign(outputs.size(), true);
+    std::vector<std::size_t> usable_of(outputs.size(), 0);
     for (std::size_t k = 0; k < outputs.size(); ++k) {
+        if (is_dead(set, k)) {
+            out.kept[k] = false;
+            out.said.emplace_back("screened",
+                                  fmt::format("output \"{}\" {}", outputs[k], std::string("never moves") + lost_words));
+            continue;
+        }
         std::vector<std::string> faults;
         std::size_t before = 0, after = 0;
         for (const record_data& record : set.records) {
@@ -184,14 +220,19 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
         }
         const bool lost = static_cast<double>(after) < (1 - share_lost) * static_cast<double>(before);
         if (!faults.empty() && lost) out.kept[k] = false;
+        usable_of[k] = after;
         for (const std::string& text : faults)
             out.said.emplace_back("screened",
-                                  text + (lost ? ": the whole output is left out, its shape entries are empty. "
-                                                 "Look at its sensor, range and cable"
-                                               : ": left out as gaps, nothing is interpolated"));
+                                  text + (lost ? lost_words : ": left out as gaps, nothing is interpolated"));
     }
-    if (std::none_of(out.kept.begin(), out.kept.end(), [](bool kept) { return kept; }))
+    leave_out_sparse(outputs, usable_of, out);
+    if (std::none_of(out.kept.begin(), out.kept.end(), [](bool kept) { return kept; })) {
         out.kept.assign(outputs.size(), true); // nothing else is there: the clean samples have to do
+        out.said.erase(
+            std::remove_if(out.said.begin(), out.said.end(),
+                           [](const auto& one) { return one.second.find("never moves") != std::string::npos; }),
+            out.said.end());
+    }
     return out;
 }
 

@@ -15,7 +15,9 @@ from okid.campaign.run import run_campaign
 from okid.campaign.spec import CampaignSpec
 from rig_records import SMALL, campaign, facts
 
-NAMED = 'method = "okid-era"\np = 20\npieces = 5             # a record is cut into, for the standard deviations of a day'
+NAMED = (
+    'method = "okid-era"\np = 20\npieces = 5             # a record is cut into, for the standard deviations of a day'
+)
 
 
 def default(folder: Path, changes: dict[str, str] | None = None, **own: Any) -> CampaignSpec:

@@ -67,7 +67,11 @@ WRONG = [
     ("p = 10", "p = 2.5", "found 2.5, expected a whole number from 1 to 4096"),
     ("p = 10", 'order = "best"', "found 'best', expected 'auto' or a whole number from 1 to 4096"),
     ("p = 10", 'method = "okid"', "found 'okid', expected 'auto' or 'okid-era' or 'okid-era-dc'"),
-    ("p = 10", 'p = 10\nmethod = "auto"', 'key "p": method "auto" does not have it: name one method, such as "okid-era"'),
+    (
+        "p = 10",
+        'p = 10\nmethod = "auto"',
+        'key "p": method "auto" does not have it: name one method, such as "okid-era"',
+    ),
     ("p = 10", "p = 10\nband = [1, 9]", 'key "band": method "okid-era" does not have it: only "auto" does'),
     ("p = 10", "band = [9, 1]", 'key "band": found [9, 1], expected [lowest, highest] in Hz'),
     ("p = 10", "sigma_blocks = 3", "found 3, expected 0 or a whole number from 8 to 100"),

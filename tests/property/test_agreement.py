@@ -94,9 +94,25 @@ def frozen(y: np.ndarray) -> np.ndarray:
     return out
 
 
+def dead(y: np.ndarray) -> np.ndarray:
+    return np.full_like(y, 0.3)
+
+
+def sparse(y: np.ndarray) -> np.ndarray:
+    """A sensor of a seventh of the rate, or a cable that fails all the time."""
+    return np.where(np.arange(len(y)) % 7 == 0, y, np.nan)
+
+
 @pytest.mark.parametrize(
     ("damage", "word", "whole"),
-    [(clip, "clipped", True), (spike, "spikes", False), (zeros, "zero", False), (frozen, "frozen", True)],
+    [
+        (dead, "never moves", True),
+        (sparse, "missing so often", True),
+        (clip, "clipped", True),
+        (spike, "spikes", False),
+        (zeros, "zero", False),
+        (frozen, "frozen", True),
+    ],
 )
 def test_a_bad_channel_is_named_and_makes_no_modes(damage: Any, word: str, whole: bool, tmp_path: Path) -> None:
     lab = forced(14)

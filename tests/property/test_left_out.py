@@ -87,3 +87,36 @@ def test_a_noisy_output_is_named() -> None:
         said.append([w.text for w in result.warnings if w.code == "noisy_output"])
         assert len(result.confident_modes) == len(lab.frequency_hz)
     assert said[0] == [] and len(said[1]) == 1 and said[1][0].startswith('output "y3" is much noisier than the rest')
+
+
+def test_a_sensor_that_dies_between_records_costs_no_record() -> None:
+    """Five records, one with a dead sensor, another that holds no number of another one: no record is lost for it."""
+    lab = forced(21, count=10000)
+    u, y = lab.samples[:, : lab.n_u], lab.samples[:, lab.n_u :].copy()
+    us, ys = np.array_split(u, 5), np.array_split(y, 5)
+    ys[1][:, 3] = 0.25
+    ys[4][:, 6] = np.nan
+    result = okid.identify(us, ys, fs=lab.fs, output_names=NAMES)
+    said = " ".join(w.text for w in result.warnings if w.code == "screened")
+    assert 'output "y3" of record 1' in said and "never moves" in said
+    assert len(result.confident_modes) == len(lab.frequency_hz)
+    for mode, truth in zip(result.confident_modes, lab.frequency_hz, strict=True):
+        assert mode.frequency_hz == pytest.approx(truth, rel=1e-3)
+
+
+def test_outputs_that_are_all_dead_are_refused() -> None:
+    rng = np.random.default_rng(3)
+    with pytest.raises(okid.IdentificationError, match='output "y1" is constant'):
+        okid.identify(rng.standard_normal((4000, 1)), np.ones((4000, 2)), fs=100.0)
+    with pytest.raises(okid.IdentificationError, match='input "u1" is constant'):
+        okid.identify(np.ones((4000, 1)), rng.standard_normal((4000, 2)), fs=100.0)
+    with pytest.raises(okid.InputError, match='column "u1" holds no number'):
+        okid.identify(np.full((4000, 1), np.nan), rng.standard_normal((4000, 2)), fs=100.0)
+
+
+def test_records_of_a_whole_number_of_blocks() -> None:
+    """5,120 samples are 20 blocks of the sums that compare records: the last one is empty."""
+    lab = forced(21, count=10240)
+    u, y = np.array_split(lab.samples[:, : lab.n_u], 2), np.array_split(lab.samples[:, lab.n_u :], 2)
+    result = okid.identify(u, y, fs=lab.fs, sigma_blocks=0)
+    assert len(result.confident_modes) == len(lab.frequency_hz) and not result.warnings

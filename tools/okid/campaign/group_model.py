@@ -55,16 +55,18 @@ def _held(found: HostResult, order: int, frequencies_hz: Sequence[float]) -> lis
 
 def in_units(spec: CampaignSpec, record: ReadRecord) -> tuple[NDArray[np.float64], int]:
     """Samples in engineering units with NaN where one is missing, and how many have a code at full scale."""
-    c, codes = spec.channels, record.samples
-    rows = np.array(codes, dtype=np.float64)
-    full = np.zeros(len(rows), dtype=bool)
-    if c.codes:
-        full = np.any((codes <= -(2 ** (c.codes - 1))) | (codes >= 2 ** (c.codes - 1) - 1), axis=1)
-        rows = rows * np.array(c.scale) + np.array(c.offset)
-    rows[full if c.saturated == "missing" else []] = np.nan
-    if record.missing is not None:
-        rows[record.missing] = np.nan
-    return rows, int(full.sum())
+    c, rows = spec.channels, np.array(record.samples, dtype=np.float64)
+    scale, offset = np.array(c.scale), np.array(c.offset)
+    if record.samples.dtype.kind != "f":
+        rows = rows * scale + offset
+    rows[:, np.isnan(rows).all(axis=0)] = 0.0  # no number at all: a dead channel, as one that never moves
+    if not c.codes:
+        return rows, 0
+    codes, most = np.rint((rows - offset) / scale), 2 ** (c.codes - 1)
+    full = (codes <= -most) | (codes >= most - 1)
+    if c.saturated == "missing":
+        rows[full] = np.nan
+    return rows, int(full.any(axis=1).sum())
 
 
 def agree(spec: CampaignSpec, records: Sequence[NDArray[np.float64]]) -> dict[str, Any]:

@@ -146,8 +146,10 @@ def _of_file(spec: CampaignSpec, kind: str, path: Path) -> tuple[NDArray[Any], f
 
 
 def _as_codes(spec: CampaignSpec, name: str, samples: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-    """The samples as the accumulator takes them; which are missing, None = none."""
+    """The samples as the accumulator takes them; which are missing, None = none. Auto takes them as they are."""
     codes = spec.channels.codes
+    if spec.identification.method == "auto":
+        return samples, None
     if samples.dtype.kind == "f":
         absent = ~np.all(np.isfinite(samples), axis=1)
         missing = absent if np.any(absent) else None
