@@ -35,6 +35,7 @@
 #ifndef OKID_H
 #define OKID_H
 #include <okid/accumulator.h>
+#include <okid/correlation.h>
 #include <okid/identify.h>
 #include <okid/mechanics.h>
 #include <okid/mkr.h>

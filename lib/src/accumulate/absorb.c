@@ -6,9 +6,8 @@
 // NUMERICS   codes: exact, bounds in the public header; doubles: plain sums
 // WORKSPACE  none; touches the open slot and x only
 #include "accumulator.h"
+#include "source.h"
 #include "wide.h"
-
-enum { SCAN = 256, SCAN_AHEAD = 16384 };
 
 /// Rows the kernel may sum before they are folded into pairs (see the public header).
 static int64_t fold_rows(okid_sample_t sample) {
@@ -55,8 +54,8 @@ static void fold_partial(okid_accumulator_t* a) {
 #ifdef OKID_INTEGER_KERNEL
 static void sum_codes(okid_accumulator_t* a, const double* x, int32_t count) {
     int64_t *low = (int64_t*)acc_slot_data(a, a->open), *high = low + acc_sum_count(a);
-    okid_kernel_integer(low, a->config.sample == OKID_SAMPLE_INT32 ? high : NULL, (const int64_t*)x, a->m,
-                        a->config.lags, count);
+    okid_kernel_integer(low, a->config.sample == OKID_SAMPLE_INT32 ? high : NULL, (const int64_t*)x + acc_lag_count(a),
+                        (const int64_t*)x, a->m, a->m, a->config.lags, count);
 }
 #else
 /// 32-bit codes: kernel on the high and low halves of the codes, x = high 2^16 + low, 0 <= low < 2^16.
@@ -65,7 +64,7 @@ static void sum_codes(okid_accumulator_t* a, const double* x, int32_t count) {
     const int32_t m = a->m, p = a->config.lags;
     double* partial = acc_at(a, a->partial_at);
     if (a->config.sample != OKID_SAMPLE_INT32) {
-        kernel(partial, x, x, m, p, count);
+        kernel(partial, x + acc_lag_count(a), x, m, m, p, count);
         return;
     }
     const size_t numbers = (size_t)(p + count) * (size_t)m, sums = acc_sum_count(a);
@@ -76,16 +75,17 @@ static void sum_codes(okid_accumulator_t* a, const double* x, int32_t count) {
         high[i] = upper;
         low[i] = code - upper * 65536;
     }
-    kernel(partial, high, high, m, p, count);
-    kernel(partial + sums, high, low, m, p, count);
-    kernel(partial + sums, low, high, m, p, count);
-    kernel(partial + 2 * sums, low, low, m, p, count);
+    const double *now_high = high + acc_lag_count(a), *now_low = low + acc_lag_count(a);
+    kernel(partial, now_high, high, m, m, p, count);
+    kernel(partial + sums, now_high, low, m, m, p, count);
+    kernel(partial + sums, now_low, high, m, m, p, count);
+    kernel(partial + 2 * sums, now_low, low, m, m, p, count);
 }
 #endif
 
 static void run_kernel(okid_accumulator_t* a, const double* x, int32_t count) {
     if (!acc_has_codes(a)) {
-        okid_kernel_pick()(acc_slot_data(a, a->open), x, x, a->m, a->config.lags, count);
+        okid_kernel_pick()(acc_slot_data(a, a->open), x + acc_lag_count(a), x, a->m, a->m, a->config.lags, count);
         return;
     }
     const int64_t limit = fold_rows(a->config.sample);
@@ -211,33 +211,6 @@ static void make_room(okid_accumulator_t* a) {
     okid_accumulator_clear_slot(a, a->open, 0);
 }
 
-/// What a call brings: m numbers a sample of one of four kinds.
-typedef struct source_t {
-    enum { FROM_DOUBLE, FROM_FLOAT, FROM_INT16, FROM_INT32 } kind;
-    const void* at;
-} source_t;
-
-static size_t number_bytes(source_t s) { return s.kind == FROM_DOUBLE ? 8 : s.kind == FROM_INT16 ? 2 : 4; }
-
-static source_t advance(source_t s, size_t numbers) {
-    return (source_t){s.kind, (const char*)s.at + numbers * number_bytes(s)};
-}
-
-static void copy_in(source_t source, double* to, size_t numbers) {
-    switch (source.kind) {
-    case FROM_DOUBLE: memcpy(to, source.at, numbers * sizeof *to); break;
-    case FROM_FLOAT:
-        for (size_t i = 0; i < numbers; ++i) to[i] = (double)((const float*)source.at)[i];
-        break;
-    case FROM_INT16:
-        for (size_t i = 0; i < numbers; ++i) acc_put_code(to + i, ((const int16_t*)source.at)[i]);
-        break;
-    default:
-        for (size_t i = 0; i < numbers; ++i) acc_put_code(to + i, ((const int32_t*)source.at)[i]);
-        break;
-    }
-}
-
 /// Take up to `count` samples of one run through x; returns how many were taken.
 static size_t feed(okid_accumulator_t* a, source_t source, size_t count) {
     const int32_t m = a->m, p = a->config.lags;
@@ -297,43 +270,13 @@ static void feed_run(okid_accumulator_t* a, source_t source, size_t count) {
     }
 }
 
-/// Is every number finite, for codes: below full scale?
-static int usable(const okid_accumulator_t* a, source_t source, size_t numbers) {
-    if (source.kind == FROM_DOUBLE || source.kind == FROM_FLOAT) {
-        double sum = 0;
-        if (source.kind == FROM_DOUBLE)
-            for (size_t i = 0; i < numbers; ++i) sum += ((const double*)source.at)[i] * 0.0;
-        else
-            for (size_t i = 0; i < numbers; ++i) sum += (double)((const float*)source.at)[i] * 0.0;
-        return sum == 0;
-    }
-    const int32_t top = a->config.sample == OKID_SAMPLE_INT16   ? INT16_MAX
-                        : a->config.sample == OKID_SAMPLE_INT24 ? (1 << 23) - 1
-                                                                : INT32_MAX;
-    size_t full = 0;
-    if (source.kind == FROM_INT16)
-        for (size_t i = 0; i < numbers; ++i)
-            full += ((const int16_t*)source.at)[i] == top || ((const int16_t*)source.at)[i] == -top - 1;
-    else
-        for (size_t i = 0; i < numbers; ++i)
-            full += ((const int32_t*)source.at)[i] == top || ((const int32_t*)source.at)[i] == -top - 1;
-    return full == 0;
-}
-
 /// Feed what is usable, make gaps of the rest.
 static okid_status_t feed_usable(okid_accumulator_t* a, source_t source, size_t count) {
     const size_t m = (size_t)a->m;
     okid_status_t status = OKID_OK;
     while (count > 0) {
-        const size_t most =
-            count < SCAN_AHEAD ? count : SCAN_AHEAD; // what was looked at is still in the cache when fed
-        size_t run = 0;
-        while (run < most) { // as far as whole pieces are usable, then sample by sample
-            const size_t piece = most - run < SCAN ? most - run : SCAN;
-            if (!usable(a, advance(source, run * m), piece * m)) break;
-            run += piece;
-        }
-        while (run < most && usable(a, advance(source, run * m), m)) ++run;
+        const size_t most = count < SCAN_AHEAD ? count : SCAN_AHEAD,
+                     run = usable_run(source, a->config.sample, m, most);
         feed_run(a, source, run);
         source = advance(source, run * m);
         count -= run;
@@ -379,22 +322,14 @@ static okid_status_t ready_for_codes(const okid_accumulator_t* a, const void* co
 okid_status_t okid_accumulator_add_i16(okid_accumulator_t* self, const int16_t* codes, size_t count) {
     const okid_status_t status = ready_for_codes(self, codes, count, 1);
     if (status != OKID_OK) return status;
-    const size_t numbers = count * (size_t)self->m;
-    int64_t saturated = 0;
-    for (size_t i = 0; i < numbers; ++i) saturated += codes[i] == INT16_MAX || codes[i] == INT16_MIN;
-    return add_codes(self, (source_t){FROM_INT16, codes}, count, saturated);
+    const source_t source = {FROM_INT16, codes};
+    return add_codes(self, source, count, look_at_codes(source, OKID_SAMPLE_INT16, count * (size_t)self->m).saturated);
 }
 
 okid_status_t okid_accumulator_add_i32(okid_accumulator_t* self, const int32_t* codes, size_t count) {
     const okid_status_t status = ready_for_codes(self, codes, count, 0);
     if (status != OKID_OK) return status;
-    const int32_t top = self->config.sample == OKID_SAMPLE_INT24 ? (1 << 23) - 1 : INT32_MAX, bottom = -top - 1;
-    const size_t numbers = count * (size_t)self->m;
-    int64_t saturated = 0, outside = 0;
-    for (size_t i = 0; i < numbers; ++i) {
-        saturated += codes[i] == top || codes[i] == bottom;
-        outside += codes[i] > top || codes[i] < bottom;
-    }
-    if (outside) return OKID_ERR_RANGE;
-    return add_codes(self, (source_t){FROM_INT32, codes}, count, saturated);
+    const source_t source = {FROM_INT32, codes};
+    const codes_seen_t seen = look_at_codes(source, self->config.sample, count * (size_t)self->m);
+    return seen.outside ? OKID_ERR_RANGE : add_codes(self, source, count, seen.saturated);
 }

@@ -3,7 +3,7 @@
 // METHOD     matrix product without packing: the lag window of a sample is contiguous in memory, so a register tile of
 //            OKID_ROWS x OKID_COLS numbers is held over all samples of the run; the last tile overlaps its neighbour
 // NUMERICS   plain sums in double in the order of the samples; exact for 16-bit codes up to 2^22 samples
-// WORKSPACE  none; 2 m^2 (p+1) flop a sample
+// WORKSPACE  none; 2 m w (p+1) flop a sample
 #include "kernel.h"
 #include "isa.h"
 
@@ -33,10 +33,10 @@ static inline lanes_t load(const double* p) {
 /// One tile: `rows` channels from `current` against TILE window entries from `window`; the first `skip` columns belong
 /// to the neighbour and are left alone.
 static inline __attribute__((always_inline)) void tile(double* S, int ld, const double* current, const double* window,
-                                                       int m, int count, const int rows, int skip) {
+                                                       int m, int stride, int count, const int rows, int skip) {
     lanes_t acc[MAX_ROWS][COLS];
     for (int r = 0; r < rows; ++r) memcpy(acc[r], S + r * ld, sizeof acc[r]);
-    for (int n = 0; n < count; ++n, current += m, window += m) {
+    for (int n = 0; n < count; ++n, current += m, window += stride) {
         lanes_t w[COLS];
 #pragma GCC unroll 8
         for (int k = 0; k < COLS; ++k) w[k] = load(window + k * LANES);
@@ -54,25 +54,24 @@ static inline __attribute__((always_inline)) void tile(double* S, int ld, const 
     }
 }
 
-static void tiles(double* S, int ld, const double* current, const double* window, int m, int count, int rows,
+static void tiles(double* S, int ld, const double* current, const double* window, int m, int w, int count, int rows,
                   int skip) {
     switch (rows) {
-    case 1: tile(S, ld, current, window, m, count, 1, skip); break;
-    case 2: tile(S, ld, current, window, m, count, 2, skip); break;
-    case 3: tile(S, ld, current, window, m, count, 3, skip); break;
-    case 4: tile(S, ld, current, window, m, count, 4, skip); break;
-    default: tile(S, ld, current, window, m, count, MAX_ROWS, skip); break;
+    case 1: tile(S, ld, current, window, m, w, count, 1, skip); break;
+    case 2: tile(S, ld, current, window, m, w, count, 2, skip); break;
+    case 3: tile(S, ld, current, window, m, w, count, 3, skip); break;
+    case 4: tile(S, ld, current, window, m, w, count, 4, skip); break;
+    default: tile(S, ld, current, window, m, w, count, MAX_ROWS, skip); break;
     }
 }
 
 okid_kernel_fn OKID_KERNEL;
-void OKID_KERNEL(double* S, const double* current, const double* window, int m, int p, int count) {
-    const int width = m * (p + 1);
-    current += (size_t)p * (size_t)m;
+void OKID_KERNEL(double* S, const double* current, const double* window, int m, int w, int p, int count) {
+    const int width = w * (p + 1);
     if (width < TILE) { // a handful of numbers: no tile fits
         for (int n = 0; n < count; ++n)
             for (int r = 0; r < m; ++r)
-                for (int c = 0; c < width; ++c) S[r * width + c] += current[n * m + r] * window[n * m + c];
+                for (int c = 0; c < width; ++c) S[r * width + c] += current[n * m + r] * window[n * w + c];
         return;
     }
     const int groups = (m + MAX_ROWS - 1) / MAX_ROWS;
@@ -80,7 +79,7 @@ void OKID_KERNEL(double* S, const double* current, const double* window, int m, 
         const int start = c + TILE <= width ? c : width - TILE;
         for (int g = 0, r = 0; g < groups; ++g) {
             const int rows = (m - r + groups - g - 1) / (groups - g);
-            tiles(S + r * width + start, width, current + r, window + start, m, count, rows, c - start);
+            tiles(S + r * width + start, width, current + r, window + start, m, w, count, rows, c - start);
             r += rows;
         }
     }

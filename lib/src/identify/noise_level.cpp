@@ -9,12 +9,12 @@
 #include "identify/noise_level.hpp"
 
 #include "identify/companion.hpp"
+#include "identify/signs.hpp"
 #include "identify/triangular.hpp"
 #include "linalg/linalg.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 namespace okid {
 namespace {
@@ -25,17 +25,6 @@ constexpr int draws = 3, iterations = 10;
 constexpr double margin = 1.5;
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
-/// +1 and -1 by xorshift.
-struct signs {
-    std::uint64_t state = 0x9E3779B97F4A7C15u;
-    double operator()() {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        return (state >> 40 & 1) != 0 ? 1 : -1;
-    }
-};
 
 /// d Y_n = d Ybar^I_n + sum_h (d theta^y_h Y_(n-h) + theta^y_h d Y_(n-h)). Blocks of a stack stand one below the other,
 /// the newest on top and p zeros at the bottom, so that each sum is one product.

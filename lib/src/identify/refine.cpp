@@ -8,7 +8,9 @@
 // WORKSPACE  two Gram matrices and the equations, some 6 total^2 numbers; one pass over the records an iteration
 #include <okid/refine.h>
 
+#include "identify/refine_moments.hpp"
 #include "identify/refine_pass.hpp"
+#include "identify/signs.hpp"
 
 #include <cmath>
 
@@ -25,9 +27,11 @@ struct okid_refine {
     okid::refine_equations equations;
     okid::refine_change change;
     okid::refine_pass pass;
-    double *basis, *inverse; ///< n_z x n_z: states = basis times modal coordinates
-    double *spare, *product; ///< n_z x max(n_z, n_u, n_y, runs)
-    double *scores, *drive;  ///< of the blocks; n_u: mean square of the inputs
+    okid::refine_moments moments;
+    const okid_correlation_sums_t* sums; ///< what is refined, instead of records
+    double *basis, *inverse;             ///< n_z x n_z: states = basis times modal coordinates
+    double *spare, *product;             ///< n_z x max(n_z, n_u, n_y, runs)
+    double *scores, *drive;              ///< of the blocks; n_u: mean square of the inputs
     okid_real_t *a, *vectors, *re, *im, *eigen;
     okid_real_t *A, *B, *C, *D, *x0, *noise;
     bool ready; ///< the equations of the result are factored
@@ -37,11 +41,12 @@ namespace {
 
 constexpr double enough = 1e-3;       // log-likelihood that a step must promise to be worth it: 1/20 of a deviation
 constexpr double at_rounding = 1e-24; // mean square of the residuals over that of the outputs
+constexpr double truncated = 1e-2;    // what a mode may have left of its amplitude after the lags of the sums
 constexpr int tries = 12;             // of the damping, and of halving the step of a pole
 
 bool valid(const okid_refine_config_t& c) {
     constexpr int most = 1 << 14;
-    return c.n_u >= 1 && c.n_y >= 1 && c.n_z >= 1 && c.runs >= 1 && c.n_u <= most && c.n_y <= most && c.n_z <= most &&
+    return c.n_u >= 1 && c.n_y >= 1 && c.n_z >= 1 && c.runs >= 0 && c.n_u <= most && c.n_y <= most && c.n_z <= most &&
            c.runs <= most && (c.blocks == 0 || (c.blocks >= 2 && c.blocks <= 64)) && c.iterations >= 0 &&
            (c.offset == 0 || c.offset == 1) &&
            static_cast<long long>(c.n_z) * (c.n_u + c.runs + 1) + c.n_u + c.runs <= most;
@@ -50,7 +55,7 @@ bool valid(const okid_refine_config_t& c) {
 void lay_out(okid_refine& s, const okid_refine_config_t& c, okid::arena& memory) {
     s.config = c;
     okid::refine_layout& l = s.layout;
-    l = {c.n_u, c.n_y, c.n_z, c.runs, c.offset != 0, nullptr, nullptr, nullptr};
+    l = {c.n_u, c.n_y, c.n_z, c.runs, c.offset != 0, nullptr, nullptr, nullptr, 1};
     for (bool** flags : {&l.pair, &l.held}) *flags = memory.take<bool>(area(c.n_z, 1));
     l.fixed = memory.take<int>(area(c.n_z, 1));
     s.best.lay_out(l, memory);
@@ -59,7 +64,10 @@ void lay_out(okid_refine& s, const okid_refine_config_t& c, okid::arena& memory)
     s.at_trial.lay_out(l, memory);
     s.equations.lay_out(l, memory);
     s.change.lay_out(l, memory);
-    s.pass.lay_out(l, memory);
+    if (c.runs > 0)
+        s.pass.lay_out(l, memory);
+    else
+        s.moments.lay_out(l, memory);
     const int widest = std::max({c.n_z, c.n_u, c.n_y, c.runs});
     for (double** square : {&s.basis, &s.inverse}) *square = memory.take<double>(area(c.n_z, c.n_z));
     for (double** wide : {&s.spare, &s.product}) *wide = memory.take<double>(area(c.n_z, widest));
@@ -160,6 +168,15 @@ okid_status_t look_at(okid_refine& s, const okid::refine_records& records) {
     return OKID_OK;
 }
 
+/// The same from sums.
+okid_status_t look_at(okid_refine& s, const okid_correlation_sums_t& sums) {
+    const int n_u = s.layout.n_u, n_y = s.layout.n_y, m = n_u + n_y;
+    if (sums.rows * n_y <= static_cast<double>(okid::refine_parameters::count(s.layout))) return OKID_ERR_TOO_SHORT;
+    for (int c = 0; c < n_u; ++c) s.drive[c] = sums.U[at(c, c, m)];
+    for (int o = 0; o < n_y; ++o) s.at_best.output[o] = s.at_trial.output[o] = sums.Y[at(n_u + o, o, m)] / sums.rows;
+    return OKID_OK;
+}
+
 void accept(okid_refine& s) {
     std::swap(s.best, s.trial);
     std::swap(s.at_best, s.at_trial);
@@ -174,11 +191,20 @@ void keep_inside(okid_refine& s) {
                 s.trial.pole[i] = turn + 1 < tries ? (s.trial.pole[i] + s.best.pole[i]) / 2 : s.best.pole[i];
 }
 
+/// What a step needs at `p`, from the records or from their sums.
+void sum_up(okid_refine& s, const okid::refine_parameters& p, const okid::refine_records& records,
+            okid::refine_sums& out) {
+    if (s.sums != nullptr)
+        s.moments.sum(p, *s.sums, out);
+    else
+        s.pass.sum(p, records, out);
+}
+
 /// Try the step in `change`. @return it was better, and is taken
 bool attempt(okid_refine& s, const okid::refine_records& records) {
     s.change.add_to(s.layout, s.best, 1, s.trial);
     keep_inside(s);
-    s.pass.sum(s.trial, records, s.at_trial);
+    sum_up(s, s.trial, records, s.at_trial);
     if (!(s.at_trial.likelihood > s.at_best.likelihood)) return false;
     accept(s);
     return true;
@@ -241,6 +267,31 @@ void centre_scores(const okid_refine& s) {
     }
 }
 
+/// Scores of blocks as white noise of the size found would give them: draws whose covariance is the Fisher matrix over the blocks.
+void draw_scores(okid_refine& s) {
+    const int t = s.layout.total(), n_y = s.layout.n_y;
+    double *factor = s.at_trial.gram, *draw = s.moments.one;
+    const auto scale = [&](int i) { return std::sqrt(std::max(s.at_best.gram[at(i, i, t)], 0.0)); };
+    constexpr double floor = 1e-12;
+    for (int c = 0; c < t; ++c)
+        for (int r = 0; r < t; ++r) {
+            const double size = scale(r) * scale(c);
+            factor[at(r, c, t)] = (size > 0 ? s.at_best.gram[at(r, c, t)] / size : 0) + (r == c ? floor : 0);
+        }
+    if (okid::linalg::cholesky(t, factor, t) != 0) std::fill(factor, factor + area(t, t), NAN);
+    okid::signs sign;
+    for (size_t b = 0; b < static_cast<size_t>(s.config.blocks); ++b)
+        for (int o = 0; o < n_y; ++o) {
+            double* score = s.scores + b * area(t, n_y) + at(0, o, t);
+            std::fill(score, score + t, 0.0);
+            for (int c = 0; c < t; ++c) {
+                draw[c] = sign() * std::sqrt(s.at_best.square[o] / s.config.blocks);
+                for (int r = c; r < t; ++r) score[r] += factor[at(r, c, t)] * draw[c];
+            }
+            for (int r = 0; r < t; ++r) score[r] *= scale(r);
+        }
+}
+
 void put(const double* from, size_t count, okid_real_t* to) {
     for (size_t k = 0; k < count; ++k) to[k] = static_cast<okid_real_t>(from[k]);
 }
@@ -271,7 +322,8 @@ void realise(const okid_refine& s, const okid::refine_parameters& p, okid_real_t
 void publish(okid_refine& s, okid_refined_t& out) {
     const okid::refine_layout& l = s.layout;
     realise(s, s.best, s.A, s.B, s.C, s.D);
-    multiply(false, false, l.n_z, l.runs, l.n_z, 1, s.basis, l.n_z, s.best.start, l.n_z, 0, s.product, l.n_z);
+    if (l.runs > 0)
+        multiply(false, false, l.n_z, l.runs, l.n_z, 1, s.basis, l.n_z, s.best.start, l.n_z, 0, s.product, l.n_z);
     put(s.product, area(l.n_z, l.runs), s.x0);
     const double n = double(s.at_best.used), free = double(l.linear() * l.n_y + l.shaped()) / l.n_y;
     for (int o = 0; o < l.n_y; ++o)
@@ -281,7 +333,7 @@ void publish(okid_refine& s, okid_refined_t& out) {
     out.B = s.B;
     out.C = s.C;
     out.D = s.D;
-    out.x0 = s.x0;
+    out.x0 = l.runs > 0 ? s.x0 : nullptr;
     out.noise_std = s.noise;
 }
 
@@ -309,33 +361,70 @@ okid_status_t okid_refine_create(okid_refine_t** self, const okid_refine_config_
     return OKID_OK;
 }
 
-okid_status_t okid_refine_run(okid_refine_t* self, const okid_model_t* start, const int32_t* counts,
-                              const double* samples, okid_refined_t* out) {
-    if (self == nullptr || start == nullptr || counts == nullptr || samples == nullptr || out == nullptr ||
-        start->A == nullptr || start->B == nullptr || start->C == nullptr || start->D == nullptr)
-        return OKID_ERR_NULL;
-    okid_refine& s = *self;
-    const okid::refine_layout& l = s.layout;
-    if (start->n_u != l.n_u || start->n_y != l.n_y || start->n_z != l.n_z) return OKID_ERR_MISMATCH;
-    if (std::any_of(counts, counts + l.runs, [](int32_t n) { return n < 0; })) return OKID_ERR_DIM;
-    const okid::refine_records records{counts, samples};
-    s.ready = false;
-    okid_status_t status = look_at(s, records);
-    if (status == OKID_OK) status = decompose(s, *start);
+namespace {
+
+/// From the start, whose modal coordinates are taken first, to the result.
+okid_status_t refine(okid_refine& s, const okid_model_t& start, const okid::refine_records& records,
+                     okid_refined_t& out) {
+    okid_status_t status = s.sums != nullptr ? look_at(s, *s.sums) : look_at(s, records);
+    if (status == OKID_OK) status = decompose(s, start);
     if (status != OKID_OK) return status;
-    s.pass.sum(s.best, records, s.at_best);
+    sum_up(s, s.best, records, s.at_best);
     if (!std::isfinite(s.at_best.likelihood)) return OKID_ERR_NUMERIC;
-    if (s.equations.prepare(s.best, s.at_best, true) && s.equations.damp(0)) {
+    if (s.layout.runs > 0 && s.equations.prepare(s.best, s.at_best, true) && s.equations.damp(0)) {
         s.equations.step(s.at_best.with_e, s.change);
         attempt(s, records);
     }
-    *out = okid_refined_t{};
+    out = okid_refined_t{};
     const double before = s.at_best.likelihood;
-    improve(s, records, *out);
-    out->gain = s.at_best.likelihood - before;
-    std::fill(s.layout.held, s.layout.held + l.n_z, false); // the replicates may move every pole
+    improve(s, records, out);
+    out.gain = s.at_best.likelihood - before;
+    std::fill(s.layout.held, s.layout.held + s.layout.n_z, false); // replicates and deviations: every pole may move
     s.ready = s.equations.prepare(s.best, s.at_best, false) && s.equations.damp(0);
+    return OKID_OK;
+}
+
+bool fits(const okid_refine& s, const okid_model_t& start) {
+    return start.n_u == s.layout.n_u && start.n_y == s.layout.n_y && start.n_z == s.layout.n_z;
+}
+
+bool complete(const okid_model_t* start) {
+    return start != nullptr && start->A != nullptr && start->B != nullptr && start->C != nullptr && start->D != nullptr;
+}
+
+} // namespace
+
+okid_status_t okid_refine_run(okid_refine_t* self, const okid_model_t* start, const int32_t* counts,
+                              const double* samples, okid_refined_t* out) {
+    if (self == nullptr || !complete(start) || counts == nullptr || samples == nullptr || out == nullptr)
+        return OKID_ERR_NULL;
+    okid_refine& s = *self;
+    if (!fits(s, *start) || s.layout.runs == 0) return OKID_ERR_MISMATCH;
+    if (std::any_of(counts, counts + s.layout.runs, [](int32_t n) { return n < 0; })) return OKID_ERR_DIM;
+    const okid::refine_records records{counts, samples};
+    s.ready = false;
+    s.sums = nullptr;
+    const okid_status_t status = refine(s, *start, records, *out);
+    if (status != OKID_OK) return status;
     out->whiteness = s.pass.score(s.best, records, s.at_best, s.config.blocks, s.scores);
+    centre_scores(s);
+    publish(s, *out);
+    return out->converged != 0 ? OKID_OK : OKID_WARN_MODEL;
+}
+
+okid_status_t okid_refine_from_correlation(okid_refine_t* self, const okid_model_t* start,
+                                           const okid_correlation_sums_t* sums, okid_refined_t* out) {
+    if (self == nullptr || !complete(start) || sums == nullptr || out == nullptr) return OKID_ERR_NULL;
+    okid_refine& s = *self;
+    if (!fits(s, *start) || s.layout.runs != 0 || sums->n_u != start->n_u || sums->n_y != start->n_y)
+        return OKID_ERR_MISMATCH;
+    s.ready = false;
+    s.sums = sums;
+    s.layout.radius = std::pow(truncated, 1.0 / sums->lags);
+    const okid_status_t status = refine(s, *start, {}, *out);
+    s.sums = nullptr; // they are the caller's
+    if (status != OKID_OK) return status;
+    draw_scores(s);
     centre_scores(s);
     publish(s, *out);
     return out->converged != 0 ? OKID_OK : OKID_WARN_MODEL;

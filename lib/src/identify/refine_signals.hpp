@@ -18,6 +18,7 @@ struct refine_layout {
     bool* pair;     ///< n_z: a pair begins here
     int* fixed;     ///< n_z: the input whose gain into the mode is held, which fixes the scale of the mode
     bool* held;     ///< n_z: the pole stays where it is
+    double radius;  ///< poles stay inside it
 
     int size(int k) const { return pair[k] ? 2 : 1; }
     /// Of one run: [u; s (states); phi of the inputs that are not fixed; s' = ds/dw; 1; w^t].
@@ -60,9 +61,9 @@ struct refine_parameters {
         const double* c = shows + at(o, l.n_u + k, l.n_y);
         return {c[0], l.pair[k] ? -c[l.n_y] : 0.0};
     }
-    /// The pole is inside the unit circle, and one of a pair above the real axis.
+    /// The pole is inside its circle, and one of a pair above the real axis.
     bool inside(const refine_layout& l, int k) const {
-        return std::norm(w(l, k)) < 1 && (!l.pair[k] || pole[k + 1] > 0);
+        return std::norm(w(l, k)) < l.radius * l.radius && (!l.pair[k] || pole[k + 1] > 0);
     }
 };
 

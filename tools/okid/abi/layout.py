@@ -216,6 +216,27 @@ class SubspaceInfo(Structure):
     _fields_ = [("ridge", c_double), ("input_excitation", c_double), ("channel", c_int32)]
 
 
+class CorrelationConfig(Structure):
+    """okid_correlation_config_t."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("n_u", "n_y", "lags", "own_lags")),
+        ("sample", c_int),
+        *((name, c_int32) for name in ("block", "slots", "saturated_missing", "buffer")),
+        ("forgetting", c_double),
+    ]
+
+
+class CorrelationSums(Structure):
+    """okid_correlation_sums_t."""
+
+    _fields_: ClassVar[Any] = [
+        *((name, c_int32) for name in ("n_u", "n_y", "lags", "own_lags", "runs", "centred")),
+        ("rows", c_double),
+        *((name, doubles) for name in ("U", "Y", "T", "sum", "lag_sum", "ends", "weight")),
+    ]
+
+
 class RefineConfig(Structure):
     """okid_refine_config_t."""
 
@@ -369,6 +390,8 @@ STRUCTS: dict[str, type[Structure]] = {
     "okid_records_t": Records,
     "okid_run_sums_t": RunSums,
     "okid_cluster_t": Cluster,
+    "okid_correlation_config_t": CorrelationConfig,
+    "okid_correlation_sums_t": CorrelationSums,
     "okid_era_config_t": EraConfig,
     "okid_identify_config_t": IdentifyConfig,
     "okid_identified_t": Identified,
