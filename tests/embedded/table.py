@@ -31,6 +31,7 @@ KERNELS = {
         "kernel_integer",
         "spectrum",
     ),
+    "correlation sums": ("correlation", "correlation_sums", "correlation_serial"),
     "observer, dense": ("observer",),
     "observer, structured": ("structured",),
     "stability of the observer": ("companion",),
@@ -82,6 +83,19 @@ def print_images(folder: Path) -> None:
     print_table(HEAD, rows)
 
 
+def print_correlation(folder: Path) -> None:
+    """The nodes that sum for a refinement on the host: memory and instructions, measured in QEMU."""
+    rows = []
+    for name in ("m4-double-p300", "m7-double-p300"):
+        m = json.loads((folder / f"{name}.json").read_text())
+        each = m["summing_ticks"] * 1e9 / m["tick_hz"] / m["samples"]
+        ram = m["data"] + m["bss"] + m["stack_used"]
+        sizes = [str(m[key]) for key in ("text", "bss", "state_bytes", "work_bytes", "stack_used")]
+        rows.append([name, *sizes, f"{ram} ({ram / 1024:.1f} KiB)", f"{each:.0f}"])
+    print("\nCorrelation sums, 300 lags, two runs, 16-bit codes of W1; work: the written state:\n")
+    print_table(["image", "text", "bss", "of it sums", "work", "stack", "RAM in all", "instructions a sample"], rows)
+
+
 def text_bytes(folder: Path) -> dict[str, int]:
     """Code and constants of each object file of the library, before the linker leaves out what is not called."""
     objects = sorted((folder / "okid" / "lib").rglob("*.obj"))
@@ -130,6 +144,7 @@ def main() -> int:
     print_kernels(folder)
     print_stacks(folder)
     print_images(folder)
+    print_correlation(folder)
     return 0
 
 

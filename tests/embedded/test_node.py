@@ -104,6 +104,20 @@ def test_sums_are_those_of_the_host_to_the_last_bit_and_modes_agree(node: Node, 
     keep_measurements(node, image, modes, expected)
 
 
+@pytest.mark.parametrize(("folder", "machine"), [("m4-double", "netduinoplus2"), ("m7-double", "mps2-an500")])
+def test_correlation_sums_are_those_of_the_host_to_the_last_bit(folder: str, machine: str, w1: Codes) -> None:
+    lags, image = 300, Image(folder, machine, 300)
+    host = host_chain.correlation([w1[:4000], w1[4100:]], lags, gap=100)
+    with Node(machine, image.path) as node:
+        node.send(packet(bytes([RESET])), *samples(w1[:4000], 0), *samples(w1[4100:], 4100))
+        assert node.state() == host
+        counts = node.counts()
+    assert counts["missing"] == 100
+    size = sections(image)
+    assert size["data"] + size["bss"] + counts["stack_used"] <= 80 * 1024
+    (BUILD / f"{image.name}.json").write_text(json.dumps({**counts, **size, "machine": machine}))
+
+
 def keep_measurements(node: Node, image: Image, modes: Modes, expected: Modes) -> None:
     """Sizes, stack, instructions and distances from the host, for table.py."""
     counts = node.counts()

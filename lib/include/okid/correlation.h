@@ -47,6 +47,13 @@ static inline okid_correlation_config_t okid_correlation_defaults(int32_t n_u, i
 /// Private; lives in the caller's block. It holds offsets, no pointers: a memcpy of the block is a snapshot.
 typedef struct okid_correlation okid_correlation_t;
 
+/// Bytes for static arrays: growing sums of codes (doubles take less) without own_lags; never less than okid_correlation_memsize().
+#define OKID_CORRELATION_BYTES(n_u, n_y, lags, slots, buffer)                                                          \
+    (8 * (2 * ((2 * (size_t)(n_u) + (n_y)) * (n_u) * ((size_t)(lags) + 1) + ((size_t)(n_u) + (n_y)) * (n_y)) +         \
+          (size_t)(n_u) * ((lags) + (buffer)) + ((size_t)(n_u) + 2 * (n_y)) * (buffer) + 2 * ((size_t)(n_u) + (n_y)) + \
+          (size_t)(slots) * (1 + 2 * (size_t)(n_u) * (lags))) +                                                        \
+     320)
+
 /// Bytes okid_correlation_create() needs (alignment slack included); 0 when the configuration is invalid.
 OKID_API size_t okid_correlation_memsize(const okid_correlation_config_t* config);
 /// Lay one out in the caller's block. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY

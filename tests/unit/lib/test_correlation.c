@@ -353,6 +353,22 @@ static void wrong_use_is_refused(void) {
     free(other);
 }
 
+static void constants_bound_the_memory(void) {
+    for (int n_u = 1; n_u < 5; ++n_u)
+        for (int n_y = 1; n_y < 9; n_y += 2)
+            for (int lags = 1; lags < 3000; lags = 3 * lags + 1)
+                for (int sample = 0; sample < 4; ++sample) {
+                    okid_correlation_config_t config = okid_correlation_defaults(n_u, n_y, lags);
+                    config.sample = (okid_sample_t)sample;
+                    config.slots = n_u;
+                    config.buffer = n_y;
+                    const size_t needed = okid_correlation_memsize(&config);
+                    const size_t bound = OKID_CORRELATION_BYTES(n_u, n_y, lags, n_u, n_y);
+                    TEST_ASSERT_TRUE(needed > 0 && needed <= bound);
+                    TEST_ASSERT_TRUE(sample == 0 || bound - needed < 400);
+                }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(one_run_in_any_cut);
@@ -362,6 +378,7 @@ int main(void) {
     RUN_TEST(merged_is_batch);
     RUN_TEST(bytes_go_on_bit_for_bit);
     RUN_TEST(full_scale_24_bit_codes_stay_exact);
+    RUN_TEST(constants_bound_the_memory);
     RUN_TEST(wrong_use_is_refused);
     return UNITY_END();
 }
