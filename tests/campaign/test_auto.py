@@ -13,6 +13,7 @@ import pytest
 from okid.campaign import tasks
 from okid.campaign.run import run_campaign
 from okid.campaign.spec import CampaignSpec
+from okid.campaign.tables import make_tables
 from rig_records import SMALL, campaign, facts
 
 NAMED = (
@@ -90,3 +91,19 @@ def test_codes_at_full_scale_are_left_out_when_asked(tmp_path: Path, client: Any
     (record,) = (one for done in out.done.values() for one in done.records if one["name"].endswith(path.name))
     assert record["saturated"] == 3
     assert all(sum(mode["holds"] for mode in done.result["modes"]) == 3 for done in out.done.values())
+
+
+def test_a_dead_sensor_costs_neither_its_record_nor_the_track(tmp_path: Path, client: Any) -> None:
+    spec = default(tmp_path, {'by = ["day"]': 'by = ["record"]'})
+    for path in sorted((tmp_path / "records").iterdir())[8:12]:
+        codes = np.load(path)
+        codes[:, 2] = 7
+        np.save(path, codes)
+    out = run_campaign(spec, client)
+    assert not out.skipped and not out.faults
+    modes = make_tables(spec, out)["modes"]
+    confident = modes[modes["holds"]]
+    assert len(confident) == 3 * SMALL.records and set(confident["track"]) == {1, 2, 3}
+    assert confident.groupby("track")["frequency_hz"].std().max() < 0.5
+    hurt = confident[confident["shape_re"].map(lambda shape: np.isnan(np.array(shape, dtype=float)).any())]
+    assert len(hurt) == 3 * 4

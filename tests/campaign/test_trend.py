@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from okid.campaign import change_point, control_chart, trend
+from okid.campaign import change_point, control_chart, trend, trend_page
 from okid.campaign.spec import Trend
 from okid.campaign.trend import SeriesTrend, Track, analyse
 
@@ -34,19 +34,23 @@ def test_regression_finds_what_temperature_does() -> None:
     assert one.regression is not None and one.watched == [1, 2, 3]
     slope = one.regression.coefficients[1] / 10.0
     assert np.all(np.abs(slope - SLOPE * F0) < 4.0 * one.regression.deviations[1] / 10.0)
-    np.testing.assert_allclose(np.sqrt(np.diag(one.regression.covariance)), SIGMA, rtol=0.25)
+    np.testing.assert_allclose(np.sqrt(one.regression.variance), SIGMA, rtol=0.25)
     assert one.limits is not None and one.limits.per_year == 122
     assert not one.alarms and one.change is None
 
 
-@pytest.mark.parametrize("persistence", [0.0, 0.5])
-def test_false_alarms_come_at_the_stated_rate(monkeypatch: pytest.MonkeyPatch, persistence: float) -> None:
+@pytest.mark.parametrize(("persistence", "missing"), [(0.0, 0.0), (0.5, 0.0), (0.0, 0.3)])
+def test_false_alarms_come_at_the_stated_rate(
+    monkeypatch: pytest.MonkeyPatch, persistence: float, missing: float
+) -> None:
     """80 undamaged years watched after a year of training, 30 % of which may have an alarm: 24 +- 4.1 of them."""
     monkeypatch.setattr(control_chart, "_SIMULATED", 400)
     monkeypatch.setattr(trend, "find_change", lambda *_: None)
     alarmed = 0
     for seed in range(80):
         one = series(seed, persistence=persistence)
+        for k, track in enumerate(one.tracks):
+            track.frequency_hz[np.random.default_rng([seed, k]).random(244) < missing] = np.nan
         analyse(one, Trend(training_share=0.5, false_alarm_per_year=0.3))
         assert one.limits is not None
         alarmed += bool(one.alarms)
@@ -84,7 +88,7 @@ def test_season_alone_is_no_change() -> None:
         analyse(one, Trend(training_share=0.5, false_alarm_per_year=0.01))
     assert not known.alarms
     assert unknown.regression is not None and len(unknown.regression.coefficients) == 1
-    assert np.all(unknown.regression.covariance.diagonal() > 5.0 * SIGMA**2)
+    assert np.all(unknown.regression.variance > 5.0 * SIGMA**2)
 
 
 def test_same_seed_same_limits() -> None:
@@ -94,13 +98,14 @@ def test_same_seed_same_limits() -> None:
     assert runs[0].limits == runs[1].limits
 
 
-def test_missing_modes_leave_their_groups_out() -> None:
+def test_missing_modes_leave_the_others_watched() -> None:
     one = series(4)
     one.tracks[1].frequency_hz[[10, 200]] = np.nan
-    one.tracks[2].frequency_hz[::2] = np.nan  # half of the groups: not watched
+    one.tracks[2].frequency_hz[::2] = np.nan  # half of the groups
     analyse(one, Trend(training_share=0.5))
-    assert one.watched == [1, 2] and len(one.rows) == 242
-    assert any("2 of 244 groups lack a watched mode" in remark for remark in one.remarks)
+    assert one.watched == [1, 2, 3] and len(one.rows) == 244
+    assert any("122 of 244 groups lack one of the watched modes" in remark for remark in one.remarks)
+    assert not one.alarms and one.change is None
 
 
 def test_blurred_group_does_not_spoil_the_training() -> None:
@@ -111,18 +116,20 @@ def test_blurred_group_does_not_spoil_the_training() -> None:
     one.tracks[0].frequency_std_hz[30] = 0.4
     for each in (good, one):
         analyse(each, Trend(training_share=0.5))
-    assert 30 not in one.rows and len(one.rows) == 243
+    assert len(one.rows) == 244
     assert good.regression is not None and one.regression is not None
-    np.testing.assert_allclose(one.regression.covariance, good.regression.covariance, rtol=0.1, atol=1e-6)
+    np.testing.assert_allclose(one.regression.variance, good.regression.variance, rtol=0.1)
 
 
 @pytest.mark.parametrize(
-    ("count", "words"), [(30, "15 training groups, 25 are needed"), (3, "training groups"), (1, "no regression")]
+    ("count", "words"),
+    [(18, "9 training groups, 10 are needed"), (3, "training groups"), (1, "no group in the training")],
 )
 def test_too_short_says_so(count: int, words: str) -> None:
     one = series(1, count=count)
     analyse(one, Trend(training_share=0.5))
     assert one.regression is None and any(words in remark for remark in one.remarks)
+    assert words in one.reason and "not watched: " + one.reason in trend_page.verdict(one)[1][0]
 
 
 def test_heat_beyond_the_training_is_told() -> None:
@@ -131,3 +138,47 @@ def test_heat_beyond_the_training_is_told() -> None:
     one.temperature_c[200:210] += 30.0
     analyse(one, Trend(training_share=0.5))
     assert any("outside of the training's temperatures" in remark for remark in one.remarks)
+
+
+def short_campaign(seed: int, drop: float) -> SeriesTrend:
+    """50 groups of 3 modes of a scatter of 0.2 %, one in ten of them not found, 5 % of the groups wrong in some way.
+
+    From group 35 on the lower two are `drop` lower. The scatter is not Gaussian, as the limits take it to be.
+    """
+    rng = np.random.default_rng([seed, 50])
+    one = series(seed, count=50)
+    bad = rng.random(50) < 0.05
+    for k, track in enumerate(one.tracks):
+        f = F0[k] * (1.0 + 2e-3 * rng.laplace(size=50) / np.sqrt(2.0))
+        f[35:] *= 1.0 - (drop if k < 2 else 0.0)
+        std = F0[k] * 2e-3 * np.exp(0.3 * rng.standard_normal(50))
+        for group in np.flatnonzero(bad):
+            kind = rng.integers(3)  # a mode too many, one that is blurred, all of a broken sensor
+            if kind == 0 and k == 1:
+                f[group] *= 1.1
+            if kind == 1 and k == 0:
+                f[group], std[group] = f[group] * 1.05, 20.0 * std[group]
+            if kind == 2:
+                f[group] = np.nan
+        f[rng.random(50) < 0.1] = np.nan
+        track.frequency_hz, track.frequency_std_hz = f, std
+    one.temperature_c = None
+    return one
+
+
+def test_a_drop_is_found_among_bad_records(monkeypatch: pytest.MonkeyPatch) -> None:
+    """1.5 % in two modes of 50 groups, trained on 15: within 5 groups in 95 of 100; without it the stated rate."""
+    monkeypatch.setattr(control_chart, "_SIMULATED", 400)
+    monkeypatch.setattr(trend, "find_change", lambda *_: None)
+    found = false = 0
+    for seed in range(100):
+        one = short_campaign(seed, 0.015)
+        analyse(one, Trend(training_share=0.3, false_alarm_per_year=0.05))
+        assert one.charts is not None, one.reason
+        at = [row for row, _ in one.alarms if row >= 35]
+        found += bool(at) and at[0] < 40
+        healthy = short_campaign(1000 + seed, 0.0)
+        analyse(healthy, Trend(training_share=0.3, false_alarm_per_year=0.2))
+        false += bool(healthy.alarms)
+    assert found >= 95
+    assert false <= 14  # 35 groups of 122 a year at 20 %: 6 +- 2.4 expected of Gaussian scatter

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from okid.campaign.trend_model import Regression, filled, whitened
+
 Real = NDArray[np.float64]
 _NULL, _BOOTSTRAP = 999, 400
 _AT_ONCE = 4_000_000  # numbers
@@ -52,12 +54,14 @@ def _noise(rng: np.random.Generator, count: int, n: int, persistence: Real) -> R
     return out
 
 
-def find_change(white: Real, training: NDArray[np.bool_], X: Real, persistence: Real, seed: int) -> ChangePoint | None:
+def find_change(
+    white: Real, training: NDArray[np.bool_], X: Real, weight: Real, model: Regression, seed: int
+) -> ChangePoint | None:
     """The most probable single change of the mean of standardised residuals (n, d); None when there are too few.
 
     The probability without a change is that of simulated residuals, whose mean and temperature dependence were removed
-    by the same fit on the same `training` rows (flags) of X (n, k); the interval is a parametric bootstrap of the shift
-    that was found. Cost: O(1400 n d).
+    by the same fit on the same `training` rows (flags) of X (n, k), with the same values missing (weight 0); the
+    interval is a parametric bootstrap of the shift that was found. Cost: O(1400 n d).
     """
     n, d = white.shape
     flags = training
@@ -67,18 +71,23 @@ def find_change(white: Real, training: NDArray[np.bool_], X: Real, persistence: 
     k, statistic = int(at[0]), float(best[0])
     shift = white[k:].mean(axis=0) - white[:k].mean(axis=0)
     rng = np.random.default_rng([seed, 11])
-    own = X[flags]
-    remove = X @ np.linalg.solve(own.T @ own, own.T)  # (n, training)
+    seen, root = weight > 0, np.linalg.cholesky(model.correlation).T
+    learn = np.einsum("dkl,tl,td->dkt", model.inverse, X[flags], weight[flags])
+
+    def residuals(count: int) -> Real:
+        noise = np.where(seen, _noise(rng, count, n, model.persistence) @ root, 0.0)
+        noise -= weight * (X @ np.einsum("dkt,ctd->ckd", learn, noise[:, flags], optimize=True))
+        return whitened(filled(noise, seen, model.correlation), model.correlation)
+
     chunk = max(1, _AT_ONCE // (n * d))
     above, places = 0, []
     for first in range(0, _NULL, chunk):
-        noise = _noise(rng, min(chunk, _NULL - first), n, persistence)
-        noise -= remove @ noise[:, flags]
-        above += int(np.sum(_split(noise)[1] >= statistic))
+        above += int(np.sum(_split(residuals(min(chunk, _NULL - first)))[1] >= statistic))
     step = np.zeros((n, d))
     step[k:] = shift
     for first in range(0, _BOOTSTRAP, chunk):
-        noise = _noise(rng, min(chunk, _BOOTSTRAP - first), n, persistence)
-        places.append(_split(noise + step)[0])
+        noise = np.where(seen, _noise(rng, min(chunk, _BOOTSTRAP - first), n, model.persistence) @ root, 0.0)
+        white_noise = whitened(filled(noise, seen, model.correlation), model.correlation)
+        places.append(_split(white_noise + step)[0])
     low, high = np.quantile(np.concatenate(places), [0.025, 0.975])
     return ChangePoint(k, int(np.floor(low)), int(np.ceil(high)), (above + 1) / (_NULL + 1), statistic, shift)

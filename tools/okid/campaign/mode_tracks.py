@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from okid import abi
 from okid.campaign.spec import Trend
@@ -24,6 +25,21 @@ class Tracker:
         self._block, self._handle = abi.block(size), ctypes.c_void_p()
         place = (ctypes.byref(self._handle), ctypes.byref(config), self._block.ctypes.data, self._block.size)
         abi.check(abi.library().okid_track_create(*place), "tracks")
+        self._known: list[tuple[float, NDArray[np.complex128]]] = []  # the last modes whose shapes were whole
+
+    def _whole(self, f: NDArray[np.float64], shapes: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+        """Entries of outputs that were left out (NaN) as the whole shape nearest in frequency has them, else 0."""
+        for k, shape in enumerate(shapes):
+            gone = np.isnan(shape)
+            if not gone.any():
+                continue
+            near = min(self._known, key=lambda one: abs(one[0] - f[k]), default=(0.0, np.zeros_like(shape)))[1]
+            power = np.vdot(near[~gone], near[~gone]).real
+            scale = np.vdot(near[~gone], shape[~gone]) / power if power > 0.0 else 0.0
+            shapes[k] = np.where(gone, scale * near, shape)
+        if all(np.isfinite(shape).all() for shape in shapes) and shapes:
+            self._known = list(zip(f.tolist(), shapes, strict=True))
+        return np.array(shapes)
 
     def update(self, modes: Sequence[dict[str, Any]]) -> list[int]:
         """The number of each mode of the next group, 0 = none."""
@@ -32,8 +48,9 @@ class Tracker:
             return []
         f = np.array([mode["frequency_hz"] for mode in modes[:count]])
         z = np.array([mode["damping_ratio"] for mode in modes[:count]])
-        re = np.ascontiguousarray([mode["shape_re"] for mode in modes[:count]], dtype=np.float64)
-        im = np.ascontiguousarray([mode["shape_im"] for mode in modes[:count]], dtype=np.float64)
+        shapes = self._whole(f, [np.array(mode["shape_re"], dtype=float) + 1j * np.array(mode["shape_im"], dtype=float)
+                                 for mode in modes[:count]])  # fmt: skip
+        re, im = np.ascontiguousarray(shapes.real), np.ascontiguousarray(shapes.imag)
         numbers = np.zeros(count, dtype=np.int32)
         pointers = [abi.pointer(one) for one in (f, z, re, im)]
         out = numbers.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))

@@ -13,15 +13,16 @@ from okid.campaign import trend_model
 from okid.campaign.change_point import ChangePoint, find_change
 from okid.campaign.control_chart import Charts, Limits, charts, limits
 from okid.campaign.spec import Trend
-from okid.campaign.trend_model import Regression, design
+from okid.campaign.trend_model import Regression, design, far_rows
 
 Real = NDArray[np.float64]
 SEEN = 0.5  # share of the groups a mode must be in to be drawn
-WATCHED = 0.8  # share of the training groups it must be in to be watched
-BLURRED = 5.0  # times the usual sigma: such a group is not watched
+WATCHED = 0.5  # share of the training groups it must be in to be watched
+BLURRED = 5.0  # times the usual sigma: such a value is not used
 _YEAR_S = 365.25 * 86400.0
+_NAMED = 5
 _SURE = 0.01  # probability without a change below which a change point is told
-_SPARE = 20  # training groups beyond the numbers that are fitted
+_SPARE = 8  # training groups of a mode beyond the numbers that are fitted
 
 
 @dataclass
@@ -39,8 +40,8 @@ class Track:
 class SeriesTrend:
     """Everything the page shows of one series. Times s since 1970 (n,), temperatures (n,) or None, in time order.
 
-    `watched`: numbers of the tracks in the charts; `rows`: groups in which all of them were found; `training`: flags of
-    those rows. Charts, regression and change are None with the reason in `remarks`.
+    `watched`: numbers of the tracks in the charts; `rows`: groups in which any of them was found; `training`: flags of
+    those rows. Charts, regression and change are None with the `reason`, also in `remarks`.
     """
 
     name: str
@@ -56,9 +57,16 @@ class SeriesTrend:
     limits: Limits | None = None
     change: ChangePoint | None = None
     alarms: list[tuple[int, str]] = field(default_factory=list)
+    odd: list[int] = field(default_factory=list)
     shift_hz: Real | None = None
     shift_std_hz: Real | None = None
     remarks: list[str] = field(default_factory=list)
+    reason: str = ""
+
+    def not_watched(self, why: str) -> None:
+        """Tell why there are no charts."""
+        self.reason = why
+        self.remarks.append(f"{why}: no charts")
 
     @property
     def expected(self) -> Real | None:
@@ -94,103 +102,129 @@ def series_of(tables: dict[str, Any]) -> list[SeriesTrend]:
     return sorted(out, key=lambda one: (-len(one.groups), one.name))
 
 
-def _sharp(track: Track) -> NDArray[np.bool_]:
-    """Groups in which the mode was found, with a σ not far above the usual one: chosen by precision alone."""
+def _weight(track: Track) -> Real:
+    """Of each group: 1, less where σ is above the usual one, 0 where the mode is missing or blurred."""
     std = track.frequency_std_hz
     known = std[np.isfinite(std)]
     usual = float(np.median(known)) if len(known) else np.inf
-    return np.isfinite(track.frequency_hz) & ~(std > BLURRED * usual)
+    times = np.nan_to_num(std / usual, nan=1.0, posinf=np.inf)
+    return np.where(np.isfinite(track.frequency_hz) & (times <= BLURRED), 1.0 / np.maximum(1.0, times), 0.0)
 
 
-def _choose(series: SeriesTrend, spec: Trend) -> bool:
-    """Tracks and groups that are watched; False with a remark when there are too few."""
+def _choose(series: SeriesTrend, spec: Trend) -> tuple[Real, Real, Real] | None:
+    """Frequencies, weights (n, d), regressors (n, k) of the tracks and groups that are watched; None says why not."""
     n = len(series.groups)
     first = series.time_s < (
         spec.training_until.timestamp() if spec.training_until is not None
         else series.time_s[min(n - 1, max(1, round(spec.training_share * n)))] if n else 0.0
     )  # fmt: skip
-    warm = np.ones(n, dtype=np.bool_) if series.temperature_c is None else np.isfinite(series.temperature_c)
-    if not np.any(first & warm):
-        series.remarks.append("no group in the training period: no regression, no charts")
-        return False
-    chosen = [t for t in series.tracks if np.mean(np.isfinite(t.frequency_hz[first & warm])) >= WATCHED]
-    if not chosen:
-        series.remarks.append("no mode is in 80 % of the training groups: no regression, no charts")
-        return False
-    whole = warm & np.all([_sharp(t) for t in chosen], axis=0)
-    series.watched = [t.number for t in chosen]
-    series.rows = np.flatnonzero(whole)
-    series.training = first[series.rows]
-    left_out = int(np.sum(~whole))
-    if left_out:
-        series.remarks.append(
-            f"{left_out} of {n} groups lack a watched mode, a temperature or a sharp σ: not in the charts"
-        )
-    return True
-
-
-def _fit(series: SeriesTrend, y: Real, order: int) -> tuple[Regression, Real] | None:
-    """Regression of the training rows, and the regressors of all rows."""
-    flags, t = series.training, series.temperature_c
-    own = None if t is None else t[series.rows]
-    spread = 0.0 if own is None else float(np.ptp(own[flags])) if np.any(flags) else 0.0
-    order = order if spread > 0.0 else 0
-    need = order + 1 + y.shape[1] + _SPARE
-    if int(np.sum(flags)) < need:
-        series.remarks.append(f"{int(np.sum(flags))} training groups, {need} are needed: no regression, no charts")
+    t = series.temperature_c
+    warm = np.ones(n, dtype=np.bool_) if t is None else np.isfinite(t)
+    training = first & warm
+    if not np.any(training):
+        series.not_watched("no group in the training period")
         return None
-    centre = 0.0 if own is None else float(np.mean(own[flags]))
-    X = design(own if order else None, centre, order, len(y))
-    return trend_model.fit(y[flags], X[flags], centre), X
+    spread = 0.0 if t is None else float(np.ptp(t[training]))
+    order = spec.temperature_order if spread > 0.0 else 0
+    need, there = order + 1 + _SPARE, int(np.sum(training))
+    if there < need:
+        series.not_watched(f"{there} training groups, {need} are needed")
+        return None
+    weights = {track.number: _weight(track) for track in series.tracks}
+    seen = {number: int(np.sum(weight[training] > 0)) for number, weight in weights.items()}
+    chosen = [t for t in series.tracks if seen[t.number] >= max(need, WATCHED * there)]
+    if not chosen:
+        best = max(seen.values(), default=0)
+        series.not_watched(
+            f"no mode is in half of the training groups ({there}), and in {need}: the best one is in {best}"
+        )
+        return None
+    series.watched = [t.number for t in chosen]
+    weight = np.column_stack([weights[number] for number in series.watched])
+    series.rows = np.flatnonzero(warm & np.any(weight > 0, axis=1))
+    series.training = first[series.rows]
+    _tell_missing(series, n, weight, {t.number: seen[t.number] for t in series.tracks if t not in chosen}, there)
+    centre = 0.0 if t is None else float(np.mean(t[series.rows][series.training]))
+    X = design(t[series.rows] if t is not None and order else None, centre, order, len(series.rows))
+    y = np.column_stack([track.frequency_hz for track in chosen])
+    return y[series.rows], weight[series.rows], X
+
+
+def _tell_missing(series: SeriesTrend, n: int, weight: Real, others: dict[int, int], there: int) -> None:
+    if left_out := n - len(series.rows):
+        series.remarks.append(f"{left_out} of {n} groups have no watched mode or no temperature: not in the charts")
+    if part := int(np.sum(np.any(weight[series.rows] == 0, axis=1))):
+        series.remarks.append(
+            f"{part} of {n} groups lack one of the watched modes, or its σ is more than {BLURRED:g} times the usual: "
+            "judged by the others"
+        )
+    middle = {track.number: float(np.nanmedian(track.frequency_hz)) for track in series.tracks}
+    for number, count in others.items():
+        if count >= 0.2 * there:
+            series.remarks.append(f"{middle[number]:.4g} Hz is in {count} of {there} training groups: not watched")
 
 
 def analyse(series: SeriesTrend, spec: Trend) -> None:
     """Regression, charts, alarms and change of one series, written into it. Deterministic for a given `spec.seed`."""
-    if not _choose(series, spec):
+    found = _choose(series, spec)
+    if found is None:
         return
-    chosen = [t for t in series.tracks if t.number in series.watched]
-    y = np.column_stack([t.frequency_hz[series.rows] for t in chosen])
-    fitted = _fit(series, y, spec.temperature_order)
-    if fitted is None:
-        return
-    model, X = fitted
+    y, weight, X = found
+    flags, t = series.training, series.temperature_c
+    far = far_rows(y[flags], X[flags], weight[flags])
+    if np.any(far):
+        weight[flags] *= ~far
+        count = int(np.sum(far))
+        series.remarks.append(f"{count} values of the training lie far from the others of their mode: not used")
+    centre = 0.0 if t is None else float(np.mean(t[series.rows][flags]))
+    model = trend_model.fit(y[flags], X[flags], centre, weight[flags])
     series.regression = model
-    if np.any(np.diag(model.covariance) <= 0.0):
-        series.remarks.append("a mode does not move at all in the training: no charts")
+    if np.any(model.variance <= 0.0):
+        series.not_watched("a mode does not move at all in the training")
         return
-    white = trend_model.standardised(y, X, model)
-    flags = series.training
-    watched = ~flags
-    _charts(series, spec, white, X, watched)
-    change = find_change(white, flags, X, model.persistence, spec.seed)
+    white = trend_model.standardised(y, X, model, weight)
+    _charts(series, spec, white, X, weight)
+    change = find_change(white, flags, X, weight, model, spec.seed)
     if change is not None and change.p_value <= _SURE:
         series.change = change
-        raw = y - X @ model.coefficients
-        before, after = raw[: change.at], raw[change.at :]
-        series.shift_hz = after.mean(axis=0) - before.mean(axis=0)
+        seen = weight > 0
+        raw = np.where(seen, y, np.nan) - X @ model.coefficients
+        series.shift_hz = np.full(y.shape[1], np.nan)
+        series.shift_std_hz = np.full(y.shape[1], np.nan)
         inflation = (1.0 + model.persistence) / (1.0 - model.persistence)  # of the variance of a mean
-        variance = np.diag(model.covariance) * inflation * (1.0 / len(before) + 1.0 / len(after))
-        series.shift_std_hz = np.sqrt(variance)
+        before, after = seen[: change.at].sum(axis=0), seen[change.at :].sum(axis=0)
+        for k in np.flatnonzero((before > 0) & (after > 0)):
+            series.shift_hz[k] = np.nanmean(raw[change.at :, k]) - np.nanmean(raw[: change.at, k])
+            series.shift_std_hz[k] = np.sqrt(model.variance[k] * inflation[k] * (1.0 / before[k] + 1.0 / after[k]))
     _remarks(series, model)
 
 
-def _charts(series: SeriesTrend, spec: Trend, white: Real, X: Real, watched: NDArray[np.bool_]) -> None:
+def _charts(series: SeriesTrend, spec: Trend, white: Real, X: Real, weight: Real) -> None:
+    watched = ~series.training
     if not np.any(watched):
-        series.remarks.append("no group after the training period: nothing to be watched yet")
+        series.not_watched("no group after the training period")
         return
     assert series.regression is not None
     spacing = float(np.median(np.diff(series.time_s[series.rows])))
     per_year = round(_YEAR_S / spacing) if spacing > 0.0 else len(white)
-    series.limits = limits(X[~watched], X[watched], series.regression, per_year, spec.false_alarm_per_year, spec.seed)
+    sides = [(X[rows], weight[rows]) for rows in (~watched, watched)]
+    series.limits = limits(sides[0], sides[1], series.regression, per_year, spec.false_alarm_per_year, spec.seed)
     found = charts(white[watched])
-    t2, mean = np.full(len(white), np.nan), np.full(len(white), np.nan)
-    t2[watched], mean[watched] = found
-    series.charts = Charts(t2, mean)
+    whole = np.full((3, len(white)), np.nan)
+    whole[:, watched] = found
+    series.charts = Charts(*whole)
+    t2, mean, single = whole
     for k in np.flatnonzero(watched):
         said = [name for name, value, limit in (("T²", t2[k], series.limits.t2), ("EWMA", mean[k], series.limits.mean))
                 if value > limit]  # fmt: skip
         if said:
             series.alarms.append((int(series.rows[k]), " and ".join(said)))
+        elif single[k] > series.limits.single:
+            series.odd.append(int(series.rows[k]))
+    if series.odd:
+        named = ", ".join(series.groups[row] for row in series.odd[:_NAMED])
+        more = f" and {len(series.odd) - _NAMED} more" if len(series.odd) > _NAMED else ""
+        series.remarks.append(f"far from the others, but not followed by others like it: {named}{more}")
 
 
 def _remarks(series: SeriesTrend, model: Regression) -> None:

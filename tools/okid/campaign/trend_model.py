@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Frequencies over temperature: a least-squares line (or parabola) of a training period, and what is left."""
+"""Frequencies over temperature: a least-squares line (or parabola) of a training period, and what is left.
+
+Every mode has its own rows and weights: a mode that a group does not show (weight 0) takes nothing from the others.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +13,25 @@ from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+_LEAST_EIGENVALUE = 0.02  # of a correlation matrix whose entries come from different rows
+_FAR = 8.0  # robust standard deviations: such a row of the training is an accident
 
 
 class Regression(NamedTuple):
-    """Fit of d columns on k regressors by n training rows.
+    """Fit of d columns on k regressors by n training rows, each with its weight.
 
-    coefficients (k, d) about `centre_c`, and their standard deviations; covariance (d, d) of the residuals with n - k
-    degrees of freedom; inverse (k, k) of X'X; persistence (d,): lag-1 correlation of the residuals, 0 .. 0.95.
+    coefficients (k, d) about `centre_c`, and their standard deviations; variance (d,) of the residuals of weight 1 with
+    freedom (d,) degrees of freedom, correlation (d, d) shrunk to none; inverse (d, k, k) of X'WX; persistence (d,):
+    lag-1 correlation of the residuals, 0 .. 0.95.
     """
 
     coefficients: Real
     deviations: Real
     centre_c: float
-    covariance: Real
+    variance: Real
+    correlation: Real
     inverse: Real
-    freedom: int
+    freedom: Real
     persistence: Real
     lag1: Real
 
@@ -36,31 +43,92 @@ def design(temperature: Real | None, centre_c: float, order: int, count: int) ->
     return np.column_stack([((temperature - centre_c) / 10.0) ** power for power in range(order + 1)])
 
 
-def fit(y: Real, X: Real, centre_c: float) -> Regression:
-    """Least squares of y (n, d) on X (n, k), n > k; the lag-1 correlation is freed of its bias in small samples."""
-    n, k = X.shape
-    inverse = np.asarray(np.linalg.inv(X.T @ X), dtype=np.float64)
-    coefficients = inverse @ X.T @ y
-    residual = y - X @ coefficients
-    covariance = residual.T @ residual / (n - k)
+def inverses(X: Real, weight: Real) -> Real:
+    """(X' W X)^-1 of each column (d, k, k); weight (n, d): 1 / the standard deviation of a residual."""
+    return np.linalg.inv(np.einsum("nk,nd,nl->dkl", X, weight**2, X))
+
+
+def spread_of(residual: Real, weight: Real, k: int) -> tuple[Real, Real]:
+    """Variance (..., d), shrunk correlation (..., d, d) of weighted residuals (..., n, d), 0 where one is missing."""
+    seen = (weight > 0).astype(np.float64)
+    freedom = seen.sum(axis=0) - k
+    moments = np.swapaxes(residual, -1, -2) @ residual
+    power = np.swapaxes(residual**2, -1, -2) @ seen  # of column i over the rows of column j
+    bound = np.sqrt(power * np.swapaxes(power, -1, -2))
+    d = residual.shape[-1]
+    shrink = min(1.0, d / float(np.mean(freedom)))
+    R = (1.0 - shrink) * moments / np.where(bound > 0.0, bound, 1.0)
+    R[..., np.arange(d), np.arange(d)] = 1.0
+    if np.any(seen == 0.0):
+        values, vectors = np.linalg.eigh(R)
+        R = (vectors * np.maximum(values, _LEAST_EIGENVALUE)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    return moments[..., np.arange(d), np.arange(d)] / freedom, R
+
+
+def fit(y: Real, X: Real, centre_c: float, weight: Real) -> Regression:
+    """Weighted least squares of y (n, d) on X (n, k); the lag-1 correlation is freed of its bias in small samples."""
+    k, seen = X.shape[1], weight > 0
+    inverse = inverses(X, weight)
+    known = np.where(seen, y, 0.0)
+    coefficients = np.einsum("dkl,nl,nd->kd", inverse, X, weight**2 * known)
+    residual = np.where(seen, weight * (known - X @ coefficients), 0.0)
+    variance, correlation = spread_of(residual, weight, k)
     power = np.sum(residual**2, axis=0)
     lag1 = np.sum(residual[1:] * residual[:-1], axis=0) / np.where(power > 0.0, power, 1.0)
-    deviations: Real = np.sqrt(np.outer(np.diag(inverse), np.diag(covariance)))
+    n = seen.sum(axis=0)
     persistence = np.clip(lag1 + (k + 3.0 * lag1) / n, 0.0, 0.95)
-    freedom = n - k
-    return Regression(coefficients, deviations, centre_c, np.asarray(covariance), inverse, freedom, persistence, lag1)
+    deviations = np.sqrt(np.einsum("dkk->kd", inverse) * variance)
+    return Regression(coefficients, deviations, centre_c, variance, correlation, inverse, n - k, persistence, lag1)
 
 
-def standardised(y: Real, X: Real, model: Regression) -> Real:
-    """Residuals (n, d) whitened by the covariance, and shortened by the error of the fit at that temperature.
+def far_rows(y: Real, X: Real, weight: Real) -> Flags:
+    """Values (n, d) far from what the others of their column tell: least absolute deviations, then the median."""
+    out = np.zeros(y.shape, dtype=np.bool_)
+    for j in range(y.shape[1]):
+        rows = np.flatnonzero(weight[:, j] > 0)
+        Xw, yw = weight[rows, j, None] * X[rows], weight[rows, j] * y[rows, j]
+        scale, b = float(np.std(yw)), np.linalg.lstsq(Xw, yw, rcond=None)[0]
+        for _ in range(30):
+            w = 1.0 / np.sqrt(np.maximum(np.abs(yw - Xw @ b), 1e-6 * scale + 1e-300))
+            b = np.linalg.lstsq(w[:, None] * Xw, w * yw, rcond=None)[0]
+        left = np.abs(yw - Xw @ b)
+        usual = 1.4826 * float(np.median(left)) * np.sqrt(len(rows) / max(1, len(rows) - X.shape[1]))
+        out[rows, j] = left > _FAR * usual if usual > 0.0 else False
+    return out
+
+
+def filled(z: Real, seen: Flags, correlation: Real) -> Real:
+    """Standardised residuals (..., n, d) with what is missing (seen (n, d) false) as the others of its row expect it.
+
+    z' R^-1 z of such a row is that of the columns that were seen alone.
+    """
+    out = np.where(seen, z, 0.0)
+    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    for p, pattern in enumerate(patterns):
+        if np.all(pattern) or not np.any(pattern):
+            continue
+        rows = np.flatnonzero(which.ravel() == p)
+        guess = np.linalg.solve(correlation[np.ix_(pattern, pattern)], correlation[np.ix_(pattern, ~pattern)])
+        out[..., rows[:, None], np.flatnonzero(~pattern)] = out[..., rows[:, None], np.flatnonzero(pattern)] @ guess
+    return out
+
+
+def whitened(z: Real, correlation: Real) -> Real:
+    """Rows (..., d) without the correlation of their columns."""
+    return z @ np.linalg.inv(np.linalg.cholesky(correlation)).T
+
+
+def standardised(y: Real, X: Real, model: Regression, weight: Real) -> Real:
+    """Residuals (n, d) over their standard deviation and that of the fit at that temperature, filled and whitened.
 
     Of a new row of the same structure each is about N(0, 1): the whole row has the squared length T^2.
     """
-    root = np.linalg.cholesky(model.covariance)
-    white = np.linalg.solve(root, (y - X @ model.coefficients).T).T
-    return np.asarray(white / np.sqrt(1.0 + leverage(X, model))[:, None])
+    seen = weight > 0
+    left = weight * (np.where(seen, y, 0.0) - X @ model.coefficients)
+    z = left / np.sqrt(model.variance * (1.0 + leverage(X, model, weight)))
+    return whitened(filled(z, seen, model.correlation), model.correlation)
 
 
-def leverage(X: Real, model: Regression) -> Real:
-    """x' (X'X)^-1 x of each row (n,): how far its temperature lies from those of the training."""
-    return np.asarray(np.einsum("nk,kl,nl->n", X, model.inverse, X))
+def leverage(X: Real, model: Regression, weight: Real) -> Real:
+    """w^2 x' (X'WX)^-1 x of each row and column (n, d): how far its temperature lies from those of the training."""
+    return np.asarray(weight**2 * np.einsum("nk,dkl,nl->nd", X, model.inverse, X))

@@ -79,7 +79,10 @@ def _over_temperature(series: SeriesTrend, pictures: Pictures) -> str:
 def _chart_picture(series: SeriesTrend, pictures: Pictures) -> str:
     assert series.charts is not None and series.limits is not None
     drawing = figures.figure(9.6, 4.0)
-    pairs = ((series.charts.t2, series.limits.t2, "T² [-]"), (series.charts.mean, series.limits.mean, "EWMA T² [-]"))
+    pairs = (
+        (series.charts.t2, series.limits.t2, "T² of three in a row [-]"),
+        (series.charts.mean, series.limits.mean, "EWMA T² [-]"),
+    )
     for place, (values, limit, name) in enumerate(pairs, 1):
         ax = drawing.add_subplot(2, 1, place)
         draw_chart(ax, series, values, limit, place == 1)
@@ -121,7 +124,7 @@ def _track_table(series: SeriesTrend) -> str:
                     if k is None
                     else _pm(10 * model.coefficients[1, k] / middle, 10 * model.deviations[1, k] / middle)
                 )
-            row.append("-" if k is None else f"{np.sqrt(model.covariance[k, k]):.2g}")
+            row.append("-" if k is None else f"{np.sqrt(model.variance[k]):.2g}")
             if series.shift_hz is not None and series.shift_std_hz is not None:
                 shifts = 100 / middle * series.shift_hz, 100 / middle * series.shift_std_hz
                 row.append("-" if k is None else _pm(float(shifts[0][k]), float(shifts[1][k])))
@@ -139,7 +142,7 @@ def verdict(series: SeriesTrend) -> tuple[bool, list[str]]:
         watched = int(np.sum(np.isfinite(series.charts.t2)))
         lines.append(f"{series.name}: no alarm in {watched} watched groups")
     else:
-        lines.append(f"{series.name}: not watched")
+        lines.append(f"{series.name}: not watched: {series.reason}")
     if series.change is not None:
         c = series.change
         low, at, high = (
@@ -196,7 +199,8 @@ def _chart_words(series: SeriesTrend, trend: Trend) -> str:
         f"not change is {100 * trend.false_alarm_per_year:g} %, half of it for each chart, found with "
         f"{series.limits.simulated} simulated years (Gaussian residuals with the persistence of the training, refitted "
         f"on {int(np.sum(series.training))} training groups). T²: squared distance of all watched modes of a group "
-        "from what its temperature lets expect; EWMA: the same of a weighted mean (0.2 of the newest group)."
+        "from what its temperature lets expect, the smallest of three groups in a row; EWMA: the same of a "
+        "weighted mean (0.2 of the newest group). A single group far off, as of a bad record, is in neither."
     )
 
 

@@ -11,7 +11,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from numpy.typing import NDArray
 
 from okid.campaign.trend import SeriesTrend, Track
-from okid.campaign.trend_model import design
+from okid.campaign.trend_model import design, leverage
 from okid.result.figures import BLUE, FAINT, GREEN, GREY, ORANGE, RED, log_axis
 
 Real = NDArray[np.float64]
@@ -108,7 +108,8 @@ def draw_over_temperature(ax: Axes, series: SeriesTrend, track: Track, named: bo
         line = np.linspace(float(np.nanmin(t)), float(np.nanmax(t)), 60)
         X = design(line if order else None, model.centre_c, order, len(line))
         middle = X @ model.coefficients[:, column]
-        width = 2.0 * np.sqrt(model.covariance[column, column] * (1.0 + np.einsum("nk,kl,nl->n", X, model.inverse, X)))
+        lever = leverage(X, model, np.ones((len(X), len(model.variance))))[:, column]
+        width = 2.0 * np.sqrt(model.variance[column] * (1.0 + lever))
         ax.fill_between(
             line, middle - width, middle + width, color=GREEN, alpha=0.22, lw=0, label="fit ± 2 σ" if named else None
         )
