@@ -263,7 +263,7 @@ void okid_host_capture_t::tell_health() {
 }
 
 void okid_host_capture_t::serve() {
-    if (live_) session_->alive();
+    if (live_) session_->alive(true);
     if (lines_) lines_->serve(*session_);
     recording_->serve(*session_);
     tell_health();

@@ -39,7 +39,9 @@ class agreement {
     const record_result& found() const { return found_; }
     [[noreturn]] void refuse() const { throw failure(*fault_); } ///< of the last run()
     /// An eighth of what is kept came since the last run(): so all updates together cost a few times one result.
-    bool due() const { return 8 * (came_ - run_at_) >= basis(); }
+    bool due() const { return due_after(came_ - run_at_); }
+    bool due_after(std::int64_t samples) const { return 8 * samples >= basis(); }
+    void pass() { run_at_ = came_; } ///< this update is not made: the next one is due as if it had been
 
     std::int64_t basis() const { return came_ - begin_; }
     std::int64_t rows() const; ///< complete ones

@@ -27,14 +27,17 @@ alarm_watch::baseline& alarm_watch::of(int track) {
     return all_.back();
 }
 
-void alarm_watch::learn(baseline& to, const observed_mode& mode, std::int64_t first, std::int64_t end) const {
+void alarm_watch::learn(baseline& to, const observed_mode& mode, std::int64_t first, std::int64_t end,
+                        int steps) const {
     if (!mode.at_rest) return;
+    to.steps += to.updates > 0 ? steps : 1;
     const double weight = 1 / (mode.sigma_hz * mode.sigma_hz), before = to.mean;
     if (to.updates == 0) to.begun = end;
     to.weight += weight;
     to.mean += weight / to.weight * (mode.frequency_hz - before);
     to.scatter += weight * (mode.frequency_hz - before) * (mode.frequency_hz - to.mean);
-    if (++to.updates < config_.baseline_updates) return;
+    ++to.updates;
+    if (to.steps < config_.baseline_updates) return;
     const double told = to.updates / to.weight; // harmonic mean of the variances
     const double seen =
         to.scatter / to.weight / independence(static_cast<double>(end - to.begun), static_cast<double>(end - first));
@@ -50,19 +53,19 @@ void alarm_watch::judge(baseline& to, const observed_mode& mode) const {
     if (off < config_.k_sigma / 2) to.away = false;
 }
 
-bool alarm_watch::update(const std::vector<observed_mode>& modes, std::int64_t first, std::int64_t end) {
+bool alarm_watch::update(const std::vector<observed_mode>& modes, std::int64_t first, std::int64_t end, int steps) {
     if (!config_.enabled) return false;
     for (const observed_mode& mode : modes) {
         if (mode.track <= 0 || !(mode.sigma_hz > 0) || !std::isfinite(mode.sigma_hz)) continue;
         baseline& one = of(mode.track);
         one.unseen = 0;
-        if (one.updates < config_.baseline_updates)
-            learn(one, mode, first, end);
+        if (one.steps < config_.baseline_updates)
+            learn(one, mode, first, end, steps);
         else
             judge(one, mode);
     }
     all_.erase(std::remove_if(all_.begin(), all_.end(),
-                              [](baseline& each) { return ++each.unseen > forgotten && !each.away; }),
+                              [&](baseline& each) { return (each.unseen += steps) > forgotten && !each.away; }),
                all_.end());
     away_.clear();
     for (const baseline& each : all_)

@@ -30,8 +30,9 @@ class alarm_watch {
     explicit alarm_watch(const alarm_config& config) : config_(config) {}
 
     /// @param first, end  samples the update rests on
+    /// @param steps  updates since the last call, 1 = none was left out: the time of a baseline is that of the stream
     /// @return true when an alarm begins or ends with it
-    bool update(const std::vector<observed_mode>& modes, std::int64_t first, std::int64_t end);
+    bool update(const std::vector<observed_mode>& modes, std::int64_t first, std::int64_t end, int steps = 1);
     bool standing() const { return standing_; }
     /// Modes that are away by the newest update in which they were seen, the farthest (in sigma) first.
     const std::vector<departure>& away() const { return away_; }
@@ -39,7 +40,7 @@ class alarm_watch {
 
   private:
     struct baseline {
-        int track = 0, updates = 0, beyond = 0, unseen = 0;
+        int track = 0, updates = 0, steps = 0, beyond = 0, unseen = 0;
         bool away = false;
         double weight = 0, mean = 0, scatter = 0; ///< sums over weights 1 / sigma^2
         std::int64_t begun = 0;                   ///< end of the first update in it
@@ -47,7 +48,7 @@ class alarm_watch {
         departure newest{};
     };
     baseline& of(int track);
-    void learn(baseline& to, const observed_mode& mode, std::int64_t first, std::int64_t end) const;
+    void learn(baseline& to, const observed_mode& mode, std::int64_t first, std::int64_t end, int steps) const;
     void judge(baseline& to, const observed_mode& mode) const;
 
     alarm_config config_;

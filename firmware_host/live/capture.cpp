@@ -59,7 +59,7 @@ class pump {
         auto heard = begin;
         while (!target_.done() && !stop_requested()) {
             wake_.wait(merge_.waiting() ? 1 : 100, stop_fd(), target_.triggered() ? -1 : lines_.fd());
-            target_.alive();
+            target_.alive(true);
             lines_.serve(target_);
             if (move_frames(true)) heard = clock_type::now();
             tell_hurry();
@@ -87,7 +87,7 @@ class pump {
                                 (count = merge_.take(frames_.data(), frames_.size())) > 0;
              any = true) {
             tell_losses();
-            target_.alive();
+            target_.alive(count < frames_.size());
             lines_.serve(target_);
             for (std::size_t i = 0; i < count; ++i) target_.frame(frames_[i]);
         }

@@ -109,10 +109,13 @@ void identifier::create_watch(const stream_config& config) {
     row_.resize(m_);
 }
 
-void identifier::watch_model() {
+bool identifier::wants_model() const {
     okid_watch_state_t now{};
     okid_watch_state(watch_, &now);
-    if (now.learning || (now.watching && samples_ < due_)) return;
+    return !now.learning && (!now.watching || samples_ >= due_);
+}
+
+void identifier::watch_model() {
     if (okid_watch_set_model(watch_, &model_) != OKID_OK) return; // a model without a predictor is not watched
     watched_ = true;
     const std::int64_t age = memory_samples_ > 0 ? memory_samples_ : basis();

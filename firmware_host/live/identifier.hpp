@@ -44,6 +44,12 @@ class identifier {
     const agreement* agreed() const { return agreed_.get(); }
     /// Is an update worth its work? Of a named method always.
     bool due() const { return !agreed_ || change_at_ || agreed_->due(); }
+    /// Is the next one due when so many samples more are there?
+    bool due_after(std::int64_t samples) const { return agreed_ ? agreed_->due_after(samples) : samples > 0; }
+    /// Leave an update out that was due.
+    void pass() {
+        if (agreed_) agreed_->pass();
+    }
     const okid_identified_t& model() const { return model_; }
     okid_identify_t* decomposition() { return identify_; } ///< of the last run()
     /// Standard deviations for the model of the last run(), of its modes and what the plan wants; none when sigma_blocks is
@@ -57,6 +63,8 @@ class identifier {
     const okid_identify_config_t& config() const { return identify_config_; }
     int most_modes() const { return most_order_ / 2; }
 
+    /// Is there no model to compare with, or one as old as the memory?
+    bool wants_model() const;
     /// Compare what comes with the model of the last run(), which is at rest.
     void watch_model();
     /// Has the structure changed since the last call? @return how many samples ago that began. A window and a fading memory
@@ -66,10 +74,11 @@ class identifier {
 
     bool exact() const { return !agreed_ && sums_config_.sample != OKID_SAMPLE_DOUBLE; } ///< codes, summed exactly
     std::int64_t lags() const { return lags_; }
-    std::int64_t unknowns() const { return q_; } ///< regressors q = n_u + lags m
-    std::int64_t rows();                         ///< regression rows now in the sums
-    std::int64_t basis();                        ///< samples the model rests on
-    okid_accumulator_stats_t stats();            ///< since the start, restarts or not
+    std::int64_t unknowns() const { return q_; }      ///< regressors q = n_u + lags m
+    std::int64_t rows();                              ///< regression rows now in the sums
+    std::int64_t samples() const { return samples_; } ///< that ever came
+    std::int64_t basis();                             ///< samples the model rests on
+    okid_accumulator_stats_t stats();                 ///< since the start, restarts or not
     std::size_t sums_bytes() const { return agreed_ ? agreed_->bytes() : sums_bytes_; } ///< of the sums of the whole
 
   private:

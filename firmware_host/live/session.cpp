@@ -69,10 +69,11 @@ session::session(const live_config& config, const session_options& options)
       publisher_(config, {options.events, options.table && options.events != "-" && options.json != "-", options.live,
                           options.listener ? [to = options.listener](const std::string& line) { to->on_event(line); }
                                            : std::function<void(const std::string&)>()}),
-      grid_(config, *this), check_(config), stream_(stream_of(config)), identifier_(stream_.sums()),
-      alarm_(config.alarm), trigger_(config), hammer_(config, identifier_.lags()), losses_(config.buses.size()),
-      health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
-      update_samples_(samples_of(config.identification.update_s, config.rate_hz)), rate_(config.rate_hz) {
+      grid_(config, *this), check_(config), maker_(config), stream_(maker_.sums()), trigger_(config),
+      hammer_(config, stream_.sums().lags()), losses_(config.buses.size()), health_(config.buses.size()),
+      clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
+      update_samples_(samples_of(config.identification.update_s, config.rate_hz)), rate_(config.rate_hz),
+      updates_(maker_, options.live && options.identify, config.n_u + config.n_y) {
     if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
     if (config.publish.samples) feed_.emplace(config);
     stats_samples_ =
@@ -134,11 +135,11 @@ void session::on_sample(std::int64_t index, const double* row) {
     rate_.add(index, grid_.time_ns(index));
     if (options_.listener) options_.listener->on_sample(index, row);
     if (!options_.identify) return;
-    if (feed_) send_samples(feed_->add(index, row));
+    if (feed_ && !relief_.stands(overload_step::pictures)) send_samples(feed_->add(index, row));
     if (hammer_.wanted()) {
         if (hammer_.add(index, row, 1)) strike();
     } else if (!trigger_.waiting())
-        identifier_.add(row);
+        updates_.add(row);
     else if (trigger_.add(index, row, 1, grid_.time_ns(index)))
         begin(index);
     // While nothing comes there is nothing to update: one is enough, when the next sample is there.
@@ -159,7 +160,7 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
     if (hammer_.wanted()) {
         if (hammer_.add(index, nullptr, count)) strike();
     } else if (!trigger_.waiting())
-        identifier_.add_missing(count);
+        updates_.add_missing(count);
     else
         (void)trigger_.add(index, nullptr, count, 0);
     if (now_ / update_samples_ == index / update_samples_) return;
@@ -184,11 +185,11 @@ void session::begin(std::int64_t until) {
           {"time_s", static_cast<double>(time_us) / 1e6}});
     trigger_.each_kept([&](std::int64_t first, const double* row, std::int64_t count) {
         if (row)
-            identifier_.add(row);
+            updates_.add(row);
         else
-            identifier_.add_missing(count);
+            updates_.add_missing(count);
         const std::int64_t end = first + count;
-        if (end > sample && end <= until && end / update_samples_ > first / update_samples_) show_modes(end);
+        if (end > sample && end <= until && end / update_samples_ > first / update_samples_) hand_over(end);
     });
 }
 
@@ -208,9 +209,9 @@ void session::strike() {
         await(now_);
         return;
     }
-    identifier_.add_missing(0);
-    hammer_.each_row([&](const double* row) { identifier_.add(row); });
-    show_modes(now_);
+    updates_.add_missing(0);
+    hammer_.each_row([&](const double* row) { updates_.add(row); });
+    hand_over(now_);
 }
 
 lamp_state session::lamps() const {
@@ -218,12 +219,12 @@ lamp_state session::lamps() const {
     if (hammer_.wanted()) {
         out.armed = hammer_.armed();
         out.go = hammer_.last_good();
-        out.alarm = alarm_.standing();
+        out.alarm = alarm_;
         return out;
     }
     out.armed = trigger_.waiting() || config_.trigger.source == trigger_source::immediate;
     out.go = settled_;
-    out.alarm = alarm_.standing();
+    out.alarm = alarm_;
     return out;
 }
 
@@ -299,6 +300,7 @@ ordered_json session::stats_event() const {
             {{"skew_us", skew.us}, {"skew_std_us", skew.std_us}, {"rate_ppm", skew.rate_ppm}});
     const double rate_hz = observed_rate_hz();
     event["rate_hz_by_stamps"] = rate_hz > 0 ? ordered_json(rate_hz) : ordered_json(nullptr);
+    if (options_.identify) event["updates"] = {{"made", updates_made_}, {"skipped", updates_skipped_}};
     return event;
 }
 
@@ -356,7 +358,7 @@ void session::tell_remarks() {
 
 /// Channels on clocks of their own: how well their time is known, and what that is in phase at each mode.
 void session::remark_clocks(result_context& about) const {
-    const okid_identified_t& model = identifier_.model();
+    const okid_identified_t& model = stream_.model();
     for (const clock_skew& skew : grid_.skews()) {
         std::string phases;
         for (int k = 0; k < model.mode_count; ++k)
@@ -378,7 +380,7 @@ void session::remark_clocks(result_context& about) const {
 
 /// Channels without a counter whose bursts all end alike: what nobody can see in their arrivals.
 void session::remark_places(result_context& about) const {
-    const okid_identified_t& model = identifier_.model();
+    const okid_identified_t& model = stream_.model();
     for (std::size_t c = 0; c < config_.channels.size(); ++c) {
         const grid_channel_counts counts = grid_.channel(c);
         const std::string& name = config_.channels[c].name;
@@ -418,7 +420,8 @@ void session::finish() {
     grid_.finish();
     if (feed_) send_samples(feed_->end_block());
     start(std::int64_t{std::time(nullptr)} * 1000000000); // nothing was heard at all
-    const okid_status_t status = options_.identify ? identifier_.run(stream_.config().mass) : OKID_OK;
+    tell_updates(updates_.finish());
+    const okid_status_t status = options_.identify ? stream_.sums().run(stream_.config().mass) : OKID_OK;
     tell(stats_event());
     if (!options_.identify) return publisher_.finish();
     check_heard();
@@ -437,9 +440,16 @@ void session::finish() {
     remark_clocks(about);
     remark_places(about);
     remark_converted(about);
+    if (updates_given_up_ > 0)
+        about.warnings.emplace_back(
+            "updates_given_up",
+            fmt::format(
+                "the machine was too slow for {} updates whose models are watched for changes of the structure: "
+                "a change may not have been noticed, okid replay of the journal looks again",
+                updates_given_up_));
     stream_.add_mass(about);
     stream_.add_sigma(about);
-    const ordered_json result = result_json(identifier_.model(), about);
+    const ordered_json result = result_json(stream_.model(), about);
     tell({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
     const std::string text = result.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
     const bool to_file = !options_.json.empty() && options_.json != "-";
@@ -447,7 +457,7 @@ void session::finish() {
     publisher_.finish();
     if (!options_.json.empty() && !to_file) write_whole_file("-", text);
     if (options_.table && !publisher_.events_on_stdout() && options_.json != "-")
-        write_whole_file("-", shown(result_table(identifier_.model(), about)));
+        write_whole_file("-", shown(result_table(stream_.model(), about)));
 }
 
 } // namespace okid_host

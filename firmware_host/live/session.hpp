@@ -2,7 +2,6 @@
 // One live session: frames in, events and a result out. Everything happens by count of samples, nothing by the clock, so
 // that a recorded stream gives the same result at every speed.
 #pragma once
-#include "alarm.hpp"
 #include "align/aligner.hpp"
 #include "align/rate_meter.hpp"
 #include "align/trigger.hpp"
@@ -10,10 +9,12 @@
 #include "hammer.hpp"
 #include "publish/publisher.hpp"
 #include "publish/sample_feed.hpp"
+#include "relief.hpp"
 #include "result/result.hpp"
-#include "stream.hpp"
 #include "stream_target.hpp"
+#include "update_thread.hpp"
 
+#include <array>
 #include <cstdint>
 #include <drv/clock_fit.h>
 #include <optional>
@@ -26,6 +27,8 @@ namespace okid_host {
 class session_listener : public grid_sink {
   public:
     virtual void on_event(const std::string& line) = 0;
+    /// The samples up to here are with the thread that makes the updates.
+    virtual void on_handed_over(std::int64_t /*samples*/) {}
 };
 
 struct session_options {
@@ -57,7 +60,7 @@ class session : public stream_target, private grid_sink {
     bool heard() const override { return started_; }
     stream_check& check() override { return check_; }
     void ready() override;
-    void alive() override { publisher_.beat(); }
+    void alive(bool caught_up) override;
 
     /// Final stats, then result and table. Throws `failure` (exit 3) when no model can be had: then there is no result.
     void finish() override;
@@ -73,11 +76,10 @@ class session : public stream_target, private grid_sink {
     void strike();
     void update(std::int64_t samples);
     void await(std::int64_t samples);
-    void show_modes(std::int64_t samples);
-    table_state table(std::int64_t samples);
-    void follow(std::int64_t samples, const stream_update& found, table_state& state);
-    void tell_modes(const table_state& state, const deviations* sigma);
-    void tell_alarm(double t);
+    void hand_over(std::int64_t samples);
+    void tell_updates(std::vector<update_report> reports);
+    void count_update(const update_report& report);
+    void overload(overload_step step, bool on);
     void send_samples(const json_line& block);
     std::string silence(std::size_t index) const;
     void check_heard() const;
@@ -97,9 +99,8 @@ class session : public stream_target, private grid_sink {
     std::optional<sample_feed> feed_;
     aligner grid_;
     stream_check check_;
-    stream stream_;
-    identifier& identifier_; ///< of stream_
-    alarm_watch alarm_;
+    update_maker maker_;
+    stream& stream_; ///< of maker_: only before and after the thread
     trigger trigger_;
     hammer hammer_;
     std::vector<device_losses> losses_;
@@ -110,10 +111,13 @@ class session : public stream_target, private grid_sink {
     rate_meter rate_;           ///< of the samples that came
     std::int64_t start_ns_ = 0; ///< what t counts from
     std::int64_t gaps_ = 0;
-    std::vector<observed_mode> observed_; ///< of the newest update
-    table_state shown_;                   ///< hammer test: after the newest blow
+    table_state shown_; ///< hammer test: after the newest blow
     std::int64_t stats_told_ = 0;
-    bool started_ = false, settled_ = false, due_ = false, remarked_ = false;
+    std::uint64_t updates_made_ = 0, updates_skipped_ = 0, updates_given_up_ = 0;
+    relief relief_;
+    std::array<bool, relief::steps> overloaded_{}; ///< told, by step
+    bool started_ = false, settled_ = false, alarm_ = false, due_ = false, remarked_ = false;
+    update_thread updates_; ///< the last: it ends before what it works on
 };
 
 } // namespace okid_host

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  updates and results of a running stream, for the live program and for other languages
-// METHOD   an update identifies, gives the modes their tracks and looks whether they rest; from then on the newest model at
-//          rest is watched, and a change of the structure is told with the next update
+// METHOD   an update identifies, gives the modes their tracks and looks whether they rest. A model at rest is watched, and a
+//          change of the structure is told with the next update; which updates may give that model depends on the samples
+//          alone, and these are never left out, so that a slow machine comes to the same result
 #include "stream.hpp"
 
 #include "error.hpp"
@@ -15,7 +16,8 @@ namespace okid_host {
 
 stream::stream(stream_config config)
     : config_(std::move(config)), identifier_(config_),
-      tracks_(static_cast<int>(config_.outputs.size()), identifier_.most_modes()) {}
+      tracks_(static_cast<int>(config_.outputs.size()), identifier_.most_modes()),
+      baseline_tracks_(static_cast<int>(config_.outputs.size()), identifier_.most_modes()) {}
 
 void stream::reset() {
     identifier_.reset();
@@ -29,38 +31,73 @@ void stream::restore(const void* state, std::size_t bytes) {
 
 void stream::forget_updates() {
     settling_.reset();
+    baseline_settling_.reset();
     settled_ = false;
     tracks_.jump();
+    baseline_tracks_.jump();
+    looks_ = 0;
+    look_at_ = 0;
     changed_at_ = restarted_at_ = restarts_told_ = 0;
+}
+
+std::optional<stream_update::change> stream::take_change(std::int64_t now) {
+    const std::optional<std::int64_t> ago = identifier_.take_change();
+    if (!ago) return std::nullopt;
+    changed_at_ = now - *ago;
+    looks_ = 0;
+    look_at_ = 0;
+    const bool restarted = identifier_.restarts() > restarts_told_;
+    restarts_told_ = identifier_.restarts();
+    if (restarted) {
+        restarted_at_ = now - identifier_.basis();
+        for (mode_tracks* each : {&tracks_, &baseline_tracks_}) each->jump();
+        for (settling* each : {&settling_, &baseline_settling_}) each->reset();
+    }
+    return stream_update::change{changed_at_, restarted};
+}
+
+void stream::give_tracks(mode_tracks& by, std::vector<int>& to) {
+    to = by.update(model());
+    for (std::size_t k = 0; k < to.size(); ++k)
+        if (doubtful(k)) to[k] = 0;
+}
+
+/// The model of an obliged update, if there is one: is it at rest beside those of the others?
+void stream::look_for_baseline(const stream_update& found) {
+    static const std::vector<double> unknown;
+    if (found.status < 0) {
+        baseline_settling_.reset();
+    } else {
+        give_tracks(baseline_tracks_, baseline_signed_);
+        if (baseline_settling_.add(model(), baseline_signed_, found.sigma ? found.sigma->frequency_hz : unknown))
+            identifier_.watch_model();
+    }
+    if (++looks_ < 3) return;
+    looks_ = 0;
+    look_at_ = identifier_.samples() + identifier_.basis() / 2;
 }
 
 stream_update stream::update(std::int64_t now) {
     stream_update out;
-    if (const std::optional<std::int64_t> ago = identifier_.take_change()) {
-        changed_at_ = now - *ago;
-        out.changed = {changed_at_, identifier_.restarts() > restarts_told_};
-        restarts_told_ = identifier_.restarts();
-        if (out.changed->restarted) {
-            restarted_at_ = now - identifier_.basis();
-            tracks_.jump();
-            settling_.reset();
-        }
-    }
+    out.changed = take_change(now);
     out.rows = identifier_.rows();
-    if (out.rows >= needed()) out.status = identifier_.run();
     settled_ = false;
-    if (out.status < 0) {
+    if (out.rows < needed()) {
         settling_.reset();
         return out;
     }
-    static const std::vector<double> unknown;
-    out.sigma = identifier_.sigma({});
-    signed_tracks_ = tracks_.update(model());
-    for (std::size_t k = 0; k < signed_tracks_.size(); ++k)
-        if (doubtful(k)) signed_tracks_[k] = 0;
-    out.tracks = &signed_tracks_;
-    out.settled = settled_ = settling_.add(model(), *out.tracks, out.sigma ? out.sigma->frequency_hz : unknown);
-    if (out.settled) identifier_.watch_model();
+    const bool baseline = obliged();
+    out.status = identifier_.run();
+    if (out.status < 0) {
+        settling_.reset();
+    } else {
+        static const std::vector<double> unknown;
+        out.sigma = identifier_.sigma({});
+        give_tracks(tracks_, signed_tracks_);
+        out.tracks = &signed_tracks_;
+        out.settled = settled_ = settling_.add(model(), *out.tracks, out.sigma ? out.sigma->frequency_hz : unknown);
+    }
+    if (baseline) look_for_baseline(out);
     return out;
 }
 

@@ -37,6 +37,18 @@ class stream {
     /// Equations an update needs: with fewer a model only repeats the noise.
     std::int64_t needed() const { return 2 * identifier_.unknowns(); }
 
+    /// Must an update be made now, however late it is? The samples that come are compared with its model, when it is at
+    /// rest, and the result depends on that. Three updates in a row, then none until half of the memory is new.
+    bool obliged() const { return identifier_.wants_model() && identifier_.samples() >= look_at_; }
+    /// May it be left out? Yes when it is not obliged, and the next one is due already.
+    /// @param ahead  samples that came behind it, up to the newest update; hurry: whatever came behind it
+    bool may_skip(std::int64_t ahead, bool hurry) {
+        return identifier_.rows() >= needed() && !obliged() && (hurry || identifier_.due_after(ahead));
+    }
+    /// Leave it out. The later ones, and the result, are the same as if it had been made.
+    void skip() { identifier_.pass(); }
+    /// What the watch noticed since the last call, or the last update. Before it is asked whether an update may be left out.
+    std::optional<stream_update::change> take_change(std::int64_t now);
     /// Identify, follow the modes, and watch what comes from a model at rest on. Nothing in the sums changes.
     /// @param now  samples of the stream so far, as messages count them
     stream_update update(std::int64_t now);
@@ -73,12 +85,19 @@ class stream {
 
   private:
     void forget_updates();
+    void give_tracks(mode_tracks& by, std::vector<int>& to);
+    void look_for_baseline(const stream_update& found);
 
     stream_config config_;
     identifier identifier_;
     settling settling_;
     mode_tracks tracks_;
     std::vector<int> signed_tracks_; ///< of the last update, 0 where a mode is doubtful
+    settling baseline_settling_;     ///< of the obliged updates alone
+    mode_tracks baseline_tracks_;
+    std::vector<int> baseline_signed_;
+    int looks_ = 0;            ///< obliged updates in a row
+    std::int64_t look_at_ = 0; ///< the next one, in samples that ever came
     bool settled_ = false;
     std::int64_t changed_at_ = 0, restarted_at_ = 0, restarts_told_ = 0;
 };

@@ -50,7 +50,8 @@ class stream_target {
     virtual stream_check& check() = 0; ///< what speaks against the configuration
     /// Every device is open; and, from then on at least every second: the thread that reads is at work. For a service manager.
     virtual void ready() {}
-    virtual void alive() {}
+    /// @param caught_up  no frame waits that could be worked on
+    virtual void alive(bool /*caught_up*/) {}
     virtual void finish() = 0;
 };
 

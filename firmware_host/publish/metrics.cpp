@@ -96,6 +96,7 @@ std::vector<MetricFamily> collect(const live_numbers& now, const publisher_figur
     out.counter("okid_changes_total", "Changes of the structure that restarted the identification", now.changes);
     out.counter("okid_gaps_total", "Gaps in the samples", now.gaps);
     out.counter("okid_updates_total", "Updates computed", figures.updates);
+    out.counter("okid_updates_skipped_total", "Updates left out because the machine was too slow", figures.skipped);
     out.gauge("okid_update_seconds", "How long the newest update took to compute", figures.update_s);
     out.gauge("okid_update_worst_seconds", "How long the longest update took", figures.update_worst_s);
     out.counter("okid_events_dropped_total", "Events that publishing was too slow for", figures.dropped);

@@ -11,8 +11,8 @@ namespace okid_host {
 
 /// What no event tells.
 struct publisher_figures {
-    double update_s = 0, update_worst_s = 0; ///< how long the newest update took, and the longest
-    std::uint64_t updates = 0, dropped = 0;  ///< dropped: events that no sink could be given
+    double update_s = 0, update_worst_s = 0;             ///< how long the newest update took, and the longest
+    std::uint64_t updates = 0, skipped = 0, dropped = 0; ///< dropped: events that no sink could be given
 };
 
 /// Throws `failure` (exit 4) when the address cannot be listened on, exit 2 in a build without.

@@ -51,7 +51,7 @@ publisher::~publisher() {
     if (wake_fd_ >= 0) close(wake_fd_);
 }
 
-publisher_figures publisher::figures() const { return {update_s_, worst_s_, updates_, dropped_}; }
+publisher_figures publisher::figures() const { return {update_s_, worst_s_, updates_, skipped_, dropped_}; }
 
 void publisher::update_took(double seconds) {
     update_s_ = seconds;
@@ -74,7 +74,11 @@ void publisher::event(nlohmann::ordered_json event, double wall_s) {
     one.event = std::make_shared<const nlohmann::ordered_json>(std::move(event));
     if (options_.listener) options_.listener(*one.line);
     if (events_) events_->put(one.line);
-    if (!sinks_.empty()) hand_over(std::move(one));
+    if (sinks_.empty()) return;
+    if (only_urgent_ && (one.type == "modes" || one.type == "stats"))
+        ++dropped_;
+    else
+        hand_over(std::move(one));
 }
 
 void publisher::samples(json_line block) {
@@ -97,6 +101,7 @@ void publisher::hand_over(publication one) {
 }
 
 void publisher::table(const table_state& state) {
+    if (only_urgent_) return;
     if (lines_) try {
             lines_->put(std::make_shared<const std::string>(table_line(state)));
         } catch (const failure&) {

@@ -43,6 +43,9 @@ class publisher {
     void samples(json_line block);
     void table(const table_state& state);
     void update_took(double seconds);
+    void update_skipped() { ++skipped_; }
+    /// To sinks and screens alarms and what happened only; the file of --events gets everything.
+    void only_urgent(bool on) { only_urgent_ = on; }
     /// The session lives; for the watchdog.
     void beat() { beats_.fetch_add(1, std::memory_order_relaxed); }
 
@@ -63,10 +66,11 @@ class publisher {
     publisher_figures figures() const;
 
     publisher_options options_;
+    bool only_urgent_ = false;
     std::unique_ptr<line_writer> events_, lines_; ///< lines_: the table where there is no terminal
     std::unique_ptr<terminal_table> terminal_;
     std::vector<std::unique_ptr<event_sink>> sinks_;
-    std::atomic<std::uint64_t> beats_{0}, updates_{0}, dropped_{0};
+    std::atomic<std::uint64_t> beats_{0}, updates_{0}, skipped_{0}, dropped_{0};
     std::atomic<double> update_s_{0}, worst_s_{0};
 
     mutable std::mutex mutex_;

@@ -20,6 +20,7 @@ from typing import Any
 
 from cobs import cobs
 from command_help import OKID
+from okid.capture.stream import Capture
 from waiting import until
 
 Event = dict[str, Any]
@@ -216,7 +217,17 @@ def node_on_a_line(folder: pathlib.Path) -> list[Event]:
     return events_of(events) + [event for event in heard if event["type"] == "samples"]
 
 
+def in_a_hurry(folder: pathlib.Path) -> list[Event]:
+    """The changing frame as a live session gets it that is fed without waiting: updates are left out."""
+    with Capture(folder / "lossy.toml", live=True) as live:
+        live.open(folder / "lossy.log")
+        while live.play(10000) == 10000:
+            live.serve()
+        live.finish()
+        return live.events()
+
+
 def all_runs(folder: pathlib.Path) -> list[Event]:
     """Events of all the runs above."""
-    runs = (changing_frame, triggered_frame, two_clocks, struck_frame, node_on_a_line)
+    runs = (changing_frame, triggered_frame, two_clocks, struck_frame, in_a_hurry, node_on_a_line)
     return [event for run in runs for event in run(folder)]

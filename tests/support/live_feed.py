@@ -31,10 +31,11 @@ def w2_frequencies(rate_hz: float) -> NDArray[np.float64]:
 
 
 class Watch:
-    """Reads `[publish] socket` and notes when each `modes` event came."""
+    """Reads `[publish] socket` and notes when each `modes` event came, and each block of the signals."""
 
     def __init__(self, path: Path) -> None:
         self.came: list[tuple[float, float]] = []  # (t of the update, seconds since 1970 when its line was here)
+        self.blocks: list[float] = []
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._socket.connect(str(path))
         self._thread = threading.Thread(target=self._read, daemon=True)
@@ -49,6 +50,8 @@ class Watch:
                 event = json.loads(line)
                 if event["type"] == "modes":
                     self.came.append((event["t"], now))
+                elif event["type"] == "samples":
+                    self.blocks.append(now)
 
     def end(self) -> list[tuple[float, float]]:
         """After the run has ended."""
