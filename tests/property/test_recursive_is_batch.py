@@ -16,7 +16,7 @@ import reference
 import systems
 from numpy.typing import NDArray
 from okid import Accumulator, InputError, SquareRoot
-from okid.abi.identifier import Identifier
+from okid.identification.identifier import Identifier
 
 SAMPLES = 10000
 

@@ -11,12 +11,11 @@ from typing import Any
 from okid import frf, modal
 from okid._errors import Error, IdentificationError, InputError
 from okid.abi.accumulator import Accumulator
-from okid.abi.identifier import Identified, Identifier, usable_p
 from okid.abi.square_root import SquareRoot
 from okid.abi.sums import Stats
 from okid.data.records import Record, read_csv
-from okid.data.structure import Structure
 from okid.demo import demo, demo_frame, demo_record
+from okid.identification.identifier import Identified, Identifier, usable_p
 from okid.identify import identify, stabilization
 from okid.result.modal_table import ModalTable
 from okid.result.model import Model
@@ -24,6 +23,7 @@ from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping
 from okid.result.result import Result
 from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization
 from okid.session import Session
+from okid.structure import Structure
 
 __all__ = [
     "Accumulator",

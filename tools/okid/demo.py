@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from okid.data.structure import Structure
 from okid.identify import identify
 from okid.result.result import Result
+from okid.structure import Structure
 
 Real = NDArray[np.float64]
 

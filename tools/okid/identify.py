@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from okid._errors import InputError
-from okid.abi import host_result
 from okid.abi.arguments import channel_names
 from okid.data.records import paired
+from okid.identification import host_result
 from okid.result.result import Result
 from okid.result.stabilization import Criteria, Stabilization, of_identifiers
 

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
 from okid.abi.arguments import frame_names, names, unmasked, whole
-from okid.abi.stream import HostStream
 from okid.abi.sums import Stats
+from okid.identification.stream import HostStream
 from okid.result.parts import Mode
 from okid.result.result import Result
 

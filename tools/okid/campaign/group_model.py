@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from okid._errors import Error, IdentificationError
 from okid.abi.accumulator import Accumulator
-from okid.abi.host_result import HostResult, identify
-from okid.abi.stream import HostStream
 from okid.campaign.record_read import ReadRecord
 from okid.campaign.spec import FEWEST, CampaignSpec
+from okid.identification.host_result import HostResult, identify
+from okid.identification.stream import HostStream
 from okid.result.stabilization import of_identifiers
 
 MOST_NUMBERS = 10_000_000  # of a group that auto looks at, as live: an identification holds them some 8 times

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from okid._errors import InputError
 from okid.abi.accumulator import Accumulator
-from okid.abi.identifier import Identifier
 from okid.campaign.record_read import ReadRecord
 from okid.campaign.spec import CampaignSpec
+from okid.identification.identifier import Identifier
 
 
 def make_identifier(spec: CampaignSpec) -> Identifier:

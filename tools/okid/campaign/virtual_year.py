@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from okid._errors import InputError
-from okid.data.structure import Structure
 from okid.data.whole_file import whole_file
+from okid.structure import Structure
 
 Real = NDArray[np.float64]
 MASSES = np.array([1.0, 0.8, 1.2])  # kg

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from okid._errors import Error
 from okid.abi.accumulator import Accumulator
-from okid.abi.identifier import Identifier, usable_p
+from okid.identification.identifier import Identifier, usable_p
 from okid.live.config import Identification
 from okid.result.stabilization import Cluster, OrderPoles, Stabilization, default_orders, of_identifiers
 

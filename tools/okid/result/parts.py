@@ -29,6 +29,16 @@ def _optional(nested: Any) -> Real | None:
     return None if nested is None else numbers(nested)
 
 
+class Observer(NamedTuple):
+    """What the least-squares step found; see okid_observer_info_t."""
+
+    ridge: float
+    radius: float
+    radius_plain: float
+    condition: float
+    input_excitation: float
+
+
 class Mode(NamedTuple):
     """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known.
 

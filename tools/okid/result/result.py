@@ -15,16 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import Error, InputError
-from okid.abi.identifier import Observer
 from okid.data.whole_file import whole_file
 from okid.result.modal_table import ModalTable
 from okid.result.model import Model
-from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping, Refinement, Skew, Warning, numbers
+from okid.result.parts import Fit, MassMatrices, Mode, Observer, ProportionalDamping, Refinement, Skew, Warning, numbers
 from okid.result.stabilization import Criteria, Stabilization, of_identifiers
 
 if TYPE_CHECKING:
-    from okid.abi.host_result import HostResult
-    from okid.abi.identifier import Identifier
+    from okid.identification.host_result import HostResult
+    from okid.identification.identifier import Identifier
 
 Real = NDArray[np.float64]
 _PLAIN = ("method", "fs_hz", "samples", "records", "gaps", "p", "rows", "order", "hold", "detrend", "start")

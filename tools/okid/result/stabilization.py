@@ -14,7 +14,7 @@ from okid import abi
 from okid._errors import Error, InputError
 
 if TYPE_CHECKING:
-    from okid.abi.identifier import Identified, Identifier
+    from okid.identification.identifier import Identified, Identifier
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

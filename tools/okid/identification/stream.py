@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from okid._errors import Error, InputError
 from okid.abi import host
 from okid.abi.arguments import unmasked
-from okid.abi.host_result import HostResult, options_text
+from okid.identification.host_result import HostResult, options_text
 
 _KINDS = {np.dtype(np.float64): 0, np.dtype(np.float32): 1, np.dtype(np.int16): 2, np.dtype(np.int32): 3}
 _Place = ctypes.c_char * 0  # the address of a writable, C-contiguous buffer, faster than ndarray.ctypes

@@ -15,6 +15,7 @@ from okid.abi.accumulator import Accumulator
 from okid.abi.arguments import choice, positive, whole
 from okid.abi.square_root import SquareRoot
 from okid.result.model import Model
+from okid.result.parts import Observer
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -33,16 +34,6 @@ HANKEL = {
     "literal": abi.HANKEL_LITERAL,
 }
 _SOLVER = {"dense": abi.SOLVER_DENSE, "structured": abi.SOLVER_STRUCTURED}
-
-
-class Observer(NamedTuple):
-    """What the least-squares step found; see okid_observer_info_t."""
-
-    ridge: float
-    radius: float
-    radius_plain: float
-    condition: float
-    input_excitation: float
 
 
 class Identified(NamedTuple):

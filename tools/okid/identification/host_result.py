@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from okid import abi
 from okid._errors import Error
 from okid.abi import host
-from okid.abi.identifier import Identifier
+from okid.identification.identifier import Identifier
 
 Real = NDArray[np.float64]
 
