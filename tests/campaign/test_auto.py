@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +93,18 @@ def test_codes_at_full_scale_are_left_out_when_asked(tmp_path: Path, client: Any
     (record,) = (one for done in out.done.values() for one in done.records if one["name"].endswith(path.name))
     assert record["saturated"] == 3
     assert all(sum(mode["holds"] for mode in done.result["modes"]) == 3 for done in out.done.values())
+
+
+def test_command(tmp_path: Path) -> None:
+    default(tmp_path)
+    for words, told in ((["check"], "method auto; series: frame"), (["run", "--workers", "1"], "6 of 6 groups with")):
+        run = [sys.executable, "-m", "okid.campaign", words[0], str(tmp_path / "SPEC.toml"), *words[1:]]
+        done = subprocess.run(run, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+        assert told in done.stdout
+    assert "frame: not watched: 2 training groups, 11 are needed" in done.stdout
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<tr><th>method</th><td>auto</td></tr>" in page
 
 
 def test_a_dead_sensor_costs_neither_its_record_nor_the_track(tmp_path: Path, client: Any) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Updates on a thread of their own: a live session that is fed as fast as a log can be read leaves most of them out, says
+"""Updates on a thread of their own: a live session fed as fast as a log is read leaves most of them out, says
 so, and ends with the result of `okid replay`, which makes every one. Nothing of the stream waits for them."""
 
 from __future__ import annotations

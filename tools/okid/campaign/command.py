@@ -115,7 +115,7 @@ def _load_about(folder: Path) -> tuple[dict[str, Any], Trend]:
 
 def _check(args: argparse.Namespace) -> int:
     spec = load_spec(args.spec)
-    identifier = make_identifier(spec)
+    method = "method auto" if spec.identification.method == "auto" else f"{make_identifier(spec).lags} lags"
     records, bad = list_records(spec)
     groups, keyless = group_records(spec, records)
     size = sum(ref.size for ref in records)
@@ -125,7 +125,7 @@ def _check(args: argparse.Namespace) -> int:
     )
     sizes = sorted(len(group.records) for group in groups)
     if sizes:
-        print(f"records a group: {sizes[0]} to {sizes[-1]}; {identifier.lags} lags; series: "
+        print(f"records a group: {sizes[0]} to {sizes[-1]}; {method}; series: "
               f"{', '.join(sorted({group.series for group in groups})[:_SHOWN])}")  # fmt: skip
     for one in [*bad, *keyless][:_SHOWN]:
         _complain(f"{one.name}: {one.reason}: it would be left out")
@@ -143,7 +143,8 @@ def _run(args: argparse.Namespace, written: str) -> int:
         spec, workers=args.workers or spec.workers, address=args.cluster or (None if args.workers else spec.address),
         folder=Path(args.out) if args.out else spec.folder,
     )  # fmt: skip
-    make_identifier(spec)  # sizes the library does not take are told before any work
+    if spec.identification.method != "auto":
+        make_identifier(spec)  # sizes the library does not take are told before any work
     outcome = run_campaign(spec)
     tables = make_tables(spec, outcome)
     write_tables(spec.folder, tables)
