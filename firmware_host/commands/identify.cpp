@@ -201,9 +201,10 @@ void add_identify(CLI::App& app) {
         ->add_option("--output-dofs", given->wanted.output_dofs,
                      "where each sensor stands; every degree of freedom needs a force or a sensor, one needs both")
         ->type_name("LIST");
-    command->add_flag("--refine", given->wanted.refine,
+    command->add_flag("--refine{yes}", given->wanted.refine,
                       "improve the model by maximum likelihood: with noise at the sensors nothing can be more exact. "
-                      "Needs --inputs");
+                      "Needs --inputs. --refine=auto, the default of method auto: where the noise is white and all "
+                      "modes stay who they are; --refine=no");
     command->add_flag(
         "--stabilization", given->wanted.stabilization,
         "look at all orders and three horizons too, and list the modes that hold (JSON: \"stabilization\")");

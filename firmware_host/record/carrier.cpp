@@ -143,12 +143,11 @@ std::vector<mode_shift> shifts_of(const mode_shift& whole, const std::vector<std
     return out;
 }
 
-carried_mode carried(const okid_identified_t& model, const std::optional<deviations>& sigma, int k, bool exact) {
+carried_mode carried(const okid_identified_t& model, const std::optional<deviations>& sigma, int k) {
     carried_mode out;
     const auto at = static_cast<std::size_t>(k), n_y = static_cast<std::size_t>(model.n_y);
     out.frequency_hz = model.frequency_hz[k];
     out.damping_ratio = model.damping_ratio[k];
-    out.exact = exact;
     for (std::size_t i = 0; i < n_y; ++i)
         out.shape.emplace_back(model.shape_re[at * n_y + i], model.shape_im[at * n_y + i]);
     if (!sigma) return out;
@@ -161,6 +160,26 @@ carried_mode carried(const okid_identified_t& model, const std::optional<deviati
 }
 
 } // namespace
+
+std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& model,
+                                                    const std::vector<replicate_model>& replicates,
+                                                    const std::vector<mode_shift>& wanted) {
+    std::vector<std::optional<carried_mode>> out(wanted.size());
+    std::optional<deviations> sigma;
+    std::vector<std::vector<mode_shift>> moved;
+    if (!replicates.empty()) sigma = deviations_of(model, replicates, {});
+    for (const replicate_model& replicate : replicates) moved.push_back(modes_in(replicate, model.dt));
+    const auto here =
+        modes_in(model.frequency_hz, model.damping_ratio, model.shape_re, model.shape_im, model.mode_count, model.n_y);
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+        const int k = place_of(here, wanted[i]);
+        if (k < 0) continue;
+        out[i] = carried(model, sigma, k);
+        out[i]->mpc = model.mpc[k];
+        out[i]->shifts = shifts_of(here[static_cast<std::size_t>(k)], moved);
+    }
+    return out;
+}
 
 std::vector<std::optional<carried_mode>> carry(const record_level& level, int number,
                                                const std::vector<consensus_run>& runs,
@@ -183,26 +202,26 @@ std::vector<std::optional<carried_mode>> carry(const record_level& level, int nu
     const bool nearly_singular = (model.warnings & OKID_NOTE_ILL_CONDITIONED) && model.observer_info.ridge <= 1e-10;
     const bool exact = nearly_singular && run_factor(level, config, at_rest, identifier, model);
     if (nearly_singular && !exact && okid_identify_run(identifier, sums.handle(), &model) < 0) return out;
-    std::optional<deviations> sigma;
-    std::vector<std::vector<mode_shift>> moved;
+    std::vector<replicate_model> replicates;
     if (blocks > 0) {
         record_work work;
         work.set = set_of(level, static_cast<std::size_t>(n_u), static_cast<std::size_t>(n_y));
         work.at_rest = at_rest;
         work.config = config;
         work.model = model;
-        const auto replicates = leave_out_blocks(work, sums.handle(), blocks);
-        if (!replicates.empty()) sigma = deviations_of(model, replicates, {});
-        for (const replicate_model& replicate : replicates) moved.push_back(modes_in(replicate, model.dt));
+        replicates = leave_out_blocks(work, sums.handle(), blocks);
     }
-    const auto here =
-        modes_in(model.frequency_hz, model.damping_ratio, model.shape_re, model.shape_im, model.mode_count, model.n_y);
+    std::vector<mode_shift> wanted;
+    std::vector<std::size_t> places;
     for (std::size_t i = 0; i < modes.size(); ++i) {
         if (modes[i].level != number || !modes[i].confident()) continue;
-        const int k = place_of(here, modes[i]);
-        if (k < 0) continue;
-        out[i] = carried(model, sigma, k, exact);
-        out[i]->shifts = shifts_of(here[static_cast<std::size_t>(k)], moved);
+        wanted.push_back({modes[i].frequency_hz, modes[i].damping_ratio, modes[i].shape});
+        places.push_back(i);
+    }
+    auto found = carried_by(model, replicates, wanted);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        if (found[i]) found[i]->exact = exact;
+        out[places[i]] = std::move(found[i]);
     }
     return out;
 }

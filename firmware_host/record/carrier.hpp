@@ -12,13 +12,18 @@ namespace okid_host {
 
 /// What a carrier says of one mode.
 struct carried_mode {
-    double frequency_hz = 0, damping_ratio = 0;
+    double frequency_hz = 0, damping_ratio = 0, mpc = 0;
     double frequency_std_hz = NAN, damping_std = NAN;
     std::vector<std::complex<double>> shape;        ///< as the level has it, largest entry 1
     std::vector<double> shape_re_std, shape_im_std; ///< empty: not known
     std::vector<mode_shift> shifts;                 ///< a block each, empty: not known
     bool exact = false;                             ///< from the QR factor of nearly noise-free records
 };
+
+/// What a model and its replicates say of the modes wanted; none where the model lacks them.
+std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& model,
+                                                    const std::vector<replicate_model>& replicates,
+                                                    const std::vector<mode_shift>& wanted);
 
 /// The modes of `modes` that belong to this level, from one CVA model of the lowest order that has them all; none where the
 /// model lacks them. @param blocks  left out in turn for the standard deviations, 0 = none

@@ -236,7 +236,7 @@ std::vector<replicate_model> improve(const record_options& options, std::vector<
     tell(options, "simulating the model");
     if (from_record) fit_inputs(work);
     fit_records(work.set, work.model, work.context);
-    if (options.refine) {
+    if (options.refine == "yes") {
         tell(options, "refining the model");
         replicates = refine_model(options.detrend != "none", work);
         if (replicates.empty()) { // as without it: blocks of the records as they stand now
@@ -320,7 +320,7 @@ record_result identify_records(record_set records, const record_options& options
             find_stabilization(work.identifier, work.config, work.model, again_with(work.set, work.at_rest));
     }
     std::vector<replicate_model> replicates;
-    if (!options.refine) {
+    if (options.refine != "yes") {
         tell(options, "leaving out one block after the other");
         replicates = leave_out_blocks(work, accumulator, options.sigma_blocks);
     }

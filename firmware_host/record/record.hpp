@@ -23,12 +23,13 @@ struct record_options {
     bool p_given = false;
     std::string method = "okid-era", hankel = "system", hold = "zoh", detrend = "mean";
     std::string start =
-        "moving";               ///< "rest": each record begins before the structure was struck, its silent past is used
-    bool refine = false;        ///< maximum likelihood after the identification
-    mass_plan mass;             ///< where the channels stand, when M, K and R are wanted
-    remarks said;               ///< known before the data are seen
-    bool stabilization = false; ///< look at all orders and some horizons too
-    int sigma_blocks = 20;      ///< blocks left out in turn for the standard deviations; 0 = none
+        "moving"; ///< "rest": each record begins before the structure was struck, its silent past is used
+    std::string refine =
+        "no";       ///< maximum likelihood after the identification: yes, no, or (method auto) where it serves
+    mass_plan mass; ///< where the channels stand, when M, K and R are wanted
+    remarks said;   ///< known before the data are seen
+    bool stabilization = false;                    ///< look at all orders and some horizons too
+    int sigma_blocks = 20;                         ///< blocks left out in turn for the standard deviations; 0 = none
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
     bool all_modes = false;                        ///< auto lists also what few runs found

@@ -9,6 +9,7 @@
 #include "error.hpp"
 #include "modal_gain.hpp"
 #include "modal_model.hpp"
+#include "modal_refine.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_hold.hpp"
@@ -371,6 +372,7 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
         remove_means(work.set);
     }
     make_modal_model(listed, options.fs_hz, work);
+    if (refine_agreed(options, listed, work)) make_modal_model(listed, options.fs_hz, work);
     if (work.set.n_u > 0) fit_records(work.set, work.model, work.context); // the states it needs to begin with
     remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);

@@ -24,12 +24,12 @@ constexpr double lost_percent = 0.5;  ///< a loss of prediction worth a remark
 
 std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
 
-/// Stretches without a missing input, the longest where there are too many, one after the other.
+/// Stretches without a missing input, the longest where there are too many, one after the other; `most` samples of them.
 struct driven_runs {
     std::vector<std::int32_t> counts;
     std::vector<double> samples;
 
-    driven_runs(const record_set& set, std::size_t least) {
+    driven_runs(const record_set& set, std::size_t least, std::size_t most = SIZE_MAX) {
         std::vector<std::pair<const record_data*, stretch>> all;
         for (const record_data& record : set.records)
             for (const stretch& piece : stretches_of(set, record, least)) all.emplace_back(&record, piece);
@@ -39,9 +39,12 @@ struct driven_runs {
         });
         all.resize(std::min(all.size(), most_runs));
         for (const auto& [record, piece] : all) {
-            counts.push_back(static_cast<std::int32_t>(piece.count));
+            const std::size_t count = std::min(piece.count, most);
+            if (count < least) break;
+            most -= count;
+            counts.push_back(static_cast<std::int32_t>(count));
             const double* rows = set.rows(*record) + piece.first * set.channels();
-            samples.insert(samples.end(), rows, rows + piece.count * set.channels());
+            samples.insert(samples.end(), rows, rows + count * set.channels());
         }
     }
 };
@@ -56,10 +59,16 @@ double mean_of(const std::optional<std::vector<double>>& percent) {
 /// The library's refinement and what it made.
 class refiner {
   public:
-    refiner(const driven_runs& runs, const okid_identified_t& start, bool constants)
+    /// @param iterations  at most, 0 = as many as it takes; others leave no replicates
+    refiner(const driven_runs& runs, const okid_identified_t& start, bool constants, int iterations = 0)
         : n_u_(start.n_u), n_y_(start.n_y), n_z_(start.n_z) {
-        const okid_refine_config_t config{
-            n_u_, n_y_, n_z_, static_cast<std::int32_t>(runs.counts.size()), blocks, 0, constants ? 1 : 0};
+        const okid_refine_config_t config{n_u_,
+                                          n_y_,
+                                          n_z_,
+                                          static_cast<std::int32_t>(runs.counts.size()),
+                                          iterations > 0 ? 0 : blocks,
+                                          iterations,
+                                          constants ? 1 : 0};
         block_.resize(okid_refine_memsize(&config));
         status = okid_refine_create(&refine_, &config, block_.data(), block_.size());
         const okid_model_t model = model_view(start);
@@ -221,33 +230,51 @@ void find_markov(const okid_model_t& m, int count, std::vector<double>& out) {
     }
 }
 
+double whiteness_nearby(bool constants, const record_work& work) {
+    constexpr std::size_t glance = 20000;
+    const driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)), glance);
+    const refiner one(runs, work.model, constants, 2);
+    return one.status < 0 ? INFINITY : one.found.whiteness;
+}
+
+likeliest_model likeliest(bool constants, const record_work& work) {
+    const driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)));
+    refiner one(runs, work.model, constants);
+    likeliest_model out;
+    out.status = one.status;
+    if (one.status < 0) return out;
+    out.arrays = std::make_unique<refined_arrays>();
+    if (!make_model(work.model, one.found, *out.arrays, out.model)) out.status = OKID_ERR_NO_MODES;
+    out.found = report(one.found, work.model.n_y);
+    out.replicates = one.replicates();
+    return out;
+}
+
 std::vector<replicate_model> refine_model(bool constants, record_work& result) {
-    const okid_identified_t start = result.model;
-    const driven_runs runs(result.set, std::max<std::size_t>(20, 2 * size_of(start.n_z)));
     std::string reason = "it simulates the record worse";
     for (const bool with : {true, false}) {
         if (with && !constants) continue;
-        refiner one(runs, start, with);
+        likeliest_model one = likeliest(with, result);
+        if (one.status == OKID_ERR_NO_MODES) continue;
         if (one.status < 0) {
             reason = okid_status_text(one.status);
             break;
         }
         record_trial trial;
-        auto arrays = std::make_unique<refined_arrays>();
-        if (!make_model(start, one.found, *arrays, trial.model)) continue;
+        trial.model = one.model;
         const double predicted = mean_of(result.context.prediction_percent);
-        choose_gain(result.set, predicted, *arrays, trial);
+        choose_gain(result.set, predicted, *one.arrays, trial);
         if (!(mean_of(trial.context.simulation_percent) >= mean_of(result.context.simulation_percent) - same_percent))
             continue;
         result.model = trial.model;
-        result.refined = std::move(arrays);
+        result.refined = std::move(one.arrays);
         result.context.x0 = std::move(trial.context.x0);
         result.context.simulation_percent = std::move(trial.context.simulation_percent);
         result.context.prediction_percent = std::move(trial.context.prediction_percent);
-        result.context.refined = report(one.found, start.n_y);
+        result.context.refined = std::move(one.found);
         remark_on(*result.context.refined, predicted, mean_of(result.context.prediction_percent),
                   result.context.warnings);
-        return one.replicates();
+        return std::move(one.replicates);
     }
     result.context.warnings.emplace_back(
         "refine_failed", fmt::format("the model is as identified, the refinement was of no use: {}", reason));

@@ -6,6 +6,21 @@
 
 namespace okid_host {
 
+/// The likeliest model near a start, and models without one of twenty blocks each.
+struct likeliest_model {
+    okid_status_t status = OKID_OK; ///< >= 0: there is one
+    okid_identified_t model{};      ///< in `arrays`
+    std::unique_ptr<refined_arrays> arrays;
+    refinement found;
+    std::vector<replicate_model> replicates;
+};
+
+/// How white the residuals of a likelier model are, from two steps over 20,000 samples; infinite where there is none.
+double whiteness_nearby(bool constants, const record_work& work);
+
+/// @param constants  as for refine_model()
+likeliest_model likeliest(bool constants, const record_work& work);
+
 /// Put the refined model, its modes and its fits into `result` where it simulates the records no worse than the model that
 /// stands there with its fits; else a remark refine_failed. The records are in the model's own terms.
 /// @param constants  the records are less their means or lines: the constants of the outputs are not known exactly

@@ -28,7 +28,8 @@ void one_of(const std::string& option, const std::string& value, const std::vect
 }
 
 void check_refine(const record_request& given) {
-    if (given.refine && given.inputs.empty())
+    if (!given.refine.empty()) one_of("--refine", given.refine, {"auto", "yes", "no"});
+    if (given.refine == "yes" && given.inputs.empty())
         usage("--refine needs a measured force: without --inputs (ambient) there is nothing to simulate");
 }
 
@@ -114,7 +115,7 @@ mass_plan check_dofs(const record_request& given, const record_options& options,
 std::string chosen_method(const record_request& given) {
     if (!given.method.empty()) return given.method;
     const bool single = !given.p.empty() || !given.rows.empty() || !given.max_order.empty() || given.order != "auto" ||
-                        given.hankel != "system" || given.refine || given.stabilization;
+                        given.hankel != "system" || given.refine == "yes" || given.stabilization;
     return single ? "okid-era" : default_method;
 }
 
@@ -152,11 +153,12 @@ void check_agreement(const record_request& given, record_options& options) {
     for (const auto& [option, there] :
          {std::pair{"--p", !given.p.empty()}, std::pair{"--rows", !given.rows.empty()},
           std::pair{"--order", given.order != "auto"}, std::pair{"--max-order", !given.max_order.empty()},
-          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--refine", given.refine},
-          std::pair{"--stabilization", given.stabilization}})
+          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--stabilization", given.stabilization}})
         if (agreed && there)
             usage(
                 fmt::format("{} belongs to one method, --method auto agrees over many: leave one of them out", option));
+    if (!agreed && given.refine == "auto")
+        usage(fmt::format("--refine=auto belongs to --method auto: with {} say yes or no", options.method));
     if (!given.band.empty()) {
         const std::size_t colon = given.band.find(':');
         if (colon == std::string::npos)
@@ -203,7 +205,7 @@ record_options check_request(const record_request& given) {
                           options.sigma_blocks, fewest_blocks, most_blocks));
     options.stabilization = given.stabilization;
     options.hankel = given.hankel;
-    options.refine = given.refine;
+    options.refine = !given.refine.empty() ? given.refine : agreed ? "auto" : "no";
     options.detrend = given.detrend;
     options.start = given.start;
     check_channels(given);

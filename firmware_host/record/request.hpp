@@ -16,7 +16,8 @@ struct record_request {
     std::string fs, p, rows, max_order, sigma_blocks;
     std::string band, decimate, modes; ///< of method auto
     std::string hit_dofs;              ///< one number a record
-    bool refine = false, stabilization = false;
+    std::string refine;                ///< auto, yes or no; empty: auto under method auto, else no
+    bool stabilization = false;
 };
 
 /// Throws `failure` (exit 2) naming the option, what was found and what was expected. `fs_hz` stays 0.

@@ -151,8 +151,8 @@ def test_an_option_of_one_method_means_okid_era(tmp_path: Path, arguments: dict[
 
 
 @pytest.mark.parametrize("arguments", [
-    {"method": "auto", "p": 5}, {"method": "auto", "refine": True}, {"method": "okid-era", "decimate": 4},
-    {"decimate": 0}, {"modes": [0]}, {"modes": [40]}], ids=str)  # fmt: skip
+    {"method": "auto", "p": 5}, {"refine": "perhaps"}, {"method": "okid-era", "refine": "auto"},
+    {"method": "okid-era", "decimate": 4}, {"decimate": 0}, {"modes": [0]}, {"modes": [40]}], ids=str)  # fmt: skip
 def test_arguments_that_do_not_go_with_the_method(tmp_path: Path, arguments: dict[str, Any]) -> None:
     one, other = both(tmp_path, [measured(1000)], U, Y, **{"method": None, **arguments})
     assert one == other and one[0] == 2

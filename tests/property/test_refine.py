@@ -117,6 +117,37 @@ def test_errors_reach_the_cramer_rao_bound(name: str, noise: float) -> None:
     assert np.all(rms > 0.6), rms  # nothing can be better: a smaller error would be a wrong bound
 
 
+@pytest.mark.parametrize("name", ["w1", "w2"])
+def test_method_auto_goes_on_to_the_likeliest_modes(name: str) -> None:
+    s, ratios, inside = getattr(systems, name)(), [], []
+    for seed in range(40 if SLOW else 10):
+        u, y, sigma = made(name, 5.0, 5000 + seed)
+        limit = np.concatenate(bound(s, u, sigma))
+        result = okid.identify(u, y, fs=s.fs)
+        assert result.method == "auto"
+        assert result.refinement is not None
+        error = np.concatenate(near(s, result)) - np.concatenate(s.modes())
+        signed = [m for m in result.modes if m.confident]
+        assert len(signed) == len(s.M)
+        ratios.append(error / limit)
+        stated = [m.frequency_std_hz for m in signed] + [m.damping_ratio_std for m in signed]
+        inside.append(abs(error) < 1.96 * np.array(stated))
+    assert np.sqrt(np.mean(np.array(ratios) ** 2)) < 1 + 3 / np.sqrt(2 * np.size(ratios))
+    assert 0.85 < np.mean(inside) < 0.99
+
+
+def test_method_auto_leaves_modes_alone_where_residuals_are_not_white() -> None:
+    """A sensor with a hum beside its noise, which no model of the force explains."""
+    s = systems.w1()
+    u, y, sigma = made("w1", 1.0, 23)
+    y = y + 20 * sigma * np.sin(2 * np.pi * 0.37 * np.arange(len(y)))[:, None]
+    agreed, told, never = (okid.identify(u, y, fs=s.fs, refine=word) for word in (None, "auto", "no"))
+    assert agreed.refinement is told.refinement is never.refinement is None
+    assert [m.frequency_hz for m in agreed.modes] == [m.frequency_hz for m in never.modes]
+    insisted = okid.identify(u, y, fs=s.fs, method="auto", refine=True)
+    assert insisted.refinement is not None or "refine_failed" in [w.code for w in insisted.warnings]
+
+
 @pytest.mark.parametrize(("name", "noise"), [("w1", 1.0), ("w1", 5.0), ("w2", 5.0)])
 def test_every_method_leads_to_the_same_maximum(name: str, noise: float) -> None:
     s = getattr(systems, name)()

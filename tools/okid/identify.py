@@ -36,7 +36,7 @@ def identify(
     input_dofs: Sequence[int] | None = None,
     output_dofs: Sequence[int] | None = None,
     sensing: str | Sequence[str] = "acceleration",
-    refine: bool = False,
+    refine: bool | str | None = None,
     sigma_blocks: int | None = None,
     units: Sequence[str] | None = None,
     band: tuple[float, float] | None = None,
@@ -53,7 +53,7 @@ def identify(
     `method` "auto": the modes that several methods, horizons and rates agree on, each with mode.confident, .found_in
     and .why (docs/how-okid-decides.md); the doubtful ones are listed with them. Or one method: "okid-era",
     "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx". Default: "auto"; "okid-era" when an option of one method
-    is given (p, rows, order, max_order, hankel, refine).
+    is given (p, rows, order, max_order, hankel, refine=True).
     u None = no measured force (ambient): modes and predictor only, there is no simulation fit; the okid methods then
     realize the covariances of the outputs.
     `p` ARX horizon of the okid methods (default 40), reduced with a warning when there are fewer than 10 samples an
@@ -70,9 +70,10 @@ def identify(
     numbers are then taken as N, m/s^2, m/s, m, unless a name says otherwise ("acc1 [g]", "acc1_g") or `units` does
     (one a channel, inputs first). Every degree of freedom needs a force or a sensor, one needs both.
 
-    `refine`: improve the model by maximum likelihood, with noise at the sensors to the Cramér-Rao bound
-    (result.refinement; a warning refine_failed when nothing was to be had). Needs u. With degrees of freedom also
-    the delay of every output (result.skew), which is taken out of M, K and R.
+    `refine` True ("yes"): improve the model by maximum likelihood, with noise at the sensors to the Cramér-Rao bound
+    (result.refinement; a warning refine_failed when nothing was to be had). Needs u. Of a named method with degrees of
+    freedom also the delay of every output (result.skew), which is taken out of M, K and R. "auto", the default of
+    method "auto": where the residuals are nearly white and all modes stay who they are. "no" (False): not.
 
     `sigma_blocks`: blocks of the record that are left out in turn for the standard deviations, 8 to 100 (default 20);
     0 = none. They cost some 3 (okid-era) to 20 identifications.
@@ -100,7 +101,8 @@ def identify(
         "outputs": channel_names(output_names, y, "y", outputs[0].shape[1]),
         "fs": fs, "method": method, "p": p, "rows": rows, "order": order, "max_order": max_order, "hankel": hankel,
         "detrend": detrend, "hold": hold, "start": start, "input_dofs": input_dofs, "output_dofs": output_dofs,
-        "sensing": sensing, "refine": refine, "sigma_blocks": sigma_blocks, "units": units,
+        "sensing": sensing, "refine": ("no", "yes")[refine] if isinstance(refine, bool) else refine,
+        "sigma_blocks": sigma_blocks, "units": units,
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
         "hit_dofs": hit_dofs,
     }  # fmt: skip

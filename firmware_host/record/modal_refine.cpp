@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  the likeliest modes near those agreed on
+// METHOD   okid/refine.h from the modal model; taken as a whole or not at all
+#include "modal_refine.hpp"
+
+#include "carrier.hpp"
+#include "record_refine.hpp"
+
+#include <cmath>
+#include <fmt/format.h>
+
+namespace okid_host {
+namespace {
+
+constexpr double nearly_white = 3; // residuals of a refinement, 1 = white
+constexpr double same_frequency = 0.005, same_damping = 1.5,
+                 same_shape = 0.95; // a mode that a refinement has not changed
+
+/// Is this mode still the one it was?
+bool same_mode(const listed_mode& before, const carried_mode& after) {
+    const double f = after.frequency_hz / before.frequency_hz, zeta = after.damping_ratio / before.damping_ratio;
+    return std::abs(f - 1) < same_frequency && zeta > 1 / same_damping && zeta < same_damping &&
+           shape_mac(before.shape, after.shape) > same_shape;
+}
+
+/// The refined modes in the place of those in the model, with their deviations.
+void take_refined(const std::vector<std::optional<carried_mode>>& found, std::vector<listed_mode>& listed,
+                  record_work& work) {
+    deviations* sigma = work.context.sigma ? &*work.context.sigma : nullptr;
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < listed.size(); ++i) {
+        listed_mode& mode = listed[i];
+        if (!mode.in_model) continue;
+        const carried_mode& from = *found[next++];
+        mode.frequency_hz = from.frequency_hz;
+        mode.damping_ratio = from.damping_ratio;
+        mode.mpc = from.mpc;
+        mode.shape = from.shape;
+        if (!sigma) continue;
+        work.shifts[i] = from.shifts;
+        sigma->frequency_hz[i] = from.frequency_std_hz;
+        sigma->damping_ratio[i] = from.damping_std;
+        const auto at = static_cast<std::ptrdiff_t>(i * mode.shape.size());
+        std::copy(from.shape_re_std.begin(), from.shape_re_std.end(), sigma->shape_re.begin() + at);
+        std::copy(from.shape_im_std.begin(), from.shape_im_std.end(), sigma->shape_im.begin() + at);
+    }
+}
+
+} // namespace
+
+bool refine_agreed(const record_options& options, std::vector<listed_mode>& listed, record_work& work) {
+    if (options.refine == "no" || work.set.n_u == 0 || work.model.n_z == 0) return false;
+    if (options.stage) options.stage("refining the modes");
+    const bool constants = options.detrend != "none";
+    if (options.refine == "auto" && whiteness_nearby(constants, work) > 2 * nearly_white) return false;
+    std::vector<mode_shift> wanted;
+    std::vector<const listed_mode*> before;
+    for (const listed_mode& mode : listed) {
+        if (!mode.in_model) continue;
+        wanted.push_back({mode.frequency_hz, mode.damping_ratio, mode.shape});
+        before.push_back(&mode);
+    }
+    const likeliest_model one = likeliest(constants, work);
+    std::string fault = one.status < 0 ? okid_status_text(one.status) : "";
+    if (fault.empty() && !one.found.converged) fault = "it did not come to an end";
+    if (fault.empty() && options.refine == "auto" && one.found.whiteness > nearly_white)
+        fault = "what it leaves is not white";
+    std::vector<std::optional<carried_mode>> found;
+    if (fault.empty()) found = carried_by(one.model, one.replicates, wanted);
+    for (std::size_t i = 0; i < found.size() && fault.empty(); ++i)
+        if (!found[i] || !same_mode(*before[i], *found[i]))
+            fault = fmt::format("the mode at {:.4g} Hz would be another one", before[i]->frequency_hz);
+    if (!fault.empty()) {
+        if (options.refine == "yes")
+            work.context.warnings.emplace_back(
+                "refine_failed", fmt::format("the modes are as agreed on, the refinement was of no use: {}", fault));
+        return false;
+    }
+    take_refined(found, listed, work);
+    work.context.refined = one.found;
+    return true;
+}
+
+} // namespace okid_host

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+// Maximum likelihood of the modes that several methods agree on.
+#pragma once
+#include "modal_model.hpp"
+#include "record.hpp"
+
+#include <vector>
+
+namespace okid_host {
+
+/// Maximum likelihood of the modes in the model, where it serves: what it leaves of the outputs is nearly white (or the caller
+/// insists), and all modes stay who they are. @return the modes have changed
+bool refine_agreed(const record_options& options, std::vector<listed_mode>& listed, record_work& work);
+
+} // namespace okid_host
