@@ -55,7 +55,7 @@ bench: build ## speed of the kernels and of whole identifications as ratios with
 	@cmake --build build --target bench_slicot -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_slicot build/bench.json
 	@$(PYTHON) tests/bench/python_call.py build/bench.json
 	@$(PYTHON) tests/bench/campaign.py 1000 5 build/bench.json
-	@PYTHONPATH=tests/support OPENBLAS_NUM_THREADS=1 $(PYTHON) tests/bench/live_latency.py
+	@cmake --build build --target bench_latency -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_latency build/bench.json
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
 	@$(PYTHON) tools/bench_check.py build/bench.json

@@ -33,6 +33,10 @@ LIMITS |= {
     f"python_call_us_{kind}": (2.0, "us that a call from Python costs beside the work") for kind in ("i16", "f64")
 }
 LIMITS |= {f"python_share_{kind}": (0.05, "of the C time of 4,096 samples") for kind in ("i16", "f64")}
+LIMITS |= {
+    "handed_over_over_bare_calm": (20.0, "p99 from a line to the thread that identifies, of that of a bare reader"),
+    "handed_over_over_bare_busy": (5.0, "the same beside two busy processors"),
+}
 LIMITS["campaign_worker_mb"] = (500.0, "MB of a worker, whatever the number of records")
 # Whole identifications by n4sid-moesp, times faster than SLICOT's MOESP with Cholesky at the same block rows and order.
 SLICOT = {f"slicot_moesp_over_n4sid-moesp_{size}": 3.0 for size in ("W1_s10", "W2_s15", "W3_s22")}
