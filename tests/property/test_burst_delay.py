@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import program
+import pytest
 
 CONFIG = """[acquisition]
 rate_hz = 1000
@@ -85,3 +86,75 @@ def test_bursts_that_end_anywhere_and_punctual_frames_are_known(tmp_path: Path) 
         stats, result = play(tmp_path, every_s)
         assert stats["channel"]["force"].get("place_std_us", 0) < 60
         assert stats["channel"]["force"]["missing"] == 0
+
+
+RIG = """rate_hz = 1000.0
+duration_s = 12.0
+seed = 1
+masses = [1.0, 0.8, 1.2]
+springs = [3e4, 2e4, 2.5e4]
+zeta = [0.01, 0.01]
+force_dofs = [1]
+sense_dofs = [1, 2, 3]
+noise_percent = 1.0
+bits = 16
+"""
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A frame whose force comes over a bus of its own, without a counter."""
+    folder = tmp_path_factory.mktemp("bursts")
+    (folder / "rig.toml").write_text(RIG)
+    names = {"log": "a.log", "truth": "t.json", "dbc": "a.dbc", "config": "a.toml"}
+    given = [x for option, name in names.items() for x in (f"--{option}", folder / name)]
+    program.okid("simulate", folder / "rig.toml", *given, status=0)
+    text = (folder / "a.toml").read_text()
+    bus = '[[bus]]\nname = "can1"\ntype = "socketcan"\ninterface = "vcan1"\ndbc = "a.dbc"\n\n[[channel]]'
+    text = text.replace("[[channel]]", bus, 1).replace('bus = "can0"\n', 'bus = "can1"\n', 1)
+    (folder / "b.toml").write_text(text.replace('sequence = "Counter"\n', "", 1))
+    return folder
+
+
+def in_bursts(rig: Path, polled_s: float, packet: int, jitter_s: float, late_s: float) -> tuple[Any, list[str]]:
+    """Bursts of polls or of packets, handed over so late behind their last sample at least, two stalls among them.
+    @return M and the warnings"""
+    rows, last = [], 0.0
+    for n, row in enumerate((rig / "a.log").read_text().splitlines()):
+        stamp, _, data = row.split()
+        if data.startswith("101#"):
+            rows.append((float(stamp[1:-1]), f"vcan0 {data}"))
+            continue
+        k = n // 2
+        early_s = 1e-3 - late_s  # of a poll, before the next sample is there
+        burst = int(np.ceil((k / 1000 + early_s) / polled_s - 1e-9)) if polled_s else k // packet
+        handed_s = burst * polled_s - early_s if polled_s else (burst * packet + packet - 1) / 1000 + late_s
+        handed_s += np.random.default_rng(burst).uniform(0, jitter_s)
+        for at, held in ((3.0, 0.15), (7.3, 0.3)):
+            handed_s = at + held if at <= handed_s < at + held else handed_s
+        last = max(handed_s, last + 1e-6)
+        rows.append((1.7e9 + last, f"vcan1 {data}"))
+    rows.sort(key=lambda row: row[0])
+    (rig / "b.log").write_text("".join(f"({t:.6f}) {text}\n" for t, text in rows))
+    done = program.okid("replay", rig / "b.log", "-c", rig / "b.toml", "--json", "-", status=0)
+    result = json.loads(done.stdout)
+    return np.array(result["mkr"]["M"]), [warning["code"] for warning in result["warnings"]]
+
+
+@pytest.mark.parametrize(
+    ("polled_s", "packet", "jitter_s"), [(0.016, 0, 0.0), (0.01617, 0, 2e-3), (0.0, 4, 0.0), (0.0, 16, 2e-3)]
+)
+def test_masses_beside_a_punctual_bus(rig: Path, polled_s: float, packet: int, jitter_s: float) -> None:
+    """M within 3 % of the truth: every sample in its place."""
+    truth = np.array(json.loads((rig / "t.json").read_text())["M"])
+    found, _ = in_bursts(rig, polled_s, packet, jitter_s, 3e-4)
+    np.testing.assert_allclose(found, truth, atol=0.03 * truth.max(), rtol=0)
+    np.testing.assert_allclose(np.diag(found), np.diag(truth), rtol=0.03)
+
+
+def test_a_constant_delay_of_a_sample_is_marked(rig: Path) -> None:
+    """Nobody can see it in the arrivals; M is wrong, and the result says so."""
+    truth = np.array(json.loads((rig / "t.json").read_text())["M"])
+    found, warnings = in_bursts(rig, 0.0, 16, 0.0, 1.0e-3)
+    assert np.abs(found - truth).max() > 0.1
+    assert {"burst_delay", "mkr_feedthrough_misfit", "mkr_residual"} <= set(warnings)

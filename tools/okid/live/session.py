@@ -289,7 +289,7 @@ class Session:
     def _slow_frames(self) -> list[Frame]:
         run, out = self.run, []
         for kind, value in (("modes", run.modes), ("stats", run.stats), ("result", run.result)):
-            if value is not None and self._changed(kind, value["t"]):
+            if value is not None and self._changed(kind, value):
                 out.append(frame(kind, value))
         tracks = run.tracks
         last = tracks.updates[-1]["n"] if tracks.updates else 0
