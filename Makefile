@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo check test test-slow test-wheel test-embedded test-package package docs score bench bench-check bench-peers \
+.PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-package package docs score bench bench-check bench-peers \
 	fuzz lint format sanitize sanitize-all coverage sbom clean
 
 help: ## this list
@@ -40,6 +40,16 @@ test-slow: ## the same with more seeds, more frames, longer loads
 test-wheel: ## the Python package as a stranger installs it: source distribution, wheel, fresh environment
 	@tools/setup.sh test
 	@tests/wheel/run
+
+test-controller: ## okid on CAN controllers and a USB adapter, emulated, with the drivers of the stock kernel
+	@tools/setup.sh test
+	@cmake --preset release -DOKID_BUILD_TESTS=ON --log-level=WARNING >/dev/null
+	@cmake --build build -j$(JOBS) --target okid_program vcan_flood -- --quiet
+	@tests/controller/run
+
+test-distribution: ## build and unit tests in clean Debian 13 and Debian testing (root)
+	@tools/setup.sh package
+	@tests/distribution/run
 
 test-embedded: ## firmware on Cortex-M in QEMU, the library on Arm boards, the installed package
 	@tools/setup.sh embedded

@@ -247,7 +247,10 @@ ordered_json session::bus_stats(std::size_t bus) const {
     const grid_bus_counts counts = grid_.bus(bus);
     const auto lost = [&](gap_cause cause) { return counts.lost[static_cast<std::size_t>(cause)]; };
     const auto beyond = [](std::uint64_t seen, std::uint64_t booked) { return seen > booked ? seen - booked : 0; };
-    const std::uint64_t overflow = losses_[bus].socket_overflow, driver = losses_[bus].driver;
+    // A controller tells how often it overran, not how many frames that cost: the holes behind it say so.
+    const bool overran = health_[bus] && health_[bus]->counts.lost_driver > 0;
+    const std::uint64_t overflow = losses_[bus].socket_overflow,
+                        driver = std::max(losses_[bus].driver, overran ? lost(gap_cause::driver) : 0);
     const std::uint64_t sequence = lost(gap_cause::sequence) + beyond(lost(gap_cause::socket_overflow), overflow) +
                                    beyond(lost(gap_cause::driver), driver);
     const std::uint64_t link = lost(gap_cause::link_down), stall = lost(gap_cause::stall), crc = lost(gap_cause::crc);
