@@ -153,7 +153,8 @@ static void test_frames_of_one_read_stay_together() {
                     if (static_cast<int>(batch.size()) < size) continue;
                     size = together;
                     for (drv_frame_t& frame : batch) {
-                        frame.time_ns = day_ns + std::int64_t{n} * 1000000 + 300000 + static_cast<std::int64_t>(c) * 100000;
+                        frame.time_ns =
+                            day_ns + std::int64_t{n} * 1000000 + 300000 + static_cast<std::int64_t>(c) * 100000;
                         on.push(frame);
                     }
                     batch.clear();
