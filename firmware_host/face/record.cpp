@@ -9,6 +9,9 @@
 #include "record/csv_header.hpp"
 #include "record/request.hpp"
 
+#include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <fmt/format.h>
 #include <utility>
 
@@ -51,6 +54,64 @@ record_options checked(const asked& given) {
     return options;
 }
 
+/// One side of a record into rows of `width` numbers. @return false: some are missing or infinite
+template <class Number>
+bool copy_side(const okid_host_columns_t& from, std::size_t count, std::size_t width, double* to) {
+    double sum = 0;
+    for (std::size_t c = 0; c < from.channels; ++c) {
+        const char* at = static_cast<const char*>(from.data) + static_cast<std::ptrdiff_t>(c) * from.channel_stride;
+        double* out = to + c;
+        for (std::size_t n = 0; n < count; ++n, at += from.row_stride, out += width) {
+            Number x;
+            std::memcpy(&x, at, sizeof x);
+            *out = static_cast<double>(x);
+            sum += *out * 0.0;
+        }
+    }
+    return sum == 0;
+}
+
+/// `what`: u or y.
+void take_side(const okid_host_columns_t& from, std::size_t count, std::size_t width, const char* what,
+               const std::string& place, double* to) {
+    using copy_t = bool (*)(const okid_host_columns_t&, std::size_t, std::size_t, double*);
+    static constexpr copy_t copies[] = {copy_side<double>, copy_side<float>, copy_side<std::int16_t>,
+                                        copy_side<std::int32_t>};
+    if (from.type < 0 || from.type > 3)
+        throw failure(exit_usage, fmt::format("{}: numbers of type {}, expected 0 to 3", what, from.type));
+    if (from.channels == 0 || copies[from.type](from, count, width, to)) return;
+    for (std::size_t n = 0; n < count; ++n)
+        for (std::size_t c = 0; c < from.channels; ++c)
+            if (std::isinf(to[n * width + c]))
+                throw failure(exit_usage, fmt::format("{}{} is infinite at sample {} (from 0) of channel {}{}; use NaN "
+                                                      "for missing samples",
+                                                      what, place, n, what, c + 1));
+}
+
+/// What is common to both ways in: fill(i, record, rows) brings record i.
+template <class Fill>
+okid_host_result_t* identify(const char* options, int32_t records, const size_t* counts, const char* const* names,
+                             okid_host_stage_t stage, void* context, Fill fill) {
+    record_options wanted = checked(read_record(options));
+    if (stage) wanted.stage = [&](const char* text) { stage(context, text); };
+    record_set set;
+    set.n_u = wanted.inputs.size();
+    set.n_y = wanted.outputs.size();
+    std::size_t total = 0;
+    for (int32_t i = 0; i < records; ++i) total += counts[i];
+    set.samples.reserve(total * set.channels());
+    std::vector<std::string> columns = wanted.inputs;
+    columns.insert(columns.end(), wanted.outputs.begin(), wanted.outputs.end());
+    for (int32_t i = 0; i < records; ++i) {
+        set.records.push_back({names[i], set.count(), counts[i]});
+        fill(i, set);
+        const bool screens = wanted.method == "auto" && records > 1; // a sensor that died in one of several records
+        check_columns(names[i], columns, screens ? set.n_u : columns.size(), set.rows(set.records.back()), counts[i]);
+    }
+    check_columns("all records", columns, columns.size(), set.samples.data(), set.count());
+    return make_result(identify_records(std::move(set), wanted));
+}
+
 } // namespace
 } // namespace okid_host::face
 
@@ -61,22 +122,26 @@ int32_t okid_host_identify(const char* options, int32_t records, const double* c
                            okid_host_result_t** result) {
     *result = nullptr;
     return face::guard([&] {
-        record_options wanted = face::checked(face::read_record(options));
-        if (stage) wanted.stage = [&](const char* text) { stage(context, text); };
-        record_set set;
-        set.n_u = wanted.inputs.size();
-        set.n_y = wanted.outputs.size();
-        std::size_t total = 0;
-        for (int32_t i = 0; i < records; ++i) total += counts[i];
-        set.samples.reserve(total * set.channels());
-        std::vector<std::string> columns = wanted.inputs;
-        columns.insert(columns.end(), wanted.outputs.begin(), wanted.outputs.end());
-        for (int32_t i = 0; i < records; ++i) {
-            const bool screens = wanted.method == "auto" && records > 1; // a sensor that died in one of several records
-            check_columns(names[i], columns, screens ? set.n_u : columns.size(), samples[i], counts[i]);
-            set.add(names[i], samples[i], counts[i]);
-        }
-        check_columns("all records", columns, columns.size(), set.samples.data(), set.count());
-        *result = face::make_result(identify_records(std::move(set), wanted));
+        *result = face::identify(options, records, counts, names, stage, context, [&](int32_t i, record_set& set) {
+            set.samples.insert(set.samples.end(), samples[i], samples[i] + counts[i] * set.channels());
+        });
+    });
+}
+
+int32_t okid_host_identify_columns(const char* options, int32_t records, const okid_host_columns_t* inputs,
+                                   const okid_host_columns_t* outputs, const size_t* counts, const char* const* names,
+                                   okid_host_stage_t stage, void* context, okid_host_result_t** result) {
+    *result = nullptr;
+    return face::guard([&] {
+        *result = face::identify(options, records, counts, names, stage, context, [&](int32_t i, record_set& set) {
+            if (inputs[i].channels != set.n_u || outputs[i].channels != set.n_y)
+                throw failure(exit_usage, fmt::format("{}: {} inputs and {} outputs, expected {} and {}", names[i],
+                                                      inputs[i].channels, outputs[i].channels, set.n_u, set.n_y));
+            set.samples.resize(set.samples.size() + counts[i] * set.channels());
+            double* rows = set.rows(set.records.back());
+            const std::string place = records > 1 ? fmt::format("[{}]", i) : "";
+            face::take_side(inputs[i], counts[i], set.channels(), "u", place, rows);
+            face::take_side(outputs[i], counts[i], set.channels(), "y", place, rows + set.n_u);
+        });
     });
 }

@@ -71,6 +71,8 @@ std::unique_ptr<std::byte[]> accumulate(const record_set& set, const okid_identi
     shape.sample = OKID_SAMPLE_DOUBLE;
     shape.forgetting = 1;
     shape.edges = 1;
+    shape.bulk = 1;
+    shape.buffer = 1; // the record is in memory
     const std::size_t bytes = okid_accumulator_memsize(&shape);
     auto block = library_memory(bytes, config);
     check_status(okid_accumulator_create(&accumulator, &shape, block.get(), bytes), "accumulator");
@@ -108,15 +110,17 @@ okid_status_t refine_by_factor(okid_accumulator_t* accumulator, okid_status_t st
 }
 
 /// B and D of a subspace model from the records. Where that fails, those of the subspace equations stay.
-void fit_inputs(record_work& work) {
-    std::vector<double> B, D;
-    okid_status_t status = fit_outputs(work.set, work.model.n_z, work.model.A, work.model.C, B, D);
+/// @return the initial states that go with them; empty: not known
+std::vector<double> fit_inputs(record_work& work) {
+    std::vector<double> B, D, x0;
+    okid_status_t status = fit_outputs(work.set, work.model.n_z, work.model.A, work.model.C, B, D, &x0);
     if (status >= 0) status = okid_identify_set_inputs(work.identifier, B.data(), D.data(), &work.model);
     if (status < 0)
         work.context.warnings.emplace_back(
             "inputs_from_subspace",
             fmt::format("B and D could not be fitted to the record ({}): they are those of the subspace equations",
                         okid_status_text(status)));
+    return status >= 0 ? x0 : std::vector<double>{};
 }
 
 /// The same for the replicates: the outputs of the block that each leaves out are missing.
@@ -234,8 +238,8 @@ std::vector<replicate_model> improve(const record_options& options, std::vector<
                                      record_work& work) {
     const bool from_record = is_subspace(work.config.method) && work.config.n_u > 0;
     tell(options, "simulating the model");
-    if (from_record) fit_inputs(work);
-    fit_records(work.set, work.model, work.context);
+    const std::vector<double> states = from_record ? fit_inputs(work) : std::vector<double>{};
+    fit_records(work.set, work.model, work.context, states.empty() ? nullptr : &states);
     if (options.refine == "yes") {
         tell(options, "refining the model");
         replicates = refine_model(options.detrend != "none", work);

@@ -13,16 +13,17 @@
 namespace okid_host {
 namespace {
 
-struct channel_range {
-    double low = INFINITY, high = -INFINITY;
+/// The first number of a channel, NaN where it has none, and whether a later one differs.
+struct channel_movement {
+    double first = NAN;
+    bool moves = false;
 };
 
-channel_range range_of(const record_set& set, std::size_t channel) {
-    channel_range out;
-    for (std::size_t i = channel; i < set.samples.size(); i += set.channels()) {
-        if (std::isnan(set.samples[i])) continue;
-        out.low = std::min(out.low, set.samples[i]);
-        out.high = std::max(out.high, set.samples[i]);
+channel_movement movement_of(const record_set& set, std::size_t channel) {
+    channel_movement out;
+    for (std::size_t i = channel; i < set.samples.size() && !out.moves; i += set.channels()) {
+        if (std::isnan(out.first)) out.first = set.samples[i];
+        out.moves = set.samples[i] < out.first || set.samples[i] > out.first;
     }
     return out;
 }
@@ -34,42 +35,73 @@ const std::string& name_of(std::size_t channel, const record_options& options) {
 
 /// Correlation of the inputs over all samples that have them all; each record about its own mean.
 Eigen::MatrixXd input_correlation(const record_set& set) {
-    using inputs = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-    const auto n_u = static_cast<Eigen::Index>(set.n_u);
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(n_u, n_u);
+    const std::size_t n_u = set.n_u;
+    std::vector<double> sums(n_u * n_u), mean(n_u), left(n_u);
+    const auto each = [&](const record_data& record, const auto& use) {
+        const double* u = set.rows(record);
+        for (std::size_t n = 0; n < record.count; ++n, u += set.channels())
+            if (std::none_of(u, u + n_u, [](double x) { return std::isnan(x); })) use(u);
+    };
     for (const record_data& record : set.records) {
-        const inputs u(set.rows(record), n_u, static_cast<Eigen::Index>(record.count),
-                       Eigen::OuterStride<>(static_cast<Eigen::Index>(set.channels())));
-        Eigen::VectorXd mean = Eigen::VectorXd::Zero(n_u), centred(n_u);
+        std::fill(mean.begin(), mean.end(), 0.0);
         double present = 0;
-        for (Eigen::Index n = 0; n < u.cols(); ++n)
-            if (!u.col(n).hasNaN()) mean += u.col(n), present += 1;
-        if (present > 0) mean /= present;
-        for (Eigen::Index n = 0; n < u.cols(); ++n) {
-            if (u.col(n).hasNaN()) continue;
-            centred = u.col(n) - mean;
-            sum.noalias() += centred * centred.transpose();
-        }
+        each(record, [&](const double* u) {
+            for (std::size_t c = 0; c < n_u; ++c) mean[c] += u[c];
+            present += 1;
+        });
+        for (double& x : mean) x /= std::max(present, 1.0);
+        each(record, [&](const double* u) {
+            for (std::size_t c = 0; c < n_u; ++c) {
+                left[c] = u[c] - mean[c];
+                for (std::size_t d = 0; d <= c; ++d) sums[c * n_u + d] += left[c] * left[d];
+            }
+        });
     }
+    const auto size = static_cast<Eigen::Index>(n_u);
+    const Eigen::MatrixXd sum = Eigen::Map<Eigen::MatrixXd>(sums.data(), size, size).selfadjointView<Eigen::Upper>();
     const Eigen::VectorXd scale = sum.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
     return scale.asDiagonal() * sum * scale.asDiagonal();
+}
+
+/// Surely not half of the energy about the medians lies in the first p samples of the records: a median is within one
+/// standard deviation of the mean, and about no value is there less energy than about the mean.
+bool surely_later(const record_set& set, int p) {
+    double early = 0, total = 0;
+    for (const record_data& record : set.records)
+        for (std::size_t k = 0; k < set.n_u; ++k) {
+            const double* u = set.rows(record) + k;
+            const double shift = record.count > 0 ? u[0] : 0;
+            double sum = 0, square = 0;
+            for (std::size_t i = 0; i < record.count; ++i) {
+                const double x = u[i * set.channels()] - shift;
+                sum += x, square += x * x;
+            }
+            const auto count = static_cast<double>(record.count);
+            const double mean = sum / count, spread = std::sqrt(std::max(0.0, square / count - mean * mean));
+            for (std::size_t i = 0; i < std::min(record.count, static_cast<std::size_t>(p)); ++i) {
+                const double most = std::abs(u[i * set.channels()] - shift - mean) + spread;
+                early += most * most;
+            }
+            total += count * spread * spread;
+        }
+    return early < 0.49 * total; // of missing samples NaN: not sure
 }
 
 } // namespace
 
 void check_moving(const record_set& set, const record_options& options) {
     for (std::size_t k = 0; k < set.channels(); ++k) {
-        const channel_range range = range_of(set, k);
-        if (range.high > range.low) continue;
+        const channel_movement found = movement_of(set, k);
+        if (found.moves) continue;
         const bool input = k < set.n_u;
-        if (range.low > range.high)
+        if (std::isnan(found.first))
             throw failure(exit_no_model, fmt::format("no model: {} \"{}\" has no sample in the range used",
                                                      input ? "input" : "output", name_of(k, options)));
         throw failure(
             exit_no_model,
             fmt::format("no model: {} \"{}\" is constant ({:g}): it {}. Leave it out of --{}, or check the {} "
                         "and its wiring",
-                        input ? "input" : "output", name_of(k, options), range.low,
+                        input ? "input" : "output", name_of(k, options), found.first,
                         input ? "excites nothing" : "measures nothing", input ? "inputs" : "outputs",
                         input ? "force sensor" : "sensor"),
             input ? OKID_ERR_INPUT : OKID_ERR_OUTPUT);
@@ -97,7 +129,7 @@ void check_not_a_line(const record_set& set, const record_data& record, const st
 
 void check_different_inputs(const record_set& set, const record_options& options) {
     const auto n_u = static_cast<Eigen::Index>(options.inputs.size());
-    if (n_u == 0) return;
+    if (n_u == 0 || (n_u == 1 && set.records.size() == 1)) return; // a single one moves: check_moving()
     Eigen::MatrixXd left = input_correlation(set);
     for (Eigen::Index k = 0; k < n_u; ++k) { // what is left of an input after the earlier ones explain what they can
         if (left(k, k) < 1e-10)
@@ -185,6 +217,7 @@ void remark_exchanged(const std::vector<std::string>& units, const record_option
 }
 
 void remark_early_hit(const record_set& set, int p, result_context& context) {
+    if (surely_later(set, p)) return;
     double early = 0, total = 0;
     std::vector<double> values;
     for (const record_data& record : set.records)

@@ -14,9 +14,10 @@ struct stretch {
 /// tell their initial state from the noise, are left out; a record without missing inputs is one stretch.
 std::vector<stretch> stretches_of(const record_set& set, const record_data& record, std::size_t least);
 
-/// B (n_z x n_u) and D (n_y x n_u) that make the simulated outputs of A and C fit the records best.
+/// B (n_z x n_u) and D (n_y x n_u) that make the simulated outputs of A and C fit the records best; x0, where given, gets
+/// the initial state that goes with them, n_z numbers a record.
 okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const double* C, std::vector<double>& B,
-                          std::vector<double>& D);
+                          std::vector<double>& D, std::vector<double>* x0 = nullptr);
 
 /// What the model's prediction leaves of each sample, n_y numbers, NaN where there is none to compare; from rest, or the
 /// initial state that fits a stretch best.
@@ -24,6 +25,8 @@ std::vector<double> residuals(const record_set& set, const okid_identified_t& mo
 
 /// Fill x0, simulation_percent and prediction_percent of the context. The records are in the model's own terms
 /// (detrended); missing inputs are taken as 0. Without inputs: prediction_percent only.
-void fit_records(const record_set& set, const okid_identified_t& model, result_context& context);
+/// @param known  initial states as fit_outputs() gives them: serve the records without missing inputs
+void fit_records(const record_set& set, const okid_identified_t& model, result_context& context,
+                 const std::vector<double>* known = nullptr);
 
 } // namespace okid_host

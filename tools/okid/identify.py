@@ -6,12 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from okid._errors import InputError
 from okid.abi.arguments import channel_names
-from okid.data.records import paired
+from okid.data.records import sides
 from okid.identification import host_result
 from okid.result.result import Result
 from okid.result.stabilization import Criteria, Stabilization, of_identifiers
@@ -47,9 +46,10 @@ def identify(
     """Identify a structure from measured inputs and outputs.
 
     u (N, n_u) or (N,), y (N, n_y) or (N,) at `fs` Hz, or lists of such arrays: several records, merged exactly, each
-    centred by itself. Frames of pandas give the channels their names. NaN (or masked) = missing sample: the regression
-    leaves it out and re-arms, nothing is interpolated; the fits and model.x0 are those of the record less its own mean
-    (or line) and start anew after missing inputs. The arrays are never modified.
+    centred by itself. float64, float32, int16 and int32 are read where they stand, with any strides. Frames of pandas
+    give the channels their names. NaN (or masked) = missing sample: the regression leaves it out and re-arms, nothing
+    is interpolated; the fits and model.x0 are those of the record less its own mean (or line) and start anew after
+    missing inputs. The arrays are never modified.
     `method` "auto": the modes that several methods, horizons and rates agree on, each with mode.confident, .found_in
     and .why (docs/how-okid-decides.md); the doubtful ones are listed with them. Or one method: "okid-era",
     "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx". Default: "auto"; "okid-era" when an option of one method
@@ -94,8 +94,7 @@ def identify(
     >>> result.mkr.M.diagonal().round(1).tolist()  # kg; true: 1, 0.8, 1.2
     [1.0, 0.8, 1.2]
     """
-    inputs, outputs = paired(u, y)
-    records = [np.hstack(pair) for pair in zip(inputs, outputs, strict=True)]
+    inputs, outputs = sides(u, y, host_result.TYPES)
     options = {
         "inputs": channel_names(input_names, u, "u", inputs[0].shape[1]),
         "outputs": channel_names(output_names, y, "y", outputs[0].shape[1]),
@@ -106,7 +105,7 @@ def identify(
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
         "hit_dofs": hit_dofs,
     }  # fmt: skip
-    return Result.of_host(host_result.identify(options, records))
+    return Result.of_host(host_result.identify(options, inputs, outputs))
 
 
 def stabilization(

@@ -36,6 +36,24 @@ OKID_HOST_API int32_t okid_host_identify(const char* options, int32_t records, c
                                          const size_t* counts, const char* const* names, okid_host_stage_t stage,
                                          void* context, okid_host_result_t** result);
 
+/** Channels of a record as arrays have them: sample n of channel c stands at data + n * row_stride + c * channel_stride. */
+typedef struct okid_host_columns {
+    const void* data;
+    int32_t type;                         /**< of a number: 0 double, 1 float, 2 int16, 3 int32 */
+    size_t channels;                      /**< 0: none, data may be NULL */
+    ptrdiff_t row_stride, channel_stride; /**< in bytes */
+} okid_host_columns_t;
+
+/**
+ * okid_host_identify() of records whose inputs and outputs stand apart, in numbers of any of four types.
+ *
+ * @param inputs, outputs  of each record, counts[i] samples; read during the call only. A number that is infinite is refused
+ */
+OKID_HOST_API int32_t okid_host_identify_columns(const char* options, int32_t records,
+                                                 const okid_host_columns_t* inputs, const okid_host_columns_t* outputs,
+                                                 const size_t* counts, const char* const* names,
+                                                 okid_host_stage_t stage, void* context, okid_host_result_t** result);
+
 /** okid.result/1, as `okid identify --json` writes it. NULL when memory ran out. */
 OKID_HOST_API const char* okid_host_result_json(okid_host_result_t* self);
 

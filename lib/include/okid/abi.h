@@ -37,6 +37,8 @@
 #define okid_mkr_identify OKID_LINKED(okid_mkr_identify)
 #define okid_modal_analyse OKID_LINKED(okid_modal_analyse)
 #define okid_modal_mac OKID_LINKED(okid_modal_mac)
+#define okid_model_fit OKID_LINKED(okid_model_fit)
+#define okid_model_fit_memsize OKID_LINKED(okid_model_fit_memsize)
 #define okid_model_initial_state OKID_LINKED(okid_model_initial_state)
 #define okid_model_predict OKID_LINKED(okid_model_predict)
 #define okid_model_simulate OKID_LINKED(okid_model_simulate)

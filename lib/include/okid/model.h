@@ -50,6 +50,16 @@ OKID_NODISCARD OKID_API okid_status_t okid_model_initial_state(const okid_model_
                                                                const okid_real_t* y, size_t count, okid_real_t* x0,
                                                                okid_real_t* work);
 
+OKID_API size_t okid_model_fit_memsize(const okid_model_t* model);
+
+/// How much of measured outputs the model leaves: all of a record in one pass, simulation and one-step prediction side by
+/// side, both from x0. A sample whose outputs have a NaN corrects no state. Without K the prediction is the simulation.
+/// @param rows  in, (n_u + n_y) x count: inputs, without a NaN, then outputs; @param x0  in, n_z or NULL (0)
+/// @param sums  in and out, n_y x 5: squares left by simulation, by prediction; sum, squares and count of what was measured
+/// @param work  okid_model_fit_memsize() bytes
+OKID_NODISCARD OKID_API okid_status_t okid_model_fit(const okid_model_t* model, const double* rows, size_t count,
+                                                     const okid_real_t* x0, double* sums, void* work, size_t bytes);
+
 #ifdef __cplusplus
 }
 #endif

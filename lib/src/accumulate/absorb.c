@@ -131,12 +131,14 @@ static void flush(okid_accumulator_t* a) {
     a->pending = 0;
 }
 
-/// Round what the spectra hold back to integers and add it to the open slot.
+/// Bring what the spectra hold into the open slot, of codes rounded to integers.
 static void flush_spectrum(okid_accumulator_t* a) {
     if (!acc_bulk_on(&a->config) || !(acc_bulk(a)->energy > 0)) return;
+    const int codes = acc_has_codes(a);
     fold_partial(a);
-    okid_spectrum_pick().flush(&acc_bulk(a)->plan, acc_spectra(a), acc_at(a, a->partial_at));
-    a->partial_rows = 1; // integers far below 2^53: energy < 2^43 is what the error bound allows
+    okid_spectrum_pick().flush(&acc_bulk(a)->plan, acc_spectra(a),
+                               codes ? acc_at(a, a->partial_at) : acc_slot_data(a, a->open), codes);
+    a->partial_rows = codes; // integers far below 2^53: energy < 2^43 is what the error bound allows
     fold_partial(a);
     acc_bulk(a)->energy = 0;
 }
@@ -160,28 +162,41 @@ static double batch_energy(const okid_accumulator_t* a, const spectrum_plan_t* p
     return (double)most;
 }
 
-/// The FFT path: take one batch when the call is long enough and its sums stay exact; returns the samples taken.
-static size_t feed_bulk(okid_accumulator_t* a, const int16_t* codes, size_t count) {
+/// May this batch of codes go into the spectra, what they hold brought out before where needed?
+static int room_for_batch(okid_accumulator_t* a, const int16_t* codes) {
     bulk_t* bulk = acc_bulk(a);
-    const int32_t m = a->m, p = bulk->plan.p, total = spectrum_samples(&bulk->plan);
-    if (count < (size_t)total) return 0;
-    flush(a);
     const double energy = batch_energy(a, &bulk->plan, codes);
     if (okid_spectrum_error(&bulk->plan, bulk->energy + energy) >= 0.5) flush_spectrum(a);
     if (okid_spectrum_error(&bulk->plan, energy) >= 0.5) return 0;
+    bulk->energy += energy;
+    return 1;
+}
+
+/// The FFT path: take one batch when the call is long enough and sums of codes stay exact; returns the samples taken.
+static size_t feed_bulk(okid_accumulator_t* a, source_t source, size_t count) {
+    bulk_t* bulk = acc_bulk(a);
+    const int16_t* codes = source.kind == FROM_INT16 ? source.at : NULL;
+    const double* numbers = source.kind == FROM_DOUBLE ? source.at : NULL;
+    const size_t m = (size_t)a->m, total = (size_t)spectrum_samples(&bulk->plan), lags = acc_lag_count(a);
+    if ((!codes && !numbers) || count < total) return 0;
+    flush(a);
+    if (codes && !room_for_batch(a, codes)) return 0;
     double* x = acc_x(a);
     keep_head(a, x);
-    okid_spectrum_pick().absorb(&bulk->plan, acc_spectra(a), x, codes);
-    bulk->energy += energy > 0 ? energy : 1; // silence counts as rows too
-    int64_t* sum = (int64_t*)(acc_slot_data(a, a->open) + acc_slot_sum(a));
-    for (int32_t n = 0; n < total; ++n)
-        for (int32_t r = 0; r < m; ++r) sum[r] += codes[(size_t)n * (size_t)m + (size_t)r];
-    const int16_t* tail = codes + (size_t)(total - p) * (size_t)m;
-    for (int32_t i = 0; i < p * m; ++i) x[i] = tail[i];
-    acc_slot(a, a->open)->rows += total;
-    a->stats.rows += total;
-    a->clock += total;
-    return (size_t)total;
+    okid_spectrum_pick().absorb(&bulk->plan, acc_spectra(a), x, codes, numbers);
+    if (!(bulk->energy > 0)) bulk->energy = 1; // silence counts as rows too
+    double* sum = acc_slot_data(a, a->open) + acc_slot_sum(a);
+    for (size_t i = 0, r = 0; i < total * m; ++i, r = r + 1 < m ? r + 1 : 0) {
+        if (codes)
+            ((int64_t*)sum)[r] += codes[i];
+        else
+            sum[r] += numbers[i];
+    }
+    copy_in(advance(source, (total - (size_t)bulk->plan.p) * m), x, lags);
+    acc_slot(a, a->open)->rows += (int64_t)total;
+    a->stats.rows += (int64_t)total;
+    a->clock += (int64_t)total;
+    return total;
 }
 
 void okid_accumulator_settle(okid_accumulator_t* self) {
@@ -260,9 +275,8 @@ static void feed_run(okid_accumulator_t* a, source_t source, size_t count) {
     a->stats.samples += (int64_t)count;
     for (size_t done = 0; done < count;) {
         size_t taken = 0;
-        if (acc_bulk_on(&a->config) && source.kind == FROM_INT16 && a->have == a->config.lags)
-            taken = feed_bulk(a, (const int16_t*)source.at, count - done);
-        else if (a->config.buffer == 1 && source.kind == FROM_DOUBLE)
+        if (acc_bulk_on(&a->config) && a->have == a->config.lags) taken = feed_bulk(a, source, count - done);
+        if (taken == 0 && a->config.buffer == 1 && source.kind == FROM_DOUBLE)
             taken = feed_in_place(a, (const double*)source.at, done, count - done);
         if (taken == 0) taken = feed(a, source, count - done);
         source = advance(source, taken * (size_t)a->m);

@@ -16,7 +16,7 @@ static int valid(const okid_accumulator_config_t* c) {
     if (!(c->forgetting > 0 && c->forgetting <= 1)) return 0;
     if (c->slots > 0 && (c->block == 0 || c->forgetting < 1)) return 0;
     if (c->forgetting < 1 && (c->block == 0 || !c->edges)) return 0;
-    if (c->bulk && (c->sample != OKID_SAMPLE_INT16 || c->block > 0)) return 0;
+    if (c->bulk && ((c->sample != OKID_SAMPLE_INT16 && c->sample != OKID_SAMPLE_DOUBLE) || c->block > 0)) return 0;
     if (c->buffer < 0 || c->buffer > 65536) return 0;
     return !(c->block > 0 && c->slots == 0 && !c->edges);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    the lagged sums of 16-bit codes by FFT, one source for every instruction set
+// PURPOSE    the lagged sums of 16-bit codes and of doubles by FFT, one source for every instruction set
 // METHOD     overlap-save with windows of N = p + L samples. z = current + i full (current: the window with its first p
 //            samples zero) gives both spectra of a channel from one complex transform; the cross-spectra
 //            Current_r conj(Full_c) of all windows are added, one inverse transform at the end gives
@@ -7,7 +7,8 @@
 //            that a butterfly never shuffles; four windows are transformed before the cross-spectra are touched once
 // REFERENCE  Stockham radix 4: Van Loan, Computational Frameworks for the FFT (1992), 1.7; error: Higham, Accuracy and
 //            Stability of Numerical Algorithms (2002), theorem 24.2
-// NUMERICS   the sums are integers: rounding makes them exact while the error stays below 1/2, see okid_spectrum_error()
+// NUMERICS   the sums are integers: rounding makes them exact while the error stays below 1/2, see okid_spectrum_error().
+//            Of doubles that error remains: as that of plain sums a small multiple of eps times the energy
 // WORKSPACE  okid_spectrum_doubles(); about 5 m log2 N + 4 m^2 flop a sample
 #include "spectrum.h"
 #include "isa.h"
@@ -95,16 +96,17 @@ static double* transform(const map_t* a, int total) {
 }
 
 /// Window `index` of the batch into z = current + i full for one group; @return largest energy of its channels.
-static double load_window(const spectrum_plan_t* plan, const map_t* a, const double* history, const int16_t* codes,
-                          int index, int group) {
+static inline __attribute__((always_inline)) double load_window(const spectrum_plan_t* plan, const map_t* a,
+                                                                const double* history, const int16_t* codes,
+                                                                const double* numbers, int index, int group) {
     const int m = plan->m, p = plan->p, first = group * V, lanes = m - first < V ? m - first : V;
     double energy[V] = {0};
     for (int k = 0; k < plan->length; ++k) {
         const int n = index * plan->fresh + k - p; // sample of this call
         double* z = a->work + 2 * V * (size_t)k;
         for (int c = 0; c < lanes; ++c) {
-            const double x =
-                n < 0 ? history[(n + p) * m + first + c] : codes[(size_t)n * (size_t)m + (size_t)(first + c)];
+            const size_t at = (size_t)n * (size_t)m + (size_t)(first + c);
+            const double x = n < 0 ? history[(n + p) * m + first + c] : numbers ? numbers[at] : codes[at];
             z[c] = k < p ? 0 : x;
             z[V + c] = x;
             energy[c] += x * x;
@@ -156,13 +158,15 @@ static void add_cross(const spectrum_plan_t* plan, const map_t* a) {
 }
 
 okid_spectrum_absorb_fn ABSORB;
-double ABSORB(const spectrum_plan_t* plan, double* memory, const double* history, const int16_t* codes) {
+double ABSORB(const spectrum_plan_t* plan, double* memory, const double* history, const int16_t* codes,
+              const double* numbers) {
     const map_t a = map_of(plan, memory);
     double energy = 0;
     for (int b = 0; b < SPECTRUM_BATCH; ++b) {
         double most = 0;
         for (int g = 0; g < plan->groups; ++g) {
-            const double e = load_window(plan, &a, history, codes, b, g);
+            const double e = numbers ? load_window(plan, &a, history, NULL, numbers, b, g)
+                                     : load_window(plan, &a, history, codes, NULL, b, g);
             most = e > most ? e : most;
             split_spectra(plan, &a, transform(&a, plan->length), b, g);
         }
@@ -191,7 +195,7 @@ static void load_rows(const spectrum_plan_t* plan, const map_t* a, int r, int gr
 }
 
 okid_spectrum_flush_fn FLUSH;
-void FLUSH(const spectrum_plan_t* plan, double* memory, double* sums) {
+void FLUSH(const spectrum_plan_t* plan, double* memory, double* sums, int of_codes) {
     const map_t a = map_of(plan, memory);
     const int m = plan->m, p = plan->p, width = m * (p + 1);
     const double scale = 1.0 / plan->length;
@@ -203,8 +207,9 @@ void FLUSH(const spectrum_plan_t* plan, double* memory, double* sums) {
             for (int b = 0; b <= p; ++b)
                 for (int c = 0; c < lanes; ++c) {
                     const double* at = x + 2 * V * (size_t)b + c;
-                    sums[r * width + (p - b) * m + first + c] = nearbyint(at[0] * scale);
-                    if (r + 1 < m) sums[(r + 1) * width + (p - b) * m + first + c] = nearbyint(-at[V] * scale);
+                    double* to = sums + r * width + (p - b) * m + first + c;
+                    *to = of_codes ? nearbyint(at[0] * scale) : *to + at[0] * scale;
+                    if (r + 1 < m) to[width] = of_codes ? nearbyint(-at[V] * scale) : to[width] - at[V] * scale;
                 }
         }
     memset(a.cross, 0, 2 * V * (size_t)(plan->length / 2 + 1) * (size_t)(m * plan->groups) * sizeof(double));

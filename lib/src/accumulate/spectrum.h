@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    the lagged sums of 16-bit codes by FFT: the same integers as the direct kernel, for long lags and long calls
+// PURPOSE    the lagged sums of 16-bit codes by FFT: the same integers as the direct kernel, for long lags and long calls; of doubles
+//            to a few eps of the energy
 #ifndef OKID_SPECTRUM_H
 #define OKID_SPECTRUM_H
 
@@ -31,13 +32,14 @@ void okid_spectrum_create(const spectrum_plan_t* plan, double* memory);
 /// Sums gathered since the last flush are exact after rounding while this stays below 1/2.
 double okid_spectrum_error(const spectrum_plan_t* plan, double energy);
 
-/// Absorb spectrum_samples() samples that follow the p samples of `history` (time order, m numbers each).
-/// @return the largest energy (sum of squares over the windows) of a channel, for okid_spectrum_error()
+/// Absorb spectrum_samples() samples, codes or numbers (the other one NULL), that follow the p samples of `history` (time
+/// order, m numbers each). @return the largest energy (sum of squares over the windows) of a channel, for okid_spectrum_error()
 typedef double okid_spectrum_absorb_fn(const spectrum_plan_t* plan, double* memory, const double* history,
-                                       const int16_t* codes);
+                                       const int16_t* codes, const double* numbers);
 
-/// Write the sums S (m x m(p+1), row-major, as the direct kernel orders them) as exact integers in doubles and begin anew.
-typedef void okid_spectrum_flush_fn(const spectrum_plan_t* plan, double* memory, double* sums);
+/// Bring out the sums S (m x m(p+1), row-major, as the direct kernel orders them) and begin anew: of codes written as exact
+/// integers, else added to what stands there.
+typedef void okid_spectrum_flush_fn(const spectrum_plan_t* plan, double* memory, double* sums, int of_codes);
 
 typedef struct spectrum_kernels_t {
     okid_spectrum_absorb_fn* absorb;

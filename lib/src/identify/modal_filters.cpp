@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    filters in the modal coordinates of a given A, and the Gram matrix of their signals over a run of samples
-// METHOD     phi(t+1) = w phi(t) + u(t) for every eigenvalue and input; 64 samples at a time into the sums
+// METHOD     phi(t+1) = w phi(t) + u(t) for every eigenvalue and input; 64 samples at a time into the sums. Without a gap the
+//            sums of two signals a, b solve S - w_a S w_b = (what the inputs and the two ends add): run()
 // REFERENCE  docs/numerics.md section 2, "B,D,z0 by output error"
-// NUMERICS   needs independent eigenvectors; unstable eigenvalues grow until the numbers end (the caller looks)
-// WORKSPACE  base^2 + (64 + n_y) base numbers; base^2 flop a sample, base = n_z n_u + n_z + n_u
+// NUMERICS   needs independent eigenvectors; unstable eigenvalues grow until the numbers end (the caller looks). run() divides
+//            by 1 - |w|^2: not below 1e-6
+// WORKSPACE  base^2 + (64 + n_y) base numbers; base^2 flop a sample, run() 2 base (n_u + n_y), base = n_z n_u + n_z + n_u
 #include "identify/modal_filters.hpp"
 
+#include "mechanics/recursion.h"
+
 #include <cmath>
+#include <complex>
 
 namespace okid {
 
@@ -16,7 +21,7 @@ using std::size_t;
 namespace {
 
 constexpr int batch = 64;
-constexpr double died_out = 1e-14;
+constexpr double died_out = 1e-14, least_decay = 1e-6, denormal = 1e-200;
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
@@ -37,6 +42,12 @@ modal_filters::modal_filters(int inputs, int outputs, int states, arena& memory)
     state_ = memory.take<double>(area(base, 1));
     signals_ = memory.take<double>(area(base, batch));
     outputs_ = memory.take<double>(area(n_y, batch));
+    const int most = static_cast<int>(okid_recursion_padded(area(n_z, n_u + 1)));
+    w_ = memory.take<double>(area(2, most));
+    drive_ = memory.take<double>(area(most, n_u));
+    z_ = memory.take<double>(area(2, most));
+    batch_ = memory.take<double>(area(n_u + 2 * most, batch));
+    with_v_ = memory.take<double>(area(n_u + 2 * most, n_u + n_y));
 }
 
 bool modal_filters::decompose(const okid_real_t* A, const okid_real_t* C) {
@@ -96,6 +107,91 @@ void modal_filters::flush() {
     if (columns == 0 || rows == 0) return;
     lower_product(rows, [columns](int) { return columns; }, signals_, base, 1, sums, base);
     multiply(false, true, rows, n_y, columns, 1, signals_, base, outputs_, n_y, 1, with_y, base);
+}
+
+bool modal_filters::settles() const {
+    for (int k = 0; k < n_z; ++k) {
+        const double re = re_[k], im = im_[k];
+        if (!(re * re + im * im <= 1 - least_decay)) return false;
+    }
+    return true;
+}
+
+/// w, z and drive of every lane: group c of input c, the last one free.
+void modal_filters::place_lanes() {
+    blocks_ = 0;
+    for (int k = 0; k < n_z; k += size(k)) ++blocks_;
+    lanes_ = static_cast<int>(okid_recursion_padded(area(blocks_, n_u + 1)));
+    for (double* both : {w_, z_}) std::fill(both, both + 2 * lanes_, 0.0);
+    std::fill(drive_, drive_ + at(0, n_u, lanes_), 0.0);
+    std::fill(with_v_, with_v_ + at(0, n_u + n_y, n_u + 2 * lanes_), 0.0);
+    for (int c = 0, lane = 0; c <= n_u; ++c)
+        for (int k = 0; k < n_z; k += size(k), ++lane) {
+            w_[lane] = re_[k];
+            w_[lanes_ + lane] = im_[k];
+            if (c < n_u)
+                drive_[at(lane, c, lanes_)] = 1;
+            else
+                z_[lane] = 1;
+        }
+}
+
+/// Sums of the state of lane s with that of lane t.
+void modal_filters::two_states(int s, int t) {
+    using complex = std::complex<double>;
+    const auto signal = [&](int lane) { // place among the signals of its real part
+        int k = 0;
+        for (int b = lane % blocks_; b > 0; --b) k += size(k);
+        return n_u + lane / blocks_ * n_z + k;
+    };
+    const auto of = [&](const double* both, int lane) { return complex(both[lane], both[lanes_ + lane]); };
+    const auto with_input = [&](int lane, int group) {
+        if (group == n_u) return complex(0);
+        const double* column = with_v_ + at(n_u, group, n_u + 2 * lanes_);
+        return complex(column[lane], column[lanes_ + lane]);
+    };
+    const int a = s / blocks_, b = t / blocks_;
+    const double first = a == n_u && b == n_u, inputs = a < n_u && b < n_u ? with_v_[at(a, b, n_u + 2 * lanes_)] : 0;
+    const auto solve = [&](complex w, complex q, complex z) { // of the second state or of its conjugate
+        const complex v = of(w_, s);
+        return (v * with_input(s, b) + w * q + inputs + first - of(z_, s) * z) / (1.0 - v * w);
+    };
+    const complex w = of(w_, t), q = with_input(t, a), z = of(z_, t);
+    const complex h1 = solve(std::conj(w), std::conj(q), std::conj(z)), h2 = solve(w, q, z);
+    const int i = signal(s), j = signal(t);
+    const bool p = im_[(i - n_u) % n_z] > 0, r = im_[(j - n_u) % n_z] > 0;
+    sums[at(i, j, base)] = (h1.real() + h2.real()) / 2;
+    if (p) sums[at(i + 1, j, base)] = (h1.imag() + h2.imag()) / 2;
+    if (r) sums[at(i, j + 1, base)] = (h2.imag() - h1.imag()) / 2;
+    if (p && r) sums[at(i + 1, j + 1, base)] = (h1.real() - h2.real()) / 2;
+}
+
+void modal_filters::run(const double* v, int count) {
+    const int m = n_u + n_y;
+    place_lanes();
+    const int wide = n_u + 2 * lanes_;
+    const okid_filters_t filters{area(n_u, 1), area(m, 1), area(lanes_, 1), w_, w_ + lanes_, drive_, z_, batch_};
+    const auto step = okid_recursion_pick().filters;
+    for (int n = 0; n < count; n += batch, v += at(0, batch, m)) {
+        const int size = std::min(batch, count - n);
+        step(&filters, v, static_cast<size_t>(size));
+        multiply(false, true, wide, m, size, 1, batch_, wide, v, m, 1, with_v_, wide);
+        for (int k = 0; k < 2 * lanes_; ++k)
+            if (std::abs(z_[k]) < denormal) z_[k] = 0;
+    }
+    const auto copy = [&](int from, int to) {
+        for (int c = 0; c < n_u; ++c) sums[at(to, c, base)] = with_v_[at(from, c, wide)];
+        for (int o = 0; o < n_y; ++o) with_y[at(to, o, base)] = with_v_[at(from, n_u + o, wide)];
+    };
+    for (int c = 0; c < n_u; ++c) copy(c, c);
+    for (int c = 0, lane = 0; c <= n_u; ++c)
+        for (int k = 0; k < n_z; k += this->size(k), ++lane) {
+            copy(n_u + lane, n_u + c * n_z + k);
+            if (pair(k)) copy(n_u + lanes_ + lane, n_u + c * n_z + k + 1);
+        }
+    for (int s = 0; s < blocks_ * (n_u + 1); ++s)
+        for (int t = 0; t <= s; ++t) two_states(s, t);
+    used = count;
 }
 
 void modal_filters::complete_sums() {

@@ -24,6 +24,11 @@ struct modal_filters {
     void start();
     /// One sample with known inputs. It counts when its outputs are known too; the filters go on in any case.
     void sample(const double* v);
+    /// Do all modes die out fast enough for run()?
+    bool settles() const;
+    /// The same of `count` samples without a gap at once, from start() on: only products of signals with inputs and outputs are
+    /// summed, those of two signals follow from z(t+1) = w z(t) + u(t) on both sides.
+    void run(const double* v, int count);
     void complete_sums();
 
     /// out += sum over outputs of M_k Z M_l^T for every two modes; Z of two sets of filters, M = [c1 -c2; c2 c1].
@@ -36,11 +41,16 @@ struct modal_filters {
     int size(int k) const { return pair(k) ? 2 : 1; }
     void advance(double* x) const;
     void flush();
+    void place_lanes();
+    void two_states(int s, int t);
 
     okid_real_t *a_, *vectors_, *re_, *im_, *eigen_;
     double *shapes_, *shared_;            // C V, (C V)^T C V
     double *state_, *signals_, *outputs_; // now; a batch of samples
     int waiting_ = 0;
+    int blocks_, lanes_;               // of run(): modes, a pair one; complex states, padded: (group, mode)
+    double *w_, *drive_, *z_, *batch_; // re and im of w and z; lanes x n_u; signals of a batch
+    double* with_v_;                   // signals times rows, n_u + 2 lanes x n_u + n_y
 };
 
 } // namespace okid

@@ -102,16 +102,27 @@ static void sums_by_fft_are_exact(void) {
         int16_t* codes = random_codes((size_t)(m * (p + count)), 7 + s);
         double *memory = malloc(okid_spectrum_doubles(&plan) * sizeof *memory),
                *history = malloc((size_t)(m * p) * sizeof *history),
+               *numbers = malloc((size_t)(m * (p + count)) * sizeof *numbers),
                *sums = malloc((size_t)(m * m * (p + 1)) * sizeof *sums);
         for (int i = 0; i < m * p; ++i) history[i] = codes[i];
         for (int k = 0; k < count_of_kernels; ++k) {
             memset(memory, 0, okid_spectrum_doubles(&plan) * sizeof *memory);
             okid_spectrum_create(&plan, memory);
-            const double energy = kernels[k].absorb(&plan, memory, history, codes + m * p);
+            const double energy = kernels[k].absorb(&plan, memory, history, codes + m * p, NULL);
             TEST_ASSERT_TRUE(energy > 0 && okid_spectrum_error(&plan, energy) < 0.5);
-            kernels[k].flush(&plan, memory, sums);
+            kernels[k].flush(&plan, memory, sums, 1);
+            expect_sums(kernels[k].name, sums, codes, m, m, p, count);
+            for (int i = 0; i < m * (p + count); ++i) numbers[i] = codes[i];
+            (void)kernels[k].absorb(&plan, memory, history, NULL, numbers + m * p);
+            memset(sums, 0, (size_t)(m * m * (p + 1)) * sizeof *sums);
+            kernels[k].flush(&plan, memory, sums, 0); // added, not rounded
+            for (int i = 0; i < m * m * (p + 1); ++i) {
+                TEST_ASSERT_TRUE_MESSAGE(fabs(sums[i] - nearbyint(sums[i])) < 1e-3, kernels[k].name);
+                sums[i] = nearbyint(sums[i]);
+            }
             expect_sums(kernels[k].name, sums, codes, m, m, p, count);
         }
+        free(numbers);
         free(sums);
         free(history);
         free(memory);

@@ -34,11 +34,21 @@ class Decomposition(ctypes.Structure):
     _fields_ = (("identifier", _handle), ("config", _handle), ("model", _handle))
 
 
+class Columns(ctypes.Structure):
+    """okid_host_columns_t."""
+
+    _fields_ = (
+        ("data", _handle), ("type", _status), ("channels", _size), ("row_stride", ctypes.c_ssize_t),
+        ("channel_stride", ctypes.c_ssize_t),
+    )  # fmt: skip
+
+
 SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_abi": (_status, []),
     "okid_host_error": (_text, []),
     "okid_host_error_status": (_status, []),
     "okid_host_identify": (_status, [_text, _status, _out, _sizes, ctypes.POINTER(_text), _handle, _handle, _out]),
+    "okid_host_identify_columns": (_status, [_text, _status, *[_handle] * 7]),
     "okid_host_result_json": (_text, [_handle]),
     "okid_host_result_summary": (_text, [_handle]),
     "okid_host_result_table": (_text, [_handle]),

@@ -176,6 +176,8 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_model_simulate": (c_int, [_model, doubles, c_size_t, doubles, doubles, doubles]),
     "okid_model_predict": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles, doubles]),
     "okid_model_initial_state": (c_int, [_model, doubles, doubles, c_size_t, doubles, doubles]),
+    "okid_model_fit_memsize": (c_size_t, [_model]),
+    "okid_model_fit": (c_int, [_model, doubles, c_size_t, doubles, doubles, opaque, c_size_t]),
     "okid_warning_code": (c_char_p, [c_uint32]),
     "okid_identify_usable_p": (c_int32, [c_int32, c_int32, c_int32, c_int64]),
     "okid_identify_lags": (c_int32, [POINTER(IdentifyConfig)]),

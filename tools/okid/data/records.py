@@ -22,41 +22,46 @@ from okid.abi.arguments import unmasked
 Real = NDArray[np.float64]
 
 
-def _one(values: ArrayLike, what: str) -> Real:
+def _one(values: ArrayLike, what: str, types: tuple[str, ...]) -> NDArray[Any]:
     given = unmasked(values)
     if given.dtype.kind not in "fiub":
         raise InputError(f"{what} is of type {given.dtype}, expected real numbers")
-    real = np.asarray(given, dtype=np.float64)  # perhaps the caller's own: nobody may modify it
+    real = given if given.dtype.str[1:] in types and given.dtype.isnative else np.asarray(given, dtype=np.float64)
     if real.ndim == 1:
         real = real[:, None]
     if real.ndim != 2 or real.shape[1] == 0:
         raise InputError(f"{what} has shape {given.shape}, expected (samples, channels)")
+    return real  # perhaps the caller's own: nobody may modify it
+
+
+def _check_finite(real: Real, what: str) -> None:
     if np.any(np.isinf(real)):
         row, column = np.argwhere(np.isinf(real))[0]
         raise InputError(
             f"{what} is infinite at sample {row} (from 0) of channel {what.split('[')[0]}{column + 1}; use NaN for "
             "missing samples"
         )
-    return real
 
 
-def _many(values: ArrayLike | Sequence[ArrayLike], what: str) -> list[Real]:
+def _many(values: ArrayLike | Sequence[ArrayLike], what: str, types: tuple[str, ...]) -> list[NDArray[Any]]:
     if isinstance(values, list | tuple) and values and all(hasattr(v, "shape") and hasattr(v, "dtype") or
                                                            hasattr(v, "to_numpy") for v in values):  # fmt: skip
-        return [_one(v, f"{what}[{k}]") for k, v in enumerate(values)]
-    return [_one(values, what)]  # type: ignore[arg-type]
+        return [_one(v, f"{what}[{k}]", types) for k, v in enumerate(values)]
+    return [_one(values, what, types)]  # type: ignore[arg-type]
 
 
-def paired(
-    u: ArrayLike | Sequence[ArrayLike] | None, y: ArrayLike | Sequence[ArrayLike]
-) -> tuple[list[Real], list[Real]]:
-    """Records as two lists of float64 (N, n_u) and (N, n_y) of matching lengths, to be read only; u None = no inputs.
+def sides(
+    u: ArrayLike | Sequence[ArrayLike] | None, y: ArrayLike | Sequence[ArrayLike], types: tuple[str, ...] = ("f8",)
+) -> tuple[list[NDArray[Any]], list[NDArray[Any]]]:
+    """Records as two lists of arrays (N, n_u) and (N, n_y) of matching lengths, to be read only; u None = no inputs.
+
+    Other numbers than `types` become float64. Nobody has looked for infinite ones.
 
     A list or tuple of NumPy arrays or pandas frames is several records; everything else is one. InputError names what
     does not fit.
     """
-    outputs = _many(y, "y")
-    inputs = [np.zeros((len(one), 0)) for one in outputs] if u is None else _many(u, "u")
+    outputs = _many(y, "y", types)
+    inputs = [np.zeros((len(one), 0)) for one in outputs] if u is None else _many(u, "u", types)
     if len(inputs) != len(outputs):
         raise InputError(f"u has {len(inputs)} records and y has {len(outputs)}")
     for k, (one, other) in enumerate(zip(inputs, outputs, strict=True)):
@@ -67,6 +72,17 @@ def paired(
             raise InputError(f"u has {len(one)} samples and y has {len(other)}{place}{hint}")
         if one.shape[1] != inputs[0].shape[1] or other.shape[1] != outputs[0].shape[1]:
             raise InputError(f"the number of channels changes between the records{place}")
+    return inputs, outputs
+
+
+def paired(
+    u: ArrayLike | Sequence[ArrayLike] | None, y: ArrayLike | Sequence[ArrayLike]
+) -> tuple[list[Real], list[Real]]:
+    """sides() in float64, without infinite numbers. InputError names the first one."""
+    inputs, outputs = sides(u, y)
+    for what, given in (("u", inputs), ("y", outputs)):
+        for k, one in enumerate(given):
+            _check_finite(one, f"{what}[{k}]" if len(given) > 1 else what)
     return inputs, outputs
 
 

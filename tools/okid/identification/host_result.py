@@ -86,12 +86,20 @@ class HostResult:
         return Identifier.of_handle(raw.identifier, config, model, self)
 
 
-def identify(options: Mapping[str, Any], records: Sequence[Real]) -> HostResult:
-    """`options` by the names of the arguments of okid.identify(); records (N, n_u + n_y), inputs first."""
-    handle, count = ctypes.c_void_p(), len(records)
-    rows = [np.ascontiguousarray(record, dtype=np.float64) for record in records]
-    samples = (ctypes.c_void_p * count)(*(one.ctypes.data for one in rows))
-    counts = (ctypes.c_size_t * count)(*map(len, rows))
+TYPES = ("f8", "f4", "i2", "i4")  # numbers the library takes as they are, in the order of okid_host_columns_t
+
+
+def _columns(arrays: Sequence[NDArray[Any]]) -> Any:
+    return (host.Columns * len(arrays))(
+        *((a.ctypes.data, TYPES.index(a.dtype.str[1:]), a.shape[1], *a.strides) for a in arrays)
+    )
+
+
+def identify(options: Mapping[str, Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]]) -> HostResult:
+    """`options` by the arguments of okid.identify(); of each record (N, n_u) and (N, n_y), one of TYPES."""
+    handle, count = ctypes.c_void_p(), len(outputs)
+    counts = (ctypes.c_size_t * count)(*map(len, outputs))
     names = (ctypes.c_char_p * count)(*(f"record {k} (counted from 0)".encode() for k in range(count)))
-    host.call("identify", options_text(options), count, samples, counts, names, None, None, ctypes.byref(handle))
+    given = _columns(inputs), _columns(outputs), counts, names
+    host.call("identify_columns", options_text(options), count, *given, None, None, ctypes.byref(handle))
     return HostResult(handle)

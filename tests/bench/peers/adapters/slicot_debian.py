@@ -15,7 +15,7 @@ import numpy as np
 _library = ctypes.CDLL("libslicot.so.0")
 
 
-def _call(routine: str, *arguments: Any) -> None:
+def _arguments(*arguments: Any) -> list[Any]:
     """Everything by address, lengths of the CHARACTER arguments behind all others."""
     passed: list[Any] = []
     texts = 0
@@ -29,32 +29,39 @@ def _call(routine: str, *arguments: Any) -> None:
             passed.append(ctypes.byref(ctypes.c_double(a)))
         else:
             passed.append(ctypes.byref(a if isinstance(a, ctypes.c_int) else ctypes.c_int(a)))
-    getattr(_library, routine)(*passed, *[ctypes.c_size_t(1)] * texts)
+    return [*passed, *[ctypes.c_size_t(1)] * texts]
+
+
+def prepared(meth: str, alg: str, given_u: Any, given_y: Any, n: int, s: int) -> Any:
+    """What identifies these arrays at order n and s block rows each time it is called; memory is taken before. @return A"""
+    u, y = np.array(given_u, order="F"), np.array(given_y, order="F")
+    (samples, m), n_y = u.shape, y.shape[1]
+    width = 2 * (m + n_y) * s
+    ldr, unknowns = max(width, 3 * m * s), m * (n + n_y)
+    R, values = np.zeros((ldr, width), order="F"), np.zeros(n_y * s)
+    work = np.zeros(8 * width**2 + 4 * m * s * (n + n_y) * (unknowns + 1) + 1_000_000)
+    whole = np.zeros(4 * width + n * n + 4 * unknowns, np.int32)
+    found, warning, info = ctypes.c_int(0), ctypes.c_int(0), ctypes.c_int(0)
+    A, B, C, D = (np.zeros(shape, order="F") for shape in ((n, n), (n, m), (n_y, n), (n_y, m)))
+    Q, Ry, S, K = (np.zeros(shape, order="F") for shape in ((n, n), (n_y, n_y), (n, n_y), (n, n_y)))
+    first = _arguments(meth, alg, "M" if meth == "M" else "N", "O", "N", "N", s, m, n_y, samples, u, samples, y, samples,
+                       found, R, ldr, values, 0.0, -1.0, whole, work, work.size, warning, info)  # fmt: skip
+    logical = np.zeros(2 * n, np.int32)
+    second = _arguments(meth, "A", "K", s, n, m, n_y, samples, R, ldr, A, n, C, n_y, B, n, D, n_y, Q, n, Ry, n_y, S, n, K,
+                        n, 0.0, whole, work, work.size, logical, warning, info)  # fmt: skip
+
+    def run() -> Any:
+        for routine, arguments in (("ib01ad_", first), ("ib01bd_", second)):
+            getattr(_library, routine)(*arguments)
+            if info.value != 0:
+                raise RuntimeError(f"{routine[:-1].upper()}: info {info.value}")
+        return A
+
+    return run
 
 
 def _slicot(meth: str, alg: str) -> Any:
-    def way(problem: Any) -> Any:
-        u, y = np.asfortranarray(problem.u.copy()), np.asfortranarray(problem.y.copy())
-        (samples, m), n_y, n, s = u.shape, y.shape[1], problem.order, problem.rows
-        width = 2 * (m + n_y) * s
-        ldr, unknowns = max(width, 3 * m * s), m * (n + n_y)
-        R, values = np.zeros((ldr, width), order="F"), np.zeros(n_y * s)
-        work = np.zeros(8 * width**2 + 4 * m * s * (n + n_y) * (unknowns + 1) + 1_000_000)
-        whole = np.zeros(4 * width + n * n + 4 * unknowns, np.int32)
-        found, warning, info = ctypes.c_int(0), ctypes.c_int(0), ctypes.c_int(0)
-        _call("ib01ad_", meth, alg, "M" if meth == "M" else "N", "O", "N", "N", s, m, n_y, samples, u, samples, y,
-              samples, found, R, ldr, values, 0.0, -1.0, whole, work, work.size, warning, info)  # fmt: skip
-        if info.value != 0:
-            raise RuntimeError(f"IB01AD: info {info.value}")
-        A, B, C, D = (np.zeros(shape, order="F") for shape in ((n, n), (n, m), (n_y, n), (n_y, m)))
-        Q, Ry, S, K = (np.zeros(shape, order="F") for shape in ((n, n), (n_y, n_y), (n, n_y), (n, n_y)))
-        _call("ib01bd_", meth, "A", "K", s, n, m, n_y, samples, R, ldr, A, n, C, n_y, B, n, D, n_y, Q, n, Ry, n_y, S,
-              n, K, n, 0.0, whole, work, work.size, np.zeros(2 * n, np.int32), warning, info)  # fmt: skip
-        if info.value != 0:
-            raise RuntimeError(f"IB01BD: info {info.value}")
-        return A
-
-    return way
+    return lambda problem: prepared(meth, alg, problem.u, problem.y, problem.order, problem.rows)()
 
 
 WAYS = {

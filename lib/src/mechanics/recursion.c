@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE    what goes from sample to sample along a record, one source for every instruction set
+// METHOD     follow: one product a sample, [estimate; next state] = M [u; y; x], its columns summed in two chains so that
+//            additions do not wait for each other; simulation and prediction side by side. filters: modes lie across lanes
+// NUMERICS   plain recursions; the predictor is A - K C as one matrix
+// WORKSPACE  none
+#include "recursion.h"
+#include "accumulate/isa.h"
+
+#include <string.h>
+
+#define FOLLOW OKID_FOR_ISA(okid_follow_)
+#define FILTERS OKID_FOR_ISA(okid_filters_)
+
+#if defined(__AVX512F__)
+enum { LANES = 8, VECTORS = 4 };
+#elif defined(__AVX2__)
+enum { LANES = 4, VECTORS = 4 };
+#else
+enum { LANES = 2, VECTORS = 4 };
+#endif
+typedef double lanes_t __attribute__((vector_size(LANES * sizeof(double))));
+
+static inline lanes_t load(const double* p) {
+    lanes_t v;
+    memcpy(&v, p, sizeof v);
+    return v;
+}
+static inline void store(double* p, lanes_t v) { memcpy(p, &v, sizeof v); }
+
+/// `vectors` vectors of rows of M [v; x]: v has `given` numbers from column 0 on, x has n_z from column `from` on.
+static inline __attribute__((always_inline)) void strip(const double* M, size_t ld, const double* v, size_t given,
+                                                        const double* x, size_t from, size_t n_z, double* out,
+                                                        const int vectors) {
+    lanes_t even[VECTORS] = {{0}}, odd[VECTORS] = {{0}};
+    for (size_t c = 0; c < given; ++c)
+#pragma GCC unroll 4
+        for (int k = 0; k < vectors; ++k) odd[k] += v[c] * load(M + c * ld + (size_t)(k * LANES));
+    const double* at = M + from * ld;
+    size_t c = 0;
+    for (; c + 1 < n_z; c += 2, at += 2 * ld)
+#pragma GCC unroll 4
+        for (int k = 0; k < vectors; ++k) {
+            even[k] += x[c] * load(at + k * LANES);
+            odd[k] += x[c + 1] * load(at + ld + k * LANES);
+        }
+    for (int k = 0; c < n_z && k < vectors; ++k) even[k] += x[c] * load(at + k * LANES);
+#pragma GCC unroll 4
+    for (int k = 0; k < vectors; ++k) store(out + k * LANES, even[k] + odd[k]);
+}
+
+static inline __attribute__((always_inline)) void product(const okid_follow_t* f, const double* M, const double* v,
+                                                          size_t given, const double* x, double* out) {
+    const size_t from = f->n_u + f->n_y;
+    for (size_t r = 0; r < f->ld; r += VECTORS * LANES) switch ((f->ld - r) / LANES) {
+        case 1: strip(M + r, f->ld, v, given, x, from, f->n_z, out + r, 1); break;
+        case 2: strip(M + r, f->ld, v, given, x, from, f->n_z, out + r, 2); break;
+        case 3: strip(M + r, f->ld, v, given, x, from, f->n_z, out + r, 3); break;
+        default: strip(M + r, f->ld, v, given, x, from, f->n_z, out + r, VECTORS); break;
+        }
+}
+
+static int all_finite(const double* v, size_t count) {
+    double sum = 0;
+    for (size_t i = 0; i < count; ++i) sum += v[i] * 0.0;
+    return sum == 0;
+}
+
+okid_follow_fn FOLLOW;
+void FOLLOW(const okid_follow_t* self, const double* rows, size_t count) {
+    const okid_follow_t f = *self;
+    const size_t m = f.n_u + f.n_y;
+    const int whole = all_finite(rows, count * m);
+    double *simulated = f.simulated, *predicted = f.predicted;
+    double *next_simulated = simulated + f.ld, *next_predicted = predicted + f.ld;
+    double *left = f.sums, *ahead = left + f.n_y, *sum = ahead + f.n_y, *square = sum + f.n_y, *known = square + f.n_y;
+    for (size_t n = 0; n < count; ++n, rows += m) {
+        const double* y = rows + f.n_u;
+        product(&f, f.simulator, rows, f.n_u, simulated + f.n_y, next_simulated);
+        const int corrects = whole || all_finite(y, f.n_y);
+        if (!f.predictor)
+            memcpy(next_predicted, next_simulated, f.ld * sizeof *predicted);
+        else
+            product(&f, corrects ? f.predictor : f.simulator, rows, corrects ? m : f.n_u, predicted + f.n_y,
+                    next_predicted);
+        for (size_t o = 0; f.errors && o < f.n_y; ++o) f.errors[n * f.n_y + o] = y[o] - next_simulated[o];
+        for (size_t o = 0; o < f.n_y; ++o) {
+            if (!corrects && y[o] != y[o]) continue;
+            const double simulation = y[o] - next_simulated[o], prediction = y[o] - next_predicted[o];
+            left[o] += simulation * simulation;
+            ahead[o] += prediction * prediction;
+            sum[o] += y[o];
+            square[o] += y[o] * y[o];
+            known[o] += 1;
+        }
+        double* swap = simulated;
+        simulated = next_simulated, next_simulated = swap;
+        swap = predicted;
+        predicted = next_predicted, next_predicted = swap;
+    }
+    if (simulated != f.simulated) memcpy(f.simulated, simulated, f.ld * sizeof *simulated);
+    if (predicted != f.predicted) memcpy(f.predicted, predicted, f.ld * sizeof *predicted);
+}
+
+okid_filters_fn FILTERS;
+void FILTERS(const okid_filters_t* self, const double* rows, size_t count) {
+    const okid_filters_t f = *self;
+    double *re = f.state, *im = re + f.states, *to = f.signals;
+    for (size_t n = 0; n < count; ++n, rows += f.m, to += f.n_u + 2 * f.states) {
+        for (size_t c = 0; c < f.n_u; ++c) to[c] = rows[c];
+        for (size_t k = 0; k < f.states; k += LANES) {
+            const lanes_t a = load(re + k), b = load(im + k), wr = load(f.w_re + k), wi = load(f.w_im + k);
+            store(to + f.n_u + k, a);
+            store(to + f.n_u + f.states + k, b);
+            lanes_t next = wr * a - wi * b;
+            for (size_t c = 0; c < f.n_u; ++c) next += rows[c] * load(f.drive + c * f.states + k);
+            store(re + k, next);
+            store(im + k, wr * b + wi * a);
+        }
+    }
+}
+
+#ifdef OKID_KERNEL_IS_BASE
+okid_recursion_t okid_recursion_pick(void) {
+#ifdef OKID_KERNEL_DISPATCH
+    extern okid_follow_fn okid_follow_avx2, okid_follow_avx512;
+    extern okid_filters_fn okid_filters_avx2, okid_filters_avx512;
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
+        return (okid_recursion_t){okid_follow_avx512, okid_filters_avx512};
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return (okid_recursion_t){okid_follow_avx2, okid_filters_avx2};
+#endif
+    return (okid_recursion_t){okid_follow_base, okid_filters_base};
+}
+#endif
