@@ -64,6 +64,7 @@ bench: build ## speed of the kernels and of whole identifications as ratios with
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --only kernels --save build/bench.json
 	@cmake --build build --target bench_slicot -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_slicot build/bench.json
 	@$(PYTHON) tests/bench/python_call.py build/bench.json
+	@$(PYTHON) tests/bench/identify_beside.py build/bench.json
 	@$(PYTHON) tests/bench/campaign.py 1000 5 build/bench.json
 	@cmake --build build --target bench_latency -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_latency build/bench.json
 

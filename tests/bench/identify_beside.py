@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""okid.identify beside SLICOT's MOESP (Cholesky: IB01AD, IB01BD; A, B, C, D, K) on the same arrays, in turns within one process, one
-thread; the least processor time of each. usage: identify_beside.py [BENCH.json to add to]
+"""okid.identify beside SLICOT's MOESP (Cholesky: IB01AD, IB01BD; A, B, C, D, K) on the same arrays, in turns within one
+process, one thread; the least processor time of each. usage: identify_beside.py [BENCH.json to add to]
 
-The true order, s block rows (okid methods: p = s, 2 s block rows), 1 % noise, no standard deviations. SLICOT works on its own
-copies in Fortran order, made before; its modes are not computed.
+The true order, s block rows (okid methods: p = s, 2 s block rows), 1 % noise, no standard deviations. SLICOT works on
+its own copies in Fortran order, made before; its modes are not computed.
 """
 
 from __future__ import annotations
@@ -61,11 +61,10 @@ def main() -> None:
             *(of_okid(m, u, y, structure.fs, order, s) for m in METHODS),
         ]
         slicot, *times = least_times(ways, 7 if samples > 50_000 else 25)
-        print(f"okid.identify {name}, s = {s}: SLICOT {1e3 * slicot:.2f} ms; "
-              + ", ".join(f"{m} {1e3 * t:.2f} ({slicot / t:.2f} x)" for m, t in zip(METHODS, times, strict=True)))  # fmt: skip
-        ratios |= {
-            f"slicot_moesp_over_identify_{m}_{name}_s{s}": slicot / t for m, t in zip(METHODS, times, strict=True)
-        }
+        print(f"okid.identify {name}, s = {s}: SLICOT {1e3 * slicot:.2f} ms")
+        for method, took in zip(METHODS, times, strict=True):
+            ratios[f"slicot_moesp_over_identify_{method}_{name}_s{s}"] = slicot / took
+            print(f"  {method:12} {1e3 * took:7.2f} ms, SLICOT takes {slicot / took:.2f} times as long")
     if len(sys.argv) > 1:
         path = Path(sys.argv[1])
         bench = json.loads(path.read_text(encoding="utf-8"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""okid_model_fit() against recursions written here in innovation form, and B, D by output error with and without a gap."""
+"""okid_model_fit() against recursions written here; B, D and x0 of a record against regressors of every sample."""
 
 from __future__ import annotations
 

@@ -45,11 +45,12 @@ OKID_NODISCARD OKID_API okid_status_t okid_model_predict(const okid_model_t* mod
 
 /// Least-squares initial state: the x0 for which simulation over the record fits best in the output-error sense.
 /// Samples of y with a NaN carry no weight; a NaN in u counts as 0. @param x0  out, n_z
-/// Cost 2 count n_y n_z^2 flop. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_NUMERIC
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_NUMERIC
 OKID_NODISCARD OKID_API okid_status_t okid_model_initial_state(const okid_model_t* model, const okid_real_t* u,
                                                                const okid_real_t* y, size_t count, okid_real_t* x0,
                                                                okid_real_t* work);
 
+/// Bytes of scratch okid_model_fit() needs; 0: sizes that are no model.
 OKID_API size_t okid_model_fit_memsize(const okid_model_t* model);
 
 /// How much of measured outputs the model leaves: all of a record in one pass, simulation and one-step prediction side by

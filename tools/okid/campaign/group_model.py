@@ -84,7 +84,8 @@ def agree(spec: CampaignSpec, records: Sequence[NDArray[np.float64]]) -> dict[st
         "sigma_blocks": i.sigma_blocks, "band": ":".join(map(str, i.band)) or None, "decimate": i.decimate or None,
     }  # fmt: skip
     try:
-        found = identify(options, records)
+        n_u = len(c.inputs)
+        found = identify(options, [one[:, :n_u] for one in records], [one[:, n_u:] for one in records])
     except Error as fault:
         return out | {"fault": str(fault)}
     return out | {"modes": [_listed(mode, mode["confident"]) for mode in found.about()["modes"]]}

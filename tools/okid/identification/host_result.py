@@ -90,9 +90,8 @@ TYPES = ("f8", "f4", "i2", "i4")  # numbers the library takes as they are, in th
 
 
 def _columns(arrays: Sequence[NDArray[Any]]) -> Any:
-    return (host.Columns * len(arrays))(
-        *((a.ctypes.data, TYPES.index(a.dtype.str[1:]), a.shape[1], *a.strides) for a in arrays)
-    )
+    sides = [host.Columns(a.ctypes.data, TYPES.index(a.dtype.str[1:]), a.shape[1], *a.strides) for a in arrays]
+    return (host.Columns * len(sides))(*sides)
 
 
 def identify(options: Mapping[str, Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]]) -> HostResult:

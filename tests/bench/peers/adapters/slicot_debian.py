@@ -33,7 +33,7 @@ def _arguments(*arguments: Any) -> list[Any]:
 
 
 def prepared(meth: str, alg: str, given_u: Any, given_y: Any, n: int, s: int) -> Any:
-    """What identifies these arrays at order n and s block rows each time it is called; memory is taken before. @return A"""
+    """A function that identifies these arrays at order n and s block rows and returns A; memory is taken before."""
     u, y = np.array(given_u, order="F"), np.array(given_y, order="F")
     (samples, m), n_y = u.shape, y.shape[1]
     width = 2 * (m + n_y) * s
@@ -44,11 +44,11 @@ def prepared(meth: str, alg: str, given_u: Any, given_y: Any, n: int, s: int) ->
     found, warning, info = ctypes.c_int(0), ctypes.c_int(0), ctypes.c_int(0)
     A, B, C, D = (np.zeros(shape, order="F") for shape in ((n, n), (n, m), (n_y, n), (n_y, m)))
     Q, Ry, S, K = (np.zeros(shape, order="F") for shape in ((n, n), (n_y, n_y), (n, n_y), (n, n_y)))
-    first = _arguments(meth, alg, "M" if meth == "M" else "N", "O", "N", "N", s, m, n_y, samples, u, samples, y, samples,
-                       found, R, ldr, values, 0.0, -1.0, whole, work, work.size, warning, info)  # fmt: skip
-    logical = np.zeros(2 * n, np.int32)
-    second = _arguments(meth, "A", "K", s, n, m, n_y, samples, R, ldr, A, n, C, n_y, B, n, D, n_y, Q, n, Ry, n_y, S, n, K,
-                        n, 0.0, whole, work, work.size, logical, warning, info)  # fmt: skip
+    logical, room = np.zeros(2 * n, np.int32), (whole, work, work.size)
+    first = _arguments(meth, alg, "M" if meth == "M" else "N", "O", "N", "N", s, m, n_y, samples, u, samples, y,
+                       samples, found, R, ldr, values, 0.0, -1.0, *room, warning, info)  # fmt: skip
+    second = _arguments(meth, "A", "K", s, n, m, n_y, samples, R, ldr, A, n, C, n_y, B, n, D, n_y, Q, n, Ry, n_y, S,
+                        n, K, n, 0.0, *room, logical, warning, info)  # fmt: skip
 
     def run() -> Any:
         for routine, arguments in (("ib01ad_", first), ("ib01bd_", second)):
