@@ -43,7 +43,7 @@ static void a_missing_input_is_no_force(void) {
     const okid_real_t A[1] = {(okid_real_t)0.5}, B[1] = {1}, C[1] = {2}, D[1] = {3}, x0[1] = {4};
     const okid_model_t model = {.n_u = 1, .n_y = 1, .n_z = 1, .A = A, .B = B, .C = C, .D = D};
     const okid_real_t held[3] = {1, (okid_real_t)NAN, 2}, none[3] = {1, 0, 2};
-    okid_real_t y[3], expected[3], work[64];
+    okid_real_t y[3], expected[3], work[4096];
     TEST_ASSERT_TRUE(okid_model_workspace(&model) <= sizeof work / sizeof *work);
     TEST_ASSERT_EQUAL(OKID_OK, okid_model_simulate(&model, none, 3, x0, expected, work));
     const okid_status_t status = okid_model_simulate(&model, held, 3, x0, y, work);
