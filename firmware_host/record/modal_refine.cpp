@@ -4,6 +4,7 @@
 #include "modal_refine.hpp"
 
 #include "carrier.hpp"
+#include "record_hold.hpp"
 #include "record_refine.hpp"
 
 #include <cmath>
@@ -46,10 +47,17 @@ void take_refined(const std::vector<std::optional<carried_mode>>& found, std::ve
     }
 }
 
+/// The likelihood is that of a force that is held between samples. One behind an anti-alias filter is not: on simulated
+/// laboratory records the intervals of the refined values held damping in 76 % instead of 92 %, white as the residuals were.
+bool is_held(const record_options& options, const record_set& set) {
+    return options.hold == "auto" ? !falls_to_nyquist(set) : options.hold != "band";
+}
+
 } // namespace
 
 bool refine_agreed(const record_options& options, std::vector<listed_mode>& listed, record_work& work) {
     if (options.refine == "no" || work.set.n_u == 0 || work.model.n_z == 0) return false;
+    if (options.refine == "auto" && !is_held(options, work.set)) return false;
     if (options.stage) options.stage("refining the modes");
     const bool constants = options.detrend != "none";
     if (options.refine == "auto" && whiteness_nearby(constants, work) > 2 * nearly_white) return false;
