@@ -300,8 +300,13 @@ okid_status_t okid_correlation_merge(okid_correlation_t* self, okid_correlation_
         else
             to[r].real += from[r].real;
     }
-    int64_t *counts = &self->stats.samples, *more = &other->stats.samples; // six counts side by side
-    for (int i = 0; i < 6; ++i) counts[i] += more[i];
+    okid_accumulator_stats_t *counts = &self->stats, *more = &other->stats;
+    counts->samples += more->samples;
+    counts->missing += more->missing;
+    counts->gaps += more->gaps;
+    counts->saturated += more->saturated;
+    counts->rows += more->rows;
+    counts->dropped += more->dropped;
     return OKID_OK;
 }
 

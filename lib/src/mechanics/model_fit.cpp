@@ -84,9 +84,15 @@ struct first_state {
         rows = memory.take<double>(block * static_cast<size_t>(n_u + n_y));
         sums = memory.take<double>(5 * y);
         observe = memory.take<double>(block * y * z);
-        for (double** each : {&square, &step, &power, &spare, &normal}) *each = memory.take<double>(z * z);
+        square = memory.take<double>(z * z);
+        step = memory.take<double>(z * z);
+        power = memory.take<double>(z * z);
+        spare = memory.take<double>(z * z);
+        normal = memory.take<double>(z * z);
         seen = memory.take<double>(std::max(y, z) * z);
-        for (double** each : {&right, &part, &scale}) *each = memory.take<double>(z);
+        right = memory.take<double>(z);
+        part = memory.take<double>(z);
+        scale = memory.take<double>(z);
         errors = memory.take<double>(block * y);
     }
 
