@@ -89,7 +89,8 @@ OKID_API void okid_correlation_config(const okid_correlation_t* self, okid_corre
 
 /// The sums in engineering units; the arrays live in the block given to okid_correlation_sums(). All column-major.
 typedef struct okid_correlation_sums_t {
-    int32_t n_u, n_y;      ///< as in the config
+    int32_t n_u;           ///< as in the config
+    int32_t n_y;           ///< as in the config
     int32_t lags;          ///< as in the config
     int32_t own_lags;      ///< as in the config
     int32_t runs;          ///< pieces whose ends are given: runs, or slots that fade
