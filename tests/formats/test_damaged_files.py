@@ -101,7 +101,7 @@ def test_a_missing_library_is_named_with_the_remedy(
     monkeypatch.setitem(sys.modules, module, None)
     path = tmp_path / "a.mat"
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(600))
-    words = rf"needs {package}, which is not installed: pip install 'okid\[formats\]'"
+    words = rf"needs {package}, which is not installed: pip install '\./tools\[formats\]' in a checkout"
     with pytest.raises(okid.InputError, match=words):
         read(path)
 

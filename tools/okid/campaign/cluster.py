@@ -62,7 +62,8 @@ def connected(workers: int, address: str | None, memory_mb: float) -> Iterator[A
         import_module("cryptography")  # for the certificates
     except ImportError:
         raise InputError(
-            "a campaign needs Dask and cryptography, which are not installed: pip install 'okid[campaign]'"
+            "a campaign needs Dask and cryptography, which are not installed: pip install './tools[campaign]' in a "
+            "checkout of okid"
         ) from None
     settings = {
         "distributed.admin.large-graph-warning-threshold": "4GB",

@@ -20,7 +20,9 @@ def library(name: str, purpose: str) -> Any:
         return importlib.import_module(name)
     except ImportError:
         package = name.partition(".")[0]
-        raise InputError(f"{purpose} needs {package}, which is not installed: pip install 'okid[formats]'") from None
+        raise InputError(
+            f"{purpose} needs {package}, which is not installed: pip install './tools[formats]' in a checkout of okid"
+        ) from None
 
 
 @contextlib.contextmanager
