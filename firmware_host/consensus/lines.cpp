@@ -2,8 +2,11 @@
 // PURPOSE  tell lines from modes
 // METHOD   the amplitude of a response at the mode's frequency, block by block: that of a vibration driven by chance wanders
 //          (its spread is half its mean), that of a line stays. A multiple of a stronger vibration moves in phase with the power
-//          of that vibration (Kim & Powers 1979, in the time domain)
+//          of that vibration (Kim & Powers 1979, in the time domain). A line of the force, a harmonic of a drive say, is in the
+//          responses too: where the force has a narrow peak and the responses over the force have none, there is no mode
 #include "lines.hpp"
+
+#include "spectrum.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -25,6 +28,10 @@ constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / s
 constexpr double stronger = 10; // amplitude of the vibration over that of its multiple
 constexpr double coupled_periods = 6;
 constexpr int most_multiple = 5;
+constexpr double forced = 10;         // power of a line of the force over that beside it
+constexpr double resonant = 2;        // power of the responses over that of the force, at a mode over beside it
+constexpr std::size_t averaged = 4;   // segments of a spectrum, at least
+constexpr std::size_t shortest = 128; // samples of a segment
 
 /// Amplitudes at a frequency, block by block under a Hann window.
 std::vector<complex> amplitudes(const record_level& level, std::size_t m, std::size_t channel, double frequency_hz,
@@ -105,6 +112,39 @@ bool is_line(const record_level& level, std::size_t m, std::size_t channel, cons
     return a.size() >= fewest_blocks && spread_over_mean(a) < steady;
 }
 
+/// Powers of a range of channels, each in units of its spread, added up.
+struct band_powers {
+    double at = 0, below = 0, above = 0;
+};
+
+band_powers powers_around(const record_level& level, std::size_t m, std::size_t first, std::size_t last,
+                          std::size_t size, double f, double width) {
+    band_powers out;
+    for (std::size_t k = first; k < last; ++k) {
+        const std::vector<double> power = power_spectrum(level.records, m, k, size);
+        if (power.empty()) continue;
+        out.at += mean_power(power, f - width, f + width);
+        out.below += mean_power(power, f - 4 * width, f - 2 * width);
+        out.above += mean_power(power, f + 2 * width, f + 4 * width);
+    }
+    return out;
+}
+
+/// Is it the force that has a narrow peak there, and not the structure?
+bool is_line_of_force(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode) {
+    std::size_t longest = 0, size = shortest;
+    for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
+    const double f = mode.frequency_hz / level.fs_hz;
+    while (2 * averaged * size <= longest && mode.damping_ratio * f * static_cast<double>(size) < 2) size *= 2;
+    const double width = std::max(mode.damping_ratio * f, 2 / static_cast<double>(size));
+    if (n_u == 0 || longest < averaged * size || f < 4 * width) return false;
+    const band_powers force = powers_around(level, m, 0, n_u, size, f, width);
+    if (force.at < forced * std::max(force.below, force.above)) return false;
+    const band_powers response = powers_around(level, m, n_u, m, size, f, width);
+    const double beside = std::max(response.below / force.below, response.above / force.above);
+    return response.at / force.at < resonant * beside;
+}
+
 } // namespace
 
 void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::size_t n_y,
@@ -117,6 +157,10 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
             const bool mains = near_multiple(mode.frequency_hz, 50, mains_tolerance) ||
                                near_multiple(mode.frequency_hz, 60, mains_tolerance);
             mode.why.emplace_back(mains ? "pickup" : "tone");
+            continue;
+        }
+        if (is_line_of_force(level, m, n_u, mode)) {
+            mode.why.emplace_back("harmonic");
             continue;
         }
         for (const consensus_mode& base : modes) {

@@ -19,7 +19,7 @@ constexpr std::array<std::pair<const char*, const char*>, 9> words{{
     {"split", "beside a stronger one of the same shape: one mode whose frequency changes with amplitude"},
     {"tone", "a steady line, not a vibration that dies away"},
     {"pickup", "a steady line at a multiple of the mains frequency"},
-    {"harmonic", "a multiple of a stronger vibration, in phase with it"},
+    {"harmonic", "a multiple of a stronger vibration or of the drive"},
     {"wide_sigma", "its standard deviation is too wide"},
     {"band_edge", "too slow for the record, or at the edge of the band"},
     {"overdamped", "damped too much to vibrate"},
