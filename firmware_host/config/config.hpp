@@ -75,7 +75,7 @@ struct channel_config {
 };
 
 struct identification_config {
-    std::string method = "auto", hankel = "system", hold = "auto", detrend = "mean";
+    std::string method = "auto", hankel = "system", hold = "auto", detrend = "mean", refine = "no";
     int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, n4sid 30, okid without a force p; order 0 = automatic
     std::optional<double> window_s, forgetting;
     double update_s = 0.5;

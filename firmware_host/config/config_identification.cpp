@@ -93,6 +93,13 @@ void read_identification(const toml::table& file, live_config& config) {
     if (out.detrend == "linear")
         refuse_key(place, *t.get("detrend"), "detrend",
                    "\"linear\" needs the whole record: none and mean are possible while a stream runs");
+    out.refine = t["refine"].value_or(std::string(agreed ? "auto" : "no"));
+    if (config.n_u == 0) {
+        if (out.refine == "yes")
+            refuse_key(place, *t.get("refine"), "refine",
+                       "\"yes\" needs a [[channel]] with the role force: without one there is nothing to simulate");
+        out.refine = "no";
+    }
     out.p = static_cast<int>(t["p"].value_or(std::int64_t{out.p}));
     out.rows = static_cast<int>(t["rows"].value_or(std::int64_t{0}));
     out.order = static_cast<int>(t["order"].value_or(std::int64_t{0}));

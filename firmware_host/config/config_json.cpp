@@ -90,6 +90,7 @@ ordered_json identification_json(const identification_config& id) {
             {"hold", id.hold},
             {"detrend", id.detrend},
             {"window_s", or_null(id.window_s)},
+            {"refine", id.refine},
             {"forgetting", or_null(id.forgetting)},
             {"update_s", id.update_s},
             {"sigma_blocks", id.sigma_blocks},

@@ -103,6 +103,7 @@ const std::vector<section_rule> schema = {
       {"detrend", kind::choice, 0, 0, {"none", "mean", "linear"}},
       {"band", kind::array},
       {"decimate", kind::order, 1, 1000},
+      {"refine", kind::choice, 0, 0, {"auto", "yes", "no"}},
       {"window_s", kind::positive, 0, 1e6},
       {"forgetting", kind::positive, 0, 1},
       {"update_s", kind::positive, 0, 1e5},

@@ -14,9 +14,10 @@ namespace {
 
 using nlohmann::json;
 
-/// As it would stand on a command line: lists with commas, text without quotes.
+/// As it would stand on a command line: lists with commas, text without quotes; of a boolean yes or no.
 std::string words_of(const json& value) {
     if (value.is_string()) return value.get<std::string>();
+    if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
     if (!value.is_array()) return value.dump();
     std::string out;
     for (const json& one : value) out += (&one == &value.front() ? "" : ",") + words_of(one);
@@ -69,7 +70,8 @@ option_places places_of(record_request& r) {
              {"sensing", &r.sensing},
              {"input_dofs", &r.input_dofs},
              {"output_dofs", &r.output_dofs},
-             {"sigma_blocks", &r.sigma_blocks}},
+             {"sigma_blocks", &r.sigma_blocks},
+             {"refine", &r.refine}},
             {},
             {{"inputs", &r.inputs}, {"outputs", &r.outputs}}};
 }

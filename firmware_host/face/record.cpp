@@ -31,12 +31,9 @@ asked read_record(const char* text) {
     places.texts.emplace_back("decimate", &out.request.decimate);
     places.texts.emplace_back("modes", &out.request.modes);
     places.texts.emplace_back("hit_dofs", &out.request.hit_dofs);
-    places.texts.emplace_back("refine", &out.request.refine);
     places.flags = {{"stabilization", &out.request.stabilization}};
     places.lists.emplace_back("units", &out.units);
     read_options(text, places);
-    if (out.request.refine == "true") out.request.refine = "yes";
-    if (out.request.refine == "false") out.request.refine.clear();
     return out;
 }
 

@@ -134,6 +134,7 @@ void start_from(const live_config& config, stream_request& to) {
     if (wanted.rows > 0) r.rows = std::to_string(wanted.rows);
     if (wanted.order > 0) r.order = std::to_string(wanted.order);
     if (wanted.band) r.band = fmt::format("{}:{}", wanted.band->first, wanted.band->second);
+    if (wanted.refine != (wanted.method == "auto" ? "auto" : "no")) r.refine = wanted.refine;
     if (wanted.decimate > 1) r.decimate = std::to_string(wanted.decimate);
     r.sigma_blocks = std::to_string(wanted.sigma_blocks);
     to.window_s = text_of(wanted.window_s);
@@ -163,6 +164,7 @@ std::string stream_json(const stream_config& config) {
                         {"forgetting", or_null(wanted.forgetting)},
                         {"update_s", wanted.update_s},
                         {"sigma_blocks", wanted.sigma_blocks},
+                        {"refine", wanted.refine},
                         {"restart_on_change", wanted.restart_on_change},
                         {"codes", bits_of(config.sample)}}
         .dump();
@@ -185,6 +187,9 @@ stream_config read_stream(const char* text, const live_config* config) {
     if (given.record.method.empty() && !given.forgetting.empty()) given.record.method = "okid-era";
     if (given.record.method == "auto" && !given.forgetting.empty())
         refuse("forgetting", given.forgetting, "none with method auto, which keeps the samples of a window: window_s");
+    const std::string& method = given.record.method;
+    const bool where_it_serves = given.record.refine == "auto" && !method.empty() && method != "auto";
+    if (where_it_serves) given.record.refine.clear();
     const record_options checked = check_request(given.record);
     if (checked.detrend == "linear") refuse("detrend", "\"linear\"", "none or mean: a stream has no line of its own");
     stream_config out;
@@ -216,6 +221,7 @@ stream_config read_stream(const char* text, const live_config* config) {
     wanted.band = checked.band;
     wanted.decimate = checked.decimate;
     wanted.sigma_blocks = checked.sigma_blocks;
+    wanted.refine = where_it_serves ? "auto" : checked.refine;
     take_memory(given, out);
     take_samples(given, out);
     return out;
@@ -236,7 +242,7 @@ okid_host_result_t* result_of(stream& from, result_context about) {
     okid_host_result_t* const out = make_result(from.model(), std::move(about));
     out->found.config = from.sums().config();
     out->found.identifier = from.sums().decomposition();
-    out->found.realised = from.model();
+    out->found.realised = from.sums().refiner() ? from.sums().realised() : from.model();
     return out;
 }
 

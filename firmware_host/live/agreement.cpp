@@ -26,7 +26,7 @@ record_options options_of(const stream_config& config) {
     out.outputs = config.outputs;
     out.fs_hz = config.rate_hz;
     out.method = config.wanted.method;
-    out.refine = "auto";
+    out.refine = config.wanted.refine;
     out.hold = config.wanted.hold;
     out.detrend = config.wanted.detrend;
     out.sigma_blocks = config.wanted.sigma_blocks;

@@ -79,6 +79,7 @@ void identifier::create_accumulator(const stream_config& config) {
     if (okid_accumulator_create(&accumulator_, &sums_config_, whole_.block.get(), sums_bytes_) != OKID_OK)
         throw failure(exit_usage, where_ + "the accumulator cannot be made");
     okid_accumulator_set_units(accumulator_, scale_.data(), offset_.data());
+    if (config.wanted.refine != "no") refiner_ = std::make_unique<sum_refiner>(config);
     if (config.wanted.sigma_blocks == 0) return;
     blocks_ =
         std::make_unique<live_blocks>(sums_config_, identify_config_, config.wanted.sigma_blocks, config.states_only);
@@ -116,7 +117,8 @@ bool identifier::wants_model() const {
 }
 
 void identifier::watch_model() {
-    if (okid_watch_set_model(watch_, &model_) != OKID_OK) return; // a model without a predictor is not watched
+    if (okid_watch_set_model(watch_, agreed_ ? &model_ : &realised_) != OKID_OK)
+        return; // a model without a predictor is not watched
     watched_ = true;
     const std::int64_t age = memory_samples_ > 0 ? memory_samples_ : basis();
     due_ = samples_ + age;
@@ -178,6 +180,7 @@ void identifier::restart() {
     ++restarts_;
     okid_accumulator_reset(accumulator_);
     if (blocks_) blocks_->reset();
+    if (refiner_) refiner_->reset();
 }
 
 /// A row of raw numbers to those kept for auto, with the watch over it.
@@ -205,16 +208,28 @@ template <class Number> okid_status_t identifier::keep(const Number* row) {
 template <class Number> okid_status_t identifier::absorb(const Number* samples, std::size_t count) {
     okid_status_t worst = OKID_OK;
     for (std::size_t done = 0; done < count;) {
-        const std::size_t n = blocks_ ? blocks_->room(accumulator_, count - done) : count - done;
+        std::size_t n = blocks_ ? blocks_->room(accumulator_, count - done) : count - done;
+        if (refiner_) n = refiner_->room(n);
         const okid_status_t status = add_samples(accumulator_, samples + done * m_, n);
         if (status < 0)
             throw failure(status == OKID_ERR_RANGE && sizeof(Number) > 2 ? exit_usage : exit_no_model,
                           fmt::format("the samples cannot be summed any further: {}", okid_status_text(status)));
         if (blocks_) blocks_->add(accumulator_, samples + done * m_, n);
+        if (refiner_) {
+            refiner_->add(samples + done * m_, n);
+            if (refiner_->wants_model()) choose_lags();
+        }
         worst = std::max(worst, status);
         done += n;
     }
     return worst;
+}
+
+/// A model of what has come so far, for the lags of the refinement.
+void identifier::choose_lags() {
+    const bool found = okid_identify_run(identify_, accumulator_, &realised_) >= 0;
+    model_ = realised_;
+    refiner_->choose_lags(found ? &realised_ : nullptr);
 }
 
 void identifier::flush() {
@@ -282,6 +297,7 @@ void identifier::add_missing(std::int64_t count) {
     if (agreed_) return agreed_->add_missing(count);
     okid_accumulator_gap(accumulator_, count);
     if (blocks_) blocks_->gap(accumulator_, count);
+    if (refiner_) refiner_->gap();
 }
 
 void identifier::reset() {
@@ -291,6 +307,7 @@ void identifier::reset() {
     else
         okid_accumulator_reset(accumulator_);
     if (blocks_) blocks_->reset();
+    if (refiner_) refiner_->reset();
     reset_counts();
 }
 
@@ -302,8 +319,16 @@ void identifier::reset_counts() {
     before_ = {};
 }
 
+void identifier::require_no_refinement() const {
+    if (refiner_)
+        throw failure(exit_usage, where_ +
+                                      "a state holds the sums that identify, not those that refine: expected refine "
+                                      "= \"no\" in a stream whose state is taken, put back or merged");
+}
+
 std::vector<std::byte> identifier::state() {
     if (agreed_) return agreed_->state();
+    require_no_refinement();
     flush();
     std::vector<std::byte> out(okid_accumulator_serialised_size(accumulator_));
     if (okid_accumulator_serialise(accumulator_, out.data(), out.size()) != OKID_OK)
@@ -338,6 +363,7 @@ void identifier::restore(const void* state, std::size_t bytes) {
         samples_ = agreed_->basis();
         return;
     }
+    require_no_refinement();
     owned_sums from = read_state(state, bytes, sums_config_);
     reset();
     if (const okid_status_t status = okid_accumulator_deserialise(accumulator_, state, bytes); status != OKID_OK)
@@ -360,6 +386,7 @@ void identifier::merge(const void* state, std::size_t bytes) {
     }
     if (memory_samples_ > 0)
         throw failure(exit_usage, where_ + "a window and a fading memory take no further records, only a growing one");
+    require_no_refinement();
     owned_sums from = read_state(state, bytes, sums_config_);
     flush();
     if (const okid_status_t status = okid_accumulator_merge(accumulator_, from.sums); status != OKID_OK)
@@ -376,7 +403,10 @@ okid_status_t identifier::run(const mass_plan& mass) {
         return status;
     }
     flush();
-    return okid_identify_run(identify_, accumulator_, &model_);
+    const okid_status_t status = okid_identify_run(identify_, accumulator_, &realised_);
+    model_ = realised_;
+    if (status >= 0 && refiner_) refiner_->refine(model_);
+    return status;
 }
 
 std::int64_t identifier::rows() {

@@ -4,6 +4,7 @@
 #include "agreement.hpp"
 #include "blocks.hpp"
 #include "stream_config.hpp"
+#include "sum_refiner.hpp"
 
 #include <okid/accumulator.h>
 #include <okid/identify.h>
@@ -51,11 +52,15 @@ class identifier {
         if (agreed_) agreed_->pass();
     }
     const okid_identified_t& model() const { return model_; }
-    okid_identify_t* decomposition() { return identify_; } ///< of the last run()
+    const okid_identified_t& realised() const { return realised_; } ///< the model before it was refined
+    okid_identify_t* decomposition() { return identify_; }          ///< of the last run()
+    /// Maximum likelihood of a named method, else none.
+    const sum_refiner* refiner() const { return refiner_.get(); }
     /// Standard deviations for the model of the last run(), of its modes and what the plan wants; none when sigma_blocks is
     /// 0 or there is too little to cut into blocks.
     std::optional<deviations> sigma(const mass_plan& plan) {
         if (agreed_) return agreed_->found().context.sigma;
+        if (refiner_ && refiner_->refined()) return refiner_->sigma(model_, plan);
         return blocks_ && samples_ >= blind_until_ ? blocks_->sigma(accumulator_, model_, plan) : std::nullopt;
     }
     /// Of each output 100 (1 - innovation / spread), both RMS: what the model of the last run() says of the next sample.
@@ -91,6 +96,8 @@ class identifier {
     okid_accumulator_stats_t held();
     void create_accumulator(const stream_config& config);
     void create_identifier(const stream_config& config);
+    void choose_lags();
+    void require_no_refinement() const;
     template <class Number> okid_status_t absorb(const Number* samples, std::size_t count);
     template <class Number> okid_status_t keep(const Number* row);
     owned_sums read_state(const void* state, std::size_t bytes, const okid_accumulator_config_t& shape) const;
@@ -113,8 +120,9 @@ class identifier {
     okid_accumulator_t* accumulator_ = nullptr; ///< of whole_
     okid_identify_t* identify_ = nullptr;
     okid_identify_config_t identify_config_{};
-    okid_identified_t model_{};
+    okid_identified_t model_{}, realised_{};
     std::unique_ptr<live_blocks> blocks_;
+    std::unique_ptr<sum_refiner> refiner_;
 
     bool restart_on_change_ = false, watched_ = false; ///< the watch has a model
     std::unique_ptr<std::byte[]> watch_block_;

@@ -135,6 +135,18 @@ result_context stream::context(remarks said) {
         out.detrend = config_.wanted.detrend;
         out.inputs = config_.inputs;
         out.outputs = config_.outputs;
+        if (const sum_refiner* refiner = identifier_.refiner()) {
+            out.refined = refiner->refined();
+            if (!refiner->fault().empty() && config_.wanted.refine == "yes")
+                out.warnings.emplace_back(
+                    "refine_failed",
+                    fmt::format("the model is as identified, the refinement was of no use: {}", refiner->fault()));
+            if (out.refined && !out.refined->converged)
+                out.warnings.emplace_back("refine_unconverged",
+                                          fmt::format("the refinement did not come to an end in {} steps: the best "
+                                                      "model reached is given. Try another order",
+                                                      out.refined->iterations));
+        }
     }
     if (stats.missing > 0 && !agreed)
         out.warnings.emplace_back(

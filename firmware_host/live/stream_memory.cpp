@@ -4,6 +4,7 @@
 #include "agreement.hpp"
 #include "error.hpp"
 #include "result/method.hpp"
+#include "sum_refiner.hpp"
 
 #include <okid/uncertainty.h>
 
@@ -111,6 +112,7 @@ double stream_bytes(const stream_config& stream) {
     const double lagged = static_cast<double>(stream.channels()) * (sums.lags + 1);
     double out = static_cast<double>(model) + static_cast<double>(whole) + static_cast<double>(watching);
     out += 8 * lagged * lagged; // the Gram matrix for what the model predicts
+    if (stream.wanted.refine != "no") out += sum_refiner_bytes(stream);
     if (stream.wanted.sigma_blocks == 0) return out;
     const okid_accumulator_config_t block = block_sums(sums);
     const okid_jackknife_config_t jackknife{identify, block};

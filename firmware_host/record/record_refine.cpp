@@ -17,7 +17,7 @@
 namespace okid_host {
 namespace {
 
-constexpr int blocks = 20;
+constexpr int blocks = 20, draws = 64; ///< of a record; from sums
 constexpr std::size_t most_runs = 32;
 constexpr double same_percent = 0.01; ///< fits closer than this are the same
 constexpr double lost_percent = 0.5;  ///< a loss of prediction worth a remark
@@ -61,25 +61,23 @@ class refiner {
   public:
     /// @param iterations  at most, 0 = as many as it takes; others leave no replicates
     refiner(const driven_runs& runs, const okid_identified_t& start, bool constants, int iterations = 0)
-        : n_u_(start.n_u), n_y_(start.n_y), n_z_(start.n_z) {
-        const okid_refine_config_t config{n_u_,
-                                          n_y_,
-                                          n_z_,
-                                          static_cast<std::int32_t>(runs.counts.size()),
-                                          iterations > 0 ? 0 : blocks,
-                                          iterations,
-                                          constants ? 1 : 0};
-        block_.resize(okid_refine_memsize(&config));
-        status = okid_refine_create(&refine_, &config, block_.data(), block_.size());
+        : blocks_(iterations > 0 ? 0 : blocks), n_u_(start.n_u), n_y_(start.n_y), n_z_(start.n_z) {
+        open(static_cast<std::int32_t>(runs.counts.size()), iterations, constants);
         const okid_model_t model = model_view(start);
         if (status >= 0) status = okid_refine_run(refine_, &model, runs.counts.data(), runs.samples.data(), &found);
+    }
+    refiner(const okid_correlation_sums_t& sums, const okid_identified_t& start, bool constants)
+        : blocks_(draws), n_u_(start.n_u), n_y_(start.n_y), n_z_(start.n_z) {
+        open(0, 0, constants);
+        const okid_model_t model = model_view(start);
+        if (status >= 0) status = okid_refine_from_correlation(refine_, &model, &sums, &found);
     }
 
     std::vector<replicate_model> replicates() {
         std::vector<replicate_model> out;
-        for (int b = 0; b < blocks; ++b) {
+        for (int b = 0; b < blocks_; ++b) {
             replicate_model one;
-            one.share = 1.0 / blocks;
+            one.share = 1.0 / blocks_;
             one.n_u = n_u_;
             one.n_y = n_y_;
             one.A.resize(size_of(n_z_) * size_of(n_z_));
@@ -93,11 +91,17 @@ class refiner {
         return out;
     }
 
-    okid_status_t status;
+    okid_status_t status = OKID_OK;
     okid_refined_t found{};
 
   private:
-    int n_u_, n_y_, n_z_;
+    void open(std::int32_t runs, int iterations, bool constants) {
+        const okid_refine_config_t config{n_u_, n_y_, n_z_, runs, blocks_, iterations, constants ? 1 : 0};
+        block_.resize(okid_refine_memsize(&config));
+        status = okid_refine_create(&refine_, &config, block_.data(), block_.size());
+    }
+
+    int blocks_, n_u_, n_y_, n_z_;
     std::vector<std::byte> block_;
     okid_refine_t* refine_ = nullptr;
 };
@@ -214,6 +218,17 @@ refinement report(const okid_refined_t& found, int n_y) {
     return out;
 }
 
+likeliest_model outcome(refiner& one, const okid_identified_t& start) {
+    likeliest_model out;
+    out.status = one.status;
+    if (one.status < 0) return out;
+    out.arrays = std::make_unique<refined_arrays>();
+    if (!make_model(start, one.found, *out.arrays, out.model)) out.status = OKID_ERR_NO_MODES;
+    out.found = report(one.found, start.n_y);
+    out.replicates = one.replicates();
+    return out;
+}
+
 } // namespace
 
 void find_markov(const okid_model_t& m, int count, std::vector<double>& out) {
@@ -240,13 +255,13 @@ double whiteness_nearby(bool constants, const record_work& work) {
 likeliest_model likeliest(bool constants, const record_work& work) {
     const driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)));
     refiner one(runs, work.model, constants);
-    likeliest_model out;
-    out.status = one.status;
-    if (one.status < 0) return out;
-    out.arrays = std::make_unique<refined_arrays>();
-    if (!make_model(work.model, one.found, *out.arrays, out.model)) out.status = OKID_ERR_NO_MODES;
-    out.found = report(one.found, work.model.n_y);
-    out.replicates = one.replicates();
+    return outcome(one, work.model);
+}
+
+likeliest_model likeliest(bool constants, const okid_identified_t& start, const okid_correlation_sums_t& sums) {
+    refiner one(sums, start, constants);
+    likeliest_model out = outcome(one, start);
+    out.found.whiteness = NAN;
     return out;
 }
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Maximum-likelihood refinement of a model identified from records in memory (okid/refine.h).
+// Maximum-likelihood refinement of a model identified from records in memory, or from sums (okid/refine.h).
 #pragma once
 #include "record_uncertainty.hpp"
 #include "record_work.hpp"
+
+#include <okid/correlation.h>
 
 namespace okid_host {
 
@@ -20,6 +22,8 @@ double whiteness_nearby(bool constants, const record_work& work);
 
 /// @param constants  as for refine_model()
 likeliest_model likeliest(bool constants, const record_work& work);
+/// The same from correlation sums; `replicates`: 64 draws from the Cramér-Rao bound instead.
+likeliest_model likeliest(bool constants, const okid_identified_t& start, const okid_correlation_sums_t& sums);
 
 /// Put the refined model, its modes and its fits into `result` where it simulates the records no worse than the model that
 /// stands there with its fits; else a remark refine_failed. The records are in the model's own terms.

@@ -37,9 +37,11 @@ nlohmann::ordered_json refinement_json(const refinement& found, const std::vecto
 
 std::string refinement_text(const refinement& found, const std::vector<std::string>& outputs) {
     std::string out =
-        fmt::format("\nrefined: {} iterations, log-likelihood {:+.1f}, {}; correlation of the residuals "
-                    "{:.3g} (white: 1)\nnoise (1 sigma):",
-                    found.iterations, found.gain, found.converged ? "converged" : "NOT converged", found.whiteness);
+        fmt::format("\nrefined: {} iterations, log-likelihood {:+.1f}, {}{}\nnoise (1 sigma):", found.iterations,
+                    found.gain, found.converged ? "converged" : "NOT converged",
+                    std::isfinite(found.whiteness)
+                        ? fmt::format("; correlation of the residuals {:.3g} (white: 1)", found.whiteness)
+                        : fmt::format(", from sums over {} samples", found.samples));
     for (std::size_t i = 0; i < outputs.size(); ++i)
         out += fmt::format("{} {} {:.3g}", i == 0 ? "" : ",", outputs[i], found.noise_std[i]);
     return out + "\n";

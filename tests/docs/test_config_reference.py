@@ -106,6 +106,7 @@ OF_OTHER_FILES = {
     ("channel", "byte_order"): ("config_channel.cpp", r'table\["byte_order"\]\.value_or\(std::string\("(\w+)"\)\)'),
     ("channel", "value"): ("config_channel.cpp", r'\["value"\]\.value_or\(std::string\("(\w+)"\)\)'),
     ("channel", "signed"): ("config_channel.cpp", r'\["signed"\]\.value_or\((\w+)\)'),
+    ("identification", "refine"): ("config_identification.cpp", r'std::string\(agreed \? "(\w+)" : "no"\)'),
     ("trigger", "source"): ("config_trigger.cpp", r'\["source"\]\.value_or\(std::string\("(\w+)"\)\)'),
     ("trigger", "edge"): ("config_trigger.cpp", r'\["edge"\]\.value_or\(std::string\("(\w+)"\)\)'),
     ("trigger", "active_low"): ("config_trigger.cpp", r'\["active_low"\]\.value_or\((\w+)\)'),

@@ -39,6 +39,8 @@ class Session:
     `restart_on_change`: once the modes have come to rest at three calls of modes() in a row, a change of the structure
     makes a window or a fading memory forget what was before. `input_dofs`, `output_dofs`, `sensing`, `hold`: as in
     okid.identify(), for M, K and R.
+    `refine`: maximum likelihood, "auto" of method "auto". Of a named method True or "auto" (where the search ends):
+    each model is refined from correlation sums kept beside the others (result.refinement); no states or merge() then.
     The other arguments are those of okid.identify(). Raises InputError for arguments that do not go together.
 
     >>> import numpy as np, okid
@@ -74,6 +76,7 @@ class Session:
         scale: ArrayLike = 1.0,
         offset: ArrayLike = 0.0,
         sigma_blocks: int = 20,
+        refine: bool | str | None = None,
         input_dofs: Sequence[int] | None = None,
         output_dofs: Sequence[int] | None = None,
         sensing: str | Sequence[str] = "acceleration",

@@ -5,7 +5,9 @@
  *
  * Of a named method memory is taken when a stream is made; okid_host_stream_add() takes none. It costs O(m q) a sample, twice
  * that with standard deviations and without a window. Method auto (the default, unless an option of one method is given)
- * keeps the samples of the window, or the newest 10 million numbers; an update identifies from them.
+ * keeps the samples of the window, or the newest 10 million numbers; an update identifies from them. A named method with
+ * refine keeps correlation sums beside its own: some 2 (m + n_u) n_u L flop a sample, L lags to where the slowest mode has
+ * died away, at most 8192; the first 8,192 samples (65,536 where they give no model) are kept until L is chosen.
  */
 #ifndef OKID_HOST_STREAM_H
 #define OKID_HOST_STREAM_H
@@ -23,7 +25,7 @@ struct okid_host_result; /* okid_host/record.h */
 /**
  * Make a stream.
  * @param options  JSON object: inputs, outputs (lists of names), fs (Hz), method, p, rows, order, max_order, hankel, hold,
- *                 detrend (none or mean), sigma_blocks, sensing, input_dofs, output_dofs as for okid_host_identify();
+ *                 detrend (none or mean), sigma_blocks, refine, sensing, input_dofs, output_dofs as for okid_host_identify();
  *                 window_s, forgetting, update_s, restart_on_change as in [identification] of a CONFIG.toml; codes (0 real
  *                 numbers, or the bits of ADC codes: 16, 24, 32), scale and offset (one number, or one a channel: value =
  *                 scale * sample + offset), saturated (keep, missing: samples with a code at full scale); states_only

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""Maximum likelihood in a stream of a named method: the Cramér-Rao bound, gaps, cuts, windows, replay beside record.
+
+Bound, structures and simulation are the tests' own (test_refine.py, systems.py); they share with the program the model
+class: poles, shapes, white noise at the sensors. The rig of the replay comes out of `okid simulate`; it is compared
+with the refinement of the record, a second implementation (a simulation instead of sums).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+from typing import Any
+
+import numpy as np
+import okid
+import pytest
+import systems
+from numpy.typing import NDArray
+from program import okid as run_okid
+from test_refine import bound, made, options
+from two_masses import rig_text, simulate_rig
+
+SLOW = os.environ.get("OKID_SLOW") == "1"  # the long tier
+Array = NDArray[np.float64]
+MEMORY: dict[str, dict[str, Any]] = {"growing": {}, "window": {"window_s": 60.0}, "forgetting": {"forgetting": 0.9995}}
+
+
+def stream(record: Array, n_u: int, fs: float, size: int = 4000, **more: Any) -> okid.Result:
+    with okid.Session(n_u, record.shape[1] - n_u, fs=fs, **{"refine": True, **more}) as session:
+        for first in range(0, len(record), size):
+            session.feed(record[first : first + size])
+        return session.identify()
+
+
+def modes(result: okid.Result, truth: Array) -> tuple[Array, Array]:
+    """f, then zeta, of the modes nearest to the true ones, and their deviations."""
+    found = np.array([mode.frequency_hz for mode in result.modes])
+    near = [result.modes[int(np.argmin(abs(found - f)))] for f in truth]
+    values = [mode.frequency_hz for mode in near] + [mode.damping_ratio for mode in near]
+    sigma = [mode.frequency_std_hz or np.nan for mode in near] + [mode.damping_ratio_std or np.nan for mode in near]
+    return np.array(values), np.array(sigma)
+
+
+CASES = [("w1", 5.0, "growing", 24)]
+if SLOW:
+    CASES = [(name, noise, kept, 40) for name in ("w1", "w2") for noise in (1.0, 5.0) for kept in ("growing", "window")]
+
+
+@pytest.mark.parametrize(("name", "noise", "kept", "records"), CASES)
+def test_errors_reach_the_cramer_rao_bound(name: str, noise: float, kept: str, records: int) -> None:
+    """Of all samples fed, those included that arm the lags; of a window, of the samples in it."""
+    s, samples = getattr(systems, name)(), {"w1": 20000, "w2": 30000}[name]
+    truth, ratios, inside = np.concatenate(s.modes()), [], []
+    half = len(s.M)
+    for seed in range(records):
+        u, y, sigma = made.__wrapped__(name, noise, 8000 + seed, samples + (4000 if kept == "window" else 0))
+        if seed == 0:
+            limit = np.concatenate(bound(s, u[:samples], sigma))
+        window = {"window_s": samples / s.fs} if kept == "window" else {}
+        result = stream(np.hstack([u, y]), u.shape[1], s.fs, **options(name, "n4sid-moesp"), **window)
+        assert result.refinement is not None and result.refinement.converged
+        assert np.allclose(result.refinement.noise_std, sigma, rtol=0.05)
+        values, deviations = modes(result, truth[:half])
+        ratios.append((values - truth) / limit)
+        inside.append(abs(values - truth) < 1.96 * deviations)
+    square = np.mean(np.array(ratios) ** 2, axis=0)
+    f, zeta = np.sqrt(square[:half].mean()), np.sqrt(square[half:].mean())
+    print(name, noise, kept, "f", f, "zeta", zeta, "worst", np.sqrt(square.max()), "inside", np.mean(inside))
+    by_chance = 3 / np.sqrt(2 * records * half)
+    assert f < max(1.1, 1 + by_chance) and zeta < max(1.1, 1 + by_chance)
+    assert 0.90 < np.mean(inside) < 0.99
+
+
+@pytest.mark.parametrize("memory", list(MEMORY))
+def test_cuts_gaps_and_codes_do_not_matter(memory: str) -> None:
+    """Single calls or many, NaN or gap(), codes or the numbers they stand for: the same refined modes."""
+    s = systems.w1()
+    u, y, _ = made("w1", 1.0, 5, 14000)
+    record = np.hstack([u, y])
+    scale = np.max(abs(record), axis=0) / 32000
+    codes = np.rint(record / scale).astype(np.int16)
+    exact = codes * scale
+    more: dict[str, Any] = {"method": "okid-era", "p": 20, "order": 6, "sigma_blocks": 0, "fs": s.fs, **MEMORY[memory]}
+
+    def fed(parts: list[Array], gap: int = 0, **also: Any) -> Array:
+        with okid.Session(1, 3, **more, refine=True, **also) as session:
+            for k, part in enumerate(parts):
+                if gap and k > 0:
+                    session.gap(gap)
+                session.feed(part)
+            result = session.identify()
+        assert result.refinement is not None and result.refinement.samples > 2000
+        return modes(result, s.modes()[0])[0]
+
+    holed = exact.copy()
+    holed[2500:2507] = np.nan
+    whole = fed([holed])
+    assert np.allclose(fed([holed[:2500], holed[2507:]], gap=7), whole, rtol=1e-9)
+    assert np.allclose(fed(np.array_split(holed, 37)), whole, rtol=1e-9)
+    integers = fed([codes[:2500], codes[2507:]], gap=7, codes=16, scale=scale)
+    assert np.allclose(integers, whole, rtol=1e-8)
+
+
+def test_a_replay_says_what_the_record_says(tmp_path: pathlib.Path) -> None:
+    """Within half a deviation of `okid identify --refine`; the same bytes at any speed; updates are refined."""
+    rig = simulate_rig(tmp_path, rig_text(60.0))
+    config = (rig / "a.toml").read_text()
+    assert config.count("[identification]") == 1
+    (rig / "a.toml").write_text(config.replace("[identification]", '[identification]\nrefine = "yes"'))
+    runs = []
+    for speed in ("max", "400"):
+        files = ["--events", rig / "e.jsonl", "--json", rig / "r.json"]
+        done = run_okid("replay", rig / "a.log", "-c", rig / "a.toml", "--speed", speed, *files)
+        assert done.returncode == 0, done.stderr
+        runs.append((rig / "r.json").read_bytes())
+    assert runs[0] == runs[1]
+    live = json.loads(runs[0])
+    made_record = run_okid("convert", rig / "a.log", rig / "decoded.csv", "-c", rig / "a.toml")
+    assert made_record.returncode == 0, made_record.stderr
+    inputs, outputs = ",".join(live["inputs"]), ",".join(live["outputs"])
+    done = run_okid("identify", rig / "decoded.csv", "--inputs", inputs, "--outputs", outputs, "--method", "okid-era",
+                    "--p", "12", "--rows", "24", "--refine", "--json", rig / "o.json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    offline = json.loads((rig / "o.json").read_text())
+    truth = json.loads((rig / "t.json").read_text())
+    assert "refinement" in live and live["refinement"]["converged"] and live["refinement"]["whiteness"] is None
+    assert live["refinement"]["samples"] > 0.9 * live["samples"]
+    assert live["refinement"]["noise_std"] == pytest.approx(offline["refinement"]["noise_std"], rel=0.01)
+    for k, f in enumerate(truth["frequency_hz"]):
+        a, b = (min(x["modes"], key=lambda mode: abs(mode["frequency_hz"] - f)) for x in (live, offline))
+        for key in ("frequency_hz", "damping_ratio"):
+            std = b[key.replace("_hz", "_std_hz")] if key == "frequency_hz" else b["damping_ratio_std"]
+            assert abs(a[key] - b[key]) < 0.5 * std, (key, a, b)
+            assert abs(a[key] - truth[key][k]) < 4 * std
+    updates = [json.loads(line) for line in (rig / "e.jsonl").read_text().splitlines() if '"modes"' in line]
+    last = [event for event in updates if event["type"] == "modes"][-1]["modes"]
+    assert [mode["frequency_hz"] for mode in last] == pytest.approx(
+        [mode["frequency_hz"] for mode in live["modes"]], rel=1e-9
+    )
+
+
+def test_what_cannot_be_refined_says_so() -> None:
+    """Too few samples without a gap: the model as identified, and a remark. Ambient streams and states: refused."""
+    s = systems.w1()
+    u, y, _ = made("w1", 1.0, 6, 4000)
+    record = np.hstack([u, y])
+    record[::200] = np.nan
+    result = stream(record, 1, s.fs, method="okid-era", p=20)
+    assert result.refinement is None
+    assert [w.code for w in result.warnings if w.code.startswith("refine")] == ["refine_failed"]
+    with pytest.raises(okid.InputError, match="needs a measured force"):
+        okid.Session(0, 3, fs=s.fs, method="n4sid-cva", refine=True)
+    with okid.Session(1, 3, fs=s.fs, method="okid-era", p=20, refine=True) as session:
+        session.feed(np.hstack([u, y]))
+        with pytest.raises(okid.InputError, match="refine"):
+            session.to_bytes()
