@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    version and status texts
-#include <okid/identify.h>
+#include <okid/types.h>
 
 const char* okid_version(void) { return OKID_VERSION; }
 
@@ -25,19 +25,4 @@ const char* okid_status_text(okid_status_t status) {
     case OKID_ERR_FORMAT: return "the bytes are no serialised state of this version, or they are damaged";
     }
     return "unknown status";
-}
-
-const char* okid_warning_code(uint32_t bit) {
-    switch (bit) {
-    case OKID_NOTE_ARX_STABILISED: return "arx_stabilised";
-    case OKID_NOTE_ILL_CONDITIONED: return "ill_conditioned";
-    case OKID_NOTE_FEW_ROWS: return "few_rows";
-    case OKID_NOTE_MODEL_UNSTABLE: return "model_unstable";
-    case OKID_NOTE_PREDICTOR_UNSTABLE: return "predictor_unstable";
-    case OKID_NOTE_ORDER_REDUCED: return "order_reduced";
-    case OKID_NOTE_ORDER_UNCLEAR: return "order_unclear";
-    case OKID_NOTE_WEAK_EXCITATION: return "weak_excitation";
-    case OKID_NOTE_LITERAL_HANKEL: return "literal_hankel";
-    default: return NULL;
-    }
 }

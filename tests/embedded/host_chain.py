@@ -31,22 +31,6 @@ def call(name: str, *arguments: Any) -> int:
     return abi.check(getattr(abi.library(), name)(*arguments), name)
 
 
-def correlation(parts: list[NDArray[np.int16]], lags: int, gap: int) -> bytes:
-    """The state of the correlation sums of two runs, buffers of the host's size."""
-    config = abi.CorrelationConfig(N_U, N_Y, lags, 0, abi.SAMPLE_INT16, 0, 2, 0, 0, 1.0)
-    block = abi.block(abi.library().okid_correlation_memsize(ctypes.byref(config)))
-    handle = ctypes.c_void_p()
-    call("okid_correlation_create", ctypes.byref(handle), ctypes.byref(config), block.ctypes.data, block.size)
-    for k, part in enumerate(parts):
-        if k > 0:
-            abi.library().okid_correlation_gap(handle, gap)
-        codes = np.ascontiguousarray(part)
-        call("okid_correlation_add_i16", handle, codes.ctypes.data_as(abi.int16s), len(codes))
-    out = ctypes.create_string_buffer(abi.library().okid_correlation_serialised_size(handle))
-    call("okid_correlation_serialise", handle, out, len(out))
-    return out.raw
-
-
 def observe(accumulator: Accumulator, p: int) -> tuple[Real, ObserverInfo]:
     """Observer Markov parameters, dense solver."""
     gram = np.asfortranarray(accumulator.gram("mean")[0])

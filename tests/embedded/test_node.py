@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import core_feed
 import host_chain
 import numpy as np
 import pytest
@@ -71,11 +72,7 @@ def node(image: Image) -> Iterator[Node]:
 
 @pytest.fixture(scope="module")
 def w1() -> Codes:
-    """W1, 1 % noise, as a converter of 16 bits gives it: force, then the accelerations; an offset on each channel."""
-    rig = systems.w1()
-    record = np.hstack(systems.record(rig, SAMPLES, 1.0, 7))
-    codes = np.round(record / np.abs(record).max(axis=0) * 30000) + [100, -300, 250, 40]
-    return codes.astype(np.int16)
+    return core_feed.w1(SAMPLES)
 
 
 def compare(node: Modes, host: Modes, is_float: bool) -> None:
@@ -107,7 +104,7 @@ def test_sums_are_those_of_the_host_to_the_last_bit_and_modes_agree(node: Node, 
 @pytest.mark.parametrize(("folder", "machine"), [("m4-double", "netduinoplus2"), ("m7-double", "mps2-an500")])
 def test_correlation_sums_are_those_of_the_host_to_the_last_bit(folder: str, machine: str, w1: Codes) -> None:
     lags, image = 300, Image(folder, machine, 300)
-    host = host_chain.correlation([w1[:4000], w1[4100:]], lags, gap=100)
+    host = core_feed.correlation([w1[:4000], w1[4100:]], lags, gap=100)
     with Node(machine, image.path) as node:
         node.send(packet(bytes([RESET])), *samples(w1[:4000], 0), *samples(w1[4100:], 4100))
         assert node.state() == host

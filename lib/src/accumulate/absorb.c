@@ -175,8 +175,8 @@ static int room_for_batch(okid_accumulator_t* a, const int16_t* codes) {
 /// The FFT path: take one batch when the call is long enough and sums of codes stay exact; returns the samples taken.
 static size_t feed_bulk(okid_accumulator_t* a, source_t source, size_t count) {
     bulk_t* bulk = acc_bulk(a);
-    const int16_t* codes = source.kind == FROM_INT16 ? source.at : NULL;
-    const double* numbers = source.kind == FROM_DOUBLE ? source.at : NULL;
+    const int16_t* codes = source.kind == FROM_INT16 ? (const int16_t*)source.at : NULL;
+    const double* numbers = source.kind == FROM_DOUBLE ? (const double*)source.at : NULL;
     const size_t m = (size_t)a->m, total = (size_t)spectrum_samples(&bulk->plan), lags = acc_lag_count(a);
     if ((!codes && !numbers) || count < total) return 0;
     flush(a);

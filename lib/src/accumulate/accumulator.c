@@ -31,6 +31,7 @@ static uint32_t take(uint64_t* at, uint64_t numbers) {
 /// Planes of sums the kernel writes to before they are folded into the pairs.
 static uint64_t partial_planes(okid_sample_t sample) {
 #ifdef OKID_INTEGER_KERNEL
+    (void)sample;
     return 0; // it adds to the low words themselves
 #else
     return sample == OKID_SAMPLE_DOUBLE ? 0 : sample == OKID_SAMPLE_INT32 ? 3 : 1;

@@ -13,8 +13,9 @@ static inline int32_t full_scale(okid_sample_t sample) {
 }
 
 /// What a call brings: m numbers a sample of one of four kinds.
+typedef enum source_kind_t { FROM_DOUBLE, FROM_FLOAT, FROM_INT16, FROM_INT32 } source_kind_t;
 typedef struct source_t {
-    enum { FROM_DOUBLE, FROM_FLOAT, FROM_INT16, FROM_INT32 } kind;
+    source_kind_t kind;
     const void* at;
 } source_t;
 

@@ -43,8 +43,9 @@ static map_t map_of(const spectrum_plan_t* plan, double* memory) {
     return a;
 }
 
-static inline lanes_t get(const double* p) { return *(const lanes_t*)p; }
-static inline void put(double* p, lanes_t v) { *(lanes_t*)p = v; }
+// No functions: of vectors that a processor does not have a call would depend on the compiler's version.
+#define GET(p) (*(const lanes_t*)(p))
+#define PUT(p, v) (*(lanes_t*)(p) = (v))
 
 /// Forward transform (exp(-i)) of N complex lane vectors [re lanes, im lanes]; the result is in the returned array.
 static double* transform(const map_t* a, int total) {
@@ -59,23 +60,23 @@ static double* transform(const map_t* a, int total) {
             for (int q = 0; q < s; ++q) {
                 const double* from = x + 2 * V * (size_t)(q + s * k);
                 const size_t step = 2 * V * (size_t)(s * quarter);
-                const lanes_t ar = get(from), ai = get(from + V), br = get(from + step), bi = get(from + step + V);
-                const lanes_t cr = get(from + 2 * step), ci = get(from + 2 * step + V);
-                const lanes_t dr = get(from + 3 * step), di = get(from + 3 * step + V);
+                const lanes_t ar = GET(from), ai = GET(from + V), br = GET(from + step), bi = GET(from + step + V);
+                const lanes_t cr = GET(from + 2 * step), ci = GET(from + 2 * step + V);
+                const lanes_t dr = GET(from + 3 * step), di = GET(from + 3 * step + V);
                 const lanes_t acr = ar + cr, aci = ai + ci, amr = ar - cr, ami = ai - ci;
                 const lanes_t bdr = br + dr, bdi = bi + di, jr = di - bi, ji = br - dr; // i (b - d)
                 const lanes_t u1r = amr - jr, u1i = ami - ji, u2r = acr - bdr, u2i = aci - bdi;
                 const lanes_t u3r = amr + jr, u3i = ami + ji;
                 double* to = y + 2 * V * (size_t)(q + s * 4 * k);
                 const size_t next = 2 * V * (size_t)s;
-                put(to, acr + bdr);
-                put(to + V, aci + bdi);
-                put(to + next, u1r * c1 - u1i * s1);
-                put(to + next + V, u1r * s1 + u1i * c1);
-                put(to + 2 * next, u2r * c2 - u2i * s2);
-                put(to + 2 * next + V, u2r * s2 + u2i * c2);
-                put(to + 3 * next, u3r * c3 - u3i * s3);
-                put(to + 3 * next + V, u3r * s3 + u3i * c3);
+                PUT(to, acr + bdr);
+                PUT(to + V, aci + bdi);
+                PUT(to + next, u1r * c1 - u1i * s1);
+                PUT(to + next + V, u1r * s1 + u1i * c1);
+                PUT(to + 2 * next, u2r * c2 - u2i * s2);
+                PUT(to + 2 * next + V, u2r * s2 + u2i * c2);
+                PUT(to + 3 * next, u3r * c3 - u3i * s3);
+                PUT(to + 3 * next + V, u3r * s3 + u3i * c3);
             }
         }
         double* swap = x;
@@ -86,9 +87,9 @@ static double* transform(const map_t* a, int total) {
         for (int q = 0; q < s; ++q) {
             double *low = x + 2 * V * (size_t)q, *high = low + 2 * V * (size_t)s;
             for (int part = 0; part < 2 * V; part += V) {
-                const lanes_t u = get(low + part), v = get(high + part);
-                put(low + part, u + v);
-                put(high + part, u - v);
+                const lanes_t u = GET(low + part), v = GET(high + part);
+                PUT(low + part, u + v);
+                PUT(high + part, u - v);
             }
         }
     }
@@ -126,11 +127,11 @@ static void split_spectra(const spectrum_plan_t* plan, const map_t* a, const dou
     double* full = a->full + (size_t)index * a->window + 2 * V * (size_t)group;
     for (int f = 0; f <= total / 2; ++f, current += stride, full += stride) {
         const double *low = z + 2 * V * (size_t)f, *high = z + 2 * V * (size_t)((total - f) % total);
-        const lanes_t zr = get(low), zi = get(low + V), wr = get(high), wi = -get(high + V);
-        put(current, 0.5 * (zr + wr));
-        put(current + V, 0.5 * (zi + wi));
-        put(full, 0.5 * (zi - wi));
-        put(full + V, 0.5 * (wr - zr));
+        const lanes_t zr = GET(low), zi = GET(low + V), wr = GET(high), wi = -GET(high + V);
+        PUT(current, 0.5 * (zr + wr));
+        PUT(current + V, 0.5 * (zi + wi));
+        PUT(full, 0.5 * (zi - wi));
+        PUT(full + V, 0.5 * (wr - zr));
     }
 }
 
@@ -142,17 +143,17 @@ static void add_cross(const spectrum_plan_t* plan, const map_t* a) {
         const size_t at = 2 * V * (size_t)(f * groups);
         for (int r = 0; r < m; ++r)
             for (int g = 0; g < groups; ++g, cross += 2 * V) {
-                lanes_t re = get(cross), im = get(cross + V);
+                lanes_t re = GET(cross), im = GET(cross + V);
                 for (int b = 0; b < SPECTRUM_BATCH; ++b) {
                     const double* mine = a->current + (size_t)b * a->window + at + 2 * V * (size_t)(r / V) + r % V;
                     const double* full = a->full + (size_t)b * a->window + at + 2 * V * (size_t)g;
                     const double cr = mine[0], ci = mine[V];
-                    const lanes_t fr = get(full), fi = get(full + V);
+                    const lanes_t fr = GET(full), fi = GET(full + V);
                     re += cr * fr + ci * fi;
                     im += ci * fr - cr * fi;
                 }
-                put(cross, re);
-                put(cross + V, im);
+                PUT(cross, re);
+                PUT(cross + V, im);
             }
     }
 }
@@ -183,14 +184,14 @@ static void load_rows(const spectrum_plan_t* plan, const map_t* a, int r, int gr
         const double* one = a->cross + 2 * V * (size_t)((f * m + r) * groups + group);
         const double* two = one + 2 * V * (size_t)groups;
         const lanes_t none = {0};
-        const lanes_t ar = get(one), ai = get(one + V), br = pair ? get(two) : none, bi = pair ? get(two + V) : none;
+        const lanes_t ar = GET(one), ai = GET(one + V), br = pair ? GET(two) : none, bi = pair ? GET(two + V) : none;
         double* low = a->work + 2 * V * (size_t)f;
-        put(low, ar - bi); // X[f] = A + iB
-        put(low + V, -(ai + br));
+        PUT(low, ar - bi); // X[f] = A + iB
+        PUT(low + V, -(ai + br));
         if (f == 0 || f == total / 2) continue;
         double* high = a->work + 2 * V * (size_t)(total - f); // X[N-f] = conj A + i conj B
-        put(high, ar + bi);
-        put(high + V, ai - br);
+        PUT(high, ar + bi);
+        PUT(high + V, ai - br);
     }
 }
 

@@ -290,3 +290,18 @@ okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t
                                 : okid::decompose_observer_factor(s, square_root, out),
                   out);
 }
+
+const char* okid_warning_code(uint32_t bit) {
+    switch (bit) {
+    case OKID_NOTE_ARX_STABILISED: return "arx_stabilised";
+    case OKID_NOTE_ILL_CONDITIONED: return "ill_conditioned";
+    case OKID_NOTE_FEW_ROWS: return "few_rows";
+    case OKID_NOTE_MODEL_UNSTABLE: return "model_unstable";
+    case OKID_NOTE_PREDICTOR_UNSTABLE: return "predictor_unstable";
+    case OKID_NOTE_ORDER_REDUCED: return "order_reduced";
+    case OKID_NOTE_ORDER_UNCLEAR: return "order_unclear";
+    case OKID_NOTE_WEAK_EXCITATION: return "weak_excitation";
+    case OKID_NOTE_LITERAL_HANKEL: return "literal_hankel";
+    default: return nullptr;
+    }
+}

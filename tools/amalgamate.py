@@ -1,0 +1,180 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The microcontroller's part of okid as two pairs of files: okid_core.c/.h (C11: sums, packets, frames) and
+okid_modes.cpp/.h (C++17, on Eigen's headers: observer, ERA, modes).
+
+usage: amalgamate.py FOLDER
+
+What goes in is what the lists say that the build itself uses: OKID_CORE_C and OKID_CORE_CXX of lib/CMakeLists.txt and
+DRV_NODE_SOURCES of drivers/node_sources.cmake. Every file is taken as it is, its includes put in their place; a private
+name that two files have gets the name of its file before it.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LIB, DRIVERS = ROOT / "lib", ROOT / "drivers"
+SEARCHED = (LIB / "include", LIB / "src", DRIVERS / "include")
+INCLUDE = re.compile(r'#include [<"]([^>"]+)[>"]')
+TOKEN = re.compile(
+    r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'|(?:\.|->|\bstd::|\bEigen::)?[A-Za-z_]\w*', re.S
+)
+PRIVATE = re.compile(r"^(?!okid|OKID|drv|DRV)[A-Za-z_]\w*$")
+WORDS = "static inline const constexpr void int double char unsigned struct enum typedef using namespace template class"
+
+FAST = ("kernel_integer.c",)  # runs per sample: made for speed where everything else is made for size
+GCC = "defined(__GNUC__) && !defined(__clang__)"
+
+
+def listed(file: Path, name: str) -> list[Path]:
+    """The sources that a CMake file sets under this name."""
+    found = re.search(rf"set\({name}\s([^)]*)\)", file.read_text("utf-8"))
+    if not found:
+        raise SystemExit(f"amalgamate: {file}: no set({name} ...), expected the list of sources")
+    return [file.parent / source for source in found[1].split()]
+
+
+def blanked(text: str) -> str:
+    """The text without comments, strings, attributes and preprocessor lines."""
+    text = TOKEN.sub(lambda m: m[0] if re.match(r"[.:>A-Za-z_-]", m[0]) else " ", text)
+    text = re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", "", text, flags=re.M)
+    return re.sub(r"__attribute__\s*\(\(.*?\)\)(?=[\s;])", "", text)
+
+
+def statements(text: str) -> list[tuple[str, str]]:
+    """Head and braces of each declaration of a file, those inside namespaces too."""
+    out, head, body, depth = [], "", "", 0
+    for c in re.sub(r"\bnamespace\b[\w\s:]*\{", ";", blanked(text)):
+        if c == "{":
+            depth += 1
+        if depth:
+            body += c
+            if c == "}" and depth == 1:
+                depth = 0
+                if not re.match(r"\s*(typedef|struct|enum|class)\b", head) or "(" in head:  # a function or a value ends
+                    out.append((head, body))
+                    head = body = ""
+            elif c == "}":
+                depth -= 1
+        elif c in ";}":
+            out.append((head, body))
+            head = body = ""
+        else:
+            head += c
+    return out
+
+
+def private_names(text: str) -> set[str]:
+    """What a source defines for itself at file scope: functions, values, types, members of enums."""
+    names = set()
+    for head, body in statements(text):
+        head = re.sub(r"\btemplate\s*<(?:[^<>]|<[^<>]*>)*>", " ", head).strip()
+        if re.match(r"(typedef )?enum\b", head):
+            names |= set(re.findall(r"[{,]\s*(\w+)", body))
+        if found := re.match(r"(?:typedef )?(?:struct|enum|class)\s+(\w+)", head):
+            names.add(found[1])
+        if head.startswith("using"):
+            names |= set(re.findall(r"^using\s+(\w+)\s*=", head))
+        elif head.startswith("typedef"):
+            names.add(head.split()[-1])
+        elif found := re.match(r"[\w\s:<>,*&]*?(?<!:)\b(\w+)\s*(?:<[^<>()]*>\s*)?(?:[(\[=]|$)", head):
+            names.add(found[1])
+    return {name for name in names if PRIVATE.match(name)} - set(WORDS.split())
+
+
+def renamed(text: str, names: dict[str, str]) -> str:
+    """The text with these identifiers replaced, where they are no members and stand in no comment or string."""
+    return TOKEN.sub(lambda m: names.get(m[0], m[0]), text)
+
+
+@dataclass
+class Pair:
+    """A source and a header under way."""
+
+    name: str
+    source: str
+    known: set[Path] = field(default_factory=set)  ## files that stand in it already, or in a pair before it
+    system: list[str] = field(default_factory=list)
+    public: str = ""
+
+    def text(self, path: Path, renames: dict[str, str] | None = None) -> str:
+        """A file, its includes in their place; those of the public headers go to the header."""
+        whole = path.read_text("utf-8")
+        if "#pragma once" in whole or re.search(r"#ifndef \w+_H\b", whole):
+            if path in self.known:
+                return ""
+            self.known.add(path)
+        chapter = path.relative_to(ROOT)
+        whole = re.sub(r"^// SPDX-License-Identifier: MIT\n|#pragma once\n", "", whole, flags=re.M)
+        whole = renamed(whole, renames or {})
+        lines = [f"// ---- {chapter}"]
+        for line in whole.splitlines():
+            found = INCLUDE.match(line)
+            if not found:
+                lines.append(line)
+                continue
+            places = [folder / found[1] for folder in (path.parent, *SEARCHED) if (folder / found[1]).is_file()]
+            if not places:
+                self.system.append(found[1]) if found[1] not in self.system else None
+            elif "include" in places[0].parts and "include" not in path.parts:
+                self.public += self.text(places[0])
+            else:
+                lines.append(self.text(places[0]))
+        return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"
+
+    def write(self, folder: Path, sources: list[Path], first: str, above: str) -> None:
+        """Both files. first: C of the source before everything; above: include of the header."""
+        files = [*sources, *(LIB / "src").rglob("*.h")]
+        shared = Counter(name for path in files for name in private_names(path.read_text("utf-8")))
+        body = ""
+        for path in sources:
+            clashes = {name for name in private_names(path.read_text("utf-8")) if shared[name] > 1}
+            part = self.text(path, {name: f"{path.stem}_{name}" for name in clashes})
+            if path.name in FAST:
+                part = f'#if {GCC}\n#pragma GCC push_options\n#pragma GCC optimize("O3")\n#endif\n{part}'
+                part += f"#if {GCC}\n#pragma GCC pop_options\n#endif\n"
+            macros = re.findall(r"^#define (\w+)", path.read_text("utf-8"), re.M)
+            body += part + "".join(f"#undef {name}\n" for name in dict.fromkeys(macros)) + "\n"
+        in_header = [name for name in self.system if name in ("stddef.h", "stdint.h")]
+        top = f"// okid, made by tools/amalgamate.py of {len(sources)} sources: change those, not this file.\n//\n"
+        top += "".join(f"// {line}".rstrip() + "\n" for line in (ROOT / "LICENSE").read_text("utf-8").splitlines())
+        top = f"// SPDX-License-Identifier: MIT\n{top}"
+        guard = self.name.upper() + "_H"
+        includes = "".join(f"#include <{name}>\n" for name in in_header)
+        header = f"{top}#ifndef {guard}\n#define {guard}\n{above}{includes}{self.public}#endif\n"
+        includes = "".join(f"#include <{name}>\n" for name in self.system if name not in in_header)
+        (folder / f"{self.name}.h").write_text(header, "utf-8")
+        (folder / self.source).write_text(f'{top}{first}#include "{self.name}.h"\n{includes}\n{body}', "utf-8")
+
+
+CORE_FIRST = """// Codes are summed in integers: for a processor without double arithmetic, the same bits.
+#ifndef OKID_INTEGER_KERNEL
+#define OKID_INTEGER_KERNEL 1
+#endif
+"""
+
+
+def amalgamate(folder: Path) -> None:
+    """Write the four files into the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lib = LIB / "CMakeLists.txt"
+    core = Pair("okid_core", "okid_core.c")
+    sources = listed(lib, "OKID_CORE_C") + listed(DRIVERS / "node_sources.cmake", "DRV_NODE_SOURCES")
+    core.write(folder, sources, CORE_FIRST, "")
+    public = {path for path in core.known if "include" in path.parts}
+    modes = Pair("okid_modes", "okid_modes.cpp", known=public)
+    first = "#ifndef EIGEN_NO_DEBUG\n#define EIGEN_NO_DEBUG 1\n#endif\n"
+    sources = listed(lib, "OKID_CORE_CXX") + listed(lib, "OKID_LINALG_eigen")
+    modes.write(folder, sources, first, '#include "okid_core.h"\n')
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+        sys.exit(__doc__)
+    amalgamate(Path(sys.argv[1]))
