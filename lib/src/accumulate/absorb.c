@@ -286,19 +286,13 @@ static void feed_run(okid_accumulator_t* a, source_t source, size_t count) {
 
 /// Feed what is usable, make gaps of the rest.
 static okid_status_t feed_usable(okid_accumulator_t* a, source_t source, size_t count) {
-    const size_t m = (size_t)a->m;
     okid_status_t status = OKID_OK;
     while (count > 0) {
-        const size_t most = count < SCAN_AHEAD ? count : SCAN_AHEAD,
-                     run = usable_run(source, a->config.sample, m, most);
-        feed_run(a, source, run);
-        source = advance(source, run * m);
-        count -= run;
-        if (run == most) continue;
+        const piece_t piece = next_piece(&source, &count, a->config.sample, (size_t)a->m);
+        feed_run(a, piece.source, piece.count);
+        if (!piece.missing_behind) continue;
         okid_accumulator_gap(a, 1);
         status = OKID_WARN_MISSING;
-        source = advance(source, m);
-        --count;
     }
     return status;
 }

@@ -223,19 +223,13 @@ static void feed_run(okid_correlation_t* s, source_t source, size_t count) {
 
 /// Feed what is usable, make gaps of the rest.
 static okid_status_t feed_usable(okid_correlation_t* s, source_t source, size_t count) {
-    const size_t m = (size_t)s->m;
     okid_status_t status = OKID_OK;
     while (count > 0) {
-        const size_t most = count < SCAN_AHEAD ? count : SCAN_AHEAD,
-                     run = usable_run(source, s->config.sample, m, most);
-        feed_run(s, source, run);
-        source = advance(source, run * m);
-        count -= run;
-        if (run == most) continue;
+        const piece_t piece = next_piece(&source, &count, s->config.sample, (size_t)s->m);
+        feed_run(s, piece.source, piece.count);
+        if (!piece.missing_behind) continue;
         okid_correlation_gap(s, 1);
         status = OKID_WARN_MISSING;
-        source = advance(source, m);
-        --count;
     }
     return status;
 }

@@ -73,6 +73,23 @@ static inline size_t usable_run(source_t source, okid_sample_t sample, size_t m,
     return run;
 }
 
+/// Usable samples in a row, and whether the sample behind them is missing.
+typedef struct piece_t {
+    source_t source;
+    size_t count;
+    int missing_behind;
+} piece_t;
+
+/// Take the next piece off what is left of a call, with the missing sample behind it.
+static inline piece_t next_piece(source_t* left, size_t* count, okid_sample_t sample, size_t m) {
+    const size_t most = *count < SCAN_AHEAD ? *count : SCAN_AHEAD, run = usable_run(*left, sample, m, most);
+    const piece_t piece = {*left, run, run < most};
+    const size_t taken = run + (size_t)piece.missing_behind;
+    *left = advance(*left, taken * m);
+    *count -= taken;
+    return piece;
+}
+
 /// Codes at full scale, and words that are no code of this width.
 typedef struct codes_seen_t {
     int64_t saturated, outside;
