@@ -3,23 +3,9 @@
 // before everything that computes.
 #pragma once
 #include "config/config.hpp"
-
-#include <csignal>
-#include <pthread.h>
-#include <thread>
-#include <utility>
+#include "files/side_by_side.hpp"
 
 namespace okid_host {
-
-/// A thread that no signal is delivered to.
-template <class Run> std::thread quiet_thread(Run&& run) {
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    std::thread out(std::forward<Run>(run));
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    return out;
-}
 
 /// SCHED_FIFO and CPUs as [realtime] has them. What the config asks for and the system refuses is said on stderr, once a
 /// cause, with the remedy; the default priority may be refused in silence.

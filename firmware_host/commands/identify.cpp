@@ -171,6 +171,10 @@ void add_identify(CLI::App& app) {
         ->add_option("--decimate", given->wanted.decimate,
                      "--method auto looks at no higher rate than one Nth of the record's (default auto: all rates)")
         ->type_name("N|auto");
+    command
+        ->add_option("--threads", given->wanted.threads,
+                     "processors for --method auto (default: all it may use); the result is the same for any number")
+        ->type_name("N");
     command->add_flag("--all-modes", given->all_modes, "the table also lists the modes that are not signed, and why");
     command
         ->add_option("--modes", given->wanted.modes, "only these modes, by their numbers in the table (--method auto)")

@@ -4,6 +4,7 @@
 //          its Hankel matrix (ERA on covariances without inputs); every order from the one decomposition of a run
 #include "consensus_runs.hpp"
 
+#include "files/side_by_side.hpp"
 #include "result/method.hpp"
 
 #include <algorithm>
@@ -113,25 +114,36 @@ level_sums::level_sums(const record_level& level, int n_u, int n_y, int lags, bo
     }
 }
 
-std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest) {
-    std::vector<consensus_run> out;
+std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest,
+                                   int threads) {
+    struct piece { // runs of one level that share their sums
+        const record_level* level;
+        int lags;
+        std::vector<consensus_run> runs;
+    };
+    std::vector<piece> pieces;
     for (std::size_t k = 0; k < levels.size(); ++k) {
         const record_level& level = levels[k];
-        std::vector<consensus_run> runs =
-            plan_runs(n_u, n_y, static_cast<int>(k), level.fs_hz, level.top, level.samples);
-        int lags = -1;
-        std::unique_ptr<level_sums> sums;
-        std::stable_sort(runs.begin(), runs.end(), [&](const consensus_run& a, const consensus_run& b) {
-            const auto ca = run_config(a, n_u, n_y), cb = run_config(b, n_u, n_y);
-            return okid_identify_lags(&ca) < okid_identify_lags(&cb);
-        });
-        for (consensus_run& run : runs) {
+        const std::size_t first = pieces.size();
+        for (consensus_run& run : plan_runs(n_u, n_y, static_cast<int>(k), level.fs_hz, level.top, level.samples)) {
             const okid_identify_config_t config = run_config(run, n_u, n_y);
-            if (const int needed = okid_identify_lags(&config); needed != lags)
-                sums = std::make_unique<level_sums>(level, n_u, n_y, lags = needed, at_rest);
-            if (find_poles(config, *sums, run)) out.push_back(std::move(run));
+            const int lags = okid_identify_lags(&config);
+            auto at = std::find_if(pieces.begin() + static_cast<std::ptrdiff_t>(first), pieces.end(),
+                                   [lags](const piece& one) { return one.lags >= lags; });
+            if (at == pieces.end() || at->lags != lags) at = pieces.insert(at, {&level, lags, {}});
+            at->runs.push_back(std::move(run));
         }
     }
+    side_by_side(pieces.size(), threads, [&](std::size_t i) {
+        piece& mine = pieces[i];
+        const level_sums sums(*mine.level, n_u, n_y, mine.lags, at_rest);
+        for (consensus_run& run : mine.runs)
+            if (!find_poles(run_config(run, n_u, n_y), sums, run)) run.orders.clear();
+    });
+    std::vector<consensus_run> out;
+    for (piece& one : pieces)
+        for (consensus_run& run : one.runs)
+            if (!run.orders.empty()) out.push_back(std::move(run));
     return out;
 }
 

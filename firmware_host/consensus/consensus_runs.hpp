@@ -29,6 +29,8 @@ class level_sums {
 };
 
 /// All runs of all levels with their poles linked. Runs that find no model are left out.
-std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest);
+/// @param threads  at a time, 0: all processors; the result is the same for any number
+std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest,
+                                   int threads);
 
 } // namespace okid_host

@@ -36,6 +36,7 @@ constexpr std::array arguments{argument{"--inputs", "inputs", ""},
                                argument{"--band", "band", ""},
                                argument{"--decimate", "decimate", " N "},
                                argument{"--modes", "modes", ""},
+                               argument{"--threads", "threads", " N "},
                                argument{"--hit-dofs", "hit_dofs", ""},
                                argument{"--json", "to_dict()", ""}};
 

@@ -22,6 +22,7 @@ constexpr char state_mark[9] = "okid.rec";
 
 record_options options_of(const stream_config& config) {
     record_options out;
+    out.threads = 1; // the others are the readers'
     out.inputs = config.inputs;
     out.outputs = config.outputs;
     out.fs_hz = config.rate_hz;

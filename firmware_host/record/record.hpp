@@ -32,6 +32,7 @@ struct record_options {
     int sigma_blocks = 20;                         ///< blocks left out in turn for the standard deviations; 0 = none
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
+    int threads = 0;                               ///< of auto, at a time; 0: all processors
     bool all_modes = false;                        ///< auto lists also what few runs found
     bool modes_without_matrices = false;           ///< auto: what stands in the way of M, K, R is a remark
     std::vector<int> modes;                        ///< numbers of the modes picked by hand (auto); empty: all

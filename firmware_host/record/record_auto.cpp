@@ -7,6 +7,7 @@
 #include "carrier.hpp"
 #include "consensus/lines.hpp"
 #include "error.hpp"
+#include "files/side_by_side.hpp"
 #include "modal_gain.hpp"
 #include "modal_model.hpp"
 #include "modal_refine.hpp"
@@ -128,16 +129,18 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
                                    const std::vector<consensus_mode>& modes, const record_options& options, bool rest) {
     std::vector<listed_pair> out;
     for (const consensus_mode& mode : modes) out.emplace_back(mode, std::nullopt);
-    for (std::size_t k = 0; k < levels.size(); ++k) {
+    std::vector<std::vector<std::optional<carried_mode>>> found(levels.size());
+    side_by_side(levels.size(), options.threads, [&](std::size_t k) {
         const bool any = std::any_of(modes.begin(), modes.end(), [&](const consensus_mode& mode) {
             return mode.confident() && mode.level == static_cast<int>(k);
         });
-        if (!any) continue;
-        const auto found = carry(levels[k], static_cast<int>(k), runs, modes, static_cast<int>(options.inputs.size()),
-                                 static_cast<int>(options.outputs.size()), rest, options.sigma_blocks);
-        for (std::size_t i = 0; i < modes.size(); ++i)
-            if (found[i]) out[i].second = found[i];
-    }
+        if (any)
+            found[k] = carry(levels[k], static_cast<int>(k), runs, modes, static_cast<int>(options.inputs.size()),
+                             static_cast<int>(options.outputs.size()), rest, options.sigma_blocks);
+    });
+    for (const auto& of_level : found)
+        for (std::size_t i = 0; i < of_level.size(); ++i)
+            if (of_level[i]) out[i].second = of_level[i];
     if (!options.inputs.empty()) shapes_at_own_rate(levels, runs, modes, options, rest, out);
     for (auto& [mode, carried] : out) {
         if (!carried) continue;
@@ -264,7 +267,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     const auto levels =
         make_levels(std::move(rows), set.n_u, set.n_y, options.fs_hz, work.at_rest, options.decimate, scale);
     tell("looking with several methods, horizons and rates");
-    const auto runs = look_at(levels, n_u, n_y, work.at_rest);
+    const auto runs = look_at(levels, n_u, n_y, work.at_rest, options.threads);
     auto modes = find_agreement(runs);
     mark_lines(levels, set.n_u, set.n_y, modes);
     mark_slow(set, options.fs_hz, modes);

@@ -147,7 +147,7 @@ std::vector<int> numbers_of(const std::string& option, const std::string& text) 
 void check_agreement(const record_request& given, record_options& options) {
     const bool agreed = options.method == "auto";
     for (const auto& [option, text] : {std::pair{"--band", &given.band}, std::pair{"--decimate", &given.decimate},
-                                       std::pair{"--modes", &given.modes}})
+                                       std::pair{"--modes", &given.modes}, std::pair{"--threads", &given.threads}})
         if (!agreed && !text->empty())
             usage(fmt::format("{} belongs to --method auto, {} takes the record as it is", option, options.method));
     for (const auto& [option, there] :
@@ -169,6 +169,8 @@ void check_agreement(const record_request& given, record_options& options) {
     }
     if (!given.decimate.empty() && given.decimate != "auto")
         options.decimate = static_cast<int>(whole_number("--decimate", given.decimate, 1, 1000));
+    if (!given.threads.empty())
+        options.threads = static_cast<int>(whole_number("--threads", given.threads, 1, 1024));
     if (!given.modes.empty()) options.modes = numbers_of("--modes", given.modes);
 }
 

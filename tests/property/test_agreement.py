@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import okid as okid_module
 import pytest
 from laboratory import Laboratory, ambient, chain, forced
 from program import okid
@@ -175,6 +176,18 @@ def test_options_of_one_method_do_not_go_with_auto(tmp_path: Path) -> None:
     done = okid("identify", tmp_path / "record.csv", *channels, "--method", "auto", "--p", "30")
     assert done.returncode == 2
     assert "--p belongs to one method" in done.stderr
+    done = okid("identify", tmp_path / "record.csv", *channels, "--method", "n4sid-cva", "--threads", "2")
+    assert done.returncode == 2
+    assert "--threads belongs to --method auto" in done.stderr
+
+
+def test_the_number_of_threads_changes_nothing(tmp_path: Path) -> None:
+    lab = forced(16, count=4000)
+    one, three = (identify(lab, tmp_path, "--threads", n) for n in ("1", "3"))
+    assert one == three
+    samples = [lab.samples[:, : lab.n_u], lab.samples[:, lab.n_u :]]
+    from_python = [okid_module.identify(*samples, fs=lab.fs, threads=n).to_dict() for n in (1, 2, None)]
+    assert from_python[0] == from_python[1] == from_python[2]
 
 
 def predicted(result: dict[str, Any], samples: np.ndarray, n_u: int) -> np.ndarray:

@@ -42,6 +42,7 @@ def identify(
     decimate: int | None = None,
     modes: Sequence[int] | None = None,
     hit_dofs: Sequence[int] | None = None,
+    threads: int | None = None,
 ) -> Result:
     """Identify a structure from measured inputs and outputs.
 
@@ -79,7 +80,8 @@ def identify(
     0 = none. They cost some 3 (okid-era) to 20 identifications.
 
     Of "auto" alone: `band` (low, high) in Hz where modes are sought; `decimate` the largest factor of the lower rates;
-    `modes` the numbers, from 1, of the listed modes that are kept: picked by hand they count as confident.
+    `modes` the numbers, from 1, of the listed modes that are kept: picked by hand they count as confident; `threads`
+    the processors used (default all; the result is the same for any number).
 
     `hit_dofs`: where each record was struck (roving hammer), one number a record: each place becomes an input of its
     own; with `output_dofs` it says where the forces of M, K and R act.
@@ -103,7 +105,7 @@ def identify(
         "sensing": sensing, "refine": ("no", "yes")[refine] if isinstance(refine, bool) else refine,
         "sigma_blocks": sigma_blocks, "units": units,
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
-        "hit_dofs": hit_dofs,
+        "hit_dofs": hit_dofs, "threads": threads,
     }  # fmt: skip
     return Result.of_host(host_result.identify(options, inputs, outputs))
 

@@ -82,6 +82,7 @@ def agree(spec: CampaignSpec, records: Sequence[NDArray[np.float64]]) -> dict[st
     options = {
         "inputs": list(c.inputs), "outputs": list(c.outputs), "fs": c.fs_hz, "method": "auto",
         "sigma_blocks": i.sigma_blocks, "band": ":".join(map(str, i.band)) or None, "decimate": i.decimate or None,
+        "threads": 1,
     }  # fmt: skip
     try:
         n_u = len(c.inputs)
