@@ -15,6 +15,7 @@ from okid.abi.square_root import SquareRoot
 from okid.abi.sums import Stats
 from okid.data.records import Record, read_csv
 from okid.demo import demo, demo_frame, demo_record
+from okid.identification.change_test import ChangeTest, ChangeVerdict, ModeShift
 from okid.identification.identifier import Identified, Identifier, usable_p
 from okid.identify import identify, stabilization
 from okid.result.modal_table import ModalTable
@@ -27,6 +28,8 @@ from okid.structure import Structure
 
 __all__ = [
     "Accumulator",
+    "ChangeTest",
+    "ChangeVerdict",
     "Cluster",
     "Criteria",
     "Error",
@@ -38,6 +41,7 @@ __all__ = [
     "MassMatrices",
     "ModalTable",
     "Mode",
+    "ModeShift",
     "Model",
     "OrderPoles",
     "ProportionalDamping",

@@ -15,6 +15,7 @@
 #define OKID_LINKED_AS_(name, abi, real) OKID_LINKED_(name, abi, real)
 #define OKID_LINKED(name) OKID_LINKED_AS_(name, OKID_ABI, OKID_REAL)
 #define okid_accumulator_create OKID_LINKED(okid_accumulator_create)
+#define okid_change_create OKID_LINKED(okid_change_create)
 #define okid_correlation_create OKID_LINKED(okid_correlation_create)
 #define okid_era_create OKID_LINKED(okid_era_create)
 #define okid_identify_create OKID_LINKED(okid_identify_create)

@@ -18,7 +18,7 @@
 ///
 /// examples/modes_from_codes.c is the whole program. What may follow: okid/uncertainty.h (standard deviations),
 /// okid/mkr.h (mass, stiffness, damping), okid/refine.h (maximum likelihood), okid/stabilization.h (which modes are real),
-/// okid/track.h and okid/watch.h (modes over time), okid/model.h and okid/mechanics.h (simulation). The single steps of an
+/// okid/track.h, okid/watch.h and okid/change.h (modes and changes over time), okid/model.h and okid/mechanics.h (simulation). The single steps of an
 /// identification, for processors where it does not fit as a whole, stand in okid/steps/.
 ///
 /// **Memory** is the caller's. X_memsize() tells how many bytes a configuration needs (0: it is invalid), X_create() lays
@@ -35,6 +35,7 @@
 #ifndef OKID_H
 #define OKID_H
 #include <okid/accumulator.h>
+#include <okid/change.h>
 #include <okid/correlation.h>
 #include <okid/identify.h>
 #include <okid/mechanics.h>

@@ -324,6 +324,30 @@ class WatchState(Structure):
     _fields_ = [*((name, c_int32) for name in ("watching", "learning", "high")), ("ratio", c_double)]
 
 
+class ChangeConfig(Structure):
+    """okid_change_config_t."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("n_u", "n_y", "rows", "order", "blocks")),
+        *((name, c_double) for name in ("false_alarm", "fs_hz")),
+    ]
+
+
+class ChangeMode(Structure):
+    """okid_change_mode_t."""
+
+    _fields_ = [(name, c_double) for name in ("frequency_hz", "damping_ratio", "shift", "sigma")]
+
+
+class ChangeVerdict(Structure):
+    """okid_change_verdict_t."""
+
+    _fields_ = [
+        *((name, c_double) for name in ("statistic", "p_value", "freedom")),
+        *((name, c_int32) for name in ("modes", "farthest", "blocks", "alarm")),
+    ]
+
+
 class SkewConfig(Structure):
     """okid_skew_config_t."""
 
@@ -414,6 +438,9 @@ STRUCTS: dict[str, type[Structure]] = {
     "okid_stabilized_t": Stabilized,
     "okid_track_config_t": TrackConfig,
     "okid_track_t": Track,
+    "okid_change_config_t": ChangeConfig,
+    "okid_change_mode_t": ChangeMode,
+    "okid_change_verdict_t": ChangeVerdict,
     "okid_watch_config_t": WatchConfig,
     "okid_watch_state_t": WatchState,
     "okid_subspace_config_t": SubspaceConfig,
