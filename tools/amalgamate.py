@@ -4,10 +4,11 @@
 okid_modes.cpp/.h (C++17, on Eigen's headers: observer, ERA, modes).
 
 usage: amalgamate.py FOLDER
+       amalgamate.py FOLDER --boards [URL]   a library for Zephyr, PlatformIO, Arduino, ESP-IDF, CMSIS-Pack
 
-What goes in is what the lists say that the build itself uses: OKID_CORE_C and OKID_CORE_CXX of lib/CMakeLists.txt and
-DRV_NODE_SOURCES of drivers/node_sources.cmake. Every file is taken as it is, its includes put in their place; a private
-name that two files have gets the name of its file before it.
+URL: where the library is published, for its manifests. What goes in is what the lists say that the build itself uses:
+OKID_CORE_C and OKID_CORE_CXX of lib/CMakeLists.txt and DRV_NODE_SOURCES of drivers/node_sources.cmake. Every file is
+taken as it is, its includes put in their place; a private name that two files have gets the name of its file before it.
 """
 
 from __future__ import annotations
@@ -153,6 +154,14 @@ class Pair:
         (folder / self.source).write_text(f'{top}{first}#include "{self.name}.h"\n{includes}\n{body}', "utf-8")
 
 
+MODES_FIRST = """// The build of a board compiles every file that a library has.
+#if !__has_include(<Eigen/Core>)
+#warning "okid_modes.cpp is empty: Eigen/Core is not in the include path"
+#else
+#ifndef EIGEN_NO_DEBUG
+#define EIGEN_NO_DEBUG 1
+#endif
+"""
 CORE_FIRST = """// Codes are summed in integers: for a processor without double arithmetic, the same bits.
 #ifndef OKID_INTEGER_KERNEL
 #define OKID_INTEGER_KERNEL 1
@@ -169,12 +178,46 @@ def amalgamate(folder: Path) -> None:
     core.write(folder, sources, CORE_FIRST, "")
     public = {path for path in core.known if "include" in path.parts}
     modes = Pair("okid_modes", "okid_modes.cpp", known=public)
-    first = "#ifndef EIGEN_NO_DEBUG\n#define EIGEN_NO_DEBUG 1\n#endif\n"
     sources = listed(lib, "OKID_CORE_CXX") + listed(lib, "OKID_LINALG_eigen")
-    modes.write(folder, sources, first, '#include "okid_core.h"\n')
+    modes.write(folder, sources, MODES_FIRST, '#include "okid_core.h"\n')
+    with (folder / modes.source).open("a", encoding="utf-8") as end:
+        end.write("#endif\n")
+
+
+PLACES = {  # what packaging/ has, and where it stands in the library that all of them share
+    "arduino/library.json": "library.json",
+    "arduino/library.properties": "library.properties",
+    "arduino/stream_node": "examples/stream_node",
+    "arduino/modes_node": "examples/modes_node",
+    "cmsis/okid.okid.pdsc": "okid.okid.pdsc",
+    "esp-idf/CMakeLists.txt": "CMakeLists.txt",
+    "esp-idf/idf_component.yml": "idf_component.yml",
+    "zephyr/CMakeLists.txt": "zephyr/CMakeLists.txt",
+    "zephyr/Kconfig": "zephyr/Kconfig",
+    "zephyr/module.yml": "zephyr/module.yml",
+    "zephyr/sample": "samples/stream",
+}
+
+
+def boards(folder: Path, url: str) -> None:
+    """The library in the form that the build of a board expects."""
+    amalgamate(folder / "src")
+    version = re.search(r'#define OKID_VERSION "([^"]+)"', (LIB / "include" / "okid" / "types.h").read_text("utf-8"))
+    assert version
+    for here, there in PLACES.items():
+        from_ = ROOT / "packaging" / here
+        for path in [from_] if from_.is_file() else sorted(p for p in from_.rglob("*") if p.is_file()):
+            to = folder / there / path.relative_to(from_)
+            to.parent.mkdir(parents=True, exist_ok=True)
+            to.write_text(path.read_text("utf-8").replace("@VERSION@", version[1]).replace("@URL@", url), "utf-8")
+    (folder / "LICENSE").write_text((ROOT / "LICENSE").read_text("utf-8"), "utf-8")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
-        sys.exit(__doc__)
-    amalgamate(Path(sys.argv[1]))
+    match sys.argv[1:]:
+        case [folder] if not folder.startswith("-"):
+            amalgamate(Path(folder))
+        case [folder, "--boards", *url] if not folder.startswith("-") and len(url) < 2:
+            boards(Path(folder), url[0] if url else "https://okid.invalid/")
+        case _:
+            sys.exit(__doc__)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Print the requirements of tools/pyproject.toml for one tier: build, test (build + test) or dev (all)."""
+"""The requirements of tools/pyproject.toml for one tier: build, test (build + test), dev (all), boards (alone)."""
 
 import pathlib
 import re
@@ -7,7 +7,7 @@ import sys
 import tomllib
 
 project = tomllib.loads(pathlib.Path(__file__).with_name("pyproject.toml").read_text())["project"]
-tiers = {"build": ["run"], "test": ["run", "test"], "dev": ["run", "test", "docs", "dev"]}
+tiers = {"build": ["run"], "test": ["run", "test"], "dev": ["run", "test", "docs", "dev"], "boards": ["boards"]}
 
 
 def wanted(extra: str) -> list[str]:

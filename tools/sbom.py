@@ -33,9 +33,11 @@ COMMANDS = {
     "debian-dev": "`make lint`, `make docs`",
     "debian-package": "`make package`, `make test-package`",
 }
+APART = ("wheel", "boards")  # what they list is not in .venv
 EXTRAS = {
     "test": "`make test`",
     "docs": "`make docs`",
+    "boards": "`make test-embedded`",
     "dev": "`make lint`, `make coverage`, `make sbom`",
 }  # the others are for users
 
@@ -191,11 +193,11 @@ class Debian:
 
 
 class Python:
-    """Metadata of the Python packages: of this environment, and of what a wheel is built with."""
+    """Metadata of the Python packages: of this environment, and of what stands apart from it."""
 
     def __init__(self, build: pathlib.Path) -> None:
         self.folder = build / "sbom-site"
-        wanted = [one for one, extra in python_lists() if extra == "wheel" and not self.find(name_of(one))]
+        wanted = [one for one, extra in python_lists() if extra in APART and not self.find(name_of(one))]
         if wanted:
             pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"]
             subprocess.run([*pip, "--target", str(self.folder), *wanted], check=False)

@@ -64,6 +64,15 @@ if [ "${OKID_SKIP_APT:-}" != 1 ]; then
   fi
 fi
 
+# The readers that frameworks of boards have for their manifests: a Python of their own, because they want other versions.
+if [ "${1:-}" = embedded ] && ! cmp -s tools/pyproject.toml .venv/boards/.okid; then
+  [ -x .venv/boards/bin/python ] || python3 -m venv .venv/boards || exit 4
+  echo "setup: installing Python packages (boards) into .venv/boards, some minutes the first time"
+  python3 tools/requirements.py boards | .venv/boards/bin/python -m pip install --quiet --disable-pip-version-check -r /dev/stdin || {
+    echo "setup: pip could not install tools/pyproject.toml [boards]; see the lines above." >&2; exit 4; }
+  cp tools/pyproject.toml .venv/boards/.okid
+fi
+
 # Python: one .venv, refreshed only when the list of requirements changed. A tier includes the ones before it.
 case $tier in
   build) covers="build test dev" ;;

@@ -30,6 +30,11 @@ def w1(count: int) -> Codes:
 def generate(folder: Path) -> None:
     """okid_core.c/.h, okid_modes.cpp/.h and the record as codes.h."""
     subprocess.run([sys.executable, ROOT / "tools" / "amalgamate.py", folder], check=True)
+    write_codes(folder)
+
+
+def write_codes(folder: Path) -> None:
+    """The record as codes.h."""
     rows = ",\n".join("{" + ", ".join(map(str, row)) + "}" for row in w1(SAMPLES).tolist())
     head = f"#include <stdint.h>\nenum {{ SAMPLES = {SAMPLES} }};\n"
     text = f"{head}static const int16_t codes[SAMPLES][4] = {{{rows}}};\n"
@@ -40,6 +45,14 @@ def compile(compiler: list[str], folder: Path, image: Path, *rest: object) -> No
     """feed.c with okid_core.c of the folder to an image; rest: the board's sources and the linker's arguments."""
     command = [*compiler, "-I.", f"-I{BOARDS}", HERE / "feed.c", "okid_core.c", *rest, "-o", image]
     subprocess.run([str(word) for word in command], cwd=folder, check=True)
+
+
+def sketch(library: Path, name: str, compiler: list[str], image: Path, *rest: object) -> None:
+    """A sketch of packaging/arduino over the record, with the stubs; rest: objects, sources, the linker's arguments."""
+    source, stubs = library / "examples" / name / f"{name}.ino", ROOT / "tests" / "boards" / "stubs"
+    include = [f"-I{library / 'src'}", f"-I{stubs}", f"-I{BOARDS}", f'-DSKETCH="{source}"']
+    command = [*compiler, "-std=gnu++17", "-Wall", "-Wextra", "-Werror", *include, stubs / "sketch.cpp", *rest]
+    subprocess.run([str(word) for word in [*command, "-o", image]], check=True)
 
 
 def correlation(parts: list[Codes], lags: int, gap: int) -> bytes:
