@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-package package docs score bench bench-check bench-peers \
+.PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-package package docs docs-pictures score bench bench-check bench-peers \
 	fuzz lint format sanitize sanitize-all coverage sbom clean
 
 help: ## this list
@@ -108,6 +108,10 @@ test-package: ## packages and wheel in clean systems: installed, used, purged (r
 docs: ## the documentation as web pages in build/docs; every warning is an error
 	@tools/setup.sh docs
 	@tools/docs.sh
+
+docs-pictures: build ## every picture of docs/images, from real runs (some minutes; needs Chromium)
+	@tools/setup.sh test
+	@PYTHONPATH=tools $(PYTHON) -m docs_pictures
 
 lint: ## format, clang-tidy, cppcheck, warnings of two compilers, ruff, mypy
 	@tools/setup.sh dev

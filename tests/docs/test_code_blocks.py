@@ -20,7 +20,7 @@ from command_help import ROOT
 from markdown_pages import Block, blocks, name_of, pages
 from program import okid
 
-RUN_ELSEWHERE = re.compile(r"tests/docs/test_(?:howto|tutorial)\.py")
+RUN_ELSEWHERE = re.compile(r"tests/docs/test_(?:howto|tutorial|recipes)\.py")
 BUS = '[[bus]]\nname = "can0"\ninterface = "can0"\n'
 CHANNEL = """[[channel]]
 name = "{}"

@@ -26,6 +26,10 @@ class Identification:
     window_s: float | None = None
     forgetting: float | None = None
 
+    @property
+    def drawn(self) -> str:
+        return "okid-era" if self.method == "auto" else self.method
+
 
 @dataclass(frozen=True)
 class PageConfig:
@@ -69,7 +73,7 @@ def read_config(path: str | Path, socket: str | None = None) -> PageConfig:
         samples=found["publish"]["samples"],
         title=found["notes"].get("title", ""),
         identification=Identification(
-            "okid-era" if wanted["method"] == "auto" else wanted["method"], wanted["p"] or Identification.p,
+            wanted["method"], wanted["p"] or Identification.p,
             wanted["rows"] or 0, wanted["detrend"], wanted["window_s"], wanted["forgetting"],
         ),
         geometry=geometry_of({"geometry": found["geometry"], "channel": found["channels"]}, str(file)),

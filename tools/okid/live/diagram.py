@@ -85,7 +85,7 @@ def draw(material: Material, wanted: Identification) -> dict[str, Any]:
     try:
         rows = min(wanted.rows, 2 * p) if wanted.rows and p < wanted.p else wanted.rows
         identifier = Identifier(
-            n_u, n_y, fs=material.rate_hz, p=p, rows=rows, max_order=MOST_ORDER, detrend=detrend, method=wanted.method
+            n_u, n_y, fs=material.rate_hz, p=p, rows=rows, max_order=MOST_ORDER, detrend=detrend, method=wanted.drawn
         )
         forgetting = wanted.forgetting or 1.0
         block = max(1, round(0.5 * material.rate_hz)) if forgetting < 1.0 else 0
