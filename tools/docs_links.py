@@ -13,7 +13,7 @@ LINK = re.compile(r"(?<!!)\[([^\]]+)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     """The page with such links as their words; fenced blocks stay as they are."""
     root = Path(config["docs_dir"]).resolve()
-    folder = Path(page.file.abs_src_path).parent
+    folder = (root / page.file.src_uri).parent
 
     def kept(link: re.Match[str]) -> str:
         target = (folder / link[2]).resolve()

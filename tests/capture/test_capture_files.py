@@ -34,7 +34,7 @@ def run(folder: Path, line: str) -> int:
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("can --log a.log --out a.log", "a.log: is --log, a file to be read; --out is not written over it"),
+        ("can --log a.log --out a.log", "a.log: is --log, a file to be read; --out does not overwrite it"),
         ("can --log a.log --out hard.log", "hard.log: is --log"),
         ("can --log a.log --out soft.log", "soft.log: is --log"),
         ("can --interface file --channel a.log --out a.log", "a.log: is --log"),

@@ -191,7 +191,7 @@ def test_events_are_told_in_words(tmp_path: Path) -> None:
             "sample": 5,
             "accepted": False,
             "reason": "double_hit",
-            "text": "a second blow",
+            "text": "a second hit",
         },
         {"type": "news of later days", "t": 5.0},
     ]
@@ -205,7 +205,7 @@ def test_events_are_told_in_words(tmp_path: Path) -> None:
             "alarm over: every mode is back at its baseline",
             "17 lines of okid did not reach this page",
             "can0: down link went down",
-            "blow 2 refused (double_hit): a second blow",
+            "hit 2 rejected (double_hit): a second hit",
             "event 'news of later days'",
         ]
         state = one._state()

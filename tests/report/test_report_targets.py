@@ -47,7 +47,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--out", "r.json"], "r.json: is a result to be read, a report is not written over it"),
+        (["--out", "r.json"], "r.json: is a result to be read, a report does not overwrite it"),
         (["--out", "../{}/r.json"], "is a result to be read"),
         (["--record", "r.csv", "--out", "r.csv"], "r.csv: is a record to be read"),
         (["--record", "r.csv", "--out", "link.html"], "link.html: is a record to be read"),

@@ -82,7 +82,7 @@ def test_the_tolerance_is_that_of_the_program() -> None:
 
 def test_what_was_not_looked_at_is_said(raw: dict[str, Any], tmp_path: Path) -> None:
     bare = shown(raw)
-    assert "Nothing speaks against it in what was looked at: warnings of the identification, consistency" in bare
+    assert "No quality warning in what was checked: warnings of the identification, consistency" in bare
     assert "rate by the time stamps (no events given)" in bare
     assert "Not looked at: completeness, units, modes that the order cut off, whiteness of the residual (no rec" in bare
     silent = shown(raw, events=written(tmp_path / "e.jsonl", CHANNELS, None))
@@ -126,7 +126,7 @@ def test_remarks_of_every_code_are_shown_and_named(raw: dict[str, Any]) -> None:
     assert "Look at: the warnings below (saturated, of_a_newer_okid, warning, bare)." in told
     mild = shown({**raw, "warnings": given[2:3]})
     assert 'class="verdict"' in mild
-    assert "Nothing speaks against it" in mild
+    assert "No quality warning" in mild
 
 
 def test_every_doubt_leaves_room_for_the_remarks(raw: dict[str, Any], tmp_path: Path) -> None:

@@ -21,4 +21,4 @@ class InputError(Error):
 
 
 class IdentificationError(Error):
-    """The data were read, but no model can be identified honestly (constant input, too short, weak excitation ..)."""
+    """The data were read, but no reliable model can be identified (constant input, too short, weak excitation ..)."""

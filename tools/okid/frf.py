@@ -139,7 +139,7 @@ def h1(
         records = [_struck_part(data, n_u) for data in records]
         nperseg = min(len(data) for data in records)
         if nperseg < SHORTEST:
-            raise InputError(f"only {nperseg} unbroken samples around a blow, a response function takes {SHORTEST}")
+            raise InputError(f"only {nperseg} unbroken samples around a hit, a response function takes {SHORTEST}")
     elif nperseg is None:
         nperseg = _segment_length(records)
     shape = _window(window or ("boxcar" if hit else "hann"), nperseg)

@@ -260,9 +260,7 @@ class _Run:
             ident, files = what[1], what[-1]
             for path in files:
                 path.unlink(missing_ok=True)
-            self.out.faults[ident] = (
-                f"its sums could not be merged and were removed, run again to read it anew: {reason}"
-            )
+            self.out.faults[ident] = f"its sums could not be merged and were removed, run again to read it: {reason}"
             return
         slices: list[Slice] = what[1]
         if len(slices) > 1:
@@ -272,7 +270,7 @@ class _Run:
         piece, died = slices[0], type(fault).__name__ == "KilledWorker"
         if len(piece.records) > 1 and self.spec.identification.method == "auto":
             told = "a worker ended over it: too large for its memory?" if died else reason
-            self.out.faults[piece.group] = f"its records could not be identified, run again to try anew: {told}"
+            self.out.faults[piece.group] = f"its records could not be identified, run again: {told}"
         elif len(piece.records) > 1:
             self.split(piece)
         elif died and not what[2]:

@@ -34,7 +34,7 @@ def check_outputs(inputs: Mapping[str, Name], outputs: Mapping[str, Name]) -> No
     for index, (option, path) in enumerate(named):
         for role, other in inputs.items():
             if other is not None and _same(path, Path(other)):
-                raise InputError(f"{path}: is {role}, a file to be read; {option} is not written over it: name another")
+                raise InputError(f"{path}: is {role}, a file to be read; {option} does not overwrite it: name another")
         for before, other in named[:index]:
             if _same(path, other):
                 raise InputError(f"{path}: {before} and {option} are the same file: name two")

@@ -221,7 +221,7 @@ class Capture:
 
     @property
     def done(self) -> bool:
-        """As many samples or blows as were asked for have come."""
+        """As many samples or hits as were asked for have come."""
         return bool(host.library().okid_host_capture_done(self._open()))
 
     def take(self, *, raw: bool = False, every: bool = False) -> list[Real]:

@@ -48,12 +48,12 @@ def _check_pair(source: Path, target: Path, given: str, wanted: str) -> None:
         log = source if source.suffix.lower() == ".log" else source.with_suffix(".log")
         first = "" if log == source else f"okid-convert {source} {log}, then "
         raise InputError(
-            f"{source} holds CAN frames and {target} would hold samples: which bits are which channel stands in a "
+            f"{source} holds CAN frames and {target} would hold samples: which bits are which channel is in a "
             f"CONFIG.toml, so {first}okid convert {log} OUT.csv -c CONFIG.toml (a table of frames: OUT.can.csv)"
         )
     if given == "record" and wanted == "frames":
         raise InputError(
-            f"{source} holds samples and {target} would hold CAN frames: which bits are which channel stands in a "
+            f"{source} holds samples and {target} would hold CAN frames: which bits are which channel is in a "
             "CONFIG.toml, so okid convert IN.csv OUT.log -c CONFIG.toml"
         )
     if given == "result" and target.suffix.lower() not in RESULT_EXTENSIONS:

@@ -26,7 +26,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="okid-live",
         description="Show a running `okid run CONFIG.toml` (or `okid replay`) as a web page: signals, spectra, "
-        "response functions, modes, stabilization diagram, mode shapes, bus health, result. It only looks on.",
+        "response functions, modes, stabilization diagram, mode shapes, bus health, result. It is read-only.",
         epilog="example: okid-live frame.toml --open      with socket = \"okid.sock\" and samples = true in [publish] "
         "of frame.toml; from another computer: ssh -L 8765:127.0.0.1:8765 HOST, then http://127.0.0.1:8765/",
     )  # fmt: skip

@@ -24,8 +24,8 @@ def _alarm(event: dict[str, Any]) -> tuple[str, str]:
 
 
 def _hit(event: dict[str, Any]) -> tuple[str, str]:
-    verdict = "good" if event.get("accepted") else f"refused ({event.get('reason')})"
-    return ("good" if event.get("accepted") else "warn"), f"blow {event.get('number')} {verdict}: {event.get('text')}"
+    verdict = "good" if event.get("accepted") else f"rejected ({event.get('reason')})"
+    return ("good" if event.get("accepted") else "warn"), f"hit {event.get('number')} {verdict}: {event.get('text')}"
 
 
 def _change(event: dict[str, Any]) -> tuple[str, str]:

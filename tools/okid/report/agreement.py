@@ -74,7 +74,7 @@ def history_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Secti
             error.set_xlabel("time [s]")
     drawing.align_ylabels()
     kind = "simulated from the inputs alone" if excerpt.simulated else "predicted one sample ahead"
-    where = "around the hardest blow" if excerpt.hit else "where the responses are largest"
+    where = "around the hardest hit" if excerpt.hit else "where the responses are largest"
     words = f"{len(excerpt.time_s)} samples {where}, {kind}. Shown: {len(shown)} of {len(m.result.outputs)} outputs."
     picture = m.pictures.inline(drawing, "measured and modelled responses over time")
     return page.section(title, picture, page.note(words), name="Time histories")
@@ -144,7 +144,7 @@ def residual_section(m: Material) -> page.Section | None:
             "force. Shown: the input with the largest correlation."
         )
     if m.measured.excerpt is not None and m.measured.excerpt.hit:
-        words += " The force is one blow: its bounds are rough."
+        words += " The force is one hit: its bounds are rough."
     if len(m.result.outputs) > MOST_SHOWN:
         words += f" Pictures: the {MOST_SHOWN} outputs with the largest correlations."
     rows = page.table([*head, "verdict"], _white_rows(m, white), "words")

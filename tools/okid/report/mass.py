@@ -108,7 +108,7 @@ def mass_section(m: Material) -> list[page.Section]:
                 _matrix(f"R [N s/m] proportional: {formula}", pdc["R"]),
             ))  # fmt: skip
         else:
-            parts.append(page.absent(f"More than {MOST_SHOWN} columns: the matrices stand in the result file."))
+            parts.append(page.absent(f"More than {MOST_SHOWN} columns: the matrices are in the result file."))
         parts.append(_damping_picture(m, mkr, pdc))
     except (KeyError, TypeError, ValueError) as fault:
         if isinstance(fault, InputError):

@@ -42,7 +42,7 @@ def _table(modes: Sequence[dict[str, Any]], shown: Sequence[int], sure: bool) ->
     z_std = any(modes[k].get("damping_ratio_std") is not None for k in shown)
     voted = any(modes[k].get("found_in") is not None for k in shown)
     head = ["mode", "f [Hz]", *(["± σ [Hz]"] if f_std else []), "ζ [%]", *(["± σ [%]"] if z_std else [])]
-    head += ["MPC", "EMAC", "CMI", *(["found in"] if voted else []), *([] if sure else ["what speaks against it"])]
+    head += ["MPC", "EMAC", "CMI", *(["found in"] if voted else []), *([] if sure else ["why doubtful"])]
     rows = []
     for k in shown:
         one = modes[k]

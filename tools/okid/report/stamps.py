@@ -44,5 +44,5 @@ def rate_doubt(m: Material) -> str:
         return ""
     return (
         f"by the time stamps {seen:.4g} samples came a second, fs is {fs:.10g}: every frequency scales with it "
-        "(mend rate_hz, unless the frames were played at another speed)"
+        "(fix rate_hz, unless the frames were played at another speed)"
     )

@@ -60,7 +60,7 @@ def check_target(target: Place, inputs: Mapping[str, Place | None], kind: str = 
     goal = Path(target)
     for what, path in inputs.items():
         if path is not None and _same(goal, Path(path)):
-            raise InputError(f"{target}: {_READ[what]}, a report is not written over it: give another name")
+            raise InputError(f"{target}: {_READ[what]}, a report does not overwrite it: give another name")
     if kind == ".html" and goal.suffix.lower() == ".pdf":
         raise InputError(
             f"{target}: the page is HTML, expected a name that ends in .html; --pdf {target} prints it too"
@@ -77,7 +77,7 @@ def check_target(target: Place, inputs: Mapping[str, Place | None], kind: str = 
         raise InputError(f"{target}: {fault.strerror or fault}") from None
     if head and not head.startswith(begins):
         raise InputError(
-            f"{target}: exists and is not {name}, a report is not written over it: give a name that ends in {kind}"
+            f"{target}: exists and is not {name}, a report does not overwrite it: give a name that ends in {kind}"
         )
 
 

@@ -146,7 +146,7 @@ def _looked_at(m: Material) -> tuple[list[str], dict[str, list[str]]]:
 def verdict(m: Material) -> str:
     """The result, what speaks against it, and what was not looked at."""
     doubts, (seen, unseen) = _doubts(m), _looked_at(m)
-    last = f"Look at: {doubts}." if doubts else f"Nothing speaks against it in what was looked at: {', '.join(seen)}."
+    last = f"Look at: {doubts}." if doubts else f"No quality warning in what was checked: {', '.join(seen)}."
     text = f"<p>{escape(headline(m))}</p>\n<p>{escape(last)}</p>"
     if unseen:
         parts = "; ".join(f"{', '.join(what)} ({why})" for why, what in unseen.items())

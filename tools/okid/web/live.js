@@ -24,7 +24,7 @@ const outputs = () => page.facts.channels.filter((one) => one.role !== "force" &
 
 function waiting() {
   if (!page.state || page.state.samples === "off") return ADD_SAMPLES;
-  return page.facts.hammer ? "waiting for a good blow" : "waiting for samples";
+  return page.facts.hammer ? "waiting for a hit" : "waiting for samples";
 }
 
 // Upper end of the frequency axes: Nyquist, or well above the highest mode.
@@ -154,7 +154,7 @@ function takeResult(result) {
 
 function showDiagramNote() {
   const found = page.diagram;
-  const what = found && (page.facts.hammer ? `${found.stretches} blows` : `last ${found.seconds && found.seconds.toFixed(1)} s`);
+  const what = found && (page.facts.hammer ? `${found.stretches} hits` : `last ${found.seconds && found.seconds.toFixed(1)} s`);
   const lines = found && !found.text ? found.modes.filter((mode) => mode[0] <= topFrequency()).length : 0;
   by("diagram-note").textContent = found && !found.text ? `${what}, p = ${found.p}, ${lines} mode${lines === 1 ? "" : "s"} hold${lines === 1 ? "s" : ""}` : "";
 }
@@ -190,7 +190,7 @@ function takeSpectra(found) {
   }
   page.spectra = found;
   const more = lanes.shown.length > MOST_SPECTRA ? `, first ${MOST_SPECTRA} chosen channels` : "";
-  const what = page.facts.hammer ? "blows" : "averages";
+  const what = page.facts.hammer ? "hits" : "averages";
   const number = found.most && found.averages > found.most ? `newest ${found.most}` : found.averages;
   by("spectra-note").textContent = `${number} ${what} of ${found.segment_s.toPrecision(3)} s, ${found.resolution_hz.toPrecision(3)} Hz a line${more}`;
   plots.spectra.want();

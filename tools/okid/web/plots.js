@@ -177,7 +177,7 @@ export function spectra(found, channels, hammer) {
       line: { color: palette[k % palette.length], width: 1.2 } };
   });
   return { data, layout: layout({ xaxis: axis("frequency [Hz]", { range: [0, found.top] }),
-    yaxis: logarithmic(hammer ? "mean |X|² of the blows [unit²/Hz]" : "power density [unit²/Hz]", data.map((one) => one.y)) }) };
+    yaxis: logarithmic(hammer ? "mean |X|² of the hits [unit²/Hz]" : "power density [unit²/Hz]", data.map((one) => one.y)) }) };
 }
 
 export function diagram(found, top) {

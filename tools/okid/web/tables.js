@@ -106,11 +106,11 @@ export function showStats(event) {
 
 export function showHits(hits) {
   const last = hits[hits.length - 1];
-  fill(document.getElementById("hammer-table"), ["blow", "t [s]", "<verdict", "peak", "width [ms]", "force to [Hz]", "<what was seen"],
+  fill(document.getElementById("hammer-table"), ["hit", "t [s]", "<verdict", "peak", "width [ms]", "force to [Hz]", "<what was seen"],
     hits.slice().reverse().map((hit) => [String(hit.number), hit.t.toFixed(2), hit.accepted ? ["good", "good"] : [String(hit.reason), "bad"],
       known(hit.peak) ? hit.peak.toPrecision(4) : "–", known(hit.duration_s) ? (1000 * hit.duration_s).toFixed(2) : "–",
       known(hit.force_band_hz) ? hit.force_band_hz.toFixed(0) : "–", [hit.text || "", "long"]]));
-  document.querySelector("#hammer .absent").textContent = last ? "" : "waiting for the first blow";
+  document.querySelector("#hammer .absent").textContent = last ? "" : "waiting for the first hit";
   document.getElementById("hammer-note").textContent = last ? `${last.accepted_hits} good, ${last.left} to go` : "";
 }
 

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""Words of the field in everything a user reads: the odd ones that were found stay out, acronyms are explained.
+
+Read are the prose of all pages and the texts in quotes of the program, the package and the live page.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterator
+from functools import cache
+
+import pytest
+from markdown_pages import ROOT, name_of, pages, prose
+
+ODD = {  # pattern -> what to write
+    r"\bblows?\b": "hit",
+    r"\badds? the good ones up\b": "averages the accepted hits",
+    r"\bjudges? (?:blows|hits)\b": "accepts or rejects hits",
+    r"(?<!the )\bmodes that hold\b": "stable modes",
+    r"\bridge that cures\b": "minimum stabilising regularisation",
+    r"\bonly looks on\b": "is read-only",
+    r"\bspeaks? against\b": "quality warning, why doubtful",
+    r"\bdie[sd]? away\b": "decays",
+    r"\bwritten over\b": "overwritten",
+    r"\bmust pass over\b": "must ignore",
+    r"\banew\b": "again",
+    r"\bfor ever\b": "forever",
+    r"\bmend(?:s|ed)?\b": "fix",
+    r"\bgives? way in time\b": "is deleted",
+    r"\bhonest(?:ly)?\b": "reliable",
+    r"\bin the place of\b": "in place of",
+    r"\b(?:is|are) told\b(?! apart)": "is reported",
+    r"\bis said (?:on|in)\b": "is reported",
+    r"\bcomes? to rest\b": "settles",
+    r"\bcures\b": "makes stable",
+}
+ACRONYMS = {  # spelled out where a newcomer meets them first, on the pages they begin with
+    "README.md": {
+        "OKID": "observer/kalman filter identification",
+        "ERA": "eigensystem realization algorithm",
+        "MPC": "modal phase collinearity",
+        "EMAC": "extended modal amplitude coherence",
+        "FRF": "frequency response function",
+    },
+    "docs/recipes/hammer.md": {"FRF": "frequency response function"},
+    "docs/recipes/matrices.md": {"DOF": "degree of freedom"},
+    "docs/recipes/live-can.md": {"DBC": "can database"},
+}
+TEXT = {
+    ".py": r'"((?:[^"\\\n]|\\.)*)"',
+    ".js": r"[\"'`]([^\"'`\n]*)[\"'`]",
+    ".html": r">([^<\n]+)<",
+}
+
+
+@cache
+def texts() -> tuple[tuple[str, str], ...]:
+    """(where, text): prose of the pages, texts in quotes of sources, without their comments."""
+    return tuple([*of_pages(), *of_sources()])
+
+
+def of_pages() -> Iterator[tuple[str, str]]:
+    for page in pages():
+        if page.name != "CHANGELOG.md":
+            yield name_of(page), re.sub(r"\]\([^)]*\)", "]", prose(page.read_text()))
+
+
+def of_sources() -> Iterator[tuple[str, str]]:
+    listed = ["git", "ls-files", "firmware_host", "tools/okid"]
+    for name in subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split():
+        path = ROOT / name
+        if path.suffix in TEXT and path.exists():
+            source = re.sub(r'"""(?:.|\n)*?"""|(?m:^\s*(?://|#).*$)', "", path.read_text())
+            yield name, "\n".join(re.findall(TEXT[path.suffix], source))
+
+
+@pytest.mark.parametrize("pattern", ODD)
+def test_odd_words_stay_out(pattern: str) -> None:
+    found = [
+        f"{name}: …{text[max(0, hit.start() - 40) : hit.end() + 20]!r}"
+        for name, text in texts()
+        for hit in re.finditer(pattern, text, re.IGNORECASE)
+    ]
+    assert not found, f"write {ODD[pattern]!r}:\n" + "\n".join(found)
+
+
+def test_acronyms_are_spelled_out() -> None:
+    for name, wanted in ACRONYMS.items():
+        text = (ROOT / name).read_text()
+        for acronym, words in wanted.items():
+            first = re.search(rf"\b{acronym}s?\b", text)
+            assert first and words in text.lower(), f"{name}: {acronym} is not spelled out as {words!r}"
+            assert abs(text.lower().index(words) - first.start()) < 900, f"{name}: {acronym} stands far from {words!r}"
+
+
+def test_glossary() -> None:
+    rows = re.findall(r"(?m)^\| (?!term|---)(.+?) \|", (ROOT / "docs" / "glossary.md").read_text())
+    assert len(rows) >= 60 and rows == list(dict.fromkeys(rows))
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 120
