@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-package package docs docs-pictures score bench bench-check bench-peers \
+.PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-languages test-package package docs docs-pictures score bench bench-check bench-peers \
 	fuzz lint format sanitize sanitize-all coverage sbom clean
 
 help: ## this list
@@ -54,6 +54,10 @@ test-distribution: ## build and unit tests in clean Debian 13 and Debian testing
 test-embedded: ## firmware on Cortex-M in QEMU, the library on Arm boards, the installed package
 	@tools/setup.sh embedded
 	@tests/embedded/run
+
+test-languages: build ## bindings of tools/bindings.py: Rust by cargo, okid_identify in GNU Octave
+	@tools/setup.sh languages
+	@$(PYTHON) -m pytest -q -p no:cacheprovider -c tools/pyproject.toml --rootdir . tests/languages
 
 score: build ## the default identification on measured records ($OKID_DATA), beside release 0.1's figures
 	@$(PYTHON) tools/score.py build/okid

@@ -29,6 +29,7 @@ COMMANDS = {
     "debian-test": "`make test`",
     "debian-bench": "`make bench`",
     "debian-embedded": "`make test-embedded`",
+    "debian-languages": "`make test-languages`",
     "debian-fuzz": "`make fuzz`, `make lint`",
     "debian-dev": "`make lint`, `make docs`",
     "debian-package": "`make package`, `make test-package`",
