@@ -49,7 +49,7 @@ def tracking_section(m: Material) -> page.Section | None:
         ax = drawing.add_subplot(bands, columns, place)
         points = events.tracks[track]
         drawings.draw_track(ax, points, events, end)
-        ax.set_title(f"track {track}: last {points[-1].frequency_hz:.4f} Hz")
+        ax.set_title(f"track {track}: last {points[-1].frequency_hz:.4f} Hz", loc="left")
         ax.set_ylabel("f [Hz]")
         ax.tick_params(labelbottom=place > len(shown) - columns)
         if place > len(shown) - columns:
