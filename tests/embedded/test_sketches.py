@@ -80,6 +80,7 @@ def test_modes_on_the_board_are_those_of_the_structure(library: Path) -> None:
     np.testing.assert_allclose(found[:, 1], 100 * damping, rtol=0.03)
 
 
+@pytest.mark.xdist_group("sketches")
 def test_validators_of_the_frameworks_accept_the_manifests(library: Path) -> None:
     """PlatformIO's, ESP-IDF's and Kconfig's own readers, in a Python of their own (tools/setup.sh embedded)."""
     python = core_feed.ROOT / ".venv" / "boards" / "bin" / "python"
