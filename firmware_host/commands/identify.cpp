@@ -119,6 +119,7 @@ void identify(identify_arguments given) {
         progress display(!given.quiet);
         options.stage = [&](const char* stage) { display.stage(stage); };
         result = identify_records(read_records(given, options, display), options);
+        finish_fits(result);
         result.context.all_modes = given.all_modes;
     }
     const okid_identified_t& model = result.model.view();

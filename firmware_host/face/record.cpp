@@ -9,6 +9,7 @@
 #include "record/csv_header.hpp"
 #include "record/request.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -52,35 +53,56 @@ record_options checked(const asked& given) {
     return options;
 }
 
-/// One side of a record into rows of `width` numbers. @return false: some are missing or infinite
+/// Samples first .. of one side of a record into `count` rows of `width` numbers.
 template <class Number>
-bool copy_side(const okid_host_columns_t& from, std::size_t count, std::size_t width, double* to) {
-    double sum = 0;
+void copy_side(const okid_host_columns_t& from, std::size_t first, std::size_t count, std::size_t width, double* to) {
     for (std::size_t c = 0; c < from.channels; ++c) {
-        const char* at = static_cast<const char*>(from.data) + static_cast<std::ptrdiff_t>(c) * from.channel_stride;
+        const char* at = static_cast<const char*>(from.data) + static_cast<std::ptrdiff_t>(c) * from.channel_stride +
+                         static_cast<std::ptrdiff_t>(first) * from.row_stride;
         double* out = to + c;
         for (std::size_t n = 0; n < count; ++n, at += from.row_stride, out += width) {
             Number x;
             std::memcpy(&x, at, sizeof x);
             *out = static_cast<double>(x);
-            sum += *out * 0.0;
         }
     }
-    return sum == 0;
 }
 
+using copy_t = void (*)(const okid_host_columns_t&, std::size_t, std::size_t, std::size_t, double*);
+
 /// `what`: u or y.
-void take_side(const okid_host_columns_t& from, std::size_t count, std::size_t width, const char* what,
-               const std::string& place, double* to) {
-    using copy_t = bool (*)(const okid_host_columns_t&, std::size_t, std::size_t, double*);
+copy_t copy_of(const okid_host_columns_t& from, const char* what) {
     static constexpr copy_t copies[] = {copy_side<double>, copy_side<float>, copy_side<std::int16_t>,
                                         copy_side<std::int32_t>};
     if (from.type < 0 || from.type > 3)
         throw failure(exit_usage, fmt::format("{}: numbers of type {}, expected 0 to 3", what, from.type));
-    if (from.channels == 0 || copies[from.type](from, count, width, to)) return;
+    return copies[from.type];
+}
+
+/// The rows [u; y] of a record behind those of the set, some at a time through a buffer that stays in the cache.
+/// @return false: some are missing or infinite
+bool append_rows(const okid_host_columns_t& u, const okid_host_columns_t& y, std::size_t count, record_set& set) {
+    constexpr std::size_t most = 128;
+    const copy_t copies[] = {copy_of(u, "u"), copy_of(y, "y")};
+    const std::size_t width = set.channels();
+    std::vector<double> rows(most * width);
+    bool finite = true;
+    for (std::size_t first = 0; first < count; first += most) {
+        const std::size_t some = std::min(most, count - first);
+        copies[0](u, first, some, width, rows.data());
+        copies[1](y, first, some, width, rows.data() + set.n_u);
+        finite = finite && all_finite(rows.data(), some * width);
+        set.samples.insert(set.samples.end(), rows.data(), rows.data() + some * width);
+    }
+    return finite;
+}
+
+/// Refuses an infinite number among `channels` of each row; `what`: u or y.
+void check_not_infinite(const double* rows, std::size_t count, std::size_t width, std::size_t channels,
+                        const char* what, const std::string& place) {
     for (std::size_t n = 0; n < count; ++n)
-        for (std::size_t c = 0; c < from.channels; ++c)
-            if (std::isinf(to[n * width + c]))
+        for (std::size_t c = 0; c < channels; ++c)
+            if (std::isinf(rows[n * width + c]))
                 throw failure(exit_usage, fmt::format("{}{} is infinite at sample {} (from 0) of channel {}{}; use NaN "
                                                       "for missing samples",
                                                       what, place, n, what, c + 1));
@@ -135,11 +157,12 @@ int32_t okid_host_identify_columns(const char* options, int32_t records, const o
             if (inputs[i].channels != set.n_u || outputs[i].channels != set.n_y)
                 throw failure(exit_usage, fmt::format("{}: {} inputs and {} outputs, expected {} and {}", names[i],
                                                       inputs[i].channels, outputs[i].channels, set.n_u, set.n_y));
-            set.samples.resize(set.samples.size() + counts[i] * set.channels());
-            double* rows = set.rows(set.records.back());
+            set.complete = face::append_rows(inputs[i], outputs[i], counts[i], set) && (i == 0 || set.complete);
+            if (set.complete) return;
+            const double* rows = set.rows(set.records.back());
             const std::string place = records > 1 ? fmt::format("[{}]", i) : "";
-            face::take_side(inputs[i], counts[i], set.channels(), "u", place, rows);
-            face::take_side(outputs[i], counts[i], set.channels(), "y", place, rows + set.n_u);
+            face::check_not_infinite(rows, counts[i], set.channels(), set.n_u, "u", place);
+            face::check_not_infinite(rows + set.n_u, counts[i], set.channels(), set.n_y, "y", place);
         });
     });
 }

@@ -93,9 +93,18 @@ std::vector<named_array> arrays_of(const okid_host_result_t& self) {
 }
 
 /// The result as JSON, its warnings in the words of arguments.
-std::string text_of(const okid_host_result_t& self, bool arrays) {
+std::string text_of(okid_host_result_t& self, bool arrays) {
+    finish_fits(self.found);
     nlohmann::ordered_json out = result_json(self.found.model.view(), self.found.context, arrays);
     for (auto& warning : out["warnings"]) warning["text"] = argument_words(warning["text"].get<std::string>());
+    return result_text(out);
+}
+
+/// The summary without what the fits say.
+std::string brief_of(const okid_host_result_t& self) {
+    nlohmann::ordered_json out = result_json(self.found.model.view(), self.found.context, false);
+    out.erase("fit");
+    out.erase("warnings");
     return result_text(out);
 }
 
@@ -139,14 +148,21 @@ const char* okid_host_result_summary(okid_host_result_t* self) {
     return face::made_once(self->summary, [&] { return face::text_of(*self, false); });
 }
 
-const char* okid_host_result_table(okid_host_result_t* self) {
-    return face::made_once(
-        self->table, [&] { return face::argument_words(result_table(self->found.model.view(), self->found.context)); });
+const char* okid_host_result_brief(okid_host_result_t* self) {
+    return face::made_once(self->brief, [&] { return face::brief_of(*self); });
 }
 
-int32_t okid_host_result_array(const okid_host_result_t* self, const char* name, okid_host_array_t* out) {
+const char* okid_host_result_table(okid_host_result_t* self) {
+    return face::made_once(self->table, [&] {
+        finish_fits(self->found);
+        return face::argument_words(result_table(self->found.model.view(), self->found.context));
+    });
+}
+
+int32_t okid_host_result_array(okid_host_result_t* self, const char* name, okid_host_array_t* out) {
     int32_t there = 0;
     (void)face::guard([&] {
+        if (std::strncmp(name, "fit.", 4) == 0) finish_fits(self->found);
         for (const auto& one : face::arrays_of(*self))
             if (std::strcmp(one.name, name) == 0 && one.array.data != nullptr) *out = one.array, there = 1;
     });

@@ -10,8 +10,8 @@
 
 struct okid_host_result {
     okid_host::record_result found;
-    std::vector<double> x0, observer; ///< arrays that stand nowhere else
-    std::string json, summary, table; ///< made when they are first asked for
+    std::vector<double> x0, observer;        ///< arrays that stand nowhere else
+    std::string json, summary, brief, table; ///< made when they are first asked for
 };
 
 namespace okid_host::face {

@@ -232,13 +232,34 @@ long long find_model(const record_options& options, okid_accumulator_t*& accumul
     return rows;
 }
 
+/// May the fits of this n4sid model wait until somebody asks for them? Where its innovations leave 30 % of the amplitude of an output
+/// explained it is no model that check_explains() refuses (5 %).
+bool fits_can_wait(const record_options& options, okid_accumulator_t* accumulator, const record_work& work) {
+    const okid_identified_t& model = work.model;
+    if (!work.set.complete || options.refine == "yes" || options.mass.wanted() || !model.K ||
+        (model.warnings & (OKID_NOTE_PREDICTOR_UNSTABLE | OKID_NOTE_MODEL_UNSTABLE)))
+        return false;
+    std::vector<double> energy(work.set.channels());
+    if (okid_accumulator_energy(accumulator, OKID_DETREND_MEAN, energy.data()) != OKID_OK) return false;
+    for (int o = 0; o < model.n_y; ++o)
+        if (model.innovation[o * (model.n_y + 1)] * static_cast<double>(okid_accumulator_rows(accumulator)) <
+            0.7 * 0.7 * energy[work.set.n_u + static_cast<std::size_t>(o)])
+            return true;
+    return false;
+}
+
 /// B and D of the records, the fits, the refinement: all of it about the records without their means or lines.
 /// @return the replicates that stand after it
-std::vector<replicate_model> improve(const record_options& options, std::vector<replicate_model> replicates,
-                                     record_work& work) {
+std::vector<replicate_model> improve(const record_options& options, okid_accumulator_t* accumulator,
+                                     std::vector<replicate_model> replicates, record_work& work) {
     const bool from_record = is_subspace(work.config.method) && work.config.n_u > 0;
     tell(options, "simulating the model");
     const std::vector<double> states = from_record ? fit_inputs(work) : std::vector<double>{};
+    if (!states.empty() && fits_can_wait(options, accumulator, work)) {
+        tell_states(states, work.model.n_z, work.context);
+        work.states = states;
+        return replicates;
+    }
     fit_records(work.set, work.model, work.context, states.empty() ? nullptr : &states);
     if (options.refine == "yes") {
         tell(options, "refining the model");
@@ -306,6 +327,7 @@ record_result identify_records(record_set records, const record_options& options
     work.set = std::move(records);
     work.at_rest = options.start == "rest";
     const missing_count missing = count_missing(work.set);
+    work.set.complete = missing.samples == 0;
     work.context = describe_records(work.set, options, missing);
     check_moving(work.set, options);
     check_different_inputs(work.set, options);
@@ -329,8 +351,9 @@ record_result identify_records(record_set records, const record_options& options
         replicates = leave_out_blocks(work, accumulator, options.sigma_blocks);
     }
     if (options.detrend == "mean" && !own_means_first) remove_means(work.set); // the fit is about the record's mean
-    replicates = improve(options, std::move(replicates), work);
-    check_fit(work.context);
+    replicates = improve(options, accumulator, std::move(replicates), work);
+    const std::size_t place = work.context.warnings.size();
+    if (work.states.empty()) check_fit(work.context);
     remark_contradiction(modes_of(work.model), {}, options.fs_hz, work);
     find_matrices(replicates, options, work);
     find_deviations(rows, replicates, options, work);
@@ -341,7 +364,19 @@ record_result identify_records(record_set records, const record_options& options
     result.memory = std::move(work.memory);
     result.identifier = work.identifier;
     result.realised = work.realised;
+    if (!work.states.empty())
+        result.to_come.reset(new record_result::fits_to_come{std::move(work.set), std::move(work.states), place});
     return result;
+}
+
+void finish_fits(record_result& result) {
+    const auto later = std::move(result.to_come);
+    if (!later) return;
+    fit_records(later->set, result.model.view(), result.context, &later->states);
+    auto& said = result.context.warnings;
+    const auto before = static_cast<std::ptrdiff_t>(said.size());
+    remark_low_fit(*result.context.simulation_percent, true, result.context);
+    std::rotate(said.begin() + static_cast<std::ptrdiff_t>(later->place), said.begin() + before, said.end());
 }
 
 } // namespace okid_host

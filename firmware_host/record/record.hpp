@@ -48,9 +48,21 @@ struct record_result {
     std::unique_ptr<std::byte[]> memory;   ///< of `identifier`
     okid_identify_t* identifier = nullptr; ///< for the poles of other orders; `model` does not look into it
     okid_identified_t realised{};          ///< what it gave, in its own memory
+
+    /// Fits that nobody has asked for yet.
+    struct fits_to_come {
+        record_set set;             ///< the records less their means
+        std::vector<double> states; ///< initial ones, a record after the other
+        std::size_t place;          ///< of their remarks among the warnings
+    };
+    std::unique_ptr<fits_to_come> to_come;
 };
 
 /// Identify from all records together. Throws `failure`: exit 3 when no honest model can be had.
+/// Fits of an n4sid model that surely explains its record may be left for finish_fits().
 record_result identify_records(record_set records, const record_options& options);
+
+/// The fits and what is to be said of them, if they were left for later.
+void finish_fits(record_result& result);
 
 } // namespace okid_host

@@ -346,6 +346,7 @@ void find_matrix_deviations(const std::vector<listed_mode>& listed, const record
         for (std::size_t n = b * count / blocks; n < (b + 1) * count / blocks; ++n)
             std::fill_n(part.set.samples.begin() + static_cast<std::ptrdiff_t>(n * m + part.set.n_u), part.set.n_y,
                         NAN);
+        part.set.complete = false;
         make_modal_model(without_block(listed, work, b), options.fs_hz, part);
         held_model other;
         const okid_model_t view = as_taken(part.model, other);

@@ -33,32 +33,51 @@ const std::string& name_of(std::size_t channel, const record_options& options) {
     return channel < n_u ? options.inputs[channel] : options.outputs[channel - n_u];
 }
 
+/// What some inputs are about: complete samples, their mean, the products of what is left of them.
+struct input_moments {
+    double count = 0;
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd products;
+
+    explicit input_moments(Eigen::Index n_u)
+        : mean(Eigen::VectorXd::Zero(n_u)), products(Eigen::MatrixXd::Zero(n_u, n_u)) {}
+
+    /// Of a piece that stays in the cache (samples x inputs). Chan, Golub, LeVeque (1983).
+    void add(const Eigen::Ref<const Eigen::MatrixXd>& piece) {
+        if (piece.rows() == 0) return;
+        const auto more = static_cast<double>(piece.rows());
+        const Eigen::VectorXd own = piece.colwise().mean(), apart = own - mean;
+        const Eigen::MatrixXd left = piece.rowwise() - own.transpose();
+        products += left.transpose() * left + (count * more / (count + more)) * apart * apart.transpose();
+        mean += apart * (more / (count + more));
+        count += more;
+    }
+};
+
+/// Over the samples of a record that have all inputs.
+input_moments moments_of(const record_set& set, const record_data& record) {
+    constexpr Eigen::Index most = 256;
+    const auto n_u = static_cast<Eigen::Index>(set.n_u);
+    input_moments out(n_u);
+    Eigen::MatrixXd piece(most, n_u);
+    Eigen::Index held = 0;
+    const double* u = set.rows(record);
+    for (std::size_t n = 0; n < record.count; ++n, u += set.channels()) {
+        if (!set.complete && std::any_of(u, u + n_u, [](double x) { return std::isnan(x); })) continue;
+        for (Eigen::Index c = 0; c < n_u; ++c) piece(held, c) = u[c];
+        if (++held < most) continue;
+        out.add(piece);
+        held = 0;
+    }
+    out.add(piece.topRows(held));
+    return out;
+}
+
 /// Correlation of the inputs over all samples that have them all; each record about its own mean.
 Eigen::MatrixXd input_correlation(const record_set& set) {
-    const std::size_t n_u = set.n_u;
-    std::vector<double> sums(n_u * n_u), mean(n_u), left(n_u);
-    const auto each = [&](const record_data& record, const auto& use) {
-        const double* u = set.rows(record);
-        for (std::size_t n = 0; n < record.count; ++n, u += set.channels())
-            if (std::none_of(u, u + n_u, [](double x) { return std::isnan(x); })) use(u);
-    };
-    for (const record_data& record : set.records) {
-        std::fill(mean.begin(), mean.end(), 0.0);
-        double present = 0;
-        each(record, [&](const double* u) {
-            for (std::size_t c = 0; c < n_u; ++c) mean[c] += u[c];
-            present += 1;
-        });
-        for (double& x : mean) x /= std::max(present, 1.0);
-        each(record, [&](const double* u) {
-            for (std::size_t c = 0; c < n_u; ++c) {
-                left[c] = u[c] - mean[c];
-                for (std::size_t d = 0; d <= c; ++d) sums[c * n_u + d] += left[c] * left[d];
-            }
-        });
-    }
-    const auto size = static_cast<Eigen::Index>(n_u);
-    const Eigen::MatrixXd sum = Eigen::Map<Eigen::MatrixXd>(sums.data(), size, size).selfadjointView<Eigen::Upper>();
+    const auto size = static_cast<Eigen::Index>(set.n_u);
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size, size);
+    for (const record_data& record : set.records) sum += moments_of(set, record).products;
     const Eigen::VectorXd scale = sum.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
     return scale.asDiagonal() * sum * scale.asDiagonal();
 }
@@ -67,23 +86,18 @@ Eigen::MatrixXd input_correlation(const record_set& set) {
 /// standard deviation of the mean, and about no value is there less energy than about the mean.
 bool surely_later(const record_set& set, int p) {
     double early = 0, total = 0;
-    for (const record_data& record : set.records)
+    for (const record_data& record : set.records) {
+        const input_moments about = moments_of(set, record);
         for (std::size_t k = 0; k < set.n_u; ++k) {
-            const double* u = set.rows(record) + k;
-            const double shift = record.count > 0 ? u[0] : 0;
-            double sum = 0, square = 0;
-            for (std::size_t i = 0; i < record.count; ++i) {
-                const double x = u[i * set.channels()] - shift;
-                sum += x, square += x * x;
-            }
-            const auto count = static_cast<double>(record.count);
-            const double mean = sum / count, spread = std::sqrt(std::max(0.0, square / count - mean * mean));
+            const auto at = static_cast<Eigen::Index>(k);
+            const double energy = about.products(at, at), spread = std::sqrt(energy / std::max(about.count, 1.0));
             for (std::size_t i = 0; i < std::min(record.count, static_cast<std::size_t>(p)); ++i) {
-                const double most = std::abs(u[i * set.channels()] - shift - mean) + spread;
+                const double most = std::abs(set.rows(record)[i * set.channels() + k] - about.mean[at]) + spread;
                 early += most * most;
             }
-            total += count * spread * spread;
+            total += energy;
         }
+    }
     return early < 0.49 * total; // of missing samples NaN: not sure
 }
 

@@ -112,6 +112,7 @@ okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const
 }
 
 std::vector<stretch> stretches_of(const record_set& set, const record_data& record, std::size_t least) {
+    if (set.complete) return {{0, record.count}};
     std::vector<stretch> out;
     std::size_t first = 0;
     for (std::size_t i = 0; i <= record.count; ++i) {
@@ -121,6 +122,11 @@ std::vector<stretch> stretches_of(const record_set& set, const record_data& reco
         first = i + 1;
     }
     return out;
+}
+
+void tell_states(const std::vector<double>& states, int n_z, result_context& context) {
+    context.x0.emplace();
+    for (auto at = states.begin(); at != states.end(); at += n_z) context.x0->emplace_back(at, at + n_z);
 }
 
 std::vector<double> residuals(const record_set& set, const okid_identified_t& found) {

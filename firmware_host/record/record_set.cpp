@@ -14,8 +14,15 @@ bool is_complete(const double* row, std::size_t channels) {
     return std::none_of(row, row + channels, [](double x) { return std::isnan(x); });
 }
 
-/// Is every number there? In vectors: nearly always they all are.
-bool is_whole(const double* x, std::size_t count) {
+/// A record without a gap.
+bool is_whole(const record_set& set, const record_data& record) {
+    return set.complete || all_finite(set.rows(record), record.count * set.channels());
+}
+
+} // namespace
+
+/// In vectors: nearly always they all are.
+bool all_finite(const double* x, std::size_t count) {
     using lanes = double __attribute__((vector_size(16)));
     using bits = std::int64_t __attribute__((vector_size(16)));
     bits missing = {};
@@ -24,12 +31,10 @@ bool is_whole(const double* x, std::size_t count) {
         lanes v, w;
         std::memcpy(&v, x + i, sizeof v);
         std::memcpy(&w, x + i + 2, sizeof w);
-        missing |= (v != v) | (w != w);
+        missing |= (v - v != 0) | (w - w != 0);
     }
-    return !(missing[0] | missing[1]) && is_complete(x + i, count - i);
+    return !(missing[0] | missing[1]) && std::all_of(x + i, x + count, [](double one) { return std::isfinite(one); });
 }
-
-} // namespace
 
 void record_set::add(std::string path, const double* from, std::size_t rows) {
     records.push_back({std::move(path), count(), rows});
@@ -46,7 +51,7 @@ void record_set::add(std::string path, std::vector<double> rows, std::size_t beg
 missing_count count_missing(const record_set& set) {
     missing_count out;
     for (const record_data& record : set.records) {
-        if (is_whole(set.rows(record), record.count * set.channels())) continue;
+        if (is_whole(set, record)) continue;
         bool in_gap = false;
         const double* row = set.rows(record);
         for (std::size_t i = 0; i < record.count; ++i, row += set.channels()) {
@@ -64,7 +69,7 @@ std::vector<long long> complete_runs(const record_set& set) {
     for (const record_data& record : set.records) {
         long long run = 0;
         const double* row = set.rows(record);
-        if (record.count > 0 && is_whole(row, record.count * set.channels())) {
+        if (record.count > 0 && is_whole(set, record)) {
             runs.push_back(static_cast<long long>(record.count));
             continue;
         }
@@ -83,20 +88,25 @@ std::vector<long long> complete_runs(const record_set& set) {
 
 void remove_means(record_set& set) {
     const std::size_t channels = set.channels();
+    std::vector<double> sum(channels), present(channels), part(channels);
     for (const record_data& record : set.records) {
         double* rows = set.rows(record);
-        for (std::size_t k = 0; k < channels; ++k) {
-            double sum = 0;
-            std::size_t present = 0;
-            for (std::size_t i = 0; i < record.count; ++i) {
-                const double x = rows[i * channels + k];
-                if (std::isnan(x)) continue;
-                sum += x;
-                ++present;
-            }
-            for (std::size_t i = 0; present && i < record.count; ++i)
-                rows[i * channels + k] -= sum / static_cast<double>(present);
+        std::fill(sum.begin(), sum.end(), 0.0);
+        std::fill(present.begin(), present.end(), set.complete ? static_cast<double>(record.count) : 0.0);
+        for (std::size_t first = 0; first < record.count; first += 256) { // sums of sums: less rounding
+            std::fill(part.begin(), part.end(), 0.0);
+            const std::size_t last = std::min(record.count, first + 256);
+            for (const double* x = rows + first * channels; x < rows + last * channels; x += channels)
+                for (std::size_t k = 0; k < channels; ++k) {
+                    const bool known = set.complete || !std::isnan(x[k]);
+                    part[k] += known ? x[k] : 0;
+                    if (!set.complete) present[k] += known;
+                }
+            for (std::size_t k = 0; k < channels; ++k) sum[k] += part[k];
         }
+        for (std::size_t k = 0; k < channels; ++k) part[k] = present[k] > 0 ? sum[k] / present[k] : 0;
+        for (double* x = rows; x < rows + record.count * channels; x += channels)
+            for (std::size_t k = 0; k < channels; ++k) x[k] -= part[k];
     }
 }
 

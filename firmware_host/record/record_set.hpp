@@ -18,6 +18,7 @@ struct record_set {
     std::size_t n_u = 0, n_y = 0;
     std::vector<record_data> records;
     std::vector<double> samples;
+    bool complete = false; ///< it is known that no number is missing
 
     std::size_t channels() const { return n_u + n_y; }
     std::size_t count() const { return channels() ? samples.size() / channels() : 0; }
@@ -28,6 +29,9 @@ struct record_set {
     /// Another record: samples begin .. end-1 of these rows.
     void add(std::string path, std::vector<double> rows, std::size_t begin, std::size_t end);
 };
+
+/// Is none of these numbers missing or infinite?
+bool all_finite(const double* x, std::size_t count);
 
 struct missing_count {
     long long samples = 0, gaps = 0; ///< samples with any channel missing, and the runs they form

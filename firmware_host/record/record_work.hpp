@@ -28,6 +28,7 @@ struct record_work {
     okid_identify_t* identifier = nullptr;
     okid_identified_t realised{}; ///< what it gave, before any refinement
     std::unique_ptr<refined_arrays> refined;
+    std::vector<double> states;                  ///< initial ones of fits that are left for later; else empty
     std::vector<std::vector<mode_shift>> shifts; ///< auto: of each listed mode, a block each; empty: not known
 };
 

@@ -201,6 +201,7 @@ void leave_out_sparse(const std::vector<std::string>& outputs, const std::vector
 
 screened_outputs screen_outputs(record_set& set, const std::vector<std::string>& outputs) {
     screened_outputs out;
+    set.complete = false; // what is faulty becomes missing
     out.kept.assign(outputs.size(), true);
     std::vector<std::size_t> usable_of(outputs.size(), 0);
     for (std::size_t k = 0; k < outputs.size(); ++k) {

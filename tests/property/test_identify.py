@@ -158,8 +158,11 @@ def test_a_blow_at_the_start_needs_the_silent_past() -> None:
     assert errors[0] < 0.1 * errors[1]
 
 
-def test_fits_are_the_formula(result: okid.Result) -> None:
+@pytest.mark.parametrize("method", ["okid-era", "n4sid-cva"])  # the fits of the latter wait until they are asked for
+def test_fits_are_the_formula(result: okid.Result, method: str) -> None:
     u, y = w1_record(1.0, 1)
+    if method != "okid-era":
+        result = okid.identify(u, y, fs=systems.w1().fs, method=method, order=6, rows=10)
     centred_u, centred_y = u - u.mean(axis=0), y - y.mean(axis=0)
     assert result.model.x0 is not None
     x0 = result.model.x0[0]
@@ -402,3 +405,24 @@ def test_outputs_that_do_not_answer_give_no_model() -> None:
     rng = np.random.default_rng(8)
     with pytest.raises(okid.IdentificationError, match="no model"):
         okid.identify(rng.standard_normal(5000), rng.standard_normal((5000, 3)), fs=100.0)
+    for order in (6, "auto"):
+        with pytest.raises(okid.IdentificationError, match="no model"):
+            okid.identify(
+                rng.standard_normal(5000),
+                rng.standard_normal((5000, 3)),
+                fs=100.0,
+                method="n4sid-moesp",
+                order=order,
+                sigma_blocks=0,
+            )
+
+
+def test_what_a_poor_fit_says_waits_with_the_fit() -> None:
+    u, y = (a.copy() for a in w1_record(1.0, 1))
+    y[:, 1] = np.random.default_rng(2).standard_normal(len(y)) * y[:, 1].std()
+    result = okid.identify(u, y, fs=systems.w1().fs, method="n4sid-moesp", order=6, rows=10, sigma_blocks=0)
+    assert [m.frequency_hz for m in result.modes]
+    assert [w.code for w in result.warnings].count("fit_low") == 1
+    assert (result.fit.simulation_percent["y2"] or 0.0) < 30.0
+    assert "fit_low" in str(result.table())
+    assert json.loads(json.dumps(result.to_dict()))["fit"]["simulation_percent"]["y2"] < 30.0

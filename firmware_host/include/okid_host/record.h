@@ -60,6 +60,9 @@ OKID_HOST_API const char* okid_host_result_json(okid_host_result_t* self);
 /** The same without singular_values, model and markov, which are there as arrays. */
 OKID_HOST_API const char* okid_host_result_summary(okid_host_result_t* self);
 
+/** The same without fit and warnings too: the fits of a named method may be computed only when they are first asked for. */
+OKID_HOST_API const char* okid_host_result_brief(okid_host_result_t* self);
+
 /** The modal table, fits, matrices and warnings for a person, as `okid identify` prints them. */
 OKID_HOST_API const char* okid_host_result_table(okid_host_result_t* self);
 
@@ -78,7 +81,7 @@ typedef struct okid_host_array {
  * plain least squares, condition, excitation (okid_observer_info_t).
  * @return 1 and the array; 0: the result has none of this name
  */
-OKID_HOST_API int32_t okid_host_result_array(const okid_host_result_t* self, const char* name, okid_host_array_t* out);
+OKID_HOST_API int32_t okid_host_result_array(okid_host_result_t* self, const char* name, okid_host_array_t* out);
 
 /** Of a result of records: an okid_identify_t with its okid_identify_config_t, and the okid_identified_t it gave. */
 typedef struct okid_host_decomposition {

@@ -12,12 +12,24 @@
 
 #include <math.h>
 
+/// The products of an end of a run, column by column; the samples stand in order below the diagonal of the first column meanwhile.
+static void add_ends(const okid_accumulator_t* a, double* gram, double sign, const double* ends) {
+    const size_t m = (size_t)a->m, n = (size_t)a->width;
+    for (size_t i = m, l = 0; i < n; i += m, ++l)
+        for (size_t c = 0; c < m; ++c) gram[i + c] = ends[acc_end(a, l, c)];
+    for (size_t j = m; j < n; ++j) {
+        const double* const sample = gram, number = sign * gram[j];
+        double* const column = gram + j * n;
+        for (size_t i = m; i < j; ++i) column[i] += sample[i] * number;
+    }
+}
+
 // Doubles.
 #define SUFFIX double
 #define ADD_SLOT(i, j, data, k) (gram[(j) * n + (i)] += (data)[k])
 #define ADD_BASE(i, j, base, k) (gram[(j) * n + (i)] += (base)[k])
 #define ADD_EDGE(i, j, edge, k) (gram[(j) * n + (i)] += (edge)[k])
-#define ADD_PRODUCT(i, j, sign, x, y) (gram[(j) * n + (i)] += (sign) * (*(x) * *(y)))
+#define ADD_ENDS add_ends
 #define ADD_ENTRY(i, j, i2, j2) (gram[(j) * n + (i)] += gram[(j2) * n + (i2)])
 #include "gram_sums.h"
 
@@ -153,23 +165,46 @@ static double in_units(const finish_t* f, double raw, size_t ci, size_t cj, doub
     return si * sj * raw + si * offset[cj] * gi + offset[ci] * sj * gj + f->rows * offset[ci] * offset[cj];
 }
 
+/// Are the numbers of the sums already in engineering units, with no offset?
+static int plain(const finish_t* f) {
+    const double *scale = acc_scale(f->a), *offset = scale + f->a->m;
+    for (int32_t c = 0; c < f->a->m; ++c)
+        if (scale[c] * f->unit != 1 || offset[c] != 0) return 0;
+    return 1;
+}
+
+/// What stands above the diagonal to its other side, in squares that stay in the cache.
+static void mirror(double* gram, size_t n) {
+    enum { SQUARE = 16 };
+    for (size_t J = 0; J < n; J += SQUARE)
+        for (size_t I = 0; I <= J; I += SQUARE)
+            for (size_t j = J; j < n && j < J + SQUARE; ++j)
+                for (size_t i = I; i < j && i < I + SQUARE; ++i) gram[i * n + j] = gram[j * n + i];
+}
+
 static void finish_double(const finish_t* f) {
     const size_t m = (size_t)f->a->m, n = (size_t)f->a->width;
     const double centre = f->detrend == OKID_DETREND_MEAN ? 1 / f->rows : 0;
-    for (size_t j = 0; j < n; ++j)
-        for (size_t i = 0; i < j; ++i) {
-            const double gi = *on_diagonal(f, i), gj = *on_diagonal(f, j);
-            f->gram[i * n + j] = f->gram[j * n + i] =
-                in_units(f, f->gram[j * n + i] - gi * gj * centre, i % m, j % m, gi, gj);
-        }
+    double* g = f->gram; // the sums of the lag rows, below the diagonal of the first column
+    for (size_t i = 0; i < n; ++i) g[i] = *on_diagonal(f, i);
+    const int as_it_is = plain(f);
+    for (size_t j = 1, cj = 1 % m; j < n; ++j, cj = cj + 1 < m ? cj + 1 : 0) {
+        double* const column = f->gram + j * n;
+        const double* const sums = g;
+        if (as_it_is && centre == 0) continue;
+        for (size_t i = 0; i < j; ++i) column[i] -= sums[i] * sums[j] * centre;
+        for (size_t i = 0, ci = 0; !as_it_is && i < j; ++i, ci = ci + 1 < m ? ci + 1 : 0)
+            column[i] = in_units(f, column[i], ci, cj, sums[i], sums[j]);
+    }
     for (size_t c = 0; c < m; ++c) {
         double raw = 0;
         for (size_t i = c; i < n; i += m) {
-            const double g = *on_diagonal(f, i);
+            const double sum = *on_diagonal(f, i);
             raw = diagonal(f->a, i, raw);
-            *on_diagonal(f, i) = in_units(f, raw - g * g * centre, c, c, g, g);
+            *on_diagonal(f, i) = in_units(f, raw - sum * sum * centre, c, c, sum, sum);
         }
     }
+    mirror(f->gram, n);
 }
 
 static double entry_exact(const finish_t* f, int64_t high, int64_t low, size_t ci, size_t cj, int64_t gi, int64_t gj,

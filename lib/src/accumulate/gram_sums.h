@@ -3,7 +3,8 @@
 // METHOD     first block row = S_b; lower blocks along the diagonals: E(a+1, b+1) = E(a, b) + F(a, b), with F the outer
 //            products of what enters (heads of runs) less what leaves (tails); strictly upper triangle only
 // USE        included by gram.c after defining SUFFIX and the macros ADD_SLOT, ADD_BASE, ADD_EDGE (one stored sum),
-//            ADD_PRODUCT (sign times two samples), ADD_ENTRY (another entry); each adds to entry (row i, column j), i < j
+//            ADD_PRODUCT (sign times two samples), ADD_ENTRY (another entry); each adds to entry (row i, column j), i < j.
+//            ADD_ENDS in the place of ADD_PRODUCT: all products of one end of a run
 #define FN_(name, suffix) name##suffix
 #define FN2_(name, suffix) FN_(name, suffix)
 #define FN(name) FN2_(name, SUFFIX)
@@ -20,11 +21,15 @@ static void FN(add_slot_)(const okid_accumulator_t* a, double* gram, int32_t k) 
         const double* ends = end == 0 ? piece.head : piece.tail;
         if (!ends) continue;
         const int sign = end == 0 ? 1 : -1;
+#ifdef ADD_ENDS
+        ADD_ENDS(a, gram, sign, ends);
+#else
         for (size_t lj = 0, j = m; lj < p; ++lj)
             for (size_t cj = 0; cj < m; ++cj, ++j)
                 for (size_t li = 0, i = m; li <= lj; ++li)
                     for (size_t ci = 0; ci < m && i < j; ++ci, ++i)
                         ADD_PRODUCT(i, j, sign, ends + acc_end(a, li, ci), ends + acc_end(a, lj, cj));
+#endif
     }
 }
 
@@ -51,5 +56,6 @@ static void FN(gram_of_)(const okid_accumulator_t* a, double* gram) {
 #undef ADD_BASE
 #undef ADD_EDGE
 #undef ADD_PRODUCT
+#undef ADD_ENDS
 #undef ADD_ENTRY
 #undef SUFFIX

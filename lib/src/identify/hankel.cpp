@@ -31,6 +31,7 @@ void hankel_factor::lay_out(arena& memory, bool with_triangle) {
     L = memory.take<double>(n * n);
     norm = memory.take<double>(n);
     unit = memory.take<double>(n);
+    estimate = memory.take<double>(4 * n);
     place = memory.take<int>(n);
     if (!with_triangle) return;
     const size_t stride = okid_triangle_stride(n);
@@ -112,6 +113,32 @@ void hankel_factor::restore_units() const {
     }
 }
 
+/// Lower triangle of L <- the Gram matrix with unit diagonal and ridge.
+void hankel_factor::fill_unit(const double* gram, double ridge) const {
+    for (int c = 0; c < size; ++c) {
+        double* column = L + at(0, c, size);
+        const double* from = gram + at(0, place[c], size);
+        column[c] = 1 + ridge;
+        for (int r = c + 1; r < size; ++r) column[r] = from[place[r]] * unit[r] * unit[c];
+    }
+}
+
+/// 1-norm of the symmetric matrix in the lower triangle of L.
+double hankel_factor::norm_of_unit() const {
+    double* sums = estimate;
+    std::fill(sums, sums + size, 1.0);
+    for (int c = 0; c < size; ++c) {
+        const double* column = L + at(0, c, size);
+        double below = 0;
+        for (int r = c + 1; r < size; ++r) {
+            below += std::abs(column[r]);
+            sums[r] += std::abs(column[r]);
+        }
+        sums[c] += below;
+    }
+    return *std::max_element(sums, sums + size);
+}
+
 okid_status_t hankel_factor::from_gram(row_order order, const double* gram, double ridge, okid_subspace_info_t* info) {
     place_rows(order, false);
     for (int r = 0; r < size; ++r) norm[r] = std::sqrt(gram[at(place[r], place[r], size)]);
@@ -120,13 +147,11 @@ okid_status_t hankel_factor::from_gram(row_order order, const double* gram, doub
     ridge = std::max(ridge, first_ridge);
     for (const double last = std::max(ridge, last_ridge);; ridge *= 100) {
         if (ridge > last) return OKID_ERR_NUMERIC;
-        for (int c = 0; c < size; ++c) {
-            double* column = L + at(0, c, size);
-            const double* from = gram + at(0, place[c], size);
-            column[c] = 1 + ridge;
-            for (int r = c + 1; r < size; ++r) column[r] = from[place[r]] * unit[r] * unit[c];
-        }
-        if (linalg::cholesky(size, L, size) == 0) break;
+        fill_unit(gram, ridge);
+        const double size_of_all = tells_condition ? norm_of_unit() : 0;
+        if (linalg::cholesky(size, L, size) != 0) continue;
+        if (tells_condition) condition = linalg::cholesky_condition(size, L, size, size_of_all, estimate);
+        break;
     }
     info->ridge = ridge;
     const okid_status_t status = excitation(order, info);

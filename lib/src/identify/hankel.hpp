@@ -19,6 +19,9 @@ struct hankel_factor {
     double *norm, *unit;   ///< of each row, and its inverse
     int* place;            ///< of each row in the matrix it came from
     okid_real_t *triangle, *rows, *panel;
+    bool tells_condition; ///< from_gram() does
+    double condition;     ///< of the Gram matrix with unit diagonal, by its 1-norm
+    double* estimate;     ///< work for it
 
     void lay_out(arena& memory, bool with_triangle);
 
@@ -33,6 +36,8 @@ struct hankel_factor {
     void place_rows(row_order order, bool outputs_last);
     okid_status_t dead_channel(row_order order, okid_subspace_info_t* info) const;
     okid_status_t excitation(row_order order, okid_subspace_info_t* info) const;
+    void fill_unit(const double* gram, double ridge) const;
+    double norm_of_unit() const;
     void restore_units() const;
 };
 

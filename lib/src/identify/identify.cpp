@@ -107,7 +107,6 @@ void lay_out_storey(okid_identify& s, okid::arena& memory) {
     const auto n = static_cast<size_t>(s.n), ny = static_cast<size_t>(s.n_y), m = static_cast<size_t>(s.m);
     if (s.by_subspace) {
         s.gram = memory.take<double>(n * n);
-        s.estimate = memory.take<double>(4 * n);
         s.powers = memory.take<okid_real_t>(2 * static_cast<size_t>(s.max_order) * static_cast<size_t>(s.n_u));
         s.storey_block = memory.take<char>(okid_subspace_memsize(&s.subspace_config));
         return;

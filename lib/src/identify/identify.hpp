@@ -52,7 +52,6 @@ struct okid_identify {
     std::size_t observer_bytes, modal_bytes;
     double *gram, *mean;       ///< gram: the Gram matrix, its factor, or S of one run
     double *head, *tail, *sum; ///< of one run
-    double* estimate;          ///< of a condition, 4 n
     okid_real_t *theta, *innovation, *markov, *gain;
     int follow;                   ///< order of replicate(), 0: a full identification
     okid::followed_era* followed; ///< ERA of replicate() near a known model, or nullptr

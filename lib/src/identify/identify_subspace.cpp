@@ -24,21 +24,6 @@ constexpr double rounding_ridge = 1e-12; // more than this is needed only by wha
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
-/// Of the Gram matrix, which is destroyed, once it has been decomposed with this ridge.
-double gram_condition(const okid_identify& s, double ridge) {
-    if (ridge > rounding_ridge) return no_pivot;
-    double *scale = s.estimate, norm = 0;
-    for (int c = 0; c < s.n; ++c) scale[c] = 1 / std::sqrt(s.gram[area(c, s.n + 1)]);
-    for (int c = 0; c < s.n; ++c) {
-        double sum = 0;
-        const double* column = s.gram + area(c, s.n);
-        for (int r = 0; r < s.n; ++r) sum += std::abs(column[r]) * scale[r];
-        norm = std::max(norm, sum * scale[c]);
-    }
-    unit_factor(s.subspace, s.gram);
-    return linalg::cholesky_condition(s.n, s.gram, s.n, norm, s.estimate);
-}
-
 double factor_condition(const okid_identify& s) {
     const auto* factor = reinterpret_cast<const okid_real_t*>(s.gram);
     double least = 1;
@@ -70,9 +55,12 @@ okid_status_t decompose_subspace_gram(okid_identify& s, okid_accumulator_t* accu
     if (status == OKID_OK) status = check_constant_gram(s, s.n, out);
     if (status != OKID_OK) return status;
     okid_subspace_info_t info;
+    expect(s.subspace, s.follow > 0 ? s.follow : s.config.order, s.follow == 0);
     status = okid_subspace_decompose(s.subspace, s.gram, out->regression_rows, &info);
     out->observer_info.channel = info.channel;
-    if (status == OKID_OK) note(s, info, s.follow > 0 ? 0 : gram_condition(s, info.ridge), out);
+    if (status != OKID_OK) return status;
+    const double condition = info.ridge > rounding_ridge ? no_pivot : condition_of(s.subspace);
+    note(s, info, s.follow > 0 ? 0 : condition, out);
     return status;
 }
 
@@ -83,6 +71,7 @@ okid_status_t decompose_subspace_factor(okid_identify& s, okid_square_root_t* sq
     if (status == OKID_OK) status = check_constant_factor(s, out);
     if (status != OKID_OK) return status;
     okid_subspace_info_t info;
+    expect(s.subspace, s.config.order, false);
     status = okid_subspace_decompose_factor(s.subspace, factor, out->regression_rows, &info);
     out->observer_info.channel = info.channel;
     if (status == OKID_OK) note(s, info, factor_condition(s), out);

@@ -20,7 +20,7 @@ using std::size_t;
 
 namespace {
 
-constexpr int batch = 64;
+constexpr int batch = 64, stretch = 256; // samples of sample(), of run()
 constexpr double died_out = 1e-14, least_decay = 1e-6, denormal = 1e-200;
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
@@ -46,7 +46,6 @@ modal_filters::modal_filters(int inputs, int outputs, int states, arena& memory)
     w_ = memory.take<double>(area(2, most));
     drive_ = memory.take<double>(area(most, n_u));
     z_ = memory.take<double>(area(2, most));
-    batch_ = memory.take<double>(area(n_u + 2 * most, batch));
     with_v_ = memory.take<double>(area(n_u + 2 * most, n_u + n_y));
 }
 
@@ -169,13 +168,18 @@ void modal_filters::two_states(int s, int t) {
 void modal_filters::run(const double* v, int count) {
     const int m = n_u + n_y;
     place_lanes();
-    const int wide = n_u + 2 * lanes_;
-    const okid_filters_t filters{area(n_u, 1), area(m, 1), area(lanes_, 1), w_, w_ + lanes_, drive_, z_, batch_};
+    const int wide = n_u + 2 * lanes_, driven = blocks_ * n_u;
+    okid_filters_t filters{area(n_u, 1), area(m, 1), area(lanes_, 1), 0, w_, w_ + lanes_, drive_, z_, with_v_};
     const auto step = okid_recursion_pick().filters;
-    for (int n = 0; n < count; n += batch, v += at(0, batch, m)) {
-        const int size = std::min(batch, count - n);
-        step(&filters, v, static_cast<size_t>(size));
-        multiply(false, true, wide, m, size, 1, batch_, wide, v, m, 1, with_v_, wide);
+    for (int n = 0; n < count; n += stretch, v += at(0, stretch, m)) {
+        double largest = 0; // of w^t: what has died out needs no product any more
+        for (int k = driven; k < lanes_; ++k) {
+            const double size = std::hypot(z_[k], z_[lanes_ + k]);
+            if (size < died_out) z_[k] = z_[lanes_ + k] = 0;
+            largest = std::max(largest, size);
+        }
+        filters.active = largest < died_out ? okid_recursion_padded(area(driven, 1)) : area(lanes_, 1);
+        step(&filters, v, static_cast<size_t>(std::min(stretch, count - n)));
         for (int k = 0; k < 2 * lanes_; ++k)
             if (std::abs(z_[k]) < denormal) z_[k] = 0;
     }

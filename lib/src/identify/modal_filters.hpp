@@ -48,9 +48,9 @@ struct modal_filters {
     double *shapes_, *shared_;            // C V, (C V)^T C V
     double *state_, *signals_, *outputs_; // now; a batch of samples
     int waiting_ = 0;
-    int blocks_ = 0, lanes_ = 0;       // of run(): modes, a pair one; complex states, padded: (group, mode)
-    double *w_, *drive_, *z_, *batch_; // re and im of w and z; lanes x n_u; signals of a batch
-    double* with_v_;                   // signals times rows, n_u + 2 lanes x n_u + n_y
+    int blocks_ = 0, lanes_ = 0; // of run(): modes, a pair one; complex states, padded: (group, mode)
+    double *w_, *drive_, *z_;    // re and im of w and z; lanes x n_u
+    double* with_v_;             // signals times rows, n_u + 2 lanes x n_u + n_y
 };
 
 } // namespace okid

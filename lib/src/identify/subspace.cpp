@@ -21,6 +21,8 @@ struct okid_subspace {
     okid::ssarx ssarx;
     okid::state_model model;
     double rows;
+    int expected; ///< the order that is decomposed for, 0: all
+    bool squares; ///< the factor came from a Gram matrix
 };
 
 namespace okid {
@@ -39,14 +41,8 @@ bool valid(const okid_subspace_config_t& c) {
 subspace_sizes sizes_of(const okid_subspace_config_t& c) {
     const int carry = (c.rows - 1) * c.n_y;
     const int m = c.n_u + c.n_y;
-    return {c.n_u,
-            c.n_y,
-            m,
-            c.rows,
-            c.rows * c.n_u,
-            c.rows * m,
-            c.rows * c.n_y,
-            std::min(c.max_order > 0 ? c.max_order : default_order, carry)};
+    const int top = std::min(c.max_order > 0 ? c.max_order : default_order, carry);
+    return {c.n_u, c.n_y, m, c.rows, c.rows * c.n_u, c.rows * m, c.rows * c.n_y, top, top};
 }
 
 size_t lay_out(okid_subspace& s, arena& memory) {
@@ -71,16 +67,23 @@ void copy_out(const double* from, size_t count, okid_real_t* to) {
     for (size_t k = 0; k < count; ++k) to[k] = static_cast<okid_real_t>(from[k]);
 }
 
-/// The common way of both forms of input, once the LQ factor stands. squares: it came from the Gram matrix
-okid_status_t decompose(okid_subspace& s, int64_t rows, bool squares) {
+/// The common way of both forms of input, once the LQ factor stands.
+okid_status_t decompose(okid_subspace& s, int columns) {
+    s.sizes.columns = columns;
     const bool by_states = s.config.method == OKID_SUBSPACE_SSARX, cva = s.config.method == OKID_SUBSPACE_CVA;
-    s.rows = static_cast<double>(rows);
-    const okid_status_t status = by_states ? s.ssarx.decompose(s.sizes, squares, s.hankel, s.cut)
-                                           : s.projection.decompose(s.sizes, cva, squares, s.hankel, s.cut);
+    const okid_status_t status = by_states ? s.ssarx.decompose(s.sizes, s.squares, s.hankel, s.cut)
+                                           : s.projection.decompose(s.sizes, cva, s.squares, s.hankel, s.cut);
     if (status != OKID_OK) s.cut.carried = 0;
-    for (int k = 0; k < s.sizes.top; ++k) // states of SSARX: x ~ Sigma^(1/2), a sample at a time
+    for (int k = 0; k < columns; ++k) // states of SSARX: x ~ Sigma^(1/2), a sample at a time
         s.model.scale[k] = by_states ? std::sqrt(static_cast<double>(s.cut.values[k]) * s.rows) : 1;
     return status;
+}
+
+/// The same for new data. squares: the factor came from their Gram matrix
+okid_status_t decompose(okid_subspace& s, int64_t rows, bool squares) {
+    s.rows = static_cast<double>(rows);
+    s.squares = squares;
+    return decompose(s, s.expected > 0 ? s.expected : s.sizes.top);
 }
 
 row_order order_of(const okid_subspace& s) {
@@ -99,11 +102,12 @@ void state_model::lay_out(const subspace_sizes& z, arena& memory) {
     scale = memory.take<double>(area(z.top, 1));
 }
 
-void unit_factor(const okid_subspace_t* self, double* L) {
-    const hankel_factor& f = self->hankel;
-    for (int c = 0; c < f.size; ++c)
-        for (int r = c; r < f.size; ++r) L[at(r, c, f.size)] = f.L[at(r, c, f.size)] * f.unit[r];
+void expect(okid_subspace_t* self, int order, bool condition) {
+    self->expected = std::min(order, self->sizes.top);
+    self->hankel.tells_condition = condition;
 }
+
+double condition_of(const okid_subspace_t* self) { return self->hankel.condition; }
 
 } // namespace okid
 
@@ -168,6 +172,7 @@ okid_status_t okid_subspace_realize(okid_subspace_t* self, int32_t order, okid_r
     if (self == nullptr || A == nullptr || C == nullptr || (B == nullptr) != (D == nullptr)) return OKID_ERR_NULL;
     okid_subspace& s = *self;
     const okid::subspace_sizes& z = s.sizes;
+    if (order > z.columns && order <= z.top && s.cut.carried == z.columns) (void)okid::decompose(s, z.top);
     if (order < 1 || order > std::min(z.top, s.cut.carried)) return OKID_ERR_DIM;
     const bool inputs = B != nullptr && z.n_u > 0, gain = K != nullptr || innovation != nullptr;
     const okid::state_model& m = s.model;

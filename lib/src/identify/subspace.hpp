@@ -11,6 +11,7 @@ struct subspace_sizes {
     int n_u, n_y, m, i;
     int a, w, h; ///< rows of U_f (i n_u), W_p (i m), Y_f (i n_y)
     int top;     ///< largest order
+    int columns; ///< singular vectors that are found, at most top
 };
 
 /// A model of one order, before it is rounded to okid_real_t. State k is to be multiplied by scale[k].
@@ -47,9 +48,11 @@ struct rank_cut {
 /// top x top. @return columns that are independent
 int orthonormalise(int rows, int columns, double* x, double* core, int top);
 
-/// The Cholesky factor of the Gram matrix with unit diagonal and ridge, in the order of rows of the method: into the
-/// lower triangle of L (size x size).
-void unit_factor(const okid_subspace_t* self, double* L);
+/// Decompose for models up to this order only, 0: for all; one of a larger order decomposes again when it is asked for.
+/// condition: from_gram() tells it.
+void expect(okid_subspace_t* self, int order, bool condition);
+/// Of the Gram matrix with unit diagonal that was decomposed last.
+double condition_of(const okid_subspace_t* self);
 
 /// MOESP and CVA: the column space of the observability matrix.
 struct projection {

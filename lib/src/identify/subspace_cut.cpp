@@ -7,9 +7,10 @@
 //            diagonal: any factor of the covariance does, and without noise the covariance has rank n_z (trap 7). An
 //            eigenvector of A A^T is off by eps s_1^2 / (s_i^2 - s_j^2) in the direction of another one; the step with A
 //            leaves (s_j / s_i)^2 of that beyond the cut and rounding of eps s_1 / s_i. Taken where the last wanted
-//            value is above 3e-5 of the first, never where the factor came from a QR of the data
-// WORKSPACE  (h^2 + (h + w) top) doubles and what the larger of the two decompositions takes; with top <= h/3
-//            2 h^2 w + 4/3 h^3 + 4 h w top flop, an SVD some 15 h^2 w
+//            value is above 3e-5 of the first and all that an order could need above 1e-6, never where the factor came
+//            from a QR of the data
+// WORKSPACE  (h^2 + (h + w) top) doubles and what the larger of the two decompositions takes; with k columns <= h/3
+//            2 h^2 w + 4/3 h^3 + 4 h w k flop, an SVD some 15 h^2 w
 #include "identify/subspace.hpp"
 
 #include <cmath>
@@ -20,7 +21,7 @@ using std::size_t;
 namespace okid {
 namespace {
 
-constexpr double weight_floor = 1e-12, least_square = 1e-9;
+constexpr double weight_floor = 1e-12, least_square = 1e-9, least_shown = 1e-12; // squares over the first one
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
@@ -58,7 +59,9 @@ int orthonormalise(int rows, int columns, double* x, double* core, int top) {
 void rank_cut::share(const subspace_sizes& z, arena& memory) {
     const auto carve = [&](arena squares, arena svd) {
         square_ = squares.take<double>(area(z.h, z.h));
-        symmetric_ = squares.take<double>(area(z.h, 1) + linalg::symmetric_work(z.h, z.top));
+        symmetric_ =
+            squares.take<double>(area(z.h, 1) + std::max(linalg::symmetric_work(z.h, z.top),
+                                                         linalg::symmetric_work(z.h, std::min(z.top, z.h / 3))));
         target_ = svd.take<okid_real_t>(area(z.h, z.w));
         left_ = svd.take<okid_real_t>(area(z.h, z.h));
         right_ = svd.take<okid_real_t>(area(z.h, z.w));
@@ -104,12 +107,12 @@ bool rank_cut::whiten(const subspace_sizes& z) const {
 bool rank_cut::by_squares(const subspace_sizes& z, const double* from, int ld) {
     double *found = symmetric_, *spare = symmetric_ + z.h;
     lower_product(z.h, [&](int) { return z.w; }, from, ld, 0, square_, z.h);
-    if (linalg::symmetric(z.h, square_, z.top, found, left, spare) != 0) return false;
-    if (!(found[z.top - 1] > least_square * found[0])) return false;
+    if (linalg::symmetric(z.h, square_, z.columns, found, left, spare) != 0) return false;
+    if (!(found[z.columns - 1] > least_square * found[0] && found[z.top - 1] > least_shown * found[0])) return false;
     for (int k = 0; k < z.h; ++k) values[k] = static_cast<okid_real_t>(std::sqrt(std::max(0.0, found[k])));
-    carried = z.top;
-    linalg::multiply(true, false, z.w, z.top, z.h, 1, from, ld, left, z.h, 0, right, z.w);
-    if (!right_side_) linalg::multiply(false, false, z.h, z.top, z.w, 1, from, ld, right, z.w, 0, left, z.h);
+    carried = z.columns;
+    linalg::multiply(true, false, z.w, z.columns, z.h, 1, from, ld, left, z.h, 0, right, z.w);
+    if (!right_side_) linalg::multiply(false, false, z.h, z.columns, z.w, 1, from, ld, right, z.w, 0, left, z.h);
     return true;
 }
 
@@ -119,7 +122,7 @@ bool rank_cut::by_svd(const subspace_sizes& z, const double* from, int ld) {
     if (linalg::svd(z.h, z.w, target_, left_, values, right_, svd_) != 0) return false;
     constexpr okid_real_t rounding = 16 * std::numeric_limits<okid_real_t>::epsilon();
     carried = 0;
-    while (carried < z.top && values[carried] > rounding * values[0]) ++carried;
+    while (carried < z.columns && values[carried] > rounding * values[0]) ++carried;
     for (int k = 0; k < carried; ++k) {
         for (int r = 0; !right_side_ && r < z.h; ++r) left[at(r, k, z.h)] = static_cast<double>(left_[at(r, k, z.h)]);
         for (int c = 0; right_side_ && c < z.w; ++c) right[at(c, k, z.w)] = static_cast<double>(right_[at(k, c, z.h)]);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    what goes from sample to sample along a record, one source for every instruction set
 // METHOD     follow: one product a sample, [estimate; next state] = M [u; y; x], its columns summed in two chains so that
-//            additions do not wait for each other; simulation and prediction side by side. filters: modes lie across lanes
+//            additions do not wait for each other; simulation and prediction side by side. filters: modes lie across lanes, and
+//            stay with the sums of a tile of channels in registers over all samples of a call
 // NUMERICS   plain recursions; the predictor is A - K C as one matrix
 // WORKSPACE  none
 #include "recursion.h"
@@ -13,10 +14,13 @@
 #define FILTERS OKID_FOR_ISA(okid_filters_)
 
 #if defined(__AVX512F__)
+#define CHANNELS 8
 enum { LANES = 8, VECTORS = 4 };
 #elif defined(__AVX2__)
+#define CHANNELS 4
 enum { LANES = 4, VECTORS = 4 };
 #else
+#define CHANNELS 4
 enum { LANES = 2, VECTORS = 4 };
 #endif
 typedef double lanes_t __attribute__((vector_size(LANES * sizeof(double))));
@@ -102,22 +106,74 @@ void FOLLOW(const okid_follow_t* self, const double* rows, size_t count) {
     if (predicted != f.predicted) memcpy(f.predicted, predicted, f.ld * sizeof *predicted);
 }
 
+/// The states of lane k on, times `channels` numbers of a row from `first` on; `last`: they are left behind where they end.
+static inline __attribute__((always_inline)) void filter_tile(const okid_filters_t* f, const double* rows, size_t count,
+                                                              size_t k, size_t first, int last, const int channels) {
+    const size_t n_u = f->n_u, m = f->m, states = f->states;
+    const double* drive = f->drive + k;
+    const lanes_t wr = load(f->w_re + k), wi = load(f->w_im + k);
+    lanes_t a = load(f->state + k), b = load(f->state + states + k), re[CHANNELS] = {{0}}, im[CHANNELS] = {{0}};
+    for (size_t n = 0; n < count; ++n, rows += m) {
+#pragma GCC unroll 8
+        for (int c = 0; c < channels; ++c) {
+            const double v = rows[first + (size_t)c];
+            re[c] += v * a;
+            im[c] += v * b;
+        }
+        lanes_t driven = {0};
+        for (size_t c = 0; c < n_u; ++c) driven += rows[c] * load(drive + c * states);
+        const lanes_t next = wr * a + (driven - wi * b);
+        b = wr * b + wi * a;
+        a = next;
+    }
+    double* to = f->sums + first * (n_u + 2 * states) + n_u + k;
+    for (int c = 0; c < channels; ++c, to += n_u + 2 * states) {
+        store(to, load(to) + re[c]);
+        store(to + states, load(to + states) + im[c]);
+    }
+    if (!last) return;
+    store(f->state + k, a);
+    store(f->state + states + k, b);
+}
+
+static void filter_tiles(const okid_filters_t* f, const double* rows, size_t count, size_t k, size_t first, int last,
+                         int channels) {
+    switch (channels) {
+    case 1: filter_tile(f, rows, count, k, first, last, 1); break;
+    case 2: filter_tile(f, rows, count, k, first, last, 2); break;
+    case 3: filter_tile(f, rows, count, k, first, last, 3); break;
+    case 4: filter_tile(f, rows, count, k, first, last, 4); break;
+#if CHANNELS > 4
+    case 5: filter_tile(f, rows, count, k, first, last, 5); break;
+    case 6: filter_tile(f, rows, count, k, first, last, 6); break;
+    case 7: filter_tile(f, rows, count, k, first, last, 7); break;
+#endif
+    default: filter_tile(f, rows, count, k, first, last, CHANNELS); break;
+    }
+}
+
 okid_filters_fn FILTERS;
 void FILTERS(const okid_filters_t* self, const double* rows, size_t count) {
     const okid_filters_t f = *self;
-    double *re = f.state, *im = re + f.states, *to = f.signals;
-    for (size_t n = 0; n < count; ++n, rows += f.m, to += f.n_u + 2 * f.states) {
-        for (size_t c = 0; c < f.n_u; ++c) to[c] = rows[c];
-        for (size_t k = 0; k < f.states; k += LANES) {
-            const lanes_t a = load(re + k), b = load(im + k), wr = load(f.w_re + k), wi = load(f.w_im + k);
-            store(to + f.n_u + k, a);
-            store(to + f.n_u + f.states + k, b);
-            lanes_t next = wr * a - wi * b;
-            for (size_t c = 0; c < f.n_u; ++c) next += rows[c] * load(f.drive + c * f.states + k);
-            store(re + k, next);
-            store(im + k, wr * b + wi * a);
+    const size_t groups = (f.m + CHANNELS - 1) / CHANNELS;
+    for (size_t k = 0; k < f.active; k += LANES)
+        for (size_t g = 0, first = 0; g < groups; ++g) {
+            const size_t channels = (f.m - first + groups - g - 1) / (groups - g);
+            filter_tiles(&f, rows, count, k, first, g + 1 == groups, (int)channels);
+            first += channels;
         }
-    }
+    for (size_t c = 0; c < f.n_u; ++c)
+        for (size_t r = 0; r < f.m; ++r) {
+            double even = 0, odd = 0;
+            const double* v = rows;
+            size_t n = 0;
+            for (; n + 1 < count; n += 2, v += 2 * f.m) {
+                even += v[c] * v[r];
+                odd += v[f.m + c] * v[f.m + r];
+            }
+            if (n < count) even += v[c] * v[r];
+            f.sums[r * (f.n_u + 2 * f.states) + c] += even + odd;
+        }
 }
 
 #ifdef OKID_KERNEL_IS_BASE

@@ -28,12 +28,13 @@ typedef struct okid_follow_t {
 /// All of `count` rows [u; y]; a y that is NaN counts in no sum and corrects no state. u must be finite.
 typedef void okid_follow_fn(const okid_follow_t* self, const double* rows, size_t count);
 
-/// z <- w z + drive u for `states` complex numbers (padded): re at state, im behind them; drive: states x n_u. What stands
-/// before each sample goes into `signals`, n_u + 2 states numbers a sample: [u, re, im].
+/// z <- w z + drive u for `states` complex numbers (padded): re at state, im behind them; drive: states x n_u. sums ([u, re,
+/// im] x m, ld n_u + 2 states) += what stands before each sample times its row [u; y].
 typedef struct okid_filters_t {
     size_t n_u, m, states;
+    size_t active; ///< of the states, padded; the others are zero and stay
     const double *w_re, *w_im, *drive;
-    double *state, *signals;
+    double *state, *sums;
 } okid_filters_t;
 
 typedef void okid_filters_fn(const okid_filters_t* self, const double* rows, size_t count);

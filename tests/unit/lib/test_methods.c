@@ -105,6 +105,33 @@ static void every_method_chooses_the_order_in_noise(void) {
     free(v);
 }
 
+/// A fixed order is all that is decomposed for; others come on demand, as from a decomposition for them.
+static void other_orders_than_the_one_asked_for(void) {
+    enum { MORE = 14 };
+    double *v = rig_record(&rig, N, 0.01, NULL, 7), f[2][MORE], radius[2], few[RIG_MODES];
+    for (int k = 0; k < METHODS; ++k) {
+        for (int way = 0; way < 2; ++way) {
+            const okid_identify_config_t config = config_of(methods[k], RIG_NU, way == 0 ? RIG_NZ : MORE);
+            create(&config);
+            TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
+            TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
+            for (int m = 0; way == 0 && m < RIG_MODES; ++m) few[m] = model.frequency_hz[m];
+            if (way == 0) TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_order(identifier, MORE, &model));
+            TEST_ASSERT_EQUAL(MORE, model.n_z);
+            for (int m = 0; m < model.mode_count; ++m) f[way][m] = model.frequency_hz[m];
+            radius[way] = model.model_radius;
+        }
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(TOLERANCE(1e-8, 1e-2), radius[1], radius[0], name_of(k, "radius"));
+        for (int m = 0; m < model.mode_count; ++m)
+            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(TOLERANCE(1e-6, 1e-1) * f[1][m], f[1][m], f[0][m], // noise: near values
+                                              name_of(k, "orders"));
+        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_order(identifier, RIG_NZ, &model));
+        for (int m = 0; m < RIG_MODES; ++m)
+            TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-9, 1e-3) * few[m], few[m], model.frequency_hz[m]);
+    }
+    free(v);
+}
+
 static void ambient_records_have_modes_and_a_predictor(void) {
     enum { LONG = 4 * N };
     double *v = rig_record(&rig, LONG, 0.01, NULL, 5), *y = malloc(sizeof(double) * LONG * RIG_NY);
@@ -267,6 +294,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(every_method_finds_the_modes_without_noise);
     RUN_TEST(every_method_chooses_the_order_in_noise);
+    RUN_TEST(other_orders_than_the_one_asked_for);
     RUN_TEST(ambient_records_have_modes_and_a_predictor);
     RUN_TEST(inputs_can_be_replaced);
     RUN_TEST(what_does_not_fit_is_refused);

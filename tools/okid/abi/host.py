@@ -51,6 +51,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_identify_columns": (_status, [_text, _status, *[_handle] * 7]),
     "okid_host_result_json": (_text, [_handle]),
     "okid_host_result_summary": (_text, [_handle]),
+    "okid_host_result_brief": (_text, [_handle]),
     "okid_host_result_table": (_text, [_handle]),
     "okid_host_result_array": (_status, [_handle, _text, ctypes.POINTER(Array)]),
     "okid_host_result_decomposition": (_status, [_handle, ctypes.POINTER(Decomposition)]),

@@ -6,7 +6,6 @@ from __future__ import annotations
 import ctypes
 import json
 import math
-import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -35,16 +34,22 @@ def _plain(value: Any) -> Any:
 
 
 def options_text(options: Mapping[str, Any]) -> bytes:
-    """For the library."""
-    return json.dumps(_plain(options)).encode()
+    """For the library; None is as if not given."""
+    given = {key: value for key, value in options.items() if value is not None}
+    try:
+        return json.dumps(given, allow_nan=False).encode()
+    except (TypeError, ValueError):
+        return json.dumps(_plain(given)).encode()
 
 
 class HostResult:
     """An okid_host_result_t, deleted with this object; `owner`: whose memory its decomposition is."""
 
     def __init__(self, handle: ctypes.c_void_p, owner: object = None) -> None:
-        self.handle, self._owner = handle, owner
-        weakref.finalize(self, host.library().okid_host_result_delete, handle)
+        self.handle, self._owner, self._delete = handle, owner, host.library().okid_host_result_delete
+
+    def __del__(self) -> None:
+        self._delete(self.handle)
 
     def _text(self, what: str) -> str:
         text: bytes | None = getattr(host.library(), f"okid_host_result_{what}")(self.handle)
@@ -56,9 +61,10 @@ class HostResult:
         """okid.result/1, as `okid identify --json` writes it."""
         return self._text("json")
 
-    def about(self) -> dict[str, Any]:
-        """The same, parsed, without singular_values, model and markov."""
-        out: dict[str, Any] = json.loads(self._text("summary"))
+    def about(self, whole: bool = True) -> dict[str, Any]:
+        """The same, parsed, without singular_values, model and markov; not `whole`: nor fit and warnings, which may
+        have to be computed first."""
+        out: dict[str, Any] = json.loads(self._text("summary" if whole else "brief"))
         return out
 
     def table(self) -> str:

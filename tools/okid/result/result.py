@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -38,7 +38,7 @@ class _Parsed(NamedTuple):
     def json(self) -> str:
         return json.dumps(self.raw, allow_nan=False) + "\n"
 
-    def about(self) -> dict[str, Any]:
+    def about(self, whole: bool = True) -> dict[str, Any]:
         return self.raw
 
     def table(self) -> str:
@@ -85,18 +85,20 @@ class Result:
     fit: Fit
     warnings: list[Warning]
     observer: Observer
-    mkr: MassMatrices | None = None
-    pdc: ProportionalDamping | None = None
-    hankel: str | None = None  # of methods with an observer
-    singular_noise: float | None = None  # singular values up to this can come from the observer's errors alone
-    refinement: Refinement | None = None  # with refine=True
-    skew: Skew | None = None  # with refine=True and degrees of freedom
-    _source: Any = field(default=None, repr=False, compare=False)
+    mkr: MassMatrices | None
+    pdc: ProportionalDamping | None
+    hankel: str | None  # of methods with an observer
+    singular_noise: float | None  # singular values up to this can come from the observer's errors alone
+    refinement: Refinement | None  # with refine=True
+    skew: Skew | None  # with refine=True and degrees of freedom
+    _source: Any = field(repr=False, compare=False)
 
     @classmethod
-    def of_host(cls, source: HostResult) -> Result:
+    def of_host(cls, source: HostResult | _Parsed) -> Result:
         """The result behind a handle of the host library."""
-        return cls._made(source)
+        out = cls.__new__(cls)
+        out._source = source
+        return out
 
     @classmethod
     def from_dict(cls, raw: Mapping[str, Any]) -> Result:
@@ -109,36 +111,51 @@ class Result:
         if raw.get("schema") != "okid.result/1":
             raise InputError(f"schema is {raw.get('schema')!r}, expected 'okid.result/1'")
         try:
-            return cls._made(_Parsed(raw, text))
+            out = cls.of_host(_Parsed(raw, text))
+            for one in fields(cls):
+                getattr(out, one.name)
+            return out
         except (KeyError, TypeError, ValueError, AttributeError) as fault:
             raise InputError(f"not a complete okid.result/1: {type(fault).__name__}: {fault}") from None
 
-    @classmethod
-    def _made(cls, source: Any) -> Result:
-        about = source.about()
-        outputs = list(about["outputs"])
+    def __getattr__(self, name: str) -> Any:
+        """A field that nobody has asked for yet, made with those that come of the same work."""
+        if name not in type(self).__dataclass_fields__ or name == "_source":
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        if name in ("fit", "warnings"):
+            about = self._source.about()
+            self.fit = Fit.of(about["fit"], list(about["outputs"]))
+            self.warnings = [Warning(**one) for one in about["warnings"]]
+        elif name in ("model", "singular_values", "markov", "observer"):
+            self._take_arrays()
+        else:
+            self._take(self._source.about(False))
+        return self.__dict__[name]
 
-        def array(name: str, *empty: int) -> Real:
-            found = source.array(name)
+    def _take_arrays(self) -> None:
+        array = self._source.array
+        n_u, n_y, n_z = len(self.inputs), len(self.outputs), int(self.order)
+
+        def shaped(name: str, *empty: int) -> Real:
+            found = array(name)
             return np.zeros(empty) if found is None or found.size == 0 else found
 
-        n_u, n_y, n_z = len(about["inputs"]), len(outputs), int(about["order"])
-        model = Model(
-            array("model.A", n_z, n_z), array("model.B", n_z, n_u), array("model.C", n_y, n_z),
-            array("model.D", n_y, n_u), array("model.K", n_z, n_y), 1.0 / float(about["fs_hz"]),
-            source.array("model.x0"),
+        self.model = Model(
+            shaped("model.A", n_z, n_z), shaped("model.B", n_z, n_u), shaped("model.C", n_y, n_z),
+            shaped("model.D", n_y, n_u), shaped("model.K", n_z, n_y), 1.0 / float(self.fs_hz), array("model.x0"),
         )  # fmt: skip
-        observer = source.array("observer")
-        return cls(
-            **{key: about[key] for key in _PLAIN},
-            inputs=list(about["inputs"]), outputs=outputs, singular_values=array("singular_values", 0), model=model,
-            markov=array("markov.Y", 0, n_y, n_u), modes=[Mode.of(one) for one in about["modes"]],
-            fit=Fit.of(about["fit"], outputs), warnings=[Warning(**one) for one in about["warnings"]],
-            observer=Observer(*([np.nan] * len(Observer._fields) if observer is None else observer.tolist())),
-            mkr=MassMatrices.of(about.get("mkr")), pdc=ProportionalDamping.of(about.get("pdc")),
-            hankel=about.get("hankel"), singular_noise=about.get("singular_noise"),
-            refinement=Refinement.of(about.get("refinement")), skew=Skew.of(about.get("skew"), outputs), _source=source,
-        )  # fmt: skip
+        self.singular_values, self.markov = shaped("singular_values", 0), shaped("markov.Y", 0, n_y, n_u)
+        observer = array("observer")
+        self.observer = Observer(*([np.nan] * len(Observer._fields) if observer is None else observer.tolist()))
+
+    def _take(self, about: dict[str, Any]) -> None:
+        for key in _PLAIN:
+            setattr(self, key, about[key])
+        self.inputs, self.outputs = list(about["inputs"]), list(about["outputs"])
+        self.modes = [Mode.of(one) for one in about["modes"]]
+        self.mkr, self.pdc = MassMatrices.of(about.get("mkr")), ProportionalDamping.of(about.get("pdc"))
+        self.hankel, self.singular_noise = about.get("hankel"), about.get("singular_noise")
+        self.refinement, self.skew = Refinement.of(about.get("refinement")), Skew.of(about.get("skew"), self.outputs)
 
     def __reduce__(self) -> Any:  # what holds memory of the C library cannot be pickled
         return Result._read, (self.to_dict(), self._source.table())
