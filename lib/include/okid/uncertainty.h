@@ -95,12 +95,14 @@ typedef struct okid_jackknife okid_jackknife_t;
 typedef struct okid_jackknife_config_t {
     okid_identify_config_t identify; ///< of the full model; its `order` is not read
     okid_accumulator_config_t sums;  ///< of the whole: okid_accumulator_config(). edges = 1, slots = 0
+    int32_t linear; ///< 1: the full model's change to first order in the place of a model of the rest, at a fraction of
+                    ///< the cost; okid-era with inputs and the system's Hankel matrix, n4sid-moesp, n4sid-cva
 } okid_jackknife_config_t;
 
 /// Of an identifier and of the sums it is given.
 static inline okid_jackknife_config_t okid_jackknife_defaults(const okid_identify_config_t* identify,
                                                               const okid_accumulator_config_t* sums) {
-    const okid_jackknife_config_t config = {*identify, *sums};
+    const okid_jackknife_config_t config = {*identify, *sums, 0};
     return config;
 }
 
@@ -117,7 +119,18 @@ OKID_NODISCARD OKID_API okid_status_t okid_jackknife_create(okid_jackknife_t** s
 OKID_NODISCARD OKID_API okid_status_t okid_jackknife_begin(okid_jackknife_t* self, okid_accumulator_t* whole,
                                                            const okid_identified_t* full);
 
-/// The model of the whole without one part.
+/// The same for `linear` (Doehler, Mevel 2013): the model is differentiated by the sums, once, out of what an identifier
+/// holds since it found it.
+/// @param by  the identifier whose last run, on the sums of the whole, gave `full`; it must stay as it is until the last
+///            okid_jackknife_delete()
+/// @return as okid_jackknife_begin(); OKID_ERR_MISMATCH also: created without `linear`, or `by` was given a triangular
+///         factor and not sums; OKID_ERR_NUMERIC: the model has no derivative
+OKID_NODISCARD OKID_API okid_status_t okid_jackknife_begin_linear(okid_jackknife_t* self, okid_identify_t* by,
+                                                                  okid_accumulator_t* whole,
+                                                                  const okid_identified_t* full);
+
+/// The model of the whole without one part. With `linear` to first order, in its own states; of the n4sid methods B and D
+/// are those of the full model.
 /// @param part    in, the sums of the part; see okid_accumulator_remove(), also for `weight`
 /// @param model   out, valid until the next call (K is NULL)
 /// @param share   out, share of the information in the part: of the energy of the channels, each counting alike, so

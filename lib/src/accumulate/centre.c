@@ -7,6 +7,7 @@
 // NUMERICS   codes: exact; what is left of a mean is below 2^-9 code
 // WORKSPACE  none; O((m p)^2)
 #include "accumulator.h"
+#include "lag_means.h"
 #include "wide.h"
 
 /// The mean in 2^-8 codes, rounded, and the sum that is left of the lag row with sum g (codes) when it is taken off.
@@ -194,4 +195,16 @@ okid_status_t okid_accumulator_run(okid_accumulator_t* self, okid_detrend_t detr
         if (sums->mean) sums->mean[j] = scale[j] * total / rows + offset[j];
     }
     return OKID_OK;
+}
+
+double okid_accumulator_lag_means(okid_accumulator_t* self, double* mean) {
+    okid_accumulator_settle(self);
+    const double rows = okid_accumulator_weight(self), unit = 1.0 / (1 << acc_fraction(self));
+    const size_t m = (size_t)self->m;
+    if (!(rows > 0)) return 0;
+    for (size_t i = 0; i < (size_t)self->width; ++i)
+        mean[i] = okid_accumulator_lag_sum(self, i, i < m ? 0 : mean[i - m]);
+    for (size_t i = 0; i < (size_t)self->width; ++i)
+        mean[i] = acc_scale(self)[i % m] * unit * mean[i] / rows + (self->centred ? 0 : acc_scale(self)[m + i % m]);
+    return rows;
 }

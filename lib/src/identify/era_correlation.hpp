@@ -10,6 +10,13 @@ namespace okid {
 /// block (i, j) = first[i + j]; rows x cols blocks of n_y x n_u, column-major.
 void fill_hankel(int n_u, int n_y, int rows, int cols, const okid_real_t* first, okid_real_t* out);
 
+/// The decomposition that an ERA holds: U (height x rank), singular values, V^T (rank x breadth).
+struct era_view {
+    int height, breadth, rank;
+    const okid_real_t *left, *values, *right;
+};
+era_view view_of(const okid_era_t* self);
+
 struct correlation {
     okid_era_config_t config;
     int rows, cols, rank;                       ///< block rows and columns of the tall Hankel matrix; columns of basis

@@ -214,6 +214,8 @@ okid_status_t finish(okid_identify& s, okid_status_t decomposed, okid_identified
 
 } // namespace
 
+okid_identify okid::plan_of(const okid_identify_config_t& config) { return plan(config); }
+
 okid_status_t okid::replicate(okid_identify& s, okid_accumulator_t* accumulator, int order, okid_identified_t* out) {
     begin(s, out, okid_accumulator_rows(accumulator));
     s.follow = order;
@@ -272,6 +274,7 @@ okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accum
     okid_accumulator_config(accumulator, &held);
     begin(s, out, okid_accumulator_rows(accumulator));
     if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.lags) return OKID_ERR_MISMATCH;
+    s.from_sums = true;
     return finish(s, decompose(s, accumulator, out), out);
 }
 
@@ -284,6 +287,7 @@ okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t
     if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.lags || s.config.solver != OKID_SOLVER_DENSE ||
         s.by_covariance)
         return OKID_ERR_MISMATCH;
+    s.from_sums = false;
     return finish(s,
                   s.by_subspace ? okid::decompose_subspace_factor(s, square_root, out)
                                 : okid::decompose_observer_factor(s, square_root, out),

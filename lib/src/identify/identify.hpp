@@ -7,6 +7,7 @@
 #include <okid/steps/square_root.h>
 #include <okid/steps/subspace.h>
 
+#include "identify/era_correlation.hpp"
 #include "identify/noise_level.hpp"
 #include "linalg/arena.hpp"
 
@@ -48,6 +49,7 @@ struct okid_identify {
     okid_observer_config_t observer_config;
     okid_subspace_config_t subspace_config;
     bool by_subspace, by_covariance;                     ///< neither: by the observer
+    bool from_sums;                                      ///< what was decomposed last: not from a triangular factor
     int n_u, n_y, m, lags, n, q, max_order, markov_last; ///< n = m (lags + 1); q: unknowns of a regression
     std::size_t observer_bytes, modal_bytes;
     double *gram, *mean;       ///< gram: the Gram matrix, its factor, or S of one run
@@ -70,6 +72,9 @@ struct okid_identify {
 };
 
 namespace okid {
+
+/// The object without memory: its sizes and configurations.
+okid_identify plan_of(const okid_identify_config_t& config);
 
 /// Gram matrix (column c for channel c first), or factor (outputs last): OKID_ERR_INPUT or _OUTPUT names a constant
 /// channel.

@@ -92,13 +92,9 @@ void noise_work::lay_out(const okid_observer_config_t& c, int rows, int last, ar
         *each = memory.take<okid_real_t>(area((last + 1 + c.p) * c.n_y, c.n_u));
 }
 
-double noise_level(const okid_observer_config_t& c, void* observer_work, const okid_real_t* theta,
-                   const okid_real_t* innovation, const okid_real_t* markov, int rows, int last, const noise_work& w) {
-    const int n_y = c.n_y, q = c.n_u + c.p * (c.n_u + n_y);
-    std::copy(innovation, innovation + n_y * n_y, w.root);
-    if (linalg::cholesky(n_y, w.root, n_y) != 0) return 0; // no innovations, no error
-    for (int k = 1; k < n_y; ++k) std::fill(w.root + area(k, n_y), w.root + area(k, n_y) + k, okid_real_t{0});
-    const int tall = (last + 1 + c.p) * n_y;
+void begin_spread(const okid_observer_config_t& c, const okid_real_t* theta, const okid_real_t* markov, int last,
+                  const noise_work& w) {
+    const int n_y = c.n_y, tall = (last + 1 + c.p) * n_y;
     std::fill(w.stack, w.stack + area(tall, c.n_u), okid_real_t{0});
     std::fill(w.changes, w.changes + area(tall, c.n_u), okid_real_t{0});
     for (int n = 0; n <= last; ++n)
@@ -107,6 +103,20 @@ double noise_level(const okid_observer_config_t& c, void* observer_work, const o
             std::copy(from, from + n_y, w.stack + area(k, tall) + (last - n) * n_y);
         }
     take_feedback(c.n_u, n_y, c.p, theta, w.feedback);
+}
+
+void spread_error(const okid_observer_config_t& c, int last, const noise_work& w) {
+    take_feedback(c.n_u, c.n_y, c.p, w.error, w.feedback_error);
+    propagate(c, last, w);
+}
+
+double noise_level(const okid_observer_config_t& c, void* observer_work, const okid_real_t* theta,
+                   const okid_real_t* innovation, const okid_real_t* markov, int rows, int last, const noise_work& w) {
+    const int n_y = c.n_y, q = c.n_u + c.p * (c.n_u + n_y);
+    std::copy(innovation, innovation + n_y * n_y, w.root);
+    if (linalg::cholesky(n_y, w.root, n_y) != 0) return 0; // no innovations, no error
+    for (int k = 1; k < n_y; ++k) std::fill(w.root + area(k, n_y), w.root + area(k, n_y) + k, okid_real_t{0});
+    begin_spread(c, theta, markov, last, w);
     signs sign;
     double sum = 0;
     for (int k = 0; k < draws; ++k) {
@@ -114,8 +124,7 @@ double noise_level(const okid_observer_config_t& c, void* observer_work, const o
         observer_error(c, observer_work, w.draw, w.solve);
         std::transform(w.draw, w.draw + area(n_y, q), w.plain, [](double x) { return static_cast<okid_real_t>(x); });
         multiply(false, false, n_y, q, n_y, 1, w.root, n_y, w.plain, n_y, 0, w.error, n_y);
-        take_feedback(c.n_u, n_y, c.p, w.error, w.feedback_error);
-        propagate(c, last, w);
+        spread_error(c, last, w);
         const double norm = hankel_norm(c.n_u, n_y, rows, w.markov, w.left, w.right, sign);
         sum += norm * norm;
     }

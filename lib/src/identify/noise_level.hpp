@@ -12,6 +12,9 @@ namespace okid {
 /// @param solve  solve_work(n_y) doubles
 void observer_error(const okid_observer_config_t& config, void* work, double* draw, double* solve);
 
+/// x (q x n_y) <- (V V^T + ridge)^-1 x with the same factor.
+void observer_change(const okid_observer_config_t& config, void* work, double* x);
+
 struct noise_work {
     double *draw, *solve;
     okid_real_t *plain, *error, *root;      ///< the draw; of theta, n_y x q; factor of the innovation covariance
@@ -22,6 +25,11 @@ struct noise_work {
 
     void lay_out(const okid_observer_config_t& c, int rows, int last, arena& memory);
 };
+
+/// How errors of theta change the Markov parameters Y_0 .. Y_last, to first order: begin once, then w.error -> w.markov.
+void begin_spread(const okid_observer_config_t& c, const okid_real_t* theta, const okid_real_t* markov, int last,
+                  const noise_work& w);
+void spread_error(const okid_observer_config_t& c, int last, const noise_work& w);
 
 /// 1.5 times the root mean square of the largest singular value of the Hankel matrix (rows x rows blocks) of what the
 /// variance of the least squares does to the Markov parameters, over a few draws with a fixed seed.

@@ -197,6 +197,20 @@ void observer_error(const okid_observer_config_t& config, void* work, double* dr
     }
 }
 
+void observer_change(const okid_observer_config_t& config, void* work, double* x) {
+    arena memory(work);
+    observer_work w;
+    lay_out(config, memory, &w);
+    const int q = config.n_u + config.p * (config.n_u + config.n_y);
+    const auto scale = [&] {
+        for (int o = 0; o < config.n_y; ++o)
+            for (int k = 0; k < q; ++k) x[o * q + k] *= w.scale[k < config.n_u ? k : k + config.n_y];
+    };
+    scale();
+    linalg::cholesky_solve(q, w.factor, q, x, q, config.n_y);
+    scale();
+}
+
 } // namespace okid
 
 size_t okid_observer_memsize(const okid_observer_config_t* config) {

@@ -109,6 +109,11 @@ void expect(okid_subspace_t* self, int order, bool condition) {
 
 double condition_of(const okid_subspace_t* self) { return self->hankel.condition; }
 
+subspace_view view_of(const okid_subspace_t* self) {
+    return {self->sizes,        self->hankel.L,      self->cut.weight, self->projection.gamma,
+            self->hankel.place, self->config.method, self->cut.carried};
+}
+
 } // namespace okid
 
 int32_t okid_subspace_max_order(const okid_subspace_config_t* config) {

@@ -105,4 +105,13 @@ struct ssarx {
     bool last_block(const subspace_sizes& z, const hankel_factor& f, int orders) const;
 };
 
+/// What linear_subspace reads; it stands until the next decomposition. weight: S of CVA, h x h lower.
+struct subspace_view {
+    subspace_sizes sizes;
+    const double *L, *weight, *gamma;
+    const int* place;
+    int32_t method, carried;
+};
+subspace_view view_of(const okid_subspace_t* self);
+
 } // namespace okid

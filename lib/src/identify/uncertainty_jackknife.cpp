@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    replicate models, each without one block of the record, from sums alone
 // METHOD     sums of the whole less those of the block, identified at the order of the full model by what okid_identify_run()
-//            does, less the scans and checks that no deviation needs; ERA starts from the full model (followed_era)
+//            does, less the scans and checks that no deviation needs; ERA starts from the full model (followed_era). Or the
+//            full model plus its derivative along the sums of the block (linear.hpp)
 // REFERENCE  docs/numerics.md, uncertainty
-// NUMERICS   codes: the sums without the block are exact; doubles: a rounding of the whole
-// WORKSPACE  an identifier, one accumulator, 2 m doubles; no heap
+// NUMERICS   codes: the sums without the block are exact; doubles: a rounding of the whole. Linear: the sums of a block are
+//            taken about the means of the whole, which is the derivative of the centred sums
+// WORKSPACE  an identifier, one accumulator, 2 m doubles, or the Gram matrix of a block and linear.hpp's; no heap
 #include <okid/uncertainty.h>
 
+#include "accumulate/lag_means.h"
 #include "identify/identify.hpp"
+#include "identify/linear.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,21 +28,49 @@ struct okid_jackknife {
     okid::followed_era followed;
     void *identifier_block, *rest_block;
     size_t identifier_bytes, rest_bytes;
+    double *gram, *mean, *part_mean; ///< linear: Gram matrix of a part; lag-row means of the whole, of a part
+    int size;                        ///< of gram
+    okid_run_sums_t run;             ///< of a part that is one run
+    okid::linear_era era;
+    okid::linear_subspace subspace;
 };
 
 namespace {
 
+bool has_derivative(const okid_identify_config_t& c) {
+    return c.method == OKID_METHOD_OKID_ERA ? c.n_u > 0 && c.hankel == OKID_HANKEL_SYSTEM
+                                            : c.method == OKID_METHOD_N4SID_MOESP || c.method == OKID_METHOD_N4SID_CVA;
+}
+
 bool valid(const okid_jackknife_config_t& c) {
+    if (c.linear != 0 && !has_derivative(c.identify)) return false;
     const int32_t lags = okid_identify_lags(&c.identify);
     return lags > 0 && c.identify.solver == OKID_SOLVER_DENSE && okid_accumulator_memsize(&c.sums) > 0 &&
            c.sums.n_u == c.identify.n_u && c.sums.n_y == c.identify.n_y && c.sums.lags == lags && c.sums.edges != 0 &&
            c.sums.slots == 0;
 }
 
+void lay_out_linear(okid_jackknife& s, okid::arena& memory) {
+    const okid_identify shape = okid::plan_of(s.config.identify);
+    s.size = shape.n;
+    s.gram = memory.take<double>(static_cast<size_t>(s.size) * static_cast<size_t>(s.size));
+    const auto n = static_cast<size_t>(s.size), m = static_cast<size_t>(s.channels);
+    for (double** each : {&s.mean, &s.part_mean, &s.run.head, &s.run.tail}) *each = memory.take<double>(n);
+    for (double** each : {&s.run.sum, &s.run.mean}) *each = memory.take<double>(m);
+    s.run.S = memory.take<double>(m * n);
+    if (shape.by_subspace)
+        s.subspace.lay_out(shape, shape.max_order, memory);
+    else
+        s.era.lay_out(shape, shape.max_order, memory);
+}
+
 size_t lay_out(okid_jackknife& s, okid::arena& memory) {
     s.channels = s.config.sums.n_u + s.config.sums.n_y;
-    s.energy = memory.take<double>(static_cast<size_t>(s.channels));
-    s.taken = memory.take<double>(static_cast<size_t>(s.channels));
+    for (double** each : {&s.energy, &s.taken}) *each = memory.take<double>(static_cast<size_t>(s.channels));
+    if (s.config.linear != 0) {
+        lay_out_linear(s, memory);
+        return memory.bytes();
+    }
     s.identifier_bytes = okid_identify_memsize(&s.config.identify);
     s.rest_bytes = okid_accumulator_memsize(&s.config.sums);
     s.identifier_block = memory.take<char>(s.identifier_bytes);
@@ -50,6 +82,63 @@ size_t lay_out(okid_jackknife& s, okid::arena& memory) {
         s.followed.lay_out({c.n_u, c.n_y, rows, rows, 0, 0, 0}, okid_identify_max_order(&c), memory);
     }
     return memory.bytes();
+}
+
+/// gram <- that of one run, by columns: the first from the sums, the others along the diagonals (what enters less what
+/// leaves). To remove means it is made about those of lag 0 and then moved to those of every lag row of the whole.
+void gram_of_run(const okid_jackknife& s, const okid_run_sums_t& run) {
+    const int m = s.channels, n = s.size, p = n / m - 1;
+    const bool centred = s.config.identify.detrend != OKID_DETREND_NONE;
+    const auto rows = static_cast<double>(run.rows);
+    double* sum = s.part_mean; // of the lag rows
+    for (int i = 0; centred && i < n; ++i) {
+        sum[i] = i < m ? run.sum[i] : sum[i - m] + run.head[i - m] - run.tail[i - m];
+        for (int c = 0; c < m; ++c)
+            run.S[i * m + c] += rows * s.mean[c] * s.mean[i % m] - run.sum[c] * s.mean[i % m] - s.mean[c] * sum[i];
+    }
+    for (int i = 0; centred && i < m * p; ++i) {
+        run.head[i] -= s.mean[i % m];
+        run.tail[i] -= s.mean[i % m];
+    }
+    const auto column_of = [&](int j) { return s.gram + static_cast<size_t>(j) * static_cast<size_t>(n); };
+    for (int c = 0; c < m; ++c)
+        for (int i = 0; i < n; ++i) column_of(c)[i] = run.S[i * m + c];
+    for (int j = m; j < n; ++j) {
+        double* column = column_of(j);
+        const double *before = column_of(j - m), enters = run.head[j - m], leaves = run.tail[j - m];
+        for (int i = 0; i < m; ++i) column[i] = column_of(i)[j];
+        for (int i = m; i < n; ++i) column[i] = before[i - m] + enters * run.head[i - m] - leaves * run.tail[i - m];
+    }
+    if (!centred) return;
+    double* apart = run.head; // of the means, lag row for lag row
+    for (int i = 0; i < n; ++i) {
+        sum[i] -= rows * (s.mean[i % m] + s.mean[i]) / 2;
+        apart[i] = s.mean[i] - s.mean[i % m];
+    }
+    for (int j = 0; j < n; ++j) {
+        double* column = column_of(j);
+        const double step = apart[j], own = sum[j];
+        for (int i = 0; i < n; ++i) column[i] -= own * apart[i] + sum[i] * step;
+    }
+}
+
+/// gram <- that of the part about the means of the whole.
+okid_status_t gram_of_part(okid_jackknife& s, okid_accumulator_t* part) {
+    const okid_detrend_t detrend = s.config.identify.detrend;
+    if (s.config.sums.forgetting == 1 && okid_accumulator_run(part, OKID_DETREND_NONE, &s.run) == OKID_OK) {
+        gram_of_run(s, s.run);
+        return OKID_OK;
+    }
+    const okid_status_t status = okid_accumulator_gram(part, detrend, s.gram, nullptr);
+    if (status != OKID_OK || detrend == OKID_DETREND_NONE) return status;
+    const double rows = okid_accumulator_lag_means(part, s.part_mean); // its own means, and how far they are away
+    for (int c = 0; c < s.size; ++c) s.part_mean[c] -= s.mean[c];
+    double* column = s.gram;
+    for (int c = 0; c < s.size; ++c, column += s.size) {
+        const double factor = rows * s.part_mean[c];
+        for (int r = 0; r < s.size; ++r) column[r] += factor * s.part_mean[r];
+    }
+    return status;
 }
 
 /// Share of the part, each channel counting alike; what is left of the whole keeps a little too.
@@ -82,6 +171,7 @@ okid_status_t okid_jackknife_create(okid_jackknife_t** self, const okid_jackknif
     s->config = *config;
     lay_out(*s, memory);
     *self = s;
+    if (config->linear != 0) return OKID_OK;
     const okid_status_t status = okid_accumulator_create(&s->rest, &s->config.sums, s->rest_block, s->rest_bytes);
     return status != OKID_OK
                ? status
@@ -91,6 +181,7 @@ okid_status_t okid_jackknife_create(okid_jackknife_t** self, const okid_jackknif
 okid_status_t okid_jackknife_begin(okid_jackknife_t* self, okid_accumulator_t* whole, const okid_identified_t* full) {
     if (self == nullptr || whole == nullptr || full == nullptr) return OKID_ERR_NULL;
     okid_jackknife& s = *self;
+    if (s.config.linear != 0) return OKID_ERR_MISMATCH;
     if (full->n_z < 1 || full->n_z > s.identifier->max_order) return OKID_ERR_DIM;
     okid_status_t status = okid_accumulator_copy(s.rest, whole); // does it fit?
     if (status == OKID_OK) status = okid_accumulator_energy(whole, s.config.identify.detrend, s.energy);
@@ -104,12 +195,41 @@ okid_status_t okid_jackknife_begin(okid_jackknife_t* self, okid_accumulator_t* w
     return status;
 }
 
+okid_status_t okid_jackknife_begin_linear(okid_jackknife_t* self, okid_identify_t* by, okid_accumulator_t* whole,
+                                          const okid_identified_t* full) {
+    if (self == nullptr || by == nullptr || whole == nullptr || full == nullptr) return OKID_ERR_NULL;
+    okid_jackknife& s = *self;
+    const okid_identify_config_t &mine = s.config.identify, &its = by->config;
+    okid_accumulator_config_t held;
+    okid_accumulator_config(whole, &held);
+    s.whole = nullptr;
+    if (s.config.linear == 0 || !by->from_sums || its.method != mine.method || its.hankel != mine.hankel ||
+        by->n_u != mine.n_u || by->n_y != mine.n_y || by->n != s.size || its.rows != okid::plan_of(mine).config.rows ||
+        held.n_u != mine.n_u || held.n_y != mine.n_y || held.lags != by->lags)
+        return OKID_ERR_MISMATCH;
+    if (full->n_z < 1 || full->n_z > okid_identify_max_order(&mine)) return OKID_ERR_DIM;
+    okid_status_t status = okid_accumulator_energy(whole, mine.detrend, s.energy);
+    if (status != OKID_OK) return status;
+    if (mine.detrend != OKID_DETREND_NONE) okid_accumulator_lag_means(whole, s.mean);
+    status = by->by_subspace ? s.subspace.begin(*by, *full) : s.era.begin(*by, *full);
+    if (status == OKID_OK) s.whole = whole;
+    return status;
+}
+
 okid_status_t okid_jackknife_delete(okid_jackknife_t* self, okid_accumulator_t* part, double weight,
                                     okid_model_t* model, double* share) {
     if (self == nullptr || self->whole == nullptr || part == nullptr || model == nullptr || share == nullptr)
         return OKID_ERR_NULL;
     okid_jackknife& s = *self;
     okid_status_t status = okid_accumulator_energy(part, s.config.identify.detrend, s.taken);
+    if (s.config.linear != 0) {
+        if (status == OKID_OK) status = gram_of_part(s, part);
+        if (status != OKID_OK) return status;
+        *share = share_of(s, weight);
+        const double step = -weight / (1 - *share);
+        *model = s.subspace.size > 0 ? s.subspace.along(s.gram, step) : s.era.along(s.gram, step);
+        return OKID_OK;
+    }
     if (status == OKID_OK) status = okid_accumulator_copy(s.rest, s.whole);
     if (status == OKID_OK) status = okid_accumulator_remove(s.rest, part, weight);
     if (status != OKID_OK) return status;

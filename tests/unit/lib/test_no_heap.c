@@ -114,14 +114,15 @@ static void nothing_for_standard_deviations(void) {
     rig_make(&rig);
     double* v = rig_record(&rig, N, 0.02, NULL, 3);
     const okid_method_t methods[] = {OKID_METHOD_OKID_ERA, OKID_METHOD_N4SID_MOESP};
-    for (size_t k = 0; k < sizeof methods / sizeof *methods; ++k) {
-        okid_jackknife_config_t config = {.identify = {.n_u = RIG_NU,
+    for (size_t k = 0; k < 2 * (sizeof methods / sizeof *methods); ++k) {
+        okid_jackknife_config_t config = {.linear = k % 2,
+                                          .identify = {.n_u = RIG_NU,
                                                        .n_y = RIG_NY,
                                                        .p = P,
                                                        .rows = P,
                                                        .max_order = 20,
                                                        .fs_hz = RIG_FS,
-                                                       .method = methods[k]}};
+                                                       .method = methods[k / 2]}};
         config.sums = (okid_accumulator_config_t){
             .n_u = RIG_NU, .n_y = RIG_NY, .lags = okid_identify_lags(&config.identify), .forgetting = 1, .edges = 1};
         const okid_replicates_config_t sums = {RIG_NU, RIG_NY, 20, NULL};
@@ -146,7 +147,9 @@ static void nothing_for_standard_deviations(void) {
         const okid_model_t view = {full.n_u, full.n_y, full.n_z, full.A, full.B, full.C, full.D, NULL};
         const long before = calls;
         okid_status_t status = okid_replicates_begin(replicates, &view, full.dt);
-        if (status >= 0) status = okid_jackknife_begin(jackknife, whole, &full);
+        if (status >= 0)
+            status = config.linear ? okid_jackknife_begin_linear(jackknife, s, whole, &full)
+                                   : okid_jackknife_begin(jackknife, whole, &full);
         for (int n = 0; status >= 0 && n < 10; ++n) {
             okid_model_t model;
             double share;

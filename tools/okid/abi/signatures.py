@@ -226,5 +226,6 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_jackknife_memsize": (c_size_t, [POINTER(JackknifeConfig)]),
     "okid_jackknife_create": (c_int, [POINTER(opaque), POINTER(JackknifeConfig), opaque, c_size_t]),
     "okid_jackknife_begin": (c_int, [opaque, opaque, POINTER(Identified)]),
+    "okid_jackknife_begin_linear": (c_int, [opaque, opaque, opaque, POINTER(Identified)]),
     "okid_jackknife_delete": (c_int, [opaque, opaque, c_double, _model, doubles]),
 }
