@@ -131,8 +131,11 @@ struct lamps_config {
 struct alarm_config {
     bool enabled = true;
     double k_sigma = 6;
-    int baseline_updates = 20; ///< settled updates that make the baseline
-    std::string command;       ///< run live at an alarm, already relative to the config's folder; "" = none
+    int baseline_updates = 20;  ///< settled updates that make the baseline
+    double test_s = 0;          ///< length of a change test, 0 = none
+    int test_rows = 0;          ///< its block rows, 0 = chosen
+    double false_alarm = 0.001; ///< of one change test
+    std::string command;        ///< run live at an alarm, already relative to the config's folder; "" = none
 };
 
 /// Where to listen or to send to.

@@ -39,6 +39,11 @@ void read_alarm(const toml::table& file, live_config& config) {
         out.k_sigma = (*table)["k_sigma"].value_or(out.k_sigma);
         out.baseline_updates =
             static_cast<int>((*table)["baseline_updates"].value_or(std::int64_t{out.baseline_updates}));
+        out.test_s = (*table)["test_s"].value_or(0.0);
+        out.test_rows = static_cast<int>((*table)["test_rows"].value_or(std::int64_t{0}));
+        out.false_alarm = (*table)["false_alarm"].value_or(out.false_alarm);
+        if (out.test_s > 0 && file.contains("hammer"))
+            refuse_key(place, *table->get("test_s"), "test_s", "blows of a [hammer] test are no stream to be tested");
         if (table->contains("command")) read_command(*table->get("command"), config);
         if (out.enabled && !sigma && table->contains("enabled"))
             refuse_key(place, *table->get("enabled"), "enabled",

@@ -153,7 +153,9 @@ ordered_json config_json(const live_config& config) {
     out["identification"] = identification_json(config.identification);
     out["alarm"] = {{"enabled", config.alarm.enabled},
                     {"k_sigma", config.alarm.k_sigma},
-                    {"baseline_updates", config.alarm.baseline_updates}};
+                    {"baseline_updates", config.alarm.baseline_updates},
+                    {"test_s", config.alarm.test_s > 0 ? ordered_json(config.alarm.test_s) : ordered_json(nullptr)},
+                    {"false_alarm", config.alarm.false_alarm}};
     out["trigger"] = start_json(config);
     out["hammer"] = hammer_json(config);
     out["record"] = record_json(config.record);

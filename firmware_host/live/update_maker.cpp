@@ -22,7 +22,9 @@ ordered_json departure_json(const departure& from) {
 } // namespace
 
 update_maker::update_maker(const live_config& config)
-    : rate_hz_(config.rate_hz), always_(config.hammer.enabled), stream_(stream_of(config)), alarm_(config.alarm) {}
+    : rate_hz_(config.rate_hz), always_(config.hammer.enabled), stream_(stream_of(config)), alarm_(config.alarm) {
+    if (config.alarm.test_s > 0) change_test_ = std::make_unique<change_test>(config, stream_.config());
+}
 
 update_report update_maker::update(std::int64_t samples, const haste& how) {
     update_report out;
@@ -30,6 +32,7 @@ update_report update_maker::update(std::int64_t samples, const haste& how) {
     out.behind = how.ahead > 0;
     out.settled = settled_;
     out.alarm = alarm_.standing();
+    if (change_test_) out.events = change_test_->take();
     if (!always_ && !stream_.due()) return out;
     if (const std::optional<stream_update::change> found = stream_.take_change(samples))
         out.events.push_back(
@@ -58,6 +61,7 @@ void update_maker::make(std::int64_t samples, update_report& out) {
     state.samples = stats.samples;
     state.missing = stats.missing;
     state.gaps = stats.gaps;
+    state.changed = change_test_ && change_test_->standing();
     if (found.tracks) {
         follow(found, out);
     } else {

@@ -3,10 +3,12 @@
 // is told to anybody: a report says what is to be told, so that updates may be made on a thread of their own.
 #pragma once
 #include "alarm.hpp"
+#include "change_test.hpp"
 #include "publish/terminal_table.hpp"
 #include "stream.hpp"
 
 #include <cstdint>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
@@ -28,8 +30,14 @@ class update_maker {
     explicit update_maker(const live_config& config);
 
     stream& sums() { return stream_; }
-    void add(const double* row) { stream_.sums().add(row); }
-    void add_missing(std::int64_t count) { stream_.sums().add_missing(count); }
+    void add(const double* row) {
+        stream_.sums().add(row);
+        if (change_test_) change_test_->add(row);
+    }
+    void add_missing(std::int64_t count) {
+        stream_.sums().add_missing(count);
+        if (change_test_) change_test_->add_missing(count);
+    }
 
     /// How pressing it is to be done with an update.
     struct haste {
@@ -50,7 +58,8 @@ class update_maker {
     bool always_; ///< a hammer test: an update for each blow
     stream stream_;
     alarm_watch alarm_;
-    std::vector<observed_mode> observed_; ///< of the newest update
+    std::unique_ptr<change_test> change_test_; ///< where [alarm] test_s asks for it
+    std::vector<observed_mode> observed_;      ///< of the newest update
     bool settled_ = false;
     int steps_ = 1; ///< since the last update that was made
 };

@@ -41,7 +41,7 @@ void publisher::open_sinks(const live_config& config) {
     if (wanted.prometheus) sinks_.push_back(make_metrics(*wanted.prometheus, [this] { return figures(); }));
     if (wanted.mqtt) sinks_.push_back(make_broker(config));
     if (!options_.live) return; // a log that is replayed calls nobody out of bed
-    if (config.alarm.enabled && !config.alarm.command.empty())
+    if ((config.alarm.enabled || config.alarm.test_s > 0) && !config.alarm.command.empty())
         sinks_.push_back(std::make_unique<alarm_command>(config.alarm.command));
     if (service_notice::wanted()) sinks_.push_back(std::make_unique<service_notice>(beats_));
 }

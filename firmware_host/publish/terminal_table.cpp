@@ -17,6 +17,7 @@ namespace {
 
 std::string state_text(const table_state& state) {
     std::string text = !state.waiting.empty() ? state.waiting : state.settled ? "settled" : "settling";
+    if (state.changed) text = "CHANGED, " + text;
     if (state.alarm) text = "ALARM, " + text;
     if (state.gaps)
         text += fmt::format(", {} missing in {} gap{}", state.missing, state.gaps, state.gaps == 1 ? "" : "s");
@@ -94,9 +95,9 @@ std::vector<std::string> terminal_table::render(const table_state& state, bool c
         lines.push_back(colour && *tint ? tint + line + "\x1b[0m" : std::move(line));
     };
     add(fmt::format("t {:10.3f} s   {} samples   {}", state.t, state.samples, state_text(state)),
-        state.alarm     ? "\x1b[31m"
-        : state.settled ? "\x1b[32m"
-                        : "\x1b[33m");
+        state.alarm || state.changed ? "\x1b[31m"
+        : state.settled              ? "\x1b[32m"
+                                     : "\x1b[33m");
     if (state.modes.empty()) return lines;
     if (height > 2) add("track       f [Hz]       ± σ     ζ [%]       ± σ     MPC    EMAC", "");
     const std::size_t room = height > lines.size() ? height - lines.size() : 0;

@@ -19,6 +19,7 @@ struct mode_row {
 struct table_state {
     double t = 0;
     bool settled = false, alarm = false;
+    bool changed = false; ///< by the newest change test
     long long samples = 0, missing = 0, gaps = 0;
     std::string waiting; ///< why there is no model; "" = there is one
     std::vector<mode_row> modes;

@@ -94,7 +94,7 @@ def changing_frame(folder: pathlib.Path) -> list[Event]:
     for old, new in (("update_s = 1.0", "update_s = 0.5\nwindow_s = 6.0"), ("[[bus]]", 'operator = "me"\n\n[[bus]]')):
         assert old in config
         config = config.replace(old, new, 1)
-    (folder / "lossy.toml").write_text(config + "\n[alarm]\nbaseline_updates = 5\n")
+    (folder / "lossy.toml").write_text(config + "\n[alarm]\nbaseline_updates = 5\ntest_s = 14.0\n")
     okid(folder, "replay", "lossy.log", "-c", "lossy.toml", "--events", "lossy.jsonl")
     return events_of(folder / "lossy.jsonl")
 

@@ -81,7 +81,7 @@ IN_CONFIG_HPP = {
         "method", "p", "hankel", "hold", "detrend", "update_s", "sigma_blocks", "restart_on_change", "mkr",
         "max_memory_mb", "decimate",
     ),
-    "alarm": ("enabled", "k_sigma", "baseline_updates"),
+    "alarm": ("enabled", "k_sigma", "baseline_updates", "false_alarm"),
     "trigger": ("pretrigger_s",),
     "hammer": ("hits", "length_s", "pretrigger_s", "double_percent", "spectrum_hz"),
     "record": ("directory", "segment_mb", "max_mb", "pretrigger_s"),

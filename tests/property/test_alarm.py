@@ -127,6 +127,25 @@ def test_nothing_changes(tmp_path: pathlib.Path, name: str, window: int | None, 
     assert sorted(m["track"] for m in modes[-1]["modes"] if m["track"])[:count] == list(range(1, count + 1))
 
 
+@pytest.mark.parametrize("softer", [None, 2])
+def test_change_test(tmp_path: pathlib.Path, softer: int | None) -> None:
+    """Beside the alarm, which is off: 2 % of a spring of W2 in mid-record; alarms in each test after it, none before."""
+    truth = simulate(tmp_path, "W2", 36000, 5, softer, 0.98)
+    text = (tmp_path / "a.toml").read_text().replace("mkr = true", "mkr = false").replace("p = 40\nrows = 80", "p = 10")
+    (tmp_path / "b.toml").write_text(text + "[alarm]\nenabled = false\ntest_s = 29.0\n")
+    done = okid("replay", tmp_path / "a.log", "-c", tmp_path / "b.toml", "--events", tmp_path / "e.jsonl", status=0)
+    tests = of_type([json.loads(line) for line in (tmp_path / "e.jsonl").read_text().splitlines()], "change_test")
+    assert [one["baseline"] for one in tests] == [True] + 5 * [False], done.stderr
+    assert [one["alarm"] for one in tests] == 3 * [False] + 3 * [softer is not None]
+    if softer is None:
+        return
+    found, change = tests[-1], truth["changes"][0]
+    for mode in found["modes"]:
+        k = min(range(6), key=lambda k: abs(truth["frequency_hz"][k] - mode["frequency_hz"]))
+        shift = 100 * (change["frequency_hz"][k] / truth["frequency_hz"][k] - 1)
+        assert abs(mode["shift_percent"] - shift) < 0.01 + 4 * mode["sigma_percent"]
+
+
 if SLOW:
 
     @pytest.mark.parametrize("name", RIGS)

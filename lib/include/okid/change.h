@@ -68,7 +68,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_change_create(okid_change_t** self, c
 OKID_NODISCARD OKID_API okid_status_t okid_change_add(okid_change_t* self, okid_accumulator_t* sums, double* scratch);
 
 /// The blocks added since the last call of learn, test or clear become the baseline. Its modes are those with a damping
-/// ratio below 0.2, at most a third of the blocks: the ones that a test sees best.
+/// ratio below 0.2 whose frequency it knows to 2 % (one sigma), at most a third of the blocks: the ones it knows best.
 /// @return OKID_OK, OKID_ERR_TOO_SHORT (fewer rows than twice the unknowns), OKID_ERR_OUTPUT (a channel without motion),
 ///         OKID_ERR_EXCITATION, OKID_ERR_NO_MODES, OKID_ERR_NUMERIC; there is no baseline then. Cost some 10 (i m)^3 flop
 OKID_NODISCARD OKID_API okid_status_t okid_change_learn(okid_change_t* self);

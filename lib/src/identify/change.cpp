@@ -26,6 +26,8 @@ namespace {
 
 using okid::linalg::multiply;
 
+constexpr double most_sigma =
+    0.02;                       // of a frequency in the baseline: what is not known to that is noise, or hardly seen
 constexpr double ridge = 1e-12; // on unit diagonals
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
@@ -154,13 +156,15 @@ void keep_best(okid_change& s, int found) {
         for (int a = 1; a < count; ++a)
             for (int b = a; b > 0 && before(s.mode[b], s.mode[b - 1]); --b) swap_modes(b, b - 1);
     };
-    if (s.added >= okid::fewest_change_blocks)
+    const bool known = s.added >= okid::fewest_change_blocks;
+    if (known)
         sort(found, [](const okid_change_mode_t& a, const okid_change_mode_t& b) { return a.sigma < b.sigma; });
     else
         sort(found, [](const okid_change_mode_t& a, const okid_change_mode_t& b) {
             return a.damping_ratio < b.damping_ratio;
         });
     s.modes = std::min(found, s.most_modes);
+    while (known && s.modes > 1 && s.mode[s.modes - 1].sigma > most_sigma) --s.modes;
     sort(s.modes,
          [](const okid_change_mode_t& a, const okid_change_mode_t& b) { return a.frequency_hz < b.frequency_hz; });
 }

@@ -96,7 +96,7 @@ class RunState:
             self.hits.append({key: value for key, value in event.items() if key != "type"})
         elif kind == "result":
             self._keep_result(event)
-        if kind in ("alarm", "alarm_over", "change", "trigger"):
+        if kind in ("alarm", "alarm_over", "change", "trigger") or (kind == "change_test" and event.get("alarm")):
             self.marks.append({"kind": kind, "t": self._moment(event)})
         if kind != "start" or fresh:
             self.say(event)

@@ -33,6 +33,15 @@ def _change(event: dict[str, Any]) -> tuple[str, str]:
     return "warn", f"the structure changed at sample {event.get('sample')}; {done}"
 
 
+def _change_test(event: dict[str, Any]) -> tuple[str, str]:
+    if event.get("p_value") is None:
+        return "plain", f"change test: {event.get('text')}"
+    moved = max(event["modes"], key=lambda mode: abs(mode["shift_percent"]) / mode["sigma_percent"])
+    far = f"{moved['frequency_hz']:.4g} Hz {moved['shift_percent']:+.2g} ± {moved['sigma_percent']:.2g} %"
+    weight = "bad" if event.get("alarm") else "plain"
+    return weight, f"change test: {event.get('text')}, p = {event['p_value']:.2g}; farthest: {far}"
+
+
 def _result(event: dict[str, Any]) -> tuple[str, str]:
     result = event.get("result") or {}
     sure = [mode for mode in result.get("modes") or [] if mode.get("confident") is not False]
@@ -44,7 +53,8 @@ def describe(event: dict[str, Any]) -> tuple[str, str] | None:
     kind = event["type"]
     if kind in ("modes", "stats", "samples"):
         return None
-    words = {"gap": _gap, "alarm": _alarm, "hit": _hit, "change": _change, "result": _result}
+    words = {"gap": _gap, "alarm": _alarm, "hit": _hit, "change": _change, "change_test": _change_test}
+    words["result"] = _result
     if kind in words:
         return words[kind](event)
     if kind == "start":

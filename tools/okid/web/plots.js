@@ -88,7 +88,7 @@ export class Plot {
   }
 }
 
-const MARKS = { alarm: ["bad", "alarm"], alarm_over: ["good", "alarm over"], change: ["warn", "change"], trigger: ["muted", "trigger"] };
+const MARKS = { alarm: ["bad", "alarm"], alarm_over: ["good", "alarm over"], change: ["warn", "change"], change_test: ["bad", "changed (test)"], trigger: ["muted", "trigger"] };
 
 function marks(list) {
   const newest = list.slice(-40);
