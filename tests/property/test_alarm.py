@@ -129,7 +129,7 @@ def test_nothing_changes(tmp_path: pathlib.Path, name: str, window: int | None, 
 
 @pytest.mark.parametrize("softer", [None, 2])
 def test_change_test(tmp_path: pathlib.Path, softer: int | None) -> None:
-    """Beside the alarm, which is off: 2 % of a spring of W2 in mid-record; alarms in each test after it, none before."""
+    """Beside the alarm, which is off: 2 % of a spring of W2 in mid-record; an alarm in each test after it only."""
     truth = simulate(tmp_path, "W2", 36000, 5, softer, 0.98)
     text = (tmp_path / "a.toml").read_text().replace("mkr = true", "mkr = false").replace("p = 40\nrows = 80", "p = 10")
     (tmp_path / "b.toml").write_text(text + "[alarm]\nenabled = false\ntest_s = 29.0\n")

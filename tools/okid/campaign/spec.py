@@ -101,6 +101,7 @@ class Trend:
     series: tuple[str, ...] | None = None
     seed: int = 1
     temperature_order: int = 1
+    change_test: bool = False
 
 
 @dataclass(frozen=True)
@@ -187,11 +188,14 @@ class _Reader:
         records = self.records()
         temperature = self.temperature(records)
         by, band = self.group(records, temperature)
+        identification, trend = self.identification(by), self.trend(by)
+        if trend.change_test and identification.method == "auto":
+            self.place("trend").refuse("change_test", 'method "auto" keeps no sums: name a method, such as "okid-era"')
         return CampaignSpec(
             path=self.path, title=campaign.get("title", self.path.stem),
             structure=campaign.get("structure", "structure"),
-            records=records, channels=self.channels(temperature), identification=self.identification(by), by=by,
-            band_c=band, temperature=temperature, trend=self.trend(by),
+            records=records, channels=self.channels(temperature), identification=identification, by=by,
+            band_c=band, temperature=temperature, trend=trend,
             folder=self.path.parent / output.get("folder", f"{self.path.stem}.campaign"),
             keep=output.get("keep", "auto"), batch_bytes=round(1e6 * output.get("batch_mb", 128)),
             workers=cluster.get("workers", 2), address=cluster.get("address"), memory_mb=cluster.get("memory_mb", 2000),

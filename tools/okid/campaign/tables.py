@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from okid._errors import InputError
+from okid.campaign.change_shifts import shift_rows
 from okid.campaign.grouping import Group
 from okid.campaign.mode_tracks import follow
 from okid.campaign.run import Outcome
@@ -17,6 +18,7 @@ from okid.campaign.spec import CampaignSpec
 from okid.data.whole_file import whole_file
 
 NAMES = ("records", "groups", "modes")
+SHIFTS = "shifts"  # with [trend] change_test
 
 
 def _when(seconds: float | None) -> datetime | None:
@@ -108,6 +110,8 @@ def make_tables(spec: CampaignSpec, out: Outcome) -> dict[str, Any]:
         "groups": pd.DataFrame(rows),
         "modes": pd.DataFrame(_mode_rows(spec, out, rows)),
     }
+    if spec.trend.change_test:
+        tables[SHIFTS] = pd.DataFrame(shift_rows(spec, out, rows))
     for whole, columns in (
         ("records", ("samples", "missing", "saturated")),
         ("groups", ("rows", "parts", "order")),
@@ -121,6 +125,8 @@ def make_tables(spec: CampaignSpec, out: Outcome) -> dict[str, Any]:
 
 def write_tables(folder: Path, tables: dict[str, Any]) -> None:
     """NAME.parquet of each table, whole or not at all. InputError when the disk refuses."""
+    if SHIFTS not in tables:
+        (folder / f"{SHIFTS}.parquet").unlink(missing_ok=True)
     for name, table in tables.items():
         with whole_file(folder / f"{name}.parquet") as part:
             table.to_parquet(part, index=False)
@@ -131,7 +137,7 @@ def read_tables(folder: Path) -> dict[str, Any]:
     import pandas as pd
 
     out = {}
-    for name in NAMES:
+    for name in (*NAMES, *([SHIFTS] if (folder / f"{SHIFTS}.parquet").exists() else [])):
         path = folder / f"{name}.parquet"
         try:
             out[name] = pd.read_parquet(path)

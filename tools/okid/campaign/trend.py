@@ -80,8 +80,15 @@ class SeriesTrend:
 
 def series_of(tables: dict[str, Any]) -> list[SeriesTrend]:
     """The series of the tables with their tracks, those first that have most groups."""
+    out = _series(tables["groups"], tables["modes"])
+    shifts = tables.get("shifts")
+    if shifts is not None and len(shifts):
+        out += _series(shifts.drop_duplicates(["series", "group"]), shifts)
+    return sorted(out, key=lambda one: (-len(one.groups), one.name))
+
+
+def _series(groups: Any, modes: Any) -> list[SeriesTrend]:
     out = []
-    groups, modes = tables["groups"], tables["modes"]
     for name, own in groups[groups["time"].notna()].groupby("series", sort=True):
         own = own.sort_values(["time", "group"])
         names = own["group"].tolist()
@@ -99,7 +106,7 @@ def series_of(tables: dict[str, Any]) -> list[SeriesTrend]:
         tracks.sort(key=lambda track: float(np.nanmedian(track.frequency_hz)))
         known = celsius if np.any(np.isfinite(celsius)) else None
         out.append(SeriesTrend(str(name), names, seconds, known, tracks))
-    return sorted(out, key=lambda one: (-len(one.groups), one.name))
+    return out
 
 
 def _weight(track: Track) -> Real:
@@ -111,13 +118,20 @@ def _weight(track: Track) -> Real:
     return np.where(np.isfinite(track.frequency_hz) & (times <= BLURRED), 1.0 / np.maximum(1.0, times), 0.0)
 
 
+def in_training(time_s: Real, spec: Trend) -> NDArray[np.bool_]:
+    """Which groups, in time order, are of the training period."""
+    n = len(time_s)
+    end = (
+        spec.training_until.timestamp() if spec.training_until is not None
+        else time_s[min(n - 1, max(1, round(spec.training_share * n)))] if n else 0.0
+    )  # fmt: skip
+    return np.asarray(time_s < end)
+
+
 def _choose(series: SeriesTrend, spec: Trend) -> tuple[Real, Real, Real] | None:
     """Frequencies, weights (n, d), regressors (n, k) of the tracks and groups that are watched; None says why not."""
     n = len(series.groups)
-    first = series.time_s < (
-        spec.training_until.timestamp() if spec.training_until is not None
-        else series.time_s[min(n - 1, max(1, round(spec.training_share * n)))] if n else 0.0
-    )  # fmt: skip
+    first = in_training(series.time_s, spec)
     t = series.temperature_c
     warm = np.ones(n, dtype=np.bool_) if t is None else np.isfinite(t)
     training = first & warm

@@ -113,9 +113,10 @@ def _track_table(series: SeriesTrend) -> str:
         good = np.isfinite(track.frequency_hz)
         middle = float(np.median(track.frequency_hz[good]))
         known = track.frequency_std_hz[np.isfinite(track.frequency_std_hz)]
+        damping = track.damping_ratio[np.isfinite(track.damping_ratio)]
         row = [f"{place} (track {track.number})", str(int(np.sum(good))), f"{middle:.5g}",
                f"{np.median(known):.2g}" if len(known) else "-",
-               f"{100 * np.nanmedian(track.damping_ratio):.3g}"]  # fmt: skip
+               f"{100 * np.median(damping):.3g}" if len(damping) else "-"]  # fmt: skip
         if model is not None:
             k = series.watched.index(track.number) if track.number in series.watched else None
             if with_slope:
@@ -179,7 +180,8 @@ def _series_section(series: SeriesTrend, pictures: Pictures, trend: Trend) -> pa
         hidden = len(series.tracks) - len(_shown(series))
         words = "Bars: ± σ of each group, by leaving out parts of its records. Shaded: training period."
         parts.append(page.note(words + (f" {hidden} tracks seen in fewer groups are not drawn." if hidden else "")))
-        parts += [page.heading("Damping over time"), _over_time(series, pictures, True)]
+        if any(np.any(np.isfinite(track.damping_ratio)) for track in series.tracks):
+            parts += [page.heading("Damping over time"), _over_time(series, pictures, True)]
         if series.temperature_c is not None:
             parts += [page.heading("Frequency over temperature"), _over_temperature(series, pictures)]
         if series.charts is not None and series.limits is not None:
