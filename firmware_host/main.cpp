@@ -90,6 +90,7 @@ int main(int argc, char** argv) {
     okid_host::add_replay(app);
     okid_host::add_simulate(app);
     okid_host::add_convert(app);
+    okid_host::add_init(app);
     okid_host::add_check(app);
     okid_host::add_doctor(app);
     okid_host::add_bench(app);

@@ -68,7 +68,7 @@ std::string line_remedy(int code, const std::string& device) {
                            there.empty() ? "this machine has no serial device that could be meant"
                                          : "serial devices found: " + list_names(there) + did_you_mean(device, there));
     if (code == EACCES)
-        return "put yourself into the group of the device: sudo usermod -aG dialout $USER, then log in anew";
+        return "put yourself into the group of the device: sudo usermod -aG dialout $USER, then log in again";
     if (code == EBUSY)
         return fmt::format("find and end the other program: sudo fuser -v {} (ModemManager takes new devices for half "
                            "a minute)",

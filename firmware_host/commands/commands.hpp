@@ -12,6 +12,7 @@ void add_record(CLI::App& app);
 void add_replay(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_check(CLI::App& app);
+void add_init(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_bench(CLI::App& app);
 void add_completion(CLI::App& app);

@@ -203,7 +203,7 @@ void check_priority(findings& out, const realtime_config& wanted) {
         out.note("real-time priority",
                  fmt::format("RLIMIT_RTPRIO is {}, expected {}: under load the reader waits for others", limit.rlim_cur,
                              reader_priority),
-                 "echo \"$USER - rtprio 20\" | sudo tee /etc/security/limits.d/60-okid.conf, then log in anew (a "
+                 "echo \"$USER - rtprio 20\" | sudo tee /etc/security/limits.d/60-okid.conf, then log in again (a "
                  "service: LimitRTPRIO=20)");
 }
 
@@ -217,7 +217,7 @@ void check_memory(findings& out, const realtime_config& wanted) {
     else
         out.missing("locked memory", fmt::format("RLIMIT_MEMLOCK is {} bytes, expected no limit", limit.rlim_cur),
                     "echo \"$USER - memlock unlimited\" | sudo tee -a /etc/security/limits.d/60-okid.conf, then log in "
-                    "anew (a service: LimitMEMLOCK=infinity)");
+                    "again (a service: LimitMEMLOCK=infinity)");
 }
 
 void check_governor(findings& out) {
@@ -234,7 +234,7 @@ void check_governor(findings& out) {
 void add_doctor(CLI::App& app) {
     auto path = std::make_shared<std::string>();
     CLI::App* command =
-        app.add_subcommand("doctor", "Look at what this machine lacks for a live measurement, and say how to mend it");
+        app.add_subcommand("doctor", "Look at what this machine lacks for a live measurement, and how to fix it");
     command->add_option("config", *path, "also look at the buses of this file")->type_name("CONFIG.toml");
     command->footer(
         "Exit 0: all well. 2: the config is wrong. 4: something is missing.\n\nExample:\n  okid doctor frame.toml");

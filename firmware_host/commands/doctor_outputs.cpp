@@ -42,9 +42,9 @@ void check_recording(findings& out, const record_config& wanted) {
     else if (free_mb < wanted.max_mb)
         out.note("recording",
                  found + fmt::format(", less than max_mb = {:g}: the disk will be full first", wanted.max_mb),
-                 "lower [record] max_mb, so that the oldest journals give way in time");
+                 "lower [record] max_mb, so that the oldest journals are deleted in time");
     else
-        out.well("recording", found + fmt::format(", the oldest journals give way at {:g} MB", wanted.max_mb));
+        out.well("recording", found + fmt::format(", the oldest journals are deleted at {:g} MB", wanted.max_mb));
 }
 
 void check_socket(findings& out, const std::string& path) {
@@ -68,7 +68,7 @@ void check_outputs(findings& out, const live_config& config) {
         out.well("alarm command", command);
     else if (!command.empty())
         out.missing("alarm command", command + " is no program that may be executed",
-                    fmt::format("chmod +x {}, or mend [alarm] command (a path without arguments)", command));
+                    fmt::format("chmod +x {}, or fix [alarm] command (a path without arguments)", command));
     if (!config.publish.socket.empty()) check_socket(out, config.publish.socket);
 }
 

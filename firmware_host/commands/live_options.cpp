@@ -67,8 +67,8 @@ bool plays_a_log(const live_config& config) {
                                        [](const bus_config& bus) { return bus.type == "replay"; });
     if (replays == 0) return false;
     if (config.buses.size() != 1)
-        throw failure(exit_usage, fmt::format("{}: a bus of type replay stands beside another bus, expected it alone",
-                                              config.path));
+        throw failure(exit_usage,
+                      fmt::format("{}: a bus of type replay beside another bus, expected it alone", config.path));
     require_edge_time(config, false);
     return true;
 }

@@ -54,7 +54,7 @@ void check_targets(const simulate_arguments& given, const std::string& dbc) {
         check_writable(targets[i]);
         std::error_code ignored;
         if (fs::equivalent(targets[i], given.rig, ignored))
-            throw failure(exit_usage, fmt::format("{}: is the rig itself, it is not written over", targets[i]));
+            throw failure(exit_usage, fmt::format("{}: is the rig itself, it is not overwritten", targets[i]));
         for (std::size_t j = 0; j < i; ++j)
             if (targets[i] == targets[j] && targets[i] != "/dev/null")
                 throw failure(exit_usage,

@@ -69,7 +69,7 @@ void check_writable(const std::string& path) {
 void check_other_file(const std::string& target, const std::string& input) {
     std::error_code ignored;
     if (std::filesystem::equivalent(target, input, ignored))
-        throw failure(exit_usage, fmt::format("{}: is a file to be read, a result is not written over it", target));
+        throw failure(exit_usage, fmt::format("{}: is a file to be read, a result does not overwrite it", target));
 }
 
 whole_file::whole_file(std::string path) : path_(std::move(path)) {

@@ -15,7 +15,7 @@ std::string remedy_for(int code) {
     case EACCES:
         return "run with sudo, or for good: sudo groupadd -f -r gpio && sudo usermod -aG gpio $USER, put "
                "packaging/60-okid-gpio.rules into /etc/udev/rules.d, sudo udevadm control --reload, sudo udevadm "
-               "trigger --subsystem-match=gpio, and log in anew";
+               "trigger --subsystem-match=gpio, and log in again";
     case EBUSY: return "end the program that has it (gpioinfo names it), or choose another line";
     case ENOTTY: return "plug the GPIO adapter in or load its driver (gpiodetect lists the chips)";
     case ENODEV: return "choose a line of a chip with interrupts, or [trigger] source = \"level\"";

@@ -143,7 +143,7 @@ bool hammer::find_second_blow() {
         if (i + apart >= begin_ && i < end_ + apart) continue;
         if (struck(i))
             return refuse("double_hit",
-                          fmt::format("a second blow of {:.0f} % {:.1f} ms {}", 100 * (force(i) - base_) / report_.peak,
+                          fmt::format("a second hit of {:.0f} % {:.1f} ms {}", 100 * (force(i) - base_) / report_.peak,
                                       1e3 * std::abs(static_cast<double>(i) - static_cast<double>(top_)) / rate_hz_,
                                       i > top_ ? "later" : "earlier"));
     }
@@ -165,7 +165,7 @@ bool hammer::find_motion() {
         const double was = rms(c, 0, count * 7 / 8), is = rms(c, count, std::min(rows(), 2 * count));
         if (was > most_motion * is)
             return refuse("moving",
-                          fmt::format("{} still moved before the blow, by {:.0f} % of what the blow made (rms): "
+                          fmt::format("{} still moved before the hit, by {:.0f} % of what the hit caused (rms): "
                                       "wait longer, or strike harder",
                                       channels_[c].name, 100 * was / is));
     }
@@ -234,7 +234,7 @@ std::string hammer::awaited() const {
     if (capturing_) return fmt::format("hit {}: recording", heard_);
     const std::string last = report_.number == 0 ? std::string()
                              : report_.good()    ? fmt::format("hit {} {}; ", report_.number, report_.text)
-                                                 : fmt::format("hit {} refused, {}; ", report_.number, report_.text);
+                                                 : fmt::format("hit {} rejected, {}; ", report_.number, report_.text);
     return fmt::format(
         "{}{}, {} of {} left", last,
         armed() ? fmt::format("strike ({} beyond {:.4g}{})", channels_[wanted_.channel].name, wanted_.level, unit_)
@@ -245,14 +245,14 @@ std::string hammer::awaited() const {
 std::string hammer::shortfall() const {
     if (!wanted() || left_ == 0) return "";
     if (heard_ == 0)
-        return fmt::format("no blow was heard: {} stayed between {:.4g} and {:.4g}{}, level is {:.4g}",
+        return fmt::format("no hit was detected: {} stayed between {:.4g} and {:.4g}{}, level is {:.4g}",
                            channels_[wanted_.channel].name, least_, most_, unit_, wanted_.level);
     std::string why;
     for (const auto& [fault, count] : refused_) why += fmt::format("{}{} {}", why.empty() ? ": " : ", ", count, fault);
     const int refused = heard_ - accepted_ - (capturing_ ? 1 : 0);
-    return fmt::format("{}: {} refused{}{}",
-                       accepted_ == 0 ? fmt::format("no blow was accepted ({} wanted)", wanted_.hits)
-                                      : fmt::format("{} of {} blows are there", accepted_, wanted_.hits),
+    return fmt::format("{}: {} rejected{}{}",
+                       accepted_ == 0 ? fmt::format("no hit was accepted ({} wanted)", wanted_.hits)
+                                      : fmt::format("{} of {} hits were accepted", accepted_, wanted_.hits),
                        refused, why, capturing_ ? "; the last one was cut off by the end" : "");
 }
 

@@ -348,7 +348,7 @@ void session::remark_rate() const {
     if (observed_hz == 0) return;
     if (std::abs(observed_hz / config_.rate_hz - 1) <= tolerance + 2.0 / static_cast<double>(now_)) return;
     say("okid: warning: by the time stamps {:.4g} samples came a second, but rate_hz is {:.10g}: every frequency "
-        "scales with it. Mend rate_hz in {}, unless the frames were played at another speed\n",
+        "scales with it. Fix rate_hz in {}, unless the frames were played at another speed\n",
         observed_hz, config_.rate_hz, config_.path);
 }
 
@@ -402,7 +402,7 @@ void session::remark_places(result_context& about) const {
         about.warnings.emplace_back(
             "burst_delay",
             fmt::format("\"{}\" comes in bursts that all end alike: beside channels of other buses its time "
-                        "is known to {:.2g} us (σ) only{}; a counter, or a sensor on the same bus, mends it",
+                        "is known to {:.2g} us (σ) only{}; a counter, or a sensor on the same bus, fixes it",
                         name, 1e6 * counts.place_std_s,
                         config_.identification.mkr
                             ? fmt::format(", by which R may be {:.0f} % wrong (σ): do not trust it", 100 * worst)

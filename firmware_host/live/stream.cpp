@@ -151,8 +151,8 @@ result_context stream::context(remarks said) {
     if (stats.missing > 0 && !agreed)
         out.warnings.emplace_back(
             "missing_samples",
-            fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags start "
-                        "anew after each gap",
+            fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags "
+                        "restart after each gap",
                         stats.missing, stats.samples + stats.missing, stats.gaps, stats.gaps == 1 ? "" : "s"));
     if (identifier_.restarts() > 0)
         out.warnings.emplace_back(

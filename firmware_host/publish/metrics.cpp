@@ -90,7 +90,7 @@ void add_modes(page& to, const live_numbers& now) {
 std::vector<MetricFamily> collect(const live_numbers& now, const publisher_figures& figures) {
     page out;
     out.gauge("okid_stream_seconds", "Stream time of the newest modes", now.t);
-    out.gauge("okid_settled", "1 = the modal table has come to rest", now.settled);
+    out.gauge("okid_settled", "1 = the modal table has settled", now.settled);
     out.gauge("okid_alarm", "1 = a tracked mode is away from its baseline", now.alarm);
     out.counter("okid_alarms_total", "Alarms raised", now.alarms);
     out.counter("okid_changes_total", "Changes of the structure that restarted the identification", now.changes);

@@ -39,7 +39,7 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
     case OKID_ERR_TOO_SHORT:
         return fmt::format(
             "too few samples: {} usable rows, but {} has {} unknowns per output and needs more than {} rows in "
-            "unbroken stretches (10 times as many are advised). Record longer, lower {}, or mend the gaps",
+            "unbroken stretches (10 times as many are advised). Record longer, lower {}, or fix the gaps",
             model.regression_rows, horizon, q, q + config.n_y, option);
     case OKID_ERR_INPUT:
         return fmt::format(
@@ -60,10 +60,10 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
             "independent broad-band forces or lower {}",
             okid_identify_lags(&config), info.input_excitation, option);
     case OKID_ERR_UNSTABLE:
-        return fmt::format(
-            "no stable observer: plain least squares has spectral radius {:.6g}, and no ridge of the grid cures it. "
-            "Try --detrend linear, a smaller --p, or a record without drift",
-            info.radius_plain);
+        return fmt::format("no stable observer: plain least squares has spectral radius {:.6g}, and no ridge of the "
+                           "grid makes it stable. "
+                           "Try --detrend linear, a smaller --p, or a record without drift",
+                           info.radius_plain);
     case OKID_ERR_NO_MODES:
         return fmt::format("no mode that holds (underdamped, below {:g} Hz, EMAC above 0.5) was found. {}",
                            context.fs_hz / 2, advice(config, option));

@@ -192,7 +192,7 @@ std::string mass_text(const mass_matrices& found) {
                                        proportional_text(found), 100 * found.pdc.residual),
                            found.R_pdc, {}, n);
     } else {
-        out += fmt::format("more than {} columns: the matrices stand in the result file (--json)\n", widest);
+        out += fmt::format("more than {} columns: the matrices are in the result file (--json)\n", widest);
         out += fmt::format("R proportional: {}\n", proportional_text(found));
     }
     return out + checks_text(found);

@@ -17,7 +17,7 @@ constexpr std::array<std::pair<const char*, const char*>, 9> words{{
     {"few_runs", "fewer than half of the runs that could see it found it"},
     {"noise_shape", "short-lived, complex or scattering: probably noise"},
     {"split", "beside a stronger one of the same shape: one mode whose frequency changes with amplitude"},
-    {"tone", "a steady line, not a vibration that dies away"},
+    {"tone", "a steady line, not a vibration that decays"},
     {"pickup", "a steady line at a multiple of the mains frequency"},
     {"harmonic", "a multiple of a stronger vibration or of the drive"},
     {"wide_sigma", "its standard deviation is too wide"},

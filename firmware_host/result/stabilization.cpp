@@ -116,7 +116,7 @@ nlohmann::ordered_json stabilization_json(const stabilization& found) {
 }
 
 std::string stabilization_text(const stabilization& found) {
-    std::string out = fmt::format("\nmodes that hold over {} models (orders and horizons), each in {:.0f} % of them or "
+    std::string out = fmt::format("\nstable modes over {} models (orders and horizons), each in {:.0f} % of them or "
                                   "more; spread over the models:\n      f [Hz]    spread     ζ [%]    spread     MPC   "
                                   "found in\n",
                                   found.models.size(), 100 * found.criteria.share);

@@ -183,7 +183,7 @@ std::vector<int> read_dofs(const table_reader& reader, const char* key, Index n)
 
 void check_modes(const table_reader& reader, const structure& body, const toml::node& at, const char* key) {
     if (structure_modes(body).frequency_hz.empty())
-        reader.bad(at, key, "damping with which every mode oscillates and dies away (0 < zeta < 1)");
+        reader.bad(at, key, "damping with which every mode oscillates and decays (0 < zeta < 1)");
 }
 
 void read_changes(const std::string& path, const table_reader& reader, rig& out) {

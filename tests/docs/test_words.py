@@ -48,7 +48,9 @@ ACRONYMS = {  # spelled out where a newcomer meets them first, on the pages they
     "docs/recipes/matrices.md": {"DOF": "degree of freedom"},
     "docs/recipes/live-can.md": {"DBC": "can database"},
 }
+LATER = ("firmware_host/record/", "firmware_host/config/", "firmware_host/commands/identify.cpp")  # not yet gone over
 TEXT = {
+    ".cpp": r'"((?:[^"\\\n]|\\.)*)"',
     ".py": r'"((?:[^"\\\n]|\\.)*)"',
     ".js": r"[\"'`]([^\"'`\n]*)[\"'`]",
     ".html": r">([^<\n]+)<",
@@ -71,7 +73,7 @@ def of_sources() -> Iterator[tuple[str, str]]:
     listed = ["git", "ls-files", "firmware_host", "tools/okid"]
     for name in subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split():
         path = ROOT / name
-        if path.suffix in TEXT and path.exists():
+        if path.suffix in TEXT and path.exists() and not name.startswith(LATER):
             source = re.sub(r'"""(?:.|\n)*?"""|(?m:^\s*(?://|#).*$)', "", path.read_text())
             yield name, "\n".join(re.findall(TEXT[path.suffix], source))
 

@@ -15,7 +15,19 @@ import pytest
 from program import PROGRAM as OKID
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-COMMANDS = ["identify", "run", "record", "replay", "simulate", "convert", "check", "doctor", "bench", "completion"]
+COMMANDS = [
+    "identify",
+    "run",
+    "record",
+    "replay",
+    "simulate",
+    "convert",
+    "init",
+    "check",
+    "doctor",
+    "bench",
+    "completion",
+]
 FIXED = {  # options of okid identify with fixed choices
     "--method": ["auto", "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"],
     "--hankel": ["system", "innovations", "literal"],

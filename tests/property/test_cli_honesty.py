@@ -310,5 +310,5 @@ def test_what_is_read_is_not_written_over(rig: pathlib.Path, tmp_path: pathlib.P
     (tmp_path / "link").symlink_to(log)
     for target in (log, config, tmp_path / "link"):
         done = okid("replay", log, "-c", config, option, target)
-        assert done.returncode == 2 and "a result is not written over it" in done.stderr, done.stderr
+        assert done.returncode == 2 and "a result does not overwrite it" in done.stderr, done.stderr
         assert (log.read_bytes(), config.read_bytes()) == before

@@ -29,7 +29,7 @@ def doctor(rig: Path, sections: str) -> tuple[int, str]:
 
 def test_recording(rig: Path) -> None:
     code, text = doctor(rig, '[record]\ndirectory = "runs/a/b"\nsegment_mb = 1\nmax_mb = 4\n')
-    assert code == 0 and "ok       recording" in text and "give way at 4 MB" in text, text
+    assert code == 0 and "ok       recording" in text and "are deleted at 4 MB" in text, text
     assert not (rig / "runs").exists()
     code, text = doctor(rig, '[record]\ndirectory = "runs"\nsegment_mb = 64\nmax_mb = 1e9\n')
     assert code == 0 and "note     recording" in text and "lower [record] max_mb" in text, text

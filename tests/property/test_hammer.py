@@ -184,10 +184,10 @@ def test_too_few_blows_still_give_what_is_there(tmp_path: Path) -> None:
     assert events[-1]["result"]["samples"] == 826
     done, events = play(tmp_path, record(["double"]), 5)
     assert done.returncode == 3
-    assert "no blow was accepted" in done.stderr and "double_hit" in done.stderr
+    assert "no hit was accepted" in done.stderr and "double_hit" in done.stderr
     done, events = play(tmp_path, record(["good"])[:1000], 5)
     assert done.returncode == 3
-    assert "no blow" in done.stderr and "20" in done.stderr
+    assert "no hit" in done.stderr and "20" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ def test_program_equals_python(tmp_path: Path) -> None:
     options = ["identify", path, "--inputs", "u1", "--outputs", "y1,y2,y3", "--p", 20, "--stabilization"]
     done = run(*options, "--json", tmp_path / "r.json")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count(" %\n") == 3 and "modes that hold over 33 models" in done.stdout
+    assert done.stdout.count(" %\n") == 3 and "stable modes over 33 models" in done.stdout
     shown = json.loads((tmp_path / "r.json").read_text())
     own = okid.stabilization(u, y, fs=s.fs, p=20).to_dict()
     theirs = shown["stabilization"]

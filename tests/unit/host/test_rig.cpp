@@ -276,7 +276,7 @@ void bad_files() {
     refused(head + "M = [[1.0, 0.0], [0.0]]\n", "row of 2");
     refused(head + "masses = []\n", "masses");
     refused(head + "masses = 3\n", "masses");
-    refused(head + "masses = [1.0]\nsprings = [1.0]\nR = [[-0.1]]\n" + rest, "dies away");
+    refused(head + "masses = [1.0]\nsprings = [1.0]\nR = [[-0.1]]\n" + rest, "decays");
     refused(head + "masses = [1.0]\nsprings = [1.0]\nR = [[5.0]]\n" + rest, "oscillates");
     refused(head + body + rest + "[[change]]\nat_s = 0.5\n", "what changes");
     refused(head + body + rest + "[[change]]\nsprings = [1.0, 1.0]\n", "at_s");
