@@ -5,6 +5,8 @@
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "files/whole_file.hpp"
+#include "frequency/identify_responses.hpp"
+#include "frequency/response_file.hpp"
 #include "progress.hpp"
 #include "record/csv.hpp"
 #include "record/csv_header.hpp"
@@ -26,7 +28,8 @@ struct identify_arguments {
     record_request wanted;
     std::vector<std::string> records;
     std::string inputs, outputs, range, json, model;
-    bool quiet = false, all_modes = false;
+    std::string exponential; ///< of frequency responses
+    bool quiet = false, all_modes = false, frf = false;
 };
 
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
@@ -109,19 +112,31 @@ record_set read_records(const identify_arguments& given, record_options& options
     return set;
 }
 
-void identify(identify_arguments given) {
+record_result identify_files_of_responses(const identify_arguments& given) {
+    response_request asked{given.wanted, given.exponential, given.all_modes};
+    if (!given.range.empty()) usage("--range is an option of records, found with --frf");
+    if (!given.inputs.empty()) asked.wanted.inputs = split_names("--inputs", given.inputs);
+    if (!given.outputs.empty()) asked.wanted.outputs = split_names("--outputs", given.outputs);
+    check_targets(given);
+    return identify_responses(read_set_ups(given.records), asked);
+}
+
+record_result identify_files_of_samples(identify_arguments given) {
+    if (!given.exponential.empty()) usage("--exponential belongs to --frf: it is the window in frequency responses");
     choose_columns(given);
     record_options options = check_request(given.wanted);
     check_targets(given);
     options.all_modes = given.all_modes;
-    record_result result;
-    {
-        progress display(!given.quiet);
-        options.stage = [&](const char* stage) { display.stage(stage); };
-        result = identify_records(read_records(given, options, display), options);
-        finish_fits(result);
-        result.context.all_modes = given.all_modes;
-    }
+    progress display(!given.quiet);
+    options.stage = [&](const char* stage) { display.stage(stage); };
+    record_result result = identify_records(read_records(given, options, display), options);
+    finish_fits(result);
+    result.context.all_modes = given.all_modes;
+    return result;
+}
+
+void identify(const identify_arguments& given) {
+    const record_result result = given.frf ? identify_files_of_responses(given) : identify_files_of_samples(given);
     const okid_identified_t& model = result.model.view();
     if (!given.model.empty()) write_whole_file(given.model, mat_file(model));
     if (!given.json.empty()) write_whole_file(given.json, result_text(result_json(model, result.context)));
@@ -217,6 +232,15 @@ void add_identify(CLI::App& app) {
         ->add_option("--sigma-blocks", given->wanted.sigma_blocks,
                      "blocks of the record left out in turn for the standard deviations (default 20), 0 = none")
         ->type_name("N");
+    command->add_flag(
+        "--frf", given->frf,
+        "the files hold frequency responses: universal files (data sets 58, 58b) or CSV (frequency_hz, then "
+        "OUT/IN:re and OUT/IN:im). Several files are set-ups of one structure. Takes --inputs, --outputs "
+        "(default: all), --band, --modes, --sensing, --input-dofs, --output-dofs");
+    command
+        ->add_option("--exponential", given->exponential,
+                     "time constant of the exponential window in the responses (--frf): its damping is taken out")
+        ->type_name("S");
     command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")
         ->type_name("A:B");
     command->add_option("--json", given->json, "write okid.result/1 to this file, - is stdout")->type_name("FILE.json");
@@ -226,6 +250,7 @@ void add_identify(CLI::App& app) {
     command->footer(
         "Examples:\n  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --json result.json\n"
         "  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --input-dofs 1 --output-dofs 1,2,3\n"
+        "  okid identify responses.uff --frf --json result.json\n"
         "A CSV has a line of column names, numbers below, and \"# fs_hz: 1024\" above (or use --fs).");
     command->callback([given] { identify(*given); });
 }

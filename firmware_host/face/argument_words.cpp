@@ -38,6 +38,7 @@ constexpr std::array arguments{argument{"--inputs", "inputs", ""},
                                argument{"--modes", "modes", ""},
                                argument{"--threads", "threads", " N "},
                                argument{"--hit-dofs", "hit_dofs", ""},
+                               argument{"--exponential", "exponential", " S "},
                                argument{"--json", "to_dict()", ""}};
 
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-'; }

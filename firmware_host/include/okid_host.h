@@ -52,6 +52,7 @@ OKID_HOST_API int32_t okid_host_error_status(void);
 #include <okid_host/capture.h>
 #include <okid_host/files.h>
 #include <okid_host/record.h>
+#include <okid_host/responses.h>
 #include <okid_host/stream.h>
 
 #endif

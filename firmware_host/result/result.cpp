@@ -138,6 +138,12 @@ std::string fit_text(const result_context& context) {
     return out;
 }
 
+/// Of many runs, without a Hankel matrix of its own.
+bool is_agreed(const result_context& context) { return context.method == "auto" || context.method == "plscf"; }
+
+/// "n/a" in the width of an indicator.
+std::string indicator(double value) { return std::isfinite(value) ? fmt::format("{:.4f}", value) : "-"; }
+
 constexpr int most_shape_columns = 6; // more would not stand side by side on a screen
 
 std::string mode_rows(const okid_identified_t& model, const result_context& context) {
@@ -164,10 +170,10 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
         if (hidden) continue;
         const double std_f = context.sigma ? context.sigma->frequency_hz[at_mode] : NAN,
                      std_zeta = context.sigma ? context.sigma->damping_ratio[at_mode] : NAN;
-        out += fmt::format("{:>4}{}{:>12.5f} {:>9} {:>9.4f} {:>9} {:>7.4f} {:>7.4f} {:>7.4f}", k + 1,
+        out += fmt::format("{:>4}{}{:>12.5f} {:>9} {:>9.4f} {:>9} {:>7} {:>7} {:>7}", k + 1,
                            verdict.confident ? ' ' : '?', model.frequency_hz[k], plus_minus(std_f),
-                           100 * model.damping_ratio[k], plus_minus(100 * std_zeta), model.mpc[k], model.emac[k],
-                           model.cmi[k]);
+                           100 * model.damping_ratio[k], plus_minus(100 * std_zeta), indicator(model.mpc[k]),
+                           indicator(model.emac[k]), indicator(model.cmi[k]));
         if (agreed) out += fmt::format(" {:>7.0f} %", 100 * verdict.found_in);
         for (int i = 0; shapes && i < model.n_y; ++i)
             out += fmt::format("  {:>{}.3f}", model.shape_re[i + static_cast<std::ptrdiff_t>(k) * model.n_y],
@@ -225,7 +231,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["gaps"] = context.gaps;
     out["inputs"] = context.inputs;
     out["outputs"] = context.outputs;
-    const bool agreed = context.method == "auto"; // of many horizons
+    const bool agreed = is_agreed(context); // of many horizons
     out["p"] = agreed ? ordered_json(nullptr) : ordered_json(model.p);
     out["rows"] = agreed ? ordered_json(nullptr) : ordered_json(model.rows);
     out["hankel"] = context.hankel ? ordered_json(*context.hankel) : ordered_json(nullptr);
@@ -269,17 +275,23 @@ std::string result_text(const nlohmann::ordered_json& result) {
 }
 
 std::string result_table(const okid_identified_t& model, const result_context& context) {
+    const bool responses = context.method == "plscf";
+    const std::string what = responses
+                                 ? fmt::format("responses at {}", counted(context.samples, "line"))
+                                 : fmt::format("{} at {:g} Hz ({:.4g} s)", counted(context.samples, "sample"),
+                                               context.fs_hz, static_cast<double>(context.samples) / context.fs_hz);
     std::string out =
-        fmt::format("{}: {} to {}, {} at {:g} Hz ({:.4g} s), {}", context.method, counted(model.n_u, "input"),
-                    counted(model.n_y, "output"), counted(context.samples, "sample"), context.fs_hz,
-                    static_cast<double>(context.samples) / context.fs_hz, counted(context.records, "record"));
+        fmt::format("{}: {} to {}, {}, {}", context.method, counted(model.n_u, "input"), counted(model.n_y, "output"),
+                    what, counted(context.records, responses ? "set-up" : "record"));
     if (context.gaps) out += ", " + counted(context.gaps, "gap");
-    const std::string horizon = context.method == "auto" ? "agreement of several methods, horizons and rates"
-                                : model.observer         ? fmt::format("p {}, {} block rows", model.p, model.rows)
-                                                         : fmt::format("{} block rows", model.rows);
+    const std::string horizon = responses            ? "agreement of several degrees, weights and normalisations"
+                                : is_agreed(context) ? "agreement of several methods, horizons and rates"
+                                : model.observer     ? fmt::format("p {}, {} block rows", model.p, model.rows)
+                                                     : fmt::format("{} block rows", model.rows);
     if (context.band_hz)
-        out += fmt::format("\nmodes sought between {:.3g} and {:.4g} Hz, at rates down to {:.4g} Hz",
-                           context.band_hz->first, context.band_hz->second, context.rates_hz.back());
+        out +=
+            fmt::format("\nmodes sought between {:.3g} and {:.4g} Hz", context.band_hz->first, context.band_hz->second);
+    if (!context.rates_hz.empty()) out += fmt::format(", at rates down to {:.4g} Hz", context.rates_hz.back());
     out += fmt::format("\n{}, order {}, detrend {}\n\n", horizon, model.n_z, context.detrend);
     out += mode_rows(model, context) + fit_text(context);
     if (context.stable) out += stabilization_text(*context.stable);

@@ -18,12 +18,14 @@ from okid.demo import demo, demo_frame, demo_record
 from okid.identification.change_test import ChangeTest, ChangeVerdict, ModeShift
 from okid.identification.identifier import Identified, Identifier, usable_p
 from okid.identify import identify, stabilization
+from okid.identify_frf import identify_frf
 from okid.result.modal_table import ModalTable
 from okid.result.model import Model
 from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping
 from okid.result.result import Result
 from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization
 from okid.session import Session
+from okid.setups import merge_setups
 from okid.structure import Structure
 
 __all__ = [
@@ -57,7 +59,9 @@ __all__ = [
     "demo_record",
     "frf",
     "identify",
+    "identify_frf",
     "library_version",
+    "merge_setups",
     "modal",
     "read_csv",
     "stabilization",
@@ -66,7 +70,7 @@ __all__ = [
 
 
 # Of okid.formats, in both directions: read_uff, write_uff ..
-_FORMATS = ("csv", "hdf5", "mat", "mdf4", "parquet", "record", "uff")
+_FORMATS = ("csv", "frf", "hdf5", "mat", "mdf4", "parquet", "record", "uff")
 
 
 def __getattr__(name: str) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frequency responses: H1 with multiple coherence, output spectra of ambient records, and both from a model."""
+"""Frequency responses: H1, H2 and Hv with multiple coherence, output spectra of ambient records, and of a model."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ class Frf(NamedTuple):
     """Measured response functions.
 
     frequency_hz (F,), response (F, n_y, n_u), coherence (F, n_y): multiple coherence of each output with all inputs,
-    NaN where there are not more averages than inputs. averages: segments used. resolution_hz: line spacing.
+    NaN where there are not more averages than inputs. averages: segments used, 0 = not known. resolution_hz: line
+    spacing. inputs, outputs: names, () = u1 .., y1 ..; set_ups: measurements of one structure that it is joined from.
     """
 
     frequency_hz: Real
@@ -29,6 +30,38 @@ class Frf(NamedTuple):
     coherence: Real
     averages: int
     resolution_hz: float
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    set_ups: int = 1
+
+    @classmethod
+    def of(
+        cls,
+        frequency_hz: ArrayLike,
+        response: ArrayLike,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        set_ups: int = 1,
+    ) -> Frf:
+        """Of frequencies (F,) and responses (F, n_y, n_u), (F, n_y) or (F,). InputError when they do not fit."""
+        f, h = np.asarray(frequency_hz, dtype=np.float64), np.asarray(response, dtype=np.complex128)
+        h = h.reshape(*h.shape, *(1,) * (3 - h.ndim)) if h.ndim < 3 else h
+        if f.ndim != 1 or h.ndim != 3 or len(f) != len(h) or len(f) < 2:
+            raise InputError(
+                f"frequency_hz has shape {f.shape} and response {h.shape}, expected (lines,) and "
+                "(lines, outputs, inputs), at least two lines"
+            )
+        for names, count, what in ((inputs, h.shape[2], "inputs"), (outputs, h.shape[1], "outputs")):
+            if len(names) not in (0, count):
+                raise InputError(f"{len(names)} names for {count} {what}, expected one for each")
+        nothing = np.full(h.shape[:2], np.nan)
+        return cls(f, h, nothing, 0, float(f[1] - f[0]), tuple(inputs), tuple(outputs), set_ups)
+
+    def names(self) -> tuple[list[str], list[str]]:
+        """Of the inputs and of the outputs."""
+        n_y, n_u = self.response.shape[1:]
+        return (list(self.inputs) or [f"u{k + 1}" for k in range(n_u)],
+                list(self.outputs) or [f"y{k + 1}" for k in range(n_y)])  # fmt: skip
 
 
 class Spectra(NamedTuple):
@@ -113,23 +146,52 @@ def solve_h1(guu: Complex, gyu: Complex, gyy: Real, count: int) -> tuple[Complex
     return response, np.clip(coherence, 0.0, 1.0)
 
 
+def _by_input(guu: Complex, gyu: Complex, gyy: Real) -> Complex:
+    """H2 of one input: G_yy over G_uy, output by output."""
+    if guu.shape[-1] != 1:
+        raise InputError(f"estimator is 'h2' with {guu.shape[-1]} inputs, expected one: take h1 or hv")
+    out = np.zeros(gyu.shape, np.complex128)
+    np.divide(gyy[:, :, None], gyu.conj(), out=out, where=gyu != 0.0)
+    return out
+
+
+def _by_total_least_squares(guu: Complex, gyu: Complex, gyy: Real) -> Complex:
+    """Hv: of [u; y_o], each at unit power, the direction of least power; of one input the mean of H1 and H2."""
+    (lines, n_y), n_u = gyy.shape, guu.shape[-1]
+    out = np.zeros(gyu.shape, np.complex128)
+    power_u = np.einsum("fii->fi", guu).real
+    for o in range(n_y):
+        whole = np.zeros((lines, n_u + 1, n_u + 1), np.complex128)
+        whole[:, :n_u, :n_u], whole[:, n_u, n_u] = guu, gyy[:, o]
+        whole[:, n_u, :n_u], whole[:, :n_u, n_u] = gyu[:, o], gyu[:, o].conj()
+        unit = np.sqrt(np.maximum(np.column_stack([power_u, gyy[:, o]]), 1e-300))
+        v = np.linalg.eigh(whole / (unit[:, :, None] * unit[:, None, :]))[1][:, :, 0].conj() / unit
+        np.divide(-v[:, :n_u], v[:, n_u:], out=out[:, o], where=v[:, n_u:] != 0.0)
+    return out
+
+
 def h1(
     u: ArrayLike | Sequence[ArrayLike],
     y: ArrayLike | Sequence[ArrayLike],
     fs: float,
     nperseg: int | None = None,
     window: str | None = None,
+    estimator: str = "h1",
 ) -> Frf:
     """H1 estimate by Welch's method for all inputs together: G_yu G_uu^-1, averaged over segments and records.
 
     u (N, n_u) or 1-D, y (N, n_y) or 1-D, or lists of such arrays (several records); NaN = missing, segments avoid it.
     Default: Hann windows with half overlap, so long that about ten averages remain, shorter where gaps leave no longer
     stretch; the whole record (its unbroken part with the blow), no window, for hammer blows.
+    estimator: "h1" errs low where the forces are noisy; "h2" (one input) errs high where the responses are; "hv" takes
+    both for equally noisy (total least squares; of one input the geometric mean of H1 and H2).
     Raises InputError when no complete segment is left, or none of 64 samples by default.
-    Source: Bendat and Piersol, multiple-input H1.
+    Source: Bendat and Piersol, multiple-input H1; Rocklin, Crowley, Vold (1985), Hv.
     """
     from okid.data.records import paired  # records imports nothing of this module
 
+    if estimator not in ("h1", "h2", "hv"):
+        raise InputError(f"estimator is {estimator!r}, expected h1, h2 or hv")
     fs = positive("fs", fs, "a sample rate in Hz")
     inputs, outputs = paired(u, y)
     n_u = inputs[0].shape[1]
@@ -157,7 +219,10 @@ def h1(
     if count == 0:
         raise InputError(f"no {nperseg} consecutive complete samples for a response function: shorten nperseg")
     spacing = fs / nperseg
-    return Frf(np.arange(lines, dtype=np.float64) * spacing, *solve_h1(guu, gyu, gyy, count), count, spacing)
+    response, coherence = solve_h1(guu, gyu, gyy, count)
+    if estimator != "h1":
+        response = (_by_input if estimator == "h2" else _by_total_least_squares)(guu, gyu, gyy)
+    return Frf(np.arange(lines, dtype=np.float64) * spacing, response, coherence, count, spacing)
 
 
 def synthesise(A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike, dt: float, frequency_hz: ArrayLike) -> Complex:

@@ -53,6 +53,62 @@ def mpc(shape: ArrayLike) -> float:
     return ((sxx - syy) ** 2 + 4.0 * sxy**2) / total**2 if total > 0.0 else 0.0
 
 
+def mean_phase(shape: ArrayLike) -> float:
+    """Angle in rad, -pi/2 .. pi/2, of the line through the origin that lies nearest to the entries of a shape."""
+    x = np.asarray(shape, dtype=np.complex128)
+    x = x[np.isfinite(x)]
+    return float(0.5 * np.angle(np.sum(x**2))) if np.any(x != 0.0) else 0.0
+
+
+def mpd(shape: ArrayLike) -> float:
+    """Mean phase deviation in degrees, 0 .. 90: how far the entries of one complex shape lie off their mean line,
+    weighted by their size. Source: Phillips, Allemang (1993); Reynders, Houbrechts, De Roeck (2012).
+
+    >>> from okid import modal
+    >>> round(modal.mpd([1.0, -0.5, 0.25]), 6), round(modal.mpd([1.0, 1.0j]), 1)
+    (0.0, 45.0)
+    """
+    x = np.asarray(shape, dtype=np.complex128)
+    x = x[np.isfinite(x)]
+    size = np.abs(x)
+    if float(np.sum(size)) == 0.0:
+        return 0.0
+    turned = x * np.exp(-1j * mean_phase(x))
+    angle = np.arctan2(np.abs(turned.imag), np.abs(turned.real))
+    return float(np.degrees(np.sum(size * angle) / np.sum(size)))
+
+
+def mcf(shape: ArrayLike) -> float:
+    """Modal complexity factor 0 .. 1 of one complex shape, 1 - mpc: 0 = a real mode. Source: Imregun, Ewins (1995)."""
+    return 1.0 - mpc(shape)
+
+
+def real_shape(shape: ArrayLike) -> Real:
+    """The shape turned to its mean phase, its real part, largest entry 1 in size: the nearest real mode.
+
+    Entries across the mean phase count little, as they do in mpc.
+    """
+    x = np.asarray(shape, dtype=np.complex128)
+    turned = np.asarray((x * np.exp(-1j * mean_phase(x))).real, dtype=np.float64)
+    largest = turned[np.argmax(np.nan_to_num(np.abs(turned)))]
+    return turned / largest if largest != 0.0 else turned
+
+
+def comac(a: ArrayLike, b: ArrayLike) -> Real:
+    """Coordinate MAC (n_y,) of paired shapes a and b (modes, n_y): the sensors that two tests differ at.
+
+    (sum over modes of |a_k conj(b_k)|)^2 / (sum |a_k|^2 sum |b_k|^2), 0 .. 1; shapes are brought to one scale first.
+    Source: Lieven, Ewins (1988). Raises InputError when the shapes do not pair.
+    """
+    first, second = (np.atleast_2d(np.asarray(x, dtype=np.complex128)) for x in (a, b))
+    if first.shape != second.shape:
+        raise InputError(f"shapes of {first.shape} and {second.shape} do not pair, expected (modes, n_y) twice")
+    first, second = (x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300) for x in (first, second))
+    cross = np.sum(np.abs(first * second.conj()), axis=0) ** 2
+    power = np.sum(np.abs(first) ** 2, axis=0) * np.sum(np.abs(second) ** 2, axis=0)
+    return np.asarray(np.divide(cross, power, out=np.zeros_like(cross), where=power > 0.0), dtype=np.float64)
+
+
 def normalised(shape: ArrayLike) -> Complex:
     """The shape scaled so that its largest entry is 1 (a zero shape stays)."""
     x = np.asarray(shape, dtype=np.complex128)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from okid.formats.by_name import read_record, write_record, write_result
     from okid.formats.can_log import convert_log, read_log, write_log
     from okid.formats.csv_file import write_csv
+    from okid.formats.frf_file import read_frf, write_frf
     from okid.formats.hdf5 import read_hdf5, write_hdf5
     from okid.formats.mat import read_mat, write_mat
     from okid.formats.mdf4 import read_mdf4, write_mdf4
@@ -29,6 +30,7 @@ __all__ = [
     "UffMode",
     "convert_log",
     "read_csv",
+    "read_frf",
     "read_geometry",
     "read_hdf5",
     "read_log",
@@ -38,6 +40,7 @@ __all__ = [
     "read_record",
     "read_uff",
     "write_csv",
+    "write_frf",
     "write_hdf5",
     "write_log",
     "write_mat",
@@ -52,6 +55,7 @@ _NAMES = {
     "okid.formats.by_name": "read_record, write_record, write_result",
     "okid.formats.csv_file": "write_csv",
     "okid.formats.can_log": "convert_log, read_log, write_log",
+    "okid.formats.frf_file": "read_frf, write_frf",
     "okid.formats.hdf5": "read_hdf5, write_hdf5",
     "okid.formats.mat": "read_mat, write_mat",
     "okid.formats.mdf4": "read_mdf4, write_mdf4",

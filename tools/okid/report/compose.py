@@ -24,7 +24,14 @@ from okid.report.modes import shape_sections, table_section
 from okid.report.other_kinds import check_kind
 from okid.report.page import count_of
 from okid.report.provenance import provenance_section, source_of
-from okid.report.responses import frf_section, markov_section, singular_section, spectra_section, stabilization_section
+from okid.report.responses import (
+    check_section,
+    frf_section,
+    markov_section,
+    singular_section,
+    spectra_section,
+    stabilization_section,
+)
 from okid.report.summary import summary_section
 from okid.report.targets import check_place, check_target, write_whole
 from okid.report.tracking import tracking_section
@@ -46,6 +53,7 @@ def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]
     if m.result.inputs:
         responses, pairs = frf_section(m)
         yield responses
+        yield check_section(m)
         yield markov_section(m, pairs)
     else:
         yield spectra_section(m)

@@ -44,7 +44,8 @@ class Measured:
 
     missing (channels,): samples of the record that are missing, inputs first; samples: rows of the record; part: which
     of them everything else is made of, "" = all; record: the whole record, its channels as the model has them;
-    factor (n_y,): simulation over record, NaN = not comparable; converted: what was said of units that were made SI.
+    factor (n_y,): simulation over record, NaN = not comparable; converted: what was said of units that were made SI;
+    simulated: the responses of the simulated outputs, estimated as frf is.
     """
 
     frf: Frf | None
@@ -62,6 +63,7 @@ class Measured:
     record: Record | None = None
     factor: Real | None = None
     converted: list[str] = field(default_factory=list)
+    simulated: Frf | None = None
 
 
 def open_record(path: str | Path) -> Record:
@@ -169,6 +171,22 @@ def _answering(result: Loaded, u: Real, y: Real) -> tuple[Frf | None, Spectra | 
         return None, None, str(fault)
 
 
+def _simulated_frf(result: Loaded, data: Real, answered: list[Answer], frf: Frf | None) -> Frf | None:
+    """H1 of the model's simulation, with the segments and the window of the record's: leakage is then in both."""
+    if frf is None or any(one.simulated is None for one in answered):
+        return None
+    n_u = len(result.inputs)
+    made = np.full(data[:, n_u:].shape, np.nan)
+    for one in answered:
+        made[one.first : one.first + len(one.y)] = one.simulated
+    made[~np.isfinite(data[:, n_u:])] = np.nan
+    try:
+        own = h1(data[:, :n_u], made, result.fs)
+    except InputError:
+        return None
+    return own if own.response.shape == frf.response.shape and np.all(np.isfinite(own.response)) else None
+
+
 def measured_from(result: Loaded, record: Record, source: str) -> Measured:
     """The same from a record that is already read."""
     own = _channels(result, record, source)
@@ -189,5 +207,5 @@ def measured_from(result: Loaded, record: Record, source: str) -> Measured:
         excerpt = excerpt._replace(time_s=excerpt.time_s + used.start / result.fs)
     return Measured(
         responses, reason, poles, fit_of(answered, result.outputs), source, own_spectra, covariance, excerpt, white,
-        missing, rows, part, own, agreed.factor, agreed.said,
+        missing, rows, part, own, agreed.factor, agreed.said, _simulated_frf(result, data, answered, responses),
     )  # fmt: skip

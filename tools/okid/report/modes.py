@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from okid import modal
 from okid.data.geometry import AXES
 from okid.formats.uff import mode_sets
 from okid.formats.uff_model import lines_text, nodes_text, units_text
@@ -170,10 +171,18 @@ def _complexity(m: Material) -> page.Section:
     for place, k in enumerate(shown, 1):
         axes = drawing.add_subplot(bands, columns, place, projection="polar")
         figures.draw_compass(axes, m.result.shapes[k], f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz")
-    words = "Every entry of a shape in the complex plane: proportionally damped structures lie on one line."
-    return page.section(
-        "Complexity", m.pictures.inline(drawing, "entries of the shapes in the complex plane"), page.note(words)
+    words = (
+        "Every entry of a shape in the complex plane: proportionally damped structures lie on one line. MPD: mean "
+        "deviation from that line; MCF = 1 − MPC; both 0 for a real mode."
     )
+    rows = [
+        [str(k + 1), f"{m.result.frequency_hz[k]:.2f}", f"{modal.mpd(m.result.shapes[k]):.1f}",
+         f"{modal.mcf(m.result.shapes[k]):.4f}"]
+        for k in m.result.confident
+    ]  # fmt: skip
+    table = page.table(["mode", "f [Hz]", "MPD [°]", "MCF"], rows) if rows else ""
+    picture = m.pictures.inline(drawing, "entries of the shapes in the complex plane")
+    return page.section("Complexity", picture, table, page.note(words))
 
 
 def _automac(m: Material) -> page.Section:

@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from okid._errors import Error
 from okid.frf import cmif, synthesise, synthesise_spectra
+from okid.identify_frf import identify_frf
+from okid.modal import mac
 from okid.report import drawings, page
 from okid.report.material import Material
 from okid.result import figures
@@ -24,7 +27,7 @@ LINES = 1200  # of a synthesised response
 def singular_section(m: Material) -> page.Section:
     """Singular values with the order; why there are none of method "auto"."""
     if len(m.result.singular_values) == 0:
-        why = "Method auto compares many models: there is no one Hankel matrix. Its modes are those they agree on."
+        why = "This method compares many models: there is no one Hankel matrix. Its modes are those they agree on."
         return page.section("Singular values", page.absent(why))
     drawing = figures.figure(9.6, 3.0)
     figures.draw_singular_values(drawing.add_subplot(), m.result.singular_values, int(m.result.raw["order"]))
@@ -171,6 +174,47 @@ def frf_section(m: Material) -> tuple[page.Section, list[tuple[int, int]]]:
     picture = m.pictures.inline(drawing, text)
     words = page.note(_frf_words(m, len(pairs), with_coherence))
     return page.section(title, picture, words, name="Responses"), pairs
+
+
+def _around(m: Material, k: int, line: Real) -> NDArray[np.bool_]:
+    """The lines around the resonance of a mode: two half-power widths to either side, at least three lines."""
+    f, zeta = float(m.result.frequency_hz[k]), float(m.result.raw["modes"][k]["damping_ratio"])
+    return np.abs(line - f) <= max(4.0 * zeta * f, 3.0 * float(line[1] - line[0]))
+
+
+def check_section(m: Material) -> page.Section | None:
+    """Each confident mode against the measured responses: how much of them around it the model explains, and where the
+    responses themselves have it. None without measured responses."""
+    if m.measured is None or m.measured.frf is None or m.measured.simulated is None or not m.result.confident:
+        return None
+    data, made = m.measured.frf, m.measured.simulated
+    try:
+        own = identify_frf(data, band=(0.0, min(m.result.shown_hz, 0.98 * m.result.fs / 2.0))).confident_modes
+    except Error:
+        own = []
+    scale = np.maximum(np.linalg.norm(data.response, axis=0), 1e-300)
+    rows = []
+    for k in m.result.confident:
+        near = _around(m, k, data.frequency_hz)
+        whole, left = data.response[near] / scale, (data.response[near] - made.response[near]) / scale
+        size = float(np.linalg.norm(whole))
+        share = 100.0 * (1.0 - float(np.linalg.norm(left)) / size) if size > 0.0 else 0.0
+        f, zeta = float(m.result.frequency_hz[k]), float(m.result.raw["modes"][k]["damping_ratio"])
+        close = [one for one in own if abs(one.frequency_hz / f - 1.0) < max(0.02, 2.0 * zeta)]
+        best = max(close, key=lambda one: mac(one.shape, m.result.shapes[k]), default=None)
+        told = ["–"] * 3
+        if best is not None and len(best.shape) == len(m.result.outputs):
+            told = [f"{best.frequency_hz:.4f}", f"{100.0 * best.damping_ratio:.3f}",
+                    f"{mac(best.shape, m.result.shapes[k]):.3f}"]  # fmt: skip
+        rows.append([str(k + 1), f"{f:.4f}", f"{100.0 * zeta:.3f}", f"{share:.1f} %", *told])
+    head = ["mode", "f [Hz]", "ζ [%]", "H1 explained", "f of H1 [Hz]", "ζ of H1 [%]", "MAC"]
+    words = (
+        "H1 explained: 100 (1 − ‖H − Ĥ‖/‖H‖) over two half-power widths around the mode, Ĥ estimated from the "
+        "simulated outputs with the same segments and window, so that leakage is in both. Beside it what the measured "
+        "responses give by themselves (pLSCF): their ζ holds the widening by the window where a resonance is only a "
+        f"few lines of {data.resolution_hz:.3g} Hz wide."
+    )
+    return page.section("Check in the frequency domain", page.table(head, rows), page.note(words), name="Check")
 
 
 def _strongest(power: Complex) -> list[int]:

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// Poles of measured frequency responses over many orders: poly-reference least squares (pLSCF).
+#pragma once
+#include "consensus/consensus.hpp"
+#include "response_set.hpp"
+
+namespace okid_host {
+
+/// Right matrix fractions of several degrees, with three weights of the lines and two normalisations each; the poles of
+/// each of these runs are linked over the degrees.
+std::vector<consensus_run> fit_matrix_fractions(const response_set& set);
+
+/// Modal phase collinearity: 1 where all entries lie on one line through the origin.
+double shape_mpc(const std::vector<std::complex<double>>& shape);
+
+} // namespace okid_host

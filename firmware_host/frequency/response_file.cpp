@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  reads frequency responses
+// METHOD   universal file: fixed columns of the 11 header lines of each data set 58 whose function is a frequency response;
+//          channels are named by node and direction ("12z", "-3x"; node 0: by the place in the file)
+// REFERENCE University of Cincinnati, universal file formats 58 and 58b
+#include "response_file.hpp"
+
+#include "error.hpp"
+#include "files/input_file.hpp"
+#include "files/nearest_name.hpp"
+#include "record/csv.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstring>
+#include <fmt/format.h>
+#include <string_view>
+
+namespace okid_host {
+namespace {
+
+using complex = std::complex<double>;
+constexpr std::size_t largest_file = std::size_t{1} << 30;
+constexpr int response_function = 4; // frequency response
+constexpr std::size_t header_lines = 11;
+
+/// One response of a file.
+struct response {
+    std::string output, input;
+    std::vector<double> frequency_hz;
+    std::vector<complex> values;
+};
+
+response_set set_of(const std::string& path, const std::vector<response>& all) {
+    response_set out;
+    out.frequency_hz = all.front().frequency_hz;
+    const auto place = [](std::vector<std::string>& names, const std::string& name) {
+        const auto at = std::find(names.begin(), names.end(), name) - names.begin();
+        if (at == static_cast<std::ptrdiff_t>(names.size())) names.push_back(name);
+        return at;
+    };
+    for (const response& one : all) {
+        (void)place(out.outputs, one.output);
+        (void)place(out.inputs, one.input);
+        if (one.frequency_hz.size() != out.frequency_hz.size() ||
+            std::abs(one.frequency_hz.back() - out.frequency_hz.back()) > 1e-5 * out.frequency_hz.back())
+            throw failure(
+                exit_usage,
+                fmt::format("{}: {} over {} has {} lines up to {:g} Hz, expected {} up to {:g} Hz as the first "
+                            "response",
+                            path, one.output, one.input, one.frequency_hz.size(), one.frequency_hz.back(),
+                            out.frequency_hz.size(), out.frequency_hz.back()));
+    }
+    out.H.setConstant(static_cast<Eigen::Index>(out.frequency_hz.size()), out.n_y() * out.n_u(), complex(NAN, NAN));
+    for (const response& one : all) {
+        const Eigen::Index column = place(out.outputs, one.output) + out.n_y() * place(out.inputs, one.input);
+        if (!out.H.col(column).array().isNaN().all())
+            throw failure(exit_usage, fmt::format("{}: {} over {} stands twice, expected each response once", path,
+                                                  one.output, one.input));
+        for (std::size_t l = 0; l < one.values.size(); ++l) out.H(static_cast<Eigen::Index>(l), column) = one.values[l];
+    }
+    for (std::size_t l = 1; l < out.frequency_hz.size(); ++l)
+        if (!(out.frequency_hz[l] > out.frequency_hz[l - 1]))
+            throw failure(exit_usage, fmt::format("{}: line {}: {:g} Hz behind {:g} Hz, expected ascending frequencies",
+                                                  path, l + 1, out.frequency_hz[l], out.frequency_hz[l - 1]));
+    return out;
+}
+
+/// The text of a universal file, line by line.
+class lines_of {
+  public:
+    lines_of(std::string path, std::string text) : path_(std::move(path)), text_(std::move(text)) {}
+
+    bool next(std::string_view& line) {
+        if (at_ >= text_.size()) return false;
+        const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+        line = std::string_view(text_).substr(at_, end - at_);
+        if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+        at_ = end + 1;
+        ++number_;
+        return true;
+    }
+    std::string_view bytes(std::size_t count) {
+        if (at_ + count > text_.size())
+            fail(fmt::format("{} bytes of samples are missing: cut off", at_ + count - text_.size()));
+        const std::string_view out = std::string_view(text_).substr(at_, count);
+        at_ += count;
+        return out;
+    }
+    [[noreturn]] void fail(const std::string& what) const {
+        throw failure(exit_usage, fmt::format("{}: line {}: {}", path_, number_, what));
+    }
+
+  private:
+    std::string path_, text_;
+    std::size_t at_ = 0, number_ = 0;
+};
+
+bool is_mark(std::string_view line) {
+    return line.substr(0, 6) == "    -1" && line.find_first_not_of(' ', 6) == line.npos;
+}
+
+std::string_view trimmed(std::string_view text) {
+    const std::size_t first = text.find_first_not_of(' ');
+    return first == text.npos ? std::string_view() : text.substr(first, text.find_last_not_of(' ') - first + 1);
+}
+
+/// The field from a column on; an empty one is 0.
+double number_at(const lines_of& from, std::string_view line, std::size_t first, std::size_t width) {
+    std::string text(trimmed(line.substr(std::min(first, line.size()), width)));
+    if (text.empty()) return 0;
+    std::replace_if(text.begin(), text.end(), [](char c) { return c == 'D' || c == 'd'; }, 'E');
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    if (*end != 0) from.fail(fmt::format("found \"{}\", expected a number", printable(text)));
+    return value;
+}
+
+std::string channel_name(double node, double direction, const char* otherwise) {
+    static constexpr std::array<const char*, 7> ways{"", "x", "y", "z", "rx", "ry", "rz"};
+    if (node == 0) return otherwise;
+    const auto way = static_cast<std::size_t>(std::abs(direction));
+    return fmt::format("{}{:g}{}", direction < 0 ? "-" : "", node, way < ways.size() ? ways[way] : "");
+}
+
+/// The numbers of a data set that is text, up to its closing mark.
+std::vector<double> read_text(lines_of& from, const std::vector<std::size_t>& widths, std::size_t count) {
+    std::vector<double> out;
+    std::string_view line;
+    while (from.next(line) && !is_mark(line))
+        for (std::size_t at = 0, k = 0; at < line.size() && !trimmed(line.substr(at)).empty();
+             k = (k + 1) % widths.size()) {
+            out.push_back(number_at(from, line, at, widths[k]));
+            at += widths[k];
+        }
+    if (out.size() != count) from.fail(fmt::format("the data set has {} numbers, expected {}", out.size(), count));
+    return out;
+}
+
+std::vector<double> read_binary(lines_of& from, bool wide, bool big, std::size_t count) {
+    const std::size_t size = wide ? 8 : 4;
+    const std::string_view bytes = from.bytes(size * count);
+    std::vector<double> out;
+    for (std::size_t k = 0; k < count; ++k) {
+        std::array<char, 8> one{};
+        std::copy_n(bytes.data() + size * k, size, one.begin());
+        if (big) std::reverse(one.begin(), one.begin() + static_cast<std::ptrdiff_t>(size));
+        double value = 0;
+        float narrow = 0;
+        if (wide)
+            std::memcpy(&value, one.data(), 8);
+        else
+            std::memcpy(&narrow, one.data(), 4), value = narrow;
+        out.push_back(value);
+    }
+    std::string_view line;
+    while (from.next(line) && !is_mark(line)) {
+    }
+    return out;
+}
+
+/// A data set 58 behind its first line; nothing for other functions than responses.
+void read_function(lines_of& from, std::string_view head, std::vector<response>& to) {
+    std::array<std::string, header_lines> lines;
+    for (std::string& line : lines) {
+        std::string_view text;
+        if (!from.next(text)) from.fail("the data set ends within its header, expected 11 lines");
+        line = text;
+    }
+    const auto at = [&](std::size_t line, std::size_t first, std::size_t width) {
+        return number_at(from, lines[line], first, width);
+    };
+    const int function = static_cast<int>(at(5, 0, 5)), type = static_cast<int>(at(6, 0, 10));
+    const auto points = static_cast<std::size_t>(std::max(0.0, at(6, 10, 10)));
+    const bool even = at(6, 20, 10) == 1, wide = type == 4 || type == 6,
+               binary = head.size() > 6 && (head[6] == 'b' || head[6] == 'B');
+    if (points > largest_file / 8) from.fail(fmt::format("{} points, more than the file can hold", points));
+    const std::size_t row = (type == 5 || type == 6 ? 2 : 1) + (even ? 0 : 1);
+    std::vector<std::size_t> widths(even ? 0 : 1, 13);
+    widths.insert(widths.end(), row - widths.size(), wide ? 20 : 13);
+    if (binary && number_at(from, head, 13, 6) > 2) from.fail("binary numbers in VMS or IBM form, expected IEEE 754");
+    const std::vector<double> all = binary ? read_binary(from, wide, number_at(from, head, 7, 6) == 2, row * points)
+                                           : read_text(from, widths, row * points);
+    if (function != response_function) return;
+    if (type != 5 && type != 6)
+        from.fail(fmt::format("a response of ordinate type {}, expected 5 or 6 (complex)", type));
+    response one{channel_name(at(5, 41, 10), at(5, 51, 4), "output"),
+                 channel_name(at(5, 66, 10), at(5, 76, 4), "input"),
+                 {},
+                 {}};
+    const double start = at(6, 30, 13), step = at(6, 43, 13);
+    for (std::size_t k = 0; k < points; ++k) {
+        const double* x = all.data() + k * row;
+        one.frequency_hz.push_back(even ? start + step * static_cast<double>(k) : x[0]);
+        one.values.emplace_back(x[row - 2], x[row - 1]);
+    }
+    to.push_back(std::move(one));
+}
+
+response_set read_universal(const std::string& path) {
+    lines_of from(path, read_input(path, "a universal file", largest_file));
+    std::vector<response> found;
+    std::string_view line;
+    bool any = false;
+    while (from.next(line)) {
+        if (!is_mark(line)) continue;
+        std::string_view head;
+        while (from.next(head) && is_mark(head)) {
+        } // written twice by some programs
+        if (head.empty() || is_mark(head)) break;
+        any = true;
+        const std::string first(head);
+        if (static_cast<int>(number_at(from, head, 0, 6)) == 58)
+            read_function(from, first, found);
+        else
+            while (from.next(line) && !is_mark(line)) {
+            }
+    }
+    if (!any) throw failure(exit_usage, fmt::format("{}: no data set, expected a universal file", path));
+    if (found.empty() || found.front().values.empty())
+        throw failure(exit_usage, fmt::format("{}: no data set 58 with a frequency response (function type 4)", path));
+    return set_of(path, found);
+}
+
+/// "OUT/IN:re" taken apart. @return false: it is none
+bool split_column(const std::string& name, response& to, bool& imaginary) {
+    const std::size_t colon = name.rfind(':'), slash = name.find('/');
+    if (colon == name.npos || slash == name.npos || slash > colon) return false;
+    const std::string part = name.substr(colon + 1);
+    to.output = name.substr(0, slash);
+    to.input = name.substr(slash + 1, colon - slash - 1);
+    imaginary = part == "im";
+    return part == "re" || imaginary;
+}
+
+response_set read_table(const std::string& path) {
+    csv_request request;
+    request.whole = true;
+    const csv_record table = read_csv(path, request);
+    const std::size_t width = table.columns.size();
+    const auto fail = [&](const std::string& what) {
+        throw failure(
+            exit_usage,
+            fmt::format("{}: {}; expected a column frequency_hz, then OUT/IN:re and OUT/IN:im of each response", path,
+                        what));
+    };
+    if (table.columns.front() != "frequency_hz")
+        fail(fmt::format("the first column is \"{}\"", printable(table.columns.front())));
+    std::vector<response> all;
+    for (std::size_t c = 1; c < width; ++c) {
+        response one;
+        bool imaginary = false;
+        if (!split_column(table.columns[c], one, imaginary))
+            fail(fmt::format("found the column \"{}\"", printable(table.columns[c])));
+        auto at = std::find_if(all.begin(), all.end(),
+                               [&](const response& x) { return x.output == one.output && x.input == one.input; });
+        if (at == all.end()) at = all.insert(all.end(), std::move(one)), at->values.resize(table.count, complex(0, 0));
+        for (std::size_t l = 0; l < table.count; ++l) {
+            const double x = table.samples[l * width + c];
+            at->values[l] += imaginary ? complex(0, x) : complex(x, 0);
+        }
+    }
+    if (all.empty() || table.count == 0) fail("no response");
+    for (response& one : all)
+        for (std::size_t l = 0; l < table.count; ++l) one.frequency_hz.push_back(table.samples[l * width]);
+    return set_of(path, all);
+}
+
+} // namespace
+
+response_set read_responses(const std::string& path) {
+    const std::size_t dot = path.rfind('.');
+    std::string ending = dot == path.npos ? "" : path.substr(dot);
+    std::transform(ending.begin(), ending.end(), ending.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return ending == ".uff" || ending == ".unv" ? read_universal(path) : read_table(path);
+}
+
+response_set read_set_ups(const std::vector<std::string>& paths) {
+    std::vector<response_set> sets;
+    for (const std::string& path : paths) sets.push_back(read_responses(path));
+    return join_set_ups(sets, paths);
+}
+
+} // namespace okid_host

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  measured frequency responses in memory: of a file, of several set-ups of one structure, or of a caller
+#pragma once
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+struct response_set {
+    std::vector<double> frequency_hz; ///< ascending, above 0
+    std::vector<std::string> inputs, outputs;
+    Eigen::MatrixXcd H; ///< lines x (outputs x inputs): output o of input i is column o + n_y i
+    int set_ups = 1;
+
+    Eigen::Index lines() const { return H.rows(); }
+    Eigen::Index n_y() const { return static_cast<Eigen::Index>(outputs.size()); }
+    Eigen::Index n_u() const { return static_cast<Eigen::Index>(inputs.size()); }
+};
+
+/// Set-ups of one structure as one: every output of every input once, entries measured several times averaged. Throws
+/// `failure` (exit 2) where the lines differ or an output was not measured for an input. `names`: of the set-ups.
+response_set join_set_ups(const std::vector<response_set>& sets, const std::vector<std::string>& names);
+
+/// The lines from low to high, those at 0 Hz left out. Throws (exit 2) where fewer than 32 stay or one is no number.
+response_set cut_band(const response_set& from, double low_hz, double high_hz);
+
+/// Outputs and inputs exchanged (Maxwell's reciprocity): what a roving hammer measures, as roving sensors would.
+response_set exchanged(const response_set& from);
+
+} // namespace okid_host

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""Modes from frequency responses: against responses solved line by line from M, R and K (no modal sum, no pole is put
+in), as a roving hammer measures them, through the formats, and where there is nothing to find."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import okid
+import pytest
+from numpy.typing import NDArray
+from okid.frf import Frf
+from program import okid as program
+
+Real = NDArray[np.float64]
+POINTS, SENSORS, MODES = 8, 3, 13
+
+
+def _structure(seed: int, n: int = MODES) -> tuple[Real, Real, Real]:
+    """A lattice of springs between random masses, every mass tied to the ground, with viscous damping of its own."""
+    r = np.random.default_rng(seed)
+    M, K = np.diag(r.uniform(0.5, 2.0, n)), np.diag(r.uniform(2e4, 9e5, n))
+    for a in range(n):
+        for b in range(a + 1, n):
+            k = r.uniform(0.0, 2.5e5) if r.random() < 0.5 else 0.0
+            K[[a, b], [a, b]] += k
+            K[a, b] -= k
+            K[b, a] -= k
+    return M, 1.2 * M + 6e-6 * K, K
+
+
+def _truth(M: Real, R: Real, K: Real) -> tuple[Real, Real, NDArray[np.complex128]]:
+    n = len(M)
+    A = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(M, K), -np.linalg.solve(M, R)],
+        ]
+    )
+    poles, vectors = np.linalg.eig(A)
+    upper = np.flatnonzero(poles.imag > 0.0)
+    upper = upper[np.argsort(np.abs(poles[upper]))]
+    size = np.abs(poles[upper])
+    return size / (2 * np.pi), -poles[upper].real / size, vectors[:n, upper].T
+
+
+def _responses(M: Real, R: Real, K: Real, f: Real, outputs: list[int], inputs: list[int]) -> NDArray[np.complex128]:
+    w = 2 * np.pi * f
+    out = []
+    for one in w:
+        out.append(-(one**2) * np.linalg.inv(K - one**2 * M + 1j * one * R)[np.ix_(outputs, inputs)])
+    return np.array(out)
+
+
+def _noisy(h: NDArray[np.complex128], share: float, seed: int) -> NDArray[np.complex128]:
+    r = np.random.default_rng(seed)
+    noise = r.normal(size=h.shape) + 1j * r.normal(size=h.shape)
+    return h + share * np.sqrt(np.mean(np.abs(h) ** 2, axis=0) / 2) * noise
+
+
+def _paired(result: okid.Result, f: Real) -> list[tuple[int, okid.Mode]]:
+    """Each true mode with the confident mode within 0.5 %, none twice."""
+    left, out = list(result.confident_modes), []
+    for k, one in enumerate(f):
+        near = [mode for mode in left if abs(mode.frequency_hz / one - 1) < 0.005]
+        if near:
+            best = min(near, key=lambda mode: abs(mode.frequency_hz - one))
+            left.remove(best)
+            out.append((k, best))
+    return out
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_roving_hammer_of_eight_points_and_three_accelerometers(seed: int) -> None:
+    M, R, K = _structure(seed)
+    f_true, zeta, shapes = _truth(M, R, K)
+    line = np.arange(0.25, 1.15 * f_true[-1], 0.25)
+    h = _noisy(_responses(M, R, K, line, list(range(SENSORS)), list(range(POINTS))), 0.01, seed)
+    names = [f"{k + 1}z" for k in range(POINTS)]
+    result = okid.identify_frf(Frf.of(line, h, names, names[:SENSORS]))
+    assert result.outputs == names and result.method == "plscf"
+    assert [one.code for one in result.warnings].count("reciprocity") == 1
+    found = _paired(result, f_true)
+    assert len(found) >= 12
+    assert len(result.confident_modes) == len(found), "a confident mode that the structure does not have"
+    for k, mode in found:
+        assert mode.damping_ratio == pytest.approx(zeta[k], rel=0.1)
+        assert okid.modal.mac(mode.shape, shapes[k, :POINTS]) >= 0.95
+
+
+def test_deviations_cover_the_errors() -> None:
+    M, R, K = _structure(4, 6)
+    f_true, zeta, _ = _truth(M, R, K)
+    line = np.arange(0.25, 1.1 * f_true[-1], 0.25)
+    clean, ratios = _responses(M, R, K, line, [0, 1, 2, 3], [0]), []
+    for seed in range(8):
+        for k, mode in _paired(okid.identify_frf(Frf.of(line, _noisy(clean, 0.02, seed))), f_true):
+            assert mode.frequency_std_hz and mode.damping_ratio_std
+            ratios += [(mode.frequency_hz - f_true[k]) / mode.frequency_std_hz,
+                       (mode.damping_ratio - zeta[k]) / mode.damping_ratio_std]  # fmt: skip
+    assert len(ratios) >= 80
+    assert 0.7 < float(np.sqrt(np.mean(np.square(ratios)))) < 1.4
+
+
+def test_matrices_of_a_known_structure() -> None:
+    M, R, K = _structure(5, 3)
+    f_true = _truth(M, R, K)[0]
+    line = np.arange(0.25, 2.0 * f_true[-1], 0.25)
+    h = _responses(M, R, K, line, [0, 1, 2], [0])
+    result = okid.identify_frf(Frf.of(line, h), input_dofs=[1], output_dofs=[1, 2, 3])
+    assert result.mkr is not None
+    assert np.allclose(result.mkr.M, M, atol=0.02 * np.max(M))
+    assert np.allclose(result.mkr.K, K, atol=0.02 * np.max(K))
+
+
+def test_exponential_window_is_taken_out() -> None:
+    M, R, K = _structure(9, 4)  # every mode moves the first mass
+    f_true, zeta, _ = _truth(M, R, K)
+    step, constant = 1.0 / 2048.0, 0.4
+    t = np.arange(16384) * step
+    w = 2 * np.pi * np.arange(1, len(t) // 2 + 1) / (len(t) * step)
+    h = np.array([np.linalg.inv(K - one**2 * M + 1j * one * R)[:, 0] for one in w])  # receptance: it has an end in time
+    answer = np.fft.irfft(np.vstack([np.linalg.inv(K)[:1, :], h]), axis=0)
+    windowed = np.fft.rfft(answer * np.exp(-t / constant)[:, None], axis=0)[: 4 * int(f_true[-1] * len(t) * step) // 3]
+    line = np.arange(len(windowed)) / (len(t) * step)
+    plain = okid.identify_frf(Frf.of(line, windowed), sensing="displacement")
+    result = okid.identify_frf(Frf.of(line, windowed), sensing="displacement", exponential=constant)
+    found = _paired(result, f_true)
+    assert len(found) == 4
+    for k, mode in found:
+        assert mode.damping_ratio == pytest.approx(zeta[k], rel=0.02)
+    assert all(one.damping_ratio > 1.2 * two.damping_ratio for one, two in zip(plain.modes, result.modes, strict=True))
+
+
+def test_noise_has_no_modes() -> None:
+    r = np.random.default_rng(0)
+    h = r.normal(size=(800, 4, 1)) + 1j * r.normal(size=(800, 4, 1))
+    with pytest.raises(okid.IdentificationError, match="no model: none of 6 runs"):
+        okid.identify_frf(Frf.of(np.arange(1, 801) * 0.25, h))
+
+
+def test_files_of_set_ups_give_what_the_whole_gives(tmp_path: Path) -> None:
+    M, R, K = _structure(7, 5)
+    line = np.arange(0.5, 1.2 * _truth(M, R, K)[0][-1], 0.5)
+    h = _noisy(_responses(M, R, K, line, [0, 1, 2, 3, 4], [0, 1]), 0.01, 7)
+    names = [f"{k + 1}z" for k in range(5)]
+    whole = okid.identify_frf(Frf.of(line, h, names[:2], names))
+    paths = []
+    for kind, part in (("uff", [0, 1]), ("csv", [2, 3, 4])):
+        paths.append(tmp_path / f"set.{kind}")
+        okid.write_frf(paths[-1], Frf.of(line, h[:, part], names[:2], [names[o] for o in part]))
+    joined = okid.identify_frf(paths)
+    assert joined.records == 2 and joined.outputs == names
+    run = program("identify", *paths, "--frf", "--json", tmp_path / "r.json", "--quiet", status=0)
+    assert run.stdout == ""
+    text = (tmp_path / "r.json").read_text(encoding="utf-8")
+    by_program = okid.Result.from_dict(json.loads(text))
+    for other in (joined, by_program):
+        assert [m.frequency_hz for m in other.modes] == pytest.approx([m.frequency_hz for m in whole.modes], rel=1e-6)
+        assert np.allclose([m.shape for m in other.modes], [m.shape for m in whole.modes], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--fs", "100"], "--fs is an option of records"),
+        (["--exponential", "-1"], '--exponential: found "-1"'),
+        (["--outputs", "9z"], '--outputs: found "9z"'),
+        (["--band", "5:6"], "lines between 5 and 6 Hz, expected at least 32"),
+    ],
+)
+def test_what_cannot_be_meant(tmp_path: Path, arguments: list[str], words: str) -> None:
+    okid.write_frf(
+        tmp_path / "a.csv",
+        Frf.of(np.arange(1.0, 101.0), np.ones((100, 1)), ["1z"], ["2z"]),
+    )
+    run = program("identify", tmp_path / "a.csv", "--frf", *arguments, status=2)
+    assert words in run.stderr

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""The report of frequency responses, and the check of a record's modes in the frequency domain."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import okid
+import pytest
+from okid.report.compose import build
+from okid.report.loaded import loaded_from
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> str:
+    force, y = okid.demo_record()
+    result = okid.identify(force, y, fs=1000.0, input_names=["f"], output_names=["a", "b", "c"], sigma_blocks=0)
+    path = tmp_path_factory.mktemp("check") / "run.csv"
+    okid.write_csv(path, okid.Record(["f", "a", "b", "c"], np.column_stack([force, y]), 1000.0))
+    return build(loaded_from(result.to_dict(), "result"), str(path))
+
+
+def _cells(page: str, section: str) -> list[list[str]]:
+    part = page[page.index(f'<section id="{section}"') :]
+    part = part[: part.index("</section>")]
+    return [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in re.findall(r"<tr[^>]*>(.*?)</tr>", part, re.S)][1:]
+
+
+def test_check_in_the_frequency_domain(page: str) -> None:
+    rows = _cells(page, "check")
+    assert len(rows) == 3
+    for row in rows:
+        f, share = float(row[1]), float(row[3].removesuffix(" %"))
+        assert share > 90.0
+        assert float(row[4]) == pytest.approx(f, rel=0.02) and float(row[6]) > 0.95
+
+
+def test_complexity_in_numbers(page: str) -> None:
+    rows = _cells(page, "complexity")
+    assert len(rows) == 3 and all(0.0 <= float(row[2]) < 5.0 and 0.0 <= float(row[3]) < 0.02 for row in rows)
+
+
+def test_report_and_universal_file_of_responses(tmp_path: Path) -> None:
+    force, y = okid.demo_record()
+    result = okid.identify_frf(okid.frf.h1(force, y, 1000.0, nperseg=4096), band=(5.0, 80.0))
+    text = build(loaded_from(result.to_dict(), "result"))
+    assert "plscf" in text and 'id="check"' not in text
+    okid.write_uff(tmp_path / "modes.uff", result)
+    modes = okid.read_uff(tmp_path / "modes.uff").modes
+    assert [one.frequency_hz for one in modes] == pytest.approx([one.frequency_hz for one in result.modes], rel=1e-5)
