@@ -13,7 +13,6 @@
 namespace okid_host {
 namespace {
 
-constexpr double nearly_white = 3; // residuals of a refinement, 1 = white
 constexpr double same_frequency = 0.005, same_damping = 1.5,
                  same_shape = 0.95; // a mode that a refinement has not changed
 

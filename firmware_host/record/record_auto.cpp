@@ -4,6 +4,7 @@
 //          then the modal model of what is confident
 #include "record_auto.hpp"
 
+#include "ambient_bound.hpp"
 #include "carrier.hpp"
 #include "consensus/lines.hpp"
 #include "error.hpp"
@@ -449,6 +450,8 @@ record_result identify_auto(record_set records, const record_options& given) {
     if (options.detrend == "linear") detrend_linear(work.set, options);
     const bool roving = !options.hits.empty();
     const std::vector<listed_mode> listed = roving ? find_struck(options, work) : find_modes_agreed(options, work);
+    if (work.set.n_u == 0 && work.context.sigma)
+        keep_to_ambient_bound(work.set, options.fs_hz, listed, *work.context.sigma);
     if (options.stage) options.stage("simulating the model");
     const bool placed = work.model.n_u > 0; // by find_struck
     if (!placed) make_models(listed, options, work);

@@ -4,6 +4,7 @@
 #include "record_refine.hpp"
 
 #include "record_fit.hpp"
+#include "whitening.hpp"
 
 #include <okid/modal.h>
 #include <okid/refine.h>
@@ -20,15 +21,13 @@ namespace {
 constexpr int blocks = 20, draws = 64; ///< of a record; from sums
 constexpr std::size_t most_runs = 32;
 constexpr double same_percent = 0.01; ///< fits closer than this are the same
+constexpr double other_percent = 0.5; ///< and that of noise that was made white: least squares is not the likeliest
 constexpr double lost_percent = 0.5;  ///< a loss of prediction worth a remark
 
 std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
 
 /// Stretches without a missing input, the longest where there are too many, one after the other; `most` samples of them.
-struct driven_runs {
-    std::vector<std::int32_t> counts;
-    std::vector<double> samples;
-
+struct driven_runs : sample_runs {
     driven_runs(const record_set& set, std::size_t least, std::size_t most = SIZE_MAX) {
         std::vector<std::pair<const record_data*, stretch>> all;
         for (const record_data& record : set.records)
@@ -60,7 +59,7 @@ double mean_of(const std::optional<std::vector<double>>& percent) {
 class refiner {
   public:
     /// @param iterations  at most, 0 = as many as it takes; others leave no replicates
-    refiner(const driven_runs& runs, const okid_identified_t& start, bool constants, int iterations = 0)
+    refiner(const sample_runs& runs, const okid_identified_t& start, bool constants, int iterations = 0)
         : blocks_(iterations > 0 ? 0 : blocks), n_u_(start.n_u), n_y_(start.n_y), n_z_(start.n_z) {
         open(static_cast<std::int32_t>(runs.counts.size()), iterations, constants);
         const okid_model_t model = model_view(start);
@@ -93,6 +92,7 @@ class refiner {
 
     okid_status_t status = OKID_OK;
     okid_refined_t found{};
+    std::vector<double> noise; ///< deviations at the outputs, where `found` has those behind a filter
 
   private:
     void open(std::int32_t runs, int iterations, bool constants) {
@@ -218,6 +218,29 @@ refinement report(const okid_refined_t& found, int n_y) {
     return out;
 }
 
+/// Refine; where what is left has a colour, again behind the filter that takes it out. Stays that of the whiter residuals.
+std::unique_ptr<refiner> refine_runs(driven_runs& runs, const okid_identified_t& start, bool constants, int iterations,
+                                     std::vector<double>& filter) {
+    filter = {1};
+    auto plain = std::make_unique<refiner>(runs, start, constants, iterations);
+    if (plain->status < 0 || plain->found.whiteness <= nearly_white) return plain;
+    okid_identified_t from = start;
+    from.A = plain->found.A;
+    from.B = plain->found.B;
+    from.C = plain->found.C;
+    from.D = plain->found.D;
+    filter = whitening_filter(residual_correlation(model_view(from), plain->found.x0, runs),
+                              static_cast<double>(plain->found.samples));
+    filter_runs(filter, size_of(start.n_u + start.n_y), runs);
+    auto white = std::make_unique<refiner>(runs, from, constants, iterations);
+    if (white->status >= 0 && white->found.whiteness < plain->found.whiteness) {
+        white->noise.assign(plain->found.noise_std, plain->found.noise_std + start.n_y);
+        return white;
+    }
+    filter = {1};
+    return plain;
+}
+
 likeliest_model outcome(refiner& one, const okid_identified_t& start) {
     likeliest_model out;
     out.status = one.status;
@@ -247,15 +270,20 @@ void find_markov(const okid_model_t& m, int count, std::vector<double>& out) {
 
 double whiteness_nearby(bool constants, const record_work& work) {
     constexpr std::size_t glance = 20000;
-    const driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)), glance);
-    const refiner one(runs, work.model, constants, 2);
-    return one.status < 0 ? INFINITY : one.found.whiteness;
+    driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)), glance);
+    std::vector<double> filter;
+    const auto one = refine_runs(runs, work.model, constants, 2, filter);
+    return one->status < 0 ? INFINITY : one->found.whiteness;
 }
 
 likeliest_model likeliest(bool constants, const record_work& work) {
-    const driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)));
-    refiner one(runs, work.model, constants);
-    return outcome(one, work.model);
+    driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)));
+    std::vector<double> filter;
+    const auto one = refine_runs(runs, work.model, constants, 0, filter);
+    likeliest_model out = outcome(*one, work.model);
+    out.found.noise_order = static_cast<int>(filter.size()) - 1;
+    if (!one->noise.empty()) out.found.noise_std = one->noise;
+    return out;
 }
 
 likeliest_model likeliest(bool constants, const okid_identified_t& start, const okid_correlation_sums_t& sums) {
@@ -279,7 +307,8 @@ std::vector<replicate_model> refine_model(bool constants, record_work& result) {
         trial.model = one.model;
         const double predicted = mean_of(result.context.prediction_percent);
         choose_gain(result.set, predicted, *one.arrays, trial);
-        if (!(mean_of(trial.context.simulation_percent) >= mean_of(result.context.simulation_percent) - same_percent))
+        if (!(mean_of(trial.context.simulation_percent) >=
+              mean_of(result.context.simulation_percent) - (one.found.noise_order > 0 ? other_percent : same_percent)))
             continue;
         result.model = trial.model;
         result.refined = std::move(one.arrays);

@@ -8,6 +8,8 @@
 
 namespace okid_host {
 
+constexpr double nearly_white = 3; ///< residuals of a refinement, 1 = white
+
 /// The likeliest model near a start, and models without one of twenty blocks each.
 struct likeliest_model {
     okid_status_t status = OKID_OK; ///< >= 0: there is one
@@ -17,10 +19,10 @@ struct likeliest_model {
     std::vector<replicate_model> replicates;
 };
 
-/// How white the residuals of a likelier model are, from two steps over 20,000 samples; infinite where there is none.
+/// How white the residuals of a likelier model are, their colour taken out where they have one, from two steps over 20,000 samples; infinite where there is none.
 double whiteness_nearby(bool constants, const record_work& work);
 
-/// @param constants  as for refine_model()
+/// Noise that is not white is made so first (whitening.hpp). @param constants  as for refine_model()
 likeliest_model likeliest(bool constants, const record_work& work);
 /// The same from correlation sums; `replicates`: 64 draws from the Cramér-Rao bound instead.
 likeliest_model likeliest(bool constants, const okid_identified_t& start, const okid_correlation_sums_t& sums);

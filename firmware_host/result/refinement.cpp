@@ -30,6 +30,7 @@ nlohmann::ordered_json refinement_json(const refinement& found, const std::vecto
     out["log_likelihood_gain"] = number_json(found.gain);
     out["log_likelihood_left"] = number_json(found.decrement);
     out["whiteness"] = number_json(found.whiteness);
+    out["noise_order"] = found.noise_order;
     out["noise_std"] = nlohmann::ordered_json::object();
     for (std::size_t i = 0; i < outputs.size(); ++i) out["noise_std"][outputs[i]] = number_json(found.noise_std[i]);
     return out;
@@ -37,11 +38,12 @@ nlohmann::ordered_json refinement_json(const refinement& found, const std::vecto
 
 std::string refinement_text(const refinement& found, const std::vector<std::string>& outputs) {
     std::string out =
-        fmt::format("\nrefined: {} iterations, log-likelihood {:+.1f}, {}{}\nnoise (1 sigma):", found.iterations,
+        fmt::format("\nrefined: {} iterations, log-likelihood {:+.1f}, {}{}{}\nnoise (1 sigma):", found.iterations,
                     found.gain, found.converged ? "converged" : "NOT converged",
                     std::isfinite(found.whiteness)
                         ? fmt::format("; correlation of the residuals {:.3g} (white: 1)", found.whiteness)
-                        : fmt::format(", from sums over {} samples", found.samples));
+                        : fmt::format(", from sums over {} samples", found.samples),
+                    found.noise_order > 0 ? fmt::format(", noise of order {}", found.noise_order) : "");
     for (std::size_t i = 0; i < outputs.size(); ++i)
         out += fmt::format("{} {} {:.3g}", i == 0 ? "" : ",", outputs[i], found.noise_std[i]);
     return out + "\n";

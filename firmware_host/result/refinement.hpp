@@ -14,6 +14,7 @@ struct refinement {
     bool converged = false;
     long long samples = 0;
     double gain = 0, decrement = 0, whiteness = 0;
+    int noise_order = 0;           ///< of the autoregression that the noise was taken for; 0: white
     std::vector<double> noise_std; ///< per output
 };
 

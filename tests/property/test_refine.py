@@ -136,16 +136,63 @@ def test_method_auto_goes_on_to_the_likeliest_modes(name: str) -> None:
     assert 0.85 < np.mean(inside) < 0.99
 
 
-def test_method_auto_leaves_modes_alone_where_residuals_are_not_white() -> None:
-    """A sensor with a hum beside its noise, which no model of the force explains."""
+def coloured(s: systems.Structure, poles: list[float], seed: int, samples: int = 10000) -> tuple[Array, Array, Array]:
+    """5 % of AR(1) noise with a pole for each sensor (over and over), and the deviations of what drives it."""
+    rng = np.random.default_rng(seed)
+    u = rng.standard_normal((samples, len(s.force_dofs)))
+    y = systems.simulate(s.discrete(), u)
+    drive = 0.05 * y.std(axis=0)
+    for o in range(y.shape[1]):
+        pole = poles[o % len(poles)]
+        drive[o] *= np.sqrt(1 - pole**2)
+        y[:, o] += drive[o] * lfilter([1.0], [1.0, -pole], rng.standard_normal(samples))
+    return u, y, drive
+
+
+COLOURS = [("w1", 0.9, "n4sid-moesp"), *([("w1", -0.7, "auto"), ("w2", 0.8, "auto")] if SLOW else [])]
+
+
+@pytest.mark.parametrize(("name", "pole", "method"), COLOURS)
+def test_coloured_noise_is_made_white(name: str, pole: float, method: str) -> None:
+    """The bound of noise of that colour: the one of white noise behind the filter 1 - pole/q."""
+    s, ratios, inside = getattr(systems, name)(), [], []
+    truth = np.concatenate(s.modes())
+    how: dict[str, Any] = {"method": "auto"} if method == "auto" else options(name, method)
+    how |= {} if method == "auto" else {"order": 2 * len(s.M)}
+    for seed in range(40 if SLOW else 12):
+        u, y, drive = coloured(s, [pole], 400 + seed)
+        if seed == 0:
+            limit = np.concatenate(bound(s, lfilter([1.0, -pole], [1.0], u, axis=0), drive))
+        result = okid.identify(u, y, fs=s.fs, refine=True, **how)
+        assert result.refinement is not None and result.refinement.noise_order >= 1
+        assert np.allclose(result.refinement.noise_std, drive / np.sqrt(1 - pole**2), rtol=0.15)
+        ratios.append((np.concatenate(near(s, result)) - truth) / limit)
+        found = np.array([m.frequency_hz for m in result.modes])
+        signed = [result.modes[int(np.argmin(abs(found - f)))] for f in truth[: len(s.M)]]
+        stated = [m.frequency_std_hz for m in signed] + [m.damping_ratio_std for m in signed]
+        inside.append(abs(ratios[-1]) * limit < 1.96 * np.array(stated))
+    pooled = np.sqrt(np.mean(np.array(ratios) ** 2))
+    print(name, pole, method, pooled, np.mean(inside))
+    assert pooled < 1.3
+    assert 0.85 < np.mean(inside) <= 1.0
+
+
+def test_method_auto_leaves_modes_alone_where_no_filter_makes_residuals_white() -> None:
+    """Sensors of different colours, which no filter common to all makes white. A hum is taken out like any colour."""
     s = systems.w1()
-    u, y, sigma = made("w1", 1.0, 23)
-    y = y + 20 * sigma * np.sin(2 * np.pi * 0.37 * np.arange(len(y)))[:, None]
+    u, y, _ = coloured(s, [0.95, 0.0, -0.9], 23)
     agreed, told, never = (okid.identify(u, y, fs=s.fs, refine=word) for word in (None, "auto", "no"))
     assert agreed.refinement is told.refinement is never.refinement is None
     assert [m.frequency_hz for m in agreed.modes] == [m.frequency_hz for m in never.modes]
     insisted = okid.identify(u, y, fs=s.fs, method="auto", refine=True)
     assert insisted.refinement is not None or "refine_failed" in [w.code for w in insisted.warnings]
+    u, y, sigma = made("w1", 1.0, 23)
+    limit = np.concatenate(bound(s, u, sigma))
+    hum = okid.identify(u, y + 20 * sigma * np.sin(2 * np.pi * 0.37 * np.arange(len(y)))[:, None], fs=s.fs)
+    assert hum.refinement is not None and hum.refinement.noise_order > 5
+    error = np.concatenate(near(s, hum)) - np.concatenate(s.modes())
+    print("hum", error / limit)
+    assert np.sqrt(np.mean((error / limit) ** 2)) < 2.0
 
 
 @pytest.mark.parametrize(("name", "noise"), [("w1", 1.0), ("w1", 5.0), ("w2", 5.0)])

@@ -158,7 +158,8 @@ class ProportionalDamping:
 @dataclass(frozen=True)
 class Refinement:
     """What came of it: steps, log-likelihood gained over the start and left (of one more step), the mean of N r^2 over
-    the autocorrelations of the residuals at lags 1..20 (1 = white), residual standard deviation of each output."""
+    the autocorrelations of the residuals at lags 1..20 (1 = white), residual standard deviation of each output, order
+    of the autoregression that the noise was taken for (0 = white)."""
 
     iterations: int
     converged: bool
@@ -167,6 +168,7 @@ class Refinement:
     decrement: float
     whiteness: float
     noise_std: Real
+    noise_order: int = 0
 
     @classmethod
     def of(cls, part: _Part | None) -> Refinement | None:
@@ -175,7 +177,7 @@ class Refinement:
             return None
         gain, left, white = numbers([part["log_likelihood_gain"], part["log_likelihood_left"], part["whiteness"]])
         return cls(part["iterations"], part["converged"], part["samples"], float(gain), float(left), float(white),
-                   numbers(list(part["noise_std"].values())))  # fmt: skip
+                   numbers(list(part["noise_std"].values())), part.get("noise_order", 0))  # fmt: skip
 
 
 @dataclass(frozen=True)
