@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  maximum likelihood of a running stream, from correlation sums
-// METHOD   lags to where the slowest mode has died away (1e-4 of its amplitude), from a model of the first samples; then every
-//          update starts from the model of the method and takes what the likelihood gives
+// METHOD   lags to where the slowest mode has died away (1e-4 of its amplitude), and the colour of the noise, from the first
+//          samples; then every update starts from the model of the method and takes what the likelihood of the sums gives
 #include "sum_refiner.hpp"
 
 #include "error.hpp"
+#include "record/whitening.hpp"
 #include "result/mode_verdict.hpp"
 
 #include <okid/refine.h>
@@ -69,7 +70,9 @@ sum_refiner::sum_refiner(const stream_config& config)
       only_where_it_serves_(config.wanted.refine == "auto"),
       constants_(config.wanted.detrend != "none" ||
                  std::any_of(config.offset.begin(), config.offset.end(), [](double x) { return x != 0; })),
-      scale_(config.scale), next_look_(first_look) {
+      scale_(config.scale), offset_(config.offset), next_look_(first_look) {
+    if (config_.block > 0) memory_ = std::int64_t{config_.block} * config_.slots;
+    if (config_.forgetting < 1) memory_ = std::llround(std::min(2 / (1 - config_.forgetting), 1e15)); // as much weight
     waiting_.reserve(static_cast<std::size_t>(first_look) * m_);
 }
 
@@ -77,28 +80,47 @@ std::size_t sum_refiner::room(std::size_t count) const {
     return sums_ ? count : std::min(count, static_cast<std::size_t>(next_look_ - kept()));
 }
 
-void sum_refiner::feed(okid_correlation_t* to, const double* rows, std::size_t count) const {
+void sum_refiner::feed(const double* rows, std::size_t count) {
+    if (filter_.size() > 1) return feed_filtered(rows, count);
     okid_status_t status = OKID_OK;
     if (config_.sample == OKID_SAMPLE_DOUBLE) {
-        status = okid_correlation_add(to, rows, count);
+        status = okid_correlation_add(sums_.sums, rows, count);
     } else if (config_.sample == OKID_SAMPLE_INT16) {
         const std::vector<std::int16_t> codes(rows, rows + count * m_);
-        status = okid_correlation_add_i16(to, codes.data(), count);
+        status = okid_correlation_add_i16(sums_.sums, codes.data(), count);
     } else {
         const std::vector<std::int32_t> codes(rows, rows + count * m_);
-        status = okid_correlation_add_i32(to, codes.data(), count);
+        status = okid_correlation_add_i32(sums_.sums, codes.data(), count);
     }
     if (status < 0)
         throw failure(exit_no_model,
                       fmt::format("the samples cannot be summed for a refinement: {}", okid_status_text(status)));
 }
 
-void sum_refiner::feed_waiting(okid_correlation_t* to) const {
-    std::int64_t first = 0;
+/// Numbers in engineering units through the filter; one that is missing takes those with it that look back to it.
+void sum_refiner::feed_filtered(const double* rows, std::size_t count) {
+    const double full = config_.sample == OKID_SAMPLE_INT16   ? 32767
+                        : config_.sample == OKID_SAMPLE_INT24 ? 8388607
+                                                              : 2147483647;
+    const bool codes = config_.sample != OKID_SAMPLE_DOUBLE && config_.saturated_missing != 0;
+    for (std::size_t i = 0; i < count * m_; ++i)
+        past_.push_back(codes && (rows[i] >= full || rows[i] < -full) ? NAN
+                                                                      : scale_[i % m_] * rows[i] + offset_[i % m_]);
+    const std::size_t order = filter_.size() - 1, have = past_.size() / m_;
+    if (have <= order) return;
+    sample_runs run{{static_cast<std::int32_t>(have)}, past_};
+    filter_runs(filter_, m_, 1, run);
+    past_.erase(past_.begin(), past_.end() - static_cast<std::ptrdiff_t>(order * m_));
+    check_statistics(okid_correlation_add(sums_.sums, run.samples.data(), run.samples.size() / m_));
+}
+
+/// The pieces between gaps of what waits, from a sample on.
+template <class Function> void sum_refiner::each_run(std::int64_t from, Function&& function) const {
+    std::int64_t first = from;
     for (std::size_t k = 0; k <= gaps_.size(); ++k) {
         const std::int64_t last = k < gaps_.size() ? gaps_[k] : kept();
-        feed(to, waiting_.data() + static_cast<std::size_t>(first) * m_, static_cast<std::size_t>(last - first));
-        if (k < gaps_.size()) okid_correlation_gap(to, 0);
+        if (last <= first) continue;
+        function(waiting_.data() + static_cast<std::size_t>(first) * m_, static_cast<std::size_t>(last - first));
         first = last;
     }
 }
@@ -122,7 +144,7 @@ template <class Number> void sum_refiner::add(const Number* rows, std::size_t co
     for (std::size_t done = 0; done < count; done += piece) {
         const std::size_t n = std::min(piece, count - done);
         numbers.assign(rows + done * m_, rows + (done + n) * m_);
-        feed(sums_.sums, numbers.data(), n);
+        feed(numbers.data(), n);
     }
 }
 
@@ -132,6 +154,7 @@ template void sum_refiner::add(const std::int16_t*, std::size_t);
 template void sum_refiner::add(const std::int32_t*, std::size_t);
 
 void sum_refiner::gap() {
+    past_.clear();
     if (sums_)
         okid_correlation_gap(sums_.sums, 0);
     else if (kept() > 0 && (gaps_.empty() || gaps_.back() != kept()))
@@ -143,22 +166,23 @@ void sum_refiner::reset() {
     waiting_.clear();
     gaps_.clear();
     next_look_ = first_look;
+    filter_ = {1};
+    past_.clear();
     found_ = {};
     fault_.clear();
 }
 
-sum_refiner::owned_correlation sum_refiner::make(std::int32_t lags) const {
+void sum_refiner::make(std::int32_t lags) {
     okid_correlation_config_t c = config_;
     c.lags = lags;
+    if (filter_.size() > 1) c.sample = OKID_SAMPLE_DOUBLE;
     const std::size_t bytes = okid_correlation_memsize(&c);
-    owned_correlation out;
-    out.block.reset(new (std::nothrow) std::byte[bytes]);
-    if (!out.block || okid_correlation_create(&out.sums, &c, out.block.get(), bytes) != OKID_OK)
+    sums_.block.reset(new (std::nothrow) std::byte[bytes]);
+    if (!sums_.block || okid_correlation_create(&sums_.sums, &c, sums_.block.get(), bytes) != OKID_OK)
         throw failure(exit_device, fmt::format("[identification]: the sums of a refinement need {:.0f} MB, which this "
                                                "machine does not give; set refine = \"no\"",
                                                static_cast<double>(bytes) / 1e6));
-    okid_correlation_set_units(out.sums, scale_.data());
-    return out;
+    if (filter_.size() == 1) okid_correlation_set_units(sums_.sums, scale_.data());
 }
 
 /// Where the slowest mode has died away and no other pole is heard any more.
@@ -179,39 +203,76 @@ void sum_refiner::choose_lags(const okid_identified_t* model) {
         next_look_ *= 2;
         return;
     }
-    sums_ = make(model ? lags_of(*model) : config_.lags);
-    feed_waiting(sums_.sums);
+    if (model) {
+        likeliest_model one = of_waiting(*model);
+        if (one.status >= 0) filter_ = std::move(one.filter);
+        whiteness_ = one.status >= 0 ? one.found.whiteness : INFINITY;
+    }
+    make(model ? lags_of(*model) : config_.lags);
+    each_run(0, [&](const double* rows, std::size_t count) {
+        if (rows != waiting_.data()) gap();
+        feed(rows, count);
+    });
+    if (!gaps_.empty() && gaps_.back() == kept()) gap();
     waiting_ = {};
     gaps_ = {};
 }
 
-std::string sum_refiner::take(const okid_identified_t& start, okid_correlation_t* from, okid_identified_t& model) {
-    std::vector<std::byte> room(okid_correlation_sums_memsize(from));
+/// What waits as a record, in engineering units and less its means.
+likeliest_model sum_refiner::of_waiting(const okid_identified_t& start) const {
+    record_work work;
+    work.model = start;
+    work.set.n_u = static_cast<std::size_t>(start.n_u);
+    work.set.n_y = static_cast<std::size_t>(start.n_y);
+    std::vector<double> mean(m_, 0.0), rows;
+    const std::int64_t first = std::max<std::int64_t>(0, kept() - memory_);
+    for (std::size_t i = static_cast<std::size_t>(first) * m_; constants_ && i < waiting_.size(); ++i)
+        mean[i % m_] += waiting_[i] / static_cast<double>(kept() - first);
+    each_run(first, [&](const double* from, std::size_t count) {
+        rows.assign(from, from + count * m_);
+        for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = scale_[i % m_] * (rows[i] - mean[i % m_]);
+        work.set.add("", rows.data(), count);
+    });
+    return likeliest(constants_, work);
+}
+
+likeliest_model sum_refiner::of_sums(const okid_identified_t& start) {
+    std::vector<std::byte> room(okid_correlation_sums_memsize(sums_.sums));
     okid_correlation_sums_t sums{};
-    okid_status_t status = okid_correlation_sums(from, constants_ ? OKID_DETREND_MEAN : OKID_DETREND_NONE, &sums,
-                                                 room.data(), room.size());
-    if (status < 0)
-        return fmt::format("no {} samples without a gap have come, so long does the slowest mode ring", config_.lags);
-    likeliest_model one = likeliest(constants_, start, sums);
-    if (one.status == OKID_ERR_UNSTABLE)
-        return fmt::format("a pole rings longer than the {} samples that the sums look back", sums.lags);
-    if (one.status < 0) return okid_status_text(one.status);
-    if (only_where_it_serves_ && !one.found.converged) return "it did not come to an end";
-    model = one.model;
-    found_ = {std::move(one.found), std::move(one.arrays), std::move(one.replicates)};
-    return "";
+    likeliest_model out;
+    out.status = okid_correlation_sums(sums_.sums, constants_ ? OKID_DETREND_MEAN : OKID_DETREND_NONE, &sums,
+                                       room.data(), room.size());
+    if (out.status < 0) return out;
+    out = likeliest(constants_, start, sums);
+    if (out.status < 0 || filter_.size() == 1) return out;
+    out.found.noise_order = static_cast<int>(filter_.size()) - 1;
+    double power = 0;
+    std::vector<double> answer(4096, 0.0); // of the noise to what drives it
+    for (std::size_t t = 0; t < answer.size(); ++t) {
+        answer[t] = t == 0 ? 1 : 0;
+        for (std::size_t k = 1; k < filter_.size() && k <= t; ++k) answer[t] -= filter_[k] * answer[t - k];
+        power += answer[t] * answer[t];
+    }
+    for (double& noise : out.found.noise_std) noise *= std::sqrt(power);
+    return out;
 }
 
 void sum_refiner::refine(okid_identified_t& model) {
     found_ = {};
-    const okid_identified_t start = model;
-    if (sums_) {
-        fault_ = take(start, sums_.sums, model);
-        return;
-    }
-    const owned_correlation now = make(lags_of(start));
-    feed_waiting(now.sums);
-    fault_ = take(start, now.sums, model);
+    fault_.clear();
+    likeliest_model one = sums_ ? of_sums(model) : of_waiting(model);
+    const double white = sums_ ? whiteness_ : one.found.whiteness;
+    if (one.status == OKID_ERR_UNSTABLE && sums_)
+        fault_ = "a pole rings longer than the sums look back";
+    else if (one.status == OKID_ERR_TOO_SHORT && sums_)
+        fault_ = "no piece without a gap was as long as the slowest mode rings";
+    else if (one.status < 0)
+        fault_ = okid_status_text(one.status);
+    else if (only_where_it_serves_ && (!one.found.converged || white > nearly_white))
+        fault_ = "it does not serve";
+    if (!fault_.empty()) return;
+    model = one.model;
+    found_ = {std::move(one.found), std::move(one.arrays), std::move(one.replicates)};
 }
 
 } // namespace okid_host

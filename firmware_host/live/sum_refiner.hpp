@@ -2,8 +2,9 @@
 // Maximum likelihood in a stream of a named method: correlation sums beside the accumulator, of the same samples, and each
 // model refined from them (okid/refine.h).
 //
-// How many lags the sums need depends on the slowest mode. So the first samples are kept as they are until a model of so and
-// so many of them, the same ones at any speed of a replay, tells it; from then on there are only sums.
+// How many lags the sums need depends on the slowest mode, and noise that has a colour goes through a filter before it is
+// summed. So the first samples are kept, and refined as a record, until a model of so and so many of them, the same ones at
+// any speed of a replay, tells both; from then on there are only sums.
 #pragma once
 #include "record/record_refine.hpp"
 #include "stream_config.hpp"
@@ -35,7 +36,7 @@ class sum_refiner {
 
     /// Is it time to choose the lags?
     bool wants_model() const { return !sums_ && kept() == next_look_; }
-    /// Choose them. @param model  NULL: there is none yet
+    /// Choose them, and the filter. @param model  NULL: there is none yet
     void choose_lags(const okid_identified_t* model);
 
     /// Refine `model`, in place; it looks into this object then. Nothing where it is of no use: fault() says why.
@@ -61,20 +62,24 @@ class sum_refiner {
     template <class Number> void keep(const Number* row);
     std::int64_t kept() const { return static_cast<std::int64_t>(waiting_.size() / m_); }
     std::int32_t lags_of(const okid_identified_t& model) const;
-    owned_correlation make(std::int32_t lags) const;
-    void feed(okid_correlation_t* to, const double* rows, std::size_t count) const;
-    void feed_waiting(okid_correlation_t* to) const;
-    std::string take(const okid_identified_t& start, okid_correlation_t* from, okid_identified_t& model);
+    void make(std::int32_t lags);
+    void feed(const double* rows, std::size_t count);
+    void feed_filtered(const double* rows, std::size_t count);
+    template <class Function> void each_run(std::int64_t from, Function&& function) const;
+    likeliest_model of_waiting(const okid_identified_t& start) const;
+    likeliest_model of_sums(const okid_identified_t& start);
 
     okid_correlation_config_t config_; ///< lags: the most
     std::size_t m_;
     double rate_hz_;
     bool only_where_it_serves_, constants_;
-    std::vector<double> scale_;
-    std::vector<double> waiting_;      ///< complete rows, raw
-    std::vector<std::int64_t> gaps_{}; ///< before which of them something is missing
-    std::int64_t next_look_;
+    std::vector<double> scale_, offset_;
+    std::vector<double> waiting_;                 ///< complete rows, raw
+    std::vector<std::int64_t> gaps_{};            ///< before which of them something is missing
+    std::int64_t next_look_, memory_ = INT64_MAX; ///< memory: samples that waiting ones may be old
     owned_correlation sums_;
+    std::vector<double> filter_{1}, past_; ///< of the noise; the samples in engineering units that it goes back to
+    double whiteness_ = 0;                 ///< of the first samples behind it
     taken found_;
     std::string fault_;
 };

@@ -2,8 +2,7 @@
 // PURPOSE  standard deviations of ambient modes, not below the bound
 // METHOD   the blocks of a record are few beside the bandwidth of a slow mode, so that their scatter may come out too small; a
 //          mode under a steady random force is a narrow-band signal whose Fisher information is known in closed form
-//          (Au, Mech. Syst. Signal Process. 48 (2014) 15-33: 1/(4 pi f T zeta^-1) for f, 1/(2 pi zeta f T) for zeta, squared
-//          and relative)
+//          (Au, Mech. Syst. Signal Process. 48 (2014) 15-33; relative variances zeta/(4 pi f T) and 1/(2 pi zeta f T))
 #include "ambient_bound.hpp"
 
 #include <algorithm>

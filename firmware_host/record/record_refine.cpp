@@ -231,7 +231,7 @@ std::unique_ptr<refiner> refine_runs(driven_runs& runs, const okid_identified_t&
     from.D = plain->found.D;
     filter = whitening_filter(residual_correlation(model_view(from), plain->found.x0, runs),
                               static_cast<double>(plain->found.samples));
-    filter_runs(filter, size_of(start.n_u + start.n_y), runs);
+    filter_runs(filter, size_of(start.n_u + start.n_y), std::max<std::size_t>(20, 2 * size_of(start.n_z)), runs);
     auto white = std::make_unique<refiner>(runs, from, constants, iterations);
     if (white->status >= 0 && white->found.whiteness < plain->found.whiteness) {
         white->noise.assign(plain->found.noise_std, plain->found.noise_std + start.n_y);
@@ -283,6 +283,7 @@ likeliest_model likeliest(bool constants, const record_work& work) {
     likeliest_model out = outcome(*one, work.model);
     out.found.noise_order = static_cast<int>(filter.size()) - 1;
     if (!one->noise.empty()) out.found.noise_std = one->noise;
+    out.filter = std::move(filter);
     return out;
 }
 

@@ -17,6 +17,7 @@ struct likeliest_model {
     std::unique_ptr<refined_arrays> arrays;
     refinement found;
     std::vector<replicate_model> replicates;
+    std::vector<double> filter{1}; ///< that the samples went through (whitening.hpp)
 };
 
 /// How white the residuals of a likelier model are, their colour taken out where they have one, from two steps over 20,000 samples; infinite where there is none.

@@ -74,7 +74,7 @@ std::vector<double> whitening_filter(const std::vector<double>& correlation, dou
     return best;
 }
 
-void filter_runs(const std::vector<double>& filter, std::size_t channels, sample_runs& runs) {
+void filter_runs(const std::vector<double>& filter, std::size_t channels, std::size_t least, sample_runs& runs) {
     const std::size_t order = filter.size() - 1;
     std::vector<double> out;
     out.reserve(runs.samples.size());
@@ -82,7 +82,7 @@ void filter_runs(const std::vector<double>& filter, std::size_t channels, sample
     std::vector<std::int32_t> counts;
     for (const std::int32_t count : runs.counts) {
         const double* const end = v + static_cast<std::size_t>(count) * channels;
-        if (static_cast<std::size_t>(count) < 2 * order + 20) {
+        if (static_cast<std::size_t>(count) < order + least) {
             v = end;
             continue;
         }

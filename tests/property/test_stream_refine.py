@@ -19,7 +19,8 @@ import pytest
 import systems
 from numpy.typing import NDArray
 from program import okid as run_okid
-from test_refine import bound, made, options
+from scipy.signal import lfilter
+from test_refine import bound, coloured, made, options
 from two_masses import rig_text, simulate_rig
 
 SLOW = os.environ.get("OKID_SLOW") == "1"  # the long tier
@@ -141,10 +142,35 @@ def test_a_replay_says_what_the_record_says(tmp_path: pathlib.Path) -> None:
     )
 
 
-def test_what_cannot_be_refined_says_so() -> None:
-    """Too few samples without a gap: the model as identified, and a remark. Ambient streams and states: refused."""
+@pytest.mark.parametrize("samples", [6000, 16000])
+def test_coloured_noise_of_a_stream_is_made_white(samples: int) -> None:
+    """As of a record (test_refine.py), before and after the lags are chosen; codes become doubles behind the filter."""
     s = systems.w1()
-    u, y, _ = made("w1", 1.0, 6, 4000)
+    for pole, codes in ((0.9, 0), (-0.6, 16)):
+        u, y, drive = coloured(s, [pole], 31, samples)
+        record = np.hstack([u, y])
+        scale = np.max(abs(record), axis=0) / 32000
+        record[3000] = np.nan
+        more: dict[str, Any] = {"codes": 16, "scale": scale} if codes else {}
+        with okid.Session(1, 3, fs=s.fs, method="n4sid-moesp", rows=40, order=6, refine="auto", **more) as session:
+            for part in (record[:3000], record[3001:]):
+                session.feed(np.rint(part / scale).astype(np.int16) if codes else part)
+                session.gap(1)
+            result = session.identify()
+        assert result.refinement is not None and result.refinement.noise_order >= 1
+        assert np.allclose(result.refinement.noise_std, drive / np.sqrt(1 - pole**2), rtol=0.25)
+        limit = np.concatenate(bound(s, lfilter([1.0, -pole], [1.0], u, axis=0), drive))
+        truth = np.concatenate(s.modes())
+        error = (modes(result, truth[:3])[0] - truth) / limit
+        assert np.sqrt(np.mean(error**2)) < 1.9, error
+        named = stream(record, 1, s.fs, method="n4sid-moesp", rows=40, order=6, refine=False)
+        assert np.mean(error**2) < np.mean(((modes(named, truth[:3])[0] - truth) / limit) ** 2)
+
+
+def test_what_cannot_be_refined_says_so() -> None:
+    """A gap each 200 samples of 12,000: the model as identified, and a remark. Ambient streams and states: refused."""
+    s = systems.w1()
+    u, y, _ = made("w1", 1.0, 6, 12000)
     record = np.hstack([u, y])
     record[::200] = np.nan
     result = stream(record, 1, s.fs, method="okid-era", p=20)
