@@ -200,11 +200,14 @@ okid_status_t okid_accumulator_run(okid_accumulator_t* self, okid_detrend_t detr
 double okid_accumulator_lag_means(okid_accumulator_t* self, double* mean) {
     okid_accumulator_settle(self);
     const double rows = okid_accumulator_weight(self), unit = 1.0 / (1 << acc_fraction(self));
-    const size_t m = (size_t)self->m;
+    const size_t m = (size_t)self->m, n = (size_t)self->width;
     if (!(rows > 0)) return 0;
-    for (size_t i = 0; i < (size_t)self->width; ++i)
-        mean[i] = okid_accumulator_lag_sum(self, i, i < m ? 0 : mean[i - m]);
-    for (size_t i = 0; i < (size_t)self->width; ++i)
+    if (acc_base_is_exact(self)) // codes: the sums are whole numbers below 2^53 in all but the longest records
+        for (size_t i = 0; i < n; ++i)
+            mean[i] = (double)okid_accumulator_lag_sum_exact(self, i, i < m ? 0 : (int64_t)mean[i - m]);
+    else
+        for (size_t i = 0; i < n; ++i) mean[i] = okid_accumulator_lag_sum(self, i, i < m ? 0 : mean[i - m]);
+    for (size_t i = 0; i < n; ++i)
         mean[i] = acc_scale(self)[i % m] * unit * mean[i] / rows + (self->centred ? 0 : acc_scale(self)[m + i % m]);
     return rows;
 }
