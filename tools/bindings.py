@@ -3,15 +3,17 @@
 """The C interface of libokid and libokid_host for other languages: the crate okid-sys (Rust), okid.jl (Julia), and the
 function okid_identify for MATLAB and GNU Octave.
 
-usage: bindings.py FOLDER     with the package okid importable
+usage: bindings.py FOLDER     with the package okid importable; the crate needs bindgen and rustfmt
 
-Functions, structs and constants are those of okid.abi, which tests/abi holds to the C headers: nothing is typed twice.
+The crate is what bindgen reads in the C headers; Julia's functions, structs and constants are those of okid.abi, the
+package's own. tests/languages holds one to the other.
 """
 
 from __future__ import annotations
 
 import ctypes
 import re
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -20,14 +22,15 @@ from okid import abi
 from okid.abi import host, layout, signatures
 
 ROOT = Path(__file__).resolve().parents[1]
-HEADERS = "".join(path.read_text("utf-8") for path in sorted((ROOT / "lib" / "include").rglob("*.h")))
+INCLUDE = [ROOT / part / "include" for part in ("lib", "firmware_host", "drivers")]
+HEADERS = "".join(path.read_text("utf-8") for path in sorted(INCLUDE[0].rglob("*.h")))
 LINKED = set(re.findall(r"#define (okid_\w+) OKID_LINKED\(", HEADERS))
 CONSTANT = re.compile(r"\bOKID_[A-Z0-9_]+\b")
 MADE = """{0} SPDX-License-Identifier: MIT
 {1} The C interface of libokid and libokid_host, made by tools/bindings.py, for 64-bit systems. What the functions do
 {1} and which pointers may be null stands in okid/okid.h and okid_host.h."""
-RUST = {"c_byte": "i8", "c_short": "i16", "c_int": "i32", "c_uint": "u32", "c_long": "i64", "c_ulong": "usize",
-        "c_double": "f64", "c_float": "f32", "c_char_p": "*const c_char", "c_void_p": "*mut c_void"}  # fmt: skip
+BINDGEN = ["bindgen", "--allowlist-function=okid_.*", "--allowlist-type=okid_.*", "--allowlist-var=OKID_.*",
+           "--blocklist-type=__.*", "--default-macro-constant-type=signed", "--no-prepend-enum-name"]  # fmt: skip
 JULIA = {"c_byte": "Int8", "c_short": "Int16", "c_int": "Int32", "c_uint": "UInt32", "c_long": "Int64",
          "c_ulong": "Csize_t", "c_double": "Float64", "c_float": "Float32", "c_char_p": "Cstring",
          "c_void_p": "Ptr{Cvoid}"}  # fmt: skip
@@ -43,14 +46,6 @@ def c_name(struct: type[ctypes.Structure]) -> str:
 
 def is_struct(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, ctypes.Structure)
-
-
-def rust(kind: Any) -> str:
-    if is_struct(kind):
-        return c_name(kind)
-    if hasattr(kind, "_length_"):
-        return f"[{rust(kind._type_)}; {kind._length_}]"
-    return RUST.get(kind.__name__) or f"*mut {rust(kind._type_)}"
 
 
 def julia(kind: Any) -> str:
@@ -95,19 +90,23 @@ def constants() -> dict[str, int]:
 
 
 def rust_text() -> str:
-    lines = [*MADE.format("//", "//!").splitlines(), "#![allow(non_camel_case_types, non_snake_case)]",
-             "use std::os::raw::{c_char, c_void};", ""]  # fmt: skip
-    lines += [f"pub const {name}: i32 = {value};" for name, value in constants().items()]
-    for kind in structs():
-        fields = "".join(f"    pub {name}: {rust(part)},\n" for name, part in kind._fields_)
-        lines.append(f"\n#[repr(C)]\n#[derive(Clone, Copy)]\npub struct {c_name(kind)} {{\n{fields}}}")
-        lines.append(f"const _: () = assert!(std::mem::size_of::<{c_name(kind)}>() == {ctypes.sizeof(kind)});")
-    lines += ["", 'extern "C" {']
-    for _, name, linked, result, arguments in functions():
-        lines += [f'    #[link_name = "{linked}"]'] if linked != name else []
-        taken = ", ".join(f"a{k}: {rust(kind)}" for k, kind in enumerate(arguments))
-        lines.append(f"    pub fn {name}({taken}){f' -> {rust(result)}' if result else ''};")
-    return "\n".join([*lines, "}", ""])
+    """Every header, but for abi.h: without its macros bindgen sees names and descriptions, not linked names."""
+    allow = "#![allow(non_camel_case_types, non_snake_case, non_upper_case_globals)]"
+    lines = [*MADE.format("//", "//!").splitlines(), allow, f"pub const OKID_ABI: i32 = {abi.ABI};"]
+    headers = [f"-include{path}" for part in INCLUDE[:2] for path in sorted(part.rglob("*.h"))]
+    clang = ["-DOKID_ABI_H", *(f"-I{part}" for part in INCLUDE), *headers]
+    try:
+        subprocess.run(["rustfmt", "--version"], check=True, capture_output=True)
+        known = subprocess.run(["bindgen", "--help"], check=True, capture_output=True, text=True).stdout
+        usize = ["--size_t-is-usize"] if "--size_t-is-usize" in known else []  # later releases do so unasked
+        command = [*BINDGEN, *usize, *(f"--raw-line={line}" for line in lines), str(INCLUDE[1] / "okid_host.h")]
+        text = subprocess.run([*command, "--", *clang], check=True, stdout=subprocess.PIPE, text=True).stdout
+    except FileNotFoundError as missing:
+        raise SystemExit(f"bindings: {missing.filename} is not installed, which the Rust crate needs") from None
+    for name in LINKED:
+        linked = f'#[link_name = "{name}_{abi.ABI}_double"]'
+        text = text.replace(f"    pub fn {name}(", f"    {linked}\n    pub fn {name}(")
+    return text.replace('doc = "< ', 'doc = " ')
 
 
 def julia_text() -> str:
@@ -135,9 +134,9 @@ def write(folder: Path) -> None:
             version = re.search(r'#define OKID_VERSION "([^"]+)"', HEADERS)
             assert version
             target.write_text(path.read_text("utf-8").replace("@VERSION@", version[1]), "utf-8")
-    for path, text in (("rust/okid-sys/src/lib.rs", rust_text()), ("julia/okid.jl", julia_text())):
+    for path, text in (("julia/okid.jl", julia_text), ("rust/okid-sys/src/lib.rs", rust_text)):
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, "utf-8")
+        (folder / path).write_text(text(), "utf-8")
 
 
 if __name__ == "__main__":

@@ -35,14 +35,14 @@ fn kernels_find_the_mode() {
         let mut how: okid_identify_config_t = std::mem::zeroed();
         (how.n_u, how.n_y, how.p, how.order, how.fs_hz, how.detrend) = (1, 1, 10, 2, RATE_HZ, OKID_DETREND_MEAN);
         let mut shape: okid_accumulator_config_t = std::mem::zeroed();
-        (shape.n_u, shape.n_y, shape.lags, shape.forgetting) = (1, 1, okid_identify_lags(&mut how), 1.0);
-        let (bytes, more) = (okid_accumulator_memsize(&mut shape), okid_identify_memsize(&mut how));
+        (shape.n_u, shape.n_y, shape.lags, shape.forgetting) = (1, 1, okid_identify_lags(&how), 1.0);
+        let (bytes, more) = (okid_accumulator_memsize(&shape), okid_identify_memsize(&how));
         assert!(bytes > 0 && more > 0);
         let (mut block, mut room) = (vec![0u64; bytes / 8 + 1], vec![0u64; more / 8 + 1]);
         let (mut sums, mut identifier) = (std::ptr::null_mut(), std::ptr::null_mut());
-        assert_eq!(okid_accumulator_create(&mut sums, &mut shape, block.as_mut_ptr().cast(), bytes), OKID_OK);
-        assert_eq!(okid_identify_create(&mut identifier, &mut how, room.as_mut_ptr().cast(), more), OKID_OK);
-        assert_eq!(okid_accumulator_add(sums, rows.as_ptr() as *mut f64, SAMPLES), OKID_OK);
+        assert_eq!(okid_accumulator_create(&mut sums, &shape, block.as_mut_ptr().cast(), bytes), OKID_OK);
+        assert_eq!(okid_identify_create(&mut identifier, &how, room.as_mut_ptr().cast(), more), OKID_OK);
+        assert_eq!(okid_accumulator_add(sums, rows.as_ptr(), SAMPLES), OKID_OK);
         let mut found: okid_identified_t = std::mem::zeroed();
         assert!(okid_identify_run(identifier, sums, &mut found) >= OKID_OK);
         assert_eq!(found.mode_count, 1);
@@ -56,10 +56,9 @@ fn host_library_finds_it_and_says_what_is_wrong() {
     let rows = record();
     let identify = |options: &str| unsafe {
         let options = CString::new(options).unwrap();
-        let (mut samples, mut count) = (rows.as_ptr() as *mut std::ffi::c_void, SAMPLES);
-        let (mut name, mut result) = (b"record\0".as_ptr().cast(), std::ptr::null_mut());
-        let null = std::ptr::null_mut();
-        let code = okid_host_identify(options.as_ptr(), 1, &mut samples, &mut count, &mut name, null, null, &mut result);
+        let (samples, name) = (rows.as_ptr(), b"record\0".as_ptr().cast());
+        let (null, mut result) = (std::ptr::null_mut(), std::ptr::null_mut());
+        let code = okid_host_identify(options.as_ptr(), 1, &samples, &SAMPLES, &name, None, null, &mut result);
         (code, result)
     };
     unsafe {

@@ -65,7 +65,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_csv_json": (_text, [_handle]),
     "okid_host_csv_samples": (ctypes.POINTER(ctypes.c_double), [_handle, _sizes, _sizes]),
     "okid_host_csv_delete": (None, [_handle]),
-    "okid_host_unit_of_name": (_size, [_text, _text, _size]),
+    "okid_host_unit_of_name": (_size, [_text, _handle, _size]),
     "okid_host_unit": (_status, [_text, ctypes.POINTER(ctypes.c_double), ctypes.POINTER(_text)]),
     "okid_host_config_load": (_status, [_text, _text, ctypes.POINTER(_handle)]),
     "okid_host_config_json": (_text, [_handle]),
@@ -74,7 +74,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_capture_create": (_status, [_handle, _handle, ctypes.POINTER(_handle)]),
     "okid_host_capture_delete": (None, [_handle]),
     "okid_host_capture_frames": (_status, [_handle, _handle, _size]),
-    "okid_host_capture_bytes": (_status, [_handle, _size, ctypes.c_char_p, _size, ctypes.c_int64]),
+    "okid_host_capture_bytes": (_status, [_handle, _size, _handle, _size, ctypes.c_int64]),
     "okid_host_capture_link": (_status, [_handle, _size, _status]),
     "okid_host_capture_lost": (_status, [_handle, _size, ctypes.c_uint64, ctypes.c_uint64]),
     "okid_host_capture_edge": (_status, [_handle, ctypes.c_int64]),
@@ -99,8 +99,8 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_stream_update": (_status, [_handle, _out]),
     "okid_host_stream_identify": (_status, [_handle, _out]),
     "okid_host_stream_state": (_status, [_handle, _out, _sizes]),
-    "okid_host_stream_restore": (_status, [_handle, ctypes.c_char_p, ctypes.c_size_t]),
-    "okid_host_stream_merge": (_status, [_handle, ctypes.c_char_p, ctypes.c_size_t]),
+    "okid_host_stream_restore": (_status, [_handle, _handle, _size]),
+    "okid_host_stream_merge": (_status, [_handle, _handle, _size]),
     "okid_host_stream_delete": (None, [_handle]),
 }
 ABI = 1
