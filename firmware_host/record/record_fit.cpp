@@ -12,6 +12,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
+#include <memory>
 
 namespace okid_host {
 namespace {
@@ -103,11 +104,11 @@ okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const
     D.resize(set.n_y * set.n_u);
     const std::size_t bytes = okid_subspace_output_error_memsize(n_u, n_y, n_z, count);
     if (bytes == 0) return OKID_ERR_DIM;
-    std::vector<std::byte> block(bytes);
+    const std::unique_ptr<std::byte[]> block(new std::byte[bytes]);
     if (x0) x0->resize(static_cast<std::size_t>(n_z) * counts.size());
     const okid_model_t model{n_u, n_y, n_z, A, nullptr, C, nullptr, nullptr};
     const okid_records_t given{count, counts.data(), set.samples.data()};
-    return okid_subspace_output_error(&model, &given, B.data(), D.data(), x0 ? x0->data() : nullptr, block.data(),
+    return okid_subspace_output_error(&model, &given, B.data(), D.data(), x0 ? x0->data() : nullptr, block.get(),
                                       bytes);
 }
 

@@ -106,6 +106,24 @@ static void keep_head(okid_accumulator_t* a, const double* history) {
         memcpy(acc_slot_data(a, a->open) + acc_slot_head(a), history, acc_lag_count(a) * sizeof *history);
 }
 
+/// sum += rows of m numbers, each channel in the order of its samples; some channels side by side.
+static void add_rows(double* sum, const double* rows, size_t m, size_t count) {
+    enum { TILE = 4 };
+    size_t r = 0;
+    for (; r + TILE <= m; r += TILE) {
+        double tile[TILE];
+        for (size_t k = 0; k < TILE; ++k) tile[k] = sum[r + k];
+        for (size_t n = 0; n < count; ++n)
+            for (size_t k = 0; k < TILE; ++k) tile[k] += rows[n * m + r + k];
+        for (size_t k = 0; k < TILE; ++k) sum[r + k] = tile[k];
+    }
+    for (; r < m; ++r) {
+        double one = sum[r];
+        for (size_t n = 0; n < count; ++n) one += rows[n * m + r];
+        sum[r] = one;
+    }
+}
+
 /// Sum `count` rows; x holds the p samples before them and then theirs.
 static void sum_rows(okid_accumulator_t* a, const double* x, int32_t count) {
     const int32_t m = a->m;
@@ -113,12 +131,9 @@ static void sum_rows(okid_accumulator_t* a, const double* x, int32_t count) {
     run_kernel(a, x, count);
     double* sum = acc_slot_data(a, a->open) + acc_slot_sum(a);
     const double* newest = x + acc_lag_count(a);
-    for (int32_t n = 0; n < count; ++n, newest += m) {
-        if (acc_has_codes(a))
-            for (int32_t r = 0; r < m; ++r) ((int64_t*)sum)[r] += acc_code(newest + r);
-        else
-            for (int32_t r = 0; r < m; ++r) sum[r] += newest[r];
-    }
+    if (!acc_has_codes(a)) add_rows(sum, newest, (size_t)m, (size_t)count);
+    for (int32_t n = 0; acc_has_codes(a) && n < count; ++n, newest += m)
+        for (int32_t r = 0; r < m; ++r) ((int64_t*)sum)[r] += acc_code(newest + r);
     acc_slot(a, a->open)->rows += count;
 }
 
@@ -186,12 +201,8 @@ static size_t feed_bulk(okid_accumulator_t* a, source_t source, size_t count) {
     okid_spectrum_pick().absorb(&bulk->plan, acc_spectra(a), x, codes, numbers);
     if (!(bulk->energy > 0)) bulk->energy = 1; // silence counts as rows too
     double* sum = acc_slot_data(a, a->open) + acc_slot_sum(a);
-    for (size_t i = 0, r = 0; i < total * m; ++i, r = r + 1 < m ? r + 1 : 0) {
-        if (codes)
-            ((int64_t*)sum)[r] += codes[i];
-        else
-            sum[r] += numbers[i];
-    }
+    if (numbers) add_rows(sum, numbers, m, total);
+    for (size_t i = 0, r = 0; codes && i < total * m; ++i, r = r + 1 < m ? r + 1 : 0) ((int64_t*)sum)[r] += codes[i];
     copy_in(advance(source, (total - (size_t)bulk->plan.p) * m), x, lags);
     acc_slot(a, a->open)->rows += (int64_t)total;
     a->stats.rows += (int64_t)total;

@@ -97,9 +97,8 @@ static double* transform(const map_t* a, int total) {
 }
 
 /// Window `index` of the batch into z = current + i full for one group; @return largest energy of its channels.
-static inline __attribute__((always_inline)) double load_window(const spectrum_plan_t* plan, const map_t* a,
-                                                                const double* history, const int16_t* codes,
-                                                                const double* numbers, int index, int group) {
+static double load_codes(const spectrum_plan_t* plan, const map_t* a, const double* history, const int16_t* codes,
+                         int index, int group) {
     const int m = plan->m, p = plan->p, first = group * V, lanes = m - first < V ? m - first : V;
     double energy[V] = {0};
     for (int k = 0; k < plan->length; ++k) {
@@ -107,7 +106,7 @@ static inline __attribute__((always_inline)) double load_window(const spectrum_p
         double* z = a->work + 2 * V * (size_t)k;
         for (int c = 0; c < lanes; ++c) {
             const size_t at = (size_t)n * (size_t)m + (size_t)(first + c);
-            const double x = n < 0 ? history[(n + p) * m + first + c] : numbers ? numbers[at] : codes[at];
+            const double x = n < 0 ? history[(n + p) * m + first + c] : codes[at];
             z[c] = k < p ? 0 : x;
             z[V + c] = x;
             energy[c] += x * x;
@@ -117,6 +116,34 @@ static inline __attribute__((always_inline)) double load_window(const spectrum_p
     double most = 0;
     for (int c = 0; c < lanes; ++c) most = energy[c] > most ? energy[c] : most;
     return most;
+}
+
+/// The same of numbers, whose energy nobody needs.
+static inline __attribute__((always_inline)) void load_numbers(const spectrum_plan_t* plan, const map_t* a,
+                                                               const double* history, const double* numbers, int index,
+                                                               int first, const int lanes) {
+    const int m = plan->m, p = plan->p, before = p - index * plan->fresh; // samples of the window in the history
+    for (int k = 0; k < plan->length; ++k) {
+        const double* row =
+            k < before ? history + (size_t)((index * plan->fresh + k) * m) : numbers + (size_t)(k - before) * (size_t)m;
+        double* z = a->work + 2 * V * (size_t)k;
+        for (int c = 0; c < lanes; ++c) {
+            z[c] = k < p ? 0 : row[first + c];
+            z[V + c] = row[first + c];
+        }
+        for (int c = lanes; c < V; ++c) z[c] = z[V + c] = 0;
+    }
+}
+
+static void load_group(const spectrum_plan_t* plan, const map_t* a, const double* history, const double* numbers,
+                       int index, int group) {
+    const int first = group * V, lanes = plan->m - first < V ? plan->m - first : V;
+    if (lanes == V)
+        load_numbers(plan, a, history, numbers, index, first, V);
+    else if (lanes == V / 2)
+        load_numbers(plan, a, history, numbers, index, first, V / 2);
+    else
+        load_numbers(plan, a, history, numbers, index, first, lanes);
 }
 
 /// Current = (Z[f] + conj Z[N-f]) / 2, Full = (Z[f] - conj Z[N-f]) / 2i.
@@ -166,8 +193,8 @@ double ABSORB(const spectrum_plan_t* plan, double* memory, const double* history
     for (int b = 0; b < SPECTRUM_BATCH; ++b) {
         double most = 0;
         for (int g = 0; g < plan->groups; ++g) {
-            const double e = numbers ? load_window(plan, &a, history, NULL, numbers, b, g)
-                                     : load_window(plan, &a, history, codes, NULL, b, g);
+            const double e = codes ? load_codes(plan, &a, history, codes, b, g) : 0;
+            if (numbers) load_group(plan, &a, history, numbers, b, g);
             most = e > most ? e : most;
             split_spectra(plan, &a, transform(&a, plan->length), b, g);
         }

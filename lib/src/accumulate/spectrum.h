@@ -33,7 +33,8 @@ void okid_spectrum_create(const spectrum_plan_t* plan, double* memory);
 double okid_spectrum_error(const spectrum_plan_t* plan, double energy);
 
 /// Absorb spectrum_samples() samples, codes or numbers (the other one NULL), that follow the p samples of `history` (time
-/// order, m numbers each). @return the largest energy (sum of squares over the windows) of a channel, for okid_spectrum_error()
+/// order, m numbers each). @return of codes the largest energy (sum of squares over the windows) of a channel, for
+/// okid_spectrum_error()
 typedef double okid_spectrum_absorb_fn(const spectrum_plan_t* plan, double* memory, const double* history,
                                        const int16_t* codes, const double* numbers);
 

@@ -152,6 +152,19 @@ static void filter_tiles(const okid_filters_t* f, const double* rows, size_t cou
     }
 }
 
+/// An input times `channels` (1 to 4) numbers of a row from `first` on.
+static void input_tile(const okid_filters_t* f, const double* rows, size_t count, size_t input, size_t first,
+                       int channels) {
+    double sums[4] = {0};
+    if (channels == 4)
+        for (size_t n = 0; n < count; ++n)
+            for (size_t k = 0; k < 4; ++k) sums[k] += rows[n * f->m + input] * rows[n * f->m + first + k];
+    else
+        for (int k = 0; k < channels; ++k)
+            for (size_t n = 0; n < count; ++n) sums[k] += rows[n * f->m + input] * rows[n * f->m + first + (size_t)k];
+    for (int k = 0; k < channels; ++k) f->sums[(first + (size_t)k) * (f->n_u + 2 * f->states) + input] += sums[k];
+}
+
 okid_filters_fn FILTERS;
 void FILTERS(const okid_filters_t* self, const double* rows, size_t count) {
     const okid_filters_t f = *self;
@@ -163,16 +176,9 @@ void FILTERS(const okid_filters_t* self, const double* rows, size_t count) {
             first += channels;
         }
     for (size_t c = 0; c < f.n_u; ++c)
-        for (size_t r = 0; r < f.m; ++r) {
-            double even = 0, odd = 0;
-            const double* v = rows;
-            size_t n = 0;
-            for (; n + 1 < count; n += 2, v += 2 * f.m) {
-                even += v[c] * v[r];
-                odd += v[f.m + c] * v[f.m + r];
-            }
-            if (n < count) even += v[c] * v[r];
-            f.sums[r * (f.n_u + 2 * f.states) + c] += even + odd;
+        for (size_t r = 0; r < f.m; r += 4) {
+            const size_t channels = f.m - r < 4 ? f.m - r : 4;
+            input_tile(&f, rows, count, c, r, (int)channels);
         }
 }
 
