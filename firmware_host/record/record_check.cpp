@@ -48,7 +48,7 @@ struct input_moments {
         const auto more = static_cast<double>(piece.rows());
         const Eigen::VectorXd own = piece.colwise().mean(), apart = own - mean;
         const Eigen::MatrixXd left = piece.rowwise() - own.transpose();
-        products += left.transpose() * left + (count * more / (count + more)) * apart * apart.transpose();
+        products += left.transpose().lazyProduct(left) + (count * more / (count + more)) * (apart * apart.transpose());
         mean += apart * (more / (count + more));
         count += more;
     }
