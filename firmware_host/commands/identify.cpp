@@ -229,8 +229,14 @@ void add_identify(CLI::App& app) {
         "--stabilization", given->wanted.stabilization,
         "look at all orders and three horizons too, and list the modes that hold (JSON: \"stabilization\")");
     command
-        ->add_option("--sigma-blocks", given->wanted.sigma_blocks,
-                     "blocks of the record left out in turn for the standard deviations (default 20), 0 = none")
+        ->add_option("--sigma", given->wanted.sigma,
+                     "standard deviations: analytic (default; the method's derivative along each block of the record), "
+                     "jackknife (identified again without each block; also where a method has no derivative), none")
+        ->type_name("analytic|jackknife|none");
+    command
+        ->add_option(
+            "--sigma-blocks", given->wanted.sigma_blocks,
+            "blocks of the record for the standard deviations (default 20), 0 = none. Without --sigma: jackknife")
         ->type_name("N");
     command->add_flag(
         "--frf", given->frf,

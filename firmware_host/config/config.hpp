@@ -82,6 +82,7 @@ struct identification_config {
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
     int sigma_blocks = 20;                         ///< blocks left out for the standard deviations; 0 = none
+    bool analytic = true;                          ///< to first order where the method has a derivative, else anew
     bool restart_on_change = true; ///< window and forgetting: samples from before a change of the structure are dropped
     bool mkr = false;              ///< M, K and R with the final result
     double max_memory_mb = 8192;   ///< of the identification

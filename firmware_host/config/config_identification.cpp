@@ -111,6 +111,9 @@ void read_identification(const toml::table& file, live_config& config) {
         refuse_key(
             place, *t.get("sigma_blocks"), "sigma_blocks",
             fmt::format("found {}, expected 0 (no standard deviations) or {} to 100", out.sigma_blocks, fewest_blocks));
+    const auto sigma = t["sigma"].value_or(std::string(t.contains("sigma_blocks") ? "jackknife" : "analytic"));
+    out.analytic = sigma == "analytic";
+    if (sigma == "none") out.sigma_blocks = 0;
     if (out.window_s && out.forgetting)
         refuse_key(place, *t.get("forgetting"), "forgetting",
                    "window_s is given too; a window and forgetting together are not available, choose one");

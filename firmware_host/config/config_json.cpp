@@ -93,6 +93,9 @@ ordered_json identification_json(const identification_config& id) {
             {"refine", id.refine},
             {"forgetting", or_null(id.forgetting)},
             {"update_s", id.update_s},
+            {"sigma", id.sigma_blocks == 0 ? "none"
+                      : id.analytic        ? "analytic"
+                                           : "jackknife"},
             {"sigma_blocks", id.sigma_blocks},
             {"restart_on_change", id.restart_on_change},
             {"mkr", id.mkr}};

@@ -107,6 +107,7 @@ const std::vector<section_rule> schema = {
       {"window_s", kind::positive, 0, 1e6},
       {"forgetting", kind::positive, 0, 1},
       {"update_s", kind::positive, 0, 1e5},
+      {"sigma", kind::choice, 0, 0, {"analytic", "jackknife", "none"}},
       {"sigma_blocks", kind::whole, 0, 100},
       {"restart_on_change", kind::flag},
       {"mkr", kind::flag},

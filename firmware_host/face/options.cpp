@@ -70,6 +70,7 @@ option_places places_of(record_request& r) {
              {"sensing", &r.sensing},
              {"input_dofs", &r.input_dofs},
              {"output_dofs", &r.output_dofs},
+             {"sigma", &r.sigma},
              {"sigma_blocks", &r.sigma_blocks},
              {"refine", &r.refine}},
             {},

@@ -136,7 +136,8 @@ void start_from(const live_config& config, stream_request& to) {
     if (wanted.band) r.band = fmt::format("{}:{}", wanted.band->first, wanted.band->second);
     if (wanted.refine != (wanted.method == "auto" ? "auto" : "no")) r.refine = wanted.refine;
     if (wanted.decimate > 1) r.decimate = std::to_string(wanted.decimate);
-    r.sigma_blocks = std::to_string(wanted.sigma_blocks);
+    r.sigma = wanted.sigma_blocks == 0 ? "none" : wanted.analytic ? "analytic" : "jackknife";
+    if (wanted.sigma_blocks > 0) r.sigma_blocks = std::to_string(wanted.sigma_blocks);
     to.window_s = text_of(wanted.window_s);
     to.forgetting = text_of(wanted.forgetting);
     to.update_s = text_of(wanted.update_s);
@@ -163,6 +164,9 @@ std::string stream_json(const stream_config& config) {
                         {"window_s", or_null(wanted.window_s)},
                         {"forgetting", or_null(wanted.forgetting)},
                         {"update_s", wanted.update_s},
+                        {"sigma", wanted.sigma_blocks == 0 ? "none"
+                                  : wanted.analytic        ? "analytic"
+                                                           : "jackknife"},
                         {"sigma_blocks", wanted.sigma_blocks},
                         {"refine", wanted.refine},
                         {"restart_on_change", wanted.restart_on_change},
@@ -222,6 +226,7 @@ stream_config read_stream(const char* text, const live_config* config) {
     wanted.decimate = checked.decimate;
     wanted.sigma_blocks = checked.sigma_blocks;
     wanted.refine = where_it_serves ? "auto" : checked.refine;
+    wanted.analytic = checked.analytic;
     take_memory(given, out);
     take_samples(given, out);
     return out;

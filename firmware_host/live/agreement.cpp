@@ -31,6 +31,7 @@ record_options options_of(const stream_config& config) {
     out.hold = config.wanted.hold;
     out.detrend = config.wanted.detrend;
     out.sigma_blocks = config.wanted.sigma_blocks;
+    out.analytic = config.wanted.analytic;
     out.band = config.wanted.band;
     out.decimate = config.wanted.decimate;
     out.modes_without_matrices = true;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  standard deviations while a stream runs: the sums of its blocks, each left out in turn
-// METHOD   delete-one-block jackknife (okid/uncertainty.h); blocks of a growing memory are paired up when all are full
+// METHOD   the model without each block (okid/uncertainty.h); blocks of a growing memory are paired up when all are full
 #include "blocks.hpp"
 
 #include "error.hpp"
+#include "result/method.hpp"
 #include "stream_memory.hpp"
 
 #include <algorithm>
@@ -34,7 +35,7 @@ owned_sums::owned_sums(const okid_accumulator_config_t& config) {
 }
 
 live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks,
-                         bool states_only)
+                         bool analytic, bool mass, bool states_only)
     : whole_(whole), sums_(block_sums(whole)), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),
       blocks_(static_cast<std::size_t>(blocks)), n_u_(whole.n_u), n_y_(whole.n_y),
       most_states_(okid_identify_max_order(&identify)), dt_(1 / identify.fs_hz) {
@@ -49,11 +50,16 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
     }
     const std::size_t count = states_only ? 0 : block_sums_held(whole, blocks);
     for (std::size_t k = 0; k < count; ++k) parts_.push_back(make());
-    const okid_jackknife_config_t config{identify, sums_};
-    const std::size_t bytes = okid_jackknife_memsize(&config);
-    jackknife_block_ = allocate(bytes, blocks);
-    if (okid_jackknife_create(&jackknife_, &config, jackknife_block_.get(), bytes) != OKID_OK)
-        throw failure(exit_usage, "[identification]: the sums for standard deviations cannot be made");
+    const auto create = [&](const okid_jackknife_config_t& config, auto& memory, okid_jackknife_t*& to) {
+        const std::size_t bytes = okid_jackknife_memsize(&config);
+        memory = allocate(bytes, blocks);
+        if (okid_jackknife_create(&to, &config, memory.get(), bytes) != OKID_OK)
+            throw failure(exit_usage, "[identification]: the sums for standard deviations cannot be made");
+    };
+    linear_mass_ = !is_subspace(identify.method);
+    const live_jackknives needed(identify, sums_, analytic, mass);
+    if (needed.linear) create(needed.config(1), linear_block_, linear_);
+    if (needed.anew) create(needed.config(0), anew_block_, anew_);
     modes_ = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, mass_plan{}, dt_);
 }
 
@@ -185,15 +191,26 @@ void live_blocks::delete_slots(okid_accumulator_t* whole, replicate_statistics& 
     }
 }
 
-std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, const okid_identified_t& model,
-                                             const mass_plan& plan) {
+/// The derivative where it serves, else identifications without each block, for which a window becomes one record.
+bool live_blocks::begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass) {
+    jackknife_ = linear_;
+    if (linear_ && (linear_mass_ || !mass)) {
+        if (okid_jackknife_begin_linear(linear_, by, whole, &model) == OKID_OK) return true;
+    }
+    jackknife_ = anew_;
+    if (!anew_) return false;
     okid_accumulator_t* all = whole;
     if (window()) {
         all = parts_[0].sums;
         okid_accumulator_reset(all);
-        if (okid_accumulator_take_slots(all, whole, 0, okid_accumulator_slots(whole)) != OKID_OK) return std::nullopt;
+        if (okid_accumulator_take_slots(all, whole, 0, okid_accumulator_slots(whole)) != OKID_OK) return false;
     }
-    if (okid_jackknife_begin(jackknife_, all, &model) != OKID_OK) return std::nullopt;
+    return okid_jackknife_begin(anew_, all, &model) == OKID_OK;
+}
+
+std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, okid_identify_t* by,
+                                             const okid_identified_t& model, const mass_plan& plan) {
+    if (!begin(whole, by, model, plan.wanted())) return std::nullopt;
     std::unique_ptr<replicate_statistics> with_mass;
     if (plan.wanted()) with_mass = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, plan, dt_);
     replicate_statistics& statistics = with_mass ? *with_mass : *modes_;

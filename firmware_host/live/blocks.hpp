@@ -45,9 +45,11 @@ class live_blocks {
     /// @param blocks  to leave out: a window has about so many, a growing memory from so many to twice as many, a fading
     ///                one twice as many, because the young ones weigh most. Throws `failure` (exit 2) when the memory
     ///                does not suffice
+    /// @param analytic  to first order, where the method has a derivative
+    /// @param mass      M, K, R will be wanted: of the n4sid methods the derivative knows no B and D
     /// @param states_only  only take() is called: there is no memory for other blocks
     live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks,
-                bool states_only = false);
+                bool analytic, bool mass, bool states_only);
 
     void set_units(const std::vector<double>& scale, const std::vector<double>& offset);
 
@@ -63,8 +65,9 @@ class live_blocks {
     /// Begin anew, as the whole does.
     void reset();
 
-    /// Standard deviations of `model`, identified from `whole`; none with too few blocks.
-    std::optional<deviations> sigma(okid_accumulator_t* whole, const okid_identified_t& model, const mass_plan& plan);
+    /// Standard deviations of `model`, which the last run of `by` identified from `whole`; none with too few blocks.
+    std::optional<deviations> sigma(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model,
+                                    const mass_plan& plan);
 
   private:
     struct part : owned_sums {
@@ -80,6 +83,7 @@ class live_blocks {
     void delete_parts(okid_accumulator_t* whole, replicate_statistics& to);
     void delete_slots(okid_accumulator_t* whole, replicate_statistics& to);
     void leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to);
+    bool begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass);
 
     okid_accumulator_config_t whole_, sums_{};
     std::size_t m_, blocks_;
@@ -90,10 +94,12 @@ class live_blocks {
     std::vector<double> history_;     ///< the last samples of the run, at most `lags`
     std::vector<std::int16_t> codes_; ///< the same as codes, when a part begins
     std::vector<std::int32_t> wide_codes_;
-    std::unique_ptr<std::byte[]> jackknife_block_;
-    okid_jackknife_t* jackknife_ = nullptr;
+    std::unique_ptr<std::byte[]> linear_block_, anew_block_;
+    okid_jackknife_t *linear_ = nullptr, *anew_ = nullptr; ///< to first order, identified anew; NULL: not needed
+    okid_jackknife_t* jackknife_ = nullptr;                ///< the one in use
     std::unique_ptr<replicate_statistics> modes_;
     int n_u_, n_y_, most_states_;
+    bool linear_mass_; ///< the derivative has B and D
     double dt_;
 };
 

@@ -81,8 +81,8 @@ void identifier::create_accumulator(const stream_config& config) {
     okid_accumulator_set_units(accumulator_, scale_.data(), offset_.data());
     if (config.wanted.refine != "no") refiner_ = std::make_unique<sum_refiner>(config);
     if (config.wanted.sigma_blocks == 0) return;
-    blocks_ =
-        std::make_unique<live_blocks>(sums_config_, identify_config_, config.wanted.sigma_blocks, config.states_only);
+    blocks_ = std::make_unique<live_blocks>(sums_config_, identify_config_, config.wanted.sigma_blocks,
+                                            config.wanted.analytic, config.mass.wanted(), config.states_only);
     blocks_->set_units(scale_, offset_);
 }
 

@@ -61,7 +61,8 @@ class identifier {
     std::optional<deviations> sigma(const mass_plan& plan) {
         if (agreed_) return agreed_->found().context.sigma;
         if (refiner_ && refiner_->refined()) return refiner_->sigma(model_, plan);
-        return blocks_ && samples_ >= blind_until_ ? blocks_->sigma(accumulator_, model_, plan) : std::nullopt;
+        return blocks_ && samples_ >= blind_until_ ? blocks_->sigma(accumulator_, identify_, model_, plan)
+                                                   : std::nullopt;
     }
     /// Of each output 100 (1 - innovation / spread), both RMS: what the model of the last run() says of the next sample.
     std::vector<double> predicted_percent();

@@ -98,6 +98,20 @@ std::size_t block_sums_held(const okid_accumulator_config_t& whole, int blocks) 
     return whole.slots > 0 ? 2 : whole.forgetting < 1 ? 2 * count + 1 : 2 * count;
 }
 
+live_jackknives::live_jackknives(const okid_identify_config_t& of, const okid_accumulator_config_t& blocks,
+                                 bool analytic, bool mass)
+    : identify(of), sums(blocks) {
+    const okid_jackknife_config_t derivative = config(1);
+    linear = analytic && okid_jackknife_memsize(&derivative) > 0;
+    anew = !linear || (mass && is_subspace(of.method));
+}
+
+double live_jackknives::bytes() const {
+    const okid_jackknife_config_t derivative = config(1), plain = config(0);
+    return (linear ? static_cast<double>(okid_jackknife_memsize(&derivative)) : 0) +
+           (anew ? static_cast<double>(okid_jackknife_memsize(&plain)) : 0);
+}
+
 double stream_bytes(const stream_config& stream) {
     if (stream.wanted.method == "auto") {
         const okid_watch_config_t watch = watch_config_of(stream);
@@ -115,13 +129,12 @@ double stream_bytes(const stream_config& stream) {
     if (stream.wanted.refine != "no") out += sum_refiner_bytes(stream);
     if (stream.wanted.sigma_blocks == 0) return out;
     const okid_accumulator_config_t block = block_sums(sums);
-    const okid_jackknife_config_t jackknife{identify, block};
+    const live_jackknives jackknives(identify, block, stream.wanted.analytic, stream.mass.wanted());
     const okid_replicates_config_t replicates{identify.n_u, identify.n_y, watch.max_order, nullptr};
     if (!stream.states_only)
         out += static_cast<double>(okid_accumulator_memsize(&block)) *
                static_cast<double>(block_sums_held(sums, stream.wanted.sigma_blocks));
-    return out + static_cast<double>(okid_jackknife_memsize(&jackknife)) +
-           static_cast<double>(okid_replicates_memsize(&replicates)) + 10 * lagged;
+    return out + jackknives.bytes() + static_cast<double>(okid_replicates_memsize(&replicates)) + 10 * lagged;
 }
 
 void fit_memory(stream_config& stream) {

@@ -5,6 +5,8 @@
 #pragma once
 #include "stream_config.hpp"
 
+#include <okid/uncertainty.h>
+
 #include <cstddef>
 
 namespace okid_host {
@@ -12,6 +14,19 @@ namespace okid_host {
 /// The sums of one block that is left out for the standard deviations, and how many of them are held at once.
 okid_accumulator_config_t block_sums(const okid_accumulator_config_t& whole);
 std::size_t block_sums_held(const okid_accumulator_config_t& whole, int blocks);
+
+/// What standard deviations of a stream are made with: derivatives, identifications without each block, or either when
+/// the derivative has no B and D for M, K, R.
+struct live_jackknives {
+    live_jackknives(const okid_identify_config_t& identify, const okid_accumulator_config_t& sums, bool analytic,
+                    bool mass);
+    okid_jackknife_config_t config(int linear_form) const { return {identify, sums, linear_form}; }
+    double bytes() const;
+
+    okid_identify_config_t identify;
+    okid_accumulator_config_t sums;
+    bool linear, anew;
+};
 
 /// Bytes of all of it; 0 when p, rows, order or window are outside what the library takes.
 double stream_bytes(const stream_config& stream);

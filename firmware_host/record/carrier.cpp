@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  standard deviations of the modes of a consensus
 // METHOD   CVA with the long horizon at one rate, at the order where the consensus found all modes of that rate; the same without
-//          one block each (jackknife)
+//          one block each
 #include "carrier.hpp"
 
 #include "record_work.hpp"
@@ -184,7 +184,7 @@ std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& mod
 std::vector<std::optional<carried_mode>> carry(const record_level& level, int number,
                                                const std::vector<consensus_run>& runs,
                                                const std::vector<consensus_mode>& modes, int n_u, int n_y, bool at_rest,
-                                               int blocks) {
+                                               int blocks, bool analytic) {
     std::vector<std::optional<carried_mode>> out(modes.size());
     const consensus_run* run = long_run(runs, number);
     const int order = run ? order_with_all(runs, *run, modes) : 0;
@@ -209,6 +209,8 @@ std::vector<std::optional<carried_mode>> carry(const record_level& level, int nu
         work.at_rest = at_rest;
         work.config = config;
         work.model = model;
+        work.identifier = identifier;
+        work.analytic = analytic;
         replicates = leave_out_blocks(work, sums.handle(), blocks);
     }
     std::vector<mode_shift> wanted;

@@ -27,9 +27,10 @@ std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& mod
 
 /// The modes of `modes` that belong to this level, from one CVA model of the lowest order that has them all; none where the
 /// model lacks them. @param blocks  left out in turn for the standard deviations, 0 = none
+/// @param analytic  to first order
 std::vector<std::optional<carried_mode>> carry(const record_level& level, int number,
                                                const std::vector<consensus_run>& runs,
                                                const std::vector<consensus_mode>& modes, int n_u, int n_y, bool at_rest,
-                                               int blocks);
+                                               int blocks, bool analytic);
 
 } // namespace okid_host

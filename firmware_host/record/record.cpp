@@ -200,6 +200,7 @@ void configure(const record_options& options, const missing_count& missing, reco
     config.order = options.order;
     config.max_order = options.max_order;
     config.fs_hz = options.fs_hz;
+    work.analytic = options.analytic && options.refine != "yes"; // else its sums are not those of `identifier`
     config.detrend = options.detrend == "mean" && !work.at_rest ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
     if (!work.at_rest) remark_early_hit(work.set, is_subspace(config.method) ? config.rows : config.p, work.context);
 }

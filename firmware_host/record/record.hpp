@@ -30,6 +30,7 @@ struct record_options {
     remarks said;   ///< known before the data are seen
     bool stabilization = false;                    ///< look at all orders and some horizons too
     int sigma_blocks = 20;                         ///< blocks left out in turn for the standard deviations; 0 = none
+    bool analytic = true;                          ///< to first order where the method has a derivative, else anew
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
     int threads = 0;                               ///< of auto, at a time; 0: all processors

@@ -108,9 +108,9 @@ void shapes_at_own_rate(const std::vector<record_level>& levels, const std::vect
                         std::vector<listed_pair>& carried) {
     if (std::none_of(modes.begin(), modes.end(), [](const consensus_mode& mode) { return mode.level > 0; })) return;
     for (consensus_mode& mode : modes) mode.level = 0; // one order for all of them
-    const auto found =
-        carry(levels[0], 0, runs, modes, static_cast<int>(options.inputs.size()),
-              static_cast<int>(options.outputs.size()), rest, options.mass.wanted() ? options.sigma_blocks : 0);
+    const auto found = carry(levels[0], 0, runs, modes, static_cast<int>(options.inputs.size()),
+                             static_cast<int>(options.outputs.size()), rest,
+                             options.mass.wanted() ? options.sigma_blocks : 0, options.analytic);
     for (std::size_t i = 0; i < found.size(); ++i) {
         auto& to = carried[i].second;
         if (!found[i] || !to || carried[i].first.level == 0) continue;
@@ -137,7 +137,7 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
         });
         if (any)
             found[k] = carry(levels[k], static_cast<int>(k), runs, modes, static_cast<int>(options.inputs.size()),
-                             static_cast<int>(options.outputs.size()), rest, options.sigma_blocks);
+                             static_cast<int>(options.outputs.size()), rest, options.sigma_blocks, options.analytic);
     });
     for (const auto& of_level : found)
         for (std::size_t i = 0; i < of_level.size(); ++i)

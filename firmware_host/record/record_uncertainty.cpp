@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  standard deviations of what is identified from records in memory
-// METHOD   delete-one-block jackknife over the sums of lagged products (okid/uncertainty.h)
+// METHOD   the model without each block, from the sums of lagged products: to first order or identified anew
+//          (okid/uncertainty.h)
 #include "record_uncertainty.hpp"
 
 #include "record_work.hpp"
@@ -91,6 +92,19 @@ std::string moved(const okid_identified_t& model, const okid_identified_t& other
     return text;
 }
 
+/// @return nullptr: the method, or this identification, has no derivative; or there is no memory
+okid_jackknife_t* begin_jackknife(okid_jackknife_config_t shape, int linear, const record_work& work,
+                                  okid_accumulator_t* whole, std::unique_ptr<std::byte[]>& block) {
+    shape.linear = linear;
+    const std::size_t bytes = okid_jackknife_memsize(&shape);
+    block.reset(bytes > 0 ? new (std::nothrow) std::byte[bytes] : nullptr);
+    okid_jackknife_t* out = nullptr;
+    if (!block || okid_jackknife_create(&out, &shape, block.get(), bytes) != OKID_OK) return nullptr;
+    const okid_status_t status = linear ? okid_jackknife_begin_linear(out, work.identifier, whole, &work.model)
+                                        : okid_jackknife_begin(out, whole, &work.model);
+    return status == OKID_OK ? out : nullptr;
+}
+
 } // namespace
 
 std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accumulator_t* whole, int blocks) {
@@ -103,13 +117,11 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
         std::min(static_cast<std::size_t>(blocks), static_cast<std::size_t>(okid_accumulator_rows(whole)) / lags);
     std::vector<replicate_model> out;
     const sums part(shape.sums);
-    const std::size_t bytes = okid_jackknife_memsize(&shape);
-    const std::unique_ptr<std::byte[]> block(new (std::nothrow) std::byte[bytes]);
-    okid_jackknife_t* jackknife = nullptr;
-    if (parts < std::size_t{fewest_blocks} || !part.handle || !block ||
-        okid_jackknife_create(&jackknife, &shape, block.get(), bytes) != OKID_OK ||
-        okid_jackknife_begin(jackknife, whole, &work.model) != OKID_OK)
-        return out;
+    if (parts < std::size_t{fewest_blocks} || !part.handle) return out;
+    std::unique_ptr<std::byte[]> block;
+    okid_jackknife_t* jackknife = work.analytic ? begin_jackknife(shape, 1, work, whole, block) : nullptr;
+    if (!jackknife) jackknife = begin_jackknife(shape, 0, work, whole, block);
+    if (!jackknife) return out;
     for (const auto& pieces : cut(work.set.records, work.at_rest ? 0 : lags, parts)) {
         if (feed_pieces(part.handle, work.set, pieces, lags) < 0) return {};
         if (okid_accumulator_rows(part.handle) == 0) continue;

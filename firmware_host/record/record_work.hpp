@@ -26,6 +26,7 @@ struct record_work {
     result_context context;
     std::unique_ptr<std::byte[]> memory;
     okid_identify_t* identifier = nullptr;
+    bool analytic = false;        ///< deviations out of what it holds, see leave_out_blocks()
     okid_identified_t realised{}; ///< what it gave, before any refinement
     std::unique_ptr<refined_arrays> refined;
     std::vector<double> states;                  ///< initial ones of fits that are left for later; else empty

@@ -169,8 +169,7 @@ void check_agreement(const record_request& given, record_options& options) {
     }
     if (!given.decimate.empty() && given.decimate != "auto")
         options.decimate = static_cast<int>(whole_number("--decimate", given.decimate, 1, 1000));
-    if (!given.threads.empty())
-        options.threads = static_cast<int>(whole_number("--threads", given.threads, 1, 1024));
+    if (!given.threads.empty()) options.threads = static_cast<int>(whole_number("--threads", given.threads, 1, 1024));
     if (!given.modes.empty()) options.modes = numbers_of("--modes", given.modes);
 }
 
@@ -200,11 +199,14 @@ record_options check_request(const record_request& given) {
     }
     if (!given.max_order.empty())
         options.max_order = static_cast<int>(whole_number("--max-order", given.max_order, 1, 10000));
+    if (!given.sigma.empty()) one_of("--sigma", given.sigma, {"analytic", "jackknife", "none"});
+    options.analytic = given.sigma.empty() ? given.sigma_blocks.empty() : given.sigma == "analytic";
     if (!given.sigma_blocks.empty())
         options.sigma_blocks = static_cast<int>(whole_number("--sigma-blocks", given.sigma_blocks, 0, most_blocks));
     if (options.sigma_blocks > 0 && options.sigma_blocks < fewest_blocks)
         usage(fmt::format("--sigma-blocks: found {}, expected 0 (no standard deviations) or {} to {}",
                           options.sigma_blocks, fewest_blocks, most_blocks));
+    if (given.sigma == "none") options.sigma_blocks = 0;
     options.stabilization = given.stabilization;
     options.hankel = given.hankel;
     options.refine = !given.refine.empty() ? given.refine : agreed ? "auto" : "no";

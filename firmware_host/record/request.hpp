@@ -13,10 +13,10 @@ struct record_request {
     std::vector<std::string> inputs, outputs; ///< names of the channels
     std::string method, hankel = "system", order = "auto", hold, detrend = "mean", start = "moving";
     std::string sensing = "acceleration", input_dofs, output_dofs; ///< lists with commas between
-    std::string fs, p, rows, max_order, sigma_blocks;
+    std::string fs, p, rows, max_order, sigma, sigma_blocks;
     std::string band, decimate, modes, threads; ///< of method auto
-    std::string hit_dofs;              ///< one number a record
-    std::string refine;                ///< auto, yes or no; empty: auto under method auto, else no
+    std::string hit_dofs;                       ///< one number a record
+    std::string refine;                         ///< auto, yes or no; empty: auto under method auto, else no
     bool stabilization = false;
 };
 

@@ -107,6 +107,7 @@ OF_OTHER_FILES = {
     ("channel", "value"): ("config_channel.cpp", r'\["value"\]\.value_or\(std::string\("(\w+)"\)\)'),
     ("channel", "signed"): ("config_channel.cpp", r'\["signed"\]\.value_or\((\w+)\)'),
     ("identification", "refine"): ("config_identification.cpp", r'std::string\(agreed \? "(\w+)" : "no"\)'),
+    ("identification", "sigma"): ("config_identification.cpp", r'"sigma_blocks"\) \? "jackknife" : "(\w+)"'),
     ("trigger", "source"): ("config_trigger.cpp", r'\["source"\]\.value_or\(std::string\("(\w+)"\)\)'),
     ("trigger", "edge"): ("config_trigger.cpp", r'\["edge"\]\.value_or\(std::string\("(\w+)"\)\)'),
     ("trigger", "active_low"): ("config_trigger.cpp", r'\["active_low"\]\.value_or\((\w+)\)'),

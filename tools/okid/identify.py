@@ -36,6 +36,7 @@ def identify(
     output_dofs: Sequence[int] | None = None,
     sensing: str | Sequence[str] = "acceleration",
     refine: bool | str | None = None,
+    sigma: str | None = None,
     sigma_blocks: int | None = None,
     units: Sequence[str] | None = None,
     band: tuple[float, float] | None = None,
@@ -76,8 +77,9 @@ def identify(
     freedom also the delay of every output (result.skew), which is taken out of M, K and R. "auto", the default of
     method "auto": where the residuals are nearly white and all modes stay who they are. "no" (False): not.
 
-    `sigma_blocks`: blocks of the record that are left out in turn for the standard deviations, 8 to 100 (default 20);
-    0 = none. They cost some 3 (okid-era) to 20 identifications.
+    `sigma`: standard deviations, "analytic" (default: the derivative of the method along each of `sigma_blocks` blocks
+    of the record, 8 to 100, default 20), "jackknife" (identified anew without each block, 3 to 20 identifications;
+    also where a method has no derivative: docs/numerics.md) or "none". `sigma_blocks` alone: jackknife, 0 = none.
 
     Of "auto" alone: `band` (low, high) in Hz where modes are sought; `decimate` the largest factor of the lower rates;
     `modes` the numbers, from 1, of the listed modes that are kept: picked by hand they count as confident; `threads`
@@ -103,7 +105,7 @@ def identify(
         "fs": fs, "method": method, "p": p, "rows": rows, "order": order, "max_order": max_order, "hankel": hankel,
         "detrend": detrend, "hold": hold, "start": start, "input_dofs": input_dofs, "output_dofs": output_dofs,
         "sensing": sensing, "refine": ("no", "yes")[refine] if isinstance(refine, bool) else refine,
-        "sigma_blocks": sigma_blocks, "units": units,
+        "sigma": sigma, "sigma_blocks": sigma_blocks, "units": units,
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
         "hit_dofs": hit_dofs, "threads": threads,
     }  # fmt: skip

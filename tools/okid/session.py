@@ -35,7 +35,7 @@ class Session:
     `inputs`, `outputs`: names of the channels, or how many; no inputs = ambient. `fs` Hz. `window_s` forgets what is
     older (in blocks of about a twentieth of it), `forgetting` fades by that factor a sample, neither keeps everything.
     `codes` 16, 24 or 32 takes ADC codes with `scale` and `offset` (value = scale code + offset, one for all channels or
-    one each), 0 real numbers. `sigma_blocks` 0 or 8 to 100 blocks that are left out in turn for ± (0 = none).
+    one each), 0 real numbers. `sigma`, `sigma_blocks`: ± as in okid.identify().
     `restart_on_change`: once the modes have come to rest at three calls of modes() in a row, a change of the structure
     makes a window or a fading memory forget what was before. `input_dofs`, `output_dofs`, `sensing`, `hold`: as in
     okid.identify(), for M, K and R.
@@ -75,7 +75,8 @@ class Session:
         codes: int = 0,
         scale: ArrayLike = 1.0,
         offset: ArrayLike = 0.0,
-        sigma_blocks: int = 20,
+        sigma: str | None = None,
+        sigma_blocks: int | None = None,
         refine: bool | str | None = None,
         input_dofs: Sequence[int] | None = None,
         output_dofs: Sequence[int] | None = None,
