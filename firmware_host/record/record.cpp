@@ -310,7 +310,7 @@ result_context describe_records(const record_set& set, const record_options& opt
     if (missing.samples)
         context.warnings.emplace_back("missing_samples",
                                       fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was "
-                                                  "interpolated; the lags start anew after each gap",
+                                                  "interpolated; the lags restart after each gap",
                                                   missing.samples, total, missing.gaps, missing.gaps == 1 ? "" : "s"));
     return context;
 }

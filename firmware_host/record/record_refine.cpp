@@ -21,7 +21,6 @@ namespace {
 constexpr int blocks = 20, draws = 64; ///< of a record; from sums
 constexpr std::size_t most_runs = 32;
 constexpr double same_percent = 0.01; ///< fits closer than this are the same
-constexpr double other_percent = 0.5; ///< and that of noise that was made white: least squares is not the likeliest
 constexpr double lost_percent = 0.5;  ///< a loss of prediction worth a remark
 
 std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
@@ -220,10 +219,10 @@ refinement report(const okid_refined_t& found, int n_y) {
 
 /// Refine; where what is left has a colour, again behind the filter that takes it out. Stays that of the whiter residuals.
 std::unique_ptr<refiner> refine_runs(driven_runs& runs, const okid_identified_t& start, bool constants, int iterations,
-                                     std::vector<double>& filter) {
+                                     noise_colour colour, std::vector<double>& filter) {
     filter = {1};
     auto plain = std::make_unique<refiner>(runs, start, constants, iterations);
-    if (plain->status < 0 || plain->found.whiteness <= nearly_white) return plain;
+    if (colour == noise_colour::white || plain->status < 0 || plain->found.whiteness <= nearly_white) return plain;
     okid_identified_t from = start;
     from.A = plain->found.A;
     from.B = plain->found.B;
@@ -272,14 +271,14 @@ double whiteness_nearby(bool constants, const record_work& work) {
     constexpr std::size_t glance = 20000;
     driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)), glance);
     std::vector<double> filter;
-    const auto one = refine_runs(runs, work.model, constants, 2, filter);
+    const auto one = refine_runs(runs, work.model, constants, 2, noise_colour::any, filter);
     return one->status < 0 ? INFINITY : one->found.whiteness;
 }
 
-likeliest_model likeliest(bool constants, const record_work& work) {
+likeliest_model likeliest(bool constants, const record_work& work, noise_colour colour) {
     driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)));
     std::vector<double> filter;
-    const auto one = refine_runs(runs, work.model, constants, 0, filter);
+    const auto one = refine_runs(runs, work.model, constants, 0, colour, filter);
     likeliest_model out = outcome(*one, work.model);
     out.found.noise_order = static_cast<int>(filter.size()) - 1;
     if (!one->noise.empty()) out.found.noise_std = one->noise;
@@ -296,9 +295,12 @@ likeliest_model likeliest(bool constants, const okid_identified_t& start, const 
 
 std::vector<replicate_model> refine_model(bool constants, record_work& result) {
     std::string reason = "it simulates the record worse";
-    for (const bool with : {true, false}) {
-        if (with && !constants) continue;
-        likeliest_model one = likeliest(with, result);
+    bool coloured = true; // of the last trial
+    for (const auto& [with, colour] : {std::pair{true, noise_colour::any}, std::pair{true, noise_colour::white},
+                                       std::pair{false, noise_colour::any}, std::pair{false, noise_colour::white}}) {
+        if ((with && !constants) || (colour == noise_colour::white && !coloured)) continue;
+        likeliest_model one = likeliest(with, result, colour);
+        coloured = one.found.noise_order > 0;
         if (one.status == OKID_ERR_NO_MODES) continue;
         if (one.status < 0) {
             reason = okid_status_text(one.status);
@@ -308,8 +310,7 @@ std::vector<replicate_model> refine_model(bool constants, record_work& result) {
         trial.model = one.model;
         const double predicted = mean_of(result.context.prediction_percent);
         choose_gain(result.set, predicted, *one.arrays, trial);
-        if (!(mean_of(trial.context.simulation_percent) >=
-              mean_of(result.context.simulation_percent) - (one.found.noise_order > 0 ? other_percent : same_percent)))
+        if (!(mean_of(trial.context.simulation_percent) >= mean_of(result.context.simulation_percent) - same_percent))
             continue;
         result.model = trial.model;
         result.refined = std::move(one.arrays);

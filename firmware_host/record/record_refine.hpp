@@ -23,8 +23,10 @@ struct likeliest_model {
 /// How white the residuals of a likelier model are, their colour taken out where they have one, from two steps over 20,000 samples; infinite where there is none.
 double whiteness_nearby(bool constants, const record_work& work);
 
-/// Noise that is not white is made so first (whitening.hpp). @param constants  as for refine_model()
-likeliest_model likeliest(bool constants, const record_work& work);
+enum class noise_colour { white, any };
+
+/// @param constants  as for refine_model(). @param colour  any: noise that is not white is made so first (whitening.hpp)
+likeliest_model likeliest(bool constants, const record_work& work, noise_colour colour = noise_colour::any);
 /// The same from correlation sums; `replicates`: 64 draws from the Cramér-Rao bound instead.
 likeliest_model likeliest(bool constants, const okid_identified_t& start, const okid_correlation_sums_t& sums);
 

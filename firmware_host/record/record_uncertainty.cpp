@@ -17,6 +17,8 @@
 namespace okid_host {
 namespace {
 
+constexpr double most_of_one_block = 0.2; // share of the power, mean over the outputs: 20 even blocks have 0.05
+
 struct sums {
     std::unique_ptr<std::byte[]> block;
     okid_accumulator_t* handle = nullptr;
@@ -44,6 +46,28 @@ std::vector<std::vector<record_piece>> cut(const std::vector<record_data>& recor
         at = end;
     }
     return out;
+}
+
+/// Does a block hold so much of the record that the model follows it? Then the change to first order is much smaller than
+/// that of the model without it: a free decay is over after a block or two.
+bool one_block_rules(const record_set& set, const std::vector<std::vector<record_piece>>& parts) {
+    const std::size_t n_y = set.n_y;
+    std::vector<double> power(parts.size() * n_y), whole(n_y);
+    for (std::size_t b = 0; b < parts.size(); ++b)
+        for (const record_piece& piece : parts[b]) {
+            const double* rows = set.rows(set.records[piece.record]) + set.n_u;
+            for (std::size_t n = piece.first; n < piece.last; ++n)
+                for (std::size_t i = 0; i < n_y; ++i)
+                    if (const double y = rows[n * set.channels() + i]; !std::isnan(y)) power[b * n_y + i] += y * y;
+        }
+    for (std::size_t k = 0; k < power.size(); ++k) whole[k % n_y] += power[k];
+    for (std::size_t b = 0; b < parts.size(); ++b) {
+        double share = 0;
+        for (std::size_t i = 0; i < n_y; ++i)
+            if (whole[i] > 0) share += power[b * n_y + i] / whole[i] / static_cast<double>(n_y);
+        if (share > most_of_one_block) return true;
+    }
+    return false;
 }
 
 /// The pieces, each behind the samples before it; before a record begins there is silence.
@@ -119,10 +143,12 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
     const sums part(shape.sums);
     if (parts < std::size_t{fewest_blocks} || !part.handle) return out;
     std::unique_ptr<std::byte[]> block;
-    okid_jackknife_t* jackknife = work.analytic ? begin_jackknife(shape, 1, work, whole, block) : nullptr;
+    const auto all_pieces = cut(work.set.records, work.at_rest ? 0 : lags, parts);
+    const bool linear = work.analytic && !one_block_rules(work.set, all_pieces);
+    okid_jackknife_t* jackknife = linear ? begin_jackknife(shape, 1, work, whole, block) : nullptr;
     if (!jackknife) jackknife = begin_jackknife(shape, 0, work, whole, block);
     if (!jackknife) return out;
-    for (const auto& pieces : cut(work.set.records, work.at_rest ? 0 : lags, parts)) {
+    for (const auto& pieces : all_pieces) {
         if (feed_pieces(part.handle, work.set, pieces, lags) < 0) return {};
         if (okid_accumulator_rows(part.handle) == 0) continue;
         okid_model_t found{};

@@ -23,6 +23,7 @@ METHODS = ["okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"]
 # Relative; another processor or BLAS adds in another order. A small difference of large numbers has fewer digits.
 LOOSE = {"std": 1e-4, "damping_ratio": 1e-6, "R": 1e-5, "mkr": 1e-6, "Y": 1e-7, "percent": 1e-6, "doubtful": 1e-4}
 # Depend on the signs and order that the SVD happens to choose, or say which release wrote them.
+REWORDED = {"start anew after": "restart after"}  # a text that says the same in better words
 SKIPPED = {"A", "B", "C", "D", "K", "x0", "version", "wall_time", "config"}
 
 
@@ -51,6 +52,8 @@ def compare(now: Any, then: Any, path: str = "") -> None:
     elif isinstance(then, float):
         assert now == pytest.approx(then, rel=tolerance(path), abs=1e-9), path
     else:
+        for old, new in REWORDED.items() if isinstance(then, str) else ():
+            then = then.replace(old, new)
         assert now == then, path
 
 

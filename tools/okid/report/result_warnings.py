@@ -12,8 +12,8 @@ from okid.report.material import Material
 
 # Nothing is to be done about these (docs/reference/result.md). Any other code, a newer one too, asks for a look.
 HARMLESS = frozenset({
-    "channel_skew", "decimated", "pdc_undetermined", "qr_factor", "refine_failed", "resampled", "restarted",
-    "unit_converted",
+    "channel_skew", "decimated", "pdc_undetermined", "qr_factor", "reciprocity", "refine_failed", "resampled",
+    "restarted", "unit_converted",
 })  # fmt: skip
 MILD = ' class="mild"'
 
