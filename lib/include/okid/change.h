@@ -48,8 +48,10 @@ typedef struct okid_change_verdict_t {
     double statistic; ///< chi-square in the limit of many blocks: s' (C + C_0)^-1 s of the shifts s
     double p_value;   ///< probability of so much without a change (F distribution); NaN with fewer than four blocks
     double freedom;   ///< of the covariance estimated from the blocks
-    int32_t modes, farthest; ///< modes tested; the one with the largest |shift| / sigma
-    int32_t blocks, alarm;   ///< blocks tested; 1: p_value < false_alarm
+    int32_t modes;    ///< tested
+    int32_t farthest; ///< the mode with the largest |shift| / sigma
+    int32_t blocks;   ///< tested
+    int32_t alarm;    ///< 1: p_value < false_alarm
 } okid_change_verdict_t;
 
 /// Private; lives in the caller's block.

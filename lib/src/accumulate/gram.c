@@ -18,7 +18,7 @@ static void add_ends(const okid_accumulator_t* a, double* gram, double sign, con
     for (size_t i = m, l = 0; i < n; i += m, ++l)
         for (size_t c = 0; c < m; ++c) gram[i + c] = ends[acc_end(a, l, c)];
     for (size_t j = m; j < n; ++j) {
-        const double* const sample = gram, number = sign * gram[j];
+        const double *const sample = gram, number = sign * gram[j];
         double* const column = gram + j * n;
         for (size_t i = m; i < j; ++i) column[i] += sample[i] * number;
     }

@@ -24,7 +24,8 @@ std::vector<record_level> table_test(double mode_hz, unsigned seed) {
     level.samples = count;
     sample_rows& rows = level.records.emplace_back();
     const double w = 2 * M_PI * mode_hz, dt = 1 / fs;
-    const std::complex<double> pole = std::exp(std::complex<double>(-damping, std::sqrt(1 - damping * damping)) * w * dt);
+    const std::complex<double> pole =
+        std::exp(std::complex<double>(-damping, std::sqrt(1 - damping * damping)) * w * dt);
     std::complex<double> state = 0;
     double phase = 0;
     for (std::size_t i = 0; i < count; ++i) {
