@@ -8,6 +8,7 @@
 #include "result/method.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <new>
 
 namespace okid_host {
@@ -48,8 +49,8 @@ std::vector<consensus_run> plan_runs(int n_u, int n_y, int level, double fs_hz, 
     const int m = n_u + n_y;
     const int borne = static_cast<int>(std::min<long long>(long_rows, samples / 10 / (n_y + 2LL * n_u)));
     const int rows = std::min(borne, std::max(6, most_unknowns / m));
-    const int less = std::max(fewest_rows, static_cast<int>(short_share * rows + 0.5));
-    const int middle = std::max(fewest_rows, static_cast<int>(middle_share * rows + 0.5));
+    const int less = std::max(fewest_rows, static_cast<int>(std::lround(short_share * rows)));
+    const int middle = std::max(fewest_rows, static_cast<int>(std::lround(middle_share * rows)));
     std::vector<consensus_run> out;
     if (rows >= fewest_rows)
         out = {run_of(OKID_METHOD_N4SID_MOESP, rows), run_of(OKID_METHOD_N4SID_MOESP, less),
