@@ -80,7 +80,8 @@ void check_options(const record_request& given) {
           std::pair{"--hankel", given.hankel != "system"}, std::pair{"--stabilization", given.stabilization},
           std::pair{"--hold", !given.hold.empty()}, std::pair{"--detrend", given.detrend != "mean"},
           std::pair{"--start", given.start != "moving"}, std::pair{"--decimate", !given.decimate.empty()},
-          std::pair{"--sigma-blocks", !given.sigma_blocks.empty()}, std::pair{"--hit-dofs", !given.hit_dofs.empty()},
+          std::pair{"--sigma", !given.sigma.empty()}, std::pair{"--sigma-blocks", !given.sigma_blocks.empty()},
+          std::pair{"--threads", !given.threads.empty()}, std::pair{"--hit-dofs", !given.hit_dofs.empty()},
           std::pair{"--refine", !given.refine.empty()}})
         if (there) throw failure(exit_usage, fmt::format("{} is an option of records, found with --frf", option));
 }
@@ -277,9 +278,7 @@ void leave_out(bool all, const std::vector<int>& numbers, std::vector<consensus_
                 picked.push_back(order[k]);
                 modes[order[k]].why.clear();
             }
-        if (const int most = *std::max_element(numbers.begin(), numbers.end()); most > static_cast<int>(order.size()))
-            throw failure(exit_usage, fmt::format("--modes: found {}, expected numbers of the {} modes listed", most,
-                                                  order.size()));
+        check_picked(numbers, order.size());
         order = std::move(picked);
     }
     const auto taken = [&](auto& values) {
@@ -437,18 +436,6 @@ void make_result(const response_set& set, double constant_s, std::vector<consens
     put_inputs(set.n_u(), std::move(B), std::move(D), work);
 }
 
-/// okid_sensing_t of each output; check_request() has looked at the words.
-std::vector<int> sensing_of_outputs(const std::string& words, std::size_t outputs) {
-    std::vector<int> out;
-    for (std::size_t at = 0; at <= words.size() && out.size() < outputs;) {
-        const std::size_t comma = std::min(words.find(',', at), words.size());
-        out.push_back(sensing_of(words.substr(at, comma - at)));
-        at = comma + 1;
-    }
-    out.resize(outputs, out.front());
-    return out;
-}
-
 } // namespace
 
 record_result identify_responses(const response_set& measured, const response_request& asked) {
@@ -474,7 +461,7 @@ record_result identify_responses(const response_set& measured, const response_re
     deviations sigma;
     sigma.frequency_hz.assign(modes.size(), NAN);
     sigma.damping_ratio.assign(modes.size(), NAN);
-    refine_modes(set, sensing_of_outputs(asked.wanted.sensing, set.outputs.size()), modes, shapes, sigma);
+    refine_modes(set, check_sensing(asked.wanted.sensing, set.outputs.size()), modes, shapes, sigma);
     leave_out(asked.all_modes, options.modes, modes, shapes, sigma);
     if (std::none_of(modes.begin(), modes.end(), [](const consensus_mode& mode) { return mode.confident(); }))
         throw_no_modes(modes, runs.size());

@@ -36,14 +36,9 @@ struct response {
 response_set set_of(const std::string& path, const std::vector<response>& all) {
     response_set out;
     out.frequency_hz = all.front().frequency_hz;
-    const auto place = [](std::vector<std::string>& names, const std::string& name) {
-        const auto at = std::find(names.begin(), names.end(), name) - names.begin();
-        if (at == static_cast<std::ptrdiff_t>(names.size())) names.push_back(name);
-        return at;
-    };
     for (const response& one : all) {
-        (void)place(out.outputs, one.output);
-        (void)place(out.inputs, one.input);
+        (void)place_of(out.outputs, one.output);
+        (void)place_of(out.inputs, one.input);
         if (one.frequency_hz.size() != out.frequency_hz.size() ||
             std::abs(one.frequency_hz.back() - out.frequency_hz.back()) > 1e-5 * out.frequency_hz.back())
             throw failure(
@@ -55,7 +50,7 @@ response_set set_of(const std::string& path, const std::vector<response>& all) {
     }
     out.H.setConstant(static_cast<Eigen::Index>(out.frequency_hz.size()), out.n_y() * out.n_u(), complex(NAN, NAN));
     for (const response& one : all) {
-        const Eigen::Index column = place(out.outputs, one.output) + out.n_y() * place(out.inputs, one.input);
+        const Eigen::Index column = place_of(out.outputs, one.output) + out.n_y() * place_of(out.inputs, one.input);
         if (!out.H.col(column).array().isNaN().all())
             throw failure(exit_usage, fmt::format("{}: {} over {} stands twice, expected each response once", path,
                                                   one.output, one.input));

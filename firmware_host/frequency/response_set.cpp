@@ -15,13 +15,6 @@ constexpr Eigen::Index fewest_lines = 32;
 
 using Eigen::Index;
 
-Index place_of(std::vector<std::string>& names, const std::string& name) {
-    const auto at = std::find(names.begin(), names.end(), name);
-    if (at != names.end()) return at - names.begin();
-    names.push_back(name);
-    return static_cast<Index>(names.size()) - 1;
-}
-
 void check_lines(const response_set& first, const response_set& other, const std::string& a, const std::string& b) {
     const bool same = first.frequency_hz.size() == other.frequency_hz.size() &&
                       std::equal(first.frequency_hz.begin(), first.frequency_hz.end(), other.frequency_hz.begin(),
@@ -35,6 +28,13 @@ void check_lines(const response_set& first, const response_set& other, const std
 }
 
 } // namespace
+
+Index place_of(std::vector<std::string>& names, const std::string& name) {
+    const auto at = std::find(names.begin(), names.end(), name);
+    if (at != names.end()) return at - names.begin();
+    names.push_back(name);
+    return static_cast<Index>(names.size()) - 1;
+}
 
 response_set join_set_ups(const std::vector<response_set>& sets, const std::vector<std::string>& names) {
     response_set out;

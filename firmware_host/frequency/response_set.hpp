@@ -18,6 +18,9 @@ struct response_set {
     Eigen::Index n_u() const { return static_cast<Eigen::Index>(inputs.size()); }
 };
 
+/// The place of a name, which comes last when it is new.
+Eigen::Index place_of(std::vector<std::string>& names, const std::string& name);
+
 /// Set-ups of one structure as one: every output of every input once, entries measured several times averaged. Throws
 /// `failure` (exit 2) where the lines differ or an output was not measured for an input. `names`: of the set-ups.
 response_set join_set_ups(const std::vector<response_set>& sets, const std::vector<std::string>& names);

@@ -138,22 +138,12 @@ result_context stream::context(remarks said) {
         if (const sum_refiner* refiner = identifier_.refiner()) {
             out.refined = refiner->refined();
             if (!refiner->fault().empty() && config_.wanted.refine == "yes")
-                out.warnings.emplace_back(
-                    "refine_failed",
-                    fmt::format("the model is as identified, the refinement was of no use: {}", refiner->fault()));
-            if (out.refined && !out.refined->converged)
-                out.warnings.emplace_back("refine_unconverged",
-                                          fmt::format("the refinement did not come to an end in {} steps: the best "
-                                                      "model reached is given. Try another order",
-                                                      out.refined->iterations));
+                out.warnings.push_back(refine_failed(refiner->fault()));
+            if (out.refined && !out.refined->converged) out.warnings.push_back(refine_unconverged(*out.refined));
         }
     }
     if (stats.missing > 0 && !agreed)
-        out.warnings.emplace_back(
-            "missing_samples",
-            fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was interpolated; the lags "
-                        "restart after each gap",
-                        stats.missing, stats.samples + stats.missing, stats.gaps, stats.gaps == 1 ? "" : "s"));
+        out.warnings.push_back(missing_samples({stats.missing, stats.gaps}, stats.samples + stats.missing));
     if (identifier_.restarts() > 0)
         out.warnings.emplace_back(
             "restarted", fmt::format("the structure changed: the result rests on the {} samples after sample {}",

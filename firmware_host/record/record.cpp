@@ -233,8 +233,8 @@ long long find_model(const record_options& options, okid_accumulator_t*& accumul
     return rows;
 }
 
-/// May the fits of this n4sid model wait until somebody asks for them? Where its innovations leave 30 % of the amplitude of an output
-/// explained it is no model that check_explains() refuses (5 %).
+/// May the fits of this n4sid model wait until somebody asks for them? Where its innovations leave 30 % of the amplitude of
+/// an output explained it is no model that check_explains() refuses (5 %).
 bool fits_can_wait(const record_options& options, okid_accumulator_t* accumulator, const record_work& work) {
     const okid_identified_t& model = work.model;
     if (!work.set.complete || options.refine == "yes" || options.mass.wanted() || !model.K ||
@@ -307,11 +307,7 @@ result_context describe_records(const record_set& set, const record_options& opt
     context.hold = options.hold;
     context.detrend = options.detrend;
     context.start = options.start;
-    if (missing.samples)
-        context.warnings.emplace_back("missing_samples",
-                                      fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was "
-                                                  "interpolated; the lags restart after each gap",
-                                                  missing.samples, total, missing.gaps, missing.gaps == 1 ? "" : "s"));
+    if (missing.samples) context.warnings.push_back(missing_samples(missing, static_cast<long long>(total)));
     return context;
 }
 

@@ -15,6 +15,7 @@
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_hold.hpp"
+#include "request.hpp"
 #include "result/hold.hpp"
 #include "roving.hpp"
 #include "screening.hpp"
@@ -238,9 +239,7 @@ void keep_picked(const std::vector<int>& numbers, std::vector<listed_pair>& foun
         picked.push_back(std::move(found[i]));
         picked.back().first.why.clear();
     }
-    if (const auto most = *std::max_element(numbers.begin(), numbers.end()); most > static_cast<int>(found.size()))
-        throw failure(exit_usage,
-                      fmt::format("--modes: found {}, expected numbers of the {} modes listed", most, found.size()));
+    check_picked(numbers, found.size());
     found = std::move(picked);
 }
 

@@ -191,12 +191,7 @@ void choose_gain(const record_set& set, double before, refined_arrays& arrays, r
 }
 
 void remark_on(const refinement& found, double before, double after, remarks& said) {
-    if (!found.converged)
-        said.emplace_back("refine_unconverged",
-                          fmt::format("the refinement did not come to an end in {} steps (log-likelihood {:+.1f}, "
-                                      "{:.2g} left): the best model reached is given. Structure and record do not fit "
-                                      "each other well: try another --order",
-                                      found.iterations, found.gain, found.decrement));
+    if (!found.converged) said.push_back(refine_unconverged(found));
     if (after < before - lost_percent)
         said.emplace_back("prediction_lower",
                           fmt::format("the one-step prediction of the refined model is {:.2f} % on average instead of "
@@ -322,8 +317,7 @@ std::vector<replicate_model> refine_model(bool constants, record_work& result) {
                   result.context.warnings);
         return std::move(one.replicates);
     }
-    result.context.warnings.emplace_back(
-        "refine_failed", fmt::format("the model is as identified, the refinement was of no use: {}", reason));
+    result.context.warnings.push_back(refine_failed(reason));
     return {};
 }
 

@@ -20,7 +20,8 @@ struct likeliest_model {
     std::vector<double> filter{1}; ///< that the samples went through (whitening.hpp)
 };
 
-/// How white the residuals of a likelier model are, their colour taken out where they have one, from two steps over 20,000 samples; infinite where there is none.
+/// How white the residuals of a likelier model are, their colour taken out where they have one, from two steps over 20,000
+/// samples; infinite where there is none.
 double whiteness_nearby(bool constants, const record_work& work);
 
 enum class noise_colour { white, any };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fmt/format.h>
 
 namespace okid_host {
 namespace {
@@ -61,6 +62,12 @@ missing_count count_missing(const record_set& set) {
         }
     }
     return out;
+}
+
+std::pair<std::string, std::string> missing_samples(const missing_count& missing, long long samples) {
+    return {"missing_samples", fmt::format("{} of {} samples are missing in {} gap{}: left out, nothing was "
+                                           "interpolated; the lags restart after each gap",
+                                           missing.samples, samples, missing.gaps, missing.gaps == 1 ? "" : "s")};
 }
 
 std::vector<long long> complete_runs(const record_set& set) {

@@ -37,6 +37,8 @@ struct missing_count {
     long long samples = 0, gaps = 0; ///< samples with any channel missing, and the runs they form
 };
 missing_count count_missing(const record_set& set);
+/// What is to be said of them, of so many samples: (code, text).
+std::pair<std::string, std::string> missing_samples(const missing_count& missing, long long samples);
 
 /// Lengths of the unbroken runs of complete samples.
 std::vector<long long> complete_runs(const record_set& set);

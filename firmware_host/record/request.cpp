@@ -44,23 +44,6 @@ void check_channels(const record_request& given) {
     if (channels > 256) usage(fmt::format("{} channels were chosen, at most 256 can be identified together", channels));
 }
 
-/// One kind for each output.
-std::vector<int> check_sensing(const std::string& sensing, std::size_t outputs) {
-    std::vector<std::string> kinds;
-    for (std::size_t at = 0; at <= sensing.size();) {
-        const std::size_t comma = std::min(sensing.find(',', at), sensing.size());
-        kinds.push_back(sensing.substr(at, comma - at));
-        at = comma + 1;
-    }
-    for (const std::string& kind : kinds) one_of("--sensing", kind, {"acceleration", "velocity", "displacement"});
-    if (kinds.size() != 1 && kinds.size() != outputs)
-        usage(fmt::format("--sensing: found {} kinds for {} outputs, expected one for all or one for each",
-                          kinds.size(), outputs));
-    std::vector<int> out;
-    for (std::size_t i = 0; i < outputs; ++i) out.push_back(sensing_of(kinds[kinds.size() == 1 ? 0 : i]));
-    return out;
-}
-
 /// "3,7,-12": where each record was struck.
 std::vector<int> check_hit_dofs(const record_request& given) {
     std::vector<int> out;
@@ -174,6 +157,28 @@ void check_agreement(const record_request& given, record_options& options) {
 }
 
 } // namespace
+
+std::vector<int> check_sensing(const std::string& sensing, std::size_t outputs) {
+    std::vector<std::string> kinds;
+    for (std::size_t at = 0; at <= sensing.size();) {
+        const std::size_t comma = std::min(sensing.find(',', at), sensing.size());
+        kinds.push_back(sensing.substr(at, comma - at));
+        at = comma + 1;
+    }
+    for (const std::string& kind : kinds) one_of("--sensing", kind, {"acceleration", "velocity", "displacement"});
+    if (kinds.size() != 1 && kinds.size() != outputs)
+        usage(fmt::format("--sensing: found {} kinds for {} outputs, expected one for all or one for each",
+                          kinds.size(), outputs));
+    std::vector<int> out;
+    for (std::size_t i = 0; i < outputs; ++i) out.push_back(sensing_of(kinds[kinds.size() == 1 ? 0 : i]));
+    return out;
+}
+
+void check_picked(const std::vector<int>& numbers, std::size_t listed) {
+    const int most = numbers.empty() ? 0 : *std::max_element(numbers.begin(), numbers.end());
+    if (most > static_cast<int>(listed))
+        usage(fmt::format("--modes: found {}, expected numbers of the {} modes listed", most, listed));
+}
 
 record_options check_request(const record_request& given) {
     record_options options;

@@ -23,6 +23,12 @@ struct record_request {
 /// Throws `failure` (exit 2) naming the option, what was found and what was expected. `fs_hz` stays 0.
 record_options check_request(const record_request& given);
 
+/// okid_sensing_t of each output, of `--sensing`: one kind for all, or one each.
+std::vector<int> check_sensing(const std::string& sensing, std::size_t outputs);
+
+/// Numbers of `--modes` are those of modes that are listed.
+void check_picked(const std::vector<int>& numbers, std::size_t listed);
+
 /// Of `--fs HZ`.
 double check_rate(const std::string& text);
 

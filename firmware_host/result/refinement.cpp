@@ -36,6 +36,18 @@ nlohmann::ordered_json refinement_json(const refinement& found, const std::vecto
     return out;
 }
 
+std::pair<std::string, std::string> refine_failed(const std::string& reason) {
+    return {"refine_failed", fmt::format("the model is as identified, the refinement was of no use: {}", reason)};
+}
+
+std::pair<std::string, std::string> refine_unconverged(const refinement& found) {
+    return {"refine_unconverged",
+            fmt::format("the refinement did not come to an end in {} steps (log-likelihood {:+.1f}, {:.2g} left): the "
+                        "best model reached is given. Structure and record do not fit each other well: try another "
+                        "--order",
+                        found.iterations, found.gain, found.decrement)};
+}
+
 std::string refinement_text(const refinement& found, const std::vector<std::string>& outputs) {
     std::string out =
         fmt::format("\nrefined: {} iterations, log-likelihood {:+.1f}, {}{}{}\nnoise (1 sigma):", found.iterations,

@@ -166,6 +166,8 @@ def test_files_of_set_ups_give_what_the_whole_gives(tmp_path: Path) -> None:
     ("arguments", "words"),
     [
         (["--fs", "100"], "--fs is an option of records"),
+        (["--sigma", "none"], "--sigma is an option of records"),
+        (["--threads", "1"], "--threads is an option of records"),
         (["--exponential", "-1"], '--exponential: found "-1"'),
         (["--outputs", "9z"], '--outputs: found "9z"'),
         (["--band", "5:6"], "lines between 5 and 6 Hz, expected at least 32"),
