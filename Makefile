@@ -7,7 +7,7 @@ JOBS ?= 2
 PYTHON := .venv/bin/python
 
 .PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-languages test-package package docs docs-pictures score bench bench-check bench-peers \
-	fuzz lint format sanitize sanitize-all coverage sbom clean
+	fuzz lint format sanitize sanitize-all coverage sbom audit clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 22
@@ -96,6 +96,9 @@ coverage: ## lines of lib and drivers that their tests run, as a table; below 95
 sbom: build ## bill of materials: build/sbom.cdx.json and docs/reference/dependencies.md
 	@tools/setup.sh docs
 	@$(PYTHON) tools/sbom.py
+
+audit: sbom ## known holes in what okid stands on: PyPI's advisories, updates that wait in Debian's archive
+	@.venv/bin/python tools/audit.py
 
 fuzz: ## fuzzers of every decoder and file reader, SECONDS=60 for all of them together
 	@tools/setup.sh fuzz
