@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Known holes in what okid stands on: the bill of materials held against PyPI's advisories and Debian's security archive.
+"""Known holes in what okid stands on: the bill of materials held against PyPI's advisories and Debian's archive.
 
 usage: tools/audit.py [--sbom build/sbom.cdx.json] [--index https://pypi.org/pypi]
-PyPI tells the advisories of one release (they come from OSV); an index that only knows the newest release says nothing of
-an older one, which is then counted as unknown. A Debian package is behind where apt knows a newer version for it.
+PyPI tells the advisories of one release (they come from OSV); an index that only knows the newest release says nothing
+of an older one, which is then counted as unknown. A Debian package is behind where apt knows a newer version for it.
 exit codes: 0 nothing known against any, 1 a hole or a waiting update, 2 wrong usage, 4 nothing could be asked
 """
 
@@ -44,11 +44,11 @@ def holes(index: str, name: str, version: str) -> list[str] | None:
     if found is None or "vulnerabilities" not in found:
         return None
     told = [one for one in found["vulnerabilities"] if not one.get("withdrawn")]
-    lines = [
-        f"{', '.join([one['id'], *one.get('aliases', [])])}: {' '.join((one.get('summary') or one['details']).split())[:120]}"
-        f" (mended in {', '.join(one.get('fixed_in') or ['no release'])})"
-        for one in told
-    ]
+    lines = []
+    for one in told:
+        names, fixed = ", ".join([one["id"], *one.get("aliases", [])]), ", ".join(one.get("fixed_in") or ["no release"])
+        summary = " ".join((one.get("summary") or one["details"]).split())[:120]
+        lines.append(f"{names}: {summary} (mended in {fixed})")
     if found["info"].get("yanked"):
         lines.append(f"taken back by its makers: {found['info'].get('yanked_reason') or 'no reason is given'}")
     return lines
@@ -90,9 +90,9 @@ def main() -> int:
     for name, version in sorted((late or {}).items()):
         bad += 1
         print(f"{name}: {version} waits in the archive")
-    unknown = sum(lines is None for lines in answers)
+    unknown, remarks = sum(lines is None for lines in answers), sum(len(lines or []) for lines in answers)
     print(
-        f"PyPI: {len(pypi)} packages, {len(pypi) - unknown} known to the index, {sum(map(len, filter(None, answers)))} remarks; "
+        f"PyPI: {len(pypi)} packages, {len(pypi) - unknown} known to the index, {remarks} remarks; "
         f"Debian: {len(debian)} packages, {'apt is missing' if late is None else f'{len(late)} behind'}"
     )
     if unknown == len(pypi) and late is None:
