@@ -56,6 +56,8 @@ def holes(index: str, name: str, version: str) -> list[str] | None:
 
 def behind(names: list[str]) -> dict[str, str] | None:
     """Debian packages for which apt knows a newer version: {name: that version}; None: there is no apt."""
+    if not names:
+        return {}
     try:
         done = subprocess.run(["apt-cache", "policy", *names], capture_output=True, text=True, env={"LC_ALL": "C"})
     except FileNotFoundError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""tools/audit.py against an index of this test: a hole, a release taken back, an advisory withdrawn, an unknown release."""
+"""tools/audit.py and an index of this test: a hole, a release taken back, an advisory withdrawn, an unknown one."""
 
 from __future__ import annotations
 

@@ -188,7 +188,8 @@ okid_status_t okid_jackknife_begin(okid_jackknife_t* self, okid_accumulator_t* w
     s.whole = whole;
     s.order = full->n_z;
     s.identifier->observer_config.ridge_min = full->observer_info.ridge;
-    s.identifier->observer_config.unstable = full->observer_info.radius_plain < 1 ? 2 : 0;
+    // a ridge of its own would make a replicate another estimate, often far away
+    s.identifier->observer_config.unstable = 2;
     const bool follows =
         s.may_follow && full->model_radius < 1 && s.followed.begin(s.identifier->era_config, s.order, full->A, full->C);
     s.identifier->followed = follows ? &s.followed : nullptr;
