@@ -34,11 +34,13 @@ static int refuse(const cursor_t* self, const char* expected) {
 
 static int peek(const cursor_t* self) { return self->at < self->length ? (unsigned char)self->line[self->at] : -1; }
 
+/// Of a character, -1 for one that is none and for the end of the line (-1).
 static int hex_digit(int c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    return -1;
+    static const uint8_t digits[256] = {
+        ['0'] = 1,  ['1'] = 2,  ['2'] = 3,  ['3'] = 4,  ['4'] = 5,  ['5'] = 6,  ['6'] = 7,  ['7'] = 8,
+        ['8'] = 9,  ['9'] = 10, ['A'] = 11, ['B'] = 12, ['C'] = 13, ['D'] = 14, ['E'] = 15, ['F'] = 16,
+        ['a'] = 11, ['b'] = 12, ['c'] = 13, ['d'] = 14, ['e'] = 15, ['f'] = 16};
+    return c < 0 ? -1 : digits[c] - 1;
 }
 
 static int parse_time(cursor_t* self, int64_t* time_ns) {
@@ -100,10 +102,9 @@ static int parse_id(cursor_t* self, drv_frame_t* frame) {
 }
 
 static int parse_data(cursor_t* self, drv_frame_t* frame, size_t most) {
-    while (hex_digit(peek(self)) >= 0) {
+    for (int high; (high = hex_digit(peek(self))) >= 0;) {
         if (frame->len == most)
             return refuse(self, most == 8 ? "at most 8 bytes in a classic frame" : "at most 64 bytes in an FD frame");
-        int high = hex_digit(peek(self));
         ++self->at;
         int low = hex_digit(peek(self));
         if (low < 0) return refuse(self, "the second hexadecimal digit of a byte");

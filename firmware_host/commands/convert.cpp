@@ -6,6 +6,7 @@
 #include "commands.hpp"
 #include "config/config.hpp"
 #include "error.hpp"
+#include "files/decimal_text.hpp"
 #include "files/whole_file.hpp"
 #include "journal/journal_header.hpp"
 #include "live/playback.hpp"
@@ -36,7 +37,7 @@ struct convert_arguments {
 /// Rows of the grid as lines of text, in the units that the identification uses.
 class csv_writer : public grid_sink {
   public:
-    csv_writer(const live_config& config, whole_file& out) : config_(config), out_(out) {
+    csv_writer(const live_config& config, whole_file& out) : out_(out) {
         fmt::format_to(std::back_inserter(text_), "# fs_hz: {}\n# units:", config.rate_hz);
         for (const channel_config& channel : config.channels)
             fmt::format_to(std::back_inserter(text_), " {}={}", channel.name,
@@ -45,17 +46,21 @@ class csv_writer : public grid_sink {
         for (std::size_t i = 0; i < config.channels.size(); ++i)
             text_ += (i ? "," : "") + quoted(config.channels[i].name);
         text_ += "\n";
+        for (const channel_config& channel : config.channels)
+            columns_.push_back({channel.layout.scale, channel.layout.offset, channel.si_factor(),
+                                channel.layout.length <= 32 && channel.layout.value != DRV_VALUE_FLOAT64});
     }
     void on_sample(std::int64_t, const double* row) override {
-        for (std::size_t i = 0; i < config_.channels.size(); ++i) {
-            const channel_config& channel = config_.channels[i];
-            const double value = (row[i] * channel.layout.scale + channel.layout.offset) * channel.si_factor();
-            const int digits = channel.layout.length <= 32 && channel.layout.value != DRV_VALUE_FLOAT64 ? 10 : 17;
+        for (std::size_t i = 0; i < columns_.size(); ++i) {
+            const column& its = columns_[i];
+            const double value = (row[i] * its.scale + its.offset) * its.factor;
             if (i) text_ += ',';
             if (std::isnan(value))
                 text_ += "nan";
+            else if (its.short_text)
+                append_ten_digits(text_, value);
             else
-                fmt::format_to(std::back_inserter(text_), "{:.{}g}", value, digits);
+                fmt::format_to(std::back_inserter(text_), "{:.17g}", value);
         }
         text_ += '\n';
         write();
@@ -65,7 +70,7 @@ class csv_writer : public grid_sink {
             throw failure(exit_usage, fmt::format("a gap of {} samples follows sample {}: too many rows for a table",
                                                   count, index));
         std::string row;
-        for (std::size_t i = 0; i < config_.channels.size(); ++i) row += i ? ",nan" : "nan";
+        for (std::size_t i = 0; i < columns_.size(); ++i) row += i ? ",nan" : "nan";
         for (; count > 0; --count) {
             text_ += row + '\n';
             write();
@@ -82,7 +87,11 @@ class csv_writer : public grid_sink {
         out_.append(text_);
         text_.clear();
     }
-    const live_config& config_;
+    struct column {
+        double scale, offset, factor;
+        bool short_text; ///< ten digits hold every code
+    };
+    std::vector<column> columns_;
     whole_file& out_;
     std::string text_;
     long long missing_ = 0;

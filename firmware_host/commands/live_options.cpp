@@ -33,6 +33,7 @@ void add_output_options(CLI::App& command, live_arguments& given) {
         ->type_name("FILE.jsonl");
     command.add_option("--json", given.json, "write the final okid.result/1 to this file, - is stdout")
         ->type_name("FILE.json");
+    command.add_flag("--quiet", given.quiet, "no modes and no table on stdout");
 }
 
 std::optional<double> parse_seconds(const char* option, const std::string& text) {
@@ -81,6 +82,7 @@ session_options check_live(const live_arguments& given, const live_config& confi
     options.duration_s = parse_seconds("--duration", given.duration);
     options.events = given.events;
     options.json = given.json;
+    options.table = !given.quiet;
     if (given.events == "-" && given.json == "-")
         throw failure(exit_usage, "--events - and --json - both want stdout, expected a file for one of them");
     if (!given.events.empty() && given.events == given.json && given.json != "-")

@@ -12,6 +12,7 @@ namespace okid_host {
 
 struct live_arguments {
     std::string config, events, json, duration, speed;
+    bool quiet = false;
 };
 
 void add_output_options(CLI::App& command, live_arguments& given);

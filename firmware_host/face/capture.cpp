@@ -126,6 +126,7 @@ struct okid_host_capture_t final : private session_listener {
     }
     void on_gap(const grid_gap&) override {}
     void on_event(const std::string& line) override;
+    bool wants_events() const override { return keep_events_; }
     void tell_health();
 
     const live_config config_;
@@ -164,7 +165,6 @@ okid_host_capture_t::okid_host_capture_t(const okid_host_config_t& config, const
 }
 
 void okid_host_capture_t::on_event(const std::string& line) {
-    if (!keep_events_) return;
     const std::lock_guard<std::mutex> hold(mutex_);
     events_ += line;
 }

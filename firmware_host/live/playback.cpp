@@ -8,14 +8,14 @@
 #include "recording_link.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
-#include <limits>
+#include <string_view>
 #include <utility>
 
 namespace okid_host {
@@ -47,15 +47,16 @@ std::vector<int> map_journal(const std::string& path, const live_config& config)
                                           list_names(names[0]), config.path, list_names(names[1])));
 }
 
+bool contains(const std::vector<std::string>& names, std::string_view name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 /// By name; a log with one interface feeds the only CAN bus.
 std::vector<std::string> map_interfaces(const std::string& log, const live_config& config) {
     std::vector<std::string> wanted;
     for (const bus_config& bus : config.buses) wanted.push_back(bus.interface);
-    std::vector<std::string> there = interfaces_of(log);
-    const bool any = std::any_of(wanted.begin(), wanted.end(), [&](const std::string& name) {
-        return std::find(there.begin(), there.end(), name) != there.end();
-    });
-    if (any || there.empty()) return wanted; // an empty or malformed log names its own fault
+    std::vector<std::string> there = interfaces_of(log, wanted);
+    if (there.empty() || contains(wanted, there.back())) return wanted; // an empty or malformed log names its own fault
     if (wanted.size() == 1 && there.size() == 1) return there;
     throw failure(exit_usage, fmt::format("{}: found frames of {}, expected an interface of {}: {}", log,
                                           list_names(there), config.path, list_names(wanted)));
@@ -63,25 +64,30 @@ std::vector<std::string> map_interfaces(const std::string& log, const live_confi
 
 } // namespace
 
-std::vector<std::string> interfaces_of(const std::string& log) {
+std::vector<std::string> interfaces_of(const std::string& log, const std::vector<std::string>& enough) {
     std::vector<std::string> out;
     std::error_code ignored;
     if (!std::filesystem::is_regular_file(log, ignored)) return out; // a pipe can be read only once
-    std::ifstream input(log);
-    std::array<char, 4096> bytes{}; // beyond this a line is no frame
-    while (input.getline(bytes.data(), bytes.size()) || input.gcount() > 0) {
-        const std::string line = bytes.data();
-        if (!input.eof() && input.fail()) {
-            input.clear();
-            input.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+    std::ifstream input(log, std::ios::binary);
+    std::string piece(std::size_t{1} << 16, '\0');
+    for (std::size_t have = 0; input;) {
+        input.read(piece.data() + have, static_cast<std::streamsize>(piece.size() - have));
+        have += static_cast<std::size_t>(input.gcount());
+        std::string_view rest(piece.data(), have);
+        for (std::size_t end; (end = rest.find('\n')) != std::string_view::npos || (!input && !rest.empty());) {
+            const std::string_view line = rest.substr(0, end);
+            rest.remove_prefix(std::min(rest.size(), line.size() + 1));
+            const std::size_t close = line.find(')');
+            if (close == std::string_view::npos) continue;
+            const std::size_t begin = line.find_first_not_of(" \t", close + 1);
+            if (begin == std::string_view::npos) continue;
+            const std::string_view name = line.substr(begin, line.find_first_of(" \t", begin) - begin);
+            if (name.size() >= DRV_NAME_BYTES || (!out.empty() && out.back() == name) || contains(out, name)) continue;
+            out.emplace_back(name);
+            if (contains(enough, name)) return out;
         }
-        const std::size_t close = line.find(')'),
-                          begin = line.find_first_not_of(" \t", close == std::string::npos ? close : close + 1);
-        if (close == std::string::npos || begin == std::string::npos) continue;
-        const std::string name = line.substr(begin, line.find_first_of(" \t", begin) - begin);
-        if (name.size() < DRV_NAME_BYTES && (out.empty() || out.back() != name) &&
-            std::find(out.begin(), out.end(), name) == out.end())
-            out.push_back(name);
+        have = rest.size() < piece.size() ? rest.size() : 0; // a line so long is no frame
+        std::memmove(piece.data(), rest.data(), have);
     }
     return out;
 }

@@ -31,7 +31,8 @@ class pacer {
 bool is_journal(const std::string& path);
 
 /// Interfaces of a log, each once, in order of appearance.
-std::vector<std::string> interfaces_of(const std::string& log);
+/// @param enough  the first of these is the last that is looked for
+std::vector<std::string> interfaces_of(const std::string& log, const std::vector<std::string>& enough = {});
 
 /// Frames of a log or of a journal and the segments behind it, one after the other. Throws `failure` (exit 2) at a line
 /// that does not parse; what is damaged in a journal is told on stderr at its end.

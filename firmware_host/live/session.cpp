@@ -67,8 +67,9 @@ ordered_json clock_json(const drv_clock_fit_t& clock) {
 session::session(const live_config& config, const session_options& options)
     : config_(config), options_(options),
       publisher_(config, {options.events, options.table && options.events != "-" && options.json != "-", options.live,
-                          options.listener ? [to = options.listener](const std::string& line) { to->on_event(line); }
-                                           : std::function<void(const std::string&)>()}),
+                          options.listener && options.listener->wants_events()
+                              ? [to = options.listener](const std::string& line) { to->on_event(line); }
+                              : std::function<void(const std::string&)>()}),
       grid_(config, *this), check_(config), maker_(config), stream_(maker_.sums()), trigger_(config),
       hammer_(config, stream_.sums().lags()), losses_(config.buses.size()), health_(config.buses.size()),
       clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
@@ -76,6 +77,8 @@ session::session(const live_config& config, const session_options& options)
       updates_(maker_, options.live && options.identify, config.n_u + config.n_y) {
     if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
     if (config.publish.samples) feed_.emplace(config);
+    if (!options.live && !publisher_.watched())
+        updates_.hurry(true); // those that the result does not rest on are left out
     stats_samples_ =
         update_samples_ * std::max<std::int64_t>(1, std::llround(stats_every_s / config.identification.update_s));
     if (options.duration_s) {

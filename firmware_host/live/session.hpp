@@ -27,6 +27,7 @@ namespace okid_host {
 class session_listener : public grid_sink {
   public:
     virtual void on_event(const std::string& line) = 0;
+    virtual bool wants_events() const { return true; } ///< of a whole run
     /// The samples up to here are with the thread that makes the updates.
     virtual void on_handed_over(std::int64_t /*samples*/) {}
 };

@@ -35,7 +35,7 @@ void update_thread::add_missing(std::int64_t count) {
 }
 
 void update_thread::update(std::int64_t samples) {
-    if (!beside_) return reports_.push_back(maker_.update(samples, {}));
+    if (!beside_) return reports_.push_back(maker_.update(samples, {0, hurry_, false}));
     open_.update = samples;
     hand_over();
 }

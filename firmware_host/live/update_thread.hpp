@@ -22,7 +22,7 @@ class update_thread {
   public:
     static constexpr std::size_t most_waiting = 8000000; ///< numbers, 64 MB
 
-    /// @param beside  on a thread of its own; else everything happens at once, and every update is made
+    /// @param beside  on a thread of its own; else everything happens at once
     /// @param width   numbers of a row
     /// @param most    numbers that may wait
     update_thread(update_maker& maker, bool beside, std::size_t width, std::size_t most = most_waiting);
@@ -33,7 +33,7 @@ class update_thread {
     void add(const double* row);
     void add_missing(std::int64_t count); ///< 0: another record begins
     void update(std::int64_t samples);
-    void hurry(bool on); ///< the machine is too slow: only what the result depends on
+    void hurry(bool on); ///< the machine is too slow, or nobody looks: only what the result depends on
 
     /// What was found since the last call. Throws what the sums threw.
     std::vector<update_report> take();

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <sys/eventfd.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace okid_host {
@@ -18,6 +19,13 @@ namespace {
 
 constexpr double redraw_every_s = 0.1; // a replay at full speed updates faster than an eye
 constexpr double farewell_s = 1.0;     // for subscribers that still read
+
+bool is_null_device(int fd) {
+    struct stat here{};
+    struct stat null{};
+    return fstat(fd, &here) == 0 && stat("/dev/null", &null) == 0 && S_ISCHR(here.st_mode) &&
+           here.st_rdev == null.st_rdev;
+}
 
 } // namespace
 
@@ -27,7 +35,7 @@ publisher::publisher(const live_config& config, const publisher_options& options
         events_ = std::make_unique<line_writer>("--events " + options.events, options.events, !options.live);
     if (options.show_table && terminal_table::fits(STDOUT_FILENO))
         terminal_ = std::make_unique<terminal_table>(STDOUT_FILENO);
-    else if (options.show_table)
+    else if (options.show_table && !is_null_device(STDOUT_FILENO))
         lines_ = std::make_unique<line_writer>("stdout", "-", !options.live);
     if (sinks_.empty() && !terminal_) return;
     wake_fd_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);

@@ -5,12 +5,15 @@ so, and ends with the result of `okid replay`, which makes every one. Nothing of
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 from okid.capture.stream import Capture
+from program import PROGRAM
 from program import okid as run_okid
 
 RIG = """rate_hz = 200.0
@@ -100,6 +103,29 @@ def test_the_result_is_that_of_replay(made: Path, keys: str) -> None:
     assert [one["on"] for one in steps] == [k % 2 == 0 for k in range(len(steps))]
     assert (told["skipped"] > 0) == (len(steps) > 0) and {one["step"] for one in steps} <= {"updates"}
     assert told["skipped"] > (0 if "auto" in keys else all_made["made"] / 2)
+
+    with Capture(path, json=str(made / "unseen.json"), keep_events=False) as unseen:
+        unseen.open(made / "a.log")
+        unseen.play(1 << 40)
+        unseen.finish()
+        left_out = unseen.stats()["updates"]["skipped"]
+    assert (made / "unseen.json").read_bytes() == truth
+    assert left_out > (0 if "auto" in keys else all_made["made"] / 2)
+
+
+def test_a_replay_that_nobody_looks_at(made: Path) -> None:
+    """Neither --quiet nor /dev/null changes a result; what goes to a pipe has a line for every update."""
+    path = config(made, "unseen", NAMED + "window_s = 8.0\nupdate_s = 0.5\n")
+    before, truth = replayed(made, path)
+    out = made / "quiet.json"
+    said = run_okid("replay", made / "a.log", "-c", path, "--json", out, "--quiet", status=0)
+    assert said.stdout == "" and out.read_bytes() == truth
+    out.unlink()
+    with open(os.devnull, "w") as null:
+        subprocess.run([PROGRAM, "replay", made / "a.log", "-c", path, "--json", out], stdout=null, check=True)
+    assert out.read_bytes() == truth
+    said = run_okid("replay", made / "a.log", "-c", path, status=0)
+    assert said.stdout.count("\nt ") + said.stdout.startswith("t ") >= len(of_type(before, "modes")) > 70
 
 
 def test_the_stream_does_not_wait(made: Path) -> None:

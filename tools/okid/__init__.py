@@ -6,27 +6,29 @@ and okid.Accumulator and okid.Identifier are what both are made of.
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from okid import frf, modal
 from okid._errors import Error, IdentificationError, InputError
-from okid.abi.accumulator import Accumulator
-from okid.abi.square_root import SquareRoot
-from okid.abi.sums import Stats
-from okid.data.records import Record, read_csv
 from okid.demo import demo, demo_frame, demo_record
-from okid.identification.change_test import ChangeTest, ChangeVerdict, ModeShift
-from okid.identification.identifier import Identified, Identifier, usable_p
 from okid.identify import identify, stabilization
 from okid.identify_frf import identify_frf
-from okid.result.modal_table import ModalTable
-from okid.result.model import Model
-from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping
-from okid.result.result import Result
-from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization
-from okid.session import Session
-from okid.setups import merge_setups
-from okid.structure import Structure
+
+if TYPE_CHECKING:
+    from okid import frf, modal
+    from okid.abi.accumulator import Accumulator
+    from okid.abi.square_root import SquareRoot
+    from okid.abi.sums import Stats
+    from okid.data.records import Record, read_csv
+    from okid.identification.change_test import ChangeTest, ChangeVerdict, ModeShift
+    from okid.identification.identifier import Identified, Identifier, usable_p
+    from okid.result.modal_table import ModalTable
+    from okid.result.model import Model
+    from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping
+    from okid.result.result import Result
+    from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization
+    from okid.session import Session
+    from okid.setups import merge_setups
+    from okid.structure import Structure
 
 __all__ = [
     "Accumulator",
@@ -69,13 +71,32 @@ __all__ = [
 ]
 
 
+_NAMES = {
+    "abi.accumulator": "Accumulator",
+    "abi.square_root": "SquareRoot",
+    "abi.sums": "Stats",
+    "data.records": "Record, read_csv",
+    "identification.change_test": "ChangeTest, ChangeVerdict, ModeShift",
+    "identification.identifier": "Identified, Identifier, usable_p",
+    "result.modal_table": "ModalTable",
+    "result.model": "Model",
+    "result.parts": "Fit, MassMatrices, Mode, ProportionalDamping",
+    "result.result": "Result",
+    "result.stabilization": "Cluster, Criteria, OrderPoles, Stabilization",
+    "session": "Session",
+    "setups": "merge_setups",
+    "structure": "Structure",
+}  # of the modules; they load when they are first used, NumPy and the libraries with them
+
+_MODULES = ("campaign", "capture", "formats", "frf", "live", "modal", "report")
+
 # Of okid.formats, in both directions: read_uff, write_uff ..
 _FORMATS = ("csv", "frf", "hdf5", "mat", "mdf4", "parquet", "record", "uff")
 
 
 def __getattr__(name: str) -> Any:
-    """Packages that bring other libraries with them load when they are first used: capture (python-can), report
-    (matplotlib), formats (read_uff, write_mdf4 .. are its functions), live, campaign (dask).
+    """Everything loads when it is first used, the packages that bring other libraries with them, too: capture
+    (python-can), report (matplotlib), formats (read_uff, write_mdf4 .. are its functions), live, campaign (dask).
 
     okid.__version__ is asked of the C library.
     """
@@ -83,12 +104,20 @@ def __getattr__(name: str) -> Any:
         from okid.abi import library
 
         return library().okid_version().decode()
-    if name in ("campaign", "capture", "formats", "live", "report"):
+    if name in _MODULES:
         return import_module(f"okid.{name}")
+    for module, names in _NAMES.items():
+        if name in names.split(", "):
+            globals()[name] = found = getattr(import_module(f"okid.{module}"), name)
+            return found
     verb, _, kind = name.partition("_")
     if (verb in ("read", "write") and kind in _FORMATS) or name == "write_result":
         return getattr(import_module("okid.formats"), name)
     raise AttributeError(f"module 'okid' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *_MODULES})
 
 
 def library_version() -> str:

@@ -3,18 +3,24 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from okid.identify import identify
-from okid.result.result import Result
-from okid.structure import Structure
 
-Real = NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from okid.result.result import Result
+    from okid.structure import Structure
+
+    Real = NDArray[np.float64]
 
 
 def demo_frame() -> Structure:
     """Three storeys on elastic columns, proportionally damped: 10.96, 31.84 and 45.66 Hz."""
+    from okid.structure import Structure
+
     free = Structure.chain([1.0, 0.8, 1.2], [3e4, 2e4, 2.5e4])
     return Structure(free.M, 1.0 * free.M + 5e-5 * free.K, free.K)
 
@@ -23,6 +29,8 @@ def demo_record(
     samples: int = 20000, fs: float = 1000.0, noise_percent: float = 1.0, seed: int = 1
 ) -> tuple[Real, Real]:
     """White shaker force u (N, 1) on the first storey, three noisy accelerations y (N, 3) in m/s^2."""
+    import numpy as np
+
     rng = np.random.default_rng(seed)
     force = rng.standard_normal((samples, 1))
     y = demo_frame().model(fs, [1], [1, 2, 3]).simulate(force)

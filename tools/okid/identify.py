@@ -4,16 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
-
-from numpy.typing import ArrayLike
+from typing import TYPE_CHECKING, Any
 
 from okid._errors import InputError
-from okid.abi.arguments import channel_names
-from okid.data.records import sides
-from okid.identification import host_result
-from okid.result.result import Result
-from okid.result.stabilization import Criteria, Stabilization, of_identifiers
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from okid.result.result import Result
+    from okid.result.stabilization import Criteria, Stabilization
 
 
 def identify(
@@ -98,6 +97,11 @@ def identify(
     >>> result.mkr.M.diagonal().round(1).tolist()  # kg; true: 1, 0.8, 1.2
     [1.0, 0.8, 1.2]
     """
+    from okid.abi.arguments import channel_names
+    from okid.data.records import sides
+    from okid.identification import host_result
+    from okid.result.result import Result
+
     inputs, outputs = sides(u, y, host_result.TYPES)
     options = {
         "inputs": channel_names(input_names, u, "u", inputs[0].shape[1]),
@@ -134,6 +138,8 @@ def stabilization(
     >>> [round(mode.frequency_hz, 1) for mode in found.modes]
     [11.0, 31.8, 45.7]
     """
+    from okid.result.stabilization import of_identifiers
+
     if "order" in options:
         raise InputError("order is not an argument of stabilization(): it looks at many, give orders=[...]")
     options["method"] = options.get("method") or "okid-era"

@@ -6,14 +6,13 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from okid._errors import InputError
-from okid.abi import host
-from okid.frf import Frf
-from okid.identification.host_result import HostResult, options_text
-from okid.result.result import Result
+
+if TYPE_CHECKING:
+    from okid.frf import Frf
+    from okid.result.result import Result
 
 
 def identify_frf(
@@ -46,6 +45,13 @@ def identify_frf(
     >>> [f"{mode.frequency_hz:.1f} Hz" for mode in result.confident_modes]
     ['11.0 Hz', '31.8 Hz', '45.7 Hz']
     """
+    import numpy as np
+
+    from okid.abi import host
+    from okid.frf import Frf
+    from okid.identification.host_result import HostResult, options_text
+    from okid.result.result import Result
+
     if not isinstance(responses, Frf):
         from okid.formats.frf_file import read_frf
 

@@ -19,8 +19,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of okid-capture; returns the exit code. Ctrl-C and SIGTERM end a run in order, with its result."""
     with early_end("okid-capture"):
         args = make_parser().parse_args(arguments)
-        module, _, name = args.command.partition(":")
-        command = getattr(import_module(f"okid.capture.{module}"), name)
+        place, _, name = args.command.partition(":")
+        module = import_module(f"okid.capture.{place}")
+        command = getattr(module, name)
+        getattr(module, "load", id)(args)
         from okid.capture.outcome import guarded
     stop = threading.Event()
 

@@ -9,15 +9,13 @@ import errno
 import socket
 import threading
 from collections.abc import Iterable
+from importlib import import_module
 from itertools import chain
-from typing import Any
-
-import can
+from typing import TYPE_CHECKING, Any
 
 from okid._errors import InputError
 from okid.capture.config import BusConfig, CaptureConfig
 from okid.capture.dbc import read_dbc
-from okid.capture.frame_log import log_messages, messages_for
 from okid.capture.outcome import (
     EXIT_DEVICE,
     EXIT_DONE,
@@ -35,9 +33,23 @@ from okid.capture.recording import Recorder, record_bus
 from okid.capture.sources import feed_messages
 from okid.capture.stream import Capture
 
+if TYPE_CHECKING:
+    import can
+
 _SO_RCVBUFFORCE = 33
 _ROOM = 8 << 20  # bytes of a socket: some 13,000 frames
 _PIECE = 20_000  # frames of a log between two looks at Ctrl-C
+
+
+def _by_library(args: argparse.Namespace) -> bool:
+    """A log that the library reads by itself."""
+    return bool(args.config and args.log and not args.out and args.log.lower().endswith((".log", ".okj")))
+
+
+def load(args: argparse.Namespace) -> None:
+    """What a run needs and takes long to load, while Ctrl-C still just ends the program."""
+    if not _by_library(args):
+        import_module("can")
 
 
 def open_bus(interface: str, channel: str, *, fd: bool = False, bitrate: int | None = None) -> can.BusABC:
@@ -45,6 +57,8 @@ def open_bus(interface: str, channel: str, *, fd: bool = False, bitrate: int | N
 
     InputError for an interface that python-can does not have.
     """
+    import can
+
     if interface not in can.VALID_INTERFACES:
         raise InputError(
             f"no python-can interface {interface!r}; there are {', '.join(sorted(can.VALID_INTERFACES))}, and file"
@@ -83,9 +97,12 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError(f"--interface {args.interface} needs --channel beside it")
     if args.log is None and args.config is None and args.interface is None:
         raise InputError("--interface and --channel are needed, or --log FILE")
-    if args.interface is not None and args.interface not in can.VALID_INTERFACES:
-        known = ", ".join(sorted(can.VALID_INTERFACES))
-        raise InputError(f"no python-can interface {args.interface!r}; there are {known}, and file")
+    if args.interface is not None:
+        from can import VALID_INTERFACES
+
+        if args.interface not in VALID_INTERFACES:
+            known = ", ".join(sorted(VALID_INTERFACES))
+            raise InputError(f"no python-can interface {args.interface!r}; there are {known}, and file")
     if args.out is None and args.config is None:
         raise InputError("nothing to do: give --out FILE.log, --config CONFIG.toml, or both")
     check_duration(args.duration)
@@ -144,17 +161,18 @@ def run_can(args: argparse.Namespace, stop: threading.Event) -> int:
 def _from_log(
     args: argparse.Namespace, config: CaptureConfig | None, remarks: list[str], database: Any, stop: threading.Event
 ) -> int:
+    if config is not None and _by_library(args):
+        return _replay(args, config, stop)
+    from okid.capture.frame_log import log_messages, messages_for
+
     if config is None:
         rest = iter(log_messages(args.log, remarks))
         first = next(rest)  # no copy is made when it cannot be read
         return _record(args, chain([first], rest), database, stop)
-    if args.out is None and args.log.lower().endswith((".log", ".okj")):
-        return _replay(args, config, stop)
     return _identify(args, config, messages_for(args.log, config, remarks), None, database, stop)
 
 
 def _replay(args: argparse.Namespace, config: CaptureConfig, stop: threading.Event) -> int:
-    """A log that the library reads by itself."""
     with make_capture(config, args, live=False) as capture:
         capture.open(args.log)
         left = 1 << 62 if args.frames is None else args.frames
@@ -215,6 +233,8 @@ def _identify(
     database: Any,
     stop: threading.Event,
 ) -> int:
+    from can import CanError
+
     fault, live = None, args.log is None
     with contextlib.ExitStack() as kept:
         capture = kept.enter_context(make_capture(config, args, live))
@@ -245,7 +265,7 @@ def _identify(
                 stop=lambda: stop.is_set() or seen == args.frames, tap=keep, idle=idle,
             ):  # fmt: skip
                 pass
-        except (can.CanError, OSError) as failed:
+        except (CanError, OSError) as failed:
             fault = f"{args.channel}: {str(failed) or type(failed).__name__}"
         finally:
             if recorder is not None:

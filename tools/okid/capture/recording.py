@@ -13,12 +13,13 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
-
-import can
+from typing import TYPE_CHECKING, Any
 
 from okid._errors import InputError
 from okid.formats.candump_text import identifier_text, log_line
+
+if TYPE_CHECKING:
+    import can
 
 _POLL_S = 0.1
 _MOST_IDENTIFIERS = 4096  # counted one by one
@@ -221,6 +222,8 @@ def record_bus(
     says why; what came before is kept). `database` (cantools) with `csv_path` also writes decoded signals, one row a
     frame. The bus stays open: it is the caller's. Raises OSError when a file cannot be written.
     """
+    from can import CanError
+
     with Recorder(
         path, channel=channel, database=database, csv_path=csv_path, flush_s=flush_s, clock=clock
     ) as recorder:
@@ -240,7 +243,7 @@ def record_bus(
             left = _POLL_S if duration is None else min(_POLL_S, max(0.0, duration - (now - begun)))
             try:
                 message = bus.recv(timeout=left)  # type: ignore[union-attr]
-            except (can.CanError, OSError) as fault:
+            except (CanError, OSError) as fault:
                 summary.fault = str(fault) or type(fault).__name__
                 break
             if message is not None:
