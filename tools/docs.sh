@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# The documentation as web pages: build/docs/site (pages and Python package, mkdocs) and build/docs/c (C headers, Doxygen).
+# The documentation as web pages: build/docs/site (mkdocs: pages, Python package, and in c/ the C headers by Doxygen).
 # Every warning is an error. Needs doxygen, and the extra "docs" of tools/pyproject.toml in .venv.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -12,4 +12,4 @@ doxygen Doxyfile || { echo "docs: Doxygen found the above in the headers" >&2; e
 log=$(mktemp)
 NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict >"$log" 2>&1 || { grep -v ^INFO "$log" >&2; rm -f "$log"; exit 1; }
 rm -f "$log"
-echo "docs: build/docs/site/index.html, build/docs/c/index.html"
+echo "docs: build/docs/site/index.html"
