@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hook of mkdocs: the pages that Doxygen made of the C headers (build/docs/c) become part of the site, linked where named."""
+"""Hook of mkdocs: what Doxygen made of the C headers (build/docs/c) as part of the site, linked where it is named."""
 
 from __future__ import annotations
 
