@@ -166,6 +166,15 @@ double quantile(std::vector<double> values, double share) {
     return values.empty() ? NAN : values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
+/// Times a quarter of an octave wide, [from ms, how many], for the picture in docs.
+nlohmann::ordered_json histogram(const std::vector<double>& values) {
+    std::map<int, std::size_t> bars;
+    for (const double value : values) ++bars[static_cast<int>(std::floor(4 * std::log2(value)))];
+    auto out = nlohmann::ordered_json::array();
+    for (const auto& [quarter, count] : bars) out.push_back({std::exp2(quarter / 4.0), count});
+    return out;
+}
+
 /// One bar for every factor of two.
 void print(const char* what, const std::vector<double>& values) {
     fmt::print("  {}: {} times, median {:.2f} ms, p99 {:.2f} ms, worst {:.2f} ms\n", what, values.size(),
@@ -218,7 +227,11 @@ int main(int argc, char** argv) try {
                                  {"case", name},
                                  {"bare_p99_ms", quantile(found.bare_ms, 0.99)},
                                  {"handed_over_p99_ms", quantile(found.handed_over_ms, 0.99)},
-                                 {"modes_p99_ms", quantile(found.told_ms, 0.99)}});
+                                 {"modes_p99_ms", quantile(found.told_ms, 0.99)},
+                                 {"histograms_ms",
+                                  {{"bare", histogram(found.bare_ms)},
+                                   {"handed_over", histogram(found.handed_over_ms)},
+                                   {"modes", histogram(found.told_ms)}}}});
         bench["ratios"][fmt::format("handed_over_over_bare_{}", name)] =
             quantile(found.handed_over_ms, 0.99) / quantile(found.bare_ms, 0.99);
     }
