@@ -209,6 +209,7 @@ stream_config read_stream(const char* text, const live_config* config) {
     out.mass = checked.mass;
     if (config) {
         out.where = config->path + ": [identification]: ";
+        out.wanted.max_memory_mb = config->identification.max_memory_mb;
         const bool own = !given.record.input_dofs.empty() || !given.record.output_dofs.empty();
         if (!own && checked.inputs.size() == config->n_u && checked.outputs.size() == config->n_y)
             out.mass = live_mass_plan(*config);

@@ -201,7 +201,7 @@ def speed() -> str:
 
 
 def latency() -> str:
-    """From a packet on the line to what okid does with it, beside a reader that does nothing else; 20 s on this machine."""
+    """From a packet on the line to what okid does with it, beside a reader that does nothing else; 20 s here."""
     build = runs.ROOT / "build"
     subprocess.run(["cmake", "--build", build, "--target", "bench_latency", "--", "--quiet"], check=True)
     (runs.FOLDER / "latency.json").write_text("{}")
