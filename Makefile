@@ -70,6 +70,7 @@ bench: build ## speed of the kernels and of whole identifications as ratios with
 	@$(PYTHON) tests/bench/python_call.py build/bench.json
 	@$(PYTHON) tests/bench/identify_beside.py build/bench.json
 	@$(PYTHON) tests/bench/campaign.py 1000 5 build/bench.json
+	@OKID_PROGRAM=build/okid $(PYTHON) tests/bench/files.py build/bench.json
 	@cmake --build build --target bench_latency -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_latency build/bench.json
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises

@@ -93,4 +93,19 @@ bool line_reader::next(std::string_view& line) {
     }
 }
 
+bool line_reader::next_lines(std::string_view& lines) {
+    for (;;) {
+        const std::string_view there(buffer_.data() + begin_, end_ - begin_);
+        const std::size_t last = there.rfind('\n');
+        if (last != std::string_view::npos || (at_end_ && !there.empty())) {
+            lines = there.substr(0, last == std::string_view::npos ? there.size() : last + 1);
+            begin_ = searched_ = begin_ + lines.size();
+            return true;
+        }
+        if (at_end_) return false;
+        searched_ = end_;
+        fill();
+    }
+}
+
 } // namespace okid_host

@@ -19,6 +19,10 @@ class line_reader {
     /// The next line without its end (LF or CR LF), valid until the next call; false at the end of the file.
     bool next(std::string_view& line);
 
+    /// Whole lines, as many as were read at once, valid until the next call; false at the end of the file. number() does
+    /// not count them.
+    bool next_lines(std::string_view& lines);
+
     std::size_t number() const { return number_; } ///< of the line given last, from 1
     std::size_t bytes() const { return bytes_; }   ///< read so far
     std::size_t size() const { return size_; }     ///< of the file, 0 for a pipe

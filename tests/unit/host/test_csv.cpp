@@ -5,8 +5,11 @@
 #include "record/csv.hpp"
 #include "record/csv_header.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <unistd.h>
@@ -71,6 +74,55 @@ void numbers_are_read_to_the_last_bit() {
     TEST_ASSERT_TRUE(r.samples[2] == 4.9e-324);
     TEST_ASSERT_TRUE(r.samples[3] == 0);
     TEST_ASSERT_TRUE(r.samples[4] == 123456789012345678901.0);
+}
+
+/// Whatever way a number takes, it is that of strtod(): with a point, and with a decimal comma between semicolons.
+void numbers_are_those_of_strtod() {
+    std::string points = "# fs_hz: 1\na,b\n", commas = "# fs_hz: 1\na;b\n";
+    std::vector<double> expected;
+    std::uint64_t state = 1;
+    const auto random = [&] { return (state = state * 6364136223846793005u + 1442695040888963407u) >> 11; };
+    const char* const formats[] = {"%.17g", "%.6f", "%.0f", "%.18e", "%.3f", "%.12g", "-%.15f", "%.9f"};
+    for (int n = 0; n < 40000; ++n) {
+        char text[64];
+        const double value = static_cast<double>(random()) / std::pow(10.0, static_cast<double>(random() % 20));
+        std::snprintf(text, sizeof text, formats[random() % 8], value);
+        expected.push_back(std::strtod(text, nullptr));
+        points += text;
+        points += n % 2 ? '\n' : ',';
+        std::replace(text, text + std::strlen(text), '.', ',');
+        commas += text;
+        commas += n % 2 ? '\n' : ';';
+    }
+    for (const std::string& text : {points, commas}) {
+        const csv_record r = take(text);
+        TEST_ASSERT_EQUAL_UINT64(expected.size(), r.samples.size());
+        TEST_ASSERT_EQUAL_MEMORY(expected.data(), r.samples.data(), expected.size() * sizeof(double));
+    }
+}
+
+/// Pieces are read side by side: what is told is the first fault of the file, with its line.
+void the_first_fault_of_a_large_file() {
+    constexpr std::size_t rows = 1200000; // 10 MB
+    std::string good = "# fs_hz: 1\na,b\n";
+    const std::size_t head = good.size();
+    for (std::size_t n = 0; n < rows; ++n) good += "1.5,2.25\n";
+    const auto at = [&](std::size_t line) { return head + (line - 3) * 9; };
+    const csv_record r = take(good + "\n \n");
+    TEST_ASSERT_EQUAL_UINT64(rows, r.count);
+    TEST_ASSERT_EQUAL_DOUBLE(2.25, r.samples.back());
+    TEST_ASSERT_EQUAL_UINT64(2 * rows, r.samples.size());
+    std::string bad = good;
+    bad.replace(at(900000), 3, "inf");
+    bad.replace(at(700001) + 4, 4, "text");
+    refused(bad, "line 700001, column 2 (b): found \"text\"");
+    bad.replace(at(650000), 8, "        ");
+    refused(bad, "line 650000: an empty line between rows");
+    refused(good.substr(0, at(600000)) + "\n" + good.substr(head), "line 600000: an empty line between rows");
+    refused(good.substr(0, at(900001)) + "1,2,3\n" + good.substr(head), "line 900001: found 3 cells");
+    std::replace(good.begin(), good.end(), ',', ';');
+    good.replace(at(800000), 3, "1,5");
+    refused(good, "line 800000, column 1 (a): found \"1,5\", expected one decimal mark");
 }
 
 void windows_export() {
@@ -214,6 +266,8 @@ int main(void) {
     RUN_TEST(plain_numbers);
     RUN_TEST(order_of_the_columns_asked_for);
     RUN_TEST(numbers_are_read_to_the_last_bit);
+    RUN_TEST(numbers_are_those_of_strtod);
+    RUN_TEST(the_first_fault_of_a_large_file);
     RUN_TEST(windows_export);
     RUN_TEST(tab_and_blanks);
     RUN_TEST(missing_cells);

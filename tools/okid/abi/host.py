@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import weakref
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -149,12 +150,12 @@ def csv(path: str | Path) -> tuple[dict[str, Any], NDArray[np.float64]]:
     """names, units, fs_hz, comments, rate_remark of a CSV record, and its samples (N, m). Raises InputError."""
     made, rows, columns = ctypes.c_void_p(), ctypes.c_size_t(), ctypes.c_size_t()
     call("csv_read", os.fsencode(path), ctypes.byref(made))
-    try:
-        data = library().okid_host_csv_samples(made, ctypes.byref(rows), ctypes.byref(columns))
-        about: dict[str, Any] = json.loads(library().okid_host_csv_json(made))
-        return about, np.array(np.ctypeslib.as_array(data, (rows.value, columns.value)))
-    finally:
-        library().okid_host_csv_delete(made)
+    data = library().okid_host_csv_samples(made, ctypes.byref(rows), ctypes.byref(columns))
+    memory = ctypes.cast(data, ctypes.POINTER(ctypes.c_double * (rows.value * columns.value))).contents
+    # The array stands in the memory of the record.
+    weakref.finalize(memory, library().okid_host_csv_delete, made).atexit = False
+    about: dict[str, Any] = json.loads(library().okid_host_csv_json(made))
+    return about, np.ctypeslib.as_array(memory).reshape(rows.value, columns.value)
 
 
 def unit_of_name(name: str) -> str:
