@@ -8,6 +8,7 @@
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "line_reader.hpp"
+#include "npy.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -40,6 +41,7 @@ csv_header read_head(line_reader& reader, const std::string& path) {
 } // namespace
 
 std::vector<std::string> read_csv_columns(const std::string& path) {
+    if (is_npy(path)) return read_npy_columns(path);
     line_reader reader(path);
     return read_head(reader, path).names;
 }
@@ -68,6 +70,7 @@ void check_columns(const std::string& path, const std::vector<std::string>& colu
 }
 
 csv_record read_csv(const std::string& path, const csv_request& asked) {
+    if (is_npy(path)) return read_npy(path, asked);
     line_reader reader(path);
     const csv_header header = read_head(reader, path);
     csv_request request = asked;

@@ -29,7 +29,7 @@ struct csv_record {
 };
 
 /// Read a record. Throws `failure` (exit 2) naming file, line, column, what was found and what was expected.
-/// Columns that were not asked for are skipped unread.
+/// Columns that were not asked for are skipped unread. A name that ends in .npy is an array (npy.hpp).
 csv_record read_csv(const std::string& path, const csv_request& request);
 
 /// Throws (exit 2) where one of the first `checked` columns of `count` rows is missing throughout.
