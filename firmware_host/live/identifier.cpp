@@ -319,19 +319,29 @@ void identifier::reset_counts() {
     before_ = {};
 }
 
-void identifier::require_no_refinement() const {
-    if (refiner_)
+/// The first bytes of a state, those of its correlation sums.
+std::size_t identifier::refinement_in(const void* state, std::size_t bytes) const {
+    const std::size_t own = sum_refiner::bytes_in(state, bytes);
+    if (refiner_ && own == 0 && !states_only_)
         throw failure(exit_usage, where_ +
-                                      "a state holds the sums that identify, not those that refine: expected refine "
-                                      "= \"no\" in a stream whose state is taken, put back or merged");
+                                      "the state has no sums for a refinement, expected one of a stream that refines; "
+                                      "or set refine = \"no\"");
+    return own;
 }
 
 std::vector<std::byte> identifier::state() {
     if (agreed_) return agreed_->state();
-    require_no_refinement();
     flush();
-    std::vector<std::byte> out(okid_accumulator_serialised_size(accumulator_));
-    if (okid_accumulator_serialise(accumulator_, out.data(), out.size()) != OKID_OK)
+    if (refiner_ && !refiner_->summing() && okid_identify_run(identify_, accumulator_, &realised_) >= 0)
+        refiner_->choose_lags(&realised_);
+    if (refiner_ && !refiner_->summing())
+        throw failure(exit_usage, where_ +
+                                      "the samples give no model yet, which must tell how far the sums of a refinement "
+                                      "look back; expected a longer record, or refine = \"no\"");
+    std::vector<std::byte> out = refiner_ ? refiner_->state() : std::vector<std::byte>();
+    const std::size_t at = out.size(), bytes = okid_accumulator_serialised_size(accumulator_);
+    out.resize(at + bytes);
+    if (okid_accumulator_serialise(accumulator_, out.data() + at, bytes) != OKID_OK)
         throw failure(exit_device, where_ + "the state cannot be written");
     return out;
 }
@@ -363,10 +373,15 @@ void identifier::restore(const void* state, std::size_t bytes) {
         samples_ = agreed_->basis();
         return;
     }
-    require_no_refinement();
-    owned_sums from = read_state(state, bytes, sums_config_);
-    reset();
-    if (const okid_status_t status = okid_accumulator_deserialise(accumulator_, state, bytes); status != OKID_OK)
+    const std::size_t refinement = refinement_in(state, bytes);
+    const void* const sums = static_cast<const std::byte*>(state) + refinement;
+    owned_sums from = read_state(sums, bytes - refinement, sums_config_);
+    if (refiner_ && refinement > 0) refiner_->put_back(state, refinement);
+    pending_ = 0;
+    if (blocks_) blocks_->reset();
+    reset_counts();
+    if (const okid_status_t status = okid_accumulator_deserialise(accumulator_, sums, bytes - refinement);
+        status != OKID_OK)
         throw failure(exit_usage, fmt::format("{}the state: {}", where_, okid_status_text(status)));
     const okid_accumulator_stats_t counts = held();
     samples_ = counts.samples + counts.missing;
@@ -386,9 +401,11 @@ void identifier::merge(const void* state, std::size_t bytes) {
     }
     if (memory_samples_ > 0)
         throw failure(exit_usage, where_ + "a window and a fading memory take no further records, only a growing one");
-    require_no_refinement();
-    owned_sums from = read_state(state, bytes, sums_config_);
+    const std::size_t refinement = refinement_in(state, bytes);
     flush();
+    if (refiner_ && refinement == bytes) return refiner_->merge(state, refinement);
+    owned_sums from = read_state(static_cast<const std::byte*>(state) + refinement, bytes - refinement, sums_config_);
+    if (refiner_ && refinement > 0) refiner_->merge(state, refinement);
     if (const okid_status_t status = okid_accumulator_merge(accumulator_, from.sums); status != OKID_OK)
         throw failure(exit_usage, fmt::format("{}the state: {}", where_, okid_status_text(status)));
     const okid_accumulator_stats_t counts = held();

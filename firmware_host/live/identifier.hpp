@@ -31,7 +31,8 @@ class identifier {
     void add_missing(std::int64_t count); ///< 0: another record begins
     void reset();                         ///< forget all samples
 
-    /// The sums as bytes (okid_accumulator_serialise()): any release reads them.
+    /// The sums as bytes (okid_accumulator_serialise()): any release reads them. Of a stream that refines its correlation sums
+    /// stand before them. Throws `failure` (exit 2) when no model has told yet how many lags these need.
     std::vector<std::byte> state();
     /// Go on where state() stood. Throws `failure` (exit 2) for bytes of another shape.
     void restore(const void* state, std::size_t bytes);
@@ -98,7 +99,7 @@ class identifier {
     void create_accumulator(const stream_config& config);
     void create_identifier(const stream_config& config);
     void choose_lags();
-    void require_no_refinement() const;
+    std::size_t refinement_in(const void* state, std::size_t bytes) const;
     template <class Number> okid_status_t absorb(const Number* samples, std::size_t count);
     template <class Number> okid_status_t keep(const Number* row);
     owned_sums read_state(const void* state, std::size_t bytes, const okid_accumulator_config_t& shape) const;

@@ -22,6 +22,7 @@ constexpr std::int32_t most_lags = 8192, fewest_lags = 64, most_runs = 64, windo
 constexpr std::int64_t first_look = 8192, last_look = 65536; // samples kept until the lags are known
 constexpr double died_away = 1e4, hardly_heard = 200; // amplitudes over what is left of them: of modes, of other poles
 constexpr double share_of_memory = 0.25;              // of max_memory_mb
+constexpr std::size_t piece = 1024, most_filter = 40; // samples handed over at a time; order of a filter
 
 okid_correlation_config_t shape_of(const stream_config& config, std::int32_t lags) {
     okid_correlation_config_t c = okid_correlation_defaults(static_cast<std::int32_t>(config.inputs.size()),
@@ -65,6 +66,17 @@ double sum_refiner_bytes(const stream_config& config) {
            static_cast<double>(okid_refine_memsize(&refine)) + 8 * m * static_cast<double>(last_look);
 }
 
+sum_refiner::owned_correlation::owned_correlation(okid_correlation_config_t config) {
+    bytes = okid_correlation_memsize(&config);
+    config.sample = OKID_SAMPLE_DOUBLE;
+    bytes = std::max(bytes, okid_correlation_memsize(&config));
+    block.reset(new (std::nothrow) std::byte[bytes]);
+    if (!block)
+        throw failure(exit_device, fmt::format("[identification]: the sums of a refinement need {:.0f} MB, which this "
+                                               "machine does not give; set refine = \"no\"",
+                                               static_cast<double>(bytes) / 1e6));
+}
+
 sum_refiner::sum_refiner(const stream_config& config)
     : config_(largest_shape(config)), m_(config.channels()), rate_hz_(config.rate_hz),
       only_where_it_serves_(config.wanted.refine == "auto"),
@@ -73,45 +85,63 @@ sum_refiner::sum_refiner(const stream_config& config)
       scale_(config.scale), offset_(config.offset), next_look_(first_look) {
     if (config_.block > 0) memory_ = std::int64_t{config_.block} * config_.slots;
     if (config_.forgetting < 1) memory_ = std::llround(std::min(2 / (1 - config_.forgetting), 1e15)); // as much weight
-    waiting_.reserve(static_cast<std::size_t>(first_look) * m_);
+    waiting_.reserve(static_cast<std::size_t>(last_look) * m_);
+    numbers_.reserve((piece + most_filter) * m_);
+    past_.reserve((piece + most_filter) * m_);
+    sums_ = owned_correlation(config_);
 }
 
 std::size_t sum_refiner::room(std::size_t count) const {
     return sums_ ? count : std::min(count, static_cast<std::size_t>(next_look_ - kept()));
 }
 
-void sum_refiner::feed(const double* rows, std::size_t count) {
-    if (filter_.size() > 1) return feed_filtered(rows, count);
-    okid_status_t status = OKID_OK;
-    if (config_.sample == OKID_SAMPLE_DOUBLE) {
-        status = okid_correlation_add(sums_.sums, rows, count);
-    } else if (config_.sample == OKID_SAMPLE_INT16) {
-        const std::vector<std::int16_t> codes(rows, rows + count * m_);
-        status = okid_correlation_add_i16(sums_.sums, codes.data(), count);
-    } else {
-        const std::vector<std::int32_t> codes(rows, rows + count * m_);
-        status = okid_correlation_add_i32(sums_.sums, codes.data(), count);
-    }
-    if (status < 0)
-        throw failure(exit_no_model,
-                      fmt::format("the samples cannot be summed for a refinement: {}", okid_status_text(status)));
+okid_status_t sum_refiner::sum(const double* rows, std::size_t count) {
+    if (config_.sample == OKID_SAMPLE_DOUBLE || in_units_) return okid_correlation_add(sums_.sums, rows, count);
+    if (config_.sample == OKID_SAMPLE_INT16) // codes that waited
+        return sum(std::vector<std::int16_t>(rows, rows + count * m_).data(), count);
+    return sum(std::vector<std::int32_t>(rows, rows + count * m_).data(), count);
+}
+
+okid_status_t sum_refiner::sum(const float* rows, std::size_t count) {
+    numbers_.assign(rows, rows + count * m_);
+    return okid_correlation_add(sums_.sums, numbers_.data(), count);
+}
+
+okid_status_t sum_refiner::sum(const std::int16_t* rows, std::size_t count) {
+    return okid_correlation_add_i16(sums_.sums, rows, count);
+}
+
+okid_status_t sum_refiner::sum(const std::int32_t* rows, std::size_t count) {
+    return okid_correlation_add_i32(sums_.sums, rows, count);
 }
 
 /// Numbers in engineering units through the filter; one that is missing takes those with it that look back to it.
-void sum_refiner::feed_filtered(const double* rows, std::size_t count) {
+template <class Number> void sum_refiner::feed_filtered(const Number* rows, std::size_t count) {
     const double full = config_.sample == OKID_SAMPLE_INT16   ? 32767
                         : config_.sample == OKID_SAMPLE_INT24 ? 8388607
                                                               : 2147483647;
     const bool codes = config_.sample != OKID_SAMPLE_DOUBLE && config_.saturated_missing != 0;
-    for (std::size_t i = 0; i < count * m_; ++i)
-        past_.push_back(codes && (rows[i] >= full || rows[i] < -full) ? NAN
-                                                                      : scale_[i % m_] * rows[i] + offset_[i % m_]);
-    const std::size_t order = filter_.size() - 1, have = past_.size() / m_;
-    if (have <= order) return;
-    sample_runs run{{static_cast<std::int32_t>(have)}, past_};
-    filter_runs(filter_, m_, 1, run);
+    for (std::size_t i = 0; i < count * m_; ++i) {
+        const auto x = static_cast<double>(rows[i]);
+        past_.push_back(codes && (x >= full || x < -full) ? NAN : scale_[i % m_] * x + offset_[i % m_]);
+    }
+    const std::size_t order = filter_.size() - 1;
+    if (past_.size() / m_ <= order) return;
+    numbers_.clear();
+    filter_run(filter_, m_, past_.data(), past_.size() / m_, numbers_);
     past_.erase(past_.begin(), past_.end() - static_cast<std::ptrdiff_t>(order * m_));
-    check_statistics(okid_correlation_add(sums_.sums, run.samples.data(), run.samples.size() / m_));
+    check_statistics(sum(numbers_.data(), numbers_.size() / m_));
+}
+
+template <class Number> void sum_refiner::feed(const Number* rows, std::size_t count) {
+    for (std::size_t done = 0; done < count; done += piece) {
+        const std::size_t n = std::min(piece, count - done);
+        if (in_units_)
+            feed_filtered(rows + done * m_, n);
+        else if (const okid_status_t status = sum(rows + done * m_, n); status < 0)
+            throw failure(exit_no_model,
+                          fmt::format("the samples cannot be summed for a refinement: {}", okid_status_text(status)));
+    }
 }
 
 /// The pieces between gaps of what waits, from a sample on.
@@ -135,17 +165,8 @@ template <class Number> void sum_refiner::keep(const Number* row) {
 }
 
 template <class Number> void sum_refiner::add(const Number* rows, std::size_t count) {
-    if (!sums_) {
-        for (std::size_t k = 0; k < count; ++k) keep(rows + k * m_);
-        return;
-    }
-    constexpr std::size_t piece = 1024;
-    std::vector<double> numbers;
-    for (std::size_t done = 0; done < count; done += piece) {
-        const std::size_t n = std::min(piece, count - done);
-        numbers.assign(rows + done * m_, rows + (done + n) * m_);
-        feed(numbers.data(), n);
-    }
+    if (sums_) return feed(rows, count);
+    for (std::size_t k = 0; k < count; ++k) keep(rows + k * m_);
 }
 
 template void sum_refiner::add(const double*, std::size_t);
@@ -162,27 +183,30 @@ void sum_refiner::gap() {
 }
 
 void sum_refiner::reset() {
-    sums_ = {};
     waiting_.clear();
     gaps_.clear();
     next_look_ = first_look;
-    filter_ = {1};
     past_.clear();
+    if (given_lags_ > 0) {
+        make(given_lags_);
+    } else {
+        sums_.sums = nullptr;
+        filter_ = {1};
+        in_units_ = false;
+    }
     found_ = {};
     fault_.clear();
 }
 
+/// Empty sums, in memory that was there from the start.
 void sum_refiner::make(std::int32_t lags) {
     okid_correlation_config_t c = config_;
     c.lags = lags;
-    if (filter_.size() > 1) c.sample = OKID_SAMPLE_DOUBLE;
-    const std::size_t bytes = okid_correlation_memsize(&c);
-    sums_.block.reset(new (std::nothrow) std::byte[bytes]);
-    if (!sums_.block || okid_correlation_create(&sums_.sums, &c, sums_.block.get(), bytes) != OKID_OK)
-        throw failure(exit_device, fmt::format("[identification]: the sums of a refinement need {:.0f} MB, which this "
-                                               "machine does not give; set refine = \"no\"",
-                                               static_cast<double>(bytes) / 1e6));
-    if (filter_.size() == 1) okid_correlation_set_units(sums_.sums, scale_.data());
+    if (in_units_) c.sample = OKID_SAMPLE_DOUBLE;
+    if (sums_.bytes < okid_correlation_memsize(&c)) sums_ = owned_correlation(c);
+    if (okid_correlation_create(&sums_.sums, &c, sums_.block.get(), sums_.bytes) != OKID_OK)
+        throw failure(exit_device, "[identification]: the sums of a refinement cannot be made; set refine = \"no\"");
+    if (!in_units_) okid_correlation_set_units(sums_.sums, scale_.data());
 }
 
 /// Where the slowest mode has died away and no other pole is heard any more.
@@ -206,16 +230,21 @@ void sum_refiner::choose_lags(const okid_identified_t* model) {
     if (model) {
         likeliest_model one = of_waiting(*model);
         if (one.status >= 0) filter_ = std::move(one.filter);
+        in_units_ = filter_.size() > 1;
         whiteness_ = one.status >= 0 ? one.found.whiteness : INFINITY;
     }
     make(model ? lags_of(*model) : config_.lags);
+    sum_waiting();
+}
+
+void sum_refiner::sum_waiting() {
     each_run(0, [&](const double* rows, std::size_t count) {
         if (rows != waiting_.data()) gap();
         feed(rows, count);
     });
     if (!gaps_.empty() && gaps_.back() == kept()) gap();
-    waiting_ = {};
-    gaps_ = {};
+    waiting_.clear();
+    gaps_.clear();
 }
 
 /// What waits as a record, in engineering units and less its means.

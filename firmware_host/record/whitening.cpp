@@ -74,6 +74,18 @@ std::vector<double> whitening_filter(const std::vector<double>& correlation, dou
     return best;
 }
 
+void filter_run(const std::vector<double>& filter, std::size_t channels, const double* samples, std::size_t count,
+                std::vector<double>& out) {
+    const std::size_t order = filter.size() - 1;
+    const double* const end = samples + count * channels;
+    for (const double* now = samples + order * channels; now < end; now += channels)
+        for (std::size_t c = 0; c < channels; ++c) {
+            double sum = 0;
+            for (std::size_t k = 0; k <= order; ++k) sum += filter[k] * *(now + c - k * channels);
+            out.push_back(sum);
+        }
+}
+
 void filter_runs(const std::vector<double>& filter, std::size_t channels, std::size_t least, sample_runs& runs) {
     const std::size_t order = filter.size() - 1;
     std::vector<double> out;
@@ -86,12 +98,7 @@ void filter_runs(const std::vector<double>& filter, std::size_t channels, std::s
             v = end;
             continue;
         }
-        for (const double* now = v + order * channels; now < end; now += channels)
-            for (std::size_t c = 0; c < channels; ++c) {
-                double sum = 0;
-                for (std::size_t k = 0; k <= order; ++k) sum += filter[k] * *(now + c - k * channels);
-                out.push_back(sum);
-            }
+        filter_run(filter, channels, v, static_cast<std::size_t>(count), out);
         v = end;
         counts.push_back(count - static_cast<std::int32_t>(order));
     }

@@ -23,6 +23,10 @@ std::vector<double> residual_correlation(const okid_model_t& model, const double
 /// @param samples  that the autocorrelations are of
 std::vector<double> whitening_filter(const std::vector<double>& correlation, double samples);
 
+/// Append v(t) + f_1 v(t - 1) + … of `count` samples in a row: none of the first ones, which have no past.
+void filter_run(const std::vector<double>& filter, std::size_t channels, const double* samples, std::size_t count,
+                std::vector<double>& out);
+
 /// v(t) <- v(t) + f_1 v(t - 1) + … in every run. The first samples of a run, which have no past, go, and so do
 /// runs of which less than `least` samples would stay.
 void filter_runs(const std::vector<double>& filter, std::size_t channels, std::size_t least, sample_runs& runs);

@@ -167,8 +167,75 @@ def test_coloured_noise_of_a_stream_is_made_white(samples: int) -> None:
         assert np.mean(error**2) < np.mean(((modes(named, truth[:3])[0] - truth) / limit) ** 2)
 
 
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_merged_and_restored_sums_are_those_of_one_stream(colour: float) -> None:
+    """Two records in one session, in two that are merged, and in one that is put aside in between: to 1e-9."""
+    s = systems.w1()
+    if colour:
+        records = [np.hstack(coloured(s, [colour], seed, 12000)[:2]) for seed in (41, 42)]
+    else:
+        records = [np.hstack(made.__wrapped__("w1", 5.0, seed, 12000)[:2]) for seed in (41, 42)]
+    more: dict[str, Any] = {"method": "n4sid-moesp", "rows": 40, "order": 6, "fs": s.fs, "refine": True}
+
+    def session() -> okid.Session:
+        return okid.Session(1, 3, **more)
+
+    def found(one: okid.Session) -> Array:
+        result = one.identify()
+        assert result.refinement is not None and result.refinement.samples > 19000
+        assert (result.refinement.noise_order > 0) == bool(colour)
+        return np.concatenate(modes(result, s.modes()[0]))
+
+    with session() as whole, session() as first, session() as second, session() as third, session() as fresh:
+        for record in records:
+            whole.feed(record)
+            whole.gap()
+        first.feed(records[0])
+        state = first.to_bytes()
+        second.restore(state)
+        second.reset()
+        assert second.samples == 0
+        second.feed(records[1])
+        first.merge(second.to_bytes())
+        third.restore(state)
+        third.gap()
+        third.feed(records[1])
+        fresh.merge(state)
+        fresh.merge(second.to_bytes())
+        truth = found(whole)
+        for one in (first, third, fresh):
+            np.testing.assert_allclose(found(one), truth, rtol=1e-9)
+        assert whole.samples == first.samples == third.samples == fresh.samples == 24000
+
+
+def test_states_that_do_not_go_together_are_refused() -> None:
+    s = systems.w1()
+    more: dict[str, Any] = {"method": "okid-era", "p": 20, "fs": s.fs}
+    with (
+        okid.Session(1, 3, **more, refine=True) as one,
+        okid.Session(1, 3, **more, refine=True) as two,
+        okid.Session(1, 3, **more) as plain,
+    ):
+        with pytest.raises(okid.InputError, match="no model yet"):
+            one.to_bytes()
+        one.feed(np.hstack(made.__wrapped__("w1", 1.0, 3, 12000)[:2]))
+        two.feed(np.hstack(made.__wrapped__("w1", 5.0, 4, 9000)[:2]))
+        state, rows = two.to_bytes(), one.stats
+        with pytest.raises(okid.InputError, match="sums to [0-9]+ lags behind a filter"):
+            one.merge(state)
+        for damaged in (state[:200], state[:-1], state[:40] + b"x" + state[41:]):
+            with pytest.raises(okid.InputError, match="damaged"):
+                one.merge(damaged)
+        plain.feed(np.hstack(made.__wrapped__("w1", 1.0, 3, 5000)[:2]))
+        with pytest.raises(okid.InputError, match="no sums for a refinement"):
+            one.merge(plain.to_bytes())
+        assert one.stats == rows
+        plain.merge(state)
+        assert plain.samples == 14000
+
+
 def test_what_cannot_be_refined_says_so() -> None:
-    """A gap each 200 samples of 12,000: the model as identified, and a remark. Ambient streams and states: refused."""
+    """A gap each 200 samples of 12,000: the model as identified, and a remark. Ambient streams: refused."""
     s = systems.w1()
     u, y, _ = made("w1", 1.0, 6, 12000)
     record = np.hstack([u, y])
@@ -178,7 +245,3 @@ def test_what_cannot_be_refined_says_so() -> None:
     assert [w.code for w in result.warnings if w.code.startswith("refine")] == ["refine_failed"]
     with pytest.raises(okid.InputError, match="needs a measured force"):
         okid.Session(0, 3, fs=s.fs, method="n4sid-cva", refine=True)
-    with okid.Session(1, 3, fs=s.fs, method="okid-era", p=20, refine=True) as session:
-        session.feed(np.hstack([u, y]))
-        with pytest.raises(okid.InputError, match="refine"):
-            session.to_bytes()

@@ -40,7 +40,7 @@ class Session:
     makes a window or a fading memory forget what was before. `input_dofs`, `output_dofs`, `sensing`, `hold`: as in
     okid.identify(), for M, K and R.
     `refine`: maximum likelihood, "auto" of method "auto". Of a named method True or "auto" (where the search ends):
-    each model is refined from correlation sums kept beside the others (result.refinement); no states or merge() then.
+    each model is refined from correlation sums kept beside the others (result.refinement).
     The other arguments are those of okid.identify(). Raises InputError for arguments that do not go together.
 
     >>> import numpy as np, okid
@@ -211,15 +211,18 @@ class Session:
         return Result.of_host(self._stream.identify())
 
     def to_bytes(self) -> bytes:
-        """The sums, for a file or another machine: what okid.Accumulator.to_bytes() gives; without the blocks for ±."""
+        """The sums, for a file or another machine: what okid.Accumulator.to_bytes() gives; without the blocks for ±. With
+        `refine` the correlation sums too; InputError while no model has told how far these look back."""
         return self._stream.state()
 
     def restore(self, state: bytes) -> None:
         """Go on where to_bytes() of a session of the same channels, lags and memory stood, else InputError. For ± what
-        was before is one block; a fading memory has none until it is forgotten."""
+        was before is one block; a fading memory has none until it is forgotten. With `refine` how far the correlation sums
+        look back and the filter of the noise are those of the state, and stay so at reset()."""
         self._stream.restore(state)
 
     def merge(self, state: bytes) -> None:
         """Add all samples of another session's to_bytes() as further records, and as one block for ±. InputError with a
-        window or forgetting."""
+        window or forgetting. With `refine` both must have begun with restore() of one state and reset(), or one of them
+        with that state itself: `first.to_bytes()` for `second.restore()`, `second.reset()`, then `first.merge()`."""
         self._stream.merge(state)

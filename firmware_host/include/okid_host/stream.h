@@ -87,15 +87,17 @@ OKID_HOST_API int32_t okid_host_stream_update(okid_host_stream_t* self, struct o
  * result of the stream. @return 0; 3: no model can be had; 4 */
 OKID_HOST_API int32_t okid_host_stream_identify(okid_host_stream_t* self, struct okid_host_result** result);
 
-/** The sums as bytes, for a file or another machine (format: okid/accumulator.h; of method auto the samples); the bytes are the stream's until its next
- * call. Every release reads those of earlier ones. @return 0 or 4 */
+/** The sums as bytes, for a file or another machine (format: okid/accumulator.h; of method auto the samples; with refine the correlation sums before
+ * them, as bytes of their own: "OKIDREF\n", uint64 their number); the bytes are the stream's until its next call. Every release reads those of earlier ones. @return 0 or 4 */
 OKID_HOST_API int32_t okid_host_stream_state(okid_host_stream_t* self, const void** state, size_t* bytes);
 
-/** Go on where a state of the same channels, lags and memory stood. What was before is one block for standard deviations, in
+/** Go on where a state of the same channels, lags and memory stood. With refine its correlation sums bring their lags and
+ * the filter of the noise along, which stay with a reset: what comes after that can be merged with the state. What was before is one block for standard deviations, in
  * a fading memory none. @return 0 or 2; on an error nothing is changed */
 OKID_HOST_API int32_t okid_host_stream_restore(okid_host_stream_t* self, const void* state, size_t bytes);
 
-/** Add all samples of a state as further records, and as one block for standard deviations. For a growing memory.
+/** Add all samples of a state as further records, and as one block for standard deviations. For a growing memory; with
+ * refine of streams that have lags and filter of one state in common.
  * @return 0 or 2; on an error nothing is changed */
 OKID_HOST_API int32_t okid_host_stream_merge(okid_host_stream_t* self, const void* state, size_t bytes);
 

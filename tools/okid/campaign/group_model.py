@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import zlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +16,7 @@ from okid.abi.accumulator import Accumulator
 from okid.campaign.record_read import ReadRecord
 from okid.campaign.spec import FEWEST, CampaignSpec
 from okid.identification.host_result import HostResult, identify
-from okid.identification.stream import HostStream
+from okid.identification.stream import HostStream, behind_refinement
 from okid.result.stabilization import of_identifiers
 
 MOST_NUMBERS = 10_000_000  # of a group that auto looks at, as live: an identification holds them some 8 times
@@ -24,19 +25,21 @@ _FEWEST_ORDERS = 12
 _KEYS = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac")
 
 
-def _merged(spec: CampaignSpec, parts: Sequence[Accumulator]) -> HostStream:
-    """All parts in one; each is a block for ±."""
+def _merged(spec: CampaignSpec, parts: Sequence[Accumulator], refinement: bytes) -> HostStream:
+    """All parts in one; each is a block for ±. With the sums of a refinement, packed."""
     c, i = spec.channels, spec.identification
     blocks = i.sigma_blocks if sum(part.rows > 0 for part in parts) >= FEWEST else 0
     whole = HostStream({
         "inputs": c.inputs, "outputs": c.outputs, "fs": c.fs_hz, "codes": c.codes, "saturated": c.saturated,
         "method": i.method, "p": i.p, "rows": i.rows or None, "order": i.order or None,
         "max_order": i.max_order or None, "hankel": i.hankel, "detrend": i.detrend, "sigma_blocks": blocks,
-        "states_only": True,
+        "states_only": True, "refine": i.refine if refinement else None,
         **({"scale": c.scale, "offset": c.offset} if c.codes else {}),
     })  # fmt: skip
     for part in parts:
         whole.merge(part.to_bytes())
+    if refinement:
+        whole.merge(zlib.decompress(refinement))
     return whole
 
 
@@ -82,7 +85,7 @@ def agree(spec: CampaignSpec, records: Sequence[NDArray[np.float64]]) -> dict[st
     options = {
         "inputs": list(c.inputs), "outputs": list(c.outputs), "fs": c.fs_hz, "method": "auto",
         "sigma_blocks": i.sigma_blocks, "band": ":".join(map(str, i.band)) or None, "decimate": i.decimate or None,
-        "threads": 1,
+        "threads": 1, "refine": i.refine or None,
     }  # fmt: skip
     try:
         n_u = len(c.inputs)
@@ -97,16 +100,17 @@ def _listed(mode: dict[str, Any], holds: bool | None) -> dict[str, Any]:
     return {**{key: mode[key] for key in _KEYS}, "holds": holds, **shape}
 
 
-def identify_group(spec: CampaignSpec, parts: Sequence[Accumulator]) -> dict[str, Any]:
+def identify_group(spec: CampaignSpec, parts: Sequence[Accumulator], refinement: bytes = b"") -> dict[str, Any]:
     """What the parts of a group tell: plain values for JSON. Without a model "modes" is empty and "fault" says why.
+    "refined": samples behind a refinement of the modes, None: there is none.
 
     Cost: one identification, a short one a part for ±, the poles of some ten orders.
     """
-    whole = _merged(spec, parts)
+    whole = _merged(spec, parts, refinement)
     out: dict[str, Any] = {
         "model_key": spec.model_key, "rows": whole.counts().rows,
-        "sums_sha256": hashlib.sha256(whole.state()).hexdigest(), "parts": sum(part.rows > 0 for part in parts),
-        "order": None, "fault": None, "modes": [],
+        "sums_sha256": hashlib.sha256(behind_refinement(whole.state())).hexdigest(),
+        "parts": sum(part.rows > 0 for part in parts), "order": None, "refined": None, "fault": None, "modes": [],
     }  # fmt: skip
     try:
         found = whole.identify()
@@ -117,4 +121,5 @@ def identify_group(spec: CampaignSpec, parts: Sequence[Accumulator]) -> dict[str
     held: list[bool | None] = [None] * len(modes)
     if spec.identification.stabilization:
         held = _held(found, int(about["order"]), [mode["frequency_hz"] for mode in modes])
+    out["refined"] = (about.get("refinement") or {}).get("samples")
     return out | {"order": about["order"], "modes": [_listed(*one) for one in zip(modes, held, strict=True)]}

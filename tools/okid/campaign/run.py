@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from okid.campaign.grouping import Group, group_records
 from okid.campaign.plan import GroupPlan, batches_of, slices_of
 from okid.campaign.progress_line import ProgressLine
 from okid.campaign.record_list import Skipped, list_records
+from okid.campaign.refinement import plan_of
 from okid.campaign.spec import CampaignSpec
 from okid.campaign.state_folder import StateFolder, same_faults, still_valid
 from okid.campaign.sums_file import GroupSums
@@ -119,6 +120,8 @@ class _Run:
         return self._client
 
     def run(self) -> Outcome:
+        if self.spec.refines:
+            self.spec = replace(self.spec, plan=self.refinement_plan())
         slices = [one for plan in self.plans() for one in self.begin(plan)]
         for batch in batches_of(self.spec, slices):
             self.submit_batch(batch)
@@ -135,6 +138,17 @@ class _Run:
         self.progress.show(self.inside, len(self.out.done) + len(self.out.faults), last=True)
         self.tell()
         return self.out
+
+    def refinement_plan(self) -> bytes:
+        """That of an earlier run, else of the first records."""
+        plan = self.state.plan()
+        if not plan:
+            records = [ref for group in self.out.groups for ref in group.records]
+            plan = self.client.submit(plan_of, self.spec, records, pure=False).result()
+            self.state.keep_plan(plan)
+        if not plan:
+            self.out.remarks.append("nothing is refined: the first records give no model that tells how")
+        return plan
 
     def plans(self) -> list[GroupPlan]:
         """What is there of each group and what is not; sums that hold other records than the group are removed."""
@@ -339,7 +353,7 @@ class _Run:
         if ident in self.trees:
             sums.left_out += self.trees[ident].left_out
         self.state.write(sums, files)
-        sums.parts = {}  # on disk; what is kept here is for the tables
+        sums.parts, sums.refinement = {}, b""  # on disk; what is kept here is for the tables
         self.out.done[ident] = sums
         self.trees.pop(ident, None)
 

@@ -62,6 +62,7 @@ class Identification:
     stabilization: bool = True
     band: tuple[float, ...] = ()
     decimate: int = 0
+    refine: str = ""
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,7 @@ class CampaignSpec:
     workers: int
     address: str | None
     memory_mb: float
+    plan: bytes = b""  # of the sums for a refinement
 
     @property
     def base(self) -> Path:
@@ -131,10 +133,17 @@ class CampaignSpec:
         return self.path.parent
 
     @property
+    def refines(self) -> bool:
+        """Are correlation sums kept beside the others?"""
+        return self.identification.method != "auto" and self.identification.refine in ("auto", "yes")
+
+    @property
     def sums_key(self) -> str:
         """Hash of everything that the sums of a record depend on."""
         i = self.identification
         lags = {"method": i.method, "p": i.p, "rows": i.rows, "pieces": i.pieces, "blocks": i.sigma_blocks}
+        if self.refines:
+            lags["order"] = i.order, i.max_order
         if i.method == "auto":
             lags = {"method": i.method, "blocks": i.sigma_blocks, "band": i.band, "decimate": i.decimate}
         config = None
@@ -148,7 +157,8 @@ class CampaignSpec:
     @property
     def model_key(self) -> str:
         """Hash of everything that the modes of given sums depend on."""
-        own = {key: value for key, value in asdict(self.identification).items() if key not in _AUTO}
+        unset = _AUTO if self.identification.refine else (*_AUTO, "refine")
+        own = {key: value for key, value in asdict(self.identification).items() if key not in unset}
         return _digest([self.sums_key, own])
 
 
@@ -272,6 +282,8 @@ class _Reader:
         method = table.setdefault("method", "okid-era" if single else "auto")
         for key in single if method == "auto" else [key for key in _AUTO if key in table]:
             place.refuse(key, f'method "{method}" does not have it: {_WHO[method == "auto"]}')
+        if table.get("refine") in ("auto", "yes") and not self.table("channels").get("inputs"):
+            place.refuse("refine", 'a refinement needs a measured force: [channels] has no "inputs"')
         band = table["band"] = tuple(table.get("band", ()))
         if band and not (len(band) == 2 and 0 <= band[0] < band[1]):
             place.refuse("band", f"found {list(band)}, expected [lowest, highest] in Hz")

@@ -41,6 +41,7 @@ KEYS: dict[str, dict[str, Any]] = {
         "hankel": ("system", "innovations", "literal"), "detrend": ("none", "mean"),
         "sigma_blocks": (0, Number(8, 100, whole=True)), "pieces": Number(1, 100, whole=True),
         "stabilization": FLAG, "band": NUMBERS, "decimate": Number(1, 1000, whole=True),
+        "refine": ("no", "auto", "yes"),
     },
     "group": {"by": NAMES, "band_c": Number(0, 200, above=True)},
     "temperature": {"channel": TEXT, "scale": Number(-1e9, 1e9), "offset": Number(-1e9, 1e9), "column": TEXT},

@@ -17,6 +17,7 @@ from typing import Any
 from okid._errors import InputError
 from okid.campaign.record_list import RecordRef
 from okid.campaign.sums_file import HEAD, GroupSums, write_sums
+from okid.data.whole_file import whole_file
 
 
 class StateFolder:
@@ -30,6 +31,16 @@ class StateFolder:
             raise InputError(f"{self.folder}: cannot be made: {fault.strerror or fault}") from None
         for left in self.folder.glob("*.part"):
             left.unlink()
+
+    def plan(self) -> bytes:
+        """Of the sums for a refinement (refinement.py); b"": none yet."""
+        path = self.folder / "refinement"
+        return path.read_bytes() if path.exists() else b""
+
+    def keep_plan(self, plan: bytes) -> None:
+        """For later runs, which add to the same sums."""
+        with whole_file(self.folder / "refinement") as part:
+            part.write_bytes(plan)
 
     def load(self) -> dict[str, list[tuple[Path, GroupSums]]]:
         """Headers (without parts) of all files by group; damaged files and those inside another one are removed."""

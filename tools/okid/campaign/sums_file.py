@@ -18,6 +18,7 @@ from typing import Any
 from okid._errors import InputError
 from okid.abi.accumulator import Accumulator
 from okid.campaign.pieces import empty_sums, fold, folds
+from okid.campaign.refinement import Refining
 from okid.campaign.spec import CampaignSpec
 from okid.data.whole_file import safe_part
 
@@ -39,6 +40,7 @@ class GroupSums:
     parts: dict[int, bytes] = field(default_factory=dict)
     result: dict[str, Any] | None = None
     left_out: list[dict[str, Any]] = field(default_factory=list)
+    refinement: bytes = b""  # packed correlation sums of all records (refinement.py)
     merged: bool = False  # the parts were merged into one: modes of the same records only, no more to add
 
     def names(self) -> set[str]:
@@ -51,11 +53,11 @@ class GroupSums:
         header = json.dumps(
             {"group": self.group, "lags": self.lags, "merged": self.merged, "records": self.records,
              "left_out": self.left_out, "result": self.result,
-             "parts": [[part, len(self.parts[part])] for part in order]},
+             "parts": [[part, len(self.parts[part])] for part in order], "refinement": len(self.refinement)},
             allow_nan=False,
         ).encode("utf-8")  # fmt: skip
         head = HEAD.pack(_MAGIC, len(header), zlib.crc32(header))
-        return b"".join([head, header, *(self.parts[part] for part in order)])
+        return b"".join([head, header, *(self.parts[part] for part in order), self.refinement])
 
     @classmethod
     def from_bytes(cls, data: bytes, source: str, parts_bytes: int | None = None) -> GroupSums:
@@ -71,11 +73,14 @@ class GroupSums:
                 if parts_bytes is None:
                     parts[int(part)] = data[at : at + size]
                 at += size
+            size = given.get("refinement", 0)
+            refinement = data[at : at + size]
+            at += size
             if at != len(data) + (parts_bytes or 0):
                 raise ValueError(f"{len(data) + (parts_bytes or 0)} bytes, expected {at}")
             return cls(
                 given["group"], int(given["lags"]), given["records"], parts, given["result"], given["left_out"],
-                given["merged"],
+                refinement, given["merged"],
             )  # fmt: skip
         except (ValueError, KeyError, TypeError, struct.error) as fault:
             raise InputError(f"{source}: sums of a campaign are damaged: {fault}") from None
@@ -150,7 +155,10 @@ def merge_sums(spec: CampaignSpec, many: Sequence[GroupSums]) -> GroupSums:
     merged = {part: _merged(spec, first.lags, packed) for part, packed in sorted(parts.items())}
     records = sorted((r for one in many for r in one.records), key=lambda record: str(record["name"]))
     left_out = [one for each in many for one in each.left_out]
-    return GroupSums(first.group, first.lags, records, merged, left_out=left_out, merged=first.merged)
+    return GroupSums(
+        first.group, first.lags, records, merged, left_out=left_out, merged=first.merged,
+        refinement=Refining(spec).merge(one.refinement for one in many).packed(),
+    )  # fmt: skip
 
 
 def whole_of(spec: CampaignSpec, lags: int, parts: Iterable[Accumulator]) -> Accumulator:

@@ -74,6 +74,7 @@ def _group_row(out: Outcome, group: Group, reasons: dict[str, str]) -> dict[str,
         "skipped": sum(ref.name in reasons for ref in group.records if ref.name not in facts),
         "samples": sum(record["samples"] - record["missing"] for record in facts.values()),
         "rows": result.get("rows"), "parts": result.get("parts"), "order": result.get("order"),
+        "refined": result.get("refined"),
         "modes": len(result.get("modes", [])), "sums_sha256": result.get("sums_sha256"),
         "fault": out.faults.get(group.ident) or result.get("fault"),
     }  # fmt: skip
@@ -114,7 +115,7 @@ def make_tables(spec: CampaignSpec, out: Outcome) -> dict[str, Any]:
         tables[SHIFTS] = pd.DataFrame(shift_rows(spec, out, rows))
     for whole, columns in (
         ("records", ("samples", "missing", "saturated")),
-        ("groups", ("rows", "parts", "order")),
+        ("groups", ("rows", "parts", "order", "refined")),
         ("modes", ("track",)),
     ):
         for column in columns:

@@ -13,6 +13,7 @@ from okid.campaign.group_model import MOST_NUMBERS, agree, identify_group, in_un
 from okid.campaign.pieces import fold, make_identifier, part_of, record_sums
 from okid.campaign.record_list import RecordRef, Skipped
 from okid.campaign.record_read import ReadRecord, Unreachable, content_hash, read_one
+from okid.campaign.refinement import Refining
 from okid.campaign.spec import CampaignSpec
 from okid.campaign.sums_file import Collector, GroupSums, merge_sums, pack, unpack, whole_of
 
@@ -81,7 +82,7 @@ def look_at_slice(spec: CampaignSpec, piece: Slice) -> SliceDone:
 def sum_slice(spec: CampaignSpec, piece: Slice) -> tuple[SliceDone, Collector]:
     """Read every record of a slice once, one at a time; one that cannot be used is left out and told."""
     lags = make_identifier(spec).lags
-    into, done = Collector(spec, lags), SliceDone(GroupSums(piece.group, lags))
+    into, done, refining = Collector(spec, lags), SliceDone(GroupSums(piece.group, lags)), Refining(spec)
     for ref in piece.records:
         try:
             record = read_one(spec, ref.name, ref.url)
@@ -94,8 +95,10 @@ def sum_slice(spec: CampaignSpec, piece: Slice) -> tuple[SliceDone, Collector]:
             counts["saturated"] += one.stats.saturated
             part = part_of(ref.name, k)
             into.add(fold(spec, part) if piece.folded else part, one)
+        refining.add(record)
         done.sums.records.append(_facts(ref, record.sha256, counts, record.temperature_c))
     done.sums.records.sort(key=lambda record: str(record["name"]))
+    done.sums.refinement = refining.packed()
     return done, into
 
 
@@ -124,7 +127,7 @@ def run_batch(spec: CampaignSpec, slices: Sequence[Slice]) -> list[SliceDone]:
             done.sums.parts = into.parts()
             continue
         parts = into.accumulators()
-        done.sums.result = identify_group(spec, parts)
+        done.sums.result = identify_group(spec, parts, done.sums.refinement)
         if _keeps_parts(spec, done.sums, parts):
             done.sums.parts = into.parts()
         else:
@@ -141,7 +144,7 @@ def finish_group(spec: CampaignSpec, packed: Sequence[bytes]) -> GroupSums:
     """The last node of the tree: everything of a group, identified."""
     sums = merge_sums(spec, [GroupSums.from_bytes(one, "a merge") for one in packed])
     parts = [unpack(data) for _, data in sorted(sums.parts.items())]
-    sums.result = identify_group(spec, parts)
+    sums.result = identify_group(spec, parts, sums.refinement)
     if not _keeps_parts(spec, sums, parts):
         _merged(spec, sums, parts)
     return sums

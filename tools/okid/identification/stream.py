@@ -23,6 +23,11 @@ _KINDS = {np.dtype(np.float64): 0, np.dtype(np.float32): 1, np.dtype(np.int16): 
 _Place = ctypes.c_char * 0  # the address of a writable, C-contiguous buffer, faster than ndarray.ctypes
 
 
+def behind_refinement(state: bytes) -> bytes:
+    """A state without the sums of its refinement: what okid.Accumulator.to_bytes() gives."""
+    return state[int.from_bytes(state[8:16], "little") :] if state.startswith(b"OKIDREF\n") else state
+
+
 class Counts(ctypes.Structure):
     """okid_host_stream_counts_t."""
 
@@ -132,7 +137,7 @@ class HostStream:
         return found
 
     def state(self) -> bytes:
-        """The sums, for restore() and merge(): what okid.Accumulator.to_bytes() gives."""
+        """The sums, for restore() and merge(): what okid.Accumulator.to_bytes() gives, behind those of a refinement."""
         at, size = ctypes.c_void_p(), ctypes.c_size_t()
         host.call("stream_state", self.handle, ctypes.byref(at), ctypes.byref(size))
         return ctypes.string_at(at, size.value)
