@@ -4,10 +4,11 @@
 // REFERENCE  docs/numerics.md, refinement from sums
 // NUMERICS   codes: products of 32 bits in 64-bit sums, folded into pairs every 2^16 rows (int16: 2^32; int32: added to pairs one
 //            by one); doubles: plain sums in the order of the samples
-// WORKSPACE  none; 2 (m + n_u) n_u (L + 1) flop a sample
+// WORKSPACE  none; 2 (m + n_u) n_u (L + 1) flop a sample, less by transforms (correlation_spectrum.c)
 #include "correlation.h"
 #include "kernel.h"
 #include "source.h"
+#include "spectrum.h"
 
 enum { ALIGN = 16, BUFFER = 256, MOST_LAGS = 65536, MOST_OWN = 256, MOST_SLOTS = 4096 };
 
@@ -30,13 +31,15 @@ static uint32_t take(uint64_t* at, uint64_t numbers) {
 static uint64_t lay_out(okid_correlation_t* s, const okid_correlation_config_t* config) {
     memset(s, 0, sizeof *s);
     s->config = *config;
-    if (config->buffer == 0) s->config.buffer = BUFFER;
+    s->points = okid_correlation_points(config);
+    s->buffer = config->buffer > 0 ? config->buffer : s->points > 0 ? s->points - config->lags : BUFFER;
     s->m = config->n_u + config->n_y;
     s->ring = config->slots + (config->block > 0);
-    const uint64_t rows = (uint64_t)s->config.buffer;
+    const uint64_t rows = (uint64_t)s->buffer;
     uint64_t at = 0;
     take(&at, (sizeof *s + 7) / 8);
     s->scale_at = take(&at, (uint64_t)s->m);
+    s->tables_at = take(&at, 2 * (uint64_t)s->points);
     s->now_at = take(&at, rows * (uint64_t)s->m);
     s->u_at = take(&at, cor_u_window(s) + rows * (uint64_t)config->n_u);
     s->y_at = take(&at, cor_y_window(s) + rows * (uint64_t)config->n_y);
@@ -44,6 +47,8 @@ static uint64_t lay_out(okid_correlation_t* s, const okid_correlation_config_t* 
     s->slots_at = take(&at, (uint64_t)s->slot_numbers * (uint64_t)s->ring);
     s->sums_numbers = (uint32_t)(cor_sum_count(s) * (size_t)cor_planes(s) + (size_t)s->m);
     s->sums_at = take(&at, (uint64_t)s->sums_numbers * (uint64_t)cor_sets(s));
+    s->spectrum_at = take(&at, okid_correlation_spectrum_numbers(s));
+    s->kept_at = take(&at, s->points > 0 && !cor_codes(s) ? s->sums_numbers : 0);
     return at <= UINT32_MAX ? at : 0;
 }
 
@@ -64,6 +69,8 @@ okid_status_t okid_correlation_create(okid_correlation_t** self, const okid_corr
     const size_t size = (size_t)lay_out(s, config) * 8;
     memset((char*)s + sizeof *s, 0, size - sizeof *s);
     for (int32_t r = 0; r < s->m; ++r) cor_scale(s)[r] = 1;
+    if (s->points > 0)
+        okid_spectrum_tables(s->points, &cor_at(s, s->tables_at)->real, &cor_at(s, s->tables_at)[s->points].real);
     *self = s;
     return OKID_OK;
 }
@@ -101,16 +108,16 @@ static void sum_band(const okid_correlation_t* s, cor_number_t* sums, const cor_
     }
 }
 
-static void keep_end(const okid_correlation_t* s, cor_number_t* to) {
-    memcpy(to, cor_at(s, s->u_at), cor_u_window(s) * sizeof *to);
-    memcpy(to + cor_u_window(s), cor_at(s, s->y_at), cor_y_window(s) * sizeof *to);
+/// The lag windows behind `rows` of the samples that wait.
+static void keep_end(const okid_correlation_t* s, int32_t rows, cor_number_t* to) {
+    memcpy(to, cor_at(s, s->u_at) + rows * s->config.n_u, cor_u_window(s) * sizeof *to);
+    memcpy(to + cor_u_window(s), cor_at(s, s->y_at) + rows * s->config.n_y, cor_y_window(s) * sizeof *to);
 }
 
-/// Sum the samples that wait; what of them the next lag windows need moves to the front.
-static void flush(okid_correlation_t* s) {
-    if (s->pending == 0) return;
+/// Sum the samples that wait.
+static void sum_pending(okid_correlation_t* s) {
     cor_slot_t* slot = cor_slot(s, s->closed);
-    if (slot->rows == 0) keep_end(s, cor_head(s, s->closed));
+    if (slot->rows == 0) keep_end(s, 0, cor_head(s, s->closed));
     if (cor_codes(s) && s->config.sample != OKID_SAMPLE_INT32) {
         const int64_t limit = s->config.sample == OKID_SAMPLE_INT16 ? INT64_C(1) << 32 : INT64_C(1) << 16;
         if (s->unfolded + s->pending > limit - 1) fold(s); // the low words hold less than 2^48 to begin with
@@ -119,9 +126,13 @@ static void flush(okid_correlation_t* s) {
     cor_number_t *sums = cor_sums(s, s->closed), *u = cor_at(s, s->u_at), *y = cor_at(s, s->y_at);
     const cor_number_t* now = cor_at(s, s->now_at);
     const int32_t n_u = s->config.n_u;
-    sum_band(s, sums, now, s->m, u, n_u, s->config.lags);
     sum_band(s, sums + cor_u_count(s), now, s->m, y, s->config.n_y, s->config.own_lags);
-    sum_band(s, sums + cor_t_at(s), u, n_u, u, n_u, s->config.lags); // the oldest input of each window with all of it
+    if (!okid_correlation_gather(s)) {
+        sum_band(s, sums, now, s->m, u, n_u, s->config.lags);
+        sum_band(s, sums + cor_t_at(s), u, n_u, u, n_u,
+                 s->config.lags); // the oldest input of each window with all of it
+    }
+    if (!cor_codes(s)) okid_correlation_bring_out(s);
     cor_number_t* sum = sums + cor_sum_count(s) * (size_t)cor_planes(s);
     for (int32_t n = 0; n < s->pending; ++n, now += s->m)
         for (int32_t r = 0; r < s->m; ++r) {
@@ -131,6 +142,13 @@ static void flush(okid_correlation_t* s) {
                 sum[r].real += now[r].real;
         }
     slot->rows += s->pending;
+}
+
+/// Sum the samples that wait; what of them the next lag windows need moves to the front.
+static void flush(okid_correlation_t* s) {
+    if (s->pending == 0) return;
+    sum_pending(s);
+    cor_number_t *u = cor_at(s, s->u_at), *y = cor_at(s, s->y_at);
     memmove(u, u + (size_t)s->pending * (size_t)s->config.n_u, cor_u_window(s) * sizeof *u);
     memmove(y, y + (size_t)s->pending * (size_t)s->config.n_y, cor_y_window(s) * sizeof *y);
     s->pending = 0;
@@ -139,8 +157,25 @@ static void flush(okid_correlation_t* s) {
 void okid_correlation_settle(okid_correlation_t* self) {
     if (self->closed == self->ring) return;
     flush(self);
+    okid_correlation_bring_out(self);
     fold(self);
-    if (cor_slot(self, self->closed)->rows > 0) keep_end(self, cor_tail(self, self->closed));
+    if (cor_slot(self, self->closed)->rows > 0) keep_end(self, 0, cor_tail(self, self->closed));
+}
+
+void okid_correlation_begin_look(okid_correlation_t* self) {
+    if (self->points == 0 || cor_codes(self) || self->pending == 0) {
+        okid_correlation_settle(self);
+        return;
+    }
+    memcpy(cor_at(self, self->kept_at), cor_sums(self, self->closed), self->sums_numbers * sizeof(cor_number_t));
+    sum_pending(self);
+    keep_end(self, self->pending, cor_tail(self, self->closed));
+}
+
+void okid_correlation_end_look(okid_correlation_t* self) {
+    if (self->points == 0 || cor_codes(self) || self->pending == 0) return;
+    memcpy(cor_sums(self, self->closed), cor_at(self, self->kept_at), self->sums_numbers * sizeof(cor_number_t));
+    cor_slot(self, self->closed)->rows -= self->pending;
 }
 
 /// End the open slot; the oldest falls out of a full window.
@@ -180,7 +215,7 @@ static void spread(okid_correlation_t* s, const cor_number_t* v, int32_t place) 
 static size_t feed(okid_correlation_t* s, source_t source, size_t count) {
     const int arming = s->have < s->config.lags;
     const cor_slot_t* slot = cor_slot(s, s->closed);
-    int64_t room = s->config.buffer - s->pending;
+    int64_t room = s->buffer - s->pending;
     if (arming && room > s->config.lags - s->have) room = s->config.lags - s->have;
     if (!arming && s->config.block > 0 && room > s->config.block - slot->rows - s->pending)
         room = s->config.block - slot->rows - s->pending;
@@ -203,7 +238,7 @@ static size_t feed(okid_correlation_t* s, source_t source, size_t count) {
     s->stats.rows += (int64_t)count;
     if (s->config.block > 0 && slot->rows + s->pending == s->config.block)
         close_slot(s);
-    else if (s->pending == s->config.buffer)
+    else if (s->pending == s->buffer)
         flush(s);
     return count;
 }

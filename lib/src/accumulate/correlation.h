@@ -27,9 +27,13 @@ struct okid_correlation {
     okid_correlation_config_t config;
     okid_accumulator_stats_t stats;
     int64_t clock, unfolded; ///< samples seen; rows in the low words since the last fold
-    uint32_t scale_at, now_at, u_at, y_at, slots_at, sums_at; ///< from this struct, in numbers
+    uint32_t scale_at, tables_at, now_at, u_at, y_at, slots_at, sums_at, spectrum_at, kept_at; ///< from it, in numbers
     uint32_t slot_numbers, sums_numbers;
     int32_t m, ring, oldest, closed; ///< the open slot follows the closed ones; none is open when closed = ring
+    int32_t buffer;                  ///< samples that may wait
+    int32_t points;                  ///< of a transform; 0: sums are made directly
+    int32_t gathered;                ///< rows in the cross-spectra
+    double energy;                   ///< codes: of those rows, for okid_spectrum_error()
     int32_t have, pending, in_gap;   ///< samples of the lag window at hand; waiting behind it; between two runs
 };
 
@@ -74,6 +78,19 @@ static inline cor_number_t* cor_sums(const okid_correlation_t* s, int32_t k) {
 static inline int32_t cor_pieces(const okid_correlation_t* s) {
     return s->closed + (s->closed < s->ring && cor_slot(s, s->closed)->rows > 0);
 }
+
+/// Points of the transforms that sum faster than the direct kernel, 0: none does. numbers: of memory for them.
+int32_t okid_correlation_points(const okid_correlation_config_t* config);
+size_t okid_correlation_spectrum_numbers(const okid_correlation_t* self);
+/// Gather the `pending` rows that wait; of codes the sums of before may go out. @return 0: they are to be summed directly
+int okid_correlation_gather(okid_correlation_t* self);
+/// Bring the sums of what was gathered out.
+void okid_correlation_bring_out(okid_correlation_t* self);
+
+/// Before and after a look at the sums of a run that goes on: numbers that transforms sum round, so that a look may not move
+/// the blocks they stand in. What waits is summed for the look alone.
+void okid_correlation_begin_look(okid_correlation_t* self);
+void okid_correlation_end_look(okid_correlation_t* self);
 
 /// Sum what waits, bring the low words of the open set into their range, and keep the tail of the open slot up to date.
 void okid_correlation_settle(okid_correlation_t* self);

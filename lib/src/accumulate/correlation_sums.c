@@ -170,7 +170,7 @@ okid_status_t okid_correlation_sums(okid_correlation_t* self, okid_detrend_t det
                                     void* block, size_t bytes) {
     if (!self || !out || !block) return OKID_ERR_NULL;
     if (bytes < okid_correlation_sums_memsize(self)) return OKID_ERR_MEMORY;
-    okid_correlation_settle(self);
+    okid_correlation_begin_look(self);
     const int32_t pieces = cor_pieces(self);
     if (pieces == 0) return OKID_ERR_TOO_SHORT;
     double* start = (double*)(((size_t)block + sizeof(double) - 1) & ~(sizeof(double) - 1));
@@ -182,6 +182,7 @@ okid_status_t okid_correlation_sums(okid_correlation_t* self, okid_detrend_t det
     else
         add_set(self, 0, pieces - 1, 1, &room);
     for (int32_t k = 0; k < pieces; ++k) put_ends(self, k, &room);
+    okid_correlation_end_look(self);
     const okid_correlation_config_t* c = &self->config;
     *out = (okid_correlation_sums_t){
         c->n_u, c->n_y,   c->lags,      c->own_lags, pieces,     detrend == OKID_DETREND_MEAN, rows, room.U, room.Y,

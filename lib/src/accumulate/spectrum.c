@@ -18,6 +18,7 @@
 
 #define ABSORB OKID_FOR_ISA(okid_spectrum_absorb_)
 #define FLUSH OKID_FOR_ISA(okid_spectrum_flush_)
+#define TRANSFORM OKID_FOR_ISA(okid_spectrum_transform_)
 
 enum { V = SPECTRUM_LANES };
 typedef double lanes_t __attribute__((vector_size(V * sizeof(double)), aligned(8)));
@@ -185,6 +186,12 @@ static void add_cross(const spectrum_plan_t* plan, const map_t* a) {
     }
 }
 
+okid_spectrum_transform_fn TRANSFORM;
+double* TRANSFORM(const double* cosine, const double* sine, double* work, double* spare, int total) {
+    const map_t a = {.cosine = (double*)(size_t)cosine, .sine = (double*)(size_t)sine, .work = work, .spare = spare};
+    return transform(&a, total);
+}
+
 okid_spectrum_absorb_fn ABSORB;
 double ABSORB(const spectrum_plan_t* plan, double* memory, const double* history, const int16_t* codes,
               const double* numbers) {
@@ -264,10 +271,14 @@ size_t okid_spectrum_doubles(const spectrum_plan_t* plan) {
 
 void okid_spectrum_create(const spectrum_plan_t* plan, double* memory) {
     const map_t a = map_of(plan, memory);
-    for (int k = 0; k < plan->length; ++k) {
-        const double angle = 6.283185307179586476925 * k / plan->length;
-        a.cosine[k] = cos(angle);
-        a.sine[k] = sin(angle);
+    okid_spectrum_tables(plan->length, a.cosine, a.sine);
+}
+
+void okid_spectrum_tables(int total, double* cosine, double* sine) {
+    for (int k = 0; k < total; ++k) {
+        const double angle = 6.283185307179586476925 * k / total;
+        cosine[k] = cos(angle);
+        sine[k] = sin(angle);
     }
 }
 
@@ -283,11 +294,13 @@ spectrum_kernels_t okid_spectrum_pick(void) {
 #ifdef OKID_KERNEL_DISPATCH
     extern okid_spectrum_absorb_fn okid_spectrum_absorb_avx2, okid_spectrum_absorb_avx512;
     extern okid_spectrum_flush_fn okid_spectrum_flush_avx2, okid_spectrum_flush_avx512;
+    extern okid_spectrum_transform_fn okid_spectrum_transform_avx2, okid_spectrum_transform_avx512;
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-        return (spectrum_kernels_t){okid_spectrum_absorb_avx512, okid_spectrum_flush_avx512};
+        return (spectrum_kernels_t){okid_spectrum_absorb_avx512, okid_spectrum_flush_avx512,
+                                    okid_spectrum_transform_avx512};
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        return (spectrum_kernels_t){okid_spectrum_absorb_avx2, okid_spectrum_flush_avx2};
+        return (spectrum_kernels_t){okid_spectrum_absorb_avx2, okid_spectrum_flush_avx2, okid_spectrum_transform_avx2};
 #endif
-    return (spectrum_kernels_t){okid_spectrum_absorb_base, okid_spectrum_flush_base};
+    return (spectrum_kernels_t){okid_spectrum_absorb_base, okid_spectrum_flush_base, okid_spectrum_transform_base};
 }
 #endif

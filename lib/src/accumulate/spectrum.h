@@ -42,9 +42,17 @@ typedef double okid_spectrum_absorb_fn(const spectrum_plan_t* plan, double* memo
 /// integers, else added to what stands there.
 typedef void okid_spectrum_flush_fn(const spectrum_plan_t* plan, double* memory, double* sums, int of_codes);
 
+/// Forward transform (exp(-i)) of `total` points, a power of two, each SPECTRUM_LANES numbers and their imaginary parts, in
+/// `work`; `spare` is as large. @return the one of both that the result is in
+typedef double* okid_spectrum_transform_fn(const double* cosine, const double* sine, double* work, double* spare,
+                                           int total);
+/// The tables of a transform, `total` numbers each.
+void okid_spectrum_tables(int total, double* cosine, double* sine);
+
 typedef struct spectrum_kernels_t {
     okid_spectrum_absorb_fn* absorb;
     okid_spectrum_flush_fn* flush;
+    okid_spectrum_transform_fn* transform;
 } spectrum_kernels_t;
 
 /// The fastest this processor runs.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Correlation sums against the sums written out over the samples: lags, ends, gaps, windows, forgetting, offsets, merging, bytes.
+#include "accumulate/correlation.h"
 #include "modal_rig.h"
 
 #include <okid/okid.h>
@@ -292,6 +293,96 @@ static void bytes_go_on_bit_for_bit(void) {
         }
 }
 
+/// A look at the sums, which leaves no trace.
+static void look(okid_correlation_t* self) {
+    okid_correlation_sums_t got;
+    const size_t size = okid_correlation_sums_memsize(self);
+    void* room = malloc(size);
+    TEST_ASSERT_GREATER_OR_EQUAL(0, (okid_correlation_sums(self, OKID_DETREND_MEAN, &got, room, size) + 99));
+    free(room);
+}
+
+static void expect_same_bytes(okid_correlation_t* a, okid_correlation_t* b) {
+    size_t size, again;
+    uint8_t *left = bytes_of(a, &size), *right = bytes_of(b, &again);
+    TEST_ASSERT_EQUAL(size, again);
+    TEST_ASSERT_EQUAL_MEMORY(left, right, size);
+    free(left);
+    free(right);
+}
+
+/// So many lags that transforms sum (buffer = 0) beside the direct kernel: the same integers, and doubles to rounding; looks in
+/// between and gaps change nothing.
+static void transforms_sum_what_the_kernel_sums(void) {
+    enum { LAGS = 300 };
+    for (int kind = 0; kind < 2; ++kind)
+        for (int window = 0; window < 2; ++window) {
+            okid_correlation_config_t config = config_of(kind ? OKID_SAMPLE_DOUBLE : OKID_SAMPLE_INT16);
+            config.lags = LAGS;
+            config.block = window ? 600 : 0;
+            void *one, *two, *three;
+            okid_correlation_t *fast = make(config, &one), *looked_at = make(config, &two);
+            TEST_ASSERT_GREATER_THAN(256, fast->points);
+            config.buffer = 64;
+            okid_correlation_t* direct = make(config, &three);
+            TEST_ASSERT_EQUAL(0, direct->points);
+            const int cuts[] = {0, 7, 190, 633, 640, N};
+            for (int k = 0; k < 5; ++k) {
+                TEST_ASSERT_EQUAL(OKID_OK, feed(fast, cuts[k], cuts[k + 1] - cuts[k]));
+                TEST_ASSERT_EQUAL(OKID_OK, feed(looked_at, cuts[k], cuts[k + 1] - cuts[k]));
+                TEST_ASSERT_EQUAL(OKID_OK, feed(direct, cuts[k], cuts[k + 1] - cuts[k]));
+                look(looked_at);
+                if (k != 2 || kind) continue;
+                okid_correlation_gap(fast, 3);
+                okid_correlation_gap(looked_at, 3);
+                okid_correlation_gap(direct, 3);
+            }
+            expect_same_bytes(fast, looked_at);
+            if (!kind) expect_same_bytes(fast, direct);
+            okid_correlation_sums_t got, wanted;
+            const size_t size = okid_correlation_sums_memsize(fast);
+            void *x = malloc(size), *y = malloc(size);
+            TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_sums(fast, OKID_DETREND_NONE, &got, x, size));
+            TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_sums(direct, OKID_DETREND_NONE, &wanted, y, size));
+            for (int i = 0; i < M * N_U * (LAGS + 1); ++i)
+                close_to(wanted.U[i], got.U[i], 100 * fabs(wanted.U[i]), "transforms, U");
+            for (int i = 0; i < N_U * N_U * (LAGS + 1); ++i)
+                close_to(wanted.T[i], got.T[i], 100 * fabs(wanted.T[i]), "transforms, T");
+            free(x);
+            free(y);
+            free(one);
+            free(two);
+            free(three);
+        }
+}
+
+/// Codes at full scale: too loud for a transform of so many points, or for many of them together.
+static void loud_codes_stay_exact(void) {
+    enum { COUNT = 9000 };
+    int16_t* loud = malloc(sizeof *loud * 2 * COUNT);
+    uint64_t state = 3;
+    for (int i = 0; i < 2 * COUNT; ++i) loud[i] = rig_normal(&state) > 0 ? 32767 : -32768;
+    const int32_t lags[] = {100, 4000};
+    for (int k = 0; k < 2; ++k) {
+        okid_correlation_config_t config = okid_correlation_defaults(1, 1, lags[k]);
+        config.sample = OKID_SAMPLE_INT16;
+        okid_correlation_t* made[2];
+        void* blocks[2];
+        for (int direct = 0; direct < 2; ++direct) {
+            config.buffer = direct;
+            const size_t bytes = okid_correlation_memsize(&config);
+            blocks[direct] = malloc(bytes);
+            TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_create(&made[direct], &config, blocks[direct], bytes));
+            TEST_ASSERT_EQUAL(direct == 0, made[direct]->points > 0);
+            TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, okid_correlation_add_i16(made[direct], loud, COUNT));
+        }
+        expect_same_bytes(made[0], made[1]);
+        free(blocks[0]);
+        free(blocks[1]);
+    }
+    free(loud);
+}
+
 static void full_scale_24_bit_codes_stay_exact(void) {
     enum { COUNT = 70000 }; // beyond the rows between two folds
     okid_correlation_config_t config = okid_correlation_defaults(1, 1, 2);
@@ -377,6 +468,8 @@ int main(void) {
     RUN_TEST(a_window_forgets_and_fades);
     RUN_TEST(merged_is_batch);
     RUN_TEST(bytes_go_on_bit_for_bit);
+    RUN_TEST(transforms_sum_what_the_kernel_sums);
+    RUN_TEST(loud_codes_stay_exact);
     RUN_TEST(full_scale_24_bit_codes_stay_exact);
     RUN_TEST(constants_bound_the_memory);
     RUN_TEST(wrong_use_is_refused);
