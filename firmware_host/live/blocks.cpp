@@ -35,10 +35,11 @@ owned_sums::owned_sums(const okid_accumulator_config_t& config) {
 }
 
 live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks,
-                         bool analytic, bool mass, bool states_only)
+                         bool analytic, bool states_only)
     : whole_(whole), sums_(block_sums(whole)), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),
       blocks_(static_cast<std::size_t>(blocks)), n_u_(whole.n_u), n_y_(whole.n_y),
       most_states_(okid_identify_max_order(&identify)), dt_(1 / identify.fs_hz) {
+    detrend_ = identify.detrend;
     length_ = whole.lags;
     const std::size_t most = window() ? 0 : static_cast<std::size_t>(whole.lags) * m_;
     history_.reserve(most);
@@ -57,10 +58,12 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
             throw failure(exit_usage, "[identification]: the sums for standard deviations cannot be made");
     };
     linear_mass_ = !is_subspace(identify.method);
-    const live_jackknives needed(identify, sums_, analytic, mass);
+    const live_jackknives needed(identify, sums_, analytic);
     if (needed.linear) create(needed.config(1), linear_block_, linear_);
-    if (needed.anew) create(needed.config(0), anew_block_, anew_);
+    create(needed.config(0), anew_block_, anew_);
     modes_ = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, mass_plan{}, dt_);
+    energy_.resize(m_);
+    one_energy_.resize(m_);
 }
 
 void live_blocks::reset() {
@@ -157,8 +160,18 @@ void live_blocks::pair_up() {
     length_ *= 2;
 }
 
+/// Share of the outputs' power that stands in one block, mean over the outputs.
+double live_blocks::share_of(okid_accumulator_t* one, double weight) {
+    if (okid_accumulator_energy(one, detrend_, one_energy_.data()) != OKID_OK) return 0;
+    double share = 0;
+    for (std::size_t i = static_cast<std::size_t>(n_u_); i < m_; ++i)
+        if (energy_[i] > 0) share += weight * one_energy_[i] / energy_[i] / n_y_;
+    return share;
+}
+
 void live_blocks::leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to) {
     if (okid_accumulator_rows(one) == 0) return;
+    most_of_one_ = std::max(most_of_one_, share_of(one, weight));
     okid_model_t found{};
     double share = 0;
     const okid_status_t status = okid_jackknife_delete(jackknife_, one, weight, &found, &share);
@@ -197,8 +210,11 @@ bool live_blocks::begin(okid_accumulator_t* whole, okid_identify_t* by, const ok
     if (linear_ && (linear_mass_ || !mass)) {
         if (okid_jackknife_begin_linear(linear_, by, whole, &model) == OKID_OK) return true;
     }
+    return begin_anew(whole, model);
+}
+
+bool live_blocks::begin_anew(okid_accumulator_t* whole, const okid_identified_t& model) {
     jackknife_ = anew_;
-    if (!anew_) return false;
     okid_accumulator_t* all = whole;
     if (window()) {
         all = parts_[0].sums;
@@ -214,12 +230,21 @@ std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, okid_ide
     std::unique_ptr<replicate_statistics> with_mass;
     if (plan.wanted()) with_mass = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, plan, dt_);
     replicate_statistics& statistics = with_mass ? *with_mass : *modes_;
-    statistics.begin(model_view(model));
-    if (window())
-        delete_slots(whole, statistics);
-    else
-        delete_parts(whole, statistics);
-    deviations out = statistics.finish();
+    const bool known = okid_accumulator_energy(whole, detrend_, energy_.data()) == OKID_OK;
+    const auto without_each = [&] {
+        most_of_one_ = 0;
+        statistics.begin(model_view(model));
+        if (window())
+            delete_slots(whole, statistics);
+        else
+            delete_parts(whole, statistics);
+        return statistics.finish();
+    };
+    deviations out = without_each();
+    if (jackknife_ == linear_ && linear_ && known && most_of_one_ > most_of_one_block) {
+        if (!begin_anew(whole, model)) return std::nullopt;
+        out = without_each();
+    }
     if (out.replicates < fewest_blocks) return std::nullopt;
     return out;
 }

@@ -46,10 +46,9 @@ class live_blocks {
     ///                one twice as many, because the young ones weigh most. Throws `failure` (exit 2) when the memory
     ///                does not suffice
     /// @param analytic  to first order, where the method has a derivative
-    /// @param mass      M, K, R will be wanted: of the n4sid methods the derivative knows no B and D
     /// @param states_only  only take() is called: there is no memory for other blocks
     live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks,
-                bool analytic, bool mass, bool states_only);
+                bool analytic, bool states_only);
 
     void set_units(const std::vector<double>& scale, const std::vector<double>& offset);
 
@@ -82,8 +81,10 @@ class live_blocks {
     void pair_up();
     void delete_parts(okid_accumulator_t* whole, replicate_statistics& to);
     void delete_slots(okid_accumulator_t* whole, replicate_statistics& to);
+    double share_of(okid_accumulator_t* one, double weight);
     void leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to);
     bool begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass);
+    bool begin_anew(okid_accumulator_t* whole, const okid_identified_t& model);
 
     okid_accumulator_config_t whole_, sums_{};
     std::size_t m_, blocks_;
@@ -95,8 +96,12 @@ class live_blocks {
     std::vector<std::int16_t> codes_; ///< the same as codes, when a part begins
     std::vector<std::int32_t> wide_codes_;
     std::unique_ptr<std::byte[]> linear_block_, anew_block_;
-    okid_jackknife_t *linear_ = nullptr, *anew_ = nullptr; ///< to first order, identified anew; NULL: not needed
-    okid_jackknife_t* jackknife_ = nullptr;                ///< the one in use
+    okid_jackknife_t *linear_ = nullptr,
+                     *anew_ = nullptr;        ///< to first order (NULL: there is no derivative), identified anew
+    okid_jackknife_t* jackknife_ = nullptr;   ///< the one in use
+    okid_detrend_t detrend_ = OKID_DETREND_MEAN;
+    std::vector<double> energy_, one_energy_; ///< of the channels: of the whole and of a block
+    double most_of_one_ = 0;                  ///< largest share of the outputs' power that one block had
     std::unique_ptr<replicate_statistics> modes_;
     int n_u_, n_y_, most_states_;
     bool linear_mass_; ///< the derivative has B and D

@@ -82,7 +82,7 @@ void identifier::create_accumulator(const stream_config& config) {
     if (config.wanted.refine != "no") refiner_ = std::make_unique<sum_refiner>(config);
     if (config.wanted.sigma_blocks == 0) return;
     blocks_ = std::make_unique<live_blocks>(sums_config_, identify_config_, config.wanted.sigma_blocks,
-                                            config.wanted.analytic, config.mass.wanted(), config.states_only);
+                                            config.wanted.analytic, config.states_only);
     blocks_->set_units(scale_, offset_);
 }
 

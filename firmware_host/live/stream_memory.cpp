@@ -99,17 +99,16 @@ std::size_t block_sums_held(const okid_accumulator_config_t& whole, int blocks) 
 }
 
 live_jackknives::live_jackknives(const okid_identify_config_t& of, const okid_accumulator_config_t& blocks,
-                                 bool analytic, bool mass)
+                                 bool analytic)
     : identify(of), sums(blocks) {
     const okid_jackknife_config_t derivative = config(1);
     linear = analytic && okid_jackknife_memsize(&derivative) > 0;
-    anew = !linear || (mass && is_subspace(of.method));
 }
 
 double live_jackknives::bytes() const {
     const okid_jackknife_config_t derivative = config(1), plain = config(0);
     return (linear ? static_cast<double>(okid_jackknife_memsize(&derivative)) : 0) +
-           (anew ? static_cast<double>(okid_jackknife_memsize(&plain)) : 0);
+           static_cast<double>(okid_jackknife_memsize(&plain));
 }
 
 double stream_bytes(const stream_config& stream) {
@@ -129,7 +128,7 @@ double stream_bytes(const stream_config& stream) {
     if (stream.wanted.refine != "no") out += sum_refiner_bytes(stream);
     if (stream.wanted.sigma_blocks == 0) return out;
     const okid_accumulator_config_t block = block_sums(sums);
-    const live_jackknives jackknives(identify, block, stream.wanted.analytic, stream.mass.wanted());
+    const live_jackknives jackknives(identify, block, stream.wanted.analytic);
     const okid_replicates_config_t replicates{identify.n_u, identify.n_y, watch.max_order, nullptr};
     if (!stream.states_only)
         out += static_cast<double>(okid_accumulator_memsize(&block)) *

@@ -15,17 +15,16 @@ namespace okid_host {
 okid_accumulator_config_t block_sums(const okid_accumulator_config_t& whole);
 std::size_t block_sums_held(const okid_accumulator_config_t& whole, int blocks);
 
-/// What standard deviations of a stream are made with: derivatives, identifications without each block, or either when
-/// the derivative has no B and D for M, K, R.
+/// What standard deviations of a stream are made with: identifications without each block, and where the method has one its
+/// derivative, for what that can tell.
 struct live_jackknives {
-    live_jackknives(const okid_identify_config_t& identify, const okid_accumulator_config_t& sums, bool analytic,
-                    bool mass);
+    live_jackknives(const okid_identify_config_t& identify, const okid_accumulator_config_t& sums, bool analytic);
     okid_jackknife_config_t config(int linear_form) const { return {identify, sums, linear_form}; }
     double bytes() const;
 
     okid_identify_config_t identify;
     okid_accumulator_config_t sums;
-    bool linear, anew;
+    bool linear;
 };
 
 /// Bytes of all of it; 0 when p, rows, order or window are outside what the library takes.

@@ -17,8 +17,6 @@
 namespace okid_host {
 namespace {
 
-constexpr double most_of_one_block = 0.2; // share of the power, mean over the outputs: 20 even blocks have 0.05
-
 struct sums {
     std::unique_ptr<std::byte[]> block;
     okid_accumulator_t* handle = nullptr;
@@ -50,16 +48,20 @@ std::vector<std::vector<record_piece>> cut(const std::vector<record_data>& recor
 
 /// Does a block hold so much of the record that the model follows it? Then the change to first order is much smaller than
 /// that of the model without it: a free decay is over after a block or two.
-bool one_block_rules(const record_set& set, const std::vector<std::vector<record_piece>>& parts) {
+bool one_block_rules(const record_set& set, bool constants, const std::vector<std::vector<record_piece>>& parts) {
     const std::size_t n_y = set.n_y;
-    std::vector<double> power(parts.size() * n_y), whole(n_y);
-    for (std::size_t b = 0; b < parts.size(); ++b)
-        for (const record_piece& piece : parts[b]) {
-            const double* rows = set.rows(set.records[piece.record]) + set.n_u;
-            for (std::size_t n = piece.first; n < piece.last; ++n)
-                for (std::size_t i = 0; i < n_y; ++i)
-                    if (const double y = rows[n * set.channels() + i]; !std::isnan(y)) power[b * n_y + i] += y * y;
-        }
+    std::vector<double> power(parts.size() * n_y), whole(n_y), mean(n_y), there(n_y);
+    const auto each = [&](auto&& function) {
+        for (std::size_t b = 0; b < parts.size(); ++b)
+            for (const record_piece& piece : parts[b]) {
+                const double* rows = set.rows(set.records[piece.record]) + set.n_u;
+                for (std::size_t n = piece.first; n < piece.last; ++n)
+                    for (std::size_t i = 0; i < n_y; ++i)
+                        if (const double y = rows[n * set.channels() + i]; !std::isnan(y)) function(b, i, y);
+            }
+    };
+    if (constants) each([&](std::size_t, std::size_t i, double y) { mean[i] += (y - mean[i]) / ++there[i]; });
+    each([&](std::size_t b, std::size_t i, double y) { power[b * n_y + i] += (y - mean[i]) * (y - mean[i]); });
     for (std::size_t k = 0; k < power.size(); ++k) whole[k % n_y] += power[k];
     for (std::size_t b = 0; b < parts.size(); ++b) {
         double share = 0;
@@ -144,7 +146,8 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
     if (parts < std::size_t{fewest_blocks} || !part.handle) return out;
     std::unique_ptr<std::byte[]> block;
     const auto all_pieces = cut(work.set.records, work.at_rest ? 0 : lags, parts);
-    const bool linear = work.analytic && !one_block_rules(work.set, all_pieces);
+    const bool linear =
+        work.analytic && !one_block_rules(work.set, work.config.detrend == OKID_DETREND_MEAN, all_pieces);
     okid_jackknife_t* jackknife = linear ? begin_jackknife(shape, 1, work, whole, block) : nullptr;
     if (!jackknife) jackknife = begin_jackknife(shape, 0, work, whole, block);
     if (!jackknife) return out;

@@ -40,6 +40,10 @@ class replicate_statistics {
     okid_replicates_t* replicates_ = nullptr;
 };
 
+/// Share of the outputs' power (mean over the outputs) that a block may have for its derivative to hold: 20 even blocks have
+/// 0.05 each. Beyond it, as of a free decay, the change to first order is much smaller than that of the model without the block.
+constexpr double most_of_one_block = 0.2;
+
 /// Throws `failure` (exit 3) for an error of the sums behind standard deviations.
 void check_statistics(okid_status_t status);
 

@@ -86,6 +86,36 @@ def test_streams_agree_too(method: str, memory: dict[str, Any]) -> None:
     assert not np.array_equal(one, other)
 
 
+def free_decay() -> Array:
+    """6,000 samples, over after some 500: the twentieth that it begins in has nearly all of its power."""
+    A, _, C, _ = W1.discrete()
+    state = np.random.default_rng(3).standard_normal(len(A))
+    rows = []
+    for _ in range(6000):
+        rows.append(C @ state)
+        state = A @ state
+    clean = np.array(rows)
+    return clean + 0.01 * clean[:300].std(axis=0) * np.random.default_rng(4).standard_normal(clean.shape)
+
+
+def test_what_one_block_rules_takes_the_jackknife() -> None:
+    """A free decay: the first-order change is not that of the model without the block (14 times smaller)."""
+    y = free_decay() + np.array([3.0, -2.0, 9.81])
+    one, other = (
+        deviations(identify(None, y, fs=W1.fs, method="n4sid-moesp", order=6, sigma=sigma).modes)
+        for sigma in ("analytic", "jackknife")
+    )
+    np.testing.assert_array_equal(one, other)
+    for memory in ({}, {"window_s": 6000 / W1.fs}):
+        got = []
+        for sigma in ("analytic", "jackknife"):
+            with Session(0, 3, fs=W1.fs, method="n4sid-moesp", order=6, sigma=sigma, **memory) as session:
+                session.feed(y)
+                got.append(deviations(session.identify().modes))
+        assert len(got[0]) >= 18
+        np.testing.assert_array_equal(*got)
+
+
 def test_another_word_is_refused() -> None:
     with pytest.raises(InputError, match='sigma: found "bootstrap", expected one of: analytic'):
         found("n4sid-cva", sigma="bootstrap")

@@ -234,6 +234,23 @@ def test_states_that_do_not_go_together_are_refused() -> None:
         assert plain.samples == 14000
 
 
+def test_a_slow_mode_of_a_fast_stream() -> None:
+    """0.5 Hz at 1 kHz, zeta 1 %, 200 s: it rings for 290,000 samples. Auto refines it; sums of a named method say why not."""
+    fs, pole = 1000.0, 2 * np.pi * 0.5 * (-0.01 + 1j * np.sqrt(1 - 0.01**2))
+    rng = np.random.default_rng(2)
+    u = rng.standard_normal(200_000)
+    signal = lfilter([0.0, 1.0], [1.0, -np.exp(pole / fs)], u)
+    clean = np.column_stack([(shape * signal).real for shape in (1.0 + 0.2j, -0.6 + 0.1j)])
+    clean += 0.1 * clean.std(axis=0) * u[:, None]
+    record = np.column_stack([u, clean + 0.01 * clean.std(axis=0) * rng.standard_normal(clean.shape)])
+    result = stream(record, 1, fs, 20_000, refine=None)
+    assert result.refinement is not None and result.refinement.converged
+    values, sigma = modes(result, np.array([0.5]))
+    assert np.all(sigma > 0) and np.all(abs(values - [0.5, 0.01]) < 4 * sigma) and np.all(sigma < [1e-4, 1e-4])
+    named = stream(record, 1, fs, 20_000, method="n4sid-cva", rows=40, order=2)
+    assert named.refinement is None and "refine_failed" in {w.code for w in named.warnings}
+
+
 def test_what_cannot_be_refined_says_so() -> None:
     """A gap each 200 samples of 12,000: the model as identified, and a remark. Ambient streams: refused."""
     s = systems.w1()

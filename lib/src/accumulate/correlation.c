@@ -69,8 +69,10 @@ okid_status_t okid_correlation_create(okid_correlation_t** self, const okid_corr
     const size_t size = (size_t)lay_out(s, config) * 8;
     memset((char*)s + sizeof *s, 0, size - sizeof *s);
     for (int32_t r = 0; r < s->m; ++r) cor_scale(s)[r] = 1;
-    if (s->points > 0)
-        okid_spectrum_tables(s->points, &cor_at(s, s->tables_at)->real, &cor_at(s, s->tables_at)[s->points].real);
+#ifndef OKID_INTEGER_KERNEL
+    double* tables = &cor_at(s, s->tables_at)->real;
+    if (s->points > 0) okid_spectrum_tables(s->points, tables, tables + s->points);
+#endif
     *self = s;
     return OKID_OK;
 }

@@ -79,6 +79,12 @@ static inline int32_t cor_pieces(const okid_correlation_t* s) {
     return s->closed + (s->closed < s->ring && cor_slot(s, s->closed)->rows > 0);
 }
 
+#ifdef OKID_INTEGER_KERNEL // no double arithmetic, no transforms
+static inline int32_t okid_correlation_points(const okid_correlation_config_t* config) { return 0 * config->lags; }
+static inline size_t okid_correlation_spectrum_numbers(const okid_correlation_t* self) { return 0 * (size_t)self->m; }
+static inline int okid_correlation_gather(const okid_correlation_t* self) { return 0 * self->m; }
+static inline void okid_correlation_bring_out(const okid_correlation_t* self) { (void)self; }
+#else
 /// Points of the transforms that sum faster than the direct kernel, 0: none does. numbers: of memory for them.
 int32_t okid_correlation_points(const okid_correlation_config_t* config);
 size_t okid_correlation_spectrum_numbers(const okid_correlation_t* self);
@@ -86,6 +92,7 @@ size_t okid_correlation_spectrum_numbers(const okid_correlation_t* self);
 int okid_correlation_gather(okid_correlation_t* self);
 /// Bring the sums of what was gathered out.
 void okid_correlation_bring_out(okid_correlation_t* self);
+#endif
 
 /// Before and after a look at the sums of a run that goes on: numbers that transforms sum round, so that a look may not move
 /// the blocks they stand in. What waits is summed for the look alone.

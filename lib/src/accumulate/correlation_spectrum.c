@@ -13,6 +13,8 @@
 
 #include <math.h>
 
+#ifndef OKID_INTEGER_KERNEL
+
 enum { V = SPECTRUM_LANES, REALS = 2 * V };
 
 static int32_t rows_of(const okid_correlation_config_t* c) { return c->n_y + 2 * c->n_u; } ///< with the oldest inputs
@@ -183,3 +185,5 @@ void okid_correlation_bring_out(okid_correlation_t* s) {
     s->gathered = 0;
     s->energy = 0;
 }
+
+#endif
