@@ -39,7 +39,6 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
     : whole_(whole), sums_(block_sums(whole)), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),
       blocks_(static_cast<std::size_t>(blocks)), n_u_(whole.n_u), n_y_(whole.n_y),
       most_states_(okid_identify_max_order(&identify)), dt_(1 / identify.fs_hz) {
-    detrend_ = identify.detrend;
     length_ = whole.lags;
     const std::size_t most = window() ? 0 : static_cast<std::size_t>(whole.lags) * m_;
     history_.reserve(most);
@@ -62,8 +61,6 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
     if (needed.linear) create(needed.config(1), linear_block_, linear_);
     create(needed.config(0), anew_block_, anew_);
     modes_ = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, mass_plan{}, dt_);
-    energy_.resize(m_);
-    one_energy_.resize(m_);
 }
 
 void live_blocks::reset() {
@@ -160,21 +157,12 @@ void live_blocks::pair_up() {
     length_ *= 2;
 }
 
-/// Share of the outputs' power that stands in one block, mean over the outputs.
-double live_blocks::share_of(okid_accumulator_t* one, double weight) {
-    if (okid_accumulator_energy(one, detrend_, one_energy_.data()) != OKID_OK) return 0;
-    double share = 0;
-    for (std::size_t i = static_cast<std::size_t>(n_u_); i < m_; ++i)
-        if (energy_[i] > 0) share += weight * one_energy_[i] / energy_[i] / n_y_;
-    return share;
-}
-
 void live_blocks::leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to) {
     if (okid_accumulator_rows(one) == 0) return;
-    most_of_one_ = std::max(most_of_one_, share_of(one, weight));
     okid_model_t found{};
     double share = 0;
     const okid_status_t status = okid_jackknife_delete(jackknife_, one, weight, &found, &share);
+    most_of_one_ = std::max(most_of_one_, share);
     if (share > 0) to.add(status < 0 ? nullptr : &found, share);
 }
 
@@ -230,7 +218,6 @@ std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, okid_ide
     std::unique_ptr<replicate_statistics> with_mass;
     if (plan.wanted()) with_mass = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, plan, dt_);
     replicate_statistics& statistics = with_mass ? *with_mass : *modes_;
-    const bool known = okid_accumulator_energy(whole, detrend_, energy_.data()) == OKID_OK;
     const auto without_each = [&] {
         most_of_one_ = 0;
         statistics.begin(model_view(model));
@@ -241,7 +228,7 @@ std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, okid_ide
         return statistics.finish();
     };
     deviations out = without_each();
-    if (jackknife_ == linear_ && linear_ && known && most_of_one_ > most_of_one_block) {
+    if (jackknife_ == linear_ && linear_ && most_of_one_ > most_of_one_block) {
         if (!begin_anew(whole, model)) return std::nullopt;
         out = without_each();
     }

@@ -81,7 +81,6 @@ class live_blocks {
     void pair_up();
     void delete_parts(okid_accumulator_t* whole, replicate_statistics& to);
     void delete_slots(okid_accumulator_t* whole, replicate_statistics& to);
-    double share_of(okid_accumulator_t* one, double weight);
     void leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to);
     bool begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass);
     bool begin_anew(okid_accumulator_t* whole, const okid_identified_t& model);
@@ -97,11 +96,9 @@ class live_blocks {
     std::vector<std::int32_t> wide_codes_;
     std::unique_ptr<std::byte[]> linear_block_, anew_block_;
     okid_jackknife_t *linear_ = nullptr,
-                     *anew_ = nullptr;        ///< to first order (NULL: there is no derivative), identified anew
-    okid_jackknife_t* jackknife_ = nullptr;   ///< the one in use
-    okid_detrend_t detrend_ = OKID_DETREND_MEAN;
-    std::vector<double> energy_, one_energy_; ///< of the channels: of the whole and of a block
-    double most_of_one_ = 0;                  ///< largest share of the outputs' power that one block had
+                     *anew_ = nullptr;      ///< to first order (NULL: there is no derivative), identified anew
+    okid_jackknife_t* jackknife_ = nullptr; ///< the one in use
+    double most_of_one_ = 0;                ///< largest share of the channels' power that one block had
     std::unique_ptr<replicate_statistics> modes_;
     int n_u_, n_y_, most_states_;
     bool linear_mass_; ///< the derivative has B and D

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Groups refined from merged correlation sums: those of one stream, however they came together, and nearer the truth.
 
-The frame of the records is the campaign's own (virtual_year.py); the modes it should have are those of its matrices, and
-the sums beside which the merged ones stand are those of one session that is fed all records.
+The frame of the records is the campaign's own (virtual_year.py); the modes it should have are those of its matrices,
+and the sums beside which the merged ones stand are those of one session that is fed all records.
 """
 
 from __future__ import annotations
