@@ -235,7 +235,7 @@ def test_states_that_do_not_go_together_are_refused() -> None:
 
 
 def test_a_slow_mode_of_a_fast_stream() -> None:
-    """0.5 Hz at 1 kHz, zeta 1 %, 200 s: it rings for 290,000 samples. Auto refines it; sums of a named method say why not."""
+    """0.5 Hz at 1 kHz, zeta 1 %, 200 s: it rings for 290,000 samples. Auto refines it, sums cannot."""
     fs, pole = 1000.0, 2 * np.pi * 0.5 * (-0.01 + 1j * np.sqrt(1 - 0.01**2))
     rng = np.random.default_rng(2)
     u = rng.standard_normal(200_000)

@@ -35,9 +35,7 @@ typedef struct okid_correlation_config_t {
     int32_t slots;        ///< 1..4096: runs there is room for; with block the closed slots of the window
     int32_t
         saturated_missing; ///< codes: 1 = a sample with a code at full scale is missing as a whole; 0 = taken, counted
-    int32_t
-        buffer; ///< samples that wait for the direct kernel, 1 = least memory; 0 = as the work is least, with FFT for long lags:
-        ///< not on a microcontroller
+    int32_t buffer; ///< samples that wait for the direct kernel, 1 = least memory; 0 = whatever is fastest, FFT or not
     double forgetting; ///< lambda in (0, 1] a row; below 1 needs block
 } okid_correlation_config_t;
 
