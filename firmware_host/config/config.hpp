@@ -8,6 +8,7 @@
 #include <drv/gpio.h>
 #include <drv/source.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -112,13 +113,17 @@ struct trigger_config {
 /// A hammer test: blows are waited for, judged and added up.
 struct hammer_config {
     bool enabled = false;
-    std::size_t channel = 0;    ///< the force, index in live_config::channels
-    double level = 0;           ///< in its unit; negative: a blow is negative
-    int hits = 5;               ///< good ones wanted
-    double length_s = 2;        ///< of a blow's ring-down
-    double pretrigger_s = 0;    ///< at least; as long as the lags in any case
+    std::size_t channel = 0; ///< the force, index in live_config::channels
+    double level = 0;        ///< in its unit; negative: a blow is negative
+    int hits = 5;            ///< good ones wanted, at every point
+    std::vector<int> points; ///< places struck one after the other (-3: at 3, reversed); empty: one that is not named
+    double length_s = 2;     ///< of a blow's ring-down
+    double pretrigger_s = 0; ///< at least; as long as the lags in any case
     double double_percent = 10; ///< of the peak: a second blow this strong is one
     double spectrum_hz = 0;     ///< the force must reach so far
+
+    int total() const { return hits * std::max(1, static_cast<int>(points.size())); }
+    int point_of(int hit) const { return points[static_cast<std::size_t>(hit / hits)]; } ///< of a good one, from 0
 };
 
 /// Lines that are active while …

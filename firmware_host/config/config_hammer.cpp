@@ -4,6 +4,7 @@
 #include "config_trigger.hpp"
 #include "error.hpp"
 
+#include <cstdlib>
 #include <fmt/format.h>
 
 namespace okid_host {
@@ -37,6 +38,29 @@ void check_company(const config_place& place, const toml::table& table, const to
                                config.hammer.length_s, bytes / 1e9, most_bytes / 1e9));
 }
 
+/// "points = [1, 2, -7]".
+void read_points(const config_place& place, const toml::table& t, const live_config& config, hammer_config& out) {
+    const toml::array* points = t["points"].as_array();
+    if (!points) return;
+    for (const toml::node& one : *points) {
+        out.points.push_back(static_cast<int>(one.value<std::int64_t>().value_or(0)));
+        if (out.points.back() == 0 || std::abs(one.value<std::int64_t>().value_or(0)) > 10000)
+            refuse_key(place, *points, "points",
+                       "expected the numbers of the places in the order in which they are struck, "
+                       "from 1 (-3: at 3, direction reversed), such as [1, 2, 7]");
+    }
+    if (points->empty()) refuse_key(place, *points, "points", "is empty, expected a place at least");
+    if (config.identification.method != "auto")
+        refuse_key(
+            place, *points, "points",
+            fmt::format("belongs to method \"auto\", {} takes all hits as one place", config.identification.method));
+    if (config.n_u != 1)
+        refuse_key(place, *points, "points",
+                   fmt::format("{} force channels, expected one, that of the "
+                               "hammer",
+                               config.n_u));
+}
+
 } // namespace
 
 void read_hammer(const toml::table& file, live_config& config) {
@@ -59,6 +83,7 @@ void read_hammer(const toml::table& file, live_config& config) {
     out.double_percent = t["double_percent"].value_or(out.double_percent);
     out.spectrum_hz = t["spectrum_hz"].value_or(out.spectrum_hz);
     check_company(place, t, file, config);
+    read_points(place, t, config, out);
 }
 
 } // namespace okid_host

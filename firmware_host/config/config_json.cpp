@@ -117,6 +117,7 @@ ordered_json hammer_json(const live_config& config) {
     return {{"channel", config.channels[hammer.channel].name},
             {"level", hammer.level},
             {"hits", hammer.hits},
+            {"points", hammer.points},
             {"length_s", hammer.length_s},
             {"pretrigger_s", hammer.pretrigger_s},
             {"double_percent", hammer.double_percent},

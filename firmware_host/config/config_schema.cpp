@@ -136,6 +136,7 @@ const std::vector<section_rule> schema = {
      {{"channel", kind::text},
       {"level", kind::number},
       {"hits", kind::whole, 1, 1000},
+      {"points", kind::array},
       {"length_s", kind::positive, 0, 1e4},
       {"pretrigger_s", kind::number, 0, 1e4},
       {"double_percent", kind::positive, 0, 100},

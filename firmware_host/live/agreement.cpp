@@ -3,6 +3,8 @@
 // METHOD   rows in one vector, the oldest dropped at its front; identify_records() over what is there
 #include "agreement.hpp"
 
+#include "record/roving.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -55,14 +57,15 @@ double agreement_bytes(const stream_config& config) {
 
 agreement::agreement(const stream_config& config)
     : where_(config.where), m_(config.channels()), options_(options_of(config)),
-      window_(config.wanted.window_s.has_value()), most_(kept_samples(config)), starts_{0}, missing_(m_, NAN) {
+      window_(config.wanted.window_s.has_value()), most_(kept_samples(config)), starts_{0}, hits_(config.hits),
+      missing_(m_, NAN) {
     if (window_) rows_.reserve(static_cast<std::size_t>(most_ + most_ / 4 + 1) * m_);
 }
 
 void agreement::push(const double* row) {
     if (came_ - begin_ == most_) {
         ++begin_;
-        while (starts_.size() > 1 && starts_[1] <= begin_) starts_.erase(starts_.begin());
+        while (starts_.size() > 1 && starts_[1] <= begin_) starts_.erase(starts_.begin()), ++gone_;
         if (begin_ - base_ > most_ / 4) {
             rows_.erase(rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>((begin_ - base_)) *
                                                            static_cast<std::ptrdiff_t>(m_));
@@ -131,6 +134,20 @@ record_set agreement::records() const {
     return out;
 }
 
+/// Where the records were struck, and with them the forces of M, K and R.
+void agreement::place_hits(const record_set& set, const mass_plan& mass) {
+    options_.mass = mass;
+    if (hits_.size() < gone_ + set.records.size()) return;
+    const auto first = hits_.begin() + static_cast<std::ptrdiff_t>(gone_);
+    options_.hits.assign(first, first + static_cast<std::ptrdiff_t>(set.records.size()));
+    if (!mass.wanted()) return;
+    const std::vector<int> places = hit_places(options_.hits);
+    const std::vector<std::string> names = place_names(options_.inputs.front(), options_.hits);
+    options_.mass.inputs.assign(places.size(), mass.inputs.front());
+    for (std::size_t k = 0; k < places.size(); ++k)
+        options_.mass.inputs[k].name = names[k], options_.mass.inputs[k].dof = places[k];
+}
+
 okid_status_t agreement::run(const mass_plan& mass) {
     const std::pair<std::int64_t, bool> now{came_, mass.wanted()};
     if (run_of_ == now) return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
@@ -138,8 +155,9 @@ okid_status_t agreement::run(const mass_plan& mass) {
     run_at_ = came_;
     fault_.reset();
     try {
-        options_.mass = mass;
-        found_ = identify_records(records(), options_);
+        record_set set = records();
+        place_hits(set, mass);
+        found_ = identify_records(std::move(set), options_);
         found_.context.x0.reset(); // of the samples of a stream nothing else is told than of its sums
         found_.context.simulation_percent.reset();
     } catch (const failure& why) {

@@ -63,6 +63,7 @@ class agreement {
     void push(const double* row);
     const double* at(std::int64_t sample) const { return rows_.data() + static_cast<std::size_t>(sample - base_) * m_; }
     record_set records() const;
+    void place_hits(const record_set& set, const mass_plan& mass);
 
     std::string where_;
     std::size_t m_;
@@ -72,6 +73,8 @@ class agreement {
     std::vector<double> rows_;                                     ///< samples base_ … came_ - 1
     std::int64_t base_ = 0, begin_ = 0, came_ = 0, forgotten_ = 0; ///< kept: begin_ … came_ - 1
     std::vector<std::int64_t> starts_;                             ///< of records
+    std::vector<int> hits_;                                        ///< of the stream's plan
+    std::size_t gone_ = 0;                                         ///< records that are forgotten
     std::vector<double> missing_;                                  ///< one row
     okid_accumulator_stats_t counts_{};
     std::int64_t run_at_ = 0;

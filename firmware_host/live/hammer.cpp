@@ -22,7 +22,7 @@ constexpr std::size_t flat_top = 5; // samples that are exactly equal at the pea
 
 hammer::hammer(const live_config& config, std::int64_t lags)
     : wanted_(config.hammer), channels_(config.channels), rate_hz_(config.rate_hz), width_(config.channels.size()),
-      identified_(config.n_u + config.n_y), left_(config.hammer.hits) {
+      identified_(config.n_u + config.n_y), left_(config.hammer.total()) {
     if (!wanted_.enabled) return;
     const channel_config& channel = config.channels[wanted_.channel];
     unit_ = channel.unit.empty() ? "" : " " + channel.unit;
@@ -62,6 +62,7 @@ bool hammer::add(std::int64_t index, const double* row, std::int64_t count) {
             to_come_ = after_;
             report_ = hit_report{};
             report_.number = ++heard_;
+            report_.point = next_point();
             report_.sample = index + i;
         }
         keep(row);
@@ -235,11 +236,14 @@ std::string hammer::awaited() const {
     const std::string last = report_.number == 0 ? std::string()
                              : report_.good()    ? fmt::format("hit {} {}; ", report_.number, report_.text)
                                                  : fmt::format("hit {} rejected, {}; ", report_.number, report_.text);
-    return fmt::format(
-        "{}{}, {} of {} left", last,
-        armed() ? fmt::format("strike ({} beyond {:.4g}{})", channels_[wanted_.channel].name, wanted_.level, unit_)
-                : "wait",
-        left_, wanted_.hits);
+    const int point = next_point(), there = left_ - (left_ - 1) / wanted_.hits * wanted_.hits;
+    const std::string at = point == 0 ? "" : fmt::format(" point {}", point);
+    return fmt::format("{}{}, {}{} of {} left", last,
+                       armed() ? fmt::format("strike{} ({} beyond {:.4g}{})", at, channels_[wanted_.channel].name,
+                                             wanted_.level, unit_)
+                       : point ? fmt::format("wait, next{}", at)
+                               : "wait",
+                       point ? fmt::format("{} of {} there, ", there, wanted_.hits) : "", left_, wanted_.total());
 }
 
 std::string hammer::shortfall() const {
@@ -251,8 +255,8 @@ std::string hammer::shortfall() const {
     for (const auto& [fault, count] : refused_) why += fmt::format("{}{} {}", why.empty() ? ": " : ", ", count, fault);
     const int refused = heard_ - accepted_ - (capturing_ ? 1 : 0);
     return fmt::format("{}: {} rejected{}{}",
-                       accepted_ == 0 ? fmt::format("no hit was accepted ({} wanted)", wanted_.hits)
-                                      : fmt::format("{} of {} hits were accepted", accepted_, wanted_.hits),
+                       accepted_ == 0 ? fmt::format("no hit was accepted ({} wanted)", wanted_.total())
+                                      : fmt::format("{} of {} hits were accepted", accepted_, wanted_.total()),
                        refused, why, capturing_ ? "; the last one was cut off by the end" : "");
 }
 

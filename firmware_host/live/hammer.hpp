@@ -26,6 +26,7 @@ struct hit_report {
     double duration_s = 0;      ///< above 10 % of the peak
     double band_hz = 0;         ///< up to here the force has a tenth of its greatest spectral amplitude
     int accepted = 0, left = 0; ///< of all so far
+    int point = 0;              ///< where it was struck by the plan; 0: there is none
     bool good() const { return fault.empty(); }
 };
 
@@ -67,6 +68,8 @@ class hammer {
     bool find_second_blow();
     void find_band();
     bool refuse(const char* fault, std::string text);
+    /// Where the next good one has to be struck; 0: no plan, or all are there.
+    int next_point() const { return wanted_.points.empty() || left_ == 0 ? 0 : wanted_.point_of(accepted_); }
 
     hammer_config wanted_;
     std::vector<channel_config> channels_;

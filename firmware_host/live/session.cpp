@@ -206,6 +206,7 @@ void session::strike() {
         {"text", hit.text}};
     if (hit.duration_s > 0)
         event.update({{"peak", hit.peak}, {"duration_s", hit.duration_s}, {"force_band_hz", hit.band_hz}});
+    if (hit.point != 0) event["point"] = hit.point;
     event.update({{"accepted_hits", hit.accepted}, {"left", hit.left}});
     tell(std::move(event));
     if (!hit.good()) {

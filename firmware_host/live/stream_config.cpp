@@ -42,6 +42,8 @@ stream_config stream_of(const live_config& config) {
         out.scale.push_back(channel.layout.scale * channel.si_factor());
         out.offset.push_back(channel.layout.offset * channel.si_factor());
     }
+    for (int hit = 0; !config.hammer.points.empty() && hit < config.hammer.total(); ++hit)
+        out.hits.push_back(config.hammer.point_of(hit));
     out.mass = live_mass_plan(config);
     fit_memory(out);
     return out;

@@ -23,6 +23,7 @@ struct stream_config {
     bool bulk = false;                         ///< long calls of 16-bit codes go through an FFT (the same bits)
     bool states_only = false;                  ///< samples come as states to merge, none are added
     std::vector<double> scale, offset;         ///< of each channel: value = scale * sample + offset
+    std::vector<int> hits;                     ///< where each record will be struck, in order; empty: one place
     mass_plan mass;                            ///< M, K and R with a result, when it wants them
     remarks said;                              ///< what was chosen for it: goes into the result
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from program import okid
-from systems import Structure, chain, rayleigh
+from systems import Structure, chain, rayleigh, simulate
 
 RATE = 1000.0
 LENGTH = 1500  # samples between two blows
@@ -101,8 +102,8 @@ def write_log(path: Path, codes: np.ndarray, lost: Sequence[int] = ()) -> None:
                 out.write(f"({1700000000 + n / RATE + channel * 2e-5:.6f}) vcan0 {0x100 + channel:03X}#{data.hex()}\n")
 
 
-def play(folder: Path, codes: np.ndarray, hits: int, more: str = "", lost: Sequence[int] = ()):
-    text = CONFIG.format(hits=hits, more=more)
+def play(folder: Path, codes: np.ndarray, hits: int, more: str = "", lost: Sequence[int] = (), config: str = CONFIG):
+    text = config.format(hits=hits, more=more)
     for number, (name, scale) in enumerate(CODES.items()):
         role = "acceleration" if number else "force"
         text += CHANNEL.format(name=name, role=role, dof=max(number, 1), can_id=0x100 + number, scale=scale)
@@ -137,6 +138,44 @@ def test_good_blows_are_added_up_and_faults_are_named(tmp_path: Path) -> None:
     assert np.allclose(result["mkr"]["M"], structure().M, atol=0.06)
     assert result["gaps"] == 0
     assert not [w for w in result["warnings"] if w["code"] == "missing_samples"]
+
+
+def test_a_plan_of_points_is_struck_one_after_the_other(tmp_path: Path) -> None:
+    """Four places of one structure, two good hits each: the guide names the next, each becomes an input of its own."""
+    one = replace(structure(), force_dofs=(0, 1))
+    plan, kinds = [1, 1, 1, -2, -2], ["good", "double", "good", "good", "good"]  # the second is no good one
+    f = np.zeros((LENGTH * 6, 2))
+    for number, (point, kind) in enumerate(zip(plan, kinds, strict=True)):
+        at = LENGTH * number + LENGTH - 100
+        f[at : at + 5, abs(point) - 1] += np.sign(point) * pulse(5, 400.0)
+        if kind == "double":
+            f[at + 40 : at + 45, abs(point) - 1] += pulse(5, 90.0)
+    random = np.random.default_rng(2)
+    y = simulate(one.discrete(), f)
+    force = f[:, 0] - f[:, 1]  # the load cell in the hammer knows no direction
+    noise = random.standard_normal((len(f), 3)) * [0.15, 0.05, 0.05]
+    columns = np.column_stack([force, y]) + noise
+    codes = np.clip(np.rint(columns / list(CODES.values())), -32768, 32767).astype(int)
+    text = CONFIG.replace("p = 20\norder = 4\n", "")
+    done, events = play(tmp_path, codes, 2, "points = [1, -2]", config=text)
+    assert done.returncode == 0, done.stderr
+    told = hits_of(events)
+    assert [hit["point"] for hit in told] == plan and [hit["accepted"] for hit in told] == [k == "good" for k in kinds]
+    assert [hit["left"] for hit in told] == [3, 3, 2, 1, 0]
+    for words in (
+        "strike point 1 (force beyond 20), 2 of 2 there, 4 of 4 left",
+        "wait, next point -2, 2 of 2 there, 2 of 4 left",
+        "1 of 2 there, 1 of 4 left",
+    ):
+        assert words in done.stdout, done.stdout
+    result = events[-1]["result"]
+    assert result["inputs"] == ["force@1", "force@2"]
+    assert np.allclose([mode["frequency_hz"] for mode in result["modes"]], one.modes()[0], rtol=2e-3)
+    feed = np.array(result["model"]["D"])  # a force moves its own mass at once, and in its own direction
+    assert np.allclose(np.diag(feed), 1.0 / np.diag(one.M), rtol=0.2), feed
+    for given, fault in (("points = [1, 0]", "expected the numbers of the places"), ("points = []", "is empty")):
+        assert fault in play(tmp_path, codes[:10], 2, given, config=text)[0].stderr
+    assert 'belongs to method "auto"' in play(tmp_path, codes[:10], 2, "points = [1, 2]")[0].stderr
 
 
 @pytest.mark.parametrize(("percent", "reason"), [(15, "double_hit"), (30, None)])

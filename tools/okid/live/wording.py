@@ -25,7 +25,9 @@ def _alarm(event: dict[str, Any]) -> tuple[str, str]:
 
 def _hit(event: dict[str, Any]) -> tuple[str, str]:
     verdict = "good" if event.get("accepted") else f"rejected ({event.get('reason')})"
-    return ("good" if event.get("accepted") else "warn"), f"hit {event.get('number')} {verdict}: {event.get('text')}"
+    at = f" at point {event['point']}" if "point" in event else ""
+    words = f"hit {event.get('number')}{at} {verdict}: {event.get('text')}"
+    return ("good" if event.get("accepted") else "warn"), words
 
 
 def _change(event: dict[str, Any]) -> tuple[str, str]:
