@@ -42,6 +42,30 @@ def test_complexity_in_numbers(page: str) -> None:
     assert len(rows) == 3 and all(0.0 <= float(row[2]) < 5.0 and 0.0 <= float(row[3]) < 0.02 for row in rows)
 
 
+def test_another_result_beside(tmp_path: Path) -> None:
+    force, y = okid.demo_record()
+    names = ["a", "b", "c"]
+    one = okid.identify(force, y, fs=1000.0, output_names=names, sigma_blocks=0)
+    moved = y.copy()
+    moved[:, 2] = 0.7 * y[:, 2] + 0.3 * y[:, 0]  # a sensor that no longer measures what it did
+    okid.identify(force, moved, fs=1010.0, output_names=names, sigma_blocks=0).save(tmp_path / "other.json")
+    text = build(loaded_from(one.to_dict(), "result"), compare=tmp_path / "other.json")
+    rows = _cells(text, "comparison")
+    assert [row[:2] for row in rows] == [["1", "1"], ["2", "2"], ["3", "3"]]
+    assert all(float(row[4]) == pytest.approx(1.0, abs=0.1) and float(row[7]) < 0.999 for row in rows)
+    assert "CoMAC" in text and "Beside other.json" in text
+    okid.identify(force, y[:, 0], fs=1000.0, output_names=["z"], sigma_blocks=0).save(tmp_path / "z.json")
+    assert "no output of the same name" in build(loaded_from(one.to_dict(), "result"), compare=tmp_path / "z.json")
+
+
+def test_deflection_of_an_ambient_record() -> None:
+    _, y = okid.demo_record()
+    record = okid.Record(["a", "b", "c"], y, 1000.0)
+    result = okid.identify(None, y, fs=1000.0, output_names=["a", "b", "c"], method="plscf")
+    rows = _cells(build(loaded_from(result.to_dict(), "result"), record), "deflection")
+    assert len(rows) >= 2 and all(float(row[3]) > 0.9 for row in rows)
+
+
 def test_report_and_universal_file_of_responses(tmp_path: Path) -> None:
     force, y = okid.demo_record()
     result = okid.identify_frf(okid.frf.h1(force, y, 1000.0, nperseg=4096), band=(5.0, 80.0))

@@ -59,6 +59,7 @@ def _parser() -> _Parser:
     parser.add_argument("--events", metavar="FILE.jsonl", help="events of the run: adds completeness, tracking, alarms")
     parser.add_argument("--geometry", metavar="CONFIG.toml", help="its section [geometry]: adds moving mode shapes")
     parser.add_argument("--config", metavar="CONFIG.toml", help="its text goes into the report, its [geometry] too")
+    parser.add_argument("--compare", metavar="OTHER.json", help="another result: its modes beside these, MAC, CoMAC")
     parser.add_argument("--out", metavar="FILE.html|-", help="default: the result's name with .html; - is stdout")
     parser.add_argument("--pdf", metavar="FILE.pdf", help="print the page too; needs Chromium or Chrome on PATH")
     parser.add_argument("--title", metavar="TEXT", help="heading of the report")
@@ -67,7 +68,7 @@ def _parser() -> _Parser:
 
 def _check_targets(args: argparse.Namespace, target: Path | None) -> None:
     """Nothing that is read is written over, the two outputs are two files, and both have a folder."""
-    inputs = {key: getattr(args, key) for key in ("result", "record", "events", "geometry", "config")}
+    inputs = {key: getattr(args, key) for key in ("result", "record", "events", "geometry", "config", "compare")}
     if target is not None:
         check_target(target, inputs)
         if args.out or target.parent.is_dir():  # else the result is not there either
@@ -86,7 +87,7 @@ def _page(args: argparse.Namespace, written: str) -> str:
 
     return build(
         load_result(args.result), args.record, args.title, events=args.events, geometry=args.geometry,
-        config=args.config, source=args.result, written=written,
+        config=args.config, compare=args.compare, source=args.result, written=written,
     )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from okid.data.records import Record
 from okid.data.toml_file import read_toml
 from okid.report import page
 from okid.report.agreement import fit_section, history_section, residual_section
+from okid.report.comparison import Other, comparison_section
 from okid.report.events import read_events
 from okid.report.geometry import read_geometry
 from okid.report.loaded import Loaded, load_result, loaded_from
@@ -21,6 +22,7 @@ from okid.report.mass import mass_section
 from okid.report.material import Material
 from okid.report.measured import measure, measured_from
 from okid.report.modes import shape_sections, table_section
+from okid.report.operating import operating_section
 from okid.report.other_kinds import check_kind
 from okid.report.page import count_of
 from okid.report.provenance import provenance_section, source_of
@@ -45,6 +47,7 @@ def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]
     yield summary_section(m)
     yield table_section(m)
     yield from shape_sections(m)
+    yield comparison_section(m)
     yield from mass_section(m)
     yield tracking_section(m)
     yield stabilization_section(m)
@@ -57,6 +60,7 @@ def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]
         yield markov_section(m, pairs)
     else:
         yield spectra_section(m)
+        yield operating_section(m)
     yield fit_section(m)
     yield history_section(m, pairs)
     yield residual_section(m)
@@ -84,22 +88,26 @@ def build(
     events: Place | None = None,
     geometry: Place | None = None,
     config: Place | None = None,
+    compare: Place | None = None,
     source: Place | None = None,
     written: str | None = None,
 ) -> str:
     """The report as one HTML string; the same arguments and files give the same string.
 
     `record`: a file, or what read_csv returns; `events`: JSON lines of the run; `geometry`, `config`: CONFIG.toml;
-    `source`: the file of the result, named in the provenance; `written`: when and by what, None = not told.
+    `compare`: another result file; `source`: the file of the result, named in the provenance; `written`: when and
+    by what, None = not told.
     Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
     """
     m = Material(result)
     named = record if isinstance(record, str | Path) else None
-    places = {"result": source, "record": named, "events": events, "geometry": geometry, "config": config}
+    places = {"result": source, "record": named, "events": events, "geometry": geometry, "config": config,
+              "compare": compare}  # fmt: skip
     for kind, path in places.items():
         if path is not None:
-            check_kind(path, "config" if kind == "geometry" else kind)
+            check_kind(path, {"geometry": "config", "compare": "result"}.get(kind, kind))
             m.sources.append(source_of(kind, path))
+    m.other = None if compare is None else Other(load_result(compare), Path(compare).name)
     m.events = None if events is None else read_events(events)
     _placed(m, geometry, config)
     if named is not None:
@@ -143,6 +151,7 @@ def write_report(
     events: Place | None = None,
     geometry: Place | None = None,
     config: Place | None = None,
+    compare: Place | None = None,
     written: str | None = None,
 ) -> int:
     """Write the report of a Result (its to_dict(), or a result file) to `path` as one HTML file; returns its bytes.
@@ -155,11 +164,13 @@ def write_report(
     source = result if isinstance(result, str | Path) else None
     named = record if isinstance(record, str | Path) else None
     check_target(
-        path, {"result": source, "record": named, "events": events, "geometry": geometry, "config": config}
+        path, {"result": source, "record": named, "events": events, "geometry": geometry, "config": config,
+               "compare": compare},
     )  # fmt: skip
     check_place(path, "path")
     text = build(
-        _loaded(result), record, title, events=events, geometry=geometry, config=config, source=source, written=written
+        _loaded(result), record, title, events=events, geometry=geometry, config=config, compare=compare, source=source,
+        written=written,
     )  # fmt: skip
     write_whole(path, text)
     return len(text.encode("utf-8"))

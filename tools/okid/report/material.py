@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from okid.report.events import Events
 from okid.report.geometry import Geometry
@@ -12,6 +12,9 @@ from okid.report.loaded import Loaded
 from okid.report.measured import Measured
 from okid.report.svg import Pictures
 from okid.result import figures
+
+if TYPE_CHECKING:
+    from okid.report.comparison import Other
 
 
 class Source(NamedTuple):
@@ -31,6 +34,7 @@ class Material:
     measured: Measured | None = None
     events: Events | None = None
     geometry: Geometry | None = None
+    other: Other | None = None
     sources: list[Source] = field(default_factory=list)
     texts: list[tuple[str, str]] = field(default_factory=list)
     pictures: Pictures = field(default_factory=Pictures)

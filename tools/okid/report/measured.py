@@ -91,7 +91,7 @@ def _poles(result: Loaded, u: Real, y: Real, source: str) -> Stabilization:
     `source` and channel."""
     raw = result.raw
     method = str(raw.get("method", "okid-era"))
-    method = "okid-era" if method == "auto" else method
+    method = "okid-era" if method in ("auto", "plscf", "poser") else method
     keys = ("rows",) if method.startswith("n4sid") or not result.inputs else ("rows", "p")
     reach: dict[str, Any] = {key: int(raw[key]) for key in keys if raw[key] is not None}
     reach.update({"input_names": result.inputs} if result.inputs else {})

@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from numpy.typing import NDArray
 
 from okid.frf import Frf
-from okid.modal import mac_matrix, normalised
+from okid.modal import mac_matrix, mean_phase, normalised
 from okid.result.stabilization import Cluster, Stabilization
 
 Real = NDArray[np.float64]
@@ -210,8 +210,8 @@ def draw_frf(axes: Sequence[Axes], measured: Frf | None, line: Real, model: Comp
 def draw_shape(ax: Axes, shape: Complex, labels: Sequence[str], title: str) -> None:
     """Stick plot of one mode against the outputs: height |entry|, sign of the real part along the shape's own line."""
     scaled = normalised(shape)
-    along = (scaled * np.exp(-0.5j * np.angle(np.sum(scaled**2)))).real  # the straight line that fits the entries best
-    along = along if along[np.argmax(np.abs(scaled))] >= 0.0 else -along
+    along = (scaled * np.exp(-1j * mean_phase(scaled))).real
+    along = along if along[np.argmax(np.nan_to_num(np.abs(scaled)))] >= 0.0 else -along
     height = np.abs(scaled) * np.where(along < 0.0, -1.0, 1.0)
     index = np.arange(1, len(height) + 1)
     ax.axhline(0.0, color=EDGE, lw=0.7)
@@ -246,25 +246,37 @@ def draw_compass(ax: Axes, shape: Complex, title: str) -> None:
     ax.set_title(title, fontsize=8.0, pad=8)
 
 
-def draw_mac(ax: Axes, shapes: Complex, labels: Sequence[str]) -> None:
-    """AutoMAC as squares, full ink = 1, with numbers up to 14 modes; `labels` "number  Hz" of each mode."""
-    values = mac_matrix(shapes)
-    count = len(values)
+def draw_mac(ax: Axes, shapes: Complex, labels: Sequence[str], other: Complex | None = None) -> None:
+    """MAC as squares, full ink = 1, with numbers up to 14 modes; `labels` "number  Hz" of each mode. `other`: shapes of
+    the columns, else those of the rows again (AutoMAC)."""
+    values = mac_matrix(shapes, other)
+    count = max(values.shape)
     for (i, j), value in np.ndenumerate(values):
         ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1.0, 1.0, facecolor=BLUE, alpha=round(float(value), 3), lw=0))
         if count <= 14:
             ax.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=6.5, color=PAPER if value > 0.55 else DARK)
     ax.grid(False)
-    ax.set_xlim(-0.5, count - 0.5)
-    ax.set_ylim(count - 0.5, -0.5)
+    ax.set_xlim(-0.5, values.shape[1] - 0.5)
+    ax.set_ylim(len(values) - 0.5, -0.5)
     ax.set_aspect("equal")
     size, step = (8.0, 1) if count <= 14 else (6.5, -(-count // 20))
-    places = range(0, count, step)
-    ax.set_xticks(places, [str(k + 1) for k in places], fontsize=size)
-    ax.set_yticks(places, [labels[k] for k in places], fontsize=size)
+    down, across = range(0, len(values), step), range(0, values.shape[1], step)
+    ax.set_xticks(across, [str(k + 1) for k in across], fontsize=size)
+    ax.set_yticks(down, [labels[k] for k in down], fontsize=size)
     ax.spines[["top", "right"]].set_visible(True)
     ax.set_xlabel("mode")
     ax.set_ylabel("mode, frequency")
+
+
+def draw_comac(ax: Axes, names: Sequence[str], values: Sequence[float]) -> None:
+    """One bar an output, 0 to 1."""
+    index = np.arange(len(names))
+    ax.bar(index, values, 0.6, color=BLUE)
+    ax.set_ylim(0.0, 1.05)
+    ax.set_xlim(-0.6, len(names) - 0.4)
+    step = -(-len(names) // 40)
+    ax.set_xticks(index[::step], [short(name) for name in names[::step]], rotation=90 if len(names) > 8 else 0)
+    ax.set_ylabel("CoMAC")
 
 
 def draw_fit(
