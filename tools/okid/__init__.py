@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from okid.abi.square_root import SquareRoot
     from okid.abi.sums import Stats
     from okid.data.records import Record, read_csv
+    from okid.grey_box import FittedMode, GreyBox, fit_structure
     from okid.identification.change_test import ChangeTest, ChangeVerdict, ModeShift
     from okid.identification.identifier import Identified, Identifier, usable_p
     from okid.result.modal_table import ModalTable
@@ -27,8 +28,9 @@ if TYPE_CHECKING:
     from okid.result.result import Result
     from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization
     from okid.session import Session
-    from okid.setups import merge_setups
+    from okid.setups import identify_setups, merge_setups
     from okid.structure import Structure
+    from okid.virtual import Estimate, VirtualSensors
 
 __all__ = [
     "Accumulator",
@@ -37,7 +39,10 @@ __all__ = [
     "Cluster",
     "Criteria",
     "Error",
+    "Estimate",
     "Fit",
+    "FittedMode",
+    "GreyBox",
     "IdentificationError",
     "Identified",
     "Identifier",
@@ -56,12 +61,15 @@ __all__ = [
     "Stabilization",
     "Stats",
     "Structure",
+    "VirtualSensors",
     "demo",
     "demo_frame",
     "demo_record",
+    "fit_structure",
     "frf",
     "identify",
     "identify_frf",
+    "identify_setups",
     "library_version",
     "merge_setups",
     "modal",
@@ -76,6 +84,7 @@ _NAMES = {
     "abi.square_root": "SquareRoot",
     "abi.sums": "Stats",
     "data.records": "Record, read_csv",
+    "grey_box": "FittedMode, GreyBox, fit_structure",
     "identification.change_test": "ChangeTest, ChangeVerdict, ModeShift",
     "identification.identifier": "Identified, Identifier, usable_p",
     "result.modal_table": "ModalTable",
@@ -84,8 +93,9 @@ _NAMES = {
     "result.result": "Result",
     "result.stabilization": "Cluster, Criteria, OrderPoles, Stabilization",
     "session": "Session",
-    "setups": "merge_setups",
+    "setups": "identify_setups, merge_setups",
     "structure": "Structure",
+    "virtual": "Estimate, VirtualSensors",
 }  # of the modules; they load when they are first used, NumPy and the libraries with them
 
 _MODULES = ("campaign", "capture", "formats", "frf", "live", "modal", "report")
