@@ -5,6 +5,7 @@
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "files/whole_file.hpp"
+#include "frequency/identify_lags.hpp"
 #include "frequency/identify_responses.hpp"
 #include "frequency/response_file.hpp"
 #include "progress.hpp"
@@ -28,8 +29,8 @@ struct identify_arguments {
     record_request wanted;
     std::vector<std::string> records;
     std::string inputs, outputs, range, json, model;
-    std::string exponential; ///< of frequency responses
-    bool quiet = false, all_modes = false, frf = false;
+    std::string exponential, references; ///< of frequency responses; of set-ups
+    bool quiet = false, all_modes = false, frf = false, set_ups = false;
 };
 
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
@@ -75,14 +76,16 @@ void check_targets(const identify_arguments& given) {
         usage(fmt::format("--json and --model both name {}, expected two files", given.json));
 }
 
-record_set read_records(const identify_arguments& given, record_options& options, progress& display) {
+/// @param outputs  those of options.outputs that the records have
+record_set read_records(const identify_arguments& given, const std::vector<std::string>& outputs,
+                        record_options& options, progress& display) {
     csv_request request;
     request.columns = options.inputs;
-    request.columns.insert(request.columns.end(), options.outputs.begin(), options.outputs.end());
+    request.columns.insert(request.columns.end(), outputs.begin(), outputs.end());
     if (!given.wanted.fs.empty()) request.fs_hz = check_rate(given.wanted.fs);
     record_set set;
     set.n_u = options.inputs.size();
-    set.n_y = options.outputs.size();
+    set.n_y = outputs.size();
     std::vector<std::string> units;
     for (const std::string& path : given.records) {
         request.progress = [&](double megabytes) {
@@ -112,9 +115,47 @@ record_set read_records(const identify_arguments& given, record_options& options
     return set;
 }
 
+void take_set_up_options(identify_arguments& given) {
+    std::string& method = given.wanted.method;
+    if (given.records.size() < 2) usage("--setups: found one file, expected one for each set-up");
+    if (!method.empty() && method != lag_method)
+        usage(fmt::format("--setups identifies with plscf, found --method {}: leave it out", method));
+    method = lag_method;
+}
+
+/// Every file a set-up with those of the outputs that it has.
+std::vector<set_up> read_each_set_up(const identify_arguments& given, record_options& options, progress& display) {
+    std::vector<set_up> out;
+    std::vector<std::string> left = options.outputs;
+    for (const std::string& path : given.records) {
+        const std::vector<std::string> columns = read_csv_columns(path);
+        set_up one;
+        for (const std::string& name : options.outputs)
+            if (std::find(columns.begin(), columns.end(), name) != columns.end()) {
+                one.outputs.push_back(name);
+                left.erase(std::remove(left.begin(), left.end(), name), left.end());
+            }
+        if (one.outputs.empty())
+            usage(fmt::format("{}: has none of the --outputs; it has: {}", path, list_names(columns)));
+        identify_arguments alone = given;
+        alone.records = {path};
+        const double before = options.fs_hz;
+        one.set = read_records(alone, one.outputs, options, display);
+        if (!out.empty() && std::abs(options.fs_hz - before) > 1e-6 * before)
+            usage(fmt::format("{}: found a sample rate of {} Hz, expected {} Hz as in {}", path, options.fs_hz, before,
+                              given.records.front()));
+        out.push_back(std::move(one));
+    }
+    if (!left.empty())
+        usage(fmt::format("--outputs: no file has {}; {} has: {}", list_names(left), given.records.front(),
+                          list_names(read_csv_columns(given.records.front()))));
+    return out;
+}
+
 record_result identify_files_of_responses(const identify_arguments& given) {
     response_request asked{given.wanted, given.exponential, given.all_modes};
     if (!given.range.empty()) usage("--range is an option of records, found with --frf");
+    if (given.set_ups) usage("--setups is an option of records: several files with --frf are set-ups anyway");
     if (!given.inputs.empty()) asked.wanted.inputs = split_names("--inputs", given.inputs);
     if (!given.outputs.empty()) asked.wanted.outputs = split_names("--outputs", given.outputs);
     check_targets(given);
@@ -124,12 +165,18 @@ record_result identify_files_of_responses(const identify_arguments& given) {
 record_result identify_files_of_samples(identify_arguments given) {
     if (!given.exponential.empty()) usage("--exponential belongs to --frf: it is the window in frequency responses");
     choose_columns(given);
+    if (!given.set_ups && !given.references.empty()) usage("--references belongs to --setups");
+    const auto references =
+        given.references.empty() ? std::vector<std::string>() : split_names("--references", given.references);
+    if (given.set_ups) take_set_up_options(given);
     record_options options = check_request(given.wanted);
     check_targets(given);
     options.all_modes = given.all_modes;
     progress display(!given.quiet);
     options.stage = [&](const char* stage) { display.stage(stage); };
-    record_result result = identify_records(read_records(given, options, display), options);
+    record_result result = given.set_ups
+                               ? identify_set_ups(read_each_set_up(given, options, display), options, references)
+                               : identify_by_method(read_records(given, options.outputs, options, display), options);
     finish_fits(result);
     result.context.all_modes = given.all_modes;
     return result;
@@ -160,8 +207,9 @@ void add_identify(CLI::App& app) {
         ->add_option("--method", given->wanted.method,
                      "how the model is found: auto (default), what several methods agree on, or one of them. With an "
                      "option of one "
-                     "method alone (--p, --rows, --order, --max-order, --hankel, --refine, --stabilization) okid-era")
-        ->type_name(fmt::format("auto|{}", fmt::join(method_names(), "|")));
+                     "method alone (--p, --rows, --order, --max-order, --hankel, --refine, --stabilization) okid-era. "
+                     "plscf: modes from correlations by way of frequency responses")
+        ->type_name(fmt::format("auto|{}|{}", fmt::join(method_names(), "|"), lag_method));
     command->add_option("--p", given->wanted.p, "observer order in samples (default 40; not for n4sid)")
         ->type_name("N");
     command
@@ -181,8 +229,7 @@ void add_identify(CLI::App& app) {
             "force between samples: held (zoh), linear (foh) or band-limited, as a load cell behind an anti-alias "
             "filter gives it (band); auto (default of --method auto) tells it from the record")
         ->type_name("auto|zoh|foh|band");
-    command->add_option("--band", given->wanted.band, "only modes in this band, Hz (--method auto)")
-        ->type_name("LO:HI");
+    command->add_option("--band", given->wanted.band, "only modes in this band, Hz (auto, plscf)")->type_name("LO:HI");
     command
         ->add_option("--decimate", given->wanted.decimate,
                      "--method auto looks at no higher rate than one Nth of the record's (default auto: all rates)")
@@ -192,8 +239,7 @@ void add_identify(CLI::App& app) {
                      "processors for --method auto (default: all it may use); the result is the same for any number")
         ->type_name("N");
     command->add_flag("--all-modes", given->all_modes, "the table also lists the modes that are not signed, and why");
-    command
-        ->add_option("--modes", given->wanted.modes, "only these modes, by their numbers in the table (--method auto)")
+    command->add_option("--modes", given->wanted.modes, "only these modes, by their numbers in the table (auto, plscf)")
         ->type_name("1,3-5");
     command->add_option("--detrend", given->wanted.detrend, "what is taken out of every channel first (default mean)")
         ->type_name("none|mean|linear");
@@ -247,6 +293,14 @@ void add_identify(CLI::App& app) {
         ->add_option("--exponential", given->exponential,
                      "time constant of the exponential window in the responses (--frf): its damping is taken out")
         ->type_name("S");
+    command->add_flag(
+        "--setups", given->set_ups,
+        "every file is a set-up of one structure, with those of the --outputs that it has: one set of modes, shapes "
+        "scaled at the outputs in common (with a force: at the force). ± is the scatter between the set-ups");
+    command
+        ->add_option("--references", given->references,
+                     "the outputs that scale the shapes of --setups (default: all that every file has)")
+        ->type_name("NAMES");
     command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")
         ->type_name("A:B");
     command->add_option("--json", given->json, "write okid.result/1 to this file, - is stdout")->type_name("FILE.json");
@@ -257,6 +311,7 @@ void add_identify(CLI::App& app) {
         "Examples:\n  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --json result.json\n"
         "  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --input-dofs 1 --output-dofs 1,2,3\n"
         "  okid identify responses.uff --frf --json result.json\n"
+        "  okid identify a.csv b.csv --setups --outputs ref1,ref2,deck1,deck2,deck3,deck4\n"
         "A CSV has a line of column names, numbers below, and \"# fs_hz: 1024\" above (or use --fs).");
     command->callback([given] { identify(*given); });
 }

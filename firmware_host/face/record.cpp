@@ -5,9 +5,12 @@
 #include "options.hpp"
 #include "result_handle.hpp"
 
+#include "frequency/identify_lags.hpp"
+#include "frequency/response_set.hpp"
 #include "record/csv.hpp"
 #include "record/csv_header.hpp"
 #include "record/request.hpp"
+#include "result/method.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +24,7 @@ namespace {
 
 struct asked {
     record_request request;
-    std::vector<std::string> units;
+    std::vector<std::string> units, references;
 };
 
 asked read_record(const char* text) {
@@ -35,6 +38,7 @@ asked read_record(const char* text) {
     places.texts.emplace_back("hit_dofs", &out.request.hit_dofs);
     places.flags = {{"stabilization", &out.request.stabilization}};
     places.lists.emplace_back("units", &out.units);
+    places.lists.emplace_back("references", &out.references);
     read_options(text, places);
     return out;
 }
@@ -108,6 +112,43 @@ void check_not_infinite(const double* rows, std::size_t count, std::size_t width
                                                       what, place, n, what, c + 1));
 }
 
+/// One record whose sides stand apart, behind those of the set.
+void add_sides(const okid_host_columns_t& u, const okid_host_columns_t& y, std::size_t count, const char* name,
+               const std::string& place, record_set& set) {
+    if (u.channels != set.n_u || y.channels != set.n_y)
+        throw failure(exit_usage, fmt::format("{}: {} inputs and {} outputs, expected {} and {}", name, u.channels,
+                                              y.channels, set.n_u, set.n_y));
+    const bool first = set.records.size() < 2;
+    set.complete = append_rows(u, y, count, set) && (first || set.complete);
+    if (set.complete) return;
+    const double* rows = set.rows(set.records.back());
+    check_not_infinite(rows, count, set.channels(), set.n_u, "u", place);
+    check_not_infinite(rows + set.n_u, count, set.channels(), set.n_y, "y", place);
+}
+
+/// The set-ups with the names that each has of `names`, one after the other; `all` becomes every name once.
+std::vector<set_up> read_set_ups(const std::vector<std::string>& names, int32_t count,
+                                 const okid_host_columns_t* inputs, const okid_host_columns_t* outputs,
+                                 const size_t* counts, const char* const* paths) {
+    std::vector<set_up> out;
+    std::size_t at = 0;
+    for (int32_t i = 0; i < count; ++i) {
+        set_up one;
+        for (std::size_t k = 0; k < outputs[i].channels; ++k, ++at)
+            one.outputs.push_back(at < names.size() ? names[at] : std::string());
+        one.set.n_u = inputs[i].channels;
+        one.set.n_y = outputs[i].channels;
+        one.set.records.push_back({paths[i], 0, counts[i]});
+        add_sides(inputs[i], outputs[i], counts[i], paths[i], fmt::format("[{}]", i), one.set);
+        out.push_back(std::move(one));
+    }
+    if (at != names.size())
+        throw failure(exit_usage, fmt::format("outputs: found {} names, expected one for each of the {} columns of the "
+                                              "set-ups",
+                                              names.size(), at));
+    return out;
+}
+
 /// What is common to both ways in: fill(i, record, rows) brings record i.
 template <class Fill>
 okid_host_result_t* identify(const char* options, int32_t records, const size_t* counts, const char* const* names,
@@ -129,7 +170,7 @@ okid_host_result_t* identify(const char* options, int32_t records, const size_t*
         check_columns(names[i], columns, screens ? set.n_u : columns.size(), set.rows(set.records.back()), counts[i]);
     }
     check_columns("all records", columns, columns.size(), set.samples.data(), set.count());
-    return make_result(identify_records(std::move(set), wanted));
+    return make_result(identify_by_method(std::move(set), wanted));
 }
 
 } // namespace
@@ -154,15 +195,22 @@ int32_t okid_host_identify_columns(const char* options, int32_t records, const o
     *result = nullptr;
     return face::guard([&] {
         *result = face::identify(options, records, counts, names, stage, context, [&](int32_t i, record_set& set) {
-            if (inputs[i].channels != set.n_u || outputs[i].channels != set.n_y)
-                throw failure(exit_usage, fmt::format("{}: {} inputs and {} outputs, expected {} and {}", names[i],
-                                                      inputs[i].channels, outputs[i].channels, set.n_u, set.n_y));
-            set.complete = face::append_rows(inputs[i], outputs[i], counts[i], set) && (i == 0 || set.complete);
-            if (set.complete) return;
-            const double* rows = set.rows(set.records.back());
-            const std::string place = records > 1 ? fmt::format("[{}]", i) : "";
-            face::check_not_infinite(rows, counts[i], set.channels(), set.n_u, "u", place);
-            face::check_not_infinite(rows + set.n_u, counts[i], set.channels(), set.n_y, "y", place);
+            face::add_sides(inputs[i], outputs[i], counts[i], names[i], records > 1 ? fmt::format("[{}]", i) : "", set);
         });
+    });
+}
+
+int32_t okid_host_identify_set_ups(const char* options, int32_t count, const okid_host_columns_t* inputs,
+                                   const okid_host_columns_t* outputs, const size_t* counts, const char* const* names,
+                                   okid_host_result_t** result) {
+    *result = nullptr;
+    return face::guard([&] {
+        face::asked given = face::read_record(options);
+        auto set_ups = face::read_set_ups(given.request.outputs, count, inputs, outputs, counts, names);
+        std::vector<std::string> all;
+        for (const std::string& name : given.request.outputs) (void)place_of(all, name);
+        given.request.outputs = all;
+        given.request.method = lag_method;
+        *result = face::make_result(identify_set_ups(std::move(set_ups), face::checked(given), given.references));
     });
 }

@@ -33,7 +33,7 @@ int32_t okid_host_identify_responses(const char* options, size_t lines, const do
                                       {"modes", &wanted.modes},
                                       {"set_ups", &set_ups},
                                       {"exponential", &asked.exponential}},
-                                     {{"all_modes", &asked.all_modes}},
+                                     {{"all_modes", &asked.all_modes}, {"stabilization", &wanted.stabilization}},
                                      {{"inputs", &wanted.inputs}, {"outputs", &wanted.outputs}}});
         response_set set;
         set.inputs = wanted.inputs;

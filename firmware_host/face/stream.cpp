@@ -196,6 +196,8 @@ stream_config read_stream(const char* text, const live_config* config) {
     if (where_it_serves) given.record.refine.clear();
     const record_options checked = check_request(given.record);
     if (checked.detrend == "linear") refuse("detrend", "\"linear\"", "none or mean: a stream has no line of its own");
+    if (checked.method == lag_method)
+        refuse("method", "\"plscf\"", "auto or another method: plscf takes whole records");
     stream_config out;
     out.inputs = checked.inputs;
     out.outputs = checked.outputs;

@@ -1,24 +1,19 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  modes and a modal model from measured frequency responses
-// METHOD   poles of matrix fractions over degrees, weights of the lines and normalisations are gathered by the agreement that
-//          method auto uses for records; those of the confident modes are refined with their residues (modal_fit); shapes
-//          from the singular vectors of the residues. Model: these modes in discrete time at 2.56 times the highest line,
-//          B and D by least squares on the responses
+// METHOD   response_modes.hpp; model: these modes in discrete time at 2.56 times the highest line, B and D by least squares on
+//          the responses
 #include "identify_responses.hpp"
 
-#include "consensus/consensus.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
-#include "matrix_fraction.hpp"
-#include "modal_fit.hpp"
 #include "record/modal_model.hpp"
 #include "record/record_refine.hpp"
+#include "response_modes.hpp"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 namespace okid_host {
 namespace {
@@ -29,19 +24,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double rate_over_band = 2.56; // of the model, as analysers sample
-constexpr double widest_damping = 0.5;  // sigma of damping over damping
-constexpr double widest_frequency = 0.05;
-constexpr double least_strength = 4;            // of a residue matrix over its noise
-constexpr int fewest_hits = 2;                  // of the runs: candidates, which the fit judges
-constexpr int first_steps = 2, last_steps = 12; // of the poles
-constexpr double neighbours = 0.02;             // in frequency: poles that compete for one resonance
-constexpr double one_mode = 2.5;                // widths between two resonances of one shape: one mode
-constexpr double same_residues = 0.95;          // MAC of the residues of two poles that are one mode
-constexpr double narrowest = 0.25;              // half a resonance's width in lines: below it is a line
-constexpr double edge_lines = 2;                // from the ends of the band
-constexpr double broadest = 0.2;                // damping of a vibration
-constexpr double worth_listing = 0.25;          // share of the runs below which a cluster is chance
-constexpr double doubtful_share = 0.5;          // of the runs: a doubtful mode that fewer found is not listed by itself
 
 /// The columns of the outputs and inputs chosen by name, all by default.
 response_set choose(const response_set& from, const record_request& wanted) {
@@ -77,12 +59,11 @@ void check_options(const record_request& given) {
          {std::pair{"--fs", !given.fs.empty()}, std::pair{"--method", !given.method.empty()},
           std::pair{"--p", !given.p.empty()}, std::pair{"--rows", !given.rows.empty()},
           std::pair{"--order", given.order != "auto"}, std::pair{"--max-order", !given.max_order.empty()},
-          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--stabilization", given.stabilization},
-          std::pair{"--hold", !given.hold.empty()}, std::pair{"--detrend", given.detrend != "mean"},
-          std::pair{"--start", given.start != "moving"}, std::pair{"--decimate", !given.decimate.empty()},
-          std::pair{"--sigma", !given.sigma.empty()}, std::pair{"--sigma-blocks", !given.sigma_blocks.empty()},
-          std::pair{"--threads", !given.threads.empty()}, std::pair{"--hit-dofs", !given.hit_dofs.empty()},
-          std::pair{"--refine", !given.refine.empty()}})
+          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--hold", !given.hold.empty()},
+          std::pair{"--detrend", given.detrend != "mean"}, std::pair{"--start", given.start != "moving"},
+          std::pair{"--decimate", !given.decimate.empty()}, std::pair{"--sigma", !given.sigma.empty()},
+          std::pair{"--sigma-blocks", !given.sigma_blocks.empty()}, std::pair{"--threads", !given.threads.empty()},
+          std::pair{"--hit-dofs", !given.hit_dofs.empty()}, std::pair{"--refine", !given.refine.empty()}})
         if (there) throw failure(exit_usage, fmt::format("{} is an option of records, found with --frf", option));
 }
 
@@ -95,214 +76,6 @@ double time_constant(const std::string& text) {
                                               "in s, above 0",
                                               printable(text)));
     return value;
-}
-
-complex pole_of(const consensus_mode& mode) {
-    const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
-    return {-zeta * w, w * std::sqrt(1 - zeta * zeta)};
-}
-
-/// What the numbers of a mode say against it, whatever the runs agree on.
-void mark_doubtful(const response_set& set, std::vector<consensus_mode>& modes) {
-    const std::vector<double>& f = set.frequency_hz;
-    const double line = (f.back() - f.front()) / static_cast<double>(set.lines() - 1);
-    for (consensus_mode& mode : modes) {
-        if (mode.frequency_hz * mode.damping_ratio < narrowest * line) mode.why.emplace_back("tone");
-        if (mode.damping_ratio > broadest) mode.why.emplace_back("overdamped");
-        if (mode.frequency_hz < f.front() + edge_lines * line || mode.frequency_hz > f.back() - edge_lines * line)
-            mode.why.emplace_back("band_edge");
-    }
-}
-
-/// Shape of a residue matrix with the scatter of its entries.
-struct residue_shape {
-    std::vector<complex> shape;
-    std::vector<double> scatter;
-    double strength = 0; ///< over the noise
-};
-
-residue_shape shape_of(const modal_fit& fit, Index k, Index n_y) {
-    const Index n_u = fit.residues.cols() / n_y;
-    Eigen::MatrixXcd R(n_y, n_u);
-    MatrixXd noise(n_y, n_u);
-    for (Index i = 0; i < n_u; ++i)
-        for (Index o = 0; o < n_y; ++o) {
-            R(o, i) = fit.residues(k, o + n_y * i);
-            noise(o, i) = fit.variance[o + n_y * i] * fit.unit_variance(k, o + n_y * i);
-        }
-    const Eigen::JacobiSVD<Eigen::MatrixXcd> svd(R, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    const Eigen::VectorXcd u = svd.matrixU().col(0), v = svd.matrixV().col(0);
-    Index largest = 0;
-    (void)u.cwiseAbs().maxCoeff(&largest);
-    residue_shape out;
-    out.strength = R.norm() / std::sqrt(2 * noise.sum());
-    for (Index o = 0; o < n_y; ++o) {
-        out.shape.push_back(u[o] / u[largest]);
-        const double variance = (noise.row(o).transpose().array() * v.array().abs2()).sum();
-        out.scatter.push_back(std::sqrt(variance) / (svd.singularValues()[0] * std::abs(u[largest])));
-    }
-    return out;
-}
-
-/// Standard deviations of frequency and damping from that of the pole's parts.
-std::pair<double, double> spread_of(complex pole, const MatrixXd& covariance, Index k) {
-    if (covariance.size() == 0) return {NAN, NAN};
-    const Eigen::Matrix2d part = covariance.block<2, 2>(2 * k, 2 * k);
-    const double size = std::abs(pole), re = pole.real(), im = pole.imag();
-    const Eigen::Vector2d f(re / size / (2 * M_PI), im / size / (2 * M_PI)),
-        zeta(-im * im / (size * size * size), re * im / (size * size * size));
-    return {std::sqrt(f.dot(part * f)), std::sqrt(zeta.dot(part * zeta))};
-}
-
-/// What many runs agree on and what few found: the fit of the residues tells which of it is in the responses.
-bool is_candidate(const consensus_mode& mode) {
-    return mode.confident() ||
-           (mode.hits >= fewest_hits && std::all_of(mode.why.begin(), mode.why.end(), [](const std::string& why) {
-                return why == "few_runs" || why == "noise_shape";
-            }));
-}
-
-/// A candidate with what the fit says of it.
-struct fitted_mode {
-    std::size_t at;      ///< in the list of modes
-    double found_in = 0; ///< share of the runs
-    complex pole;
-    residue_shape shape;
-    std::pair<double, double> sigma; ///< of frequency and damping
-    std::string why;                 ///< it is none
-};
-
-/// Found by more of the runs, or as many and stronger.
-bool better(const fitted_mode& a, const fitted_mode& b) {
-    return a.found_in != b.found_in ? a.found_in > b.found_in : a.shape.strength > b.shape.strength;
-}
-
-bool close(const fitted_mode& a, const fitted_mode& b, double share) {
-    const double widths = one_mode * std::max(-a.pole.real(), -b.pole.real());
-    return std::abs(a.pole.imag() - b.pole.imag()) < std::max(widths, share * a.pole.imag());
-}
-
-/// The worse of two poles of one mode: near each other, with proportional residues.
-bool repeats(const modal_fit& fit, const std::vector<fitted_mode>& all, std::size_t k) {
-    if (fit.residues.cols() < 3) return false;
-    for (std::size_t j = 0; j < all.size(); ++j) {
-        if (j == k || !better(all[j], all[k]) || !close(all[j], all[k], 0)) continue;
-        const Eigen::RowVectorXcd x = fit.residues.row(static_cast<Index>(k)),
-                                  y = fit.residues.row(static_cast<Index>(j));
-        if (std::norm(x.dot(y)) > same_residues * x.squaredNorm() * y.squaredNorm()) return true;
-    }
-    return false;
-}
-
-/// Leave out what the last fit judged to be none, of neighbours only the worst: without it the others look different.
-bool leave_worst_out(std::vector<fitted_mode>& candidates, std::vector<consensus_mode>& modes) {
-    std::vector<fitted_mode> left;
-    for (const fitted_mode& one : candidates) {
-        const bool worst =
-            !one.why.empty() && std::none_of(candidates.begin(), candidates.end(), [&](const fitted_mode& other) {
-                return !other.why.empty() && other.at != one.at && close(one, other, neighbours) && better(one, other);
-            });
-        if (!worst) {
-            left.push_back(one);
-            continue;
-        }
-        std::vector<std::string>& why = modes[one.at].why;
-        if (std::find(why.begin(), why.end(), one.why) == why.end()) why.push_back(one.why);
-    }
-    const bool any = left.size() < candidates.size();
-    candidates = std::move(left);
-    return any;
-}
-
-/// One round: candidates at their refined poles, each judged.
-std::vector<fitted_mode> fit_candidates(const response_set& set, const std::vector<int>& sensing,
-                                        std::vector<fitted_mode> all, int steps) {
-    std::vector<complex> poles;
-    for (const fitted_mode& one : all) poles.push_back(one.pole);
-    if (poles.empty()) return all;
-    const modal_fit fit = fit_modes(set, sensing, poles, steps);
-    for (std::size_t k = 0; k < all.size(); ++k) {
-        all[k].pole = fit.poles[k];
-        all[k].why.clear();
-        all[k].shape = shape_of(fit, static_cast<Index>(k), set.n_y());
-        all[k].sigma = spread_of(fit.poles[k], fit.covariance, static_cast<Index>(k));
-    }
-    for (std::size_t k = 0; k < all.size(); ++k) {
-        const double f = std::abs(all[k].pole) / (2 * M_PI), zeta = -all[k].pole.real() / std::abs(all[k].pole);
-        if (all[k].shape.strength < least_strength)
-            all[k].why = "noise_shape";
-        else if (!(all[k].sigma.first < widest_frequency * f && all[k].sigma.second < widest_damping * zeta))
-            all[k].why = "wide_sigma";
-        else if (zeta > broadest)
-            all[k].why = "overdamped";
-        else if (repeats(fit, all, k))
-            all[k].why = "split";
-    }
-    return all;
-}
-
-/// The candidates at their refined values, with shapes and deviations; what turns out to be none is said.
-void refine_modes(const response_set& set, const std::vector<int>& sensing, std::vector<consensus_mode>& modes,
-                  std::vector<residue_shape>& shapes, deviations& sigma) {
-    std::vector<fitted_mode> candidates;
-    for (std::size_t k = 0; k < modes.size(); ++k)
-        if (is_candidate(modes[k])) candidates.push_back({k, modes[k].found_in, pole_of(modes[k]), {}, {}, ""});
-    do { // few steps while there is noise among them
-        do candidates = fit_candidates(set, sensing, std::move(candidates), first_steps);
-        while (leave_worst_out(candidates, modes));
-        candidates = fit_candidates(set, sensing, std::move(candidates), last_steps);
-    } while (leave_worst_out(candidates, modes));
-    for (fitted_mode& one : candidates) {
-        consensus_mode& mode = modes[one.at];
-        mode.why.clear();
-        mode.frequency_hz = std::abs(one.pole) / (2 * M_PI);
-        mode.damping_ratio = -one.pole.real() / std::abs(one.pole);
-        mode.mpc = shape_mpc(one.shape.shape);
-        std::tie(sigma.frequency_hz[one.at], sigma.damping_ratio[one.at]) = one.sigma;
-        shapes[one.at] = std::move(one.shape);
-    }
-}
-
-/// Ascending; without what few runs found, or only the modes picked by their numbers, which then count as confident.
-void leave_out(bool all, const std::vector<int>& numbers, std::vector<consensus_mode>& modes,
-               std::vector<residue_shape>& shapes, deviations& sigma) {
-    std::vector<std::size_t> order;
-    for (std::size_t k = 0; k < modes.size(); ++k)
-        if (modes[k].confident() || all || modes[k].found_in >= doubtful_share) order.push_back(k);
-    std::sort(order.begin(), order.end(),
-              [&](std::size_t a, std::size_t b) { return modes[a].frequency_hz < modes[b].frequency_hz; });
-    if (!numbers.empty()) {
-        std::vector<std::size_t> picked;
-        for (std::size_t k = 0; k < order.size(); ++k)
-            if (std::find(numbers.begin(), numbers.end(), static_cast<int>(k) + 1) != numbers.end()) {
-                picked.push_back(order[k]);
-                modes[order[k]].why.clear();
-            }
-        check_picked(numbers, order.size());
-        order = std::move(picked);
-    }
-    const auto taken = [&](auto& values) {
-        auto out = values;
-        out.clear();
-        for (const std::size_t k : order) out.push_back(values[k]);
-        values = std::move(out);
-    };
-    taken(modes);
-    taken(shapes);
-    taken(sigma.frequency_hz);
-    taken(sigma.damping_ratio);
-}
-
-/// What an exponential window added to the decay rates is taken away.
-void take_window_out(double constant_s, consensus_mode& mode) {
-    if (!(constant_s > 0)) return;
-    const complex pole = pole_of(mode) + 1 / constant_s;
-    mode.frequency_hz = std::abs(pole) / (2 * M_PI);
-    mode.damping_ratio = -pole.real() / std::abs(pole);
-    if (!(mode.damping_ratio > 0)) {
-        mode.damping_ratio = 1e-9;
-        mode.why.emplace_back("tone");
-    }
 }
 
 /// B and D into the model.
@@ -363,15 +136,6 @@ void fit_responses(const response_set& set, record_work& work) {
     work.context.simulation_percent = percent;
 }
 
-[[noreturn]] void throw_no_modes(const std::vector<consensus_mode>& modes, std::size_t runs) {
-    std::string seen;
-    for (const consensus_mode& mode : modes)
-        seen += fmt::format("{}{:.4g} Hz ({})", seen.empty() ? "" : ", ", mode.frequency_hz, fmt::join(mode.why, ", "));
-    throw failure(exit_no_model, fmt::format("no model: none of {} runs over the responses agree on a mode{}. Choose a "
-                                             "band with --band, or measure with finer lines",
-                                             runs, seen.empty() ? std::string() : "; doubtful: " + seen));
-}
-
 void find_matrices(const record_options& options, record_work& work) {
     work.context.warnings.insert(work.context.warnings.end(), options.said.begin(), options.said.end());
     if (!options.mass.wanted()) return;
@@ -386,6 +150,7 @@ result_context describe(const response_set& set) {
     out.fs_hz = rate_over_band * set.frequency_hz.back();
     out.samples = set.lines();
     out.records = set.set_ups;
+    out.responses = true;
     out.inputs = set.inputs;
     out.outputs = set.outputs;
     out.hold = "band";
@@ -400,21 +165,17 @@ record_options options_of(const response_set& set, record_request given, bool tu
     if (turned) std::swap(given.input_dofs, given.output_dofs);
     given.inputs = set.inputs;
     given.outputs = set.outputs;
+    given.stabilization = false; // of the fits there are, no other method
     return check_request(given);
 }
 
 /// Modes, deviations and model into the result; the window's decay goes out of the poles last.
-void make_result(const response_set& set, double constant_s, std::vector<consensus_mode> modes,
-                 std::vector<residue_shape> shapes, deviations sigma, record_work& work) {
+void make_result(const response_set& set, double constant_s, response_modes found, record_work& work) {
+    auto& [modes, shapes, sigma, stable] = found;
+    work.context.stable = std::move(stable);
     std::vector<listed_mode> listed;
     for (std::size_t k = 0; k < modes.size(); ++k) {
         residue_shape& own = shapes[k];
-        if (own.shape.empty()) { // not refined: that of the matrix fractions
-            const auto largest = *std::max_element(modes[k].shape.begin(), modes[k].shape.end(),
-                                                   [](complex a, complex b) { return std::abs(a) < std::abs(b); });
-            for (const complex& entry : modes[k].shape) own.shape.push_back(entry / largest);
-            own.scatter.assign(own.shape.size(), NAN);
-        }
         listed.push_back({modes[k].frequency_hz, modes[k].damping_ratio, modes[k].mpc, NAN, std::move(own.shape),
                           modes[k].confident()});
         sigma.shape_re.insert(sigma.shape_re.end(), own.scatter.begin(), own.scatter.end());
@@ -452,20 +213,9 @@ record_result identify_responses(const response_set& measured, const response_re
         work.context.warnings.emplace_back(
             "reciprocity", "more inputs than outputs: by reciprocity the outputs of this result are the places that "
                            "were struck, its inputs the sensors");
-    const auto runs = fit_matrix_fractions(set);
-    auto modes = find_agreement(runs);
-    mark_doubtful(set, modes);
-    const auto chance = [](const consensus_mode& mode) { return !is_candidate(mode) && mode.found_in < worth_listing; };
-    modes.erase(std::remove_if(modes.begin(), modes.end(), chance), modes.end());
-    std::vector<residue_shape> shapes(modes.size());
-    deviations sigma;
-    sigma.frequency_hz.assign(modes.size(), NAN);
-    sigma.damping_ratio.assign(modes.size(), NAN);
-    refine_modes(set, check_sensing(asked.wanted.sensing, set.outputs.size()), modes, shapes, sigma);
-    leave_out(asked.all_modes, options.modes, modes, shapes, sigma);
-    if (std::none_of(modes.begin(), modes.end(), [](const consensus_mode& mode) { return mode.confident(); }))
-        throw_no_modes(modes, runs.size());
-    make_result(set, constant_s, std::move(modes), std::move(shapes), std::move(sigma), work);
+    const joint_responses all{{set}, set.outputs, set.outputs, check_sensing(asked.wanted.sensing, set.outputs.size())};
+    make_result(set, constant_s, find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization),
+                work);
     find_matrices(options, work);
     record_result result;
     result.model = kept_model(work.model);

@@ -296,7 +296,8 @@ result_context describe_records(const record_set& set, const record_options& opt
     const std::size_t total = set.count();
     result_context context;
     context.method = options.method;
-    if (options.method != "auto" && !looks_back_rows(method_of(options.method), options.inputs.size()))
+    if (options.method != "auto" && options.method != lag_method &&
+        !looks_back_rows(method_of(options.method), options.inputs.size()))
         context.hankel = options.hankel;
     context.fs_hz = options.fs_hz;
     context.samples = static_cast<long long>(total);

@@ -129,17 +129,24 @@ std::vector<int> numbers_of(const std::string& option, const std::string& text) 
 /// The options of method auto, and those that are none.
 void check_agreement(const record_request& given, record_options& options) {
     const bool agreed = options.method == "auto";
-    for (const auto& [option, text] : {std::pair{"--band", &given.band}, std::pair{"--decimate", &given.decimate},
-                                       std::pair{"--modes", &given.modes}, std::pair{"--threads", &given.threads}})
-        if (!agreed && !text->empty())
+    const bool of_lags = options.method == lag_method;
+    for (const auto& [option, text] : {std::pair{"--decimate", &given.decimate}, std::pair{"--threads", &given.threads},
+                                       std::pair{"--band", &given.band}, std::pair{"--modes", &given.modes}})
+        if (!agreed && !text->empty() && !(of_lags && (text == &given.band || text == &given.modes)))
             usage(fmt::format("{} belongs to --method auto, {} takes the record as it is", option, options.method));
     for (const auto& [option, there] :
          {std::pair{"--p", !given.p.empty()}, std::pair{"--rows", !given.rows.empty()},
           std::pair{"--order", given.order != "auto"}, std::pair{"--max-order", !given.max_order.empty()},
-          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--stabilization", given.stabilization}})
+          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--stabilization", given.stabilization}}) {
         if (agreed && there)
             usage(
                 fmt::format("{} belongs to one method, --method auto agrees over many: leave one of them out", option));
+        if (of_lags && there && option != std::string("--stabilization"))
+            usage(fmt::format("{} belongs to the okid and n4sid methods, plscf finds it itself: leave it out", option));
+    }
+    if (of_lags && (given.refine == "yes" || !given.sigma_blocks.empty()))
+        usage(fmt::format("{} belongs to other methods, found with plscf: leave it out",
+                          given.refine == "yes" ? "--refine" : "--sigma-blocks"));
     if (!agreed && given.refine == "auto")
         usage(fmt::format("--refine=auto belongs to --method auto: with {} say yes or no", options.method));
     if (!given.band.empty()) {
@@ -185,6 +192,7 @@ record_options check_request(const record_request& given) {
     options.method = chosen_method(given);
     std::vector<std::string> known = method_names();
     known.insert(known.begin(), "auto");
+    known.emplace_back(lag_method);
     one_of("--method", options.method, known);
     one_of("--hankel", given.hankel, hankel_names());
     check_refine(given);
@@ -220,7 +228,8 @@ record_options check_request(const record_request& given) {
     check_channels(given);
     options.inputs = given.inputs;
     options.outputs = given.outputs;
-    const std::string fault = agreed ? "" : hankel_fault(given.hankel, options.method, options.inputs.size());
+    const bool one_of_all = agreed || options.method == lag_method;
+    const std::string fault = one_of_all ? "" : hankel_fault(given.hankel, options.method, options.inputs.size());
     if (!fault.empty()) usage("--hankel: " + fault);
     options.hits = check_hit_dofs(given);
     options.mass = check_dofs(given, options, check_sensing(given.sensing, options.outputs.size()));

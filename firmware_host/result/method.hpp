@@ -12,6 +12,9 @@ namespace okid_host {
 /// okid-era, okid-era-dc, n4sid-moesp, n4sid-cva, n4sid-ssarx: in the order of okid_method_t.
 const std::vector<std::string>& method_names();
 
+/// The method of records that has no model of an order (frequency/identify_lags.hpp): none of method_names().
+constexpr const char* lag_method = "plscf";
+
 /// Samples below which auto looks at no record of so many channels: ten for each unknown of ten block rows.
 long long fewest_of_auto(std::size_t n_u, std::size_t n_y);
 

@@ -275,16 +275,16 @@ std::string result_text(const nlohmann::ordered_json& result) {
 }
 
 std::string result_table(const okid_identified_t& model, const result_context& context) {
-    const bool responses = context.method == "plscf";
-    const std::string what = responses
+    const bool fractions = context.method == "plscf";
+    const std::string what = context.responses
                                  ? fmt::format("responses at {}", counted(context.samples, "line"))
                                  : fmt::format("{} at {:g} Hz ({:.4g} s)", counted(context.samples, "sample"),
                                                context.fs_hz, static_cast<double>(context.samples) / context.fs_hz);
     std::string out =
         fmt::format("{}: {} to {}, {}, {}", context.method, counted(model.n_u, "input"), counted(model.n_y, "output"),
-                    what, counted(context.records, responses ? "set-up" : "record"));
+                    what, counted(context.records, fractions && context.records > 1 ? "set-up" : "record"));
     if (context.gaps) out += ", " + counted(context.gaps, "gap");
-    const std::string horizon = responses            ? "agreement of several degrees, weights and normalisations"
+    const std::string horizon = fractions            ? "agreement of several degrees, weights and normalisations"
                                 : is_agreed(context) ? "agreement of several methods, horizons and rates"
                                 : model.observer     ? fmt::format("p {}, {} block rows", model.p, model.rows)
                                                      : fmt::format("{} block rows", model.rows);

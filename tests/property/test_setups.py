@@ -67,6 +67,31 @@ def test_indicators_of_shapes() -> None:
     assert np.argmin(modal.comac(a, b)) == 2
 
 
+def test_one_shape_out_of_several() -> None:
+    true, r = np.array([1.0, -0.6, 0.3, 0.8]), np.random.default_rng(1)
+    estimates = [3.0j * (true + 0.05 * r.normal(size=4)) for _ in range(20)]
+    estimates += [true + 2.0j * r.normal(size=4) for _ in range(4)]  # as noise makes them
+    assert modal.mac(modal.mean_shape(estimates), true) > 0.998 > modal.mac(np.mean(np.imag(estimates), axis=0), true)
+    gap = np.array([1.0, np.nan, 0.3, 0.8])
+    assert np.allclose(modal.mean_shape([gap, -true, -true]), true, atol=1e-12)
+    assert np.isnan(modal.mean_shape([gap, 2 * gap])[1])
+
+
+def test_what_moves_under_unknown_forces() -> None:
+    """Two outputs behind one another: the second is the first through a filter that is known."""
+    r = np.random.default_rng(2)
+    x = np.convolve(r.normal(size=60000), [1.0, 0.7])[:60000]
+    y = np.column_stack([x, np.convolve(x, [0.5, 0.25])[:60000]])
+    found = frf.transmissibility(y, 100.0, nperseg=512)
+    z = np.exp(-2j * np.pi * found.frequency_hz / 100.0)
+    assert found.outputs == ("y2",) and np.allclose(found.response[1:-1, 0, 0], (0.5 + 0.25 * z)[1:-1], atol=0.02)
+    seen = frf.deflection(frf.spectra(y, 100.0), [10.0, 30.0])
+    line = np.exp(-2j * np.pi * np.array([10.0, 30.0]) / 100.0)
+    assert np.allclose(seen[:, 1] / seen[:, 0], 0.5 + 0.25 * line, atol=0.05)
+    with pytest.raises(okid.InputError, match="reference is 2"):
+        frf.transmissibility(y, 100.0, 2)
+
+
 def test_estimators_lie_where_the_noise_puts_them() -> None:
     r = np.random.default_rng(0)
     u = r.normal(size=40000)

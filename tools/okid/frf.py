@@ -266,6 +266,41 @@ def spectra(y: ArrayLike | Sequence[ArrayLike], fs: float) -> Spectra:
     return Spectra(np.arange(len(power), dtype=np.float64) * (fs / nperseg), power, count)
 
 
+def transmissibility(y: ArrayLike, fs: float, reference: int = 0, nperseg: int | None = None) -> Frf:
+    """Transmissibilities (F, n_y - 1, 1) of the other outputs over output `reference` (from 0), with coherence: H1 with
+    that output in the place of the force. What excites the structure need not be known, but stay in one place.
+
+    >>> from okid import demo_record, frf
+    >>> _, y = demo_record()
+    >>> frf.transmissibility(y, 1000.0).outputs
+    ('y2', 'y3')
+    """
+    data = np.asarray(y, dtype=np.float64)
+    if data.ndim != 2 or not 0 <= reference < data.shape[1] or data.shape[1] < 2:
+        raise InputError(f"reference is {reference} of y with shape {data.shape}, expected an output of two or more")
+    others = [k for k in range(data.shape[1]) if k != reference]
+    out = h1(data[:, [reference]], data[:, others], fs, nperseg, "hann")
+    return out._replace(inputs=(f"y{reference + 1}",), outputs=tuple(f"y{k + 1}" for k in others))
+
+
+def deflection(measured: Spectra, frequency_hz: ArrayLike, reference: int | None = None) -> Complex:
+    """Operating deflection shapes (k, n_y) at the lines nearest to `frequency_hz`: S_yr / sqrt(S_rr), in unit/sqrt(Hz),
+    the phase that of each output over the output `reference` (default: at each line the strongest). Not mode shapes:
+    what moves at that frequency, of all modes and forces together. Source: Schwarz, Richardson (1999).
+
+    >>> from okid import demo_record, frf
+    >>> seen = frf.deflection(frf.spectra(demo_record()[1], 1000.0), [10.96], reference=0)
+    >>> seen.shape, bool(seen[0, 0].imag == 0.0)
+    ((1, 3), True)
+    """
+    out = []
+    for f in np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)):
+        power = measured.power[int(np.argmin(np.abs(measured.frequency_hz - f)))]
+        r = int(np.argmax(power.diagonal().real)) if reference is None else reference
+        out.append(power[:, r] / np.sqrt(max(float(power[r, r].real), 1e-300)))
+    return np.array(out, dtype=np.complex128)
+
+
 def synthesise_spectra(
     A: ArrayLike, K: ArrayLike, C: ArrayLike, covariance: ArrayLike, dt: float, frequency_hz: ArrayLike
 ) -> Complex:

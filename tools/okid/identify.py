@@ -53,8 +53,9 @@ def identify(
     missing inputs. The arrays are never modified.
     `method` "auto": the modes that several methods, horizons and rates agree on, each with mode.confident, .found_in
     and .why (docs/how-okid-decides.md); the doubtful ones are listed with them. Or one method: "okid-era",
-    "okid-era-dc", "n4sid-moesp", "n4sid-cva" or "n4sid-ssarx". Default: "auto"; "okid-era" when an option of one method
-    is given (p, rows, order, max_order, hankel, refine=True).
+    "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx", or "plscf": modes from correlations by way of frequency
+    responses, no M, K, R. Default: "auto"; "okid-era" when an option of one method is given (p, rows, order, max_order,
+    hankel, refine=True).
     u None = no measured force (ambient): modes and predictor only, there is no simulation fit; the okid methods then
     realize the covariances of the outputs.
     `p` ARX horizon of the okid methods (default 40), reduced with a warning when there are fewer than 10 samples an
@@ -80,9 +81,9 @@ def identify(
     of the record, 8 to 100, default 20), "jackknife" (identified anew without each block, 3 to 20 identifications;
     also where a method has no derivative: docs/numerics.md) or "none". `sigma_blocks` alone: jackknife, 0 = none.
 
-    Of "auto" alone: `band` (low, high) in Hz where modes are sought; `decimate` the largest factor of the lower rates;
-    `modes` the numbers, from 1, of the listed modes that are kept: picked by hand they count as confident; `threads`
-    the processors used (default all; the result is the same for any number).
+    Of "auto" and "plscf": `band` (low, high) in Hz where modes are sought; `modes` the numbers, from 1, of the listed
+    modes that are kept: picked by hand they count as confident. Of "auto": `decimate` the largest factor of the lower
+    rates; `threads` the processors used (default all; the result is the same for any number).
 
     `hit_dofs`: where each record was struck (roving hammer), one number a record: each place becomes an input of its
     own; with `output_dofs` it says where the forces of M, K and R act.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Modes of several set-ups of one structure as one result (PoSER): by frequency, and by shape at the common sensors."""
+"""Several set-ups of one structure as one result: identified together (PreGER, the host library's work), or merged by
+their modes (PoSER)."""
 
 from __future__ import annotations
 
@@ -7,10 +8,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
+from okid.abi.arguments import channel_names
+from okid.data.records import sides
+from okid.identification import host_result
 from okid.modal import mac, mpc, normalised
 from okid.result.parts import Mode
 from okid.result.result import Result
@@ -100,6 +104,60 @@ def _states(modes: Sequence[dict[str, Any]], dt: float) -> tuple[list[list[float
         C[:, 2 * k] = [x or 0.0 for x in mode["shape_re"]]
         C[:, 2 * k + 1] = [x or 0.0 for x in mode["shape_im"]]
     return A.tolist(), C.tolist()
+
+
+def identify_setups(
+    u: Sequence[ArrayLike] | None,
+    y: Sequence[ArrayLike],
+    *,
+    fs: float,
+    output_names: Sequence[Sequence[str]],
+    references: Sequence[str] | None = None,
+    input_names: Sequence[str] | None = None,
+    band: tuple[float, float] | None = None,
+    modes: Sequence[int] | None = None,
+    detrend: str = "mean",
+    sigma: str | None = None,
+) -> Result:
+    """Identify several set-ups of one structure together, from their correlations (PreGER): one set of modes.
+
+    `y`: of each set-up (N, n_y), with `output_names` of each; one name is one sensor that stays where it is.
+    `references`: those that scale the shapes (default: all that every set-up has). `u` None: ambient, which may excite
+    every set-up another way. With `u` (N, n_u) of each set-up, forces at the same places, no reference is needed.
+    `band` (low, high) in Hz; `modes` numbers of the listed modes that are kept; `detrend` "none", "mean" or "linear".
+
+    Frequencies and damping are those of all set-ups, *_std the scatter between them, each fitted alone from the common
+    poles (sigma="none": not computed). Method "plscf". Inputs, B and D are left out.
+
+    Raises InputError (a wrong argument) or IdentificationError (no reliable mode).
+
+    >>> import okid
+    >>> _, y = okid.demo_record()
+    >>> found = okid.identify_setups(None, [y[:, [0, 1]], y[:, [0, 2]]], fs=1000.0, output_names=["ab", "ac"])
+    >>> found.outputs, [f"{mode.frequency_hz:.0f}" for mode in found.confident_modes]
+    (['a', 'b', 'c'], ['11', '32', '46'])
+    """
+    if len(y) < 2 or len(output_names) != len(y) or (u is not None and len(u) != len(y)):
+        told = "" if u is None else f", {len(u)} in u"
+        raise InputError(
+            f"{len(y)} set-ups in y, {len(output_names)} lists in output_names{told}, expected two or more"
+        )
+    inputs, outputs = [], []
+    for k, one in enumerate(y):
+        (drive,), (response,) = sides(None if u is None else [np.asarray(u[k])], [np.asarray(one)], host_result.TYPES)
+        if response.shape[1] != len(output_names[k]):
+            raise InputError(
+                f"output_names[{k}] has {len(output_names[k])} names for {response.shape[1]} columns of y[{k}]"
+            )
+        inputs.append(drive)
+        outputs.append(response)
+    options = {
+        "inputs": channel_names(input_names, None, "u", inputs[0].shape[1]),
+        "outputs": [name for names in output_names for name in names],
+        "references": None if references is None else list(references), "fs": fs, "modes": modes, "detrend": detrend,
+        "band": None if band is None else ":".join(map(str, band)), "sigma": sigma,
+    }  # fmt: skip
+    return Result.of_host(host_result.identify_set_ups(options, inputs, outputs))
 
 
 def merge_setups(results: Sequence[Result], *, references: Sequence[str] | None = None) -> Result:

@@ -50,6 +50,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_error_status": (_status, []),
     "okid_host_identify": (_status, [_text, _status, _out, _sizes, ctypes.POINTER(_text), _handle, _handle, _out]),
     "okid_host_identify_columns": (_status, [_text, _status, *[_handle] * 7]),
+    "okid_host_identify_set_ups": (_status, [_text, _status, *[_handle] * 4, _out]),
     "okid_host_identify_responses": (_status, [_text, _size, _handle, _handle, _out]),
     "okid_host_responses_read": (_status, [ctypes.POINTER(_text), _status, _out]),
     "okid_host_responses_json": (_text, [_handle]),

@@ -100,11 +100,25 @@ def _columns(arrays: Sequence[NDArray[Any]]) -> Any:
     return (host.Columns * len(sides))(*sides)
 
 
+def _records(inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]], what: str) -> tuple[Any, ...]:
+    count = len(outputs)
+    counts = (ctypes.c_size_t * count)(*map(len, outputs))
+    names = (ctypes.c_char_p * count)(*(f"{what} {k} (counted from 0)".encode() for k in range(count)))
+    return count, _columns(inputs), _columns(outputs), counts, names
+
+
 def identify(options: Mapping[str, Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]]) -> HostResult:
     """`options` by the arguments of okid.identify(); of each record (N, n_u) and (N, n_y), one of TYPES."""
-    handle, count = ctypes.c_void_p(), len(outputs)
-    counts = (ctypes.c_size_t * count)(*map(len, outputs))
-    names = (ctypes.c_char_p * count)(*(f"record {k} (counted from 0)".encode() for k in range(count)))
-    given = _columns(inputs), _columns(outputs), counts, names
-    host.call("identify_columns", options_text(options), count, *given, None, None, ctypes.byref(handle))
+    handle, arguments = ctypes.c_void_p(), _records(inputs, outputs, "record")
+    host.call("identify_columns", options_text(options), *arguments, None, None, ctypes.byref(handle))
+    return HostResult(handle)
+
+
+def identify_set_ups(
+    options: Mapping[str, Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]]
+) -> HostResult:
+    """The same of set-ups, each with columns of its own; `outputs` of the options: the names of each in turn."""
+    handle = ctypes.c_void_p()
+    arguments = _records(inputs, outputs, "set-up")
+    host.call("identify_set_ups", options_text(options), *arguments, ctypes.byref(handle))
     return HostResult(handle)

@@ -1,0 +1,462 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  the modes that are in frequency responses
+// METHOD   poles of matrix fractions over degrees, weights of the lines and normalisations, of every set-up, are gathered by the
+//          agreement that method auto uses for records; those of the candidates are refined with the residues of all set-ups
+//          (modal_fit) and judged. Shapes: the first singular vector of the residues at the references, the other entries
+//          by least squares on what each set-up has there
+// REFERENCE Mevel, Basseville, Benveniste, Goursat (2002), several set-ups with references
+#include "response_modes.hpp"
+
+#include "error.hpp"
+#include "matrix_fraction.hpp"
+#include "record/request.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <memory>
+#include <okid/stabilization.h>
+#include <tuple>
+
+namespace okid_host {
+namespace {
+
+using complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+
+constexpr double widest_damping = 0.5; // sigma of damping over damping
+constexpr double widest_frequency = 0.05;
+constexpr double least_strength = 4;            // of a residue matrix over its noise
+constexpr int fewest_hits = 2;                  // of the runs: candidates, which the fit judges
+constexpr int first_steps = 2, last_steps = 12; // of the poles
+constexpr double neighbours = 0.02;             // in frequency: poles that compete for one resonance
+constexpr double one_mode = 2.5;                // widths between two resonances of one shape: one mode
+constexpr double same_residues = 0.95;          // MAC of the residues of two poles that are one mode
+constexpr double narrowest = 0.25;              // half a resonance's width in lines: below it is a line
+constexpr double edge_lines = 2;                // from the ends of the band
+constexpr double broadest = 0.2;                // damping of a vibration
+constexpr double worth_listing = 0.25;          // share of the runs below which a cluster is chance
+constexpr double doubtful_share = 0.5;          // of the runs: a doubtful mode that fewer found is not listed by itself
+
+Index place_in(const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) - names.begin();
+}
+
+/// The columns of all set-ups side by side, each an output of its own.
+response_set side_by_side_columns(const joint_responses& from, std::vector<int>& sensing) {
+    response_set out;
+    out.frequency_hz = from.sets.front().frequency_hz;
+    out.inputs = {"all"};
+    Index columns = 0;
+    for (const response_set& set : from.sets) columns += set.H.cols();
+    out.H.resize(from.sets.front().lines(), columns);
+    columns = 0;
+    for (const response_set& set : from.sets) {
+        out.H.middleCols(columns, set.H.cols()) = set.H;
+        columns += set.H.cols();
+        for (Index c = 0; c < set.H.cols(); ++c) {
+            const std::string& name = set.outputs[static_cast<std::size_t>(c % set.n_y())];
+            out.outputs.push_back(name);
+            sensing.push_back(from.sensing[static_cast<std::size_t>(place_in(from.outputs, name))]);
+        }
+    }
+    return out;
+}
+
+/// What the numbers of a mode say against it, whatever the runs agree on.
+void mark_doubtful(const response_set& set, std::vector<consensus_mode>& modes) {
+    const std::vector<double>& f = set.frequency_hz;
+    const double line = (f.back() - f.front()) / static_cast<double>(set.lines() - 1);
+    for (consensus_mode& mode : modes) {
+        if (mode.frequency_hz * mode.damping_ratio < narrowest * line) mode.why.emplace_back("tone");
+        if (mode.damping_ratio > broadest) mode.why.emplace_back("overdamped");
+        if (mode.frequency_hz < f.front() + edge_lines * line || mode.frequency_hz > f.back() - edge_lines * line)
+            mode.why.emplace_back("band_edge");
+    }
+}
+
+/// Residues of a mode in one set-up: a row an output.
+struct residue_matrix {
+    MatrixXcd R;
+    MatrixXd variance;
+    Eigen::VectorXcd drive; ///< R = shape drive^H
+};
+
+std::vector<residue_matrix> residues_of(const joint_responses& from, const modal_fit& fit, Index k) {
+    std::vector<residue_matrix> out;
+    Index first = 0;
+    for (const response_set& set : from.sets) {
+        residue_matrix one{MatrixXcd(set.n_y(), set.n_u()), MatrixXd(set.n_y(), set.n_u()), {}};
+        for (Index c = 0; c < set.H.cols(); ++c) {
+            one.R(c % set.n_y(), c / set.n_y()) = fit.residues(k, first + c);
+            one.variance(c % set.n_y(), c / set.n_y()) = fit.variance[first + c] * fit.unit_variance(k, first + c);
+        }
+        first += set.H.cols();
+        out.push_back(std::move(one));
+    }
+    return out;
+}
+
+/// What moves each set-up, in units of the shape at the references, which has norm 1.
+void find_drives(const joint_responses& from, std::vector<residue_matrix>& all) {
+    std::vector<MatrixXcd> seen;
+    Index columns = 0;
+    for (std::size_t j = 0; j < all.size(); ++j) {
+        MatrixXcd& own = seen.emplace_back(from.references.size(), all[j].R.cols());
+        for (std::size_t r = 0; r < from.references.size(); ++r)
+            own.row(static_cast<Index>(r)) = all[j].R.row(place_in(from.sets[j].outputs, from.references[r]));
+        columns += own.cols();
+    }
+    MatrixXcd together(from.references.size(), columns);
+    columns = 0;
+    for (const MatrixXcd& own : seen) {
+        together.middleCols(columns, own.cols()) = own;
+        columns += own.cols();
+    }
+    const Eigen::JacobiSVD<MatrixXcd> svd(together, Eigen::ComputeThinU);
+    for (std::size_t j = 0; j < all.size(); ++j) all[j].drive = seen[j].adjoint() * svd.matrixU().col(0);
+}
+
+residue_shape shape_of(const joint_responses& from, const modal_fit& fit, Index k) {
+    std::vector<residue_matrix> all = residues_of(from, fit, k);
+    find_drives(from, all);
+    const auto n_y = static_cast<Index>(from.outputs.size());
+    Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(n_y);
+    Eigen::VectorXd weight = Eigen::VectorXd::Zero(n_y);
+    double power = 0, noise = 0;
+    for (std::size_t j = 0; j < all.size(); ++j) {
+        const residue_matrix& one = all[j];
+        power += one.R.squaredNorm();
+        noise += 2 * one.variance.sum();
+        const double drive = std::max(one.drive.squaredNorm(), 1e-300);
+        for (Index o = 0; o < one.R.rows(); ++o) {
+            const Index to = place_in(from.outputs, from.sets[j].outputs[static_cast<std::size_t>(o)]);
+            const double variance = std::max(
+                (one.variance.row(o).transpose().array() * one.drive.array().abs2()).sum() / (drive * drive), 1e-300);
+            sum[to] += (one.R.row(o) * one.drive).value() / drive / variance;
+            weight[to] += 1 / variance;
+        }
+    }
+    residue_shape out;
+    out.strength = std::sqrt(power / noise);
+    Index largest = 0;
+    (void)(sum.cwiseAbs().array() / weight.array().max(1e-300)).maxCoeff(&largest);
+    const complex unit = sum[largest] / weight[largest];
+    for (Index o = 0; o < n_y; ++o) { // an output of none of these set-ups is NaN
+        out.shape.push_back(weight[o] > 0 ? sum[o] / weight[o] / unit : complex(NAN, NAN));
+        out.scatter.push_back(weight[o] > 0 ? 1 / std::sqrt(weight[o]) / std::abs(unit) : NAN);
+    }
+    return out;
+}
+
+/// Standard deviations of frequency and damping from that of the pole's parts.
+std::pair<double, double> spread_of(complex pole, const MatrixXd& covariance, Index k) {
+    if (covariance.size() == 0) return {NAN, NAN};
+    const Eigen::Matrix2d part = covariance.block<2, 2>(2 * k, 2 * k);
+    const double size = std::abs(pole), re = pole.real(), im = pole.imag();
+    const Eigen::Vector2d f(re / size / (2 * M_PI), im / size / (2 * M_PI)),
+        zeta(-im * im / (size * size * size), re * im / (size * size * size));
+    return {std::sqrt(f.dot(part * f)), std::sqrt(zeta.dot(part * zeta))};
+}
+
+/// Residues, shapes and deviations of all set-ups together.
+std::pair<modal_fit, refined_modes> fit_all(const joint_responses& from, const std::vector<complex>& poles, int steps) {
+    std::vector<int> sensing;
+    const response_set columns = side_by_side_columns(from, sensing);
+    std::pair<modal_fit, refined_modes> out{fit_modes(columns, sensing, poles, steps), {}};
+    out.second.poles = out.first.poles;
+    for (std::size_t k = 0; k < poles.size(); ++k) {
+        out.second.shapes.push_back(shape_of(from, out.first, static_cast<Index>(k)));
+        out.second.sigma.push_back(spread_of(out.first.poles[k], out.first.covariance, static_cast<Index>(k)));
+    }
+    return out;
+}
+
+/// What many runs agree on and what few found: the fit of the residues tells which of it is in the responses.
+bool is_candidate(const consensus_mode& mode) {
+    return mode.confident() ||
+           (mode.hits >= fewest_hits && std::all_of(mode.why.begin(), mode.why.end(), [](const std::string& why) {
+                return why == "few_runs" || why == "noise_shape";
+            }));
+}
+
+/// A candidate with what the fit says of it.
+struct fitted_mode {
+    std::size_t at;      ///< in the list of modes
+    double found_in = 0; ///< share of the runs
+    complex pole;
+    residue_shape shape;
+    std::pair<double, double> sigma; ///< of frequency and damping
+    std::string why;                 ///< it is none
+};
+
+/// Found by more of the runs, or as many and stronger.
+bool better(const fitted_mode& a, const fitted_mode& b) {
+    return a.found_in != b.found_in ? a.found_in > b.found_in : a.shape.strength > b.shape.strength;
+}
+
+bool close(const fitted_mode& a, const fitted_mode& b, double share) {
+    const double widths = one_mode * std::max(-a.pole.real(), -b.pole.real());
+    return std::abs(a.pole.imag() - b.pole.imag()) < std::max(widths, share * a.pole.imag());
+}
+
+/// The worse of two poles of one mode: near each other, with proportional residues.
+bool repeats(const modal_fit& fit, const std::vector<fitted_mode>& all, std::size_t k) {
+    if (fit.residues.cols() < 3) return false;
+    for (std::size_t j = 0; j < all.size(); ++j) {
+        if (j == k || !better(all[j], all[k]) || !close(all[j], all[k], 0)) continue;
+        const Eigen::RowVectorXcd x = fit.residues.row(static_cast<Index>(k)),
+                                  y = fit.residues.row(static_cast<Index>(j));
+        if (std::norm(x.dot(y)) > same_residues * x.squaredNorm() * y.squaredNorm()) return true;
+    }
+    return false;
+}
+
+/// Leave out what the last fit judged to be none, of neighbours only the worst: without it the others look different.
+bool leave_worst_out(std::vector<fitted_mode>& candidates, std::vector<consensus_mode>& modes) {
+    std::vector<fitted_mode> left;
+    for (const fitted_mode& one : candidates) {
+        const bool worst =
+            !one.why.empty() && std::none_of(candidates.begin(), candidates.end(), [&](const fitted_mode& other) {
+                return !other.why.empty() && other.at != one.at && close(one, other, neighbours) && better(one, other);
+            });
+        if (!worst) {
+            left.push_back(one);
+            continue;
+        }
+        std::vector<std::string>& why = modes[one.at].why;
+        if (std::find(why.begin(), why.end(), one.why) == why.end()) why.push_back(one.why);
+    }
+    const bool any = left.size() < candidates.size();
+    candidates = std::move(left);
+    return any;
+}
+
+/// One round: candidates at their refined poles, each judged.
+std::vector<fitted_mode> fit_candidates(const joint_responses& from, std::vector<fitted_mode> all, int steps) {
+    std::vector<complex> poles;
+    for (const fitted_mode& one : all) poles.push_back(one.pole);
+    if (poles.empty()) return all;
+    const auto [fit, found] = fit_all(from, poles, steps);
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        all[k].pole = fit.poles[k];
+        all[k].why.clear();
+        all[k].shape = found.shapes[k];
+        all[k].sigma = found.sigma[k];
+    }
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        const double f = std::abs(all[k].pole) / (2 * M_PI), zeta = -all[k].pole.real() / std::abs(all[k].pole);
+        if (all[k].shape.strength < least_strength)
+            all[k].why = "noise_shape";
+        else if (!(all[k].sigma.first < widest_frequency * f && all[k].sigma.second < widest_damping * zeta))
+            all[k].why = "wide_sigma";
+        else if (zeta > broadest)
+            all[k].why = "overdamped";
+        else if (repeats(fit, all, k))
+            all[k].why = "split";
+    }
+    return all;
+}
+
+/// The candidates at their refined values, with shapes and deviations; what turns out to be none is said.
+void refine_modes(const joint_responses& from, response_modes& found) {
+    auto& [modes, shapes, sigma, stable] = found;
+    std::vector<fitted_mode> candidates;
+    for (std::size_t k = 0; k < modes.size(); ++k)
+        if (is_candidate(modes[k])) candidates.push_back({k, modes[k].found_in, pole_of(modes[k]), {}, {}, ""});
+    do { // few steps while there is noise among them
+        do candidates = fit_candidates(from, std::move(candidates), first_steps);
+        while (leave_worst_out(candidates, modes));
+        candidates = fit_candidates(from, std::move(candidates), last_steps);
+    } while (leave_worst_out(candidates, modes));
+    for (fitted_mode& one : candidates) {
+        consensus_mode& mode = modes[one.at];
+        mode.why.clear();
+        mode.frequency_hz = std::abs(one.pole) / (2 * M_PI);
+        mode.damping_ratio = -one.pole.real() / std::abs(one.pole);
+        mode.mpc = shape_mpc(one.shape.shape);
+        std::tie(sigma.frequency_hz[one.at], sigma.damping_ratio[one.at]) = one.sigma;
+        shapes[one.at] = std::move(one.shape);
+    }
+}
+
+/// Ascending; without what few runs found, or only the modes picked by their numbers, which then count as confident.
+void leave_out(bool all, const std::vector<int>& numbers, response_modes& found) {
+    auto& [modes, shapes, sigma, stable] = found;
+    std::vector<std::size_t> order;
+    for (std::size_t k = 0; k < modes.size(); ++k)
+        if (modes[k].confident() || all || modes[k].found_in >= doubtful_share) order.push_back(k);
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return modes[a].frequency_hz < modes[b].frequency_hz; });
+    if (!numbers.empty()) {
+        std::vector<std::size_t> picked;
+        for (std::size_t k = 0; k < order.size(); ++k)
+            if (std::find(numbers.begin(), numbers.end(), static_cast<int>(k) + 1) != numbers.end()) {
+                picked.push_back(order[k]);
+                modes[order[k]].why.clear();
+            }
+        check_picked(numbers, order.size());
+        order = std::move(picked);
+    }
+    const auto taken = [&](auto& values) {
+        auto out = values;
+        out.clear();
+        for (const std::size_t k : order) out.push_back(values[k]);
+        values = std::move(out);
+    };
+    taken(modes);
+    taken(shapes);
+    taken(sigma.frequency_hz);
+    taken(sigma.damping_ratio);
+}
+
+[[noreturn]] void throw_no_modes(const std::vector<consensus_mode>& modes, std::size_t runs) {
+    std::string seen;
+    for (const consensus_mode& mode : modes)
+        seen += fmt::format("{}{:.4g} Hz ({})", seen.empty() ? "" : ", ", mode.frequency_hz, fmt::join(mode.why, ", "));
+    throw failure(exit_no_model, fmt::format("no model: none of {} runs over the responses agree on a mode{}. Choose a "
+                                             "band with --band, or measure with finer lines",
+                                             runs, seen.empty() ? std::string() : "; doubtful: " + seen));
+}
+
+/// Runs of the matrix fractions of every set-up, shapes at the references.
+std::vector<consensus_run> runs_of(const joint_responses& from) {
+    std::vector<consensus_run> out;
+    for (const response_set& set : from.sets)
+        for (consensus_run& run : fit_matrix_fractions(set)) {
+            const auto seen = [&](auto& one) {
+                std::vector<complex> shape;
+                for (const std::string& name : from.references)
+                    shape.push_back(one.shape[static_cast<std::size_t>(place_in(set.outputs, name))]);
+                one.shape = std::move(shape);
+            };
+            std::for_each(run.tracks.begin(), run.tracks.end(), seen);
+            std::for_each(run.poles.begin(), run.poles.end(), seen);
+            out.push_back(std::move(run));
+        }
+    return out;
+}
+
+/// The poles of one order as the collector takes them.
+void add_model(const consensus_run& run, int order, int set_up, okid_stabilization_t* to, stabilization& out) {
+    std::vector<double> f, zeta, mpc, emac, re, im;
+    for (const run_pole& pole : run.poles) {
+        if (pole.order != order) continue;
+        f.push_back(pole.frequency_hz);
+        zeta.push_back(pole.damping_ratio);
+        mpc.push_back(pole.mpc);
+        emac.push_back(pole.emac);
+        for (const complex& entry : pole.shape) re.push_back(entry.real()), im.push_back(entry.imag());
+    }
+    okid_identified_t model{};
+    model.n_y = out.criteria.n_y;
+    model.n_z = order;
+    model.p = set_up;
+    model.mode_count = static_cast<std::int32_t>(f.size());
+    model.frequency_hz = f.data();
+    model.damping_ratio = zeta.data();
+    model.mpc = mpc.data();
+    model.emac = emac.data();
+    model.shape_re = re.data();
+    model.shape_im = im.data();
+    if (okid_stabilization_add(to, &model) == OKID_OK) out.models.emplace_back(set_up, order);
+}
+
+/// The poles of the middle weight that keeps noise unstable, of every set-up: its number in the place of a horizon.
+stabilization diagram_of(const joint_responses& from, const std::vector<consensus_run>& runs) {
+    const std::size_t of_each = runs.size() / from.sets.size();
+    stabilization out;
+    out.criteria = okid_stabilization_defaults(static_cast<std::int32_t>(from.references.size()), 0, 1);
+    out.criteria.frequency = 0.01, out.criteria.damping = 0.05, out.criteria.mac = 0.98, out.criteria.share = 0.5;
+    std::vector<const consensus_run*> shown;
+    for (std::size_t j = 0; j < from.sets.size(); ++j) {
+        shown.push_back(&runs[j * of_each + of_each / 3]);
+        out.criteria.max_models += static_cast<std::int32_t>(shown.back()->orders.size());
+        out.criteria.max_poles =
+            std::max(out.criteria.max_poles, static_cast<std::int32_t>(shown.back()->poles.size()));
+    }
+    const std::size_t bytes = okid_stabilization_memsize(&out.criteria);
+    const std::unique_ptr<std::byte[]> block(new std::byte[bytes]);
+    okid_stabilization_t* collector = nullptr;
+    if (bytes == 0 || okid_stabilization_create(&collector, &out.criteria, block.get(), bytes) != OKID_OK) return out;
+    for (std::size_t j = 0; j < shown.size(); ++j)
+        for (const int order : shown[j]->orders) add_model(*shown[j], order, static_cast<int>(j) + 1, collector, out);
+    okid_stabilized_t view{};
+    if (okid_stabilization_find(collector, &view) == OKID_OK) {
+        out.poles.assign(view.poles, view.poles + view.pole_count);
+        out.clusters.assign(view.clusters, view.clusters + view.cluster_count);
+    }
+    return out;
+}
+
+/// Shapes of what was not refined: those of the matrix fractions, where it was not in the responses NaN.
+void fill_shapes(const joint_responses& from, response_modes& found) {
+    for (std::size_t k = 0; k < found.modes.size(); ++k) {
+        residue_shape& own = found.shapes[k];
+        if (!own.shape.empty()) continue;
+        const std::vector<complex>& shape = found.modes[k].shape;
+        const auto largest = *std::max_element(shape.begin(), shape.end(),
+                                               [](complex a, complex b) { return std::abs(a) < std::abs(b); });
+        own.shape.assign(from.outputs.size(), complex(NAN, NAN));
+        own.scatter.assign(from.outputs.size(), NAN);
+        for (std::size_t r = 0; r < shape.size(); ++r)
+            own.shape[static_cast<std::size_t>(place_in(from.outputs, from.references[r]))] = shape[r] / largest;
+    }
+}
+
+} // namespace
+
+std::vector<std::string> common_outputs(const std::vector<response_set>& sets) {
+    std::vector<std::string> out;
+    for (const std::string& name : sets.front().outputs)
+        if (std::all_of(sets.begin(), sets.end(), [&](const response_set& set) {
+                return std::find(set.outputs.begin(), set.outputs.end(), name) != set.outputs.end();
+            }))
+            out.push_back(name);
+    return out;
+}
+
+complex pole_of(const consensus_mode& mode) {
+    const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
+    return {-zeta * w, w * std::sqrt(1 - zeta * zeta)};
+}
+
+void take_window_out(double constant_s, consensus_mode& mode) {
+    if (!(constant_s > 0)) return;
+    const complex pole = pole_of(mode) + 1 / constant_s;
+    mode.frequency_hz = std::abs(pole) / (2 * M_PI);
+    mode.damping_ratio = -pole.real() / std::abs(pole);
+    if (!(mode.damping_ratio > 0)) {
+        mode.damping_ratio = 1e-9;
+        mode.why.emplace_back("tone");
+    }
+}
+
+refined_modes fit_response_modes(const joint_responses& from, const std::vector<complex>& poles, int steps) {
+    return fit_all(from, poles, steps).second;
+}
+
+response_modes find_response_modes(const joint_responses& from, bool all, const std::vector<int>& numbers,
+                                   bool diagram) {
+    const auto runs = runs_of(from);
+    response_modes out;
+    if (diagram) out.stable = diagram_of(from, runs);
+    out.modes = find_agreement(runs);
+    mark_doubtful(from.sets.front(), out.modes);
+    const auto chance = [](const consensus_mode& mode) { return !is_candidate(mode) && mode.found_in < worth_listing; };
+    out.modes.erase(std::remove_if(out.modes.begin(), out.modes.end(), chance), out.modes.end());
+    out.shapes.resize(out.modes.size());
+    out.sigma.frequency_hz.assign(out.modes.size(), NAN);
+    out.sigma.damping_ratio.assign(out.modes.size(), NAN);
+    refine_modes(from, out);
+    leave_out(all, numbers, out);
+    if (std::none_of(out.modes.begin(), out.modes.end(), [](const consensus_mode& mode) { return mode.confident(); }))
+        throw_no_modes(out.modes, runs.size());
+    fill_shapes(from, out);
+    return out;
+}
+
+} // namespace okid_host
