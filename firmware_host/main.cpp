@@ -79,7 +79,8 @@ int main(int argc, char** argv) {
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
     CLI::App app{"okid: from a cable of sensor frames to natural frequencies, damping ratios and mode shapes", "okid"};
-    app.set_version_flag("--version", std::string("okid ") + okid_version() + " (" + okid_backend() + ")");
+    app.set_version_flag("--version",
+                         std::string("okid ") + okid_version() + " (" + okid_backend() + ")" + okid_host::left_out());
     app.require_subcommand(1);
     app.get_formatter()->label("REQUIRED", ""); // the usage line puts brackets around what is not
     app.footer("okid COMMAND --help tells the options of a command.\n\n"
@@ -93,7 +94,10 @@ int main(int argc, char** argv) {
     okid_host::add_init(app);
     okid_host::add_check(app);
     okid_host::add_doctor(app);
+#ifndef OKID_PORTABLE
     okid_host::add_bench(app);
+#endif
+    okid_host::add_support_bundle(app);
     okid_host::add_completion(app);
     refuse_empty_values(app);
     static char help[] = "--help", version[] = "--version";

@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""The requirements of tools/pyproject.toml for one tier: build, test (build + test), dev (all), boards (alone)."""
+"""Requirements of tools/pyproject.toml of a tier: build, test (build + test), dev (all), boards, release (alone)."""
 
 import pathlib
 import re
 import sys
 import tomllib
 
-project = tomllib.loads(pathlib.Path(__file__).with_name("pyproject.toml").read_text())["project"]
-tiers = {"build": ["run"], "test": ["run", "test"], "dev": ["run", "test", "docs", "dev"], "boards": ["boards"]}
+pyproject = tomllib.loads(pathlib.Path(__file__).with_name("pyproject.toml").read_text())
+project = pyproject["project"]
+tiers = {
+    "build": ["run"],
+    "test": ["run", "test"],
+    "dev": ["run", "test", "docs", "dev"],
+    "boards": ["boards"],
+    "release": ["release"],
+}
 
 
 def wanted(extra: str) -> list[str]:
@@ -20,5 +27,7 @@ def wanted(extra: str) -> list[str]:
     return out
 
 
+if sys.argv[1:] == ["release"]:  # which builds without an environment of its own for each wheel
+    print("\n".join(pyproject["build-system"]["requires"]), "ninja", "cmake>=3.25", sep="\n")
 for extra in tiers[sys.argv[1] if len(sys.argv) > 1 else "build"]:
     print("\n".join(wanted(extra)))

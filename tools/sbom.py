@@ -34,11 +34,12 @@ COMMANDS = {
     "debian-dev": "`make lint`, `make docs`",
     "debian-package": "`make package`, `make test-package`",
 }
-APART = ("wheel", "boards")  # what they list is not in .venv
+APART = ("wheel", "boards", "release")  # what they list is not in .venv
 EXTRAS = {
     "test": "`make test`",
     "docs": "`make docs`",
     "boards": "`make test-embedded`",
+    "release": "`packaging/release`",
     "dev": "`make lint`, `make coverage`, `make sbom`",
 }  # the others are for users
 
@@ -48,9 +49,10 @@ INTRODUCTION = """\
 What okid is built from, runs with and is tested with; none of it is part of this repository. Versions and licences are
 those of the machine where the release was tested, read off its packages by `tools/sbom.py`, which also writes this list
 together with what the packages bring along as CycloneDX 1.5 into `build/sbom.cdx.json`. The wheel holds the
-libraries with the headers of Eigen, fmt, nlohmann-json and toml++ compiled in and links the run-time libraries of C and
-C++ only; toml++ (MIT) is taken from libtomlplusplus-dev, or from the source distribution of pytomlpp 1.1.0. `a|b`: the
-first the distribution has. Licences stand as the packages name them."""
+libraries and the program with the headers of Eigen, fmt, nlohmann-json, toml++ and CLI11 compiled in and links the
+run-time libraries of C and C++ only (that of `packaging/release` the one of C, with LLVM's libc++ inside); toml++ (MIT)
+and CLI11 (BSD-3-Clause) are taken from libtomlplusplus-dev and libcli11-dev, or from the source distributions of
+pytomlpp 1.1.0 and highspy 1.15.1. `a|b`: the first the distribution has. Licences stand as the packages name them."""
 
 
 class Missing(Exception):

@@ -15,6 +15,10 @@ void add_check(CLI::App& app);
 void add_init(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_bench(CLI::App& app);
+void add_support_bundle(CLI::App& app);
 void add_completion(CLI::App& app);
+
+/// ", without MQTT, ...": what this build of the program cannot do; "" where nothing is missing.
+std::string left_out();
 
 } // namespace okid_host

@@ -231,6 +231,41 @@ void check_governor(findings& out) {
 
 } // namespace
 
+std::string left_out() {
+    std::string out;
+#ifdef OKID_PORTABLE
+    out += ", without GPIO lines, okid bench";
+#endif
+#ifndef OKID_MQTT
+    out += out.empty() ? ", without MQTT" : ", MQTT";
+#endif
+#ifndef OKID_PROMETHEUS
+    out += out.empty() ? ", without Prometheus" : ", Prometheus";
+#endif
+    return out;
+}
+
+findings examine(const std::optional<live_config>& config) {
+    findings out;
+    const std::string lacks = left_out();
+    if (!lacks.empty())
+        out.note("build", "this okid is" + lacks.substr(1), "the Debian packages and make build have them");
+    const bool wants_can = !config || std::any_of(config->buses.begin(), config->buses.end(),
+                                                  [](const bus_config& b) { return b.type == "socketcan"; });
+    const bool kernel_has_can = wants_can && check_kernel(out);
+    check_buses(out, config, kernel_has_can);
+    check_lines(out, config);
+    if (wants_can) check_buffers(out);
+    const realtime_config realtime = config ? config->realtime : realtime_config{};
+    check_priority(out, realtime);
+    check_processors(out, realtime);
+    check_memory(out, realtime);
+    if (config) check_outputs(out, *config);
+    check_clock(out);
+    check_governor(out);
+    return out;
+}
+
 void add_doctor(CLI::App& app) {
     auto path = std::make_shared<std::string>();
     CLI::App* command =
@@ -241,23 +276,11 @@ void add_doctor(CLI::App& app) {
     command->callback([path] {
         std::optional<live_config> config;
         if (!path->empty()) config = load_config(*path);
-        findings out;
-        const bool wants_can = !config || std::any_of(config->buses.begin(), config->buses.end(),
-                                                      [](const bus_config& b) { return b.type == "socketcan"; });
-        const bool kernel_has_can = wants_can && check_kernel(out);
-        check_buses(out, config, kernel_has_can);
-        check_lines(out, config);
-        if (wants_can) check_buffers(out);
-        const realtime_config realtime = config ? config->realtime : realtime_config{};
-        check_priority(out, realtime);
-        check_processors(out, realtime);
-        check_memory(out, realtime);
-        if (config) check_outputs(out, *config);
-        check_clock(out);
-        check_governor(out);
-        if (out.count() > 0)
+        const findings found = examine(config);
+        fmt::print("{}", found.text());
+        if (found.count() > 0)
             throw failure(exit_device,
-                          fmt::format("{} thing{} missing, see above", out.count(), out.count() == 1 ? "" : "s"));
+                          fmt::format("{} thing{} missing, see above", found.count(), found.count() == 1 ? "" : "s"));
     });
 }
 

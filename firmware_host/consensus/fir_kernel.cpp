@@ -13,7 +13,14 @@ constexpr double pi = 3.14159265358979323846;
 
 double sinc(double x) { return x == 0 ? 1 : std::sin(pi * x) / (pi * x); }
 
-double kaiser(double x) { return std::abs(x) >= 1 ? 0 : std::cyl_bessel_i(0.0, kaiser_shape * std::sqrt(1 - x * x)); }
+/// Modified Bessel function I0 by its power series; std::cyl_bessel_i is not in every C++ library.
+double bessel_i0(double x) {
+    double sum = 1, term = 1;
+    for (int k = 1; term > 1e-17 * sum; ++k) sum += term *= x * x / (4.0 * k * k);
+    return sum;
+}
+
+double kaiser(double x) { return std::abs(x) >= 1 ? 0 : bessel_i0(kaiser_shape * std::sqrt(1 - x * x)); }
 
 } // namespace
 

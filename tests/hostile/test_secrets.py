@@ -42,6 +42,7 @@ def everything_said(folder: pathlib.Path, config: pathlib.Path) -> dict[str, byt
     keep("check", okid("check", config))
     keep("check --json", okid("check", config, "--json"))
     keep("doctor", okid("doctor", config))
+    keep("support-bundle", okid("support-bundle", config))
     keep("run", okid("run", config, "--events", folder / "e.jsonl", "--json", folder / "r.json"))
     for journal in (folder / "runs").glob("*.okj"):
         keep("replay", okid("replay", journal, "--events", folder / "e2.jsonl", "--json", folder / "r2.json"))

@@ -26,6 +26,7 @@ COMMANDS = [
     "check",
     "doctor",
     "bench",
+    "support-bundle",
     "completion",
 ]
 FIXED = {  # options of okid identify with fixed choices

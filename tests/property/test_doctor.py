@@ -71,3 +71,21 @@ def test_an_empty_value_is_refused(rig: Path, option: str) -> None:
     done = okid("replay", rig / "a.log", "-c", rig / "a.toml", option, "")
     assert done.returncode == 2
     assert f"{option}: found an empty value" in done.stderr, done.stderr
+
+
+def test_support_bundle(rig: Path) -> None:
+    text = (rig / "a.toml").read_text() + '\n[publish]\nmqtt = "mqtt://me:hush hush@localhost/lab"\n'
+    (rig / "b.toml").write_text(text)
+    lines = [f'{{"type":"modes","t":{k}}}' for k in range(100)] + ['{"type":"result","long":"' + "x" * 5000 + '"}']
+    (rig / "e.jsonl").write_text("\n".join(lines) + "\n")
+    done = okid("support-bundle", rig / "b.toml", "--events", rig / "e.jsonl", "--lines", "3", "--out", rig / "s.txt")
+    assert done.returncode == 0, done.stderr
+    told = (rig / "s.txt").read_text()
+    version = okid("--version").stdout.strip()
+    for wanted in (version, os.uname().release, "## okid doctor", "[publish]", lines[98], lines[99], "3027 more bytes"):
+        assert wanted in told, (wanted, told)
+    assert "hush" not in told and lines[97] not in told
+    (rig / "c.toml").write_text("[acquisition]\nrate_hz = -5\n")
+    told = okid("support-bundle", rig / "c.toml").stdout
+    assert "c.toml" in told and "rate_hz" in told.split("## okid doctor")[0] and "rate_hz = -5" in told
+    assert okid("support-bundle", "--events", rig / "none").returncode == 2

@@ -6,18 +6,20 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 from okid._errors import InputError
 
 
 def find_program() -> str | None:
-    """$OKID_PROGRAM, else `okid` on the path, else that of the source tree's build; None when there is none."""
+    """$OKID_PROGRAM, else the source tree's build, the command beside this Python or on the path; else None."""
     given = os.environ.get("OKID_PROGRAM")
     if given:
         return given
     built = Path(__file__).resolve().parents[3] / "build" / "okid"
-    return shutil.which("okid") or (str(built) if os.access(built, os.X_OK) else None)
+    beside = Path(sys.executable).with_name("okid")
+    return next((str(one) for one in (built, beside) if os.access(one, os.X_OK)), None) or shutil.which("okid")
 
 
 def run_program(*arguments: str | Path) -> str:
