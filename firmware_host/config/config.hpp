@@ -156,6 +156,15 @@ struct broker_address {
     net_address at;
     std::string user, password, prefix = "okid";
     std::string password_file; ///< read_password() finds it
+    bool discovery = false;    ///< Home Assistant is told what there is
+};
+
+/// Where lines for InfluxDB go: a file, else by HTTP with a path, else by UDP.
+struct influx_target {
+    std::string file; ///< already relative to the config's folder
+    net_address at;
+    std::string path;       ///< and query of the URL
+    std::string token_file; ///< read_password() finds it
 };
 
 /// [publish]: where events and modes go besides the events file and the terminal.
@@ -163,6 +172,7 @@ struct publish_config {
     std::string socket; ///< path of a unix socket, already relative to the config's folder; "" = none
     std::optional<net_address> udp, prometheus;
     std::optional<broker_address> mqtt;
+    std::optional<influx_target> influx;
     bool samples = false; ///< the signals too go to the unix socket
 };
 

@@ -5,6 +5,7 @@
 #include "files/nearest_name.hpp"
 #include "secrets.hpp"
 
+#include <algorithm>
 #include <arpa/inet.h>
 #include <charconv>
 #include <filesystem>
@@ -112,6 +113,31 @@ void read_password_file(const config_place& place, const toml::node& node, publi
     out.mqtt->password_file = *node.value<std::string>();
 }
 
+/// udp://host:port, http://host[:port]/path?query, else a file
+influx_target influx_of(const config_place& place, const toml::node& node) {
+    constexpr const char* expected = "a file (run.lp), udp://host:port or http://host:port/api/v2/write?org=o&bucket=b";
+    const std::string text = *node.value<std::string>();
+    influx_target out;
+    const std::size_t scheme = text.find("://");
+    if (scheme == std::string::npos) {
+        out.file = (std::filesystem::path(place.path).parent_path() / text).string();
+        return out;
+    }
+    const std::size_t host = scheme + 3, slash = std::min(text.find('/', host), text.size());
+    const bool http = text.compare(0, scheme, "http") == 0;
+    if (http) out.path = slash < text.size() ? text.substr(slash) : "/api/v2/write";
+    for (const char* secret : {"?token=", "&token=", "?p=", "&p="})
+        if (out.path.find(secret) != std::string::npos)
+            refuse_key(place, node, "influx", "found a password in the query; it belongs into influx_token_file");
+    const std::optional<net_address> at =
+        address_of(std::string_view(text).substr(host, slash - host), http ? 8086 : 0);
+    const bool plain = std::all_of(out.path.begin(), out.path.end(), [](char c) { return c > ' ' && c < 127; });
+    if (!at || !plain || !(http || (text.compare(0, scheme, "udp") == 0 && slash == text.size())))
+        refuse_address(place, node, "influx", expected);
+    out.at = *at;
+    return out;
+}
+
 bool everybody_reads(const std::string& path) {
     struct stat status{};
     return stat(path.c_str(), &status) == 0 && (status.st_mode & S_IROTH);
@@ -174,12 +200,23 @@ void read_publish(const toml::table& file, live_config& config) {
     }
     if (const toml::node* node = table->get("mqtt")) out.mqtt = broker_of(place, *node);
     if (const toml::node* node = table->get("password_file")) read_password_file(place, *node, out);
+    if (const toml::node* node = table->get("discovery")) {
+        if (!out.mqtt) refuse_key(place, *node, "discovery", "it is told over MQTT, expected mqtt beside it");
+        out.mqtt->discovery = *node->value<bool>();
+    }
+    if (const toml::node* node = table->get("influx")) out.influx = influx_of(place, *node);
+    if (const toml::node* node = table->get("influx_token_file")) {
+        if (!out.influx || out.influx->path.empty())
+            refuse_key(place, *node, "influx_token_file", "it is for HTTP, expected influx = \"http://…\" beside it");
+        out.influx->token_file = *node->value<std::string>();
+    }
     if (out.mqtt && !out.mqtt->password.empty() && everybody_reads(config.path))
         config.warnings.emplace_back(
             "[publish] mqtt holds a password, and every user of this computer can read the config: "
             "chmod o-r, or use password_file");
     for (const auto& [what, address] :
-         {std::pair{"udp", out.udp}, std::pair{"mqtt", out.mqtt ? std::optional(out.mqtt->at) : std::nullopt}})
+         {std::pair{"udp", out.udp}, std::pair{"mqtt", out.mqtt ? std::optional(out.mqtt->at) : std::nullopt},
+          std::pair{"influx", out.influx && out.influx->file.empty() ? std::optional(out.influx->at) : std::nullopt}})
         if (address && !address->loopback())
             config.warnings.push_back(
                 fmt::format("[publish] {} sends to {}, beyond this computer, and unencrypted", what, address->text()));

@@ -155,7 +155,10 @@ const std::vector<section_rule> schema = {
       {"udp", kind::text},
       {"prometheus", kind::text},
       {"mqtt", kind::text},
-      {"password_file", kind::text}}},
+      {"password_file", kind::text},
+      {"discovery", kind::flag},
+      {"influx", kind::text},
+      {"influx_token_file", kind::text}}},
     {"realtime", false, {{"priority", kind::whole, 0, 99}, {"lock_memory", kind::flag}, {"cpus", kind::array}}},
     {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
 

@@ -16,9 +16,11 @@
 #include <mosquitto.h>
 #include <mutex>
 #include <poll.h>
+#include <set>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <thread>
+#include <tuple>
 #include <unistd.h>
 #endif
 
@@ -46,6 +48,29 @@ std::unique_ptr<event_sink> make_broker(const live_config&) {
 }
 #else
 namespace {
+
+/// What Home Assistant is told of a mode: two sensors that read the topic of the modes, in a device of that rig.
+std::vector<std::pair<std::string, std::string>> discovery_of(const std::string& level, const std::string& modes_topic,
+                                                              int track) {
+    std::vector<std::pair<std::string, std::string>> out;
+    for (const auto& [word, key, unit] :
+         {std::tuple{"frequency", "frequency_hz", "Hz"}, {"damping", "damping_ratio", "%"}}) {
+        const std::string object = fmt::format("mode{}_{}", track, word);
+        const nlohmann::ordered_json config{
+            {"name", fmt::format("mode {} {}", track, word)},
+            {"unique_id", fmt::format("okid_{}_{}", level, object)},
+            {"state_topic", modes_topic},
+            {"value_template",
+             fmt::format("{{{{ value_json.modes | selectattr('track', 'eq', {}) | map(attribute='{}') | "
+                         "map('multiply', {}) | first | default(this.state) }}}}",
+                         track, key, *unit == '%' ? 100 : 1)},
+            {"unit_of_measurement", unit},
+            {"state_class", "measurement"},
+            {"device", {{"identifiers", {"okid_" + level}}, {"name", "okid " + level}}}};
+        out.emplace_back(fmt::format("homeassistant/sensor/okid_{}/{}/config", level, object), config.dump());
+    }
+    return out;
+}
 
 constexpr int keepalive_s = 10;
 constexpr std::chrono::seconds retry(2), farewell(1);
@@ -163,7 +188,9 @@ class connection {
 
 class broker : public event_sink {
   public:
-    explicit broker(const live_config& config) : topic_(config.publish.mqtt->prefix + "/" + topic_level(config)) {
+    explicit broker(const live_config& config)
+        : level_(topic_level(config)), discovery_(config.publish.mqtt->discovery),
+          topic_(config.publish.mqtt->prefix + "/" + level_) {
         mosquitto_lib_init();
         const broker_address& to = *config.publish.mqtt;
         link_ = std::make_shared<connection>(
@@ -184,11 +211,24 @@ class broker : public event_sink {
         const bool newest_counts = one.type == "modes" || one.type == "result";
         (void)mosquitto_publish(link_->client(), nullptr, topic.c_str(), static_cast<int>(one.line->size()) - 1,
                                 one.line->data(), 0, newest_counts);
+        if (discovery_ && one.type == "modes") tell_of(*one.event, topic);
         link_->wake();
     }
     bool finished() override { return !mosquitto_want_write(link_->client()); }
 
   private:
+    /// Each track once; the broker keeps it.
+    void tell_of(const nlohmann::ordered_json& event, const std::string& modes_topic) {
+        for (const auto& mode : event.at("modes"))
+            if (mode.at("track").is_number() && told_.insert(mode.at("track").get<int>()).second)
+                for (const auto& [topic, text] : discovery_of(level_, modes_topic, mode.at("track").get<int>()))
+                    (void)mosquitto_publish(link_->client(), nullptr, topic.c_str(), static_cast<int>(text.size()),
+                                            text.data(), 0, true);
+    }
+
+    std::string level_;
+    bool discovery_;
+    std::set<int> told_;
     std::string topic_;
     std::shared_ptr<connection> link_;
     std::thread thread_;

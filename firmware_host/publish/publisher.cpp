@@ -6,6 +6,7 @@
 #include "broker.hpp"
 #include "datagrams.hpp"
 #include "error.hpp"
+#include "influx.hpp"
 #include "service_notice.hpp"
 #include "subscribers.hpp"
 
@@ -47,6 +48,7 @@ void publisher::open_sinks(const live_config& config) {
     if (!wanted.socket.empty()) sinks_.push_back(std::make_unique<subscribers>(wanted.socket));
     if (wanted.udp) sinks_.push_back(std::make_unique<datagrams>(*wanted.udp));
     if (wanted.prometheus) sinks_.push_back(make_metrics(*wanted.prometheus, [this] { return figures(); }));
+    if (wanted.influx) sinks_.push_back(make_influx(config, options_.live));
     if (wanted.mqtt) sinks_.push_back(make_broker(config));
     if (!options_.live) return; // a log that is replayed calls nobody out of bed
     if ((config.alarm.enabled || config.alarm.test_s > 0) && !config.alarm.command.empty())

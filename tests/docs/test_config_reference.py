@@ -100,6 +100,7 @@ def test_defaults_are_those_of_the_source(section: str) -> None:
 
 OF_OTHER_FILES = {
     ("bus", "baud"): ("config_line.cpp", r"usual_baud = (\d+);"),
+    ("publish", "discovery"): ("config.hpp", r"bool discovery = (\w+);"),
     ("bus", "sync_id"): ("config_send.cpp", r"canopen_sync_id = (0x[0-9a-f]+);"),
     ("bus", "clock"): ("config_clock.cpp", r'\["clock"\]\.value_or\(std::string\("(\w+)"\)\)'),
     ("acquisition", "decimate"): ("config_clock.cpp", r'\["decimate"\]\.value_or\(std::int64_t\{(\d+)\}\)'),

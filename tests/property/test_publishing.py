@@ -8,6 +8,7 @@ import json
 import os
 import pathlib
 import pty
+import re
 import shutil
 import signal
 import socket
@@ -19,6 +20,7 @@ import threading
 import time
 import urllib.request
 from collections.abc import Iterator
+from datetime import datetime
 from typing import Any
 
 import pytest
@@ -387,6 +389,118 @@ def test_mqtt(rig: pathlib.Path) -> None:
     assert all(topic == f"lab/Frame_7_b/{json.loads(text)['type']}" for topic, text in got)
 
 
+def test_home_assistant_is_told_when_it_is_asked_for(rig: pathlib.Path) -> None:
+    port = free_port()
+    with broker(port, rig):
+        section = f'mqtt = "mqtt://127.0.0.1:{port}/lab"\ndiscovery = true'
+        with replaying(rig, section, "--speed", "20") as run:
+            assert run.wait(60) == 0
+        kept = Packets(port)  # what a Home Assistant that starts later gets
+        told = {}
+        while len(told) < 4:
+            topic, text = kept.message()
+            if topic.startswith("homeassistant/"):
+                told[topic] = json.loads(text)
+    tracks = {mode["track"] for event in numbers(file_lines(rig), "modes") for mode in event["modes"]} - {None}
+    assert tracks == {1, 2}
+    for track, word, unit in ((1, "frequency", "Hz"), (2, "damping", "%")):
+        one = told[f"homeassistant/sensor/okid_Frame_7_b/mode{track}_{word}/config"]
+        assert one["state_topic"] == "lab/Frame_7_b/modes" and one["unit_of_measurement"] == unit
+        assert one["unique_id"] == f"okid_Frame_7_b_mode{track}_{word}"
+        assert f"'track', 'eq', {track}" in one["value_template"]
+
+
+POINT = re.compile(r"([a-z_]+)((?:,[a-z]+=(?:[^ ,=\\]|\\.)+)+) ([a-z_]+=[^ ,]+(?:,[a-z_]+=[^ ,]+)*) (\d+)")
+
+
+def points(text: str) -> list[tuple[str, dict[str, str], dict[str, str], int]]:
+    """A reader of line protocol of the tests' own: measurement, tags, fields, ns; every line is one."""
+    out = []
+    for line in text.splitlines():
+        found = POINT.fullmatch(line)
+        assert found, line
+        tags = dict(one.split("=") for one in found[2][1:].split(","))
+        out.append((found[1], tags, dict(one.split("=") for one in found[3].split(",")), int(found[4])))
+    return out
+
+
+def assert_influx(text: str, events: list[str]) -> None:
+    """Every frequency of every tracked mode with the digits of the event, at its time."""
+    start = json.loads(events[0])
+    begin = datetime.fromisoformat(start["wall_time"]).timestamp()
+    seen = [
+        (int(tags["mode"]), float(of["frequency_hz"]), ns) for name, tags, of, ns in points(text) if name == "okid_mode"
+    ]
+    wanted = [
+        (mode["track"], mode["frequency_hz"], event["t"])
+        for event in numbers(events, "modes")
+        for mode in event["modes"]
+        if mode["track"] is not None
+    ]
+    assert [one[:2] for one in seen] == [one[:2] for one in wanted] and seen
+    assert all(abs(ns / 1e9 - begin - t) < 0.1 for (_, _, ns), (_, _, t) in zip(seen, wanted, strict=True))
+    last = [
+        of for name, tags, of, _ in points(text) if name == "okid_bus" and tags == {"rig": "Frame_7_b", "bus": "can0"}
+    ][-1]
+    assert float(last["received"]) == numbers(events, "stats")[-1]["bus"]["can0"]["received"]
+
+
+def test_influx_lines_in_a_file(rig: pathlib.Path) -> None:
+    with replaying(rig, 'influx = "out.lp"') as run:
+        assert run.wait(60) == 0
+    assert_influx((rig / "out.lp").read_text(), file_lines(rig))
+
+
+def test_influx_lines_by_datagrams(rig: pathlib.Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
+        ear.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+        ear.bind(("127.0.0.1", 0))
+        ear.settimeout(1.0)
+        with replaying(rig, f'influx = "udp://127.0.0.1:{ear.getsockname()[1]}"') as run:
+            assert run.wait(60) == 0
+        got = []
+        with contextlib.suppress(TimeoutError):
+            while True:
+                got.append(ear.recv(65536).decode())
+    assert all(one.endswith("\n") and len(one) <= 1400 for one in got)
+    assert_influx("".join(got), file_lines(rig))
+
+
+def test_influx_by_http_keeps_what_is_not_taken(rig: pathlib.Path) -> None:
+    """The first request gets no answer, the second is told to come again: nothing is lost, nothing doubled."""
+    (rig / "token").write_text("s3cret\n")
+    requests: list[tuple[str, str, str]] = []
+    replies = [b"", b"HTTP/1.1 503 Service Unavailable\r\n\r\n"]
+
+    def serve(door: socket.socket) -> None:
+        while True:
+            try:
+                visitor, _ = door.accept()
+            except OSError:
+                return
+            with visitor, visitor.makefile("rb") as wire:
+                first = wire.readline().decode().strip()
+                heads = {
+                    k.lower(): v.strip()
+                    for k, _, v in (h.decode().partition(":") for h in iter(wire.readline, b"\r\n"))
+                }
+                body = wire.read(int(heads["content-length"])).decode()
+                reply = replies.pop(0) if replies else b"HTTP/1.1 204 No Content\r\n\r\n"
+                if b"204" in reply:
+                    requests.append((first, heads["authorization"], body))
+                visitor.sendall(reply)
+
+    with socket.create_server(("127.0.0.1", 0)) as door:
+        threading.Thread(target=serve, args=(door,), daemon=True).start()
+        url = f"http://127.0.0.1:{door.getsockname()[1]}/api/v2/write?org=lab&bucket=rig"
+        with replaying(rig, f'influx = "{url}"\ninflux_token_file = "token"', "--speed", "8") as run:
+            assert run.wait(60) == 0
+            assert run.stderr is not None and run.stderr.read().count("the run goes on") == 1
+        door.shutdown(socket.SHUT_RDWR)
+    assert {one[:2] for one in requests} == {("POST /api/v2/write?org=lab&bucket=rig HTTP/1.1", "Token s3cret")}
+    assert_influx("".join(body for _, _, body in requests), file_lines(rig))
+
+
 def test_a_broker_that_is_away_and_comes(rig: pathlib.Path) -> None:
     port = free_port()
     with replaying(rig, f'mqtt = "mqtt://127.0.0.1:{port}"', "--speed", "6") as run:
@@ -408,6 +522,11 @@ def test_a_broker_that_is_away_and_comes(rig: pathlib.Path) -> None:
         ('mqtt = "localhost"', ['"mqtt"', "mqtt://host"]),
         ('mqtt = "mqtt://"', ['"mqtt"']),
         ('mqtt = "mqtt://localhost/a/#"', ['"mqtt"']),
+        ('influx = "udp://127.0.0.1"', ['"influx"', "udp://host:port"]),
+        ('influx = "https://db.example/"', ['"influx"', "http://host:port"]),
+        ('influx = "http://db.example/write?u=me&p=secret"', ['"influx"', "influx_token_file"]),
+        ('influx = "out.lp"\ninflux_token_file = "t"', ['"influx_token_file"', "expected influx"]),
+        ("discovery = true", ['"discovery"', "expected mqtt"]),
         (f'socket = "{"x" * 120}"', ['"socket"', "at most 107"]),
         ("socket = 7", ['"socket"', "found 7"]),
     ],
