@@ -98,15 +98,16 @@ _NAMES = {
     "virtual": "Estimate, VirtualSensors",
 }  # of the modules; they load when they are first used, NumPy and the libraries with them
 
-_MODULES = ("campaign", "capture", "formats", "frf", "live", "modal", "report")
+_MODULES = ("campaign", "capture", "formats", "frf", "live", "modal", "notebook", "plots", "report")
 
 # Of okid.formats, in both directions: read_uff, write_uff ..
-_FORMATS = ("csv", "frf", "hdf5", "mat", "mdf4", "parquet", "record", "uff")
+_FORMATS = ("csv", "frf", "hdf5", "mat", "mcap", "mdf4", "parquet", "record", "sound", "tdms", "uff")
 
 
 def __getattr__(name: str) -> Any:
     """Everything loads when it is first used, the packages that bring other libraries with them, too: capture
-    (python-can), report (matplotlib), formats (read_uff, write_mdf4 .. are its functions), live, campaign (dask).
+    (python-can), report and plots (matplotlib), notebook (anywidget), formats (read_uff, write_mdf4 .. are its
+    functions), live, campaign (dask).
 
     okid.__version__ is asked of the C library.
     """
