@@ -11,14 +11,17 @@ from pathlib import Path
 import can
 import okid
 import pytest
+import soundfile
 from can_frames import plain_frames
+from nptdms import ChannelObject, TdmsWriter
 from okid.formats import read_hdf5, read_log, read_mat, read_mdf4, read_parquet, read_record, write_log, write_record
-from okid.formats.by_name import EXTENSIONS
+from okid.formats.by_name import EXTENSIONS, WRITTEN_EXTENSIONS
 from okid.formats.can_log import LOG_EXTENSIONS
 from sample_records import full_record
 
 FRAMES = [f"log{ending}" for ending in LOG_EXTENSIONS]
 RECORDS = [f"record{ending}" for ending in EXTENSIONS]
+WRITTEN = [f"record{ending}" for ending in WRITTEN_EXTENSIONS]
 
 
 def reader(name: str) -> Callable[[Path], object]:
@@ -28,8 +31,13 @@ def reader(name: str) -> Callable[[Path], object]:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("whole")
-    for name in RECORDS:
+    for name in WRITTEN:
         write_record(folder / name, full_record(120))
+    samples = full_record(120).samples[:, 1]
+    for ending in ("wav", "flac"):
+        soundfile.write(folder / f"record.{ending}", samples / 100.0, 1024, subtype="PCM_24")
+    with TdmsWriter(folder / "record.tdms") as file:
+        file.write_segment([ChannelObject("g", "a", samples, properties={"wf_increment": 1e-3})])
     for name in FRAMES:
         write_log(folder / name, plain_frames(80))
     return folder
@@ -106,7 +114,7 @@ def test_a_missing_library_is_named_with_the_remedy(
         read(path)
 
 
-@pytest.mark.parametrize("name", RECORDS + FRAMES)
+@pytest.mark.parametrize("name", WRITTEN + FRAMES)
 def test_what_cannot_be_written_leaves_nothing_behind(tmp_path: Path, name: str) -> None:
     def write(path: Path) -> None:
         _ = write_log(path, plain_frames(5)) if name in FRAMES else write_record(path, full_record(9))

@@ -142,7 +142,7 @@ LINES = "expected JSON lines as `okid run` or `okid replay` writes them with --e
         ("--record", "run.log", f"{RECORD}: `okid convert run.log run.csv -c CONFIG.toml` makes one"),
         ("--record", "log.csv", f"is a log of CAN frames (candump -L), {RECORD}"),
         ("--record", "run.okj", f"{RECORD}: `okid convert run.okj run.csv` makes one"),
-        ("--record", "can.csv", f"{RECORD}: `okid-convert can.csv run.log`, then `okid convert run.log run.csv"),
+        ("--record", "can.csv", f"{RECORD}: `okid-convert can.csv run.csv --config CONFIG.toml"),
         ("--record", "dir", f"is a folder, {RECORD}"),
         ("--record", "words.txt", "the extension is '.txt', expected one of .csv, .uff"),
         ("--events", "result.json", f"is a result of okid, {LINES}"),

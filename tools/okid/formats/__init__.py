@@ -16,8 +16,11 @@ if TYPE_CHECKING:
     from okid.formats.frf_file import read_frf, write_frf
     from okid.formats.hdf5 import read_hdf5, write_hdf5
     from okid.formats.mat import read_mat, write_mat
+    from okid.formats.mcap_file import read_mcap, write_events_mcap, write_mcap
     from okid.formats.mdf4 import read_mdf4, write_mdf4
     from okid.formats.parquet import read_parquet, write_parquet
+    from okid.formats.sound import read_sound
+    from okid.formats.tdms import read_tdms
     from okid.formats.uff import UffFile, read_uff, write_uff
     from okid.formats.uff_function import UffFunction
     from okid.formats.uff_model import UffMode
@@ -35,15 +38,20 @@ __all__ = [
     "read_hdf5",
     "read_log",
     "read_mat",
+    "read_mcap",
     "read_mdf4",
     "read_parquet",
     "read_record",
+    "read_sound",
+    "read_tdms",
     "read_uff",
     "write_csv",
+    "write_events_mcap",
     "write_frf",
     "write_hdf5",
     "write_log",
     "write_mat",
+    "write_mcap",
     "write_mdf4",
     "write_parquet",
     "write_record",
@@ -58,8 +66,11 @@ _NAMES = {
     "okid.formats.frf_file": "read_frf, write_frf",
     "okid.formats.hdf5": "read_hdf5, write_hdf5",
     "okid.formats.mat": "read_mat, write_mat",
+    "okid.formats.mcap_file": "read_mcap, write_events_mcap, write_mcap",
     "okid.formats.mdf4": "read_mdf4, write_mdf4",
     "okid.formats.parquet": "read_parquet, write_parquet",
+    "okid.formats.sound": "read_sound",
+    "okid.formats.tdms": "read_tdms",
     "okid.formats.uff": "UffFile, read_uff, write_uff",
     "okid.formats.uff_function": "UffFunction",
     "okid.formats.uff_model": "UffMode",

@@ -14,13 +14,15 @@ from okid.formats.csv_file import write_csv
 from okid.formats.foreign_library import reading
 from okid.formats.hdf5 import read_hdf5, write_hdf5
 from okid.formats.mat import read_mat, write_mat
+from okid.formats.mcap_file import read_mcap, write_mcap
 from okid.formats.mdf4 import read_mdf4, write_mdf4
 from okid.formats.parquet import read_parquet, write_parquet
+from okid.formats.sound import read_sound
+from okid.formats.tdms import read_tdms
 from okid.formats.uff import read_uff, write_uff
 from okid.result.result import Result
 
 Part = int | str | None
-EXTENSIONS = (".csv", ".uff", ".unv", ".mf4", ".h5", ".hdf5", ".mat", ".parquet")
 RESULT_EXTENSIONS = (".uff", ".unv", ".h5", ".hdf5", ".mat")
 
 
@@ -29,14 +31,12 @@ def _only_part(path: str | Path, group: Part) -> None:
         raise InputError(f"{path}: group {group!r} asked for, but this format has no groups")
 
 
-def _read_csv(path: str | Path, group: Part) -> Record:
-    _only_part(path, group)
-    return read_csv(path)
+def _whole(read: Callable[[str | Path], Record]) -> Callable[[str | Path, Part], Record]:
+    def only(path: str | Path, group: Part) -> Record:
+        _only_part(path, group)
+        return read(path)
 
-
-def _read_parquet(path: str | Path, group: Part) -> Record:
-    _only_part(path, group)
-    return read_parquet(path)
+    return only
 
 
 def _read_uff(path: str | Path, group: Part) -> Record:
@@ -46,14 +46,18 @@ def _read_uff(path: str | Path, group: Part) -> Record:
 
 
 _READERS: dict[str, Callable[[str | Path, Part], Record]] = {
-    ".csv": _read_csv,
+    ".csv": _whole(read_csv),
     ".uff": _read_uff,
     ".unv": _read_uff,
     ".mf4": read_mdf4,
     ".h5": read_hdf5,
     ".hdf5": read_hdf5,
     ".mat": read_mat,
-    ".parquet": _read_parquet,
+    ".parquet": _whole(read_parquet),
+    ".mcap": _whole(read_mcap),
+    ".tdms": read_tdms,
+    ".wav": _whole(read_sound),
+    ".flac": _whole(read_sound),
 }
 _WRITERS: dict[str, Callable[[str | Path, Record], None]] = {
     ".csv": write_csv,
@@ -64,7 +68,9 @@ _WRITERS: dict[str, Callable[[str | Path, Record], None]] = {
     ".hdf5": write_hdf5,
     ".mat": write_mat,
     ".parquet": write_parquet,
+    ".mcap": write_mcap,
 }
+EXTENSIONS, WRITTEN_EXTENSIONS = tuple(_READERS), tuple(_WRITERS)
 
 
 def _ending(path: str | Path, known: tuple[str, ...]) -> str:
@@ -75,11 +81,11 @@ def _ending(path: str | Path, known: tuple[str, ...]) -> str:
 
 
 def read_record(path: str | Path, *, group: Part = None, fs: float | None = None) -> Record:
-    """Read measured samples from .csv, .uff, .unv, .mf4, .h5, .hdf5, .mat or .parquet.
+    """Read measured samples from .csv, .uff, .unv, .mf4, .h5, .hdf5, .mat, .parquet, .mcap, .tdms, .wav or .flac.
 
     group: which part, where a file holds several of different length or rate: the number that the error message
-    lists (UFF, MDF4), the path inside the file (HDF5), variable names with commas (.mat). fs: Hz, overrides what the
-    file says. InputError of one line names the file and what is wrong with it.
+    lists (UFF, MDF4, TDMS), the path inside the file (HDF5), variable names with commas (.mat). fs: Hz, overrides what
+    the file says. InputError of one line names the file and what is wrong with it.
     """
     record = _READERS[_ending(path, EXTENSIONS)](path, group)
     if fs is not None:
@@ -90,11 +96,12 @@ def read_record(path: str | Path, *, group: Part = None, fs: float | None = None
 
 
 def write_record(path: str | Path, record: Record) -> None:
-    """Write measured samples as .csv, .uff, .unv, .mf4, .h5, .hdf5, .mat or .parquet, whole or not at all.
+    """Write measured samples as .csv, .uff, .unv, .mf4, .h5, .hdf5, .mat, .parquet or .mcap, whole or not at all.
 
-    InputError names what the format cannot hold (UFF and MDF4 want a sample rate) or why the file cannot be written.
+    InputError names what the format cannot hold (UFF, MDF4 and MCAP want a sample rate) or why the file cannot be
+    written.
     """
-    _WRITERS[_ending(path, EXTENSIONS)](path, record)
+    _WRITERS[_ending(path, WRITTEN_EXTENSIONS)](path, record)
 
 
 def write_result(path: str | Path, result: Result | Mapping[str, Any], geometry: Geometry | None = None) -> None:

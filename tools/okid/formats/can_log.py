@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import re
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ import can
 from okid._errors import InputError
 from okid.formats.bus_mdf4 import bus_number, write_bus_mdf4
 from okid.formats.candump_text import log_line
-from okid.formats.foreign_library import library, reading, writing
+from okid.formats.foreign_library import Complaints, library, listening, reading, writing
 from okid.formats.log_names import FRAME_CSV_HEAD, LOG_EXTENSIONS, is_frame_csv
 from okid.formats.mdf4 import quiet_asammdf
 
@@ -26,7 +26,14 @@ _LINE = re.compile(
     r"(?:#(?P<flags>[0-9A-Fa-f])(?P<fd>(?:[0-9A-Fa-f]{2})*)|(?P<remote>[Rr])(?P<dlc>[0-8])?|"
     r"(?P<data>(?:[0-9A-Fa-f]{2}){0,8}))(?:_[0-9A-Fa-f])?(?:[ \t]+(?P<way>[RT]))?"
 )
-_FORMS = "(seconds) interface ID#data, ID##flags data or ID#R, as candump -L writes it"
+# What candump shows on a terminal with -t a, A, d or z, and with -x; not its ASCII column, which -a adds.
+_SHOWN = re.compile(
+    r"[ \t]*\((?P<time>\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+|\d+\.\d+)\)[ \t]+(?P<bus>[!-~]+)[ \t]+"
+    r"(?:(?P<way>[RT])X (?P<brs>[B-]) (?P<esi>[E-])[ \t]+)?"
+    r"(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})[ \t]+\[(?P<dlc>\d{1,2})\]"
+    r"(?P<data>(?:[ \t]+[0-9A-Fa-f]{2})*)(?P<remote>[ \t]+remote request)?(?:[ \t]+ERRORFRAME)?(?:[ \t]+'.*')?"
+)
+_FORMS = "(seconds) interface ID#data, ID##flags data or ID#R, as candump -L writes it, or what candump -t a shows"
 
 
 def _cannot_hold(extension: str, frame: can.Message) -> str | None:
@@ -82,14 +89,50 @@ def _candump_frame(found: re.Match[str]) -> can.Message:
     )  # fmt: skip
 
 
-def _candump(path: str | Path) -> Iterator[can.Message]:
+def _shown_frame(found: re.Match[str], time_s: float) -> can.Message:
+    number, data = int(found["id"], 16), bytes.fromhex(found["data"] or "")
+    error = len(found["id"]) == 8 and bool(number & 0x20000000)
+    given: dict[str, Any] = {"is_remote_frame": True, "dlc": int(found["dlc"])} if found["remote"] else {"data": data}
+    if len(found["dlc"]) == 2:  # so candump shows CAN FD
+        given |= {"is_fd": True, "bitrate_switch": found["brs"] == "B", "error_state_indicator": found["esi"] == "E"}
+    if not found["remote"] and len(data) != int(found["dlc"]):
+        raise InputError(f"{found[0][:60]!r} shows {len(data)} bytes and states {int(found['dlc'])}")
+    return can.Message(
+        timestamp=time_s, arbitration_id=number & 0x1FFFFFFF, is_extended_id=len(found["id"]) == 8,
+        is_error_frame=error, channel=found["bus"], is_rx=found["way"] != "T", **given,
+    )  # fmt: skip
+
+
+def _shows_steps(path: str | Path) -> bool:
+    """Whether the times are those since the frame before (candump -t d): they fall, others only grow."""
+    before = 0.0
+    with open(path, encoding="utf-8", newline="") as file:
+        for line in file:
+            found = _SHOWN.fullmatch(line.rstrip("\r\n "))
+            if found is None or "-" in found["time"]:
+                return False
+            if float(found["time"]) < before:
+                return True
+            before = float(found["time"])
+    return False
+
+
+def _candump(path: str | Path, remarks: list[str]) -> Iterator[can.Message]:
     """python-can's own reader takes error frames of candump for data frames and drops the length of remote ones."""
+    steps, before = None, 0.0
     with open(path, encoding="utf-8", newline="") as file:
         for number, line in enumerate(file, 1):
             text = line.rstrip("\r\n ")
-            found = _LINE.fullmatch(text)
-            if found is not None:
+            if (found := _LINE.fullmatch(text)) is not None:
                 yield _candump_frame(found)
+            elif (found := _SHOWN.fullmatch(text)) is not None:
+                if steps is None and (steps := _shows_steps(path)):
+                    remarks.append("times are steps from frame to frame (candump -t d): added up from 0")
+                if "-" in found["time"]:  # candump -t A: of the local clock
+                    before = datetime.fromisoformat(found["time"]).astimezone().timestamp()
+                else:
+                    before = float(found["time"]) + (before if steps else 0.0)
+                yield _shown_frame(found, before)
             elif text:
                 raise InputError(f"{path}:{number}: found {text[:60]!r}, expected {_FORMS}")
 
@@ -113,35 +156,10 @@ def _whole(frame: can.Message, number: int) -> can.Message:
     return frame
 
 
-class _Complaints(logging.Handler):
+def _left_out(complaints: Complaints) -> list[str]:
     """What python-can has to say about lines that it skips."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.texts: list[str] = []
-        self.count = 0
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.count += 1
-        if self.count == 1:
-            self.texts.append(" ".join(record.getMessage().split())[:120])
-
-    def remark(self) -> list[str]:
-        lines = "line was" if self.count == 1 else "lines were"
-        return [f"{self.count} {lines} not understood and left out ({self.texts[0]})"] if self.count else []
-
-
-@contextlib.contextmanager
-def _listening() -> Iterator[_Complaints]:
-    log, ear = logging.getLogger("can"), _Complaints()
-    spread = log.propagate
-    log.addHandler(ear)
-    log.propagate = False
-    try:
-        yield ear
-    finally:
-        log.removeHandler(ear)
-        log.propagate = spread
+    lines = "line was" if complaints.count == 1 else "lines were"
+    return [f"{complaints.count} {lines} not understood and left out ({complaints.first})"] if complaints.count else []
 
 
 def read_log(path: str | Path, remarks: list[str] | None = None) -> Iterator[can.Message]:
@@ -154,16 +172,17 @@ def read_log(path: str | Path, remarks: list[str] | None = None) -> Iterator[can
     extension = _extension(path)
     if extension == ".mf4":
         library("asammdf", "MDF")
-    with reading(path, f"a {extension} log of CAN frames"), quiet_asammdf(), _listening() as complaints:
+    with reading(path, f"a {extension} log of CAN frames"), quiet_asammdf(), listening("can") as complaints:
         if extension == ".csv" and not is_frame_csv(path):
             raise InputError(f"is no table of frames of python-can, expected the header {FRAME_CSV_HEAD}")
         count = 0
-        for frame in _candump(path) if extension == ".log" else _library_frames(path, extension):
+        told = remarks if remarks is not None else []
+        for frame in _candump(path, told) if extension == ".log" else _library_frames(path, extension):
             count += 1
             frame.channel = _bus_name(extension, frame.channel)
             yield _whole(frame, count)
         if remarks is not None:
-            remarks += complaints.remark()
+            remarks += _left_out(complaints)
         if count == 0:
             raise InputError(f"holds no CAN frame, expected a {extension} log")
 

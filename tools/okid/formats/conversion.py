@@ -6,14 +6,24 @@ from __future__ import annotations
 import argparse
 import hashlib
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from okid._errors import Error, InputError
 from okid.data.geometry import read_geometry
 from okid.data.interrupt import EXIT_INTERRUPTED
-from okid.formats.by_name import EXTENSIONS, RESULT_EXTENSIONS, read_record, write_record, write_result
+from okid.data.records import Record
+from okid.formats.by_name import (
+    EXTENSIONS,
+    RESULT_EXTENSIONS,
+    WRITTEN_EXTENSIONS,
+    read_record,
+    write_record,
+    write_result,
+)
 from okid.formats.log_names import LOG_EXTENSIONS, is_frame_csv
+from okid.formats.mcap_file import write_events_mcap
 from okid.formats.mdf4 import holds_frames
 from okid.formats.result_tree import load_result
 from okid.formats.uff import uff_losses
@@ -23,12 +33,14 @@ _FRAMES_ONLY = (".log", ".asc", ".blf", ".trc", ".db")
 
 
 def _kind(path: Path, read: bool) -> str:
-    """ "frames", "record", "result" or "either" by the name, for files to read by a look at .csv and .mf4 too."""
+    """ "frames", "record", "result", "events" or "either" by the name; files .csv and .mf4 are looked into."""
     ending = path.suffix.lower()
     if ending == ".okj":
         raise InputError(f"{path}: a journal is read and written by the program: okid convert {path} OUT.log")
     if ending == ".json" and read:
         return "result"
+    if ending == ".jsonl" and read:
+        return "events"
     if (
         ending in _FRAMES_ONLY
         or path.name.lower().endswith(".can.csv")
@@ -37,20 +49,23 @@ def _kind(path: Path, read: bool) -> str:
         return "frames"
     if ending == ".mf4":
         return "either" if not read else "frames" if holds_frames(path) else "record"
-    if ending in EXTENSIONS:
+    samples = EXTENSIONS if read else WRITTEN_EXTENSIONS
+    if ending in samples:
         return "record"
-    known = sorted({*EXTENSIONS, *LOG_EXTENSIONS, *([".json"] if read else [])})
+    known = sorted({*samples, *LOG_EXTENSIONS, *([".json", ".jsonl"] if read else [])})
     raise InputError(f"{path}: the extension is {ending!r}, expected one of {', '.join(known)}")
 
 
-def _check_pair(source: Path, target: Path, given: str, wanted: str) -> None:
-    if given == "frames" and wanted == "record":
-        log = source if source.suffix.lower() == ".log" else source.with_suffix(".log")
-        first = "" if log == source else f"okid-convert {source} {log}, then "
+def _check_pair(source: Path, target: Path, given: str, wanted: str, config: str | None) -> None:
+    if given == "frames" and wanted == "record" and config is None:
         raise InputError(
             f"{source} holds CAN frames and {target} would hold samples: which bits are which channel is in a "
-            f"CONFIG.toml, so {first}okid convert {log} OUT.csv -c CONFIG.toml (a table of frames: OUT.can.csv)"
+            f"CONFIG.toml, so give --config CONFIG.toml (a table of frames: OUT.can.csv)"
         )
+    if config is not None and (given, wanted) != ("frames", "record"):
+        raise InputError("--config says which bits of CAN frames are which channel: IN holds frames, OUT samples")
+    if given == "events" and target.suffix.lower() != ".mcap":
+        raise InputError(f"{target}: events are written as .mcap")
     if given == "record" and wanted == "frames":
         raise InputError(
             f"{source} holds samples and {target} would hold CAN frames: which bits are which channel is in a "
@@ -72,8 +87,22 @@ def _convert_frames(args: argparse.Namespace, source: Path, target: Path) -> str
     return f"{target}: {summary.frames} frames over {span:.3f} s"
 
 
+def _decoded(args: argparse.Namespace, source: Path) -> Record:
+    """The samples in a log of frames, on the grid of the config: `okid convert` makes them."""
+    from okid.capture.program import run_program
+    from okid.formats.can_log import convert_log
+
+    if args.group is not None or args.fs is not None:
+        raise InputError("--group and --fs are for files of samples; the rate of decoded frames is that of --config")
+    with tempfile.TemporaryDirectory() as folder:
+        log, table = Path(folder, "frames.log"), Path(folder, "samples.csv")
+        _note(convert_log(source, log).remarks)
+        run_program("convert", log, table, "-c", args.config)
+        return read_record(table)
+
+
 def _convert_record(args: argparse.Namespace, source: Path, target: Path) -> str:
-    record = read_record(source, group=args.group, fs=args.fs)
+    record = _decoded(args, source) if args.config else read_record(source, group=args.group, fs=args.fs)
     if args.channels is not None:
         record = record.select([name.strip() for name in args.channels.split(",")], str(source))
     with source.open("rb") as file:
@@ -106,7 +135,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="okid-convert",
         description="Convert measured samples, identified models or logs of CAN frames by file name extension. "
-        f"Samples: {', '.join(EXTENSIONS)}. Models: .json (okid.result/1) to {', '.join(RESULT_EXTENSIONS)}. "
+        f"Samples: {', '.join(EXTENSIONS)} (the last three only read). Models: .json (okid.result/1) to "
+        f"{', '.join(RESULT_EXTENSIONS)}. Events: .jsonl (okid run --events) to .mcap. "
         "Logs: .log (candump -L), .asc, .blf, .trc, .db, .mf4, .can.csv.",
         epilog="examples: okid-convert run.mf4 run.csv --channels force,a1,a2; "
         "okid-convert result.json modes.uff --geometry frame.toml; okid-convert trace.blf trace.log",
@@ -121,6 +151,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--geometry", metavar="CONFIG.toml", help="its [geometry] gives a model's nodes and lines in .uff"
     )
+    parser.add_argument(
+        "--config", metavar="CONFIG.toml", help="decode a log of CAN frames into samples by this config"
+    )
     parser.add_argument("--force", action="store_true", help="replace OUT when it is there")
     return parser
 
@@ -130,7 +163,7 @@ def _run(args: argparse.Namespace) -> str:
     if not source.exists():
         raise InputError(f"{source}: No such file or directory")
     given, wanted = _kind(source, True), _kind(target, False)
-    _check_pair(source, target, given, wanted)
+    _check_pair(source, target, given, wanted, args.config)
     if args.geometry is not None and (given != "result" or target.suffix.lower() not in (".uff", ".unv")):
         raise InputError("--geometry is for an identified model written as .uff or .unv")
     if target.exists() and target.samefile(source):
@@ -138,8 +171,11 @@ def _run(args: argparse.Namespace) -> str:
     if target.exists() and (target.is_dir() or not args.force):
         remedy = "" if target.is_dir() else ": give --force to replace it"
         raise InputError(f"{target}: is there already{remedy}")
-    if given == "frames":
+    if given == "frames" and not args.config:
         return _convert_frames(args, source, target)
+    if given == "events":
+        with source.open("rb") as lines:
+            return f"{target}: {write_events_mcap(target, lines)} events"
     return _convert_result(args, source, target) if given == "result" else _convert_record(args, source, target)
 
 

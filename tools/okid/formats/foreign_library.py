@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -61,3 +62,30 @@ def writing(path: str | Path) -> Iterator[Path]:
 def _one_line(fault: BaseException) -> str:
     text = " ".join(str(fault).split())
     return f"{type(fault).__name__}: {text[:160]}" if text else type(fault).__name__
+
+
+class Complaints(logging.Handler):
+    """How many warnings a library gave, and the first of them."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.first = ""
+        self.count = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.count += 1
+        self.first = self.first or " ".join(record.getMessage().split())[:120]
+
+
+@contextlib.contextmanager
+def listening(name: str) -> Iterator[Complaints]:
+    """What goes to the log `name` meanwhile, which nobody else hears."""
+    log, ear = logging.getLogger(name), Complaints()
+    spread = log.propagate
+    log.addHandler(ear)
+    log.propagate = False
+    try:
+        yield ear
+    finally:
+        log.removeHandler(ear)
+        log.propagate = spread

@@ -10,7 +10,6 @@ import logging
 import re
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from html import unescape
 from pathlib import Path
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from okid._errors import InputError
 from okid.data.records import Record, even_rate
 from okid.formats.foreign_library import library, reading, writing
+from okid.formats.rasters import Raster, choose_raster, sort_in
 
 Real = NDArray[np.float64]
 _MARK = "okid record "
@@ -52,25 +52,6 @@ def write_mdf4(path: str | Path, record: Record) -> None:
             saved.replace(part)
 
 
-@dataclass
-class _Raster:
-    """The channels that share one row of time stamps."""
-
-    times_s: Real
-    names: list[str] = field(default_factory=list)
-    units: list[str] = field(default_factory=list)
-    columns: list[Real] = field(default_factory=list)
-
-    def fits(self, times_s: Real) -> bool:
-        return len(times_s) == len(self.times_s) and np.allclose(times_s, self.times_s, rtol=0.0, atol=1e-9)
-
-    def text(self, number: int) -> str:
-        rate = even_rate(self.times_s)
-        grid = f"{rate:g} Hz" if isinstance(rate, float) else "uneven"
-        shown = ", ".join(self.names[:6]) + (" .." if len(self.names) > 6 else "")
-        return f"{number}: {shown} ({len(self.times_s)} samples, {grid})"
-
-
 def _samples(signal: Any) -> Real | None:
     """A channel as float64, NaN where its invalidation bit is set; None when it holds no numbers."""
     values = np.asarray(signal.samples)
@@ -83,8 +64,8 @@ def _samples(signal: Any) -> Real | None:
     return column
 
 
-def _rasters(file: Any, remarks: list[str]) -> list[_Raster]:
-    found: list[_Raster] = []
+def _rasters(file: Any, remarks: list[str]) -> list[Raster]:
+    found: list[Raster] = []
     for number, group in enumerate(file.groups):
         master = file.masters_db.get(number)
         for place, channel in enumerate(group.channels):
@@ -99,33 +80,8 @@ def _rasters(file: Any, remarks: list[str]) -> list[_Raster]:
             if column is None:
                 remarks.append(f"{channel.name} is left out: it holds no numbers")
             elif len(column):
-                _sort_in(found, str(channel.name), str(signal.unit or ""), np.asarray(signal.timestamps, float), column)
+                sort_in(found, str(channel.name), str(signal.unit or ""), np.asarray(signal.timestamps, float), column)
     return found
-
-
-def _sort_in(found: list[_Raster], name: str, unit: str, times_s: Real, column: Real) -> None:
-    raster = next((one for one in found if one.fits(times_s)), None)
-    if raster is None:
-        raster = _Raster(times_s)
-        found.append(raster)
-    raster.names.append(name.strip() or f"channel {len(raster.names) + 1}")
-    raster.units.append(unit.strip())
-    raster.columns.append(column)
-
-
-def _choose(rasters: list[_Raster], group: int | str | None) -> _Raster:
-    if not rasters:
-        raise InputError("holds no channel with samples")
-    listed = "; ".join(one.text(k) for k, one in enumerate(rasters, 1))
-    if group is None:
-        if len(rasters) > 1:
-            raise InputError(
-                f"channels of {len(rasters)} rasters, okid does not resample: choose with group= or --group ({listed})"
-            )
-        return rasters[0]
-    if not str(group).isdigit() or not 1 <= int(group) <= len(rasters):
-        raise InputError(f"group is {group!r}, expected one of {listed}")
-    return rasters[int(group) - 1]
 
 
 def _own_words(comment: str) -> dict[str, Any] | None:
@@ -142,7 +98,7 @@ def _own_words(comment: str) -> dict[str, Any] | None:
 
 def _record(file: Any, group: int | str | None) -> Record:
     remarks: list[str] = []
-    raster = _choose(_rasters(file, remarks), group)
+    raster = choose_raster(_rasters(file, remarks), group)
     samples, about = np.column_stack(raster.columns), _own_words(str(file.header.comment or ""))
     if about is not None and about.get("names") == raster.names and about.get("units") == raster.units:
         return Record.described(samples, about, remarks)

@@ -47,7 +47,7 @@ _INSTEAD = {
     "the table itself goes behind --record",
     ("record", "log"): "`okid convert {path} run.csv -c CONFIG.toml` makes one",
     ("record", "journal"): "`okid convert {path} run.csv` makes one",
-    ("record", "frames"): "`okid-convert {path} run.log`, then `okid convert run.log run.csv -c CONFIG.toml` makes one",
+    ("record", "frames"): "`okid-convert {path} run.csv --config CONFIG.toml` makes one",
     ("record", "events"): "give it behind --events",
     ("record", "config"): "give it behind --config",
     ("events", "config"): "give it behind --config",

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: MIT
+"""MCAP through the library `mcap`: samples and events as JSON messages that Foxglove and PlotJuggler plot.
+
+A sample of the grid is a message of the topic /signals, with its number and a value a channel (null = missing); an
+event is a message of /modes, /alarm .. as in the events file. The record's description is the metadata "okid.record/1".
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from okid._errors import InputError
+from okid.data.records import Record
+from okid.formats.foreign_library import library, reading, writing
+
+SIGNALS = "/signals"
+_ABOUT = "okid.record/1"
+_TIME = {
+    "type": "object",
+    "title": "time",
+    "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}},
+}
+
+
+class McapFile:
+    """Signals and events into an open binary file; close() writes the index, without which readers scan the file."""
+
+    def __init__(self, file: IO[bytes], start_ns: int) -> None:
+        self._writer = library("mcap.writer", "MCAP").Writer(file)
+        self._writer.start(profile="", library="okid")
+        self._start_ns = start_ns
+        self._topics: dict[str, int] = {}
+        self._names: list[str] = []
+        self._fs_hz = 0.0
+
+    def close(self) -> None:
+        """Nothing can be written any more."""
+        self._writer.finish()
+
+    def describe(self, about: dict[str, Any]) -> None:
+        """Names, units, rate .. of the signals, as Record.about() gives them: before the first sample."""
+        self._names, self._fs_hz = list(about["names"]), float(about["fs_hz"])
+        self._writer.add_metadata(_ABOUT, {"json": json.dumps(about)})
+        values = {
+            name: {"type": ["number", "null"], "description": unit}
+            for name, unit in zip(self._names, about["units"], strict=True)
+        }
+        self._topic(SIGNALS, "okid.Signals", {"timestamp": _TIME, "sample": {"type": "integer"}, **values})
+
+    def samples(self, first: int, rows: Iterable[Sequence[float | None]]) -> None:
+        """Rows of the grid from sample number `first` on, one value a channel, None or NaN = missing."""
+        for number, row in enumerate(rows, first):
+            ns = self._start_ns + round(number * 1e9 / self._fs_hz)
+            stamp = {"sec": ns // 1_000_000_000, "nsec": ns % 1_000_000_000}
+            values = [None if value is None or value != value else value for value in row]
+            self._put(
+                self._topics[SIGNALS],
+                ns,
+                {"timestamp": stamp, "sample": number, **dict(zip(self._names, values, strict=True))},
+            )
+
+    def event(self, event: dict[str, Any]) -> None:
+        """An event of okid run under its own topic, at its stream time."""
+        kind = str(event["type"])
+        channel = self._topics.get(f"/{kind}") or self._topic(f"/{kind}", f"okid.{kind}", {"t": {"type": "number"}})
+        self._put(channel, self._start_ns + round(float(event.get("t") or 0.0) * 1e9), event)
+
+    def _topic(self, topic: str, name: str, properties: dict[str, Any]) -> int:
+        text = json.dumps({"type": "object", "title": name, "properties": properties})
+        schema = self._writer.register_schema(name, "jsonschema", text.encode())
+        channel: int = self._writer.register_channel(topic, "json", schema)
+        self._topics[topic] = channel
+        return channel
+
+    def _put(self, channel: int, ns: int, message: dict[str, Any]) -> None:
+        self._writer.add_message(channel, log_time=ns, publish_time=ns, data=json.dumps(message).encode())
+
+
+def write_mcap(path: str | Path, record: Record) -> None:
+    """Write a record as MCAP: one JSON message a sample, numbers with the digits that give the same bits.
+
+    A record without a start time begins at 1970-01-01. InputError when the rate is not known, a channel is named
+    timestamp or sample, mcap is missing or the file cannot be written.
+    """
+    if record.fs_hz is None:
+        raise InputError(f"{path}: MCAP needs a sample rate and the record has none: give fs_hz (okid-convert --fs)")
+    about = record.about()
+    taken = {"timestamp", "sample"} & set(about["names"])
+    if taken:
+        raise InputError(
+            f"{path}: a channel is named {taken.pop()!r}, as MCAP messages name their time: choose --channels"
+        )
+    library("mcap.writer", "MCAP")
+    with writing(path) as part, part.open("wb") as out:
+        file = McapFile(out, 0 if record.start_time is None else nanoseconds(record.start_time))
+        file.describe(about)
+        file.samples(0, map(np.ndarray.tolist, record.samples))
+        file.close()
+
+
+def nanoseconds(when: datetime) -> int:
+    """Since 1970; exact, as a float of seconds is not."""
+    since = when - datetime(1970, 1, 1, tzinfo=UTC)
+    return (since.days * 86400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
+
+
+def read_mcap(path: str | Path) -> Record:
+    """Read the topic /signals of an MCAP file that okid wrote; samples that are not there are NaN.
+
+    InputError when there is none, mcap is missing or the file is damaged.
+    """
+    stream, kinds = library("mcap.stream_reader", "MCAP"), library("mcap.records", "MCAP")
+    about: dict[str, Any] | None = None
+    rows: dict[int, list[float | None]] = {}
+    wanted: int | None = None
+    with reading(path, "an MCAP file"), open(path, "rb") as source:
+        for one in stream.StreamReader(source).records:
+            if isinstance(one, kinds.Metadata) and one.name == _ABOUT:
+                about = json.loads(one.metadata["json"])
+            elif isinstance(one, kinds.Channel) and one.topic == SIGNALS:
+                wanted = one.id
+            elif about is not None and isinstance(one, kinds.Message) and one.channel_id == wanted:
+                values = json.loads(one.data)
+                rows[int(values["sample"])] = [values[name] for name in about["names"]]
+        if about is None or not rows:
+            raise InputError(f"has no topic {SIGNALS} with samples as okid writes it")
+        samples = np.full((max(rows) + 1 - min(rows), len(about["names"])), np.nan)
+        for number, row in rows.items():
+            samples[number - min(rows)] = [np.nan if value is None else value for value in row]
+        return Record.described(samples, about)
+
+
+def write_events_mcap(path: str | Path, lines: Iterable[bytes | str]) -> int:
+    """Write the events of okid run or replay (`--events FILE`) as MCAP, a topic each. @return how many."""
+    count = 0
+    library("mcap.writer", "MCAP")
+    with writing(path) as part, part.open("wb") as out:
+        file: McapFile | None = None
+        for number, line in enumerate(lines, 1):
+            event = _event(line, path, number)
+            if file is None:
+                if event["type"] != "start":
+                    raise InputError(f"{path}: the first event is {event['type']!r}, expected 'start'")
+                file = McapFile(out, nanoseconds(datetime.fromisoformat(event["wall_time"])))
+            file.event(event)
+            count += 1
+        if file is None:
+            raise InputError(f"{path}: there is no event to write")
+        file.close()
+    return count
+
+
+def _event(line: bytes | str, path: str | Path, number: int) -> dict[str, Any]:
+    try:
+        event = json.loads(line)
+        if isinstance(event, dict) and isinstance(event.get("type"), str):
+            return event
+    except ValueError:
+        pass
+    raise InputError(f"{path}: line {number} of the events is no JSON object with a type")
