@@ -25,8 +25,9 @@ static double direct_work(const okid_correlation_config_t* c, double rows) {
     return (c->sample == OKID_SAMPLE_DOUBLE ? 2 : 16) * rows * rows_of(c) * c->n_u * (c->lags + 1.0);
 }
 static double block_work(const okid_correlation_config_t* c, double points) {
-    const double forward = (signals_of(c) + REALS - 1) / REALS, back = (rows_of(c) * c->n_u + REALS - 1) / REALS;
-    return points * ((forward + back) * V * 20 * log2(points) + 8.0 * rows_of(c) * c->n_u);
+    const int32_t forward = (signals_of(c) + REALS - 1) / REALS, back = (rows_of(c) * c->n_u + REALS - 1) / REALS;
+    const int32_t lanes = (forward + back) * V;
+    return points * (20.0 * lanes * log2(points) + 8.0 * rows_of(c) * c->n_u);
 }
 
 int32_t okid_correlation_points(const okid_correlation_config_t* c) {
