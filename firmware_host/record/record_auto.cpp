@@ -6,6 +6,7 @@
 
 #include "ambient_bound.hpp"
 #include "carrier.hpp"
+#include "combinations.hpp"
 #include "consensus/lines.hpp"
 #include "error.hpp"
 #include "files/side_by_side.hpp"
@@ -376,6 +377,9 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
         remove_means(work.set);
     }
     make_modal_model(listed, options.fs_hz, work);
+    if (work.set.n_u > 0) fit_records(work.set, work.model, work.context); // the states it needs to begin with
+    if (options.modes.empty() && mark_combinations(listed, options.fs_hz, work))
+        make_modal_model(listed, options.fs_hz, work);
     if (refine_agreed(options, listed, work)) make_modal_model(listed, options.fs_hz, work);
     if (work.set.n_u > 0) fit_records(work.set, work.model, work.context); // the states it needs to begin with
     remark_unsteady(listed, options.fs_hz, work);

@@ -6,6 +6,8 @@
 //          depend on the envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line
 #include "steadiness.hpp"
 
+#include "modal_answer.hpp"
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -79,13 +81,6 @@ slopes slopes_of(const std::vector<block_frequency>& over, double block_frequenc
     return out;
 }
 
-/// One record run through the model: the states of its modes, and what is left of the outputs.
-struct answered_record {
-    std::vector<std::vector<complex>> states; ///< modes, samples
-    std::vector<double> left;                 ///< samples x n_y, NaN where a sample is missing
-    std::size_t count = 0;
-};
-
 struct steady_search {
     const record_set& set;
     std::vector<const listed_mode*> modes; ///< those in the model
@@ -93,38 +88,6 @@ struct steady_search {
     double fs_hz;
     std::vector<double> spread; ///< of each output's residual
 };
-
-answered_record answer(const steady_search& s, const record_work& work, std::size_t r) {
-    const record_set& set = s.set;
-    const record_data& record = set.records[r];
-    const Eigen::Map<const Eigen::MatrixXd> B(work.model.B, work.model.n_z, work.model.n_u),
-        D(work.model.D, work.model.n_y, work.model.n_u);
-    answered_record out;
-    out.states.resize(s.mu.size());
-    std::vector<complex> q;
-    for (std::size_t k = 0; k < s.mu.size(); ++k)
-        q.emplace_back((*work.context.x0)[r][2 * k], (*work.context.x0)[r][2 * k + 1]);
-    for (std::size_t t = 0; t < record.count; ++t, ++out.count) {
-        const double* row = set.rows(record) + t * set.channels();
-        if (std::any_of(row, row + set.n_u, [](double u) { return std::isnan(u); })) break;
-        for (std::size_t o = 0; o < set.n_y; ++o) {
-            double left = row[set.n_u + o];
-            for (std::size_t k = 0; k < q.size(); ++k) left -= (s.modes[k]->shape[o] * q[k]).real();
-            for (std::size_t j = 0; j < set.n_u; ++j)
-                left -= D(static_cast<Eigen::Index>(o), static_cast<Eigen::Index>(j)) * row[j];
-            out.left.push_back(left);
-        }
-        for (std::size_t k = 0; k < q.size(); ++k) {
-            out.states[k].push_back(q[k]);
-            q[k] *= s.mu[k];
-            for (std::size_t j = 0; j < set.n_u; ++j)
-                q[k] += complex(B(static_cast<Eigen::Index>(2 * k), static_cast<Eigen::Index>(j)),
-                                B(static_cast<Eigen::Index>(2 * k) + 1, static_cast<Eigen::Index>(j))) *
-                        row[j];
-        }
-    }
-    return out;
-}
 
 /// The correction of one pole over samples first … first + length - 1.
 block_frequency corrected(const steady_search& s, const answered_record& record, std::size_t k, std::size_t first,
@@ -169,7 +132,7 @@ std::vector<std::vector<block_frequency>> with_force(steady_search& s, const rec
     std::vector<std::vector<block_frequency>> out(s.modes.size());
     double seconds_before = 0;
     for (std::size_t r = 0; r < s.set.records.size(); ++r) {
-        const answered_record record = answer(s, work, r);
+        const answered_record record = answer(work, s.modes, r);
         s.spread.assign(s.set.n_y, 1e-300);
         for (std::size_t o = 0; o < s.set.n_y; ++o) {
             double square = 0, n = 0;

@@ -20,6 +20,7 @@ TRUE = {
     "level_dependent": {"silverbox_multisine", "silverbox_arrow", "frame3_flex_sine10", "frame3_flex_quake",
                         "frame3_flex_sine15", "frame3_flex_sine20", "frame3_flex_decay", "ridgecrest_0704",
                         "ridgecrest_0706", "ridgecrest_0822", "ridgecrest_200604", "ridgecrest_200624"},
+    "nonlinear": {f"frame3_flex_{name}" for name in ("quake", "sine10", "sine15", "sine20", "decay")},  # so its owner
     "screened": {"tower_wn1"},
 }  # fmt: skip
 UNKNOWN = {("level_dependent", f"tower_wn{k}") for k in (1, 2, 3)}  # all three agree in sign

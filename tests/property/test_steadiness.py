@@ -65,18 +65,32 @@ def codes(lab: Laboratory) -> set[str]:
 )
 def test_integrated(cubic: float, drift: float, code: str | None) -> None:
     u, y = integrated(cubic, drift)
-    said = {w.code: w.text for w in okid.identify(u, y, fs=FS, sigma_blocks=0).warnings}
+    result = okid.identify(u, y, fs=FS, sigma_blocks=0)
+    said = {w.code: w.text for w in result.warnings}
+    assert [round(m.frequency_hz) for m in result.modes if m.confident] == [10, 27 + (cubic > 0), 42]
+    assert ("nonlinear" in said) == (cubic != 0)
     assert set(said) & {"level_dependent", "time_varying"} == ({code} if code else set())
     if code:
         sign = "+" if cubic > 0 else "-"
         assert f": {sign}0." in said[code] and " σ)" in said[code]
 
 
+def test_strongly_cubic() -> None:
+    """Subspace methods agree on sums of 10.6, 28 and 42.5 Hz; the linear modes lie at 10.3, 27.4 and 42.2 Hz."""
+    u, y = integrated(3e6, 0.0)
+    result = okid.identify(u, y, fs=FS, sigma_blocks=0)
+    sure = [mode.frequency_hz for mode in result.modes if mode.confident]
+    assert np.allclose(sure, [10.6, 28.0, 42.5], rtol=0.02), sure
+    assert sum("harmonic" in mode.why for mode in result.modes) >= 2
+    assert any(w.code == "nonlinear" and "2 × 10.62 + 28" in w.text for w in result.warnings)
+    assert "nonlinear" in {w.code for w in okid.identify(None, y, fs=FS, sigma_blocks=0).warnings}
+
+
 @pytest.mark.parametrize("seed", range(40, 46))
 def test_linear_and_forced(seed: int) -> None:
-    assert not codes(forced(seed, count=8000)) & {"level_dependent", "time_varying"}
+    assert not codes(forced(seed, count=8000)) & {"level_dependent", "nonlinear", "time_varying"}
 
 
 def test_linear_and_otherwise() -> None:
     for lab in (ambient(41, True, seconds=300), chain(42, count=10000).lab):
-        assert not codes(lab) & {"level_dependent", "time_varying"}
+        assert not codes(lab) & {"level_dependent", "nonlinear", "time_varying"}

@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  tell modes of a nonlinear structure from the distortion it makes
+// METHOD   a spring that is not straight answers motions at f1, f2 with forces at 2 f1, f1 + f2, 2 f1 + f2 ..., whose amplitude
+//          in a short block is the product of theirs, phase included (higher-order coherence: Kim & Powers 1979). Of a linear
+//          structure under chance forces the phases have nothing to do with each other. With a force it is what the model
+//          leaves that is looked at, and a frequency at which the force drives a resonance is a mode all the same
+#include "combinations.hpp"
+
+#include "consensus/consensus.hpp"
+#include "consensus/spectrum.hpp"
+#include "modal_answer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <functional>
+#include <map>
+#include <numeric>
+
+namespace okid_host {
+namespace {
+
+using complex = std::complex<double>;
+using series = std::vector<double>;
+
+constexpr std::size_t most_bases = 5,
+                      most_mixed = 3; ///< the strongest vibrations, to explain a mode and to look for more
+constexpr std::size_t most_outputs = 8;
+constexpr int most_factors = 3, most_multiple = 5;
+constexpr double product_periods = 6;      ///< of the slowest factor
+constexpr std::size_t product_blocks = 16; ///< to speak of a coherence
+constexpr double in_phase = 0.7;           ///< 1: always; the largest of linear structures is below 0.45
+constexpr double then_in_phase = 0.5, then_frequency = 0.025; ///< where the structure is known not to be linear
+constexpr double surely_in_phase = 0.75; ///< where no mode was found; the largest of linear structures is 0.5
+constexpr double by_chance = 12; ///< blocks times coherence squared: phases of chance exceed it once in e^12 (Rayleigh)
+constexpr double highest = 0.45; ///< of the rate
+constexpr double product_frequency = 0.015;
+constexpr double two_vibrations = 0.03; ///< two vibrations
+constexpr double wandering = 0.15,
+                 one_shape = 0.8;             ///< one vibration whose frequency moves: that close, of one shape (MAC)
+constexpr double next_to = 0.1;               ///< of a mode of the model its own residual is looked at
+constexpr double resonance_peak = 2;          ///< power at a mode over that beside it
+constexpr double left_alone = 0.8;            ///< of the power there: the force has no part in it
+constexpr double undriven = 0.5;              ///< of the power there, where the structure is known not to be linear
+constexpr double lasting = 0.5;               ///< blocks that carry the vibration, of all: a single decay has fewer
+constexpr std::size_t shortest_spectrum = 64; ///< samples of a spectrum
+
+/// One mode along its shape: all of it, and what the forces do not explain.
+struct strand {
+    std::vector<series> all, left;              ///< a record each
+    double power = 0, share_left = 1, peak = 0; ///< at its frequency; peak: of what the forces drive, over beside it
+    double strength = 0;                        ///< amplitude as a displacement
+};
+
+/// Factors and how often each: {base, n}; n < 0: the conjugate.
+using product = std::vector<std::pair<std::size_t, int>>;
+
+struct product_search {
+    const std::vector<listed_mode>& modes;
+    double fs_hz;
+    bool driven;
+    std::vector<strand> strands;
+    std::vector<std::vector<series>> outputs; ///< some of them, a record each: what the forces do not explain
+    std::map<std::pair<std::size_t, std::size_t>, std::vector<complex>> known; ///< amplitudes: mode, block
+
+    const std::vector<complex>& amplitudes(std::size_t mode, std::size_t block);
+};
+
+std::vector<complex> demodulated(const std::vector<series>& records, double cycles, std::size_t block) {
+    std::vector<complex> out;
+    const complex turn = std::polar(1.0, -2 * M_PI * cycles),
+                  step = std::polar(1.0, 2 * M_PI / static_cast<double>(block));
+    std::vector<double> hann;
+    complex at = 1;
+    for (std::size_t i = 0; i < block; ++i, at *= step) hann.push_back((1 - at.real()) / static_cast<double>(block));
+    for (const series& x : records) {
+        complex phase = 1;
+        for (std::size_t first = 0; first + block <= x.size(); first += block) {
+            complex sum = 0;
+            for (std::size_t i = 0; i < block; ++i, phase *= turn) sum += hann[i] * x[first + i] * phase;
+            phase /= std::abs(phase);
+            out.push_back(sum);
+        }
+    }
+    return out;
+}
+
+const std::vector<complex>& product_search::amplitudes(std::size_t mode, std::size_t block) {
+    auto [at, fresh] = known.try_emplace({mode, block});
+    if (fresh) at->second = demodulated(strands[mode].all, modes[mode].frequency_hz / fs_hz, block);
+    return at->second;
+}
+
+/// Mean length of the steps between phases, loud blocks counting more; NaN: missing.
+double coherence(const std::vector<complex>& b, const std::vector<complex>& of) {
+    complex sum = 0;
+    double total = 0, squares = 0;
+    for (std::size_t i = 0; i < b.size(); ++i) {
+        const complex p = b[i] * std::conj(of[i]);
+        const double size = std::sqrt(std::abs(p));
+        if (!(size > 0)) continue;
+        sum += p / size;
+        total += size;
+        squares += size * size;
+    }
+    const double length = total > 0 ? std::abs(sum) / total : 0;
+    return total * total * length * length > by_chance * squares ? length : 0;
+}
+
+/// Every product of the bases with these numbers of factors.
+void each_product(const std::vector<std::size_t>& bases, const std::function<void(const product&)>& see) {
+    std::vector<int> n(bases.size(), -most_factors);
+    const auto next = [&n] {
+        for (int& one : n) {
+            if (++one <= most_factors) return true;
+            one = -most_factors;
+        }
+        return false;
+    };
+    do {
+        const int factors =
+            std::accumulate(n.begin(), n.end(), 0, [](int sum, int one) { return sum + std::abs(one); });
+        if (factors < 2 || factors > most_factors) continue;
+        product out;
+        for (std::size_t i = 0; i < n.size(); ++i)
+            if (n[i] != 0) out.emplace_back(bases[i], n[i]);
+        see(out);
+    } while (next());
+    for (const std::size_t base : bases)
+        for (int multiple = most_factors + 1; multiple <= most_multiple; ++multiple) see({{base, multiple}});
+}
+
+/// Does the vibration last, or does the record hold a single decay?
+bool lasts(const std::vector<complex>& a) {
+    double sum = 0, squares = 0;
+    for (const complex& x : a)
+        if (const double size = std::abs(x); !std::isnan(size)) sum += size, squares += size * size;
+    return sum * sum >= lasting * static_cast<double>(a.size()) * squares;
+}
+
+std::string words_of(const product& of, const std::vector<listed_mode>& modes) {
+    std::string out;
+    for (const auto& [mode, n] : of) {
+        if (!out.empty() || n < 0) out += n < 0 ? (out.empty() ? "−" : " − ") : " + ";
+        if (std::abs(n) > 1) out += fmt::format("{} × ", std::abs(n));
+        out += fmt::format("{:.4g}", modes[mode].frequency_hz);
+    }
+    return out;
+}
+
+/// The strongest vibrations, those that are signed first; of a mode k those that are stronger and not its neighbours.
+std::vector<std::size_t> bases_of(const product_search& s, std::size_t k, std::size_t most) {
+    std::vector<std::size_t> order(s.modes.size()), out;
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return std::make_pair(!s.modes[a].in_model, -s.strands[a].strength) <
+               std::make_pair(!s.modes[b].in_model, -s.strands[b].strength);
+    });
+    const bool any = k == order.size();
+    const auto near = [&](std::size_t a, std::size_t b) {
+        const double e = std::abs(s.modes[a].frequency_hz / s.modes[b].frequency_hz - 1);
+        return e < two_vibrations ||
+               (any && e < wandering && shape_mac(s.modes[a].shape, s.modes[b].shape) > one_shape);
+    };
+    for (const std::size_t i : order)
+        if (out.size() < most && (any || (i != k && s.strands[i].strength > s.strands[k].strength && !near(i, k))) &&
+            std::none_of(out.begin(), out.end(), [&](std::size_t j) { return near(i, j); }))
+            out.push_back(i);
+    return out;
+}
+
+/// How much records follow a product of vibrations; 0 where that cannot be told.
+double following(product_search& s, const std::vector<series>& records, const product& of) {
+    double f = 0, slowest = INFINITY;
+    for (const auto& [i, n] : of) {
+        f += n * s.modes[i].frequency_hz;
+        slowest = std::min(slowest, s.modes[i].frequency_hz);
+    }
+    const auto block = static_cast<std::size_t>(product_periods * s.fs_hz / slowest) + 1;
+    const std::vector<complex> b = demodulated(records, f / s.fs_hz, block);
+    if (b.size() < product_blocks) return 0;
+    std::vector<complex> together(b.size(), 1);
+    for (const auto& [i, n] : of) {
+        const std::vector<complex>& a = s.amplitudes(i, block);
+        if (!s.driven && !lasts(a)) return 0;
+        for (std::size_t t = 0; t < b.size(); ++t) together[t] *= std::pow(n > 0 ? a[t] : std::conj(a[t]), std::abs(n));
+    }
+    return coherence(b, together);
+}
+
+double frequency_of(const product& of, const std::vector<listed_mode>& modes) {
+    return std::accumulate(of.begin(), of.end(), 0.0, [&](double sum, const auto& factor) {
+        return sum + factor.second * modes[factor.first].frequency_hz;
+    });
+}
+
+/// The product that mode k follows, in phase more than so much; empty: none.
+product followed(product_search& s, std::size_t k, double most, double tolerance) {
+    product best;
+    const listed_mode& mode = s.modes[k];
+    each_product(bases_of(s, k, most_bases), [&](const product& of) {
+        const double f = frequency_of(of, s.modes);
+        if (std::abs(f / mode.frequency_hz - 1) > std::max(tolerance, mode.damping_ratio)) return;
+        if (const double found = following(s, s.strands[k].left, of); found > most) most = found, best = of;
+    });
+    return best;
+}
+
+/// The multiples and sums of the strongest vibrations at which some output moves in phase, listed as a mode or not.
+std::vector<product> distortions(product_search& s) {
+    std::vector<product> out;
+    const std::vector<std::size_t> bases = bases_of(s, s.modes.size(), most_mixed);
+    each_product(bases, [&](const product& of) {
+        const double f = frequency_of(of, s.modes);
+        if (f > highest * s.fs_hz || of.front().second > most_factors ||
+            std::any_of(of.begin(), of.end(), [](const auto& factor) { return factor.second < 0; }) ||
+            std::any_of(s.modes.begin(), s.modes.end(), [f](const listed_mode& mode) {
+                return mode.in_model && std::abs(mode.frequency_hz / f - 1) < next_to;
+            }))
+            return;
+        for (const std::vector<series>& output : s.outputs)
+            if (following(s, output, of) > surely_in_phase) {
+                out.push_back(of);
+                return;
+            }
+    });
+    return out;
+}
+
+/// Powers at a mode's frequency of all of it and of what is left; is there a resonance in what the forces drive?
+void weigh(const listed_mode& mode, double fs_hz, strand& one) {
+    std::size_t longest = 0, size = shortest_spectrum;
+    for (const series& x : one.all) longest = std::max(longest, x.size());
+    const double f = mode.frequency_hz / fs_hz;
+    while (8 * size <= longest && mode.damping_ratio * f * static_cast<double>(size) < 2) size *= 2;
+    const double width = std::max(mode.damping_ratio * f, 2 / static_cast<double>(size));
+    std::vector<series> driven = one.all;
+    for (std::size_t r = 0; r < driven.size(); ++r)
+        for (std::size_t t = 0; t < driven[r].size(); ++t) driven[r][t] -= one.left[r][t];
+    const auto all = power_spectrum(one.all, 1, 0, size), left = power_spectrum(one.left, 1, 0, size),
+               of_force = power_spectrum(driven, 1, 0, size);
+    if (all.empty() || left.empty() || of_force.empty()) return;
+    one.power = mean_power(all, f - width, f + width);
+    one.share_left = mean_power(left, f - width, f + width) / std::max(one.power, 1e-300);
+    one.peak = mean_power(of_force, f - width, f + width) /
+               std::max({mean_power(of_force, f - 4 * width, f - 2 * width),
+                         mean_power(of_force, f + 2 * width, f + 4 * width), 1e-300});
+    one.strength = std::sqrt(one.power * width) / (mode.frequency_hz * mode.frequency_hz);
+}
+
+std::vector<double> weights_of_outputs(const record_set& set) {
+    std::vector<double> out;
+    for (std::size_t o = set.n_u; o < set.channels(); ++o) {
+        double square = 0, count = 0;
+        for (std::size_t i = o; i < set.samples.size(); i += set.channels())
+            if (!std::isnan(set.samples[i])) square += set.samples[i] * set.samples[i], ++count;
+        out.push_back(square > 0 ? count / square : 0);
+    }
+    return out;
+}
+
+/// Residuals of a record, sample by sample, of all outputs; without forces the outputs themselves.
+std::vector<double> left_of(const std::vector<const listed_mode*>& in_model, const record_work& work, std::size_t r) {
+    const record_set& set = work.set;
+    if (set.n_u > 0) return answer(work, in_model, r).left;
+    const double* rows = set.rows(set.records[r]);
+    return {rows, rows + set.records[r].count * set.n_y};
+}
+
+void fill(const record_work& work, product_search& s) {
+    const record_set& set = work.set;
+    const std::vector<double> weights = weights_of_outputs(set);
+    std::vector<const listed_mode*> in_model;
+    for (const listed_mode& mode : s.modes)
+        if (mode.in_model) in_model.push_back(&mode);
+    s.strands.resize(s.modes.size());
+    s.outputs.resize(std::min(most_outputs, set.n_y));
+    for (std::size_t r = 0; r < set.records.size(); ++r) {
+        const std::vector<double> residual = left_of(in_model, work, r);
+        const std::size_t count = residual.size() / set.n_y;
+        const double* outputs = set.rows(set.records[r]) + set.n_u;
+        for (std::size_t k = 0; k < s.modes.size(); ++k) {
+            series all(count), left(count);
+            for (std::size_t o = 0; o < set.n_y; ++o) {
+                const double weight = s.modes[k].shape[o].real() * weights[o];
+                for (std::size_t t = 0; t < count; ++t) all[t] += weight * outputs[t * set.channels() + o];
+                for (std::size_t t = 0; t < count; ++t) left[t] += weight * residual[t * set.n_y + o];
+            }
+            s.strands[k].left.push_back(std::move(left));
+            s.strands[k].all.push_back(std::move(all));
+        }
+        for (std::size_t i = 0; i < s.outputs.size(); ++i) {
+            series& left = s.outputs[i].emplace_back(count);
+            const std::size_t o = i * set.n_y / s.outputs.size();
+            for (std::size_t t = 0; t < count; ++t) left[t] = residual[t * set.n_y + o];
+        }
+    }
+    for (std::size_t k = 0; k < s.modes.size(); ++k) weigh(s.modes[k], s.fs_hz, s.strands[k]);
+}
+
+void doubt(const char* code, mode_verdict& verdict, listed_mode& mode) {
+    verdict.why.emplace_back(code);
+    verdict.confident = mode.in_model = false;
+}
+
+} // namespace
+
+bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_work& work) {
+    const bool driven = work.set.n_u > 0;
+    if (driven && (!work.context.x0 || work.model.n_u != static_cast<int>(work.set.n_u))) return false;
+    product_search s{modes, fs_hz, driven, {}, {}, {}};
+    fill(work, s);
+    const auto before =
+        std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; });
+    std::vector<std::string> told;
+    const auto tell = [&](double f, const product& of) {
+        told.push_back(fmt::format("{:.4g} Hz = {}", f, words_of(of, modes)));
+    };
+    const std::vector<product> more = distortions(s);
+    const std::vector<std::size_t> first = bases_of(s, modes.size(), 1); // the strongest stays
+    const auto look = [&](double least, double tolerance) {
+        for (std::size_t k = 0; k < modes.size(); ++k) {
+            const std::vector<std::string>& why = work.context.verdicts[k].why;
+            if (k == first.front() || std::find(why.begin(), why.end(), "harmonic") != why.end() ||
+                (driven && s.strands[k].peak > resonance_peak && s.strands[k].share_left < left_alone))
+                continue;
+            const product of = followed(s, k, least, tolerance);
+            if (of.empty()) continue;
+            tell(modes[k].frequency_hz, of);
+            doubt("harmonic", work.context.verdicts[k], modes[k]);
+        }
+    };
+    look(in_phase, product_frequency);
+    if (told.empty())
+        for (const product& of : more) tell(frequency_of(of, modes), of);
+    if (told.empty()) return false;
+    look(then_in_phase, then_frequency);
+    for (std::size_t k = 0; k < modes.size(); ++k)
+        if (driven && k != first.front() && modes[k].in_model && s.strands[k].peak < resonance_peak &&
+            s.strands[k].share_left > undriven)
+            doubt("undriven", work.context.verdicts[k], modes[k]);
+    work.context.warnings.emplace_back(
+        "nonlinear", fmt::format("the structure is not linear: what it does at {} moves in phase with the product of "
+                                 "these vibrations. The model holds for the level of this record",
+                                 fmt::join(told, ", ")));
+    return std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; }) != before;
+}
+
+} // namespace okid_host
