@@ -17,8 +17,8 @@ def test_thirty_two_buses(tmp_path: Path) -> None:
     for k in range(BUSES):
         config.append(f'[[bus]]\nname = "b{k}"\ninterface = "can{k}"')
         config.append(
-            f'[[channel]]\nname = "c{k}"\nrole = "{"force" if k == 0 else "acceleration"}"\nbus = "b{k}"\ncan_id = 0x10\n'
-            "start_bit = 0\nlength = 16\nsequence = { start_bit = 16, length = 8 }"
+            f'[[channel]]\nname = "c{k}"\nrole = "{"force" if k == 0 else "acceleration"}"\nbus = "b{k}"\n'
+            "can_id = 0x10\nstart_bit = 0\nlength = 16\nsequence = { start_bit = 16, length = 8 }"
         )
     (tmp_path / "many.toml").write_text("\n".join(config) + "\n")
     frames = []
