@@ -83,7 +83,7 @@ def test_lost_frames_are_counted_and_change_nothing_else(
     log.write_text("".join(line for k, line in enumerate(lines) if not (900 <= k < 921 or k == 1500)))
     assert run("can", "--log", log, "--config", rig / "a.toml", "--json", tmp_path / "r.json") == 0
     done = subprocess.run(
-        [capture.program.find_program(), "replay", log, "-c", rig / "a.toml", "--json", tmp_path / "p.json"],
+        [capture.find_program(), "replay", log, "-c", rig / "a.toml", "--json", tmp_path / "p.json"],
         capture_output=True, check=True,
     )  # fmt: skip
     assert done.returncode == 0

@@ -125,7 +125,7 @@ def _of_file(spec: CampaignSpec, kind: str, path: Path) -> tuple[NDArray[Any], f
     from okid.formats import read_record
 
     if kind in (".okj", ".log"):
-        from okid.capture.program import run_program
+        from okid.abi.program import run_program
 
         if kind == ".log" and spec.records.config is None:
             raise InputError('a candump log needs the CONFIG.toml of its channels: give [records] "config"')

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from okid.capture.emulate import Playback, packets_of, play, play_serial
     from okid.capture.frame_log import log_messages, messages_for
     from okid.capture.pacing import Pacer
-    from okid.capture.program import find_program, run_program
+    from okid.abi.program import find_program, run_program
     from okid.capture.recording import LineFile, Recorder, Summary, record_bus
     from okid.capture.sources import RawFile, can_blocks, feed_bytes, feed_messages, serial_blocks
     from okid.capture.stream import BusCounts, Capture, frames_of
@@ -75,7 +75,7 @@ _NAMES = {
     "capture.emulate": "Playback, packets_of, play, play_serial",
     "capture.frame_log": "log_messages, messages_for",
     "capture.pacing": "Pacer",
-    "capture.program": "find_program, run_program",
+    "abi.program": "find_program, run_program",
     "capture.recording": "LineFile, Recorder, Summary, record_bus",
     "capture.sources": "RawFile, can_blocks, feed_bytes, feed_messages, serial_blocks",
     "capture.stream": "BusCounts, Capture, frames_of",

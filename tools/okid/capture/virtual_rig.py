@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from okid.capture.config import CaptureConfig
-from okid.capture.program import run_program
+from okid.abi.program import run_program
 from okid.data.toml_file import read_toml
 from okid.data.whole_file import whole_file
 

@@ -89,7 +89,7 @@ def _convert_frames(args: argparse.Namespace, source: Path, target: Path) -> str
 
 def _decoded(args: argparse.Namespace, source: Path) -> Record:
     """The samples in a log of frames, on the grid of the config: `okid convert` makes them."""
-    from okid.capture.program import run_program
+    from okid.abi.program import run_program
     from okid.formats.can_log import convert_log
 
     if args.group is not None or args.fs is not None:
