@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 from okid.data.interrupt import early_end
 
 if TYPE_CHECKING:
+    from okid.abi.program import find_program, run_program
     from okid.capture.command_can import open_bus
     from okid.capture.command_serial import open_port
     from okid.capture.config import BusConfig, CaptureConfig, ChannelConfig, load_config
     from okid.capture.emulate import Playback, packets_of, play, play_serial
     from okid.capture.frame_log import log_messages, messages_for
     from okid.capture.pacing import Pacer
-    from okid.abi.program import find_program, run_program
     from okid.capture.recording import LineFile, Recorder, Summary, record_bus
     from okid.capture.sources import RawFile, can_blocks, feed_bytes, feed_messages, serial_blocks
     from okid.capture.stream import BusCounts, Capture, frames_of

@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from okid.capture.config import CaptureConfig
 from okid.abi.program import run_program
+from okid.capture.config import CaptureConfig
 from okid.data.toml_file import read_toml
 from okid.data.whole_file import whole_file
 
