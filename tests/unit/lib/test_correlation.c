@@ -293,6 +293,12 @@ static void bytes_go_on_bit_for_bit(void) {
         }
 }
 
+#ifdef OKID_INTEGER_KERNEL
+enum { TRANSFORMS = 0 }; // a microcontroller sums directly
+#else
+enum { TRANSFORMS = 1 };
+#endif
+
 /// A look at the sums, which leaves no trace.
 static void look(okid_correlation_t* self) {
     okid_correlation_sums_t got;
@@ -322,7 +328,7 @@ static void transforms_sum_what_the_kernel_sums(void) {
             config.block = window ? 600 : 0;
             void *one, *two, *three;
             okid_correlation_t *fast = make(config, &one), *looked_at = make(config, &two);
-            TEST_ASSERT_GREATER_THAN(256, fast->points);
+            TEST_ASSERT_EQUAL(TRANSFORMS, fast->points > 256);
             config.buffer = 64;
             okid_correlation_t* direct = make(config, &three);
             TEST_ASSERT_EQUAL(0, direct->points);
@@ -373,7 +379,7 @@ static void loud_codes_stay_exact(void) {
             const size_t bytes = okid_correlation_memsize(&config);
             blocks[direct] = malloc(bytes);
             TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_create(&made[direct], &config, blocks[direct], bytes));
-            TEST_ASSERT_EQUAL(direct == 0, made[direct]->points > 0);
+            TEST_ASSERT_EQUAL(TRANSFORMS && direct == 0, made[direct]->points > 0);
             TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, okid_correlation_add_i16(made[direct], loud, COUNT));
         }
         expect_same_bytes(made[0], made[1]);
