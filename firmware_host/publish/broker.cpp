@@ -104,10 +104,12 @@ class connection {
         while (!ending_) {
             lock.unlock();
             const int result = mosquitto_connect_async(client_, to_.at.host.c_str(), to_.at.port, keepalive_s);
-            if (result != MOSQ_ERR_SUCCESS)
-                complain(mosquitto_strerror(result));
-            else
+            greeted_ = result == MOSQ_ERR_SUCCESS;
+            if (greeted_)
                 converse();
+            else
+                complain(mosquitto_strerror(result));
+            greeted_ = false;
             lock.lock();
             changed_.wait_for(lock, retry, [&] { return ending_; });
         }
@@ -126,6 +128,10 @@ class connection {
         return changed_.wait_for(lock, farewell, [&] { return ended_; });
     }
     mosquitto* client() const { return client_; }
+    /// Lost where there is no connection. Between the library's socket and its CONNECT a PUBLISH would be the first packet of all.
+    void send(const std::string& topic, const char* text, std::size_t size, bool keep) {
+        if (greeted_) (void)mosquitto_publish(client_, nullptr, topic.c_str(), static_cast<int>(size), text, 0, keep);
+    }
     /// There is something to send.
     void wake() const {
         const std::uint64_t one = 1;
@@ -180,7 +186,7 @@ class connection {
     broker_address to_;
     mosquitto* client_;
     int wake_fd_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    std::atomic<bool> told_{false};
+    std::atomic<bool> told_{false}, greeted_{false}; ///< greeted: CONNECT is sent, or waits before all else
     std::mutex mutex_;
     std::condition_variable changed_;
     bool ending_ = false, ended_ = false;
@@ -209,8 +215,7 @@ class broker : public event_sink {
     void take(const publication& one) override {
         const std::string topic = topic_ + "/" + one.type;
         const bool newest_counts = one.type == "modes" || one.type == "result";
-        (void)mosquitto_publish(link_->client(), nullptr, topic.c_str(), static_cast<int>(one.line->size()) - 1,
-                                one.line->data(), 0, newest_counts);
+        link_->send(topic, one.line->data(), one.line->size() - 1, newest_counts);
         if (discovery_ && one.type == "modes") tell_of(*one.event, topic);
         link_->wake();
     }
@@ -222,8 +227,7 @@ class broker : public event_sink {
         for (const auto& mode : event.at("modes"))
             if (mode.at("track").is_number() && told_.insert(mode.at("track").get<int>()).second)
                 for (const auto& [topic, text] : discovery_of(level_, modes_topic, mode.at("track").get<int>()))
-                    (void)mosquitto_publish(link_->client(), nullptr, topic.c_str(), static_cast<int>(text.size()),
-                                            text.data(), 0, true);
+                    link_->send(topic, text.data(), text.size(), true);
     }
 
     std::string level_;

@@ -30,7 +30,7 @@ COMMANDS = [
     "completion",
 ]
 FIXED = {  # options of okid identify with fixed choices
-    "--method": ["auto", "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"],
+    "--method": ["auto", "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx", "plscf"],
     "--hankel": ["system", "innovations", "literal"],
     "--hold": ["auto", "zoh", "foh", "band"],
     "--detrend": ["none", "mean", "linear"],
