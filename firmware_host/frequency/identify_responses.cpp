@@ -170,7 +170,7 @@ record_options options_of(const response_set& set, record_request given, bool tu
 }
 
 /// Modes, deviations and model into the result; the window's decay goes out of the poles last.
-void make_result(const response_set& set, double constant_s, response_modes found, record_work& work) {
+void make_result(const response_set& set, double constant_s, response_modes&& found, record_work& work) {
     auto& [modes, shapes, sigma, stable] = found;
     work.context.stable = std::move(stable);
     std::vector<listed_mode> listed;

@@ -145,7 +145,8 @@ MatrixXd impulse_responses(const lag_sums& sums) {
         c.middleRows(d * n_u, n_u) = block_of(sums, d, sums.n_u, sums.channels() - sums.n_u).transpose();
     }
     G.leftCols(n_u).diagonal() *= 1 + force_ridge;
-    const MatrixXd g = block_levinson(std::move(G)).solve(c);
+    block_levinson levinson(std::move(G));
+    const MatrixXd g = levinson.solve(c);
     MatrixXd out(count, n_y * n_u);
     for (Index d = 0; d < count; ++d)
         for (Index i = 0; i < n_u; ++i) out.row(d).segment(n_y * i, n_y) = g.row(d * n_u + i);

@@ -115,6 +115,20 @@ def journals() -> list[bytes]:
     return [whole, whole[:200], whole[:100] + whole[110:], chunk(2, plain, 9, 2)]
 
 
+def arrays() -> list[bytes]:
+    """Of NumPy's save(): version, length of the header, header, numbers."""
+    out = []
+    for version, kind, order, shape in (
+        (1, "<f8", "False", (3, 2)),
+        (2, ">i2", "True", (2, 3)),
+        (1, "|u1", "False", (6,)),
+    ):
+        head = f"{{'descr': '{kind}', 'fortran_order': {order}, 'shape': {shape}, }}".ljust(117).encode() + b"\n"
+        length = struct.pack("<H" if version == 1 else "<I", len(head))
+        out.append(b"\x93NUMPY" + bytes([version, 0]) + length + head + bytes(range(48)))
+    return out
+
+
 def main() -> int:
     top = Path(sys.argv[1])
     seeds: dict[str, list[bytes]] = {
@@ -123,6 +137,7 @@ def main() -> int:
         "config": [CONFIG.encode(), LINE_CONFIG.encode()],
         "dbc": [DBC.encode(), DBC.replace("\n", "\r\n").encode()],
         "csv": [text.encode() for text in CSV],
+        "npy": arrays(),
         "face": [
             *(b"\x00" + text.encode() for text in (CONFIG, LINE_CONFIG)),
             *(b"\x01" + text.encode() for text in CSV),
