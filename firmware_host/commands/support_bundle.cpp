@@ -25,12 +25,13 @@ constexpr std::size_t last_bytes = 256 << 10; // of an events file
 constexpr std::size_t longest_line = 2000;    // of an event: shapes of many channels are long
 
 std::string system_text() {
-    std::string name = "not known";
+    std::string name;
     try {
         const std::string text = read_input("/etc/os-release", "the name of the system");
         const std::size_t at = text.find("PRETTY_NAME=");
-        if (at != std::string::npos) name = text.substr(at + 12, text.find('\n', at) - at - 12);
-    } catch (const failure&) { // a system without it
+        name = at != std::string::npos ? text.substr(at + 12, text.find('\n', at) - at - 12) : "without a name";
+    } catch (const failure&) {
+        name = "not known";
     }
     utsname kernel{};
     (void)uname(&kernel);
