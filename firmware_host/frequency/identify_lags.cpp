@@ -133,8 +133,8 @@ std::vector<lag_sums> sums_of(const lag_work& work, std::size_t lags) {
 response_modes find_modes(lag_work& work, std::size_t& lags) {
     std::size_t rows = SIZE_MAX;
     for (const set_up& one : work.set_ups) rows = std::min(rows, one.set.count());
-    const std::size_t most =
-        std::min(most_lags, bounded(static_cast<double>(rows / rows_per_lag), rows / rows_per_lag));
+    const std::size_t fit = rows / rows_per_lag;
+    const std::size_t most = std::min(most_lags, bounded(static_cast<double>(fit), fit));
     lags = std::min(first_lags, most);
     response_modes out;
     for (int round = 0; round < most_rounds; ++round) {

@@ -290,7 +290,7 @@ void leave_out(bool all, const std::vector<int>& numbers, response_modes& found)
     for (std::size_t k = 0; k < modes.size(); ++k)
         if (modes[k].confident() || all || modes[k].found_in >= doubtful_share) order.push_back(k);
     std::sort(order.begin(), order.end(),
-              [&](std::size_t a, std::size_t b) { return modes[a].frequency_hz < modes[b].frequency_hz; });
+              [&own = modes](std::size_t a, std::size_t b) { return own[a].frequency_hz < own[b].frequency_hz; });
     if (!numbers.empty()) {
         std::vector<std::size_t> picked;
         for (std::size_t k = 0; k < order.size(); ++k)
