@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from typing import Any
 
 import matplotlib
@@ -198,27 +197,6 @@ def speed() -> str:
     axis.legend(frameon=False, fontsize=8, ncol=2, loc="upper left")
     axis.set_ylim(top=axis.get_ylim()[1] * 8)
     return keep("speed.svg", figure)
-
-
-def latency() -> str:
-    """From a packet on the line to what okid does with it, beside a reader that does nothing else; 20 s here."""
-    build = runs.ROOT / "build"
-    subprocess.run(["cmake", "--build", build, "--target", "bench_latency", "--", "--quiet"], check=True)
-    (runs.FOLDER / "latency.json").write_text("{}")
-    subprocess.run([build / "tests/bench_latency", "latency.json", "20"], cwd=runs.FOLDER, check=True)
-    rows = {row["case"]: row for row in json.loads((runs.FOLDER / "latency.json").read_text())["rows"]}
-    labels = {"bare": "read, nothing else", "handed_over": "snapshot handed over", "modes": "modes with ± σ told"}
-    figure, axes = plt.subplots(2, 1, figsize=(8.2, 4.0), sharex=True)
-    for axis, (case, title) in zip(axes, (("calm", "calm"), ("busy", "two busy processes beside it")), strict=True):
-        for (name, label), colour in zip(labels.items(), (GREY, BLUE, GREEN), strict=True):
-            edges, counts = np.array(rows[case]["histograms_ms"][name]).T
-            share = 100 * counts / counts.sum()
-            axis.bar(edges, share, 0.19 * edges, align="edge", color=colour, alpha=0.8, label=label)
-        axis.set(xscale="log", ylabel="share [%]")
-        axis.set_title(title, fontsize=9, loc="left")
-    axes[0].legend(frameon=False, fontsize=8)
-    axes[1].set_xlabel("ms after the frame was written (8 channels, 1 kHz, p 40, an update every 0.1 s)")
-    return keep("latency.svg", figure)
 
 
 def settling() -> str:
