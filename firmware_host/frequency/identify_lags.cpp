@@ -17,6 +17,7 @@
 #include "record/record_fit.hpp"
 #include "record/roving.hpp"
 #include "response_modes.hpp"
+#include "result/method.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -61,8 +62,7 @@ std::vector<std::size_t> reference_channels(const lag_work& work, const set_up& 
     }
     const std::size_t n = work.references.size(), count = std::min(n, record_references);
     for (std::size_t k = 0; k < count; ++k)
-        out.push_back(static_cast<std::size_t>(
-            std::find(one.outputs.begin(), one.outputs.end(), work.references[k * n / count]) - one.outputs.begin()));
+        out.push_back(static_cast<std::size_t>(place_in(one.outputs, work.references[k * n / count])));
     return out;
 }
 
@@ -328,7 +328,7 @@ result_context prepare(lag_work& work) {
 record_result identify_set_ups(std::vector<set_up> set_ups, const record_options& options,
                                const std::vector<std::string>& references) {
     lag_work work{std::move(set_ups), options, {}, {}, 0, 0};
-    work.options.method = "plscf";
+    work.options.method = lag_method;
     check_references(work, references);
     record_work to;
     to.context = prepare(work);
@@ -352,7 +352,7 @@ record_result identify_set_ups(std::vector<set_up> set_ups, const record_options
 }
 
 record_result identify_by_method(record_set records, const record_options& options) {
-    if (options.method != "plscf") return identify_records(std::move(records), options);
+    if (options.method != lag_method) return identify_records(std::move(records), options);
     check_hits(records, options.hits);
     if (!options.hits.empty()) throw failure(exit_usage, "--hit-dofs belongs to --method auto, found with plscf");
     std::vector<set_up> one;

@@ -41,10 +41,6 @@ constexpr double broadest = 0.2;                // damping of a vibration
 constexpr double worth_listing = 0.25;          // share of the runs below which a cluster is chance
 constexpr double doubtful_share = 0.5;          // of the runs: a doubtful mode that fewer found is not listed by itself
 
-Index place_in(const std::vector<std::string>& names, const std::string& name) {
-    return std::find(names.begin(), names.end(), name) - names.begin();
-}
-
 /// The columns of all set-ups side by side, each an output of its own.
 response_set side_by_side_columns(const joint_responses& from, std::vector<int>& sensing) {
     response_set out;

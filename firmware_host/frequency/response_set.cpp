@@ -29,11 +29,14 @@ void check_lines(const response_set& first, const response_set& other, const std
 
 } // namespace
 
+Index place_in(const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) - names.begin();
+}
+
 Index place_of(std::vector<std::string>& names, const std::string& name) {
-    const auto at = std::find(names.begin(), names.end(), name);
-    if (at != names.end()) return at - names.begin();
-    names.push_back(name);
-    return static_cast<Index>(names.size()) - 1;
+    const Index at = place_in(names, name);
+    if (at == static_cast<Index>(names.size())) names.push_back(name);
+    return at;
 }
 
 response_set join_set_ups(const std::vector<response_set>& sets, const std::vector<std::string>& names) {

@@ -18,7 +18,10 @@ struct response_set {
     Eigen::Index n_u() const { return static_cast<Eigen::Index>(inputs.size()); }
 };
 
-/// The place of a name, which comes last when it is new.
+/// The place of a name; behind the last when it is not there.
+Eigen::Index place_in(const std::vector<std::string>& names, const std::string& name);
+
+/// The same, and a new name then stands there.
 Eigen::Index place_of(std::vector<std::string>& names, const std::string& name);
 
 /// Set-ups of one structure as one: every output of every input once, entries measured several times averaged. Throws

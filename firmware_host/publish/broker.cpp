@@ -129,8 +129,10 @@ class connection {
     }
     mosquitto* client() const { return client_; }
     /// Lost where there is no connection. Between the library's socket and its CONNECT a PUBLISH would be the first packet of all.
-    void send(const std::string& topic, const char* text, std::size_t size, bool keep) {
-        if (greeted_) (void)mosquitto_publish(client_, nullptr, topic.c_str(), static_cast<int>(size), text, 0, keep);
+    /// @return false: lost
+    bool send(const std::string& topic, const char* text, std::size_t size, bool keep) {
+        return greeted_ && mosquitto_publish(client_, nullptr, topic.c_str(), static_cast<int>(size), text, 0, keep) ==
+                               MOSQ_ERR_SUCCESS;
     }
     /// There is something to send.
     void wake() const {
@@ -215,19 +217,24 @@ class broker : public event_sink {
     void take(const publication& one) override {
         const std::string topic = topic_ + "/" + one.type;
         const bool newest_counts = one.type == "modes" || one.type == "result";
-        link_->send(topic, one.line->data(), one.line->size() - 1, newest_counts);
+        (void)link_->send(topic, one.line->data(), one.line->size() - 1, newest_counts);
         if (discovery_ && one.type == "modes") tell_of(*one.event, topic);
         link_->wake();
     }
     bool finished() override { return !mosquitto_want_write(link_->client()); }
 
   private:
-    /// Each track once; the broker keeps it.
+    /// Each track once, with the first modes that find a connection; the broker keeps it.
     void tell_of(const nlohmann::ordered_json& event, const std::string& modes_topic) {
-        for (const auto& mode : event.at("modes"))
-            if (mode.at("track").is_number() && told_.insert(mode.at("track").get<int>()).second)
-                for (const auto& [topic, text] : discovery_of(level_, modes_topic, mode.at("track").get<int>()))
-                    link_->send(topic, text.data(), text.size(), true);
+        for (const auto& mode : event.at("modes")) {
+            if (!mode.at("track").is_number()) continue;
+            const int track = mode.at("track").get<int>();
+            if (told_.count(track)) continue;
+            bool sent = true;
+            for (const auto& [topic, text] : discovery_of(level_, modes_topic, track))
+                sent = link_->send(topic, text.data(), text.size(), true) && sent;
+            if (sent) told_.insert(track);
+        }
     }
 
     std::string level_;

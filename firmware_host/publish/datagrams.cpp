@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "datagrams.hpp"
 
-#include "error.hpp"
 #include "peer.hpp"
 
-#include <cstring>
-#include <fmt/format.h>
 #include <unistd.h>
 
 namespace okid_host {
 
-datagrams::datagrams(const net_address& to) : fd_(find_peer("[publish] udp", to, SOCK_DGRAM).connect_to(SOCK_DGRAM)) {
-    if (fd_ < 0) throw failure(exit_device, fmt::format("[publish] udp {}: {}", to.text(), std::strerror(-fd_)));
-}
+datagrams::datagrams(const net_address& to) : fd_(open_datagrams("[publish] udp", to)) {}
 
 datagrams::~datagrams() { close(fd_); }
 

@@ -44,12 +44,7 @@ class influx_file : public event_sink {
 class influx_datagrams : public event_sink {
   public:
     explicit influx_datagrams(const live_config& config)
-        : lines_(topic_level(config)),
-          fd_(find_peer("[publish] influx", config.publish.influx->at, SOCK_DGRAM).connect_to(SOCK_DGRAM)) {
-        if (fd_ < 0)
-            throw failure(exit_device, fmt::format("[publish] influx {}: {}", config.publish.influx->at.text(),
-                                                   std::strerror(-fd_)));
-    }
+        : lines_(topic_level(config)), fd_(open_datagrams("[publish] influx", config.publish.influx->at)) {}
     ~influx_datagrams() override { close(fd_); }
     influx_datagrams(const influx_datagrams&) = delete;
     influx_datagrams& operator=(const influx_datagrams&) = delete;

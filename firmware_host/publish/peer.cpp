@@ -26,6 +26,12 @@ peer find_peer(const char* what, const net_address& to, int kind) {
     return out;
 }
 
+int open_datagrams(const char* what, const net_address& to) {
+    const int fd = find_peer(what, to, SOCK_DGRAM).connect_to(SOCK_DGRAM);
+    if (fd < 0) throw failure(exit_device, fmt::format("{} {}: {}", what, to.text(), std::strerror(-fd)));
+    return fd;
+}
+
 int peer::connect_to(int kind) const {
     const int fd = socket(address.ss_family, kind | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd < 0) return -errno;

@@ -19,4 +19,7 @@ struct peer {
 /// Throws `failure` (exit 4) when the address cannot be found.
 peer find_peer(const char* what, const net_address& to, int kind);
 
+/// @return a non-blocking socket for datagrams. Throws as find_peer(), and when there is no way to the address.
+int open_datagrams(const char* what, const net_address& to);
+
 } // namespace okid_host

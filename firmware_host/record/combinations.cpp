@@ -171,15 +171,18 @@ std::vector<std::size_t> bases_of(const product_search& s, std::size_t k, std::s
     return out;
 }
 
+double frequency_of(const product& of, const std::vector<listed_mode>& modes) {
+    return std::accumulate(of.begin(), of.end(), 0.0, [&](double sum, const auto& factor) {
+        return sum + factor.second * modes[factor.first].frequency_hz;
+    });
+}
+
 /// How much records follow a product of vibrations; 0 where that cannot be told.
 double following(product_search& s, const std::vector<series>& records, const product& of) {
-    double f = 0, slowest = INFINITY;
-    for (const auto& [i, n] : of) {
-        f += n * s.modes[i].frequency_hz;
-        slowest = std::min(slowest, s.modes[i].frequency_hz);
-    }
+    double slowest = INFINITY;
+    for (const auto& factor : of) slowest = std::min(slowest, s.modes[factor.first].frequency_hz);
     const auto block = static_cast<std::size_t>(product_periods * s.fs_hz / slowest) + 1;
-    const std::vector<complex> b = demodulated(records, f / s.fs_hz, block);
+    const std::vector<complex> b = demodulated(records, frequency_of(of, s.modes) / s.fs_hz, block);
     if (b.size() < product_blocks) return 0;
     std::vector<complex> together(b.size(), 1);
     for (const auto& [i, n] : of) {
@@ -188,12 +191,6 @@ double following(product_search& s, const std::vector<series>& records, const pr
         for (std::size_t t = 0; t < b.size(); ++t) together[t] *= std::pow(n > 0 ? a[t] : std::conj(a[t]), std::abs(n));
     }
     return coherence(b, together);
-}
-
-double frequency_of(const product& of, const std::vector<listed_mode>& modes) {
-    return std::accumulate(of.begin(), of.end(), 0.0, [&](double sum, const auto& factor) {
-        return sum + factor.second * modes[factor.first].frequency_hz;
-    });
 }
 
 /// The product that mode k follows, in phase more than so much; empty: none.

@@ -376,12 +376,13 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
         means = means_of(work.set);
         remove_means(work.set);
     }
-    make_modal_model(listed, options.fs_hz, work);
-    if (work.set.n_u > 0) fit_records(work.set, work.model, work.context); // the states it needs to begin with
-    if (options.modes.empty() && mark_combinations(listed, options.fs_hz, work))
+    const auto make_and_fit = [&] { // with a force the steps behind need the states it begins with
         make_modal_model(listed, options.fs_hz, work);
-    if (refine_agreed(options, listed, work)) make_modal_model(listed, options.fs_hz, work);
-    if (work.set.n_u > 0) fit_records(work.set, work.model, work.context); // the states it needs to begin with
+        if (work.set.n_u > 0) fit_records(work.set, work.model, work.context);
+    };
+    make_and_fit();
+    if (options.modes.empty() && mark_combinations(listed, options.fs_hz, work)) make_and_fit();
+    if (refine_agreed(options, listed, work)) make_and_fit();
     remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);
     find_matrix_deviations(listed, options, work);

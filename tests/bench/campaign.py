@@ -9,7 +9,6 @@ two, each into a folder of its own. Judged are the medians; least values and the
 
 from __future__ import annotations
 
-import json
 import os
 import statistics
 import sys
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_file import keep
 from okid.campaign.cluster import connected
 from okid.campaign.run import run_campaign
 from okid.campaign.spec import CampaignSpec, load_spec
@@ -116,12 +116,8 @@ def main() -> None:
         )
     print(f"two over one: {statistics.median(times[1]) / statistics.median(times[2]):.2f} (medians), "
           f"{min(times[1]) / min(times[2]):.2f} (least)")  # fmt: skip
-    if len(sys.argv) > 3:
-        path = Path(sys.argv[3])
-        bench = json.loads(path.read_text(encoding="utf-8"))
-        bench["ratios"]["campaign_two_workers"] = statistics.median(times[1]) / statistics.median(times[2])
-        bench["ratios"]["campaign_worker_mb"] = memory
-        path.write_text(json.dumps(bench, indent=1) + "\n", encoding="utf-8")
+    two = statistics.median(times[1]) / statistics.median(times[2])
+    keep({"campaign_two_workers": two, "campaign_worker_mb": memory}, argument=3)
     print(f"largest worker {memory:.0f} MB, this process {peak_mb():.0f} MB; the same sums in all {len(sums)} runs")
 
 

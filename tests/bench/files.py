@@ -7,7 +7,6 @@ usage: files.py [BENCH.json to add to]
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import tempfile
@@ -16,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from bench_file import keep
 from peers.capture import OKID, make
 
 ROWS, COLUMNS, SECONDS = 200_000, 32, 100
@@ -102,11 +102,7 @@ def main() -> None:
             except ImportError as without:
                 print(f"{part.__name__}: not measured: {without}")
     print("; ".join(f"{name} {value:.2f}" for name, value in ratios.items()))
-    if len(sys.argv) > 1:
-        path = Path(sys.argv[1])
-        bench = json.loads(path.read_text(encoding="utf-8"))
-        bench["ratios"] |= ratios
-        path.write_text(json.dumps(bench, indent=1) + "\n", encoding="utf-8")
+    keep(ratios)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ its own copies in Fortran order, made before; its modes are not computed.
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
@@ -23,6 +22,7 @@ sys.path[:0] = [str(HERE / "peers"), str(HERE.parent / "support")]
 import numpy as np  # noqa: E402
 import okid  # noqa: E402
 import systems  # noqa: E402
+from bench_file import keep  # noqa: E402
 
 SIZES = (("W1", 10_000, 10), ("W2", 20_000, 15), ("W3", 100_000, 22), ("W1", 10_000, 40), ("W2", 10_000, 30),
          ("W3", 10_000, 25))  # fmt: skip
@@ -65,11 +65,7 @@ def main() -> None:
         for method, took in zip(METHODS, times, strict=True):
             ratios[f"slicot_moesp_over_identify_{method}_{name}_s{s}"] = slicot / took
             print(f"  {method:12} {1e3 * took:7.2f} ms, SLICOT takes {slicot / took:.2f} times as long")
-    if len(sys.argv) > 1:
-        path = Path(sys.argv[1])
-        bench = json.loads(path.read_text(encoding="utf-8"))
-        bench["ratios"] |= ratios
-        path.write_text(json.dumps(bench, indent=1) + "\n", encoding="utf-8")
+    keep(ratios)
 
 
 if __name__ == "__main__":

@@ -7,13 +7,11 @@ Of a single sample nearly all is the call: the kernel only keeps it for its next
 
 from __future__ import annotations
 
-import json
-import sys
 import timeit
-from pathlib import Path
 
 import numpy as np
 import okid
+from bench_file import keep
 
 LAGS, BLOCK = 40, 4096
 
@@ -35,11 +33,7 @@ def main() -> None:
         ratios[f"python_share_{name}"] = call / (block - call)
         print(f"Accumulator.add of {name}: {call:.2f} us a call, {100 * call / (block - call):.1f} % of the C time "
               f"of {BLOCK} samples (W1, p {LAGS})")  # fmt: skip
-    if len(sys.argv) > 1:
-        path = Path(sys.argv[1])
-        bench = json.loads(path.read_text(encoding="utf-8"))
-        bench["ratios"] |= ratios
-        path.write_text(json.dumps(bench, indent=1) + "\n", encoding="utf-8")
+    keep(ratios)
 
 
 if __name__ == "__main__":

@@ -25,17 +25,24 @@ _FEWEST_ORDERS = 12
 _KEYS = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac")
 
 
+def stream_of(spec: CampaignSpec, **more: Any) -> HostStream:
+    """The identification of the spec as a stream."""
+    c, i = spec.channels, spec.identification
+    return HostStream({
+        "inputs": c.inputs, "outputs": c.outputs, "fs": c.fs_hz, "method": i.method, "p": i.p, "rows": i.rows or None,
+        "order": i.order or None, "max_order": i.max_order or None, "hankel": i.hankel, "detrend": i.detrend, **more,
+    })  # fmt: skip
+
+
 def _merged(spec: CampaignSpec, parts: Sequence[Accumulator], refinement: bytes) -> HostStream:
     """All parts in one; each is a block for ±. With the sums of a refinement, packed."""
     c, i = spec.channels, spec.identification
     blocks = i.sigma_blocks if sum(part.rows > 0 for part in parts) >= FEWEST else 0
-    whole = HostStream({
-        "inputs": c.inputs, "outputs": c.outputs, "fs": c.fs_hz, "codes": c.codes, "saturated": c.saturated,
-        "method": i.method, "p": i.p, "rows": i.rows or None, "order": i.order or None,
-        "max_order": i.max_order or None, "hankel": i.hankel, "detrend": i.detrend, "sigma_blocks": blocks,
-        "states_only": True, "refine": i.refine if refinement else None,
-        **({"scale": c.scale, "offset": c.offset} if c.codes else {}),
-    })  # fmt: skip
+    units = {"scale": c.scale, "offset": c.offset} if c.codes else {}
+    whole = stream_of(
+        spec, codes=c.codes, saturated=c.saturated, sigma_blocks=blocks, states_only=True,
+        refine=i.refine if refinement else None, **units,
+    )  # fmt: skip
     for part in parts:
         whole.merge(part.to_bytes())
     if refinement:

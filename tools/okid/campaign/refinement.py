@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from okid._errors import Error
-from okid.campaign.group_model import in_units
+from okid.campaign.group_model import in_units, stream_of
 from okid.campaign.pieces import part_of
 from okid.campaign.record_list import RecordRef
 from okid.campaign.record_read import ReadRecord, read_one
@@ -25,12 +25,7 @@ _TRIED = 8  # records
 
 
 def _stream(spec: CampaignSpec, **more: Any) -> HostStream:
-    c, i = spec.channels, spec.identification
-    return HostStream({
-        "inputs": c.inputs, "outputs": c.outputs, "fs": c.fs_hz, "method": i.method, "p": i.p, "rows": i.rows or None,
-        "order": i.order or None, "max_order": i.max_order or None, "hankel": i.hankel, "detrend": i.detrend,
-        "sigma_blocks": 0, "refine": "yes", **more,
-    })  # fmt: skip
+    return stream_of(spec, sigma_blocks=0, refine="yes", **more)
 
 
 def _feed(spec: CampaignSpec, record: ReadRecord, to: HostStream) -> None:
