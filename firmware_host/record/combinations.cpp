@@ -18,6 +18,7 @@
 #include <functional>
 #include <map>
 #include <numeric>
+#include <tuple>
 
 namespace okid_host {
 namespace {
@@ -154,9 +155,9 @@ std::string words_of(const product& of, const std::vector<listed_mode>& modes) {
 std::vector<std::size_t> bases_of(const product_search& s, std::size_t k, std::size_t most) {
     std::vector<std::size_t> order(s.modes.size()), out;
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-        return std::make_pair(!s.modes[a].in_model, -s.strands[a].strength) <
-               std::make_pair(!s.modes[b].in_model, -s.strands[b].strength);
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return std::make_tuple(!s.modes[a].in_model, -s.strands[a].strength, a) <
+               std::make_tuple(!s.modes[b].in_model, -s.strands[b].strength, b);
     });
     const bool any = k == order.size();
     const auto near = [&](std::size_t a, std::size_t b) {
