@@ -8,6 +8,7 @@
 #include "error.hpp"
 #include "files/whole_file.hpp"
 #include "live/stream_memory.hpp"
+#include "live/virtual_channels.hpp"
 #include "result/method.hpp"
 #include "result/result.hpp"
 
@@ -40,7 +41,16 @@ std::string start_text(const live_config& config) {
     return out;
 }
 
-std::string summary(const live_config& config, const stream_config& stream) {
+/// Reads what [virtual] names, too.
+std::string virtual_text(const live_config& config) {
+    std::string out;
+    if (config.virtual_sensors.model.empty()) return out;
+    for (const auto& one : virtual_channels(config).described())
+        out += fmt::format("{}{}", out.empty() ? "computed: " : ", ", one["name"].get<std::string>());
+    return out + "\n";
+}
+
+std::string summary(const live_config& config, const stream_config& stream, const std::string& computed) {
     const identification_config& id = stream.wanted;
     std::string out = fmt::format("{}: well\n\n{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", config.path, "channel",
                                   "role", "unit", "bus", "identifier", "bits", "samples counted by");
@@ -68,7 +78,7 @@ std::string summary(const live_config& config, const stream_config& stream) {
     out += fmt::format("{}, {} {:g} s, memory: {}\n", id.method, horizon, id.update_s, memory_text(config));
     out += fmt::format("needs {:.0f} MB of memory, at most {:g} are allowed\n", std::ceil(stream_bytes(stream) / 1e6),
                        id.max_memory_mb);
-    out += start_text(config);
+    out += start_text(config) + computed;
     for (const auto& [code, text] : stream.said) out += fmt::format("warning: {}\n", text);
     for (const std::string& text : config.warnings) out += fmt::format("warning: {}\n", text);
     return out;
@@ -100,10 +110,11 @@ void add_check(CLI::App& app) {
         require_identifiable(config);
         const stream_config stream = stream_of(config);
         require_memory(stream); // computed, none of it is taken
+        const std::string computed = virtual_text(config);
         write_whole_file(
             "-", given->json
                      ? config_json(config).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"
-                     : shown(summary(config, stream)));
+                     : shown(summary(config, stream, computed)));
     });
 }
 

@@ -337,6 +337,7 @@ static live_config make_config(const std::string& path, config_texts texts, bool
     read_hammer(file, config);
     read_alarm(file, config);
     read_publish(file, config);
+    read_virtual(file, config);
     read_record(file, config);
     read_realtime(file, config);
     check_geometry(file, config);

@@ -176,6 +176,12 @@ struct publish_config {
     bool samples = false; ///< the signals too go to the unix socket
 };
 
+/// [virtual]: what sensors that are missing would show, to subscribers of the samples.
+struct virtual_config {
+    std::string model;                 ///< file, already relative to the config's folder; "" = none
+    std::vector<std::string> channels; ///< of the model; empty = what is not measured
+};
+
 /// [record]: raw frames onto the disk.
 struct record_config {
     bool wanted = false;
@@ -214,6 +220,7 @@ struct live_config {
     hammer_config hammer;
     alarm_config alarm;
     publish_config publish;
+    virtual_config virtual_sensors;
     record_config record;
     realtime_config realtime;
     config_texts texts;

@@ -222,4 +222,28 @@ void read_publish(const toml::table& file, live_config& config) {
                 fmt::format("[publish] {} sends to {}, beyond this computer, and unencrypted", what, address->text()));
 }
 
+void read_virtual(const toml::table& file, live_config& config) {
+    const toml::table* table = file["virtual"].as_table();
+    if (!table) return;
+    const config_place place{config.path, "[virtual]"};
+    const toml::node* model = table->get("model");
+    if (!model)
+        throw failure(exit_usage,
+                      fmt::format("{}: line {}, [virtual]: key \"model\" is missing, expected the path of a "
+                                  "file of okid.VirtualSensors.save()",
+                                  config.path, table->source().begin.line));
+    if (!config.publish.samples)
+        refuse_key(place, *model, "model",
+                   "virtual sensors go where the signals go, expected samples = true in [publish]");
+    config.virtual_sensors.model =
+        (std::filesystem::path(config.path).parent_path() / *model->value<std::string>()).string();
+    const toml::array* channels = (*table)["channels"].as_array();
+    if (!channels) return;
+    for (const toml::node& one : *channels) {
+        if (!one.is_string())
+            refuse_key(place, one, "channels", fmt::format("found {}, expected names in quotes", found_value(one)));
+        config.virtual_sensors.channels.push_back(*one.value<std::string>());
+    }
+}
+
 } // namespace okid_host

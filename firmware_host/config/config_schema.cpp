@@ -159,6 +159,7 @@ const std::vector<section_rule> schema = {
       {"discovery", kind::flag},
       {"influx", kind::text},
       {"influx_token_file", kind::text}}},
+    {"virtual", false, {{"model", kind::text}, {"channels", kind::array}}},
     {"realtime", false, {{"priority", kind::whole, 0, 99}, {"lock_memory", kind::flag}, {"cpus", kind::array}}},
     {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
 

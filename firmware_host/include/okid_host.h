@@ -4,7 +4,7 @@
  * @brief Everything between the kernels (okid/okid.h) and a user, for every language: the face of libokid_host.
  *
  * What it does: measured records to a result (okid_host/record.h), samples as they arrive to results
- * (okid_host/stream.h), frames and bytes of devices to samples and events (okid_host/capture.h), configurations, CSV files
+ * (okid_host/stream.h), sensors that are missing (okid_host/virtual.h), frames and bytes of devices to samples and events (okid_host/capture.h), configurations, CSV files
  * and signal descriptions read (okid_host/files.h). The program `okid` and the Python package stand on the same code.
  *
  * Calls return 0, or the exit code the program would end with: 2 wrong usage or bad input, 3 no model can be had honestly,
@@ -54,5 +54,6 @@ OKID_HOST_API int32_t okid_host_error_status(void);
 #include <okid_host/record.h>
 #include <okid_host/responses.h>
 #include <okid_host/stream.h>
+#include <okid_host/virtual.h>
 
 #endif

@@ -76,7 +76,8 @@ session::session(const live_config& config, const session_options& options)
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)), rate_(config.rate_hz),
       updates_(maker_, options.live && options.identify, config.n_u + config.n_y) {
     if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
-    if (config.publish.samples) feed_.emplace(config);
+    open_virtual();
+    if (config.publish.samples) feed_.emplace(config, virtual_ ? virtual_->size() : 0);
     if (!options.live && !publisher_.watched())
         updates_.hurry(true); // those that the result does not rest on are left out
     stats_samples_ =
@@ -99,6 +100,25 @@ void session::send_samples(const json_line& block) {
     if (block) publisher_.samples(block);
 }
 
+/// A log may be played where the file of [virtual] is not.
+void session::open_virtual() {
+    if (config_.virtual_sensors.model.empty() || !options_.identify) return;
+    try {
+        virtual_.emplace(config_);
+    } catch (const failure& why) {
+        if (options_.live) throw;
+        say("okid: warning: no virtual sensors: {}\n", why.what());
+    }
+}
+
+/// What the virtual channels show while nothing is measured.
+void session::bridge(std::int64_t index, std::int64_t count) {
+    if (relief_.stands(overload_step::pictures)) return;
+    const std::int64_t end = index + std::min(count, virtual_->longest_bridge());
+    for (; index < end; ++index) send_samples(feed_->add(index, nullptr, virtual_->add(index, nullptr)));
+    send_samples(feed_->end_block());
+}
+
 void session::ready() { notify_service("READY=1"); }
 
 void session::start(std::int64_t time_ns) {
@@ -112,6 +132,8 @@ void session::start(std::int64_t time_ns) {
                                      {"role", channel_role_name(channel.role)},
                                      {"unit", channel.unit.empty() ? "" : channel.si_unit()},
                                      {"dof", channel.dof == 0 ? ordered_json(nullptr) : ordered_json(channel.dof)}});
+    if (virtual_)
+        for (ordered_json& one : virtual_->described()) event["channels"].push_back(std::move(one));
     for (const auto& [key, text] : config_.notes) event["notes"][key] = text;
     tell(event);
 }
@@ -138,7 +160,8 @@ void session::on_sample(std::int64_t index, const double* row) {
     rate_.add(index, grid_.time_ns(index));
     if (options_.listener) options_.listener->on_sample(index, row);
     if (!options_.identify) return;
-    if (feed_ && !relief_.stands(overload_step::pictures)) send_samples(feed_->add(index, row));
+    if (feed_ && !relief_.stands(overload_step::pictures))
+        send_samples(feed_->add(index, row, virtual_ ? virtual_->add(index, row) : nullptr));
     if (hammer_.wanted()) {
         if (hammer_.add(index, row, 1)) strike();
     } else if (!trigger_.waiting())
@@ -160,6 +183,7 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
     if (options_.listener) options_.listener->on_missing(index, count);
     if (!options_.identify) return;
     if (feed_) send_samples(feed_->end_block());
+    if (virtual_) bridge(index, count);
     if (hammer_.wanted()) {
         if (hammer_.add(index, nullptr, count)) strike();
     } else if (!trigger_.waiting())

@@ -13,6 +13,7 @@
 #include "result/result.hpp"
 #include "stream_target.hpp"
 #include "update_thread.hpp"
+#include "virtual_channels.hpp"
 
 #include <array>
 #include <cstdint>
@@ -82,6 +83,8 @@ class session : public stream_target, private grid_sink {
     void count_update(const update_report& report);
     void overload(overload_step step, bool on);
     void send_samples(const json_line& block);
+    void bridge(std::int64_t index, std::int64_t count);
+    void open_virtual();
     std::string silence(std::size_t index) const;
     void check_heard() const;
     nlohmann::ordered_json bus_stats(std::size_t bus) const;
@@ -97,6 +100,7 @@ class session : public stream_target, private grid_sink {
     const live_config& config_;
     session_options options_;
     publisher publisher_;
+    std::optional<virtual_channels> virtual_;
     std::optional<sample_feed> feed_;
     aligner grid_;
     stream_check check_;

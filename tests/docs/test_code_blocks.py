@@ -37,6 +37,11 @@ LEAST = {
     "bus": BUS,
     "channel": CHANNEL.format("force1", "force", "N", 0) + CHANNEL.format("acc1", "acceleration", "g", 16),
 }
+VIRTUAL = {
+    "schema": "okid.virtual/1", "inputs": ["force1"], "outputs": ["acc1", "acc2", "acc3"], "input_std": [1.0],
+    "model": {"dt": 1e-3, "A": [[0.5]], "B": [[1.0]], "C": [[1.0]] * 3, "D": [[0.0]] * 3, "K": [[0.0] * 3]},
+    "noise": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+}  # fmt: skip
 DBC = ROOT / "drivers" / "proto" / "okid.dbc"
 
 
@@ -77,6 +82,8 @@ def embedded(text: str) -> str:
             body += f'[[bus]]\nname = "{bus}"\n{line if "field = " in text and bus != "can0" else can}'
     if names & {"bus", "channel"}:
         return LEAST["acquisition"] * ("acquisition" not in names) + body
+    if "virtual" in names and "publish" not in names:
+        body += '[publish]\nsocket = "okid.sock"\nsamples = true\n'
     return "".join(part for name, part in LEAST.items() if name not in names) + body
 
 
@@ -84,6 +91,7 @@ def embedded(text: str) -> str:
 def test_toml(block: Block, tmp_path: pathlib.Path) -> None:
     (tmp_path / "okid.dbc").write_text(DBC.read_text())
     (tmp_path / "frame.dbc").write_text(DBC.read_text())
+    (tmp_path / "frame.virtual.json").write_text(json.dumps(VIRTUAL))
     if re.search(r"(?m)^(?:masses|M) = ", block.text):
         (tmp_path / "rig.toml").write_text(block.text)
         done = okid("simulate", tmp_path / "rig.toml", "--truth", "-", "--quiet")

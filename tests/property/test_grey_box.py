@@ -128,5 +128,5 @@ def test_forces_and_places_without_a_sensor() -> None:
     assert 0.8 < float(np.std(error / found.y_std[200:, [2, 5]])) < 1.3
     with pytest.raises(okid.InputError, match="a sample of 6 outputs and 0 inputs"):
         okid.VirtualSensors(known, noise).step(y[0])
-    with pytest.raises(okid.InputError, match="force_hz belongs"):
+    with pytest.raises(okid.InputError, match="expected force_std beside it"):
         okid.VirtualSensors(known, noise, force_hz=3.0)
