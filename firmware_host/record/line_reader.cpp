@@ -24,7 +24,8 @@ line_reader::line_reader(std::string path) : path_(std::move(path)) {
     struct stat status{};
     if (fstat(fd_, &status) == 0 && S_ISREG(status.st_mode)) size_ = static_cast<std::size_t>(status.st_size);
     try {
-        buffer_.resize(read_bytes);
+        const bool small = size_ > 0 && size_ < read_bytes;
+        buffer_.resize(small ? size_ + 1 : read_bytes); // with one byte more the end is seen without growing
         fill();
         if (end_ == 0) throw failure(exit_usage, fmt::format("{}: the file is empty", path_));
         check_first_bytes();
