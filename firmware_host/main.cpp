@@ -83,7 +83,7 @@ int main(int argc, char** argv) {
                          std::string("okid ") + okid_version() + " (" + okid_backend() + ")" + okid_host::left_out());
     app.require_subcommand(1);
     app.get_formatter()->label("REQUIRED", ""); // the usage line puts brackets around what is not
-    app.footer("okid COMMAND --help tells the options of a command.\n\n"
+    app.footer("okid COMMAND --help lists the options of a command.\n\n"
                "Example:\n  okid identify frame.csv --inputs force --outputs acc1,acc2,acc3");
     okid_host::add_identify(app);
     okid_host::add_run(app);

@@ -48,7 +48,7 @@ def holes(index: str, name: str, version: str) -> list[str] | None:
     for one in told:
         names, fixed = ", ".join([one["id"], *one.get("aliases", [])]), ", ".join(one.get("fixed_in") or ["no release"])
         summary = " ".join((one.get("summary") or one["details"]).split())[:120]
-        lines.append(f"{names}: {summary} (mended in {fixed})")
+        lines.append(f"{names}: {summary} (fixed in {fixed})")
     if found["info"].get("yanked"):
         lines.append(f"taken back by its makers: {found['info'].get('yanked_reason') or 'no reason is given'}")
     return lines

@@ -35,11 +35,12 @@ std::vector<bus_event> bus_watch::look(const drv_stats_t& now) {
                                    now.lost_driver),
                        first(&drv_stats_t::lost_driver)});
     if (more(&drv_stats_t::lost_overflow))
-        out.push_back({"socket_overflow",
-                       fmt::format("{} frames lost in all, the receive buffer ({} bytes) was full; okid doctor tells "
-                                   "how to enlarge it",
-                                   now.lost_overflow, now.buffer_bytes),
-                       first(&drv_stats_t::lost_overflow)});
+        out.push_back(
+            {"socket_overflow",
+             fmt::format(
+                 "{} frames lost in all, the receive buffer ({} bytes) was full; okid doctor shows how to enlarge it",
+                 now.lost_overflow, now.buffer_bytes),
+             first(&drv_stats_t::lost_overflow)});
     if (more(&drv_stats_t::no_ack))
         out.push_back({"no_ack", "nobody acknowledges what is sent: is another node on the bus, at this bit rate?",
                        first(&drv_stats_t::no_ack)});

@@ -147,9 +147,10 @@ std::string stream_check::same_group(const message& one) const {
     if (!one.frame.extended || found == end) return "";
     if (one.frame.mask)
         return fmt::format("address {:#x} sends this group: is source_address right?", found->id & 0xFF);
-    return fmt::format("{:#x} came of the same J1939 group: give pgn = {}, or mark the message VFrameFormat J1939PG "
-                       "in the dbc",
-                       found->id, group(found->id));
+    return fmt::format(
+        "{:#x} of the same J1939 group was received: give pgn = {}, or mark the message VFrameFormat J1939PG "
+        "in the dbc",
+        found->id, group(found->id));
 }
 
 std::string stream_check::others(std::size_t bus) const {

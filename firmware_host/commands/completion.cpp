@@ -105,11 +105,11 @@ void add_completion(CLI::App& app) {
         ->required()
         ->type_name("bash|zsh|fish")
         ->check(CLI::IsMember({"bash", "zsh", "fish"}).description(""));
-    command->footer("The Debian package brings all three along. To load one by hand, for this session:\n"
+    command->footer("The Debian package installs all three. To load one by hand, for this session:\n"
                     "  bash: source <(okid completion bash)\n"
                     "  zsh:  source <(okid completion zsh)      (after compinit)\n"
                     "  fish: okid completion fish | source\n"
-                    "For good, put what it prints into\n"
+                    "To keep it, write its output to\n"
                     "  bash: ~/.local/share/bash-completion/completions/okid      (needs the package bash-completion)\n"
                     "  zsh:  a file _okid in a folder of $fpath\n"
                     "  fish: ~/.config/fish/completions/okid.fish\n\n"

@@ -271,14 +271,14 @@ void convert(const convert_arguments& given) {
         throw failure(
             exit_usage,
             fmt::format("{} to {}: found \"{}\" to \"{}\", expected {}. Files of other programs (MDF4, UFF, HDF5, "
-                        ".mat, BLF, ASC) are the matter of okid-convert, which comes with the Python package",
+                        ".mat, BLF, ASC) are converted by okid-convert, of the Python package",
                         given.from, given.to, from, to, fmt::join(ways, ", ")));
     check_writable(given.to);
     if (way == ways[0]) return journal_to_log(given);
     const std::optional<live_config> config = config_for(given, from == ".okj");
     if (way == ways[3]) return log_to_journal(given, config);
     if (!config)
-        throw failure(exit_usage, from == ".okj" ? given.from + ": it holds no whole config: say -c CONFIG.toml"
+        throw failure(exit_usage, from == ".okj" ? given.from + ": it holds no complete config: give -c CONFIG.toml"
                                                  : "-c CONFIG.toml is missing: it says which bits are which channel");
     if (to == ".csv")
         frames_to_csv(given, *config);
@@ -297,7 +297,7 @@ void add_convert(CLI::App& app) {
                      "a journal and the segments behind it, a log of candump -L, or a table of samples")
         ->required()
         ->type_name("IN.okj|IN.log|IN.csv");
-    command->add_option("out", given->to, "what to make of it")->required()->type_name("OUT.csv|OUT.log|OUT.okj");
+    command->add_option("out", given->to, "the file to write")->required()->type_name("OUT.csv|OUT.log|OUT.okj");
     command->add_option("-c,--config", given->config, "which bits are which channel; a journal holds its own")
         ->type_name("CONFIG.toml");
     command->footer(

@@ -84,7 +84,7 @@ void check_interface(findings& out, const bus_config& bus) {
         return;
     }
     if (code != 0) {
-        out.note(what, fmt::format("netlink tells nothing of it ({})", std::strerror(-code)));
+        out.note(what, fmt::format("netlink reports nothing about it ({})", std::strerror(-code)));
         return;
     }
     bool first = true;
@@ -181,12 +181,12 @@ void check_clock(findings& out) {
     const bool slow = clock == "hpet" || clock == "acpi_pm" || clock == "jiffies";
     const std::string found = clock + " is slow to read; time stamps of the kernel are coarser than with tsc";
     if (clock.empty())
-        out.note("clock", "the kernel does not tell its clock source");
+        out.note("clock", "the kernel does not report its clock source");
     else if (slow && (" " + others + " ").find(" tsc ") != std::string::npos)
         out.note("clock", found,
                  "echo tsc | sudo tee /sys/devices/system/clocksource/clocksource0/current_clocksource");
     else if (slow)
-        out.note("clock", found + "; the kernel found tsc unstable, dmesg | grep -i tsc tells why");
+        out.note("clock", found + "; the kernel found tsc unstable, dmesg | grep -i tsc shows why");
     else
         out.well("clock", clock);
 }
@@ -269,7 +269,7 @@ findings examine(const std::optional<live_config>& config) {
 void add_doctor(CLI::App& app) {
     auto path = std::make_shared<std::string>();
     CLI::App* command =
-        app.add_subcommand("doctor", "Look at what this machine lacks for a live measurement, and how to fix it");
+        app.add_subcommand("doctor", "Check this machine for a live measurement: what is missing, and how to fix it");
     command->add_option("config", *path, "also look at the buses of this file")->type_name("CONFIG.toml");
     command->footer(
         "Exit 0: all well. 2: the config is wrong. 4: something is missing.\n\nExample:\n  okid doctor frame.toml");

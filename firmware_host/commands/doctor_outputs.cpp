@@ -38,7 +38,7 @@ void check_recording(findings& out, const record_config& wanted) {
     const std::string found = fmt::format("{}: {:.0f} MB free", wanted.directory, free_mb);
     if (free_mb < 2 * wanted.segment_mb)
         out.missing("recording", found + fmt::format(", a journal grows to {:g} MB", wanted.segment_mb),
-                    "free some room there, or name a [record] directory on another disk");
+                    "free space there, or name a [record] directory on another disk");
     else if (free_mb < wanted.max_mb)
         out.note("recording",
                  found + fmt::format(", less than max_mb = {:g}: the disk will be full first", wanted.max_mb),

@@ -44,7 +44,7 @@ void choose_columns(identify_arguments& given) {
     given.wanted.outputs = split_names("--outputs", given.outputs);
     for (const std::string& name : given.wanted.outputs)
         if (std::find(given.wanted.inputs.begin(), given.wanted.inputs.end(), name) != given.wanted.inputs.end())
-            usage(fmt::format("\"{}\" stands in --inputs and in --outputs, expected a column to be one of them",
+            usage(fmt::format("\"{}\" is in --inputs and in --outputs, expected a column to be one of them",
                               printable(name)));
 }
 
@@ -155,7 +155,7 @@ std::vector<set_up> read_each_set_up(const identify_arguments& given, record_opt
 record_result identify_files_of_responses(const identify_arguments& given) {
     response_request asked{given.wanted, given.exponential, given.all_modes};
     if (!given.range.empty()) usage("--range is an option of records, found with --frf");
-    if (given.set_ups) usage("--setups is an option of records: several files with --frf are set-ups anyway");
+    if (given.set_ups) usage("--setups is an option of records: several files with --frf are always set-ups");
     if (!given.inputs.empty()) asked.wanted.inputs = split_names("--inputs", given.inputs);
     if (!given.outputs.empty()) asked.wanted.outputs = split_names("--outputs", given.outputs);
     check_targets(given);
@@ -208,7 +208,7 @@ void add_identify(CLI::App& app) {
                      "how the model is found: auto (default), what several methods agree on, or one of them. With an "
                      "option of one "
                      "method alone (--p, --rows, --order, --max-order, --hankel, --refine, --stabilization) okid-era. "
-                     "plscf: modes from correlations by way of frequency responses")
+                     "plscf: modes from correlations through frequency responses")
         ->type_name(fmt::format("auto|{}|{}", fmt::join(method_names(), "|"), lag_method));
     command->add_option("--p", given->wanted.p, "observer order in samples (default 40; not for n4sid)")
         ->type_name("N");
@@ -227,7 +227,7 @@ void add_identify(CLI::App& app) {
         ->add_option(
             "--hold", given->wanted.hold,
             "force between samples: held (zoh), linear (foh) or band-limited, as a load cell behind an anti-alias "
-            "filter gives it (band); auto (default of --method auto) tells it from the record")
+            "filter gives it (band); auto (default of --method auto) determines it from the record")
         ->type_name("auto|zoh|foh|band");
     command->add_option("--band", given->wanted.band, "only modes in this band, Hz (auto, plscf)")->type_name("LO:HI");
     command
@@ -238,10 +238,11 @@ void add_identify(CLI::App& app) {
         ->add_option("--threads", given->wanted.threads,
                      "processors for --method auto (default: all it may use); the result is the same for any number")
         ->type_name("N");
-    command->add_flag("--all-modes", given->all_modes, "the table also lists the modes that are not signed, and why");
+    command->add_flag("--all-modes", given->all_modes,
+                      "the table also lists the doubtful modes, and why they are doubtful");
     command->add_option("--modes", given->wanted.modes, "only these modes, by their numbers in the table (auto, plscf)")
         ->type_name("1,3-5");
-    command->add_option("--detrend", given->wanted.detrend, "what is taken out of every channel first (default mean)")
+    command->add_option("--detrend", given->wanted.detrend, "what is removed from every channel first (default mean)")
         ->type_name("none|mean|linear");
     command
         ->add_option(
@@ -267,13 +268,13 @@ void add_identify(CLI::App& app) {
         ->add_option("--output-dofs", given->wanted.output_dofs,
                      "where each sensor stands; every degree of freedom needs a force or a sensor, one needs both")
         ->type_name("LIST");
-    command->add_flag("--refine{yes}", given->wanted.refine,
-                      "improve the model by maximum likelihood: with noise at the sensors nothing can be more exact. "
-                      "Needs --inputs. --refine=auto, the default of method auto: where the noise is white and all "
-                      "modes stay who they are; --refine=no");
     command->add_flag(
-        "--stabilization", given->wanted.stabilization,
-        "look at all orders and three horizons too, and list the modes that hold (JSON: \"stabilization\")");
+        "--refine{yes}", given->wanted.refine,
+        "improve the model by maximum likelihood: with noise at the sensors no unbiased estimate is more exact. "
+        "Needs --inputs. --refine=auto, the default of method auto: if the noise is white and every mode keeps its "
+        "identity; --refine=no");
+    command->add_flag("--stabilization", given->wanted.stabilization,
+                      "look at all orders and three horizons too, and list the stable modes (JSON: \"stabilization\")");
     command
         ->add_option("--sigma", given->wanted.sigma,
                      "standard deviations: analytic (default; the method's derivative along each block of the record), "

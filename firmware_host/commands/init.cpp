@@ -208,7 +208,7 @@ std::string text_of(const init_arguments& given, const proposal& found) {
     out += bus_section(given) + found.channels + (found.left_out.empty() ? "" : "\n" + found.left_out);
     out += "\n[identification]           # all of it may be left out\nupdate_s = 2.0\n";
     if (found.forces > 0)
-        out += "# hold = \"foh\"            # the force is a load cell's; default: told from the record\n"
+        out += "# hold = \"foh\"            # the force is a load cell's; default: determined from the record\n"
                "# mkr = true              # mass, stiffness, damping: a force or sensor at every dof, both at one\n";
     return out + "# window_s = 20.0          # for a structure that changes; default: everything since the start\n\n"
                  "# [record]                 # raw frames onto the disk\n# directory = \"runs\"\n\n"
@@ -229,7 +229,7 @@ void init(const init_arguments& given) {
     const proposal found =
         given.dbc.empty() ? from_fields(given) : from_dbc(given, hears ? listen(given) : heard_frames{});
     if (given.rate_hz == 0 && !(found.rate_hz >= 1))
-        throw failure(exit_usage, "the frames that were heard tell no sample rate; expected --rate HZ");
+        throw failure(exit_usage, "the frames that were received give no sample rate; expected --rate HZ");
     const std::string text = text_of(given, found);
     (void)load_config_text(given.config, text); // what is written is right
     write_whole_file(given.config, text);
@@ -243,14 +243,15 @@ void add_init(CLI::App& app) {
     auto given = std::make_shared<init_arguments>();
     CLI::App* command =
         app.add_subcommand("init", "Propose a commented CONFIG.toml from a DBC, a bus or a serial line");
-    command->add_option("config", given->config, "the file to write; one that exists is left alone")
+    command->add_option("config", given->config, "the file to write; an existing one is not overwritten")
         ->required()
         ->type_name("CONFIG.toml");
     command->add_option("--dbc", given->dbc, "signals with the unit of a force or a motion become channels")
         ->type_name("FILE.dbc");
     command->add_option("--interface", given->interface, "CAN interface (default can0)")->type_name("NAME");
     command
-        ->add_option("--listen", given->listen_s, "listen to it for so long: only messages that come, and their rate")
+        ->add_option("--listen", given->listen_s,
+                     "listen to it for this long: only messages that are received, and their rate")
         ->type_name("SECONDS")
         ->check(CLI::Range(0.1, 600.0).description(""));
     command->add_option("--log", given->log, "the same from a candump log")->type_name("FILE.log");

@@ -45,9 +45,8 @@ void add_record(CLI::App& app) {
     command->add_option("--duration", given->duration, "end after this much stream time")->type_name("SECONDS");
     command->add_option("--directory", given->directory, "write there instead of the directory of [record]")
         ->type_name("FOLDER");
-    command->footer(
-        "Ends in order on Ctrl-C, SIGTERM or after --duration; a kill or a power cut costs at most the last "
-        "quarter of a second.\n\nExample:\n  okid record frame.toml --duration 3600 --directory /data");
+    command->footer("Ends cleanly on Ctrl-C, SIGTERM or after --duration; a kill or a power cut costs at most the last "
+                    "quarter of a second.\n\nExample:\n  okid record frame.toml --duration 3600 --directory /data");
     command->callback([given] { record(*given); });
 }
 

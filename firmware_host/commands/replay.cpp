@@ -22,7 +22,7 @@ live_config config_for(const replay_arguments& given, const std::optional<journa
     if (!given.config.empty()) return load_config(given.config);
     if (!header) throw failure(exit_usage, "-c CONFIG.toml is missing (or --to INTERFACE, to play the log onto a bus)");
     if (header->texts.config.empty())
-        throw failure(exit_usage, fmt::format("{}: the config in it is {}; say -c CONFIG.toml", given.log,
+        throw failure(exit_usage, fmt::format("{}: the config in it is {}; give -c CONFIG.toml", given.log,
                                               header->whole ? "missing" : "damaged"));
     live_config config = load_config(given.log, header->texts);
     config.publish = {}; // the run's listeners were for the run; a journal of somebody else opens nothing here

@@ -37,7 +37,7 @@ void add_run(CLI::App& app) {
         ->required()
         ->type_name("CONFIG.toml");
     add_output_options(*command, *given);
-    command->footer("Ends in order, with the result, on Ctrl-C, SIGTERM or after --duration.\n\n"
+    command->footer("Ends cleanly, with the result, on Ctrl-C, SIGTERM or after --duration.\n\n"
                     "Example:\n  okid run frame.toml --duration 60 --events events.jsonl --json result.json");
     command->callback([given] { run(*given); });
 }

@@ -94,7 +94,9 @@ void add_support_bundle(CLI::App& app) {
                                                              "okid doctor, the config without passwords, last events");
     command->add_option("config", given->config, "the config of the run, wrong or right")->type_name("CONFIG.toml");
     command->add_option("--events", given->events, "the events of the run: their end")->type_name("FILE");
-    command->add_option("--lines", given->lines, "how many events (50)")->check(CLI::Range(1, 1000))->type_name("N");
+    command->add_option("--lines", given->lines, "how many events (50)")
+        ->check(CLI::Range(1, 1000).description(""))
+        ->type_name("N");
     command->add_option("--out", given->out, "write it there; - = stdout, the default")->type_name("FILE|-");
     command->footer("Read it before you send it: names of channels, notes and paths are in it.\n\n"
                     "Example:\n  okid support-bundle frame.toml --events events.jsonl --out bundle.txt");

@@ -110,16 +110,16 @@ struct trigger_config {
     gpio_place place;        ///< gpio
 };
 
-/// A hammer test: blows are waited for, judged and added up.
+/// A hammer test: hits are waited for, accepted or rejected, and averaged.
 struct hammer_config {
     bool enabled = false;
     std::size_t channel = 0; ///< the force, index in live_config::channels
-    double level = 0;        ///< in its unit; negative: a blow is negative
+    double level = 0;        ///< in its unit; negative: a hit is negative
     int hits = 5;            ///< good ones wanted, at every point
     std::vector<int> points; ///< places struck one after the other (-3: at 3, reversed); empty: one that is not named
-    double length_s = 2;     ///< of a blow's ring-down
+    double length_s = 2;     ///< of a hit's ring-down
     double pretrigger_s = 0; ///< at least; as long as the lags in any case
-    double double_percent = 10; ///< of the peak: a second blow this strong is one
+    double double_percent = 10; ///< of the peak: a second hit this strong is one
     double spectrum_hz = 0;     ///< the force must reach so far
 
     int total() const { return hits * std::max(1, static_cast<int>(points.size())); }

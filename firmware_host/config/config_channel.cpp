@@ -265,7 +265,7 @@ static void check_length(const config_place& place, const toml::table& table, co
     refuse_table(
         place, table,
         fmt::format("its frame has {} bytes or more, which only CAN FD has: write fd = true in [[bus]] \"{}\", or "
-                    "mend the bits of the channel",
+                    "fix the bits of the channel",
                     bytes, bus.name));
 }
 

@@ -12,17 +12,17 @@ namespace {
 
 constexpr double most_bytes = 1e9;
 
-/// What else stands in the config must be able to go with separate blows.
+/// What else stands in the config must be able to go with separate hits.
 void check_company(const config_place& place, const toml::table& table, const toml::table& file,
                    const live_config& config) {
     if (config.trigger.source != trigger_source::immediate)
         refuse_key({config.path, "[trigger]"}, *file["trigger"].as_table()->get("source"), "source",
-                   "[hammer] waits for blows by itself: leave [trigger] out");
+                   "[hammer] waits for hits itself: leave [trigger] out");
     if (config.identification.window_s || config.identification.forgetting)
         refuse_key({config.path, "[identification]"},
                    *file["identification"].as_table()->get(config.identification.window_s ? "window_s" : "forgetting"),
                    config.identification.window_s ? "window_s" : "forgetting",
-                   "the blows of a [hammer] test are added up: leave it out");
+                   "the hits of a [hammer] test are averaged: leave it out");
     if (config.channels[config.hammer.channel].role != channel_role::force)
         refuse_key(place, *table.get("channel"), "channel",
                    fmt::format("\"{}\" has not the role force", config.channels[config.hammer.channel].name));
@@ -34,8 +34,8 @@ void check_company(const config_place& place, const toml::table& table, const to
                          static_cast<double>(config.channels.size());
     if (bytes > most_bytes)
         refuse_key(place, *table.get("length_s"), "length_s",
-                   fmt::format("a blow of {:g} s would take {:.1f} GB, at most {:g} GB are kept",
-                               config.hammer.length_s, bytes / 1e9, most_bytes / 1e9));
+                   fmt::format("a hit of {:g} s would take {:.1f} GB, at most {:g} GB are kept", config.hammer.length_s,
+                               bytes / 1e9, most_bytes / 1e9));
 }
 
 /// "points = [1, 2, -7]".
@@ -74,7 +74,7 @@ void read_hammer(const toml::table& file, live_config& config) {
     if (!t.contains("level") || *t["level"].value<double>() == 0)
         throw failure(exit_usage,
                       fmt::format("{}: line {}, [hammer]: \"level\" {}: the force, in the channel's unit, with which a "
-                                  "blow begins; negative for a hammer that reads negative",
+                                  "hit begins; negative for a hammer that reads negative",
                                   config.path, t.source().begin.line, t.contains("level") ? "is 0" : "is missing"));
     out.level = *t["level"].value<double>();
     out.hits = static_cast<int>(t["hits"].value_or(std::int64_t{out.hits}));

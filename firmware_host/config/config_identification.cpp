@@ -55,7 +55,7 @@ void check_agreement(const config_place& place, const toml::table& t, const iden
                        "belongs to one method, \"auto\" agrees over many: leave one of them out");
     if (agreed && wanted.forgetting)
         refuse_key(place, *t.get("forgetting"), "forgetting",
-                   "\"auto\" keeps the samples of a window, none of them fades: expected window_s, or one method");
+                   "\"auto\" keeps the samples of a window, without forgetting: expected window_s, or one method");
     for (const char* key : {"band", "decimate"})
         if (!agreed && t.contains(key))
             refuse_key(place, *t.get(key), key,

@@ -195,13 +195,13 @@ void read_publish(const toml::table& file, live_config& config) {
             refuse_address(place, *node, "prometheus", "a numeric address and a port, such as 127.0.0.1:9273");
         if (!out.prometheus->loopback())
             config.warnings.push_back(
-                fmt::format("[publish] prometheus listens on {}: whoever reaches that address can read the modes",
+                fmt::format("[publish] prometheus listens on {}: anyone who reaches that address can read the modes",
                             out.prometheus->text()));
     }
     if (const toml::node* node = table->get("mqtt")) out.mqtt = broker_of(place, *node);
     if (const toml::node* node = table->get("password_file")) read_password_file(place, *node, out);
     if (const toml::node* node = table->get("discovery")) {
-        if (!out.mqtt) refuse_key(place, *node, "discovery", "it is told over MQTT, expected mqtt beside it");
+        if (!out.mqtt) refuse_key(place, *node, "discovery", "it is sent over MQTT, expected mqtt beside it");
         out.mqtt->discovery = *node->value<bool>();
     }
     if (const toml::node* node = table->get("influx")) out.influx = influx_of(place, *node);

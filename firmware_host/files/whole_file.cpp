@@ -82,7 +82,9 @@ whole_file::whole_file(std::string path) : path_(std::move(path)) {
     if (planted_link(path_))
         throw failure(
             exit_usage,
-            fmt::format("{}: is a link of another user in a folder for all, expected a file or nothing", path_));
+            fmt::format(
+                "{}: is a link of another user in a folder that everyone can write to, expected a file or nothing",
+                path_));
     struct stat status{};
     const bool exists = stat(path_.c_str(), &status) == 0;
     if (exists && S_ISDIR(status.st_mode)) cannot_write(path_, EISDIR);

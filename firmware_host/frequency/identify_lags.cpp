@@ -247,8 +247,8 @@ void mark_unsteady(const lag_work& work, response_modes& found) {
     }
     if (std::none_of(found.modes.begin(), found.modes.end(), [](const auto& mode) { return mode.confident(); }))
         throw failure(exit_no_model,
-                      fmt::format("no model: no mode of the correlations stays where it is without a part "
-                                  "of the record; doubtful: {}. Record longer, or choose a band with --band",
+                      fmt::format("no model: no mode of the correlations is stable when a part of the record is left "
+                                  "out; doubtful: {}. Record longer, or choose a band with --band",
                                   seen));
 }
 

@@ -7,7 +7,7 @@
  * (okid_host/stream.h), sensors that are missing (okid_host/virtual.h), frames and bytes of devices to samples and events (okid_host/capture.h), configurations, CSV files
  * and signal descriptions read (okid_host/files.h). The program `okid` and the Python package stand on the same code.
  *
- * Calls return 0, or the exit code the program would end with: 2 wrong usage or bad input, 3 no model can be had honestly,
+ * Calls return 0, or the exit code the program would end with: 2 wrong usage or bad input, 3 no reliable model,
  * 4 device, memory or disk. okid_host_error() then gives the sentence the program would print. Nothing is changed by a call
  * that fails, unless its description says so. No exception leaves the library.
  *

@@ -203,7 +203,7 @@ agreement::saved agreement::read(const void* state, std::size_t bytes) const {
     const std::size_t rest = (bytes - sizeof head) / 8;
     const auto records = static_cast<std::size_t>(head.records), samples = static_cast<std::size_t>(head.samples);
     if (records > rest || samples > rest / m_ || bytes != sizeof head + 8 * (records + samples * m_))
-        refuse_state("is damaged: its size is not the one it tells");
+        refuse_state("is damaged: its size differs from its header");
     saved out;
     out.ends.resize(records);
     out.rows.resize(samples * m_);

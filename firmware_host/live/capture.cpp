@@ -107,7 +107,7 @@ class pump {
         const std::size_t bus = merge_.waited_for();
         const std::string text =
             fmt::format("its reader is too far behind: {} frames of other buses waited for it until their memory was "
-                        "full and went on without; what of it comes {:g} s later than theirs is in the journal alone",
+                        "full and went on without; what of it comes {:g} s later than theirs is only in the journal",
                         hurried_, silence_patience_s);
         target_.bus_event(bus, "behind", text);
         if (first) say("okid: interface {}: {}\n", readers_[bus]->interface(), text);

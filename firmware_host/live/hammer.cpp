@@ -12,8 +12,8 @@ namespace okid_host {
 namespace {
 
 constexpr double pulse_share = 0.1; // of the peak: what belongs to a pulse
-constexpr double least_peak = 20;   // in deviations of the force before the blow
-constexpr double most_motion = 0.1; // rms before the blow, of that after it
+constexpr double least_peak = 20;   // in deviations of the force before the hit
+constexpr double most_motion = 0.1; // rms before the hit, of that after it
 constexpr double band_share = 0.1;  // of the greatest amplitude: -20 dB
 constexpr std::size_t frequencies = 128;
 constexpr std::size_t flat_top = 5; // samples that are exactly equal at the peak: an amplifier at its limit
@@ -85,7 +85,7 @@ bool hammer::refuse(const char* fault, std::string text) {
     return true;
 }
 
-/// A sample that is missing in the middle of a blow cannot be asked for again, but the blow can.
+/// A sample that is missing in the middle of a hit cannot be asked for again, but the hit can.
 bool hammer::find_missing() {
     std::size_t lost = 0;
     for (std::size_t i = 0; i < rows(); ++i)
@@ -115,7 +115,7 @@ bool hammer::find_overload() {
                               equal, force(top_), unit_));
 }
 
-/// Peak and extent of the blow, and the noise of the force before it.
+/// Peak and extent of the hit, and the noise of the force before it.
 void hammer::measure() {
     const auto quiet = static_cast<std::size_t>(before_) * 7 / 8;
     double sum = 0, squares = 0;
@@ -151,7 +151,7 @@ bool hammer::find_second_blow() {
     return false;
 }
 
-/// Is the structure still ringing from what was before? The rms before the blow against that behind it.
+/// Is the structure still ringing from what was before? The rms before the hit against that behind it.
 bool hammer::find_motion() {
     const auto count = static_cast<std::size_t>(before_);
     const auto rms = [&](std::size_t c, std::size_t first, std::size_t last) {

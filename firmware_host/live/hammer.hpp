@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The assistant of a hammer test: waits for a blow, keeps the samples from before it to the end of the ring-down, and judges
-// whether they are worth adding to the others.
+// The assistant of a hammer test: waits for a hit, keeps the samples from before it to the end of the ring-down, and
+// judges whether they are worth adding to the others.
 //
-// A blow begins where the force crosses `level`. Before it at least as many quiet samples are kept as the identification
+// A hit begins where the force crosses `level`. Before it at least as many quiet samples are kept as the identification
 // has lags, so that all of it counts. It is refused, with the reason, when samples are missing, a channel stood at full scale,
-// the structure still moved, the force is hardly above its noise, there was a second blow, or its spectrum ends too early.
+// the structure still moved, the force hardly exceeds its noise, there was a second hit, or its spectrum ends too early.
 // No exponential window is put on the response: a model needs none, and it would add damping.
 #pragma once
 #include "config/config.hpp"
@@ -17,9 +17,9 @@
 
 namespace okid_host {
 
-/// What became of a blow.
+/// What became of a hit.
 struct hit_report {
-    int number = 0;             ///< of the blows heard, 1 = the first
+    int number = 0;             ///< of the hits heard, 1 = the first
     std::int64_t sample = 0;    ///< with which the force crossed the level
     std::string fault, text;    ///< fault "" = accepted; text is for people
     double peak = 0;            ///< in the channel's unit, with its sign
@@ -39,16 +39,16 @@ class hammer {
     bool done() const { return wanted() && left_ == 0; }
     bool armed() const { return wanted() && !capturing_ && kept_ >= before_; }
     bool last_good() const { return report_.number > 0 && report_.good(); }
-    /// The next samples; NULL = `count` missing ones. No heap. @return true: a blow was judged
+    /// The next samples; NULL = `count` missing ones. No heap. @return true: a hit was judged
     bool add(std::int64_t index, const double* row, std::int64_t count);
     const hit_report& report() const { return report_; }
-    /// The rows of the blow just judged, oldest first.
+    /// The rows of the hit just judged, oldest first.
     template <class Visit> void each_row(Visit&& visit) const {
         for (std::size_t i = 0; i < rows(); ++i) visit(at(i));
     }
     /// What is waited for, for people.
     std::string awaited() const;
-    /// How many blows lack at the end, and what became of the others; "" when all are there.
+    /// How many hits lack at the end, and what became of the others; "" when all are there.
     std::string shortfall() const;
     int accepted() const { return accepted_; }
 
@@ -81,7 +81,7 @@ class hammer {
     std::int64_t next_ = 0, kept_ = 0, to_come_ = 0;
     bool capturing_ = false, early_ = false, have_last_ = false;
     double last_ = 0, least_ = 0, most_ = 0; ///< of the force, so far
-    // Of the blow that is judged.
+    // Of the hit that is judged.
     double base_ = 0, noise_ = 0;
     std::size_t top_ = 0, begin_ = 0,
                 end_ = 0; ///< rows of the peak, and of the first and behind the last above 10 % of it

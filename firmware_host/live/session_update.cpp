@@ -20,7 +20,7 @@ void session::update(std::int64_t samples) {
     tell(stats_event());
 }
 
-/// What is waited for, above the modes of the blows so far.
+/// What is waited for, above the modes of the hits so far.
 void session::await(std::int64_t samples) {
     table_state state = shown_;
     state.t = seconds(samples);
@@ -90,10 +90,11 @@ void session::overload(overload_step step, bool on) {
           {"step", names[which]},
           {"on", on},
           {"updates_skipped", updates_skipped_},
-          {"text", fmt::format(on ? "the machine is too slow: {} until it has caught up; samples, journal and result "
-                                    "are whole"
-                                  : "caught up: no longer so that {}",
-                               given_up[which])}});
+          {"text",
+           fmt::format(
+               on ? "the machine is too slow: {} until it has caught up; samples, journal and result are complete"
+                  : "caught up; no longer: {}",
+               given_up[which])}});
 }
 
 } // namespace okid_host

@@ -16,7 +16,7 @@ namespace okid_host {
 struct stream_update {
     struct change {
         std::int64_t sample; ///< where it began, about
-        bool restarted;      ///< what was before is forgotten
+        bool restarted;      ///< earlier samples were discarded
     };
     std::optional<change> changed; ///< since the last update
     std::int64_t rows = 0;         ///< equations at hand

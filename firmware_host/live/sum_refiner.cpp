@@ -298,7 +298,7 @@ void sum_refiner::refine(okid_identified_t& model) {
     else if (one.status < 0)
         fault_ = okid_status_text(one.status);
     else if (only_where_it_serves_ && (!one.found.converged || white > nearly_white))
-        fault_ = "it does not serve";
+        fault_ = "it cannot be used";
     if (!fault_.empty()) return;
     model = one.model;
     found_ = {std::move(one.found), std::move(one.arrays), std::move(one.replicates)};

@@ -55,7 +55,7 @@ class update_maker {
     double seconds(std::int64_t samples) const { return static_cast<double>(samples) / rate_hz_; }
 
     double rate_hz_;
-    bool always_; ///< a hammer test: an update for each blow
+    bool always_; ///< a hammer test: an update for each hit
     stream stream_;
     alarm_watch alarm_;
     std::unique_ptr<change_test> change_test_; ///< where [alarm] test_s asks for it

@@ -69,9 +69,9 @@ bool refine_agreed(const record_options& options, std::vector<listed_mode>& list
     }
     const likeliest_model one = likeliest(constants, work);
     std::string fault = one.status < 0 ? okid_status_text(one.status) : "";
-    if (fault.empty() && !one.found.converged) fault = "it did not come to an end";
+    if (fault.empty() && !one.found.converged) fault = "it did not converge";
     if (fault.empty() && options.refine == "auto" && one.found.whiteness > nearly_white)
-        fault = "what it leaves is not white";
+        fault = "its residual is not white";
     std::vector<std::optional<carried_mode>> found;
     if (fault.empty()) found = carried_by(one.model, one.replicates, wanted);
     for (std::size_t i = 0; i < found.size() && fault.empty(); ++i)
@@ -80,7 +80,8 @@ bool refine_agreed(const record_options& options, std::vector<listed_mode>& list
     if (!fault.empty()) {
         if (options.refine == "yes")
             work.context.warnings.emplace_back(
-                "refine_failed", fmt::format("the modes are as agreed on, the refinement was of no use: {}", fault));
+                "refine_failed",
+                fmt::format("the modes are those of the agreement, the refinement was rejected: {}", fault));
         return false;
     }
     take_refined(found, listed, work);

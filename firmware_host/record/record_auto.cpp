@@ -411,7 +411,7 @@ record_options without_outputs(record_options options, const std::vector<bool>& 
     return options;
 }
 
-/// Of records struck at different places: poles and shapes from what follows the blows, B and D from each place's records.
+/// Of records struck at different places: poles and shapes from what follows the hits, B and D from those of each place.
 std::vector<listed_mode> find_struck(const record_options& options, record_work& work) {
     record_options seen = options;
     record_set decays = free_decays(work.set);

@@ -49,10 +49,10 @@ int choose_p(const record_options& options, const record_set& set, long long sam
     }
     if (p < options.p)
         context.warnings.emplace_back("p_reduced",
-                                      fmt::format("p is {} instead of {}: {} samples{} bear no more unknowns (10 rows "
-                                                  "for each). Record longer{} for sharper damping",
+                                      fmt::format("p is {} instead of {}: {} samples{} support no more unknowns (10 "
+                                                  "rows for each). Record longer{} for sharper damping",
                                                   p, options.p, samples, gaps ? " with these gaps" : "",
-                                                  gaps ? " or mend the gaps" : ""));
+                                                  gaps ? " or fix the gaps" : ""));
     return p;
 }
 
@@ -71,10 +71,10 @@ int choose_rows(const record_options& options, const record_set& set, long long 
         for (const long long run : runs) columns += std::max(0LL, run - lags);
         if (columns < 10 * unknowns_of(config.method, n_u, n_y, i)) continue;
         if (i != wanted)
-            context.warnings.emplace_back(
-                "rows_reduced", fmt::format("{} block rows instead of {}: {} samples bear no more unknowns (10 for "
-                                            "each). Record longer for sharper damping",
-                                            i, wanted, samples));
+            context.warnings.emplace_back("rows_reduced",
+                                          fmt::format("{} block rows instead of {}: {} samples support no more "
+                                                      "unknowns (10 for each). Record longer for sharper damping",
+                                                      i, wanted, samples));
         return i;
     }
     throw failure(exit_no_model,

@@ -195,7 +195,7 @@ void remark_on(const refinement& found, double before, double after, remarks& sa
     if (after < before - lost_percent)
         said.emplace_back("prediction_lower",
                           fmt::format("the one-step prediction of the refined model is {:.2f} % on average instead of "
-                                      "{:.2f} %: refinement is about the simulation. For a predictor, identify "
+                                      "{:.2f} %: refinement minimises the simulation error. For a predictor, identify "
                                       "without --refine",
                                       after, before));
 }

@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double struck = 0.05;       // of the largest force: the blow is on
+constexpr double struck = 0.05;       // of the largest force: the hit is on
 constexpr double least_decay = 0.3;   // of a record
 constexpr double explained = 0.5;     // of a record's energy that its own B and D must not leave: the modes are its own
 constexpr double contradiction = 0.1; // more of the energy left by the others' B and D: a third of the amplitude
@@ -47,7 +47,7 @@ std::size_t end_of_blow(const record_set& set, const record_data& record) {
     return last;
 }
 
-/// Every record is one blow and what follows it: then nothing moves before, however short the time before the blow.
+/// Every record is one hit and what follows it: then nothing moves before, however short the time before the hit.
 bool are_blows(const record_set& set) {
     return set.n_u == 1 && std::all_of(set.records.begin(), set.records.end(), [&](const record_data& record) {
                return static_cast<double>(record.count - end_of_blow(set, record)) >=

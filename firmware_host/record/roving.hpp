@@ -20,7 +20,7 @@ record_set one_column_a_place(const record_set& set, const std::vector<int>& hit
 /// Their names: "force@3".
 std::vector<std::string> place_names(const std::string& force, const std::vector<int>& hits);
 
-/// What follows the last sample of each blow, outputs alone; empty where that is less than 30 % of a record.
+/// What follows the last sample of each hit, outputs alone; empty where that is less than 30 % of a record.
 record_set free_decays(const record_set& set);
 
 /// B, D and fits of a modal model of which each place has its own records.

@@ -228,7 +228,7 @@ void remark_unsteady(const std::vector<listed_mode>& modes, double fs_hz, record
     if (!drifts.empty())
         work.context.warnings.emplace_back(
             "time_varying",
-            fmt::format("frequencies drift while they are recorded: {}, from begin to end. Identify shorter "
+            fmt::format("frequencies drift while they are recorded: {}, from beginning to end. Identify shorter "
                         "parts, with --range",
                         fmt::join(drifts, ", ")));
 }

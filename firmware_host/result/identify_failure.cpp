@@ -24,7 +24,7 @@ std::string advice(const okid_identify_config_t& config, const std::string& opti
     const bool subspace = is_subspace(config.method);
     if (config.n_u == 0)
         return fmt::format("{}Otherwise the record shows no vibration that lasts: try another {} or an --order",
-                           subspace ? "" : "A free decay (ring-down) wants method n4sid-cva or n4sid-moesp. ", option);
+                           subspace ? "" : "A free decay (ring-down) needs method n4sid-cva or n4sid-moesp. ", option);
     return fmt::format("Is the record long enough, do the outputs answer the inputs, are the two not exchanged? Try {}"
                        "another {} or an --order",
                        subspace ? "" : "method n4sid-moesp, which needs fewer samples, ", option);
@@ -65,7 +65,7 @@ std::string reason(okid_status_t status, const okid_identified_t& model, const o
                            "Try --detrend linear, a smaller --p, or a record without drift",
                            info.radius_plain);
     case OKID_ERR_NO_MODES:
-        return fmt::format("no mode that holds (underdamped, below {:g} Hz, EMAC above 0.5) was found. {}",
+        return fmt::format("no stable mode (underdamped, below {:g} Hz, EMAC above 0.5) was found. {}",
                            context.fs_hz / 2, advice(config, option));
     case OKID_ERR_NUMERIC:
         return fmt::format("a factorisation did not converge. Check the record for extreme values; try a smaller {}",

@@ -118,8 +118,8 @@ std::string note_words(const mass_matrices& found, std::uint32_t bit) {
         return "K is not positive definite: a rigid-body mode is missing, a kind of sensor or the hold is wrong, or a "
                "mode is not one of the structure";
     case OKID_MKR_DAMPING:
-        return "R is not positive definite: it is the hardest of the three (a channel late by 1 % of a sample spoils "
-               "it); R_normal_modes and R of pdc are the better ones";
+        return "R is not positive definite: it is the least certain of the three (a channel late by 1 % of a sample "
+               "distorts it); use R_normal_modes or R of pdc";
     case OKID_MKR_RESIDUAL:
         return fmt::format("the residual of W W^T = 0 is {:.3g} (doubtful above 0.03): the kind of sensor is wrong by "
                            "one (velocity taken for acceleration), the hold is wrong, channels are late, or noise",
@@ -140,7 +140,7 @@ std::string note_words(const mass_matrices& found, std::uint32_t bit) {
             "0.1): gain, unit or polarity of one of them, or of its place",
             most->pair_spread, most->number, most->frequency_hz);
     case OKID_MKR_CLOSE:
-        return fmt::format("the choice of modes was a near thing: the weakest one taken is only {:.3g} times as strong "
+        return fmt::format("the choice of modes was close: the weakest one taken is only {:.3g} times as strong "
                            "as the best left out (doubtful below 2). Compare with another order",
                            found.margin);
     default: return "";

@@ -37,12 +37,12 @@ nlohmann::ordered_json refinement_json(const refinement& found, const std::vecto
 }
 
 std::pair<std::string, std::string> refine_failed(const std::string& reason) {
-    return {"refine_failed", fmt::format("the model is as identified, the refinement was of no use: {}", reason)};
+    return {"refine_failed", fmt::format("the model is as identified, the refinement was rejected: {}", reason)};
 }
 
 std::pair<std::string, std::string> refine_unconverged(const refinement& found) {
     return {"refine_unconverged",
-            fmt::format("the refinement did not come to an end in {} steps (log-likelihood {:+.1f}, {:.2g} left): the "
+            fmt::format("the refinement did not converge in {} steps (log-likelihood {:+.1f}, {:.2g} left): the "
                         "best model reached is given. Structure and record do not fit each other well: try another "
                         "--order",
                         found.iterations, found.gain, found.decrement)};
@@ -82,12 +82,13 @@ std::vector<std::pair<std::string, std::string>> skew_remarks(const channel_skew
                                                               const std::vector<std::string>& outputs) {
     std::vector<std::pair<std::string, std::string>> out;
     if (found.undetermined)
-        out.emplace_back("skew_undetermined",
-                         fmt::format("no delays of the outputs explain the phases of the modes (what is left is {:.3g} "
-                                     "times its deviation): complex modes, or a wrong kind of sensor or hold. Nothing "
-                                     "was corrected: R of normal modes does not hold for complex modes, and R takes "
-                                     "whatever delays there are for damping",
-                                     found.scatter));
+        out.emplace_back(
+            "skew_undetermined",
+            fmt::format(
+                "no delays of the outputs explain the phases of the modes (the rest is {:.3g} times its standard "
+                "deviation): complex modes, or a wrong kind of sensor or hold. Nothing "
+                "was corrected: R of normal modes does not hold for complex modes, and R counts such delays as damping",
+                found.scatter));
     if (const std::string late = delays_text(found, outputs, found.late); !late.empty())
         out.emplace_back("channel_skew",
                          fmt::format("outputs come late against the forces (µs, negative: early): {}. M, K and R are "

@@ -21,7 +21,7 @@ struct refinement {
 /// Key "refinement" of okid.result/1.
 nlohmann::ordered_json refinement_json(const refinement& found, const std::vector<std::string>& outputs);
 
-/// What is to be said when nothing came of it, and when it did not come to an end: (code, text).
+/// What is to be said when nothing came of it, and when it did not converge: (code, text).
 std::pair<std::string, std::string> refine_failed(const std::string& reason);
 std::pair<std::string, std::string> refine_unconverged(const refinement& found);
 

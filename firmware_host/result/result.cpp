@@ -100,13 +100,12 @@ std::string note_text(const okid_identified_t& model, std::uint32_t bit) {
         return "the predictor A - K C is unstable: no prediction fit is given. Try another --p, --rows or --order";
     case OKID_NOTE_ORDER_REDUCED:
         return fmt::format(
-            "the order asked for is more than the data can carry; {} is used. A larger --p and --rows carry "
-            "more",
+            "the order asked for is more than the data support; {} is used. A larger --p and --rows support more",
             model.n_z);
     case OKID_NOTE_ORDER_UNCLEAR:
         return fmt::format(
-            "no clear gap in the singular values: {} is the smallest order that keeps every mode that holds over the "
-            "orders{}. Compare a few orders with --order N",
+            "no clear gap in the singular values: {} is the smallest order that keeps every stable mode{}. Compare a "
+            "few orders with --order N",
             model.n_z,
             std::any_of(model.emac, model.emac + model.mode_count, [](auto emac) { return emac < doubtful_emac; })
                 ? "; it holds noise modes too (EMAC below 0.5)"
@@ -185,7 +184,7 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
         out += fmt::format("   ? EMAC below {:g}: probably noise, not a mode of the structure\n", doubtful_emac);
     if (!left_out.empty())
         out +=
-            fmt::format("   {} not signed, listed with --all-modes: {}\n",
+            fmt::format("   {} doubtful, listed with --all-modes: {}\n",
                         counted(static_cast<long long>(left_out.size()), "doubtful mode"), fmt::join(left_out, ", "));
     if (agreed) out += why_legend(verdicts);
     return out;

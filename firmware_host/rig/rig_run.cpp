@@ -96,7 +96,7 @@ VectorXd first_state(const rig& rig) {
     if (rig.excitation != "none") return state;
     gaussian random(rig.seed, stream_start);
     for (Index i = 0; i < n; ++i)
-        state(n + i) = rig.force_rms * random.next() / rig.body.M(i, i); // a blow of force_rms N s
+        state(n + i) = rig.force_rms * random.next() / rig.body.M(i, i); // a hit of force_rms N s
     return state;
 }
 

@@ -9,7 +9,7 @@ const char* okid_status_text(okid_status_t status) {
     case OKID_OK: return "ok";
     case OKID_WARN_MISSING: return "some samples were missing";
     case OKID_WARN_SATURATED: return "some codes stood at full scale";
-    case OKID_WARN_MODEL: return "a model was identified, with remarks";
+    case OKID_WARN_MODEL: return "a model was identified, with warnings";
     case OKID_ERR_NULL: return "a required pointer is NULL";
     case OKID_ERR_DIM: return "a size is outside its range";
     case OKID_ERR_MEMORY: return "the memory block is too small";

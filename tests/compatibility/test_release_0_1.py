@@ -23,7 +23,14 @@ METHODS = ["okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"]
 # Relative; another processor or BLAS adds in another order. A small difference of large numbers has fewer digits.
 LOOSE = {"std": 1e-4, "damping_ratio": 1e-6, "R": 1e-5, "mkr": 1e-6, "Y": 1e-7, "percent": 1e-6, "doubtful": 1e-4}
 # Depend on the signs and order that the SVD happens to choose, or say which release wrote them.
-REWORDED = {"start anew after": "restart after"}  # a text that says the same in better words
+REWORDED = {  # texts that say the same in better words
+    "start anew after": "restart after",
+    "bear no more unknowns": "support no more unknowns",
+    "it is the hardest of the three (a channel late by 1 % of a sample spoils it); R_normal_modes and R of pdc are the "
+    "better ones": "it is the least certain of the three (a channel late by 1 % of a sample distorts it); use "
+    "R_normal_modes or R of pdc",
+    "every mode that holds over the orders": "every stable mode",
+}
 SKIPPED = {"A", "B", "C", "D", "K", "x0", "version", "wall_time", "config"}
 
 

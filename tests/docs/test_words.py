@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Words of the field in everything a user reads: the odd ones that were found stay out, acronyms are explained.
 
-Read are the prose of all pages and the texts in quotes of the program, the package and the live page.
+Read are the prose of all pages, the texts in quotes of the program, the package and the live page, and the comments of
+the public headers.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ ODD = {  # pattern -> what to write
     r"\bblows?\b": "hit",
     r"\badds? the good ones up\b": "averages the accepted hits",
     r"\bjudges? (?:blows|hits)\b": "accepts or rejects hits",
-    r"(?<!the )\bmodes that hold\b": "stable modes",
+    r"\bmodes that hold\b": "stable modes",
     r"\bridge that cures\b": "minimum stabilising regularisation",
     r"\bonly looks on\b": "is read-only",
     r"\bspeaks? against\b": "quality warning, why doubtful",
@@ -34,7 +35,21 @@ ODD = {  # pattern -> what to write
     r"\b(?:is|are) told\b(?! apart)": "is reported",
     r"\bis said (?:on|in)\b": "is reported",
     r"\bcomes? to rest\b": "settles",
-    r"\bcures\b": "makes stable",
+    r"\bcure[sd]\b": "makes stable",
+    r"\bof no use\b": "is rejected",
+    r"\bcomes? to an end\b": "converges, ends",
+    r"\bnear thing\b": "close",
+    r"\bwho they are\b": "keep their identity",
+    r"\blooks? on\b": "is read-only, watches",
+    r"\bwhoever reaches\b": "anyone who reaches",
+    r"\b(?:hard|bear|carry) no more\b": "supports no more",
+    r"\bmode that holds\b": "stable mode",
+    r"\bfor so long\b": "for this long",
+    r"\bgood ones\b": "accepted hits, valid ones",
+    r"\bto be had\b": "possible, available",
+    r"\bit does not serve\b": "it cannot be used",
+    r"\btells? nothing\b": "reports nothing",
+    r"\bwanders\b": "scatters",
 }
 ACRONYMS = {  # spelled out where a newcomer meets them first, on the pages they begin with
     "README.md": {
@@ -48,7 +63,6 @@ ACRONYMS = {  # spelled out where a newcomer meets them first, on the pages they
     "docs/recipes/matrices.md": {"DOF": "degree of freedom"},
     "docs/recipes/live-can.md": {"DBC": "can database"},
 }
-LATER = ("firmware_host/record/", "firmware_host/config/", "firmware_host/commands/identify.cpp")  # not yet gone over
 TEXT = {
     ".cpp": r'"((?:[^"\\\n]|\\.)*)"',
     ".py": r'"((?:[^"\\\n]|\\.)*)"',
@@ -60,7 +74,7 @@ TEXT = {
 @cache
 def texts() -> tuple[tuple[str, str], ...]:
     """(where, text): prose of the pages, texts in quotes of sources, without their comments."""
-    return tuple([*of_pages(), *of_sources()])
+    return tuple([*of_pages(), *of_sources(), *of_headers()])
 
 
 def of_pages() -> Iterator[tuple[str, str]]:
@@ -73,9 +87,16 @@ def of_sources() -> Iterator[tuple[str, str]]:
     listed = ["git", "ls-files", "firmware_host", "tools/okid"]
     for name in subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split():
         path = ROOT / name
-        if path.suffix in TEXT and path.exists() and not name.startswith(LATER):
+        if path.suffix in TEXT and path.exists():
             source = re.sub(r'"""(?:.|\n)*?"""|(?m:^\s*(?://|#).*$)', "", path.read_text())
+            source = re.sub(r'"\n\s*f?"', "", source)  # one text on several lines
             yield name, "\n".join(re.findall(TEXT[path.suffix], source))
+
+
+def of_headers() -> Iterator[tuple[str, str]]:
+    for folder in ("lib/include", "drivers/include", "firmware_host/include"):
+        for path in sorted((ROOT / folder).rglob("*.h")):
+            yield str(path.relative_to(ROOT)), " ".join(re.findall(r"(?:///<?|^/?\s?\*+)(.*)", path.read_text(), re.M))
 
 
 @pytest.mark.parametrize("pattern", ODD)

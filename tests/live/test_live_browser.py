@@ -278,7 +278,7 @@ def test_without_samples_it_says_what_to_add(tmp_path: Path, browser: Any, okid_
         page.wait(f"() => document.querySelector('#{panel} .absent').innerText.includes('samples = true')")
     page.wait("() => okidLive.plots.tracking.draws > 0")
     feed.close()
-    page.wait("() => document.getElementById('link').textContent.includes('okid is gone')")
+    page.wait("() => document.getElementById('link').textContent.includes('okid ended')")
     again = OkidFeed(tmp_path / "s")
     again.accept()
     again.send(start(channels[:2], number=9))

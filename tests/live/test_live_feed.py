@@ -102,7 +102,7 @@ def test_okid_comes_late_goes_and_comes_again(tmp_path: Path) -> None:
         assert until(lambda: (page.last("state") or {}).get("link") == "live")
         assert [c["name"] for c in page.last("hello")["facts"]["channels"]] == ["f", "a", "b"]
         first.close()
-        until(lambda: "is gone" in page.last("state")["text"])
+        until(lambda: "okid ended" in page.last("state")["text"])
         again = OkidFeed(tmp_path / "s")
         again.accept()
         again.send(start(CHANNELS), modes(2.0, [10.0, 20.0]))  # the same run: nothing is forgotten
@@ -201,8 +201,8 @@ def test_events_are_told_in_words(tmp_path: Path) -> None:
         assert texts(one)[1:] == [
             "a: 5 missing, samples 5 to 9 (sequence)",
             "alarm: mode 1 at 9.5 Hz, baseline 10 Hz, σ 0.01 Hz, 1 more away",
-            "the structure changed at sample 2400; what was before is forgotten",
-            "alarm over: every mode is back at its baseline",
+            "the structure changed at sample 2400; earlier samples were discarded",
+            "alarm cleared: every mode is back at its baseline",
             "17 lines of okid did not reach this page",
             "can0: down link went down",
             "hit 2 rejected (double_hit): a second hit",

@@ -214,7 +214,7 @@ def test_an_address_beyond_this_computer_is_said(config: Path, okid_live: Callab
     live = okid_live(config, "--host", "0.0.0.0")
     assert ask(live.port)[0] == 200 and ask(live.port, "/", Host="evil.example")[0] == 403
     code, errors = live.end()
-    assert code == 0 and "whoever reaches that address" in errors and errors.count("\n") == 1
+    assert code == 0 and "anyone who reaches that address" in errors and errors.count("\n") == 1
 
 
 def test_a_socket_by_name(config: Path, tmp_path: Path, okid_live: Callable[..., Any]) -> None:

@@ -57,7 +57,7 @@ def test_what_an_index_tells(tmp_path: Path, holed: bool) -> None:
     server.shutdown()
     server.server_close()
     assert status == int(holed), said
-    assert ("holed 1.0: PYSEC-1, CVE-9: reads beyond the end (mended in 1.1)" in said) == holed
+    assert ("holed 1.0: PYSEC-1, CVE-9: reads beyond the end (fixed in 1.1)" in said) == holed
     assert ("back 2.0: taken back by its makers: broken" in said) == holed
     assert f"PyPI: {len(parts)} packages, {len(parts) - 1} known to the index, {2 * holed} remarks" in said
 

@@ -188,7 +188,7 @@ def test_a_free_decay_is_for_the_subspace_methods(tmp_path: pathlib.Path) -> Non
         file.write("# fs_hz: 250\na1,a2\n")
         np.savetxt(file, values, delimiter=",", fmt="%.9g")
     done = okid("identify", tmp_path / "decay.csv", "--outputs", "a1,a2", "--method", "okid-era")
-    assert done.returncode == 3 and "A free decay (ring-down) wants method n4sid-cva" in done.stderr
+    assert done.returncode == 3 and "A free decay (ring-down) needs method n4sid-cva" in done.stderr
     done = okid("identify", tmp_path / "decay.csv", "--outputs", "a1,a2", "--method", "n4sid-cva", "--json", "-")
     assert done.returncode == 0, done.stderr
     found = [mode["frequency_hz"] for mode in json.loads(done.stdout)["modes"] if mode["emac"] > 0.5]

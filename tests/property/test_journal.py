@@ -235,7 +235,7 @@ def test_round_trips(rig: Path) -> None:
     [
         (("a.log", "b.xyz"), (), 'found ".log" to ".xyz", expected .okj to .log'),
         (("a.log", "b.csv"), (), "-c CONFIG.toml is missing"),
-        (("bare.okj", "b.csv"), (), "it holds no whole config: say -c CONFIG.toml"),
+        (("bare.okj", "b.csv"), (), "it holds no complete config: give -c CONFIG.toml"),
         (("none.okj", "b.log"), (), "none.okj: cannot be read: No such file"),
         (("text.okj", "b.log"), (), "found no whole chunk of a journal, expected a file of okid record"),
         (("late.okj", "b.log"), (), "a journal of version 2, expected at most version 1: a later okid wrote it"),
@@ -280,7 +280,7 @@ def test_a_damaged_journal(rig: Path) -> None:
     bent[chunks[1].at + 80] ^= 1  # the config itself
     (rig / "b.okj").write_bytes(bent)
     done = okid("replay", rig / "b.okj")
-    assert done.returncode == 2 and "the config in it is damaged; say -c CONFIG.toml" in done.stderr
+    assert done.returncode == 2 and "the config in it is damaged; give -c CONFIG.toml" in done.stderr
     assert replay(rig / "b.okj", "-c", rig / "a.toml")[1][-1]["result"]["samples"] == SAMPLES
 
 

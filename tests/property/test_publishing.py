@@ -310,7 +310,7 @@ def test_what_listens_beyond_this_computer_is_said(rig: pathlib.Path) -> None:
         assert run.wait(60) == 0
         assert run.stderr is not None
         text = run.stderr.read()
-        assert "whoever reaches that address" in text and "beyond this computer" in text
+        assert "anyone who reaches that address" in text and "beyond this computer" in text
     with replaying(rig, f'prometheus = "127.0.0.1:{free_port()}"\nudp = "127.0.0.1:9"') as run:
         assert run.wait(60) == 0
         assert run.stderr is not None and run.stderr.read() == ""

@@ -219,8 +219,8 @@ def test_the_stabilization_diagram_explains_itself(small: tuple[Path, Any, Any],
     section = section[: section.index("</section>")]
     legend = re.findall(r"<text[^>]*>([^<]+)</text>", section)
     for text in (
-        "pole: frequency, damping, shape hold", "frequency and shape hold", "only the frequency holds",
-        "none of them holds", "column found (band, ring)", "mode of this model", f"order of this model: {order}",
+        "pole: frequency, damping, shape stable", "frequency and shape stable", "only the frequency stable",
+        "none of them stable", "column found (band, ring)", "mode of this model", f"order of this model: {order}",
         "measured, dB",
     ):  # fmt: skip
         assert legend.count(text) == 1, text

@@ -84,13 +84,13 @@ def test_what_was_not_looked_at_is_said(raw: dict[str, Any], tmp_path: Path) -> 
     bare = shown(raw)
     assert "No quality warning in what was checked: warnings of the identification, consistency" in bare
     assert "rate by the time stamps (no events given)" in bare
-    assert "Not looked at: completeness, units, modes that the order cut off, whiteness of the residual (no rec" in bare
+    assert "Not checked: completeness, units, modes that the order cut off, whiteness of the residual (no rec" in bare
     silent = shown(raw, events=written(tmp_path / "e.jsonl", CHANNELS, None))
-    assert "rate by the time stamps (the events do not tell it)" in silent
+    assert "rate by the time stamps (not in the events)" in silent
     u, y = demo_record(4000)
     record = okid.Record(CHANNELS, np.hstack([u, y]), FS)
     whole = shown(raw, events=written(tmp_path / "e.jsonl", CHANNELS, FS), record=record)
-    assert "Not looked at" not in whole
+    assert "Not checked" not in whole
     page = report.build(report.loaded_from(raw, "r"), events=written(tmp_path / "e.jsonl", CHANNELS, 1000.25))
     assert "<th>Rate by the stamps</th><td>1000.25 Hz</td>" in page
     assert whole.endswith("whiteness of the residual, rate by the time stamps.</p></div>")

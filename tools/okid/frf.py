@@ -73,7 +73,7 @@ class Spectra(NamedTuple):
 
 
 def is_hit(u: ArrayLike, fraction: float = 0.05) -> bool:
-    """True when 99 % of the energy of the inputs u (N, n_u) lies within `fraction` of the record: a hammer blow."""
+    """True when 99 % of the energy of the inputs u (N, n_u) lies within `fraction` of the record: a hammer hit."""
     drive = np.nan_to_num(np.asarray(u, dtype=np.float64).reshape(len(np.asarray(u)), -1))
     power = np.sum((drive - np.median(drive, axis=0)) ** 2, axis=1)
     total = float(np.sum(power))
@@ -111,7 +111,7 @@ def _segments(data: Real, length: int, step: int) -> list[Real]:
 
 
 def _struck_part(data: Real, n_u: int) -> Real:
-    """The run of complete samples with the hardest blow: what a record of a hammer test with gaps is good for."""
+    """The run of complete samples with the hardest hit: what a record of a hammer test with gaps is good for."""
     drive = data[:, :n_u] - np.nanmedian(data[:, :n_u], axis=0)
     force = np.nan_to_num(np.sum(drive**2, axis=1))
     first, end = max(_runs(data), key=lambda run: float(np.max(force[run[0] : run[1]])), default=(0, 0))
@@ -182,7 +182,7 @@ def h1(
 
     u (N, n_u) or 1-D, y (N, n_y) or 1-D, or lists of such arrays (several records); NaN = missing, segments avoid it.
     Default: Hann windows with half overlap, so long that about ten averages remain, shorter where gaps leave no longer
-    stretch; the whole record (its unbroken part with the blow), no window, for hammer blows.
+    stretch; the whole record (its unbroken part with the hit), no window, for hammer hits.
     estimator: "h1" errs low where the forces are noisy; "h2" (one input) errs high where the responses are; "hv" takes
     both for equally noisy (total least squares; of one input the geometric mean of H1 and H2).
     Raises InputError when no complete segment is left, or none of 64 samples by default.

@@ -229,10 +229,14 @@ def _answer(problem: _Problem, logs: Real, pairs: Sequence[int]) -> GreyBox:
     weak = int(np.argmin(np.diag(N)))
     unit = 1.0 / np.sqrt(np.maximum(np.diag(N), 1e-300))
     if np.diag(N)[weak] < 1e-6 or np.linalg.cond(N * np.outer(unit, unit)) > WORST:
-        held = "" if problem.scaled else " (without forces only ratios are seen: one mass or spring has to be known)"
+        held = (
+            ""
+            if problem.scaled
+            else " (without forces only ratios can be identified: one mass or spring has to be known)"
+        )
         raise IdentificationError(
-            f"the {len(pairs)} modes do not tell {', '.join(problem.names)} apart{held}; least is known of "
-            f"{problem.names[weak]!r}: leave a parameter out, or give more modes"
+            f"the {len(pairs)} modes cannot distinguish {', '.join(problem.names)}{held}; the "
+            f"least certain is {problem.names[weak]!r}: leave a parameter out, or give more modes"
         )
     freedom = max(1, len(base) - len(logs))
     covariance = np.linalg.inv(N) * max(1.0, float(base @ base) / freedom)

@@ -53,9 +53,9 @@ def identify(
     missing inputs. The arrays are never modified.
     `method` "auto": the modes that several methods, horizons and rates agree on, each with mode.confident, .found_in
     and .why (docs/how-okid-decides.md); the doubtful ones are listed with them. Or one method: "okid-era",
-    "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx", or "plscf": modes from correlations by way of frequency
-    responses, no M, K, R. Default: "auto"; "okid-era" when an option of one method is given (p, rows, order, max_order,
-    hankel, refine=True).
+    "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx", or "plscf": modes from correlations through
+    frequency responses, no M, K, R. Default: "auto"; "okid-era" when an option of one method is given (p, rows, order,
+    max_order, hankel, refine=True).
     u None = no measured force (ambient): modes and predictor only, there is no simulation fit; the okid methods then
     realize the covariances of the outputs.
     `p` ARX horizon of the okid methods (default 40), reduced with a warning when there are fewer than 10 samples an

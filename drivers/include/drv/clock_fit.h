@@ -42,7 +42,7 @@ typedef enum drv_clock_verdict_t {
     DRV_CLOCK_USED = 0,      ///< it went into the fit
     DRV_CLOCK_OUTLIER = 1,   ///< left out; when the next ones agree with it, it was one of the two below
     DRV_CLOCK_HOST_STEP = 2, ///< the host clock was set: the fit goes on from here with the rate it had
-    DRV_CLOCK_RESTART = 3    ///< the device clock began anew: likewise
+    DRV_CLOCK_RESTART = 3    ///< the device clock restarted: likewise
 } drv_clock_verdict_t;
 
 /// The clock of one device. Private but for its counts; lives where the caller puts it.
@@ -70,7 +70,7 @@ typedef struct drv_clock_fit_t {
     uint64_t used;       ///< pairs in the fit
     uint64_t outliers;   ///< pairs left out
     uint64_t host_steps; ///< times the host clock was set
-    uint64_t restarts;   ///< times the device clock began anew
+    uint64_t restarts;   ///< times the device clock restarted
 } drv_clock_fit_t;
 
 /// @return 0 or -EINVAL

@@ -42,8 +42,8 @@ int drv_host_clock_look(drv_host_clock_t* self, const drv_clock_pair_t* real);
 /// The same with the clocks of this computer, as they are now.
 int drv_host_clock_look_now(drv_host_clock_t* self);
 
-/// Host time of a stamp. When the clock was set while frames waited, a stamp of before is told from one of after by
-/// which is nearer to what is possible: not before the stamp carried last, and not after the last look.
+/// Host time of a stamp. When the clock was set while frames waited, a stamp of before is distinguished from one of after
+/// by which is nearer to what is possible: not before the stamp carried last, and not after the last look.
 int64_t drv_host_clock_carry(drv_host_clock_t* self, int64_t stamp_ns);
 
 #ifdef __cplusplus

@@ -25,10 +25,10 @@ enum {
 
 /// What a chunk holds.
 typedef enum drv_journal_kind_t {
-    DRV_JOURNAL_OTHER = 0,  ///< of a later version, to be passed over
+    DRV_JOURNAL_OTHER = 0,  ///< of a later version, to be ignored
     DRV_JOURNAL_TEXT = 1,   ///< a piece of a named text: what the frames mean
     DRV_JOURNAL_FRAMES = 2, ///< frames as they came
-    DRV_JOURNAL_END = 3     ///< the file was closed in order
+    DRV_JOURNAL_END = 3     ///< the file was closed properly
 } drv_journal_kind_t;
 
 /// Both clocks of the host, read when a chunk is written.
@@ -82,7 +82,7 @@ uint32_t drv_journal_waiting(const drv_journal_writer_t* self);
 /// Write the chunk at hand, in one call of write() when all goes well; nothing when it is empty. On an error the file
 /// is cut back to its last whole chunk, and every later call gives the same error. @return 0 or -errno
 int drv_journal_flush(drv_journal_writer_t* self, const drv_journal_time_t* now);
-/// Flush and close the file in order. @param more  the run goes on in the next segment
+/// Flush and close the file properly. @param more  the run goes on in the next segment
 int drv_journal_end(drv_journal_writer_t* self, int more, const drv_journal_time_t* now);
 
 /// Do these DRV_JOURNAL_MAGIC bytes begin a journal?
@@ -115,7 +115,7 @@ typedef struct drv_journal_reader_t {
     uint64_t torn_bytes;    ///< at the end of the file, of a chunk that was not written to its end
     uint64_t foreign;       ///< valid chunks of another run, or older than those before them: left out
     unsigned newer;         ///< version of chunks that a later okid wrote, 0 = none
-    int ended;              ///< the last chunk says that the file was closed in order
+    int ended;              ///< the last chunk says that the file was closed properly
     int more;               ///< and that the run goes on in another file
     /// @cond private
     drv_journal_read_t read;

@@ -85,7 +85,7 @@ typedef struct drv_stats_t {
     uint64_t foreign;       ///< log: frames of other interfaces, not delivered
     uint64_t torn;          ///< log: 1 = its last line had no end and was no frame: left out
     uint64_t link_down;     ///< times the interface went down or away
-    uint64_t reopened;      ///< times the socket was made anew after the interface had gone
+    uint64_t reopened;      ///< times the socket was made again after the interface had gone
     uint64_t read_errors;   ///< other errors of the socket
     int32_t buffer_bytes;   ///< receive buffer granted
     int32_t link_is_down;   ///< 1 = down or away now

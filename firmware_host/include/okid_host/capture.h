@@ -4,8 +4,8 @@
  * @brief Frames and bytes of devices in; samples on the grid, gaps, events and the result out. Part of okid_host.h.
  *
  * A capture is what `okid run` and `okid replay` do between the device and the screen: frames are decoded and placed on the
- * sample grid by counter or cadence, losses become gaps with a cause, triggers and blows are waited for, nodes on clocks of
- * their own are resampled, and the modes are identified while samples come. Only the reading of the device is the caller's:
+ * sample grid by counter or cadence, losses become gaps with a cause, triggers and hits are detected, nodes on clocks
+ * of their own are resampled, and the modes are identified while samples come. Only the reading of the device is the caller's:
  * it hands over frames or bytes in batches, as many as it has. The same frames give the same samples, gaps, events and
  * result, however they are cut into batches, and those of `okid replay` of the same log.
  *
@@ -94,7 +94,7 @@ OKID_HOST_API int okid_host_capture_open(okid_host_capture_t* self, const char* 
 /** The next frames of the log. @param played  out: how many; fewer than asked for = the end of the log, or done */
 OKID_HOST_API int okid_host_capture_play(okid_host_capture_t* self, size_t frames, size_t* played);
 
-/** 1 = as many samples or blows as were asked for have come. */
+/** 1 = as many samples or hits as were asked for have come. */
 OKID_HOST_API int32_t okid_host_capture_done(const okid_host_capture_t* self);
 
 /**
@@ -111,7 +111,7 @@ OKID_HOST_API const char* okid_host_capture_events(okid_host_capture_t* self);
 OKID_HOST_API const char* okid_host_capture_stats(okid_host_capture_t* self);
 
 /**
- * The stream ends: what waits goes out, the last stats, then the result, which is the last event. 0; 3 = no model can be had
+ * The stream ends: what waits goes out, the last stats, then the result, which is the last event. 0; 3 = no model
  * (samples and stats are there all the same); 4. Nothing can be put in afterwards.
  */
 OKID_HOST_API int okid_host_capture_finish(okid_host_capture_t* self);

@@ -7,7 +7,7 @@
  * that with standard deviations and without a window. Method auto (the default, unless an option of one method is given)
  * keeps the samples of the window, or the newest 10 million numbers; an update identifies from them. A named method with
  * refine keeps correlation sums beside its own: some 2 (m + n_u) n_u L flop a sample, L lags to where the slowest mode has
- * died away, at most 8192; the first 8,192 samples (65,536 where they give no model) are kept until L is chosen.
+ * decayed, at most 8192; the first 8,192 samples (65,536 where they give no model) are kept until L is chosen.
  */
 #ifndef OKID_HOST_STREAM_H
 #define OKID_HOST_STREAM_H
@@ -71,20 +71,20 @@ typedef struct okid_host_stream_counts {
     int64_t restarts;  /**< changes of the structure after which what was before was forgotten */
     int64_t bytes;     /**< of the sums of the whole */
     int64_t unknowns;  /**< of the regression; modes are shown from twice as many equations on */
-    int64_t settled;   /**< 1: the modal table of the last update has come to rest */
+    int64_t settled;   /**< 1: the modal table of the last update has settled */
 } okid_host_stream_counts_t;
 OKID_HOST_API int32_t okid_host_stream_stats(okid_host_stream_t* self, okid_host_stream_counts_t* out);
 
 /**
- * An update, as `okid run` makes one each update_s: the modes by now with their standard deviations. A model that has come
- * to rest is watched from then on: a change of the structure is noticed with the next update, and a window or a fading
+ * An update, as `okid run` makes one each update_s: the modes by now with their standard deviations. A model that has
+ * settled is watched from then on: a change of the structure is noticed with the next update, and a window or a fading
  * memory has then forgotten what was before (restart_on_change).
- * @return 0 and the result, NULL while there is no model to be had; or 2, 3, 4
+ * @return 0 and the result, NULL while no model is possible; or 2, 3, 4
  */
 OKID_HOST_API int32_t okid_host_stream_update(okid_host_stream_t* self, struct okid_host_result** result);
 
 /** Everything the samples tell by now. The decomposition of the result is the stream's: it is gone with the next update or
- * result of the stream. @return 0; 3: no model can be had; 4 */
+ * result of the stream. @return 0; 3: no model; 4 */
 OKID_HOST_API int32_t okid_host_stream_identify(okid_host_stream_t* self, struct okid_host_result** result);
 
 /** The sums as bytes, for a file or another machine (format: okid/accumulator.h; of method auto the samples; with refine the correlation sums before

@@ -14,7 +14,7 @@ extern "C" {
 /// How a model is found.
 typedef enum okid_method_t {
     OKID_METHOD_OKID_ERA = 0,    ///< observer least squares, Markov recursion, ERA. Without inputs: ERA on the
-                                 ///< covariances of the outputs, which stand in the place of the Markov parameters
+                                 ///< covariances of the outputs, which stand in place of the Markov parameters
     OKID_METHOD_OKID_ERA_DC = 1, ///< the same Markov parameters, ERA with data correlations (xi = zeta = 2, tau = 1)
     OKID_METHOD_N4SID_MOESP = 2, ///< subspace methods, okid/steps/subspace.h; with and without inputs
     OKID_METHOD_N4SID_CVA = 3,   ///< canonical weighting
@@ -37,7 +37,8 @@ typedef enum okid_solver_t {
 
 /// Remarks on a valid result, as bits of okid_identified_t::warnings; okid_warning_code() and _text() name them.
 enum {
-    OKID_NOTE_ARX_STABILISED = 1 << 0,     ///< plain least squares was unstable; a ridge cured it (ridge, radius_plain)
+    OKID_NOTE_ARX_STABILISED =
+        1 << 0, ///< plain least squares was unstable; a ridge made it stable (ridge, radius_plain)
     OKID_NOTE_ILL_CONDITIONED = 1 << 1,    ///< condition above 1e10: near noise-free or redundant channels
     OKID_NOTE_FEW_ROWS = 1 << 2,           ///< fewer than 10 q regression rows: variances are large
     OKID_NOTE_MODEL_UNSTABLE = 1 << 3,     ///< the realised A has a pole on or outside the unit circle

@@ -42,7 +42,7 @@ enum {
     OKID_MKR_FEEDTHROUGH = 1 << 5, ///< feedthrough > 0.1: D does not fit M (delay, missing modes, wrong kind of sensor)
     OKID_MKR_COMPLEX = 1 << 6,     ///< a mode with mpc < 0.9: its points do not move in phase
     OKID_MKR_SPREAD = 1 << 7,      ///< a mode with pair_spread > 0.1: the co-located pairs contradict each other
-    OKID_MKR_CLOSE = 1 << 8        ///< margin < 2: the choice of modes was a near thing
+    OKID_MKR_CLOSE = 1 << 8        ///< margin < 2: the choice of modes was close
 };
 
 /// The result; the arrays live in the work block. Modes ascend in frequency.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// @file stabilization.h
-/// Which poles hold while the model order and the horizon change: the stabilization diagram, and its columns found by
-/// themselves. Models come from okid_identify_poles() (every order from one decomposition), of one or several identifiers
+/// Which poles are stable while the model order and the horizon change: the stabilization diagram, and its columns found
+/// by themselves. Models come from okid_identify_poles() (every order from one decomposition), of one or several identifiers
 /// (horizons: p or rows). Poles of the structure come back at nearly every order, those of noise do not.
 #ifndef OKID_STABILIZATION_H
 #define OKID_STABILIZATION_H
@@ -17,7 +17,7 @@ typedef struct okid_stabilization_config_t {
     int32_t n_y;        ///< outputs
     int32_t max_models; ///< models that will be added, >= 1; max_models * max_poles <= 2^20
     int32_t max_poles;  ///< modes of one model, >= 1 (largest order / 2)
-    double frequency;   ///< a pole holds when one of the order before is within this relative distance; 0 = 0.01
+    double frequency;   ///< a pole is stable when one of the order before is within this relative distance; 0 = 0.01
     double damping;     ///< and its damping within this relative distance; 0 = 0.05
     double mac;         ///< and the MAC of the shapes is this at least; 0 = 0.98
     double share;       ///< of the models a mode of the structure is found in, at least; 0 = 0.5

@@ -50,7 +50,7 @@ typedef enum okid_status_t {
     OKID_OK = 0,
     OKID_WARN_MISSING = 1,    ///< some samples were missing (NaN): counted, the lag window re-arms after them
     OKID_WARN_SATURATED = 2,  ///< some codes stood at full scale: absorbed and counted
-    OKID_WARN_MODEL = 3,      ///< a model was identified, with remarks: see okid_identified_t::warnings
+    OKID_WARN_MODEL = 3,      ///< a model was identified, with warnings: see okid_identified_t::warnings
     OKID_ERR_NULL = -1,       ///< a required pointer is NULL
     OKID_ERR_DIM = -2,        ///< a size is outside its documented range
     OKID_ERR_MEMORY = -3,     ///< the caller's block is smaller than X_memsize()

@@ -65,7 +65,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_replicates_create(okid_replicates_t**
                                                              const okid_replicates_config_t* config, void* block,
                                                              size_t bytes);
 
-/// Start anew from the model that everything is compared with: its modes, and its M, K, R where they are wanted.
+/// Restart from the model that everything is compared with: its modes, and its M, K, R where they are wanted.
 /// @param full  in, A, C, and for M, K, R also B, D (K is not read); n_u, n_y as configured, 1 <= n_z <= configured
 /// @param dt    s
 /// @return OKID_OK; OKID_WARN_MODEL: M, K, R of this model cannot be had, there will be no deviation of them;
@@ -95,7 +95,7 @@ typedef struct okid_jackknife okid_jackknife_t;
 typedef struct okid_jackknife_config_t {
     okid_identify_config_t identify; ///< of the full model; its `order` is not read
     okid_accumulator_config_t sums;  ///< of the whole: okid_accumulator_config(). edges = 1, slots = 0
-    int32_t linear; ///< 1: the full model's change to first order in the place of a model of the rest, at a fraction of
+    int32_t linear; ///< 1: the full model's change to first order in place of a model of the rest, at a fraction of
                     ///< the cost; okid-era with inputs and the system's Hankel matrix, n4sid-moesp, n4sid-cva
 } okid_jackknife_config_t;
 
@@ -134,7 +134,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_jackknife_begin_linear(okid_jackknife
 /// @param part    in, the sums of the part; see okid_accumulator_remove(), also for `weight`
 /// @param model   out, valid until the next call (K is NULL)
 /// @param share   out, share of the information in the part: of the energy of the channels, each counting alike, so
-///                that a part with a hammer blow weighs more than one of ringing down
+///                that a part with a hammer hit weighs more than one of ringing down
 /// @return OKID_OK; OKID_ERR_NULL, OKID_ERR_MISMATCH; the errors of okid_identify_run(): without this part there is no
 ///         model (then `share` is valid, for okid_replicates_add(NULL))
 OKID_NODISCARD OKID_API okid_status_t okid_jackknife_delete(okid_jackknife_t* self, okid_accumulator_t* part,

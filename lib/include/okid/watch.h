@@ -2,7 +2,7 @@
 /// @file watch.h
 /// Does a model still predict what comes? Its one-step predictor runs along with the stream; when the errors rise and stay
 /// high the structure has changed, long before the samples from before have left a window, and while these mix with the new
-/// ones no estimate is of any use: forget them (okid_accumulator_reset()) and identify anew.
+/// ones no estimate is of any use: forget them (okid_accumulator_reset()) and identify again.
 #ifndef OKID_WATCH_H
 #define OKID_WATCH_H
 

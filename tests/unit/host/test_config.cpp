@@ -207,7 +207,7 @@ static void test_alarm() {
     TEST_ASSERT_FALSE(load(good + "[alarm]\nenabled = false\n").alarm.enabled);
     const std::string blind = good + "sigma_blocks = 0\n";
     TEST_ASSERT_FALSE(load(blind).alarm.enabled);
-    refuse(blind + "[alarm]\nenabled = true\n", {"[alarm]", "sigma_blocks = 0 leaves none"});
+    refuse(blind + "[alarm]\nenabled = true\n", {"[alarm]", "sigma_blocks = 0 computes none"});
     const std::string lamp = "[lamps]\nalarm = { chip = \"gpiochip0\", line = 1 }\n";
     TEST_ASSERT_EQUAL_INT(0, load(good + lamp).warnings.size());
     TEST_ASSERT_EQUAL_INT(1, load(blind + lamp).warnings.size());

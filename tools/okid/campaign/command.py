@@ -41,17 +41,17 @@ def _parser() -> argparse.ArgumentParser:
         "Exit codes: 0 done, 2 wrong usage or input, 3 no group gives a model, 130 interrupted (run again to go on).",
     )
     kinds = parser.add_subparsers(dest="kind", required=True, metavar="run|check|report|simulate")
-    run = kinds.add_parser("run", help="sum what is new, identify, write tables and report",
+    run = kinds.add_parser("run", help="sum the new records, identify, write tables and report",
                            epilog="example: okid-campaign run SPEC.toml --workers 8")  # fmt: skip
     run.add_argument("spec", metavar="SPEC.toml")
     run.add_argument("--workers", type=_positive, metavar="N", help="processes of the embedded cluster")
-    run.add_argument("--cluster", metavar="tcp://HOST:PORT", help="a Dask scheduler that is there already")
+    run.add_argument("--cluster", metavar="tcp://HOST:PORT", help="address of a running Dask scheduler")
     run.add_argument("--out", metavar="FOLDER", help="in place of [output] folder")
     run.add_argument("--quiet", action="store_true", help="faults only")
-    check = kinds.add_parser("check", help="the spec, and what it finds; nothing is read",
+    check = kinds.add_parser("check", help="check the spec and list what it finds; no record is read",
                              epilog="example: okid-campaign check SPEC.toml")  # fmt: skip
     check.add_argument("spec", metavar="SPEC.toml")
-    report = kinds.add_parser("report", help="the page again, from the tables",
+    report = kinds.add_parser("report", help="write the report again, from the tables",
                               epilog="example: okid-campaign report year/out")  # fmt: skip
     report.add_argument("folder", metavar="OUT_FOLDER")
     report.add_argument("--html", metavar="FILE.html", help="default: report.html in the folder")

@@ -2,8 +2,8 @@
 """Control charts of standardised residuals, with limits for a stated probability of a false alarm in a year.
 
 Two charts: the smallest T^2 of three groups in a row (sudden change), and that of an exponentially weighted mean (small
-change that stays; Lowry et al. 1992). A single group far off, as of a bad record, is in neither. Limits are not read
-from tables: years without damage are simulated through the same regression on the same temperatures, with as few
+change that stays; Lowry et al. 1992). A single outlying group, such as one bad record, is in neither. Limits are not
+read from tables: years without damage are simulated through the same regression on the same temperatures, with as few
 training groups and with the persistence of the residuals (Gaussian, first order); the limit is the quantile of the
 largest value of a year. Half of the probability goes to each chart.
 """

@@ -147,7 +147,7 @@ class _Run:
             plan = self.client.submit(plan_of, self.spec, records, pure=False).result()
             self.state.keep_plan(plan)
         if not plan:
-            self.out.remarks.append("nothing is refined: the first records give no model that tells how")
+            self.out.remarks.append("nothing is refined: the first records give no model to refine from")
         return plan
 
     def plans(self) -> list[GroupPlan]:

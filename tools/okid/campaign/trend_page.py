@@ -150,8 +150,9 @@ def verdict(series: SeriesTrend) -> tuple[bool, list[str]]:
             _date(series.time_s[series.rows[k]]) for k in (c.low - 1, c.at, min(c.high, len(series.rows) - 1))
         )
         lines.append(
-            f"The mean changed with the group of {at} UTC (95 %: after {low}, by {high}); without a change so much has "
-            f"a probability of {'at most ' if c.p_value <= 0.001 else ''}{c.p_value:.2g}."
+            f"The mean changed with the group of {at} UTC (95 %: after {low}, by {high}); without a change, "
+            f"a deviation this large has a probability of "
+            f"{'at most ' if c.p_value <= 0.001 else ''}{c.p_value:.2g}."
         )
     return not series.alarms and series.change is None, lines
 
@@ -202,7 +203,7 @@ def _chart_words(series: SeriesTrend, trend: Trend) -> str:
         f"{series.limits.simulated} simulated years (Gaussian residuals with the persistence of the training, refitted "
         f"on {int(np.sum(series.training))} training groups). T²: squared distance of all watched modes of a group "
         "from what its temperature lets expect, the smallest of three groups in a row; EWMA: the same of a "
-        "weighted mean (0.2 of the newest group). A single group far off, as of a bad record, is in neither."
+        "weighted mean (0.2 of the newest group). A single outlying group, such as one bad record, is in neither."
     )
 
 

@@ -47,9 +47,9 @@ def _add_can(kinds: Any) -> None:
     bus.add_argument("--bitrate", type=int, metavar="BIT/S", help="where the adapter sets it")
     bus.add_argument("--fd", action="store_true", help="receive CAN FD frames too")
     bus.add_argument(
-        "--duration", type=float, metavar="S", help="end after so many seconds (with --config: of samples)"
+        "--duration", type=float, metavar="S", help="end after this many seconds (with --config: of samples)"
     )
-    bus.add_argument("--frames", type=int, metavar="N", help="end after so many frames")
+    bus.add_argument("--frames", type=int, metavar="N", help="end after this many frames")
     bus.add_argument("--dbc", metavar="FILE", help="decode with this DBC (cantools) ..")
     bus.add_argument("--csv", metavar="FILE", help=".. into this table, one row a frame")
     bus.set_defaults(command="command_can:run_can")
@@ -73,7 +73,7 @@ def _add_serial(kinds: Any) -> None:
     line.add_argument("--out", metavar="FILE", help="every byte as it came; an existing file is appended to")
     _add_outputs(line)
     line.add_argument("--quiet", action="store_true", help="no modes and no table on stdout")
-    line.add_argument("--duration", type=float, metavar="S", help="end after so many seconds of samples")
+    line.add_argument("--duration", type=float, metavar="S", help="end after this many seconds of samples")
     line.set_defaults(command="command_serial:run_serial")
 
 
@@ -89,15 +89,15 @@ def _add_sync(kinds: Any) -> None:
     sync = kinds.add_parser(
         "sync",
         help="send SYNC or trigger frames at absolute times",
-        description="Send a frame at a fixed rate, with absolute deadlines, and tell how late they were.",
+        description="Send a frame at a fixed rate, with absolute deadlines, and report how late they were.",
         epilog="example: okid-capture sync --interface socketcan --channel can0 --rate 100 --counter",
     )
     sync.add_argument("--interface", required=True, metavar="NAME", help="of python-can")
     sync.add_argument("--channel", required=True, metavar="NAME", help="can0, vcan0, /dev/ttyACM0 ..")
     sync.add_argument("--rate", required=True, type=float, metavar="HZ", help="frames a second")
     sync.add_argument("--id", default="0x80", metavar="ID", help="identifier, default 0x80 (CANopen SYNC)")
-    sync.add_argument("--count", type=int, metavar="N", help="so many frames; default: until Ctrl-C")
-    sync.add_argument("--duration", type=float, metavar="S", help="for so long")
+    sync.add_argument("--count", type=int, metavar="N", help="this many frames; default: until Ctrl-C")
+    sync.add_argument("--duration", type=float, metavar="S", help="for this long")
     sync.add_argument("--data", default="", metavar="HEX", help="up to 8 bytes")
     sync.add_argument("--counter", nargs="?", type=int, const=LARGEST_COUNTER, metavar="LAST",
                       help="one byte that counts 1, 2 .. LAST, 1 ..; default 240")  # fmt: skip
@@ -109,7 +109,7 @@ def _add_emulate(kinds: Any) -> None:
     node = kinds.add_parser(
         "emulate",
         help="play a virtual rig or a log onto a bus or a serial line",
-        description="A node that is not there: a RIG.toml (by `okid simulate`) or a log, frame by frame at its times, "
+        description="A virtual node: a RIG.toml (by `okid simulate`) or a log, frame by frame at its times, "
         "so that a script can be written without hardware.",
         epilog="examples: okid-capture emulate rig.toml --interface udp_multicast --channel 239.74.163.2 "
         "--write-config rig-config.toml; okid-capture emulate run.log --interface socketcan --channel vcan0 --speed 2; "

@@ -143,7 +143,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("source", metavar="IN", help="file to read")
     parser.add_argument("target", metavar="OUT", help="file to write, whole or not at all")
-    parser.add_argument("--fs", type=float, metavar="HZ", help="sample rate, over what the file says")
+    parser.add_argument("--fs", type=float, metavar="HZ", help="sample rate, overrides that of the file")
     parser.add_argument("--channels", metavar="a,b", help="only these channels, in this order")
     parser.add_argument(
         "--group", metavar="G", help="part of IN when it holds several rasters: its error message lists them"

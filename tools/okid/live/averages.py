@@ -96,7 +96,7 @@ class Averages:
         self._rest = rows[first:]
 
     def add_segment(self, rows: Real) -> None:
-        """One segment (length, m): a stretch of the stream, or a blow with its ring-down."""
+        """One segment (length, m): a stretch of the stream, or a hit with its ring-down."""
         self.tried += 1
         whole = np.all(np.isfinite(rows), axis=0)
         if not np.any(whole):

@@ -78,7 +78,7 @@ def _run(args: argparse.Namespace, stop: threading.Event) -> int:
     except (OSError, UnicodeError) as fault:  # a name that is none, as a..b, is a UnicodeError
         return _fail(_why_not(args, fault), EXIT_DEVICE)
     if not is_loopback(args.host):
-        _fail(f"listens on {server.url}: whoever reaches that address can look on, unencrypted", 0)
+        _fail(f"listens on {server.url}: anyone who reaches that address can watch, unencrypted", 0)
     with server:
         _serve(server, session, stop, args.open)
     return EXIT_DONE

@@ -80,7 +80,7 @@ class Measured:
         self.restart(self._basis)
 
     def hit(self, sample: int) -> None:
-        """A good blow at that sample: its average is taken when the ring-down is there."""
+        """A good hit at that sample: its average is taken when the ring-down is there."""
         if self._hammer:
             self._blows.append(sample - self._before)
             self._take_blows()
@@ -103,7 +103,7 @@ class Measured:
                 self.averages.add(self.recent.read(first, self.recent.end - first))
 
     def material(self) -> Material | None:
-        """What the diagram is made from: the window of the config, at most what is kept; the blows of a hammer test.
+        """What the diagram is made from: the window of the config, at most what is kept; the hits of a hammer test.
 
         None without responses or samples. O(m samples).
         """

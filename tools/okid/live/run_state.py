@@ -70,7 +70,7 @@ class RunState:
         else:
             again = bool(self.start)
             self.link = "waiting"
-            self.link_text = "okid is gone, no result; waiting for it" if again else "waiting for okid"
+            self.link_text = "okid ended without a result; waiting for it" if again else "waiting for okid"
 
     def take(self, event: dict[str, Any]) -> bool:
         """Take an event in; True when it is the start of another run than the one before.

@@ -31,7 +31,7 @@ def _hit(event: dict[str, Any]) -> tuple[str, str]:
 
 
 def _change(event: dict[str, Any]) -> tuple[str, str]:
-    done = "what was before is forgotten" if event.get("restarted") else "old samples stay in"
+    done = "earlier samples were discarded" if event.get("restarted") else "earlier samples are still used"
     return "warn", f"the structure changed at sample {event.get('sample')}; {done}"
 
 
@@ -41,7 +41,7 @@ def _change_test(event: dict[str, Any]) -> tuple[str, str]:
     moved = max(event["modes"], key=lambda mode: abs(mode["shift_percent"]) / mode["sigma_percent"])
     far = f"{moved['frequency_hz']:.4g} Hz {moved['shift_percent']:+.2g} ± {moved['sigma_percent']:.2g} %"
     weight = "bad" if event.get("alarm") else "plain"
-    return weight, f"change test: {event.get('text')}, p = {event['p_value']:.2g}; farthest: {far}"
+    return weight, f"change test: {event.get('text')}, p = {event['p_value']:.2g}; largest shift: {far}"
 
 
 def _result(event: dict[str, Any]) -> tuple[str, str]:
@@ -64,7 +64,7 @@ def describe(event: dict[str, Any]) -> tuple[str, str] | None:
     if kind == "trigger":
         return "plain", f"trigger ({event.get('source')}) at sample {event.get('sample')}"
     if kind == "alarm_over":
-        return "good", "alarm over: every mode is back at its baseline"
+        return "good", "alarm cleared: every mode is back at its baseline"
     if kind == "lost":
         return "warn", f"{event.get('count')} lines of okid did not reach this page"
     if kind in ("bus", "record"):

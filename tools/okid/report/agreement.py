@@ -136,7 +136,7 @@ def residual_section(m: Material) -> page.Section | None:
     words = (
         "Residual: the error of the one-step prediction. Band: 95 %, dashed: 99 % bounds of white noise. p-value: "
         f"Ljung-Box over {white.lags} lags; below 0.01 the residual is not white; nearly white when all correlations "
-        "are below 0.1 (they explain less than 1 %). The more samples, the smaller the things this test sees."
+        "are below 0.1 (they explain less than 1 %). With more samples this test detects smaller effects."
     )
     if m.result.inputs:
         words += (

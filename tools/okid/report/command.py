@@ -28,7 +28,7 @@ class _Parser(argparse.ArgumentParser):
         if "arguments are required" in message:
             message = f"RESULT.json is missing: an okid.result/1, {MADE_BY}"
         elif found := re.fullmatch(r"argument (\S+): expected one argument", message):
-            message = f"{found[1]} wants {self._wanted[found[1]]} behind it"
+            message = f"{found[1]} needs {self._wanted[found[1]]} after it"
         print(f"{self.prog}: {message} (example and all options: {self.prog} --help)", file=sys.stderr)
         raise SystemExit(2)
 
@@ -41,8 +41,10 @@ class _Parser(argparse.ArgumentParser):
         """What no argument takes: an option that is not known, or a second file."""
         word = next((one for one in rest if one.startswith("--")), rest[0])
         if not word.startswith("-"):
-            self.error(f"{word}: found behind RESULT.json, expected one result; a record goes behind --record, the "
-                       "events of a run behind --events")  # fmt: skip
+            self.error(
+                f"{word}: found after RESULT.json, expected one result; a record goes after --record, the events of a "
+                "run after --events"
+            )
         near = difflib.get_close_matches(word.partition("=")[0], self._wanted, 1)
         self.error(f"{word} is no option" + (f": did you mean {near[0]}?" if near else ""))
 

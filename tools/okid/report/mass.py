@@ -71,7 +71,7 @@ def _checks(checks: dict[str, Any]) -> str:
                 f"{_value(checks.get('feedthrough_misfit'))}{'' if where is None else f' at {where}'}"
                 " (doubtful above 0.1)",
             ),
-            ("D over M⁻¹ at the pairs", f"{_value(checks.get('feedthrough_gain'), '.4f')} (1 when all is well)"),
+            ("D over M⁻¹ at the pairs", f"{_value(checks.get('feedthrough_gain'), '.4f')} (1 is expected)"),
             ("Modes used", chosen),
             ("Co-located pairs", _value(checks.get("collocated_pairs"))),
             ("Condition of the eigenvectors", _value(checks.get("eigenvector_condition"))),
@@ -116,8 +116,9 @@ def mass_section(m: Material) -> list[page.Section]:
         raise InputError(f"not a complete okid.result/1: mkr, pdc: {type(fault).__name__}: {fault}") from None
     parts.append(
         page.note(
-            "R of the modes is the hardest of the three: a channel late by a hundredth of a sample spoils it. R of "
-            "normal modes and the proportional R need only frequencies, damping ratios and real shapes: steadier."
+            "R of the modes is the least certain of the three: a channel late by a hundredth of a sample distorts it. "
+            "R of normal modes and the proportional R need only frequencies, damping ratios and real shapes, and are "
+            "more certain."
         )
     )
     return [page.section("Mass, stiffness and damping", *parts, name="M, K, R")]

@@ -28,7 +28,7 @@ SHORTEST_LAGS, LONGEST_LAGS = 25, 60
 class Excerpt(NamedTuple):
     """A stretch of the record and the model's answer to it: time_s (n,), measured and modelled (n, n_y).
 
-    `simulated`: from the inputs alone; else predicted one step ahead. `hit`: it begins before the hardest blow.
+    `simulated`: from the inputs alone; else predicted one step ahead. `hit`: it begins before the hardest hit.
     """
 
     time_s: Real

@@ -27,7 +27,7 @@ def table_section(m: Material) -> page.Section:
     modes, sure = m.result.raw["modes"], m.result.confident
     if not modes:
         return page.section("Modes", page.absent("The result holds no underdamped mode."))
-    parts = [_table(modes, sure, True) if sure else page.absent("No mode of this result would be signed.")]
+    parts = [_table(modes, sure, True) if sure else page.absent("This result has no confident mode.")]
     doubtful = [k for k in range(len(modes)) if k not in sure]
     if doubtful:
         words = "Not counted as modes of the structure, and not in the pictures below."

@@ -37,23 +37,23 @@ _HERE = {
 }
 _INSTEAD = {
     ("result", "truth"): "give the file of --json, not that of --truth",
-    ("result", "events"): "give it behind --events, and the file of --json here",
+    ("result", "events"): "give it with --events, and the file of --json here",
     ("result", "config"): "`okid replay LOG -c {path} --json result.json` makes one",
     ("result", "rig"): "`okid simulate {path} --log run.log --config frame.toml`, then "
     "`okid replay run.log -c frame.toml --json result.json` makes one",
     ("result", "log"): "`okid replay {path} -c CONFIG.toml --json result.json` makes one",
     ("result", "journal"): "`okid replay {path} --json result.json` makes one",
     ("result", "table"): "`okid identify {path} --inputs NAMES --outputs NAMES --json result.json` makes one; "
-    "the table itself goes behind --record",
+    "the table itself goes with --record",
     ("record", "log"): "`okid convert {path} run.csv -c CONFIG.toml` makes one",
     ("record", "journal"): "`okid convert {path} run.csv` makes one",
     ("record", "frames"): "`okid-convert {path} run.csv --config CONFIG.toml` makes one",
-    ("record", "events"): "give it behind --events",
-    ("record", "config"): "give it behind --config",
-    ("events", "config"): "give it behind --config",
-    ("events", "table"): "give it behind --record",
-    ("config", "events"): "give it behind --events",
-    ("config", "table"): "give it behind --record",
+    ("record", "events"): "give it with --events",
+    ("record", "config"): "give it with --config",
+    ("events", "config"): "give it with --config",
+    ("events", "table"): "give it with --record",
+    ("config", "events"): "give it with --events",
+    ("config", "table"): "give it with --record",
 }
 _TEXTS = (  # the first that is found in the text
     ("log", r"\A\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#", "a log of CAN frames (candump -L)"),

@@ -56,15 +56,15 @@ def _how_to_read(m: Material, rows: Stabilization) -> list[str]:
     order, tried, limits = int(m.result.raw["order"]), sorted({row.order for row in rows}), rows.criteria
     words = [
         f"How to read it: the record was identified again with orders from {tried[0]} to {tried[-1]} (a mode takes "
-        "two). A mark is a pole: a mode that the model of this order has at this frequency. Modes of the structure "
-        "come back in every order and stand above each other as a column of green dots; what noise makes up wanders.",
+        "two). A mark is a pole: a mode that the model of this order has at this frequency. Modes of the "
+        "structure appear at every order and form a column of green dots; poles of noise scatter.",
         f"Blue dashed line: order {order}, that of the model of this report; green vertical lines: the "
         f"{page.count_of(len(m.result.frequency_hz), 'mode')} of it. A column without a green line is a mode that the "
-        "model lacks (try a higher order), a green line without a column is a mode to doubt.",
-        "Marks: a value holds when the next lower order has a pole near it, within "
+        "model lacks (try a higher order), a green line without a column is a doubtful mode.",
+        "Marks: a value is stable when the next lower order has a pole near it, within "
         f"{100.0 * limits.frequency:g} % in frequency, {100.0 * limits.damping:g} % in damping and with the same shape "
-        f"(MAC ≥ {limits.mac:g}). Green dot: all three hold. Blue triangle: frequency and shape, the damping not. "
-        "Orange diamond: frequency and damping, the shape not. Red cross: the frequency alone. Grey point: none.",
+        f"(MAC ≥ {limits.mac:g}). Green dot: all three are stable. Blue triangle: frequency and shape, the damping "
+        "not. Orange diamond: frequency and damping, the shape not. Red cross: the frequency alone. Grey point: none.",
         f"Blue bands: {page.count_of(len(rows.modes), 'column')} found by the program in at least "
         f"{100.0 * limits.share:g} % of the orders, whatever the order used; ring: the pole nearest the medians.",
     ]

@@ -36,7 +36,7 @@ class Agreement(NamedTuple):
 def _factors(model: Model, u: Real, y: Real) -> Real:
     """Least-squares factor by which each output (N, n_y) must be multiplied to be the simulation from rest.
 
-    The beginning, where the unknown initial state acts, is left out unless the force is a blow. NaN where the
+    The beginning, where the unknown initial state acts, is left out unless the force is a hit. NaN where the
     correlation is below 0.9.
     """
     n_y = y.shape[1]

@@ -31,7 +31,7 @@ def rate_unseen(m: Material) -> str:
         return "no events given"
     if m.events.rate_hz is not None and abs(m.events.rate_hz - m.result.fs) > SAME_RATE * m.result.fs:
         return "the events are of another rate"
-    return "" if m.events.stamped_hz is not None else "the events do not tell it"
+    return "" if m.events.stamped_hz is not None else "not in the events"
 
 
 def rate_doubt(m: Material) -> str:

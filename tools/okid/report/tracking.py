@@ -20,7 +20,7 @@ def _chosen(events: Events) -> list[int]:
 
 def _moments(events: Events) -> str:
     rows = [(t, "alarm", text + (f", over at {end:g} s" if end is not None else "")) for t, end, text in events.alarms]
-    rows += [(t, "change", "the structure changed: the model no longer predicts it") for t in events.changes]
+    rows += [(t, "change", "the structure changed: the model no longer predicts the samples") for t in events.changes]
     rows += [(t, f"bus {name}", f"{event}: {text}") for t, name, event, text in events.bus]
     if not rows:
         return ""
@@ -56,9 +56,7 @@ def tracking_section(m: Material) -> page.Section | None:
             ax.set_xlabel("stream time [s]")
         if place == 1:
             ax.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
-    words = (
-        f"{events.updates} updates. Band: ± σ. Grey: before the mode came to rest; it may lie outside of the picture."
-    )
+    words = f"{events.updates} updates. Band: ± σ. Grey: before the mode settled; it may lie outside of the picture."
     words += (
         f" The {len(shown)} of {len(events.tracks)} tracks seen most often." if len(shown) < len(events.tracks) else ""
     )

@@ -150,5 +150,5 @@ def verdict(m: Material) -> str:
     text = f"<p>{escape(headline(m))}</p>\n<p>{escape(last)}</p>"
     if unseen:
         parts = "; ".join(f"{', '.join(what)} ({why})" for why, what in unseen.items())
-        text += f'\n<p class="unseen">{escape(f"Not looked at: {parts}.")}</p>'
+        text += f'\n<p class="unseen">{escape(f"Not checked: {parts}.")}</p>'
     return f'<div class="verdict{" doubt" if doubts else ""}">{text}</div>'

@@ -50,11 +50,11 @@ STYLE: dict[str, Any] = {
 
 # most telling first: label, colour, marker, size
 _MARKS = {
-    "stable": ("pole: frequency, damping, shape hold", GREEN, "o", 16.0),
-    "shape": ("frequency and shape hold", BLUE, "v", 13.0),
-    "damping": ("frequency and damping hold", ORANGE, "D", 10.0),
-    "frequency": ("only the frequency holds", RED, "+", 18.0),
-    "new": ("none of them holds", GREY, ".", 20.0),
+    "stable": ("pole: frequency, damping, shape stable", GREEN, "o", 16.0),
+    "shape": ("frequency and shape stable", BLUE, "v", 13.0),
+    "damping": ("frequency and damping stable", ORANGE, "D", 10.0),
+    "frequency": ("only the frequency stable", RED, "+", 18.0),
+    "new": ("none of them stable", GREY, ".", 20.0),
 }
 
 

@@ -170,7 +170,7 @@ function checks(found) {
     ...["M", "K", "R"].map((name) => [`${name} positive definite`, yes(found[`${name.toLowerCase()}_positive_definite`])]),
     ["residual of W Wᵀ = 0 (doubtful above 0.03)", below(found.ww_residual, 0.03)],
     [`misfit of D to M${where} (doubtful above 0.1)`, below(found.feedthrough_misfit, 0.1)],
-    ["D over M⁻¹ at the pairs (1 when all is well)", digits(found.feedthrough_gain)],
+    ["D over M⁻¹ at the pairs (1 is expected)", digits(found.feedthrough_gain)],
     ["modes used", chosen],
     ["how much stronger than the best left out", known(found.selection_margin) ? `${digits(found.selection_margin)} times` : "–"],
     ["co-located pairs", digits(found.collocated_pairs)],

@@ -2,7 +2,7 @@
 /// @file steps/era.h
 /// Eigensystem realization algorithm (paper eq. 43-54), Hankel matrix of the system Markov parameters only (trap 1);
 /// the observer gain follows by least squares from the observer-gain Markov parameters. With tau > 0 the data
-/// correlations H(k) H(0)^T are realized in the place of H(k): ERA/DC (Juang, Cooper, Wright 1988).
+/// correlations H(k) H(0)^T are realized in place of H(k): ERA/DC (Juang, Cooper, Wright 1988).
 #ifndef OKID_STEPS_ERA_H
 #define OKID_STEPS_ERA_H
 

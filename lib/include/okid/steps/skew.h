@@ -52,7 +52,7 @@ OKID_API size_t okid_skew_memsize(const okid_skew_config_t* config);
 OKID_NODISCARD OKID_API okid_status_t okid_skew_create(okid_skew_t** self, const okid_skew_config_t* config,
                                                        void* block, size_t bytes);
 
-/// Start anew with a model: the angles of the modes that okid_mkr_identify() takes.
+/// Restart with a model: the angles of the modes that okid_mkr_identify() takes.
 /// @return OKID_OK, OKID_ERR_NULL, or the errors of okid_mkr_identify()
 OKID_NODISCARD OKID_API okid_status_t okid_skew_begin(okid_skew_t* self, const okid_model_t* model);
 

@@ -76,7 +76,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_subspace_decompose(okid_subspace_t* s
 /// The same from the factor R of the rows: the condition of the data is not squared. For noise-free and nearly
 /// noise-free records. Needs config.factor = 1.
 /// @param factor  in, 2 i m x 2 i m of okid_square_root_factor() with lags = 2 i - 1
-/// @return also OKID_ERR_MISMATCH (created without room for it). Cost 2 (2 i m)^3 flop in the place of (2 i m)^3/3.
+/// @return also OKID_ERR_MISMATCH (created without room for it). Cost 2 (2 i m)^3 flop in place of (2 i m)^3/3.
 OKID_NODISCARD OKID_API okid_status_t okid_subspace_decompose_factor(okid_subspace_t* self, const okid_real_t* factor,
                                                                      int64_t rows, okid_subspace_info_t* info);
 
