@@ -5,11 +5,12 @@
 
 namespace okid_host {
 
-mode_tracks::mode_tracks(int n_y, int most_modes) {
+mode_tracks::mode_tracks(int n_y, int most_modes, double memory_s) {
     okid_track_config_t config{};
     config.n_y = n_y;
     config.max_modes = most_modes;
     config.max_tracks = 2 * most_modes;
+    if (memory_s > 0) config.close_hz = 0.15 / memory_s; // a sixth of what a memory resolves
     const std::size_t bytes = okid_track_memsize(&config);
     block_ = std::make_unique<std::byte[]>(bytes);
     if (okid_track_create(&tracks_, &config, block_.get(), bytes) != OKID_OK)

@@ -13,7 +13,7 @@ namespace okid_host {
 class mode_tracks {
   public:
     /// @param most_modes  of a model
-    mode_tracks(int n_y, int most_modes);
+    mode_tracks(int n_y, int most_modes, double memory_s = 0);
     /// @return the track of every mode, 0 = none yet; valid until the next call
     const std::vector<int>& update(const okid_identified_t& model);
     /// The structure has changed: the modes may be found elsewhere next time.

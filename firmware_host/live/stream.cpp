@@ -13,11 +13,21 @@
 #include <utility>
 
 namespace okid_host {
+namespace {
+
+/// What a model rests on, s; 0 where nothing is forgotten.
+double memory_s(const stream_config& config) {
+    if (config.wanted.window_s) return *config.wanted.window_s;
+    const double lambda = config.wanted.forgetting.value_or(1.0);
+    return lambda < 1 ? 1 / ((1 - lambda) * config.rate_hz) : 0;
+}
+
+} // namespace
 
 stream::stream(stream_config config)
     : config_(std::move(config)), identifier_(config_),
-      tracks_(static_cast<int>(config_.outputs.size()), identifier_.most_modes()),
-      baseline_tracks_(static_cast<int>(config_.outputs.size()), identifier_.most_modes()) {}
+      tracks_(static_cast<int>(config_.outputs.size()), identifier_.most_modes(), memory_s(config_)),
+      baseline_tracks_(static_cast<int>(config_.outputs.size()), identifier_.most_modes(), memory_s(config_)) {}
 
 void stream::reset() {
     identifier_.reset();

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    modes followed from update to update
-// METHOD     distance of every mode from every track in frequency and MAC; optimal assignment by shortest augmenting paths,
-//            in which staying alone costs 1; candidates become tracks after consecutive hits
+// METHOD     distance of every mode from every track in frequency and MAC, with the shape last seen and with the mean of some
+//            ten: where modes cross within the memory of the models the newest shapes are mixtures. Optimal assignment by
+//            shortest augmenting paths, in which staying alone costs 1; candidates become tracks after consecutive hits
 // REFERENCE  Jonker, Volgenant (1987), the assignment; MAC: Pappa, Elliott, Schenk (1993)
 // NUMERICS   only ratios of frequencies and MACs enter: nothing depends on units. A track is where it was last seen, so a
 //            slow drift of any size is followed; ties go to the older track
-// WORKSPACE  tracks (2 n_y + 8 numbers each) and a table of (modes + tracks) x tracks distances; n^3 flop at worst
+// WORKSPACE  tracks (4 n_y + 8 numbers each) and a table of (modes + tracks) x tracks distances; n^3 flop at worst
 #include <okid/modal.h>
 #include <okid/track.h>
 
@@ -22,23 +23,26 @@ struct okid_tracks {
     int32_t count, born, jumping;
     okid_track_t* track;
     okid_real_t *shape_re, *shape_im; // n_y x max_tracks, when last seen
+    okid_real_t *mean_re, *mean_im;   // the same, remembered
     int32_t *streak, *mode;           // consecutive hits; which mode it is in the newest update, -1 none
     // Of one update: rows are modes, columns tracks, then one private column a mode for staying alone.
     double *cost, *row_price, *column_price, *slack;
-    int32_t *owner, *way, *of_mode; // mode of a column, column before it on the path; track of a mode; -1 none
-    uint8_t* reached;
+    int32_t *owner, *way, *of_mode;        // mode of a column, column before it on the path; track of a mode; -1 none
+    uint8_t *reached, *mode_close, *close; // of the newest update's modes; of tracks, when last seen
 };
 
 namespace {
 
-constexpr double alone = 1; // the cost of a mode without a track
+constexpr double alone = 1;        // the cost of a mode without a track
+constexpr double remembered = 0.1; // weight of the newest shape in the mean, at least
+constexpr double by_memory = 0.35; // weight of the mean beside the shape last seen: what veers follows the latter
 
 size_t lay_out(okid_tracks& s, okid::arena& memory) {
     const auto tracks = static_cast<size_t>(s.config.max_tracks), modes = static_cast<size_t>(s.config.max_modes);
     const size_t shapes = tracks * static_cast<size_t>(s.config.n_y), columns = tracks + modes + 1;
     s.track = memory.take<okid_track_t>(tracks);
-    s.shape_re = memory.take<okid_real_t>(shapes);
-    s.shape_im = memory.take<okid_real_t>(shapes);
+    for (okid_real_t** each : {&s.shape_re, &s.shape_im, &s.mean_re, &s.mean_im})
+        *each = memory.take<okid_real_t>(shapes);
     for (int32_t** each : {&s.streak, &s.mode}) *each = memory.take<int32_t>(tracks);
     s.cost = memory.take<double>(modes * tracks);
     s.row_price = memory.take<double>(modes + 1);
@@ -46,6 +50,8 @@ size_t lay_out(okid_tracks& s, okid::arena& memory) {
     for (int32_t** each : {&s.owner, &s.way}) *each = memory.take<int32_t>(columns);
     s.of_mode = memory.take<int32_t>(modes);
     s.reached = memory.take<uint8_t>(columns);
+    s.mode_close = memory.take<uint8_t>(modes);
+    s.close = memory.take<uint8_t>(tracks);
     return memory.bytes();
 }
 
@@ -53,7 +59,7 @@ bool valid(const okid_track_config_t& c) {
     const auto within = [](double x, double most) { return x >= 0 && x < most; };
     return c.n_y >= 1 && c.n_y <= 4096 && c.max_modes >= 1 && c.max_modes <= 4096 && c.max_tracks >= 1 &&
            c.max_tracks <= 4096 && c.born >= 0 && c.dies >= 0 && within(c.frequency, 1) && within(c.jump, 1) &&
-           within(c.mac, 1);
+           c.close_hz >= 0 && within(c.mac, 1);
 }
 
 okid_tracks plan(const okid_track_config_t& c) {
@@ -81,9 +87,17 @@ double distance(const okid_tracks& s, const mode_view& to, int mode, int track, 
     const double apart = (to.frequency_hz[mode] - f) / (reach * f);
     if (std::abs(apart) >= 1) return 2 * alone;
     const size_t a = column_of(s, track), b = column_of(s, mode);
-    const double like = okid_modal_mac(s.config.n_y, s.shape_re + a, s.shape_im + a, to.shape_re + b, to.shape_im + b);
-    const double unlike = (1 - std::min(1.0, like)) / (1 - mac);
-    return apart * apart + unlike * unlike;
+    const auto unlike = [&](const okid_real_t* re, const okid_real_t* im) {
+        const double like = okid_modal_mac(s.config.n_y, re + a, im + a, to.shape_re + b, to.shape_im + b);
+        const double x = (1 - std::min(1.0, like)) / (1 - mac);
+        return x * x;
+    };
+    const double newest = unlike(s.shape_re, s.shape_im);
+    const double usual = unlike(s.mean_re, s.mean_im);
+    if (far) return apart * apart + std::min(newest, usual);
+    if (newest >= 1 && usual >= 1) return 2 * alone;
+    const double weight = s.close[track] != 0 || s.mode_close[mode] != 0 ? 1 : by_memory;
+    return apart * apart + (1 - weight) * std::min(1.0, newest) + weight * std::min(1.0, usual);
 }
 
 /// Columns 1 … tracks, then 1 a mode; column 0 is where a path begins. Pairs that cost more than being alone are never taken.
@@ -135,6 +149,28 @@ void assign(okid_tracks& s, int modes) {
         if (s.owner[j] >= 0) s.of_mode[s.owner[j]] = j - 1;
 }
 
+/// The mean of track k goes on with the shape just seen, turned and scaled to it.
+void remember(okid_tracks& s, int k) {
+    const size_t at = column_of(s, k), n = static_cast<size_t>(s.config.n_y);
+    okid_real_t *re = s.mean_re + at, *im = s.mean_im + at;
+    const okid_real_t *new_re = s.shape_re + at, *new_im = s.shape_im + at;
+    double along = 0, across = 0, own = 0, theirs = 0;
+    for (size_t i = 0; i < n; ++i) {
+        const double a = re[i], b = im[i], c = new_re[i], d = new_im[i];
+        along += a * c + b * d, across += b * c - a * d, own += a * a + b * b, theirs += c * c + d * d;
+    }
+    const double turn = std::hypot(along, across);
+    const double scale = turn > 0 && theirs > 0 ? std::sqrt(own / theirs) / turn : 0;
+    const double weight = s.track[k].hits > 1 && scale > 0 ? std::max(remembered, 1.0 / s.track[k].hits) : 1;
+    for (size_t i = 0; i < n; ++i) {
+        const double c = new_re[i], d = new_im[i];
+        const double to_re = weight < 1 ? scale * (along * c - across * d) : c;
+        const double to_im = weight < 1 ? scale * (along * d + across * c) : d;
+        re[i] = static_cast<okid_real_t>((1 - weight) * re[i] + weight * to_re);
+        im[i] = static_cast<okid_real_t>((1 - weight) * im[i] + weight * to_im);
+    }
+}
+
 void see(okid_tracks& s, int k, const mode_view& modes, int mode) {
     okid_track_t& track = s.track[k];
     track.frequency_hz = modes.frequency_hz[mode];
@@ -146,6 +182,8 @@ void see(okid_tracks& s, int k, const mode_view& modes, int mode) {
     const size_t from = column_of(s, mode), to = column_of(s, k), n = static_cast<size_t>(s.config.n_y);
     std::copy(modes.shape_re + from, modes.shape_re + from + n, s.shape_re + to);
     std::copy(modes.shape_im + from, modes.shape_im + from + n, s.shape_im + to);
+    s.close[k] = s.mode_close[mode];
+    if (s.close[k] == 0 || track.hits == 1) remember(s, k);
 }
 
 /// The lost track that candidate k, seen for `born` updates, goes on with: the nearest of those not seen since it appeared
@@ -169,9 +207,10 @@ void remove(okid_tracks& s, int k) {
     s.track[k] = s.track[last];
     s.streak[k] = s.streak[last];
     s.mode[k] = s.mode[last];
+    s.close[k] = s.close[last];
     const size_t from = column_of(s, last), to = column_of(s, k), n = static_cast<size_t>(s.config.n_y);
-    std::copy(s.shape_re + from, s.shape_re + from + n, s.shape_re + to);
-    std::copy(s.shape_im + from, s.shape_im + from + n, s.shape_im + to);
+    for (okid_real_t* each : {s.shape_re, s.shape_im, s.mean_re, s.mean_im})
+        std::copy(each + from, each + from + n, each + to);
 }
 
 /// Candidates live on hits alone, tracks survive misses.
@@ -233,6 +272,11 @@ okid_status_t okid_track_update(okid_tracks_t* self, int32_t count, const okid_r
         return OKID_ERR_DIM;
     const mode_view modes{frequency_hz, damping_ratio, shape_re, shape_im};
     const auto tracks = static_cast<size_t>(s.count);
+    for (int m = 0; m < count; ++m) {
+        s.mode_close[m] = 0;
+        for (int k = 0; k < count; ++k)
+            if (k != m && std::abs(frequency_hz[k] - frequency_hz[m]) < s.config.close_hz) s.mode_close[m] = 1;
+    }
     for (int m = 0; m < count; ++m)
         for (int k = 0; k < s.count; ++k)
             s.cost[static_cast<size_t>(m) * tracks + static_cast<size_t>(k)] = distance(s, modes, m, k, s.jumping != 0);

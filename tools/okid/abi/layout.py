@@ -296,7 +296,7 @@ class TrackConfig(Structure):
 
     _fields_ = [
         *((name, c_int32) for name in ("n_y", "max_modes", "max_tracks", "born", "dies")),
-        *((name, c_double) for name in ("frequency", "jump", "mac")),
+        *((name, c_double) for name in ("frequency", "jump", "mac", "close_hz")),
     ]
 
 
