@@ -38,19 +38,17 @@ bool flag_of(const std::string& key, const json& value) {
 }
 
 void take_option(const std::string& key, const json& value, const option_places& to) {
-    std::vector<std::string> known;
-    for (const auto& [name, place] : to.texts) {
-        known.emplace_back(name);
+    for (const auto& [name, place] : to.texts)
         if (key == name) return void(*place = words_of(value));
-    }
-    for (const auto& [name, place] : to.flags) {
-        known.emplace_back(name);
+    for (const auto& [name, place] : to.flags)
         if (key == name) return void(*place = flag_of(key, value));
-    }
-    for (const auto& [name, place] : to.lists) {
-        known.emplace_back(name);
+    for (const auto& [name, place] : to.lists)
         if (key == name) return void(*place = names_of(key, value));
-    }
+    std::vector<std::string> known;
+    const auto add = [&](const auto& places) {
+        for (const auto& one : places) known.emplace_back(one.first);
+    };
+    add(to.texts), add(to.flags), add(to.lists);
     throw failure(exit_usage, fmt::format("no option \"{}\"{}, expected one of: {}", printable(key),
                                           did_you_mean(key, known), list_names(known)));
 }

@@ -57,10 +57,30 @@ record_options checked(const asked& given) {
     return options;
 }
 
+/// Rows whose numbers stand side by side, `side` of them.
+template <class Number, std::size_t side>
+void copy_rows(const char* at, std::ptrdiff_t stride, std::size_t count, std::size_t width, double* out) {
+    for (std::size_t n = 0; n < count; ++n, at += stride, out += width) {
+        Number x[side];
+        std::memcpy(x, at, sizeof x);
+        for (std::size_t c = 0; c < side; ++c) out[c] = static_cast<double>(x[c]);
+    }
+}
+
 /// Samples first .. of one side of a record into `count` rows of `width` numbers.
 template <class Number>
 void copy_side(const okid_host_columns_t& from, std::size_t first, std::size_t count, std::size_t width, double* to) {
-    for (std::size_t c = 0; c < from.channels; ++c) {
+    constexpr auto side_by_side = static_cast<std::ptrdiff_t>(sizeof(Number));
+    std::size_t done = 0;
+    for (; from.channel_stride == side_by_side && done < from.channels;) {
+        const char* at = static_cast<const char*>(from.data) + static_cast<std::ptrdiff_t>(done) * side_by_side +
+                         static_cast<std::ptrdiff_t>(first) * from.row_stride;
+        const std::size_t left = from.channels - done, some = left >= 4 ? 4 : left >= 2 ? 2 : 1;
+        const auto copy = some == 4 ? copy_rows<Number, 4> : some == 2 ? copy_rows<Number, 2> : copy_rows<Number, 1>;
+        copy(at, from.row_stride, count, width, to + done);
+        done += some;
+    }
+    for (std::size_t c = done; c < from.channels; ++c) {
         const char* at = static_cast<const char*>(from.data) + static_cast<std::ptrdiff_t>(c) * from.channel_stride +
                          static_cast<std::ptrdiff_t>(first) * from.row_stride;
         double* out = to + c;

@@ -40,18 +40,27 @@ struct input_moments {
     Eigen::MatrixXd products;
 
     explicit input_moments(Eigen::Index n_u)
-        : mean(Eigen::VectorXd::Zero(n_u)), products(Eigen::MatrixXd::Zero(n_u, n_u)) {}
+        : mean(Eigen::VectorXd::Zero(n_u)), products(Eigen::MatrixXd::Zero(n_u, n_u)), apart_(n_u) {}
 
-    /// Of a piece that stays in the cache (samples x inputs). Chan, Golub, LeVeque (1983).
-    void add(const Eigen::Ref<const Eigen::MatrixXd>& piece) {
+    /// Of a piece that stays in the cache (samples x inputs), which is centred by it. Chan, Golub, LeVeque (1983).
+    void add(Eigen::Ref<Eigen::MatrixXd> piece) {
         if (piece.rows() == 0) return;
-        const auto more = static_cast<double>(piece.rows());
-        const Eigen::VectorXd own = piece.colwise().mean(), apart = own - mean;
-        const Eigen::MatrixXd left = piece.rowwise() - own.transpose();
-        products += left.transpose().lazyProduct(left) + (count * more / (count + more)) * (apart * apart.transpose());
-        mean += apart * (more / (count + more));
-        count += more;
+        const auto more = static_cast<double>(piece.rows()), both = count + more;
+        for (Eigen::Index r = 0; r < mean.size(); ++r) {
+            const double own = piece.col(r).mean();
+            apart_[r] = own - mean[r];
+            piece.col(r).array() -= own;
+            for (Eigen::Index c = 0; c <= r; ++c) {
+                products(r, c) += piece.col(r).dot(piece.col(c)) + count * more / both * (apart_[r] * apart_[c]);
+                products(c, r) = products(r, c);
+            }
+        }
+        mean += apart_ * (more / both);
+        count = both;
     }
+
+  private:
+    Eigen::VectorXd apart_;
 };
 
 /// Over the samples of a record that have all inputs.
@@ -62,14 +71,22 @@ input_moments moments_of(const record_set& set, const record_data& record) {
     Eigen::MatrixXd piece(most, n_u);
     Eigen::Index held = 0;
     const double* u = set.rows(record);
-    for (std::size_t n = 0; n < record.count; ++n, u += set.channels()) {
-        if (!set.complete && std::any_of(u, u + n_u, [](double x) { return std::isnan(x); })) continue;
-        for (Eigen::Index c = 0; c < n_u; ++c) piece(held, c) = u[c];
-        if (++held < most) continue;
-        out.add(piece);
+    for (std::size_t n = 0; n < record.count;) {
+        if (set.complete) {
+            held = std::min(most, static_cast<Eigen::Index>(record.count - n));
+            for (Eigen::Index c = 0; c < n_u; ++c)
+                piece.col(c).head(held) = Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<>>(
+                    u + c, held, Eigen::InnerStride<>(static_cast<Eigen::Index>(set.channels())));
+            n += static_cast<std::size_t>(held), u += static_cast<std::size_t>(held) * set.channels();
+        }
+        for (; n < record.count && held < most; ++n, u += set.channels()) {
+            if (std::any_of(u, u + n_u, [](double x) { return std::isnan(x); })) continue;
+            for (Eigen::Index c = 0; c < n_u; ++c) piece(held, c) = u[c];
+            ++held;
+        }
+        out.add(piece.topRows(held));
         held = 0;
     }
-    out.add(piece.topRows(held));
     return out;
 }
 

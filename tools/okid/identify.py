@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from okid._errors import InputError
@@ -13,6 +14,17 @@ if TYPE_CHECKING:
 
     from okid.result.result import Result
     from okid.result.stabilization import Criteria, Stabilization
+
+
+@lru_cache(maxsize=1)
+def _rooms() -> tuple[Any, ...]:
+    """What identify() works with, brought in by its first call: `import okid` stays short."""
+    from okid.abi.arguments import channel_names
+    from okid.data.records import sides
+    from okid.identification import host_result
+    from okid.result.result import Result
+
+    return channel_names, sides, host_result, Result.of_host
 
 
 def identify(
@@ -98,11 +110,7 @@ def identify(
     >>> result.mkr.M.diagonal().round(1).tolist()  # kg; true: 1, 0.8, 1.2
     [1.0, 0.8, 1.2]
     """
-    from okid.abi.arguments import channel_names
-    from okid.data.records import sides
-    from okid.identification import host_result
-    from okid.result.result import Result
-
+    channel_names, sides, host_result, of_host = _rooms()
     inputs, outputs = sides(u, y, host_result.TYPES)
     options = {
         "inputs": channel_names(input_names, u, "u", inputs[0].shape[1]),
@@ -114,7 +122,7 @@ def identify(
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
         "hit_dofs": hit_dofs, "threads": threads,
     }  # fmt: skip
-    return Result.of_host(host_result.identify(options, inputs, outputs))
+    return of_host(host_result.identify(options, inputs, outputs))  # type: ignore[no-any-return]
 
 
 def stabilization(

@@ -163,27 +163,35 @@ static void split_spectra(const spectrum_plan_t* plan, const map_t* a, const dou
     }
 }
 
-/// cross[f][r][group] += Current_r conj(Full), all windows of the batch at once.
+/// cross[f][r][group] += Current_r conj(Full), all windows of the batch at once; Full of a frequency stays in registers.
 static void add_cross(const spectrum_plan_t* plan, const map_t* a) {
     const int m = plan->m, groups = plan->groups;
-    double* cross = a->cross;
-    for (int f = 0; f <= plan->length / 2; ++f) {
-        const size_t at = 2 * V * (size_t)(f * groups);
-        for (int r = 0; r < m; ++r)
-            for (int g = 0; g < groups; ++g, cross += 2 * V) {
+    const size_t row = 2 * V * (size_t)groups;
+    for (int f = 0; f <= plan->length / 2; ++f)
+        for (int g = 0; g < groups; ++g) {
+            const double *full = a->full + (size_t)f * row + 2 * V * (size_t)g, *current = a->current + (size_t)f * row;
+            double* cross = a->cross + (size_t)(f * m) * row + 2 * V * (size_t)g;
+            lanes_t fr[SPECTRUM_BATCH], fi[SPECTRUM_BATCH];
+#pragma GCC unroll 4
+            for (int b = 0; b < SPECTRUM_BATCH; ++b) {
+                fr[b] = GET(full + (size_t)b * a->window);
+                fi[b] = GET(full + (size_t)b * a->window + V);
+            }
+            for (int r = 0; r < m; ++r, cross += row) {
+                const double* mine = current + 2 * V * (size_t)(r / V) + r % V;
                 lanes_t re = GET(cross), im = GET(cross + V);
-                for (int b = 0; b < SPECTRUM_BATCH; ++b) {
-                    const double* mine = a->current + (size_t)b * a->window + at + 2 * V * (size_t)(r / V) + r % V;
-                    const double* full = a->full + (size_t)b * a->window + at + 2 * V * (size_t)g;
+#pragma GCC unroll 4
+                for (int b = 0; b < SPECTRUM_BATCH; ++b, mine += a->window) {
                     const double cr = mine[0], ci = mine[V];
-                    const lanes_t fr = GET(full), fi = GET(full + V);
-                    re += cr * fr + ci * fi;
-                    im += ci * fr - cr * fi;
+                    re += cr * fr[b];
+                    im += ci * fr[b];
+                    re += ci * fi[b];
+                    im -= cr * fi[b];
                 }
                 PUT(cross, re);
                 PUT(cross + V, im);
             }
-    }
+        }
 }
 
 okid_spectrum_transform_fn TRANSFORM;

@@ -33,7 +33,7 @@ template <class Real> int cholesky(int n, Real* a, int lda);
 /// B <- A^-1 B with the factor of cholesky(); b is n x count.
 template <class Real> void cholesky_solve(int n, const Real* l, int ldl, Real* b, int ldb, int count);
 
-/// 1-norm condition estimate of A from its factor and the 1-norm of A. work: 4 n numbers.
+/// 1-norm condition estimate of A from its factor and the 1-norm of A. work: 2 n numbers.
 template <class Real> Real cholesky_condition(int n, const Real* l, int ldl, as_is<Real> norm1, Real* work);
 
 /// C <- alpha op(A) op(B) + beta C; C is rows x cols, inner products of length `inner`.

@@ -8,6 +8,8 @@
 //            Instantiated is what a build uses and no more: code memory of a microcontroller
 #include "linalg.hpp"
 
+#include "condition.hpp"
+
 #include <Eigen/Core>
 #include <Eigen/Jacobi>
 #include <algorithm>
@@ -120,25 +122,7 @@ template <class Real> void cholesky_solve(int n, const Real* l, int ldl, Real* b
 }
 
 template <class Real> Real cholesky_condition(int n, const Real* l, int ldl, as_is<Real> norm1, Real* work) {
-    // Hager's 1-norm estimate of the inverse (symmetric, so one solve a step).
-    vector<Real> x(work, n), y(work + n, n);
-    x.setConstant(1 / static_cast<Real>(n));
-    Real estimate = 0;
-    for (int step = 0; step < 5; ++step) {
-        y = x;
-        cholesky_solve(n, l, ldl, y.data(), n, 1);
-        const Real size = y.template lpNorm<1>();
-        if (step > 0 && size <= estimate) break;
-        estimate = size;
-        for (int i = 0; i < n; ++i) y[i] = y[i] >= 0 ? 1 : -1;
-        cholesky_solve(n, l, ldl, y.data(), n, 1);
-        int best = 0;
-        y.cwiseAbs().maxCoeff(&best);
-        if (std::abs(y[best]) <= y.dot(x)) break;
-        x.setZero();
-        x[best] = 1;
-    }
-    return norm1 * estimate;
+    return condition_of_factor<Real>(n, l, ldl, norm1, work);
 }
 
 template <class Real>

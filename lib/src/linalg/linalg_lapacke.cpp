@@ -4,6 +4,8 @@
 // NUMERICS   LAPACK's; workspace sizes are asked from LAPACK itself
 #include "linalg.hpp"
 
+#include "condition.hpp"
+
 #include <algorithm>
 #include <cblas.h>
 #include <cmath>
@@ -25,13 +27,6 @@ void potrs(int n, int count, const double* l, int ldl, double* b, int ldb) {
 }
 void potrs(int n, int count, const float* l, int ldl, float* b, int ldb) {
     LAPACKE_spotrs_work(layout, 'L', n, count, l, ldl, b, ldb);
-}
-
-void pocon(int n, const double* l, int ldl, double norm1, double* reciprocal, double* work, lapack_int* integers) {
-    LAPACKE_dpocon_work(layout, 'L', n, l, ldl, norm1, reciprocal, work, integers);
-}
-void pocon(int n, const float* l, int ldl, float norm1, float* reciprocal, float* work, lapack_int* integers) {
-    LAPACKE_spocon_work(layout, 'L', n, l, ldl, norm1, reciprocal, work, integers);
 }
 
 void gemm(CBLAS_TRANSPOSE ta, CBLAS_TRANSPOSE tb, int rows, int cols, int inner, double alpha, const double* a, int lda,
@@ -160,12 +155,7 @@ template <class Real> void cholesky_solve(int n, const Real* l, int ldl, Real* b
 }
 
 template <class Real> Real cholesky_condition(int n, const Real* l, int ldl, as_is<Real> norm1, Real* work) {
-    Real reciprocal = 0;
-    auto* integers = reinterpret_cast<lapack_int*>(work + 3 * static_cast<size_t>(n));
-    pocon(n, l, ldl, norm1, &reciprocal, work, integers);
-    constexpr double none = 1e300; // singular to working accuracy
-    return reciprocal > 0 ? 1 / reciprocal
-                          : static_cast<Real>(std::min<double>(none, std::numeric_limits<Real>::max()));
+    return condition_of_factor<Real>(n, l, ldl, norm1, work);
 }
 
 template <class Real>

@@ -6,7 +6,9 @@ from __future__ import annotations
 import ctypes
 import json
 import math
+import struct
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -33,11 +35,14 @@ def _plain(value: Any) -> Any:
     return value if value is None or isinstance(value, bool | int | float | str) else repr(value)
 
 
+_encode = json.JSONEncoder(allow_nan=False, check_circular=False).encode
+
+
 def options_text(options: Mapping[str, Any]) -> bytes:
     """For the library; None is as if not given."""
     given = {key: value for key, value in options.items() if value is not None}
     try:
-        return json.dumps(given, allow_nan=False).encode()
+        return _encode(given).encode()
     except (TypeError, ValueError):
         return json.dumps(_plain(given)).encode()
 
@@ -95,16 +100,27 @@ class HostResult:
 TYPES = ("f8", "f4", "i2", "i4")  # numbers the library takes as they are, in the order of okid_host_columns_t
 
 
-def _columns(arrays: Sequence[NDArray[Any]]) -> Any:
-    sides = [host.Columns(a.ctypes.data, TYPES.index(a.dtype.str[1:]), a.shape[1], *a.strides) for a in arrays]
-    return (host.Columns * len(sides))(*sides)
+_TYPE_OF = {name: number for number, name in enumerate(TYPES)}
+_columns_t = struct.Struct("PiNnn")  # okid_host_columns_t
+assert _columns_t.size == ctypes.sizeof(host.Columns)
+
+
+def _columns(arrays: Sequence[NDArray[Any]]) -> bytes:
+    packed = b""
+    for a in arrays:
+        row, channel = a.strides
+        packed += _columns_t.pack(a.ctypes.data, _TYPE_OF[a.dtype.str[1:]], a.shape[1], row, channel)
+    return packed
+
+
+@lru_cache(maxsize=8)
+def _names(what: str, count: int) -> Any:
+    return (ctypes.c_char_p * count)(*(f"{what} {k} (counted from 0)".encode() for k in range(count)))
 
 
 def _records(inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]], what: str) -> tuple[Any, ...]:
-    count = len(outputs)
-    counts = (ctypes.c_size_t * count)(*map(len, outputs))
-    names = (ctypes.c_char_p * count)(*(f"{what} {k} (counted from 0)".encode() for k in range(count)))
-    return count, _columns(inputs), _columns(outputs), counts, names
+    counts = struct.pack(f"{len(outputs)}N", *map(len, outputs))
+    return len(outputs), _columns(inputs), _columns(outputs), counts, _names(what, len(outputs))
 
 
 def identify(options: Mapping[str, Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]]) -> HostResult:
