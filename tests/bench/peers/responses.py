@@ -108,13 +108,13 @@ def of_sdypy(f: Any, h: Any, modes: list[Any]) -> list[list[float]]:
     return [[a / grow, b] for a, b in zip(model.nat_freq, model.nat_xi, strict=True)]
 
 
-def run(who: str, folder: Path) -> None:
+def run(who: str, folder: Path, way: Any) -> None:
     out = {}
     for k, (name, modes) in enumerate(json.loads((folder / "about.json").read_text()).items()):
         data = np.load(folder / f"{k}.npz")
         begin = time.perf_counter()
         try:
-            found: Any = {"okid": of_okid, "sdypy": of_sdypy}[who](data["f"], data["h"], modes)
+            found: Any = way(data["f"], data["h"], modes)
         except Exception as fault:  # a failure is a row of the table
             found = str(fault)[:120]
         out[name] = [found, time.perf_counter() - begin]
@@ -123,7 +123,7 @@ def run(who: str, folder: Path) -> None:
 
 def table(folder: Path) -> None:
     about = json.loads((folder / "about.json").read_text())
-    for who in ("okid", "sdypy"):
+    for who in ("okid", "sdypy", "pyoma"):
         if not (folder / f"{who}.json").exists():
             continue
         for name, (found, seconds) in json.loads((folder / f"{who}.json").read_text()).items():
@@ -151,4 +151,4 @@ if __name__ == "__main__":
     elif what == "table":
         table(Path(place))
     else:
-        run(what, Path(place))
+        run(what, Path(place), {"okid": of_okid, "sdypy": of_sdypy}[what])
