@@ -51,6 +51,8 @@ static std::string time_like(const std::vector<std::string>& names) {
     for (const std::string& name : names) {
         std::string small;
         for (const char c : name) small += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        if (small.rfind("time", 0) == 0 && small.find("ms") != std::string::npos)
+            return fmt::format(" (\"{}\" is not in seconds: give the rate with --fs)", printable(name));
         if (small == "t" || small.rfind("time", 0) == 0)
             return fmt::format(" (is \"{}\" the time in seconds? Then call it time_s)", printable(name));
     }

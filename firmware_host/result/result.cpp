@@ -184,7 +184,7 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
         out += fmt::format("   ? EMAC below {:g}: probably noise, not a mode of the structure\n", doubtful_emac);
     if (!left_out.empty())
         out +=
-            fmt::format("   {} doubtful, listed with --all-modes: {}\n",
+            fmt::format("   {}, listed with --all-modes: {}\n",
                         counted(static_cast<long long>(left_out.size()), "doubtful mode"), fmt::join(left_out, ", "));
     if (agreed) out += why_legend(verdicts);
     return out;

@@ -123,3 +123,6 @@ def test_a_time_of_another_name(rig: Path) -> None:
     (rig / "t.csv").write_text("Time [s],u,y\n" + "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99)))
     done = okid("identify", rig / "t.csv", "--inputs", "u", "--outputs", "y")
     assert done.returncode == 2 and '(is "Time [s]" the time in seconds? Then call it time_s)' in done.stderr
+    (rig / "ms.csv").write_text("Time [ms],u,y\n" + "".join(f"{10 * k},{k % 7},{k % 5}\n" for k in range(99)))
+    done = okid("identify", rig / "ms.csv", "--inputs", "u", "--outputs", "y")
+    assert done.returncode == 2 and '("Time [ms]" is not in seconds: give the rate with --fs)' in done.stderr

@@ -43,7 +43,8 @@ def keep(name: str, picture: bytes, width: int = 1000) -> str:
     image = Image.open(io.BytesIO(picture)).convert("RGB")
     if image.width > width:
         image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
-    image.quantize(64, dither=Image.Dither.NONE).save(runs.IMAGES / name, optimize=True)
+    # By coverage: colours of small marks stay.
+    image.quantize(128, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(runs.IMAGES / name, optimize=True)
     return name
 
 
