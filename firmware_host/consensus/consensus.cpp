@@ -5,6 +5,8 @@
 //          agreement = found_in x EMAC x (1 + MPC)/2 / (1 + (scatter of damping / 0.6)^2): a mode is believed from one half on
 #include "consensus.hpp"
 
+#include "result/method.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -131,7 +133,9 @@ std::vector<member> ranked(const std::vector<consensus_run>& runs) {
                                 100 * track.frequency_spread - 0.02 * track.length;
             out.push_back({static_cast<int>(r), static_cast<int>(t), &track, rank});
         }
-    std::stable_sort(out.begin(), out.end(), [](const member& a, const member& b) { return a.rank < b.rank; });
+    std::sort(out.begin(), out.end(), [](const member& a, const member& b) {
+        return std::tie(a.rank, a.run, a.track) < std::tie(b.rank, b.run, b.track);
+    });
     return out;
 }
 
@@ -176,6 +180,21 @@ bool sharp(const consensus_run& run, double f) {
            f * run.rows / run.fs_hz >= periods_well;
 }
 
+/// Root mean square distance of the subspace runs of the mode's level from its values.
+void set_scatter(const std::vector<consensus_run>& runs, const std::vector<member>& seen, consensus_mode& mode) {
+    double count = 0, f = 0, zeta = 0;
+    for (const member& m : seen) {
+        const consensus_run& run = runs[static_cast<std::size_t>(m.run)];
+        if (run.level != mode.level || !is_subspace(run.method)) continue;
+        ++count;
+        f += std::pow(m.found->frequency_hz - mode.frequency_hz, 2);
+        zeta += std::pow(m.found->damping_ratio - mode.damping_ratio, 2);
+    }
+    if (count == 0) return;
+    mode.frequency_scatter_hz = std::sqrt(f / count);
+    mode.damping_scatter = std::sqrt(zeta / count);
+}
+
 /// Frequency, damping, shape and level from the runs that are sharp there, else from all that see it.
 void set_values(const std::vector<consensus_run>& runs, const std::vector<member>& seen, consensus_mode& mode) {
     std::vector<member> use;
@@ -190,6 +209,7 @@ void set_values(const std::vector<consensus_run>& runs, const std::vector<member
     mode.shape = best->found->shape;
     mode.level = runs[static_cast<std::size_t>(use.front().run)].level;
     for (const member& m : use) mode.level = std::min(mode.level, runs[static_cast<std::size_t>(m.run)].level);
+    set_scatter(runs, seen, mode);
 }
 
 consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c) {

@@ -40,11 +40,12 @@ struct consensus_run {
 /// A cluster of tracks, at most one of each run.
 struct consensus_mode {
     double frequency_hz = 0, damping_ratio = 0, mpc = 0, emac = 0;
-    double damping_spread = 0; ///< relative, robust, over the runs
-    int hits = 0, could = 0;   ///< runs that found it, of those that could have seen it
-    double found_in = 0;       ///< hits / could
-    double agreement = 0;      ///< 0..1: found_in, consistency, phase and scatter together
-    int level = 0;             ///< the highest rate that sees it well
+    double damping_spread = 0;                            ///< relative, robust, over the runs
+    double frequency_scatter_hz = 0, damping_scatter = 0; ///< of the subspace runs of its level about the values
+    int hits = 0, could = 0;                              ///< runs that found it, of those that could have seen it
+    double found_in = 0;                                  ///< hits / could
+    double agreement = 0;                                 ///< 0..1: found_in, consistency, phase and scatter together
+    int level = 0;                                        ///< the highest rate that sees it well
     std::vector<std::complex<double>> shape;
     std::vector<std::pair<int, int>> members; ///< run, track
     std::vector<std::string> why;             ///< what speaks against it; empty: confident

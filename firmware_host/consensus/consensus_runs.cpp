@@ -37,7 +37,8 @@ bool find_poles(const okid_identify_config_t& config, const level_sums& sums, co
     okid_identified_t model{};
     if (!block || !sums.handle() || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK)
         return false;
-    if (okid_identify_run(identifier, sums.handle(), &model) < 0) return false;
+    const okid_status_t status = okid_identify_run(identifier, sums.handle(), &model);
+    if (status < 0 && status != OKID_ERR_NO_MODES) return false; // of the lowest order: higher ones may have modes
     collect_poles(identifier, model, run);
     link_tracks(run);
     return true;

@@ -155,6 +155,10 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
         if (carried->frequency_std_hz > widest_frequency * mode.frequency_hz ||
             carried->damping_std > widest_damping * mode.damping_ratio)
             mode.why.emplace_back("wide_sigma");
+        if (carried->exact) continue;
+        // what a model leaves out moves each method elsewhere, and no block of the record shows it
+        carried->frequency_std_hz = std::hypot(carried->frequency_std_hz, mode.frequency_scatter_hz);
+        carried->damping_std = std::hypot(carried->damping_std, mode.damping_scatter);
     }
     return out;
 }

@@ -64,7 +64,7 @@ def test_forced_structure_with_a_close_pair(seed: int, tmp_path: Path) -> None:
 
 def test_deviations_hold_behind_an_anti_alias_filter(tmp_path: Path) -> None:
     """Damping and frequency within two deviations, six records pooled; refined values there would hold in 76 %."""
-    held = []
+    held: dict[str, list[bool]] = {"frequency_hz": [], "damping_ratio": []}
     for seed in range(31, 37):
         lab = forced(seed)
         result = identify(lab, tmp_path)
@@ -72,8 +72,18 @@ def test_deviations_hold_behind_an_anti_alias_filter(tmp_path: Path) -> None:
         for i, mode in matched(lab, result).items():
             for key, truth in (("damping_ratio", lab.damping_ratio), ("frequency_hz", lab.frequency_hz)):
                 sigma = mode["frequency_std_hz" if key == "frequency_hz" else "damping_ratio_std"]
-                held.append(abs(mode[key] - truth[i]) < 2 * sigma)
-    assert len(held) > 80 and np.mean(held) >= 0.88, np.mean(held)
+                held[key].append(abs(mode[key] - truth[i]) < 2 * sigma)
+    for key, values in held.items():
+        assert len(values) > 40 and np.mean(values) >= 0.92, (key, np.mean(values))
+
+
+def test_a_run_without_modes_at_the_lowest_order_votes_with_the_others(tmp_path: Path) -> None:
+    """CVA and SSARX have no mode at order 4 of this record: they voted for nothing, six modes had no deviation."""
+    lab = ambient(4, False)
+    result = identify(lab, tmp_path)
+    found = matched(lab, result)
+    assert len(confident(result)) == len(found) == 9
+    assert all(mode["frequency_std_hz"] and mode["damping_ratio_std"] for mode in found.values())
 
 
 @pytest.mark.parametrize(("seed", "hum"), [(21, False), (22, True)])
