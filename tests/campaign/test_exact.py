@@ -15,6 +15,7 @@ import numpy as np
 import okid
 import pytest
 from distributed import Client, LocalCluster
+from okid.campaign.cluster import connected
 from okid.campaign.pieces import make_identifier
 from okid.campaign.progress_line import ProgressLine
 from okid.campaign.run import run_campaign
@@ -84,24 +85,26 @@ def test_two_workers_give_the_same(spec: CampaignSpec, truth: dict[str, Any], tw
 
 
 class _Killer(ProgressLine):
-    """Ends a worker process when the first batch has arrived."""
+    """Ends a worker process (kill -9) after so many steps of the run."""
 
-    def __init__(self, client: Any) -> None:
+    def __init__(self, client: Any, after: int) -> None:
         super().__init__(1, 1)
-        self._client, self.killed = client, 0
+        self._client, self._left, self.killed = client, after, 0
 
     def show(self, records: int, groups: int, last: bool = False) -> None:
-        if not self.killed:
+        self._left -= 1
+        if not self.killed and self._left < 0:
             self.killed = min(self._client.run(os.getpid).values())
             os.kill(self.killed, signal.SIGKILL)
 
 
-def test_killed_worker_changes_nothing(spec: CampaignSpec, truth: dict[str, Any], two: Any) -> None:
-    killer = _Killer(two)
-    outcome = run_campaign(replace(spec, folder=spec.base / "killed", batch_bytes=15_000), two, killer)
-    assert killer.killed > 0
-    assert facts(outcome) == truth and not outcome.skipped
-    two.wait_for_workers(2, timeout=60)
+@pytest.mark.parametrize("after", range(20) if os.environ.get("OKID_SLOW") == "1" else [0])
+def test_killed_worker_changes_nothing(spec: CampaignSpec, truth: dict[str, Any], after: int) -> None:
+    with connected(2, None, 1000.0) as client:
+        killer = _Killer(client, after)
+        outcome = run_campaign(replace(spec, folder=spec.base / f"killed{after}", batch_bytes=15_000), client, killer)
+        assert killer.killed > 0
+        assert facts(outcome) == truth and not outcome.skipped
 
 
 def test_order_of_patterns_does_not_matter(tmp_path: Path, client: Any) -> None:
