@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""Commands of pages that no test follows from top to bottom: each is run on files it could mean.
+
+Commands that take seconds each (reports, files of other programs) are run with OKID_SLOW=1; what needs a bus, a line, a
+browser or a year of records is named in ELSEWHERE.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import okid
+import pytest
+from command_help import ROOT
+from markdown_pages import blocks
+from page_runner import Block, Reader
+from test_command_lines import SHELL, command_lines
+
+SLOW = os.environ.get("OKID_SLOW") == "1"
+PAGES = [
+    "reference/cli.md",
+    "reference/rig.md",
+    "howto/report.md",
+    "howto/frequency-responses.md",
+    "migration/candump.md",
+]
+ELSEWHERE = {  # what a line begins with: where it is run
+    r"okid (?:run|record) |okid (?:simulate|replay) .* --to |okid init .* --(?:listen|device) ": "tests/vcan, tests/io",
+    r"okid bench": "make bench",
+    r"okid-live": "tests/live",
+    r"okid-capture": "tests/capture",
+    r"okid-campaign": "tests/campaign",
+}
+RIG = """rate_hz = 250.0
+duration_s = 12.0
+masses = [1.0, 0.8, 1.2]
+springs = [3e4, 2e4, 2.5e4]
+zeta = [0.01, 0.01]
+force_dofs = [1]
+sense_dofs = [1, 2, 3]
+noise_percent = 1.0
+"""
+GEOMETRY = "[geometry]\nnodes = [[0, 0, 0]]\ndofs = [{}]\n".format(", ".join(['[1, "x"]'] * 6))
+
+
+def write(path: Path, names: list[str], columns: list[np.ndarray]) -> None:
+    okid.formats.write_record(path, okid.Record(names, np.column_stack(columns), 250.0))
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files that the pages name, of one simulated frame."""
+    folder = tmp_path_factory.mktemp("pages")
+    (folder / "rig.toml").write_text(RIG)
+    (folder / "bridge.toml").write_text(GEOMETRY)
+    (folder / "runs").mkdir()
+    begin = (
+        "okid simulate rig.toml --quiet --log run.log --config frame.toml --csv simulated.csv\n"
+        "cp run.log frame.log; cp run.log rig.log; cp frame.dbc vendor.dbc; cp frame.toml lab.toml\n"
+        "okid convert run.log runs/frame-20261121T120000Z-0001.okj -c frame.toml\n"
+        + "okid-convert run.log trace.blf"
+        * SLOW
+    )
+    Reader(folder).run(Block("the files of all pages", 0, "sh", begin))
+    record = okid.read_csv(folder / "simulated.csv")
+    u, y = record.samples[:, :1], record.samples[:, 1:]
+    both = [u, y, u, y]
+    names = ["force1", "acc1", "acc2", "acc3", "force", "a1", "a2", "a3"]
+    for name in ("frame.csv", "run.csv", "monday.csv", "tuesday.csv", "deck.csv", *["run.mf4"] * SLOW):
+        write(folder / name, names, both)
+    for name, own in (("a", ["deck1", "deck2"]), ("b", ["deck3", "deck4"]), ("c", ["deck1", "deck4"])):
+        write(folder / f"{name}.csv", ["ref1", "ref2", *own], [y[:, :2], y[:, 1:]])
+    measured = okid.frf.h1(u, y, 250.0, nperseg=2048)
+    for name in ("responses", "one", "two"):
+        okid.write_frf(folder / f"{name}.uff", measured)
+    return folder
+
+
+def commands(page: str) -> list[str]:
+    shell = [block.text for block in blocks(ROOT / "docs" / page) if block.language in SHELL]
+    return [" ".join([program, *words]) for text in shell for program, words in command_lines(text)]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_run(page: str, prepared: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "here"
+    shutil.copytree(prepared, folder)
+    run, count = Reader(folder), 0
+    for line in commands(page):
+        slow = line.startswith(("okid-report", "okid-convert")) and not SLOW
+        if slow or any(re.match(start, line + " ") for start in ELSEWHERE):
+            continue
+        words = line.split()
+        if words[0] == "okid-convert" or words[1] == "init":  # these overwrite nothing
+            (folder / words[2]).unlink(missing_ok=True)
+        lacking = " || [ $? = 4 ]" if words[1] == "doctor" else ""  # this machine may have no CAN
+        run.run(Block(page, 0, "sh", line + lacking))
+        count += 1
+    assert count >= 2
