@@ -2,8 +2,8 @@
 """okid.identify beside SLICOT's MOESP (Cholesky: IB01AD, IB01BD; A, B, C, D, K) on the same arrays, in turns within one
 process, one thread; the least processor time of each. usage: identify_beside.py [BENCH.json to add to]
 
-The true order, s block rows (okid methods: p = s, 2 s block rows), 1 % noise, no standard deviations. SLICOT works on
-its own copies in Fortran order, made before; its modes are not computed.
+The true order, s block rows (okid methods: p = s, 2 s block rows), 1 % noise; without standard deviations but for one
+row. SLICOT works on its own copies in Fortran order, made before; its modes are not computed.
 """
 
 from __future__ import annotations
@@ -26,12 +26,16 @@ from bench_file import keep  # noqa: E402
 
 SIZES = (("W1", 10_000, 10), ("W2", 20_000, 15), ("W3", 100_000, 22), ("W1", 10_000, 40), ("W2", 10_000, 30),
          ("W3", 10_000, 25))  # fmt: skip
-METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")
+SIGMA = "_sigma"  # with standard deviations, analytic
+METHODS = ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx", "n4sid-moesp" + SIGMA)
 
 
 def of_okid(method: str, u: Any, y: Any, fs: float, order: int, s: int) -> Callable[[], object]:
     rows: dict[str, int] = {"rows": s} if method.startswith("n4sid") else {"p": s, "rows": 2 * s}
-    return lambda: okid.identify(u, y, fs=fs, method=method, order=order, detrend="none", sigma_blocks=0, **rows)
+    sigma = "analytic" if method.endswith(SIGMA) else "none"
+    return lambda: okid.identify(
+        u, y, fs=fs, method=method.removesuffix(SIGMA), order=order, detrend="none", sigma=sigma, **rows
+    )
 
 
 def least_times(ways: list[Callable[[], object]], turns: int) -> list[float]:
@@ -64,7 +68,7 @@ def main() -> None:
         print(f"okid.identify {name}, s = {s}: SLICOT {1e3 * slicot:.2f} ms")
         for method, took in zip(METHODS, times, strict=True):
             ratios[f"slicot_moesp_over_identify_{method}_{name}_s{s}"] = slicot / took
-            print(f"  {method:12} {1e3 * took:7.2f} ms, SLICOT takes {slicot / took:.2f} times as long")
+            print(f"  {method:17} {1e3 * took:7.2f} ms, SLICOT takes {slicot / took:.2f} times as long")
     keep(ratios)
 
 

@@ -122,7 +122,7 @@ template <class Real> void cholesky_solve(int n, const Real* l, int ldl, Real* b
 }
 
 template <class Real> Real cholesky_condition(int n, const Real* l, int ldl, as_is<Real> norm1, Real* work) {
-    return condition_of_factor<Real>(n, l, ldl, norm1, work);
+    return condition_of_solve<Real>(n, norm1, work, [&](Real* y) { cholesky_solve(n, l, ldl, y, n, 1); });
 }
 
 template <class Real>

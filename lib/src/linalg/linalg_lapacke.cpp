@@ -29,6 +29,13 @@ void potrs(int n, int count, const float* l, int ldl, float* b, int ldb) {
     LAPACKE_spotrs_work(layout, 'L', n, count, l, ldl, b, ldb);
 }
 
+void trsv(CBLAS_TRANSPOSE t, int n, const double* l, int ldl, double* x) {
+    cblas_dtrsv(CblasColMajor, CblasLower, t, CblasNonUnit, n, l, ldl, x, 1);
+}
+void trsv(CBLAS_TRANSPOSE t, int n, const float* l, int ldl, float* x) {
+    cblas_strsv(CblasColMajor, CblasLower, t, CblasNonUnit, n, l, ldl, x, 1);
+}
+
 void gemm(CBLAS_TRANSPOSE ta, CBLAS_TRANSPOSE tb, int rows, int cols, int inner, double alpha, const double* a, int lda,
           const double* b, int ldb, double beta, double* c, int ldc) {
     cblas_dgemm(CblasColMajor, ta, tb, rows, cols, inner, alpha, a, lda, b, ldb, beta, c, ldc);
@@ -155,7 +162,10 @@ template <class Real> void cholesky_solve(int n, const Real* l, int ldl, Real* b
 }
 
 template <class Real> Real cholesky_condition(int n, const Real* l, int ldl, as_is<Real> norm1, Real* work) {
-    return condition_of_factor<Real>(n, l, ldl, norm1, work);
+    return condition_of_solve<Real>(n, norm1, work, [&](Real* y) {
+        trsv(CblasNoTrans, n, l, ldl, y);
+        trsv(CblasTrans, n, l, ldl, y);
+    });
 }
 
 template <class Real>
