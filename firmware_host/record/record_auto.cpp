@@ -127,6 +127,17 @@ void shapes_at_own_rate(const std::vector<record_level>& levels, const std::vect
     }
 }
 
+/// Two clusters that one model of all modes of their rate has as a single pole are one mode: the weaker is doubtful.
+void mark_doubles(std::vector<listed_pair>& found) {
+    for (auto& [mode, carried] : found)
+        for (const auto& [other, its] : found)
+            if (carried && its && other.level == mode.level && other.agreement > mode.agreement &&
+                carried->frequency_hz == its->frequency_hz && carried->damping_ratio == its->damping_ratio) {
+                mode.why.emplace_back("split");
+                carried.reset();
+            }
+}
+
 /// Standard deviations and, of nearly noise-free records, sharper values, from one carrier for each rate.
 std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, const std::vector<consensus_run>& runs,
                                    const std::vector<consensus_mode>& modes, const record_options& options, bool rest) {
@@ -144,6 +155,7 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
     for (const auto& of_level : found)
         for (std::size_t i = 0; i < of_level.size(); ++i)
             if (of_level[i]) out[i].second = of_level[i];
+    mark_doubles(out);
     if (!options.inputs.empty()) shapes_at_own_rate(levels, runs, modes, options, rest, out);
     for (auto& [mode, carried] : out) {
         if (!carried) continue;

@@ -107,6 +107,31 @@ def ambient(seed: int, hum: bool, fs: float = 200.0, seconds: float = 600.0) -> 
     return Laboratory(fs, out, 0, frequency, damping)
 
 
+def plate(seed: int, fs: float = 1000.0, count: int = 30000) -> Laboratory:
+    """A nearly square plate up to 330 Hz (pairs), bursts of force to 0.4 fs; 12 accelerometers, 10 bits, 60 Hz hum."""
+    rng = np.random.default_rng(seed)
+    side, lowest = rng.uniform(1, 1.04), rng.uniform(9, 14)
+    order = [(i, j) for i in range(1, 7) for j in range(1, 7) if lowest * (i * i + side**2 * j * j) < 330]
+    order.sort(key=lambda t: t[0] ** 2 + side**2 * t[1] ** 2)
+    frequency = lowest * np.array([i * i + side**2 * j * j for i, j in order])
+    damping = rng.uniform(0.003, 0.01, len(order))
+
+    def shape(points: Real) -> Real:
+        return np.array([np.sin(i * np.pi * points[:, 0]) * np.sin(j * np.pi * points[:, 1]) for i, j in order]).T
+
+    long = count + 2000
+    f, t = np.fft.rfftfreq(long, 1 / fs), np.arange(long) / fs
+    force = shaped_noise(rng, long, 1, ((f > 5) & (f < 0.4 * fs)).astype(float)) * (t % 5 < 3.5)[:, None]
+    motion = respond(
+        force, shape(np.array([[0.17, 0.29]])), shape(rng.uniform(0.05, 0.95, (12, 2))), frequency, damping, fs
+    )
+    size = motion.std(0)
+    hum = np.sin(2 * np.pi * 60 * np.outer(t, np.arange(1, 6)) + rng.uniform(0, 6, 5)) @ rng.uniform(0, 0.05, (5, 12))
+    clean = np.hstack([force, motion + size * (hum + 0.01 * rng.standard_normal(motion.shape))])[:count]
+    step = np.abs(clean).max(0) / 400
+    return Laboratory(fs, np.round(clean / step) * step, 1, frequency, damping)
+
+
 class Chain(NamedTuple):
     """A chain of masses with its record and matrices."""
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import okid as okid_module
 import pytest
-from laboratory import Laboratory, ambient, chain, forced
+from laboratory import Laboratory, ambient, chain, forced, plate
 from program import okid
 
 
@@ -84,6 +84,13 @@ def test_a_run_without_modes_at_the_lowest_order_votes_with_the_others(tmp_path:
     found = matched(lab, result)
     assert len(confident(result)) == len(found) == 9
     assert all(mode["frequency_std_hz"] and mode["damping_ratio_std"] for mode in found.values())
+
+
+def test_one_pole_is_one_mode(tmp_path: Path) -> None:
+    """Runs of short horizon see one pole between two of a pair (302.62 Hz): it was confident beside both."""
+    lab = plate(4)
+    result = identify(lab, tmp_path)
+    assert len(confident(result)) == len(matched(lab, result)) == len(lab.frequency_hz)
 
 
 @pytest.mark.parametrize(("seed", "hum"), [(21, False), (22, True)])
