@@ -52,11 +52,33 @@ modal_filters::modal_filters(int inputs, int outputs, int states, arena& memory)
 bool modal_filters::decompose(const okid_real_t* A, const okid_real_t* C) {
     std::copy(A, A + at(0, n_z, n_z), a_);
     if (linalg::eigen(n_z, a_, re_, im_, vectors_, eigen_) != 0) return false;
-    std::copy(vectors_, vectors_ + at(0, n_z, n_z), modes);
+    if (!sort_modes()) return false;
     double* observe = with_y; // C in double: n_y n_z of its base n_y numbers
     std::copy(C, C + at(0, n_z, n_y), observe);
     multiply(false, false, n_y, n_z, n_z, 1, observe, n_y, modes, n_z, 0, shapes_, n_y);
     multiply(true, false, n_z, n_z, n_y, 1, shapes_, n_y, shapes_, n_y, 0, shared_, n_z);
+    return true;
+}
+
+/// The slowest first: of w^t what is left stands together. `modes` <- the vectors in that order. @return false: not all are numbers
+bool modal_filters::sort_modes() {
+    double *re = state_, *im = signals_; // free until start()
+    std::copy(re_, re_ + n_z, re);
+    std::copy(im_, im_ + n_z, im);
+    for (int to = 0; to < n_z; to += size(to)) {
+        int best = -1;
+        for (int k = 0; k < n_z; k += im[k] > 0 ? 2 : 1)
+            if (std::isfinite(re[k]) && (best < 0 || std::hypot(re[k], im[k]) > std::hypot(re[best], im[best])))
+                best = k;
+        if (best < 0) return false;
+        const int wide = im[best] > 0 ? 2 : 1;
+        std::copy(vectors_ + at(0, best, n_z), vectors_ + at(0, best + wide, n_z), modes + at(0, to, n_z));
+        for (int part = 0; part < wide; ++part) {
+            re_[to + part] = static_cast<okid_real_t>(re[best + part]);
+            im_[to + part] = static_cast<okid_real_t>(im[best + part]);
+            re[best + part] = NAN; // taken
+        }
+    }
     return true;
 }
 
@@ -172,13 +194,13 @@ void modal_filters::run(const double* v, int count) {
     okid_filters_t filters{area(n_u, 1), area(m, 1), area(lanes_, 1), 0, w_, w_ + lanes_, drive_, z_, with_v_};
     const auto step = okid_recursion_pick().filters;
     for (int n = 0; n < count; n += stretch, v += at(0, stretch, m)) {
-        double largest = 0; // of w^t: what has died out needs no product any more
-        for (int k = driven; k < lanes_; ++k) {
-            const double size = std::hypot(z_[k], z_[lanes_ + k]);
-            if (size < died_out) z_[k] = z_[lanes_ + k] = 0;
-            largest = std::max(largest, size);
-        }
-        filters.active = largest < died_out ? okid_recursion_padded(area(driven, 1)) : area(lanes_, 1);
+        int last = driven; // w^t that has died out needs no product any more
+        for (int k = driven; k < lanes_; ++k)
+            if (std::hypot(z_[k], z_[lanes_ + k]) < died_out)
+                z_[k] = z_[lanes_ + k] = 0;
+            else
+                last = k + 1;
+        filters.active = okid_recursion_padded(area(last, 1));
         step(&filters, v, static_cast<size_t>(std::min(stretch, count - n)));
         for (int k = 0; k < 2 * lanes_; ++k)
             if (std::abs(z_[k]) < denormal) z_[k] = 0;

@@ -39,6 +39,7 @@ struct modal_filters {
   private:
     bool pair(int k) const { return im_[k] > 0; }
     int size(int k) const { return pair(k) ? 2 : 1; }
+    bool sort_modes();
     void advance(double* x) const;
     void flush();
     void place_lanes();
