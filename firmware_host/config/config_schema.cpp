@@ -9,6 +9,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
+#include <tuple>
 #include <vector>
 
 namespace okid_host {
@@ -229,8 +230,9 @@ using table_entry = std::pair<std::string_view, const toml::node*>;
 std::vector<table_entry> in_order(const toml::table& table) {
     std::vector<table_entry> out;
     for (const auto& [key, node] : table) out.emplace_back(key.str(), &node);
-    std::stable_sort(out.begin(), out.end(), [](const table_entry& a, const table_entry& b) {
-        return a.second->source().begin < b.second->source().begin;
+    std::sort(out.begin(), out.end(), [](const table_entry& a, const table_entry& b) {
+        const toml::source_position at = a.second->source().begin, other = b.second->source().begin;
+        return std::tie(at.line, at.column, a.first) < std::tie(other.line, other.column, b.first);
     });
     return out;
 }

@@ -138,7 +138,7 @@ void virtual_filter::learn_noise(std::size_t count, const double* rows) {
     using by_row = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Eigen::Map<const by_row> all(rows, static_cast<Index>(count), m);
     const auto there = all.array().isFinite();
-    const Eigen::ArrayXd have = there.cast<double>().colwise().sum().transpose().max(1);
+    const Eigen::ArrayXd have = there.cast<double>().colwise().sum().transpose().max(1.0);
     const MatrixXd zeroed = there.select(all, 0.0);
     model_.mean = zeroed.colwise().sum().transpose().array() / have;
     const MatrixXd centred = there.select(all.rowwise() - model_.mean.transpose(), 0.0);
