@@ -142,13 +142,15 @@ class grid {
         double early = 0;   ///< of the line the earliest was, of late, periods
         double on_time = 0; ///< of a period; what is later was held up, or a sample before it is missing
         std::vector<late_frame> late;
-        std::int64_t heard_ns = 0;           ///< as late_frame has it, of the newest
-        std::size_t placed = 0;              ///< of `late`: they are on the grid already
-        std::size_t seen = 0, which = 0;     ///< of `late`: looked at; the last one that was about as early as any
-        double least = 0;                    ///< how late the earliest of those was, periods
-        double patience = 0;                 ///< periods for which the oldest waits before a loss is believed
-        std::int64_t newest_ns = 0;          ///< stamp of the newest frame that came
-        double spread = 0, tail_late = 0;    ///< how late the last frame of a burst was, of late and now, periods
+        std::int64_t heard_ns = 0;        ///< as late_frame has it, of the newest
+        std::size_t placed = 0;           ///< of `late`: they are on the grid already
+        std::size_t seen = 0, which = 0;  ///< of `late`: looked at; the last one that was about as early as any
+        double least = 0;                 ///< how late the earliest of those was, periods
+        double patience = 0;              ///< periods for which the oldest waits before a loss is believed
+        std::int64_t newest_ns = 0;       ///< stamp of the newest frame that came
+        double spread = 0, tail_late = 0; ///< how late the last frame of a burst was, of late and now, periods
+        std::array<double, 2> usual{};    ///< how late the least late was, of the decision time before and of this one
+        std::int64_t usual_from = 0;      ///< the place at which this one began
         std::int64_t tail = 0, tail_ns = 0;  ///< place and stamp of the newest frame placed, for the line
         std::int64_t ahead = 0;              ///< frames in a row that came before their time
         std::int64_t in_burst = 0;           ///< frames of the burst at hand
@@ -201,8 +203,12 @@ class grid {
     void settle(lane& l, std::int64_t now_ns, bool all);
     void look_at_late(lane& l);
     void place_late(lane& l, std::size_t count);
+    std::array<double, 4> least_late(const lane& l) const;
+    bool in_two_steps(const lane& l) const;
     bool catches_up(const lane& l) const;
     bool only_late(const lane& l, bool ended) const;
+    double usually_late(const lane& l) const;
+    void note_lateness(lane& l, std::int64_t index);
     void judge_late(lane& l, bool ended);
     bool may_slip(const lane& l) const;
     bool bursts_alike(const lane& l, std::int64_t& times) const;

@@ -3,8 +3,9 @@
 // METHOD   an arrival is never early and may be late by anything: a burst, a sender or a reader that stalls and catches up.
 //          The line of least delays (drv_clock_fit, from the last frame of each burst) says when a frame was due. A frame
 //          that is late waits. If one behind it comes in time, the count is right and nothing was lost; if all that come
-//          within the decision time are late by a sample and more, and do not catch up, as many samples are missing
-//          as the least late of them is late by. Neither stamps nor data ever change the order of frames
+//          within the decision time are later by a sample and more than those of the decision time before, and do not
+//          catch up, as many samples are missing as the least late of them is later by. Neither stamps nor data ever
+//          change the order of frames
 #include "grid.hpp"
 
 #include <algorithm>
@@ -31,6 +32,11 @@ constexpr double a_silence = 0.125;        // of the decision time
 constexpr double cut_off = 0.055;          // of the decision time: frames at the end of a stream that tell a loss
 constexpr std::int64_t cut_off_bursts = 8; // and at least so many times something was handed over
 constexpr double ends_alike = 0.75;        // of the bursts have the size of the one before
+constexpr double full_later = 0.5;         // periods by which a full burst is later than usual when a sample is missing
+constexpr double a_sample = 0.65;          // periods by which all are later when a sample is missing, at least
+constexpr double half_a_sample = 0.55;     // periods: later than before by so much, one may be missing
+constexpr double one_step = 0.3;           // periods by which a sample and the step of lateness may differ
+constexpr double alike_late = 0.3;         // periods
 constexpr std::int64_t slip_apart = 2500;  // samples: clocks within 400 ppm slip past each other no more often
 constexpr double silent = 0.4;             // of the time a silent lane has: then its last burst is taken for cut off
 constexpr double least_spread = 0.15;      // periods
@@ -52,6 +58,8 @@ void grid::begin_cadence(lane& l, double due_ns) {
     l.newest_ns = l.tail_ns = std::llround(due_ns);
     l.tail = l.last;
     l.ahead = l.in_burst = 0;
+    l.usual = {HUGE_VAL, HUGE_VAL};
+    l.usual_from = l.last;
     l.patience = static_cast<double>(hold_);
     l.late.reserve(most_held_ + 1);
 }
@@ -137,7 +145,7 @@ void grid::judge_late(lane& l, bool ended) {
     const double waited = static_cast<double>(l.late.back().heard_ns - l.late[l.placed].heard_ns) / period_ns_;
     const double enough = ended ? cut_off * hold : l.patience;
     std::int64_t times = 0;
-    const bool alike = bursts_alike(l, times), seen = !ended || times >= cut_off_bursts;
+    const bool alike = (ended || waited > enough) && bursts_alike(l, times), seen = !ended || times >= cut_off_bursts;
     if (seen && waited > enough && only_late(l, ended)) {
         place_late(l, l.which - l.placed + 1);
         return;
@@ -145,11 +153,17 @@ void grid::judge_late(lane& l, bool ended) {
     if (seen && waited > enough && catches_up(l)) {
         l.patience = waited + looks_again * hold;
     } else if (seen && waited > enough) {
-        const auto lost = static_cast<std::int64_t>(l.least + 1 - l.on_time);
-        if (lost == 1 && alike && may_slip(l))
-            slip(l, 1), place_late(l, l.which - l.placed + 1);
-        else
+        const double more = l.least - usually_late(l);
+        const auto lost = static_cast<std::int64_t>(std::floor(more + 1 - a_sample));
+        const bool slips = lost == 1 && alike && may_slip(l);
+        if (lost > 0 && !slips) {
+            l.uncertain += alike && (lost == 1 || in_two_steps(l));
             place_after_loss(l, lost);
+            return;
+        }
+        l.uncertain += lost <= 0 && more > half_a_sample;
+        if (slips) slip(l, 1);
+        place_late(l, l.which - l.placed + 1);
         return;
     }
     const std::size_t waiting = l.late.size() - l.placed;
@@ -167,9 +181,8 @@ bool grid::only_late(const lane& l, bool ended) const {
     return soon && l.least < std::min(l.spread + least_spread, about_one);
 }
 
-/// The last quarter is less late than all before it, or the quarters are less and less late behind a stall: whoever was held
-/// up is making up for it.
-bool grid::catches_up(const lane& l) const {
+/// How late those that wait are at least, in each quarter of their time.
+std::array<double, 4> grid::least_late(const lane& l) const {
     const std::int64_t begin_ns = l.late[l.placed].heard_ns, span_ns = l.late.back().heard_ns - begin_ns;
     std::array<double, 4> least{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL}; // of each quarter
     for (std::size_t i = l.placed; i < l.late.size(); ++i) {
@@ -178,23 +191,69 @@ bool grid::catches_up(const lane& l) const {
             least[span_ns > 0 ? static_cast<std::size_t>(std::min<std::int64_t>(3, 4 * heard_ns / span_ns)) : 3];
         its = std::min(its, lateness(l, l.late[i], i - l.placed));
     }
+    return least;
+}
+
+/// One sample less late than at first: polls slipped past one among those that wait, and of the loss one may be hidden.
+bool grid::in_two_steps(const lane& l) const {
+    const std::array<double, 4> least = least_late(l);
+    double most = l.least;
+    for (const double quarter : least) most = quarter < HUGE_VAL ? std::max(most, quarter) : most;
+    return std::abs(most - l.least - 1) < one_step;
+}
+
+/// The last quarter is less late than all before it, or the quarters are less and less late behind a stall: whoever was held
+/// up is making up for it.
+bool grid::catches_up(const lane& l) const {
+    const std::array<double, 4> least = least_late(l);
     const bool less_and_less = least[3] < least[2] - catching_up && least[2] < least[1] - catching_up;
     return less_and_less || least[3] < std::min({least[0], least[1], least[2]}) - catching_up;
 }
 
-/// Did those that wait come in bursts of one size? @param times  out: how often something was handed over
+/// How late the least late of a decision time was, of late: a clock that runs otherwise than the line makes all of them late
+/// little by little, a loss by a sample at once.
+double grid::usually_late(const lane& l) const {
+    const bool half = l.last - l.usual_from >= hold_ / 2 && l.usual[1] < HUGE_VAL;
+    if (l.usual[0] < HUGE_VAL) return half ? std::max(l.usual[0], l.usual[1]) : l.usual[0];
+    return half ? l.usual[1] : 0;
+}
+
+/// The last frame of a burst was late by l.tail_late. All are later by a sample than in the decision time before, and that is
+/// still on time: polls have slipped past a sample, or one is missing.
+void grid::note_lateness(lane& l, std::int64_t index) {
+    if (index - l.usual_from >= hold_) {
+        l.uncertain += l.usual[1] < HUGE_VAL && l.usual[1] - l.usual[0] > a_sample;
+        l.usual = {l.usual[1], HUGE_VAL};
+        l.usual_from = index;
+    }
+    if (l.tail_late > -most_early) l.usual[1] = std::min(l.usual[1], l.tail_late);
+}
+
+/// Did those that wait come in bursts that all end alike? Packets of so many samples are no polls: their first one after a
+/// loss is full, and later by what is missing.
+/// @param times  out: how often something was handed over
 bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
-    std::size_t begin = l.placed, before = 0;
-    std::int64_t same = 0;
+    std::size_t begin = l.placed, before = 0, first = 0;
+    std::int64_t same = 0, ends = 0, several = 0;
     times = 1;
     for (std::size_t i = l.placed + 1; i < l.late.size(); ++i) {
         if (static_cast<double>(l.late[i].time_ns - l.late[i - 1].time_ns) <= same_burst * period_ns_) continue;
         same += before > 1 && i - begin == before;
+        ends += lateness(l, l.late[i - 1], i - 1 - l.placed) < l.least + alike_late;
         before = i - begin;
+        several += before > 1;
+        if (times == 1) first = before;
         begin = i;
         ++times;
     }
-    return times >= cut_off_bursts && static_cast<double>(same) > ends_alike * static_cast<double>(times - 2);
+    const auto most = static_cast<std::int64_t>(ends_alike * static_cast<double>(times - 2));
+    if (times < cut_off_bursts || several <= most || std::max(same, ends) <= most) return false;
+    const double bursts = static_cast<double>(times - 1), usual = static_cast<double>(begin - l.placed) / bursts;
+    const auto first_ns = static_cast<double>(l.late[l.placed].time_ns);
+    const double usual_ns = (static_cast<double>(l.late[begin].time_ns) - first_ns) / bursts;
+    const double later = (first_ns - static_cast<double>(l.time_ns) - usual_ns) / period_ns_ - 1;
+    return l.spread > as_late || std::abs(static_cast<double>(first) - usual) > full_later ||
+           std::abs(later) > full_later;
 }
 
 /// Bursts that all end alike came a period later: polls have slipped past a sample by drift, or one sample is missing.
@@ -203,7 +262,8 @@ bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
 bool grid::may_slip(const lane& l) const {
     for (std::size_t i = l.placed; i <= l.which; ++i)
         if (l.late[i].loss) return false;
-    return l.last - std::max(l.slip_at, l.lost_at) > slip_apart;
+    const std::int64_t silence = (l.late[l.placed].time_ns - l.time_ns) / std::llround(period_ns_);
+    return l.last + silence - std::max(l.slip_at, l.lost_at) > slip_apart;
 }
 
 /// The line stays, the samples on it are others.
@@ -211,7 +271,7 @@ void grid::slip(lane& l, std::int64_t by) {
     l.slips += by;
     l.tail -= by;
     l.phase_ns += static_cast<double>(by) * l.beat_ns;
-    l.uncertain += by;
+    l.uncertain += by > 0;
     l.slip_at = by > 0 ? l.last : never;
 }
 
@@ -265,6 +325,7 @@ void grid::end_burst(lane& l, std::int64_t index) {
         (void)drv_clock_fit_add(&l.clock, tick_of(l.tail + l.slips), l.tail_ns);
         if (l.tail_late < 1) l.spread = std::max(forgets_spread * l.spread, l.tail_late);
     }
+    note_lateness(l, index);
     l.ahead = l.tail_late < -most_early ? l.ahead + l.in_burst : 0;
     l.frames += l.in_burst;
     ++l.bursts;
@@ -298,7 +359,10 @@ void grid::follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, do
         l.beat_ns = period_ns_ * (1 + 1e-6 * ppm);
         const double early = static_cast<double>(expected - frame.time_ns) / period_ns_;
         if (early <= most_early) l.early = std::max(remembers * l.early, early);
-        l.phase_ns = static_cast<double>(expected) - l.early * period_ns_;
+        const double line_ns = static_cast<double>(expected) - l.early * period_ns_;
+        for (double& least : l.usual) least += (l.phase_ns - line_ns) / period_ns_;
+        l.tail_late += (l.phase_ns - line_ns) / period_ns_;
+        l.phase_ns = line_ns;
         l.on_time = 0.5 + std::clamp(l.early, least_early, most_early);
     } else if (late_ns < 0) {
         l.phase_ns = static_cast<double>(frame.time_ns); // no line yet: the earliest so far

@@ -287,13 +287,68 @@ static void test_polls_and_losses() {
         made[fast] += static_cast<std::int64_t>(lost.size());
         found[fast] += std::min<std::int64_t>(out.marked, static_cast<std::int64_t>(lost.size()));
         told += std::min<std::int64_t>(out.marked + out.uncertain, fast ? static_cast<std::int64_t>(lost.size()) : 0);
-        if (!fast) TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.uncertain, text);
+        if (!fast && out.marked == static_cast<std::int64_t>(lost.size()))
+            TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.uncertain, text);
     }
     std::printf("polls: %lld of %lld losses found, above 800 Hz %lld, or uncertain %lld, of %lld\n",
                 static_cast<long long>(found[0]), static_cast<long long>(made[0]), static_cast<long long>(found[1]),
                 static_cast<long long>(told), static_cast<long long>(made[1]));
     TEST_ASSERT_TRUE(static_cast<double>(told) >= 0.97 * static_cast<double>(made[1])); // a slip back hides one
     TEST_ASSERT_TRUE(static_cast<double>(found[0]) >= 0.99 * static_cast<double>(made[0]));
+}
+
+/// Adapters that look by a clock of their own, late by what a gamma law gives, at sensors that run up to 200 ppm off: several
+/// samples a look. Polls slip past samples all the time; that is no loss.
+static void test_slips_are_no_losses() {
+    std::int64_t wrong = 0;
+    for (unsigned seed = 1; seed <= seeds(); ++seed) {
+        std::mt19937 random(seed);
+        const double rate_hz = std::array<double, 7>{97, 200, 500, 800, 1000, 1600, 2000}[random() % 7];
+        const double every_s = std::array<double, 4>{0.01, 0.016, 0.032, 0.005}[random() % 4];
+        if (every_s * rate_hz < 1.5) continue;
+        std::gamma_distribution<double> way(2, random() % 2 ? 25e-6 : 150e-6), cut(1.5, random() % 2 ? 1e-9 : 33e-6);
+        const double clock = every_s * (1 + 1e-6 * pick(random, -100, 100));
+        double look_s = pick(random, 0, clock), cut_s = look_s, here_s = look_s;
+        const law usual = [&](double t) {
+            while (cut_s < t) {
+                look_s += clock;
+                cut_s = look_s + cut(random);
+                here_s = cut_s + way(random);
+            }
+            return here_s;
+        };
+        rows out(1);
+        play(rate_hz, pick(random, -200, 200), static_cast<int>(30 * rate_hz), usual, {}, out);
+        wrong += out.marked > 0 || out.torn > 0;
+    }
+    std::printf("slips: %lld of %u runs with a false gap\n", static_cast<long long>(wrong), seeds());
+    TEST_ASSERT_TRUE(static_cast<double>(wrong) <= 0.01 * seeds());
+}
+
+/// A sample that never reached an adapter which hands over so many at a time: no packet is short, all are later.
+static void test_packets_that_lack_a_sample() {
+    for (unsigned seed = 1; seed <= seeds() / 2; ++seed) {
+        std::mt19937 random(seed);
+        const double rate_hz = std::array<double, 4>{97, 333, 1000, 1600}[random() % 4];
+        const int size = std::array<int, 4>{3, 8, 10, 16}[random() % 4], samples = static_cast<int>(20 * rate_hz);
+        const int at = static_cast<int>(pick(random, 5, 15) * rate_hz);
+        std::gamma_distribution<double> way(2, 0.02 / rate_hz);
+        double here_s = 0;
+        int packet = -1;
+        const law usual = [&](double t) { // of the samples that came; the missing one asks, too, and is not sent
+            const int n = static_cast<int>(std::lround(t * rate_hz)), count = n - (n > at),
+                      last = (count / size + 1) * size - 1;
+            if (count / size != packet) here_s = (last + (last >= at)) / rate_hz + way(random);
+            packet = count / size;
+            return here_s;
+        };
+        rows out(1);
+        play(rate_hz, 0, samples, usual, {at}, out);
+        char text[60];
+        std::snprintf(text, sizeof text, "seed %u, %g Hz, packets of %d", seed, rate_hz, size);
+        TEST_ASSERT_EQUAL_INT64_MESSAGE(1, out.marked, text);
+        TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.uncertain, text);
+    }
 }
 
 /// Packets of eight lines that are lost behind such polls: each is found, to the sample.
@@ -342,6 +397,8 @@ int main(void) {
     RUN_TEST(test_stalls_make_no_gap);
     RUN_TEST(test_any_end);
     RUN_TEST(test_polls_and_losses);
+    RUN_TEST(test_slips_are_no_losses);
+    RUN_TEST(test_packets_that_lack_a_sample);
     RUN_TEST(test_lost_packets);
     RUN_TEST(test_losses_among_stalls);
     return UNITY_END();
