@@ -4,6 +4,7 @@
 #include "record.hpp"
 
 #include "error.hpp"
+#include "growing_poles.hpp"
 #include "record_auto.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
@@ -113,8 +114,17 @@ okid_status_t refine_by_factor(okid_accumulator_t* accumulator, okid_status_t st
 /// @return the initial states that go with them; empty: not known
 std::vector<double> fit_inputs(record_work& work) {
     std::vector<double> B, D, x0;
-    okid_status_t status = fit_outputs(work.set, work.model.n_z, work.model.A, work.model.C, B, D, &x0);
-    if (status >= 0) status = okid_identify_set_inputs(work.identifier, B.data(), D.data(), &work.model);
+    okid_identified_t& model = work.model;
+    okid_status_t status = fit_outputs(work.set, model.n_z, model.A, model.C, B, D, &x0);
+    if (status >= 0 && work.refined) { // its A is not that of the identifier
+        work.refined->B = std::move(B);
+        work.refined->D = std::move(D);
+        model.B = work.refined->B.data();
+        model.D = work.refined->D.data();
+        find_markov(model_view(model), model.markov_count, work.refined->markov);
+        model.markov = work.refined->markov.data();
+    } else if (status >= 0)
+        status = okid_identify_set_inputs(work.identifier, B.data(), D.data(), &model);
     if (status < 0)
         work.context.warnings.emplace_back(
             "inputs_from_subspace",
@@ -237,7 +247,7 @@ long long find_model(const record_options& options, okid_accumulator_t*& accumul
 /// an output explained it is no model that check_explains() refuses (5 %).
 bool fits_can_wait(const record_options& options, okid_accumulator_t* accumulator, const record_work& work) {
     const okid_identified_t& model = work.model;
-    if (!work.set.complete || options.refine == "yes" || options.mass.wanted() || !model.K ||
+    if (!work.set.complete || options.refine == "yes" || options.mass.wanted() || !model.K || work.refined ||
         (model.warnings & (OKID_NOTE_PREDICTOR_UNSTABLE | OKID_NOTE_MODEL_UNSTABLE)))
         return false;
     std::vector<double> energy(work.set.channels());
@@ -255,6 +265,7 @@ std::vector<replicate_model> improve(const record_options& options, okid_accumul
                                      std::vector<replicate_model> replicates, record_work& work) {
     const bool from_record = is_subspace(work.config.method) && work.config.n_u > 0;
     tell(options, "simulating the model");
+    if (from_record && !(work.model.model_radius < 1)) reflect_growing(work, replicates);
     const std::vector<double> states = from_record ? fit_inputs(work) : std::vector<double>{};
     if (!states.empty() && fits_can_wait(options, accumulator, work)) {
         tell_states(states, work.model.n_z, work.context);

@@ -58,7 +58,7 @@ def shaped_noise(rng: np.random.Generator, count: int, channels: int, gain: Real
     return out
 
 
-def forced(seed: int, fs: float = 256.0, count: int = 20000) -> Laboratory:
+def forced(seed: int, fs: float = 256.0, count: int = 20000, noise: float = 1.0) -> Laboratory:
     """Five to eight modes over 6-90 Hz and one 0.2, 0.6 or 1 % above a middle one, 1-2 band-limited forces."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(5, 9))
@@ -75,8 +75,8 @@ def forced(seed: int, fs: float = 256.0, count: int = 20000) -> Laboratory:
     force = shaped_noise(rng, long, n_u, ((f > 0.5) & (f < 0.4 * fs)).astype(float))
     motion = respond(force, at_forces, at_sensors, frequency, damping, fs)
     clean = np.hstack([force, motion])[:count]
-    noise = np.concatenate([np.full(n_u, 0.002), np.full(8, rng.uniform(0.01, 0.03))]) * clean.std(0)
-    return Laboratory(fs, clean + noise * rng.standard_normal(clean.shape), n_u, frequency, damping)
+    sigma = noise * np.concatenate([np.full(n_u, 0.002), np.full(8, rng.uniform(0.01, 0.03))]) * clean.std(0)
+    return Laboratory(fs, clean + sigma * rng.standard_normal(clean.shape), n_u, frequency, damping)
 
 
 def ambient(seed: int, hum: bool, fs: float = 200.0, seconds: float = 600.0) -> Laboratory:
@@ -141,7 +141,7 @@ class Chain(NamedTuple):
     force_dofs: list[int]
 
 
-def chain(seed: int, fs: float = 200.0, count: int = 20000) -> Chain:
+def chain(seed: int, fs: float = 200.0, count: int = 20000, noise: float = 0.01) -> Chain:
     """Five masses, accelerations, forces at the ends behind an anti-alias filter at 0.38-0.42 fs; last mode 38 Hz."""
     rng = np.random.default_rng(seed)
     M, springs = np.diag(rng.uniform(1, 3, 5)), rng.uniform(0.6, 1.4, 5)
@@ -156,6 +156,6 @@ def chain(seed: int, fs: float = 200.0, count: int = 20000) -> Chain:
     f = np.fft.rfftfreq(long, 1 / fs)
     force = shaped_noise(rng, long, 2, np.clip((0.42 * fs - f) / (0.04 * fs), 0, 1))
     motion = respond(force, shapes[[0, 4]], shapes, frequency, damping, fs)
-    noisy = motion + 0.01 * motion.std(0) * rng.standard_normal(motion.shape)
+    noisy = motion + noise * motion.std(0) * rng.standard_normal(motion.shape)
     samples = np.hstack([force, noisy])[:count]
     return Chain(Laboratory(fs, samples, 2, frequency, damping), M, K * scale, [1, 5])
