@@ -91,9 +91,9 @@ csv_record read_csv(const std::string& path, const csv_request& asked) {
     if (!request.fs_hz && !header.fs_hz && !use_time && !request.whole)
         throw failure(exit_usage,
                       fmt::format("{}: no sample rate{}{}; expected --fs HZ, a line \"# fs_hz: 1024\" above the column "
-                                  "names, or a column time_s",
+                                  "names, or a column time_s (exports of loggers: okid-convert {} OUT.csv)",
                                   path, header.fs_remark.empty() ? "" : " (" + header.fs_remark + ")",
-                                  time_like(header.names)));
+                                  time_like(header.names), path));
     rows.read(reader, request);
     if (out.count == 0)
         throw failure(exit_usage,

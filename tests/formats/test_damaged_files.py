@@ -17,6 +17,7 @@ from nptdms import ChannelObject, TdmsWriter
 from okid.formats import read_hdf5, read_log, read_mat, read_mdf4, read_parquet, read_record, write_log, write_record
 from okid.formats.by_name import EXTENSIONS, WRITTEN_EXTENSIONS
 from okid.formats.can_log import LOG_EXTENSIONS
+from okid.formats.logger_text import LOGGER_EXTENSIONS
 from sample_records import full_record
 
 FRAMES = [f"log{ending}" for ending in LOG_EXTENSIONS]
@@ -38,6 +39,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
         soundfile.write(folder / f"record.{ending}", samples / 100.0, 1024, subtype="PCM_24")
     with TdmsWriter(folder / "record.tdms") as file:
         file.write_segment([ChannelObject("g", "a", samples, properties={"wf_increment": 1e-3})])
+    table = "\n".join(f"{k / 1024:.6f}\t{value:.4f}" for k, value in enumerate(samples))
+    for ending in LOGGER_EXTENSIONS:
+        (folder / f"record{ending}").write_text(f"Operator\tA. B.\ntime [s]\tacc\n{table}\n")
     for name in FRAMES:
         write_log(folder / name, plain_frames(80))
     return folder

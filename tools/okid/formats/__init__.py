@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from okid.formats.csv_file import write_csv
     from okid.formats.frf_file import read_frf, write_frf
     from okid.formats.hdf5 import read_hdf5, write_hdf5
+    from okid.formats.logger_text import read_logger
     from okid.formats.mat import read_mat, write_mat
     from okid.formats.mcap_file import read_mcap, write_events_mcap, write_mcap
     from okid.formats.mdf4 import read_mdf4, write_mdf4
@@ -37,6 +38,7 @@ __all__ = [
     "read_geometry",
     "read_hdf5",
     "read_log",
+    "read_logger",
     "read_mat",
     "read_mcap",
     "read_mdf4",
@@ -65,6 +67,7 @@ _NAMES = {
     "okid.formats.can_log": "convert_log, read_log, write_log",
     "okid.formats.frf_file": "read_frf, write_frf",
     "okid.formats.hdf5": "read_hdf5, write_hdf5",
+    "okid.formats.logger_text": "read_logger",
     "okid.formats.mat": "read_mat, write_mat",
     "okid.formats.mcap_file": "read_mcap, write_events_mcap, write_mcap",
     "okid.formats.mdf4": "read_mdf4, write_mdf4",

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from okid.data.records import Record, read_csv
 from okid.formats.csv_file import write_csv
 from okid.formats.foreign_library import reading
 from okid.formats.hdf5 import read_hdf5, write_hdf5
+from okid.formats.logger_text import LOGGER_EXTENSIONS, is_plain, read_logger
 from okid.formats.mat import read_mat, write_mat
 from okid.formats.mcap_file import read_mcap, write_mcap
 from okid.formats.mdf4 import read_mdf4, write_mdf4
@@ -39,6 +41,25 @@ def _whole(read: Callable[[str | Path], Record]) -> Callable[[str | Path, Part],
     return only
 
 
+def _read_csv(path: str | Path) -> Record:
+    """By the rules of `okid identify`; where they do not know what stands above the data, as a logger's file."""
+    try:
+        record = read_csv(path)
+    except InputError:
+        with contextlib.suppress(InputError):
+            if not is_plain(path):
+                return read_logger(path)
+        raise
+    if record.fs_hz is None and not record.remarks:  # a time_s that is uneven has its remark
+        try:
+            found = read_logger(path)
+        except InputError as fault:
+            record.remarks.append(f"no sample rate: {str(fault).removeprefix(f'{path}: ')}")
+            return record
+        return found if found.fs_hz is not None or not is_plain(path) else record
+    return record
+
+
 def _read_uff(path: str | Path, group: Part) -> Record:
     uff = read_uff(path)
     with reading(path, "UFF"):
@@ -46,7 +67,7 @@ def _read_uff(path: str | Path, group: Part) -> Record:
 
 
 _READERS: dict[str, Callable[[str | Path, Part], Record]] = {
-    ".csv": _whole(read_csv),
+    ".csv": _whole(_read_csv),
     ".uff": _read_uff,
     ".unv": _read_uff,
     ".mf4": read_mdf4,
@@ -58,6 +79,7 @@ _READERS: dict[str, Callable[[str | Path, Part], Record]] = {
     ".tdms": read_tdms,
     ".wav": _whole(read_sound),
     ".flac": _whole(read_sound),
+    **dict.fromkeys(LOGGER_EXTENSIONS, _whole(read_logger)),
 }
 _WRITERS: dict[str, Callable[[str | Path, Record], None]] = {
     ".csv": write_csv,
@@ -81,16 +103,21 @@ def _ending(path: str | Path, known: tuple[str, ...]) -> str:
 
 
 def read_record(path: str | Path, *, group: Part = None, fs: float | None = None) -> Record:
-    """Read measured samples from .csv, .uff, .unv, .mf4, .h5, .hdf5, .mat, .parquet, .mcap, .tdms, .wav or .flac.
+    """Read measured samples from .csv, .uff, .unv, .mf4, .h5, .hdf5, .mat, .parquet, .mcap, .tdms, .wav or .flac, or
+    from a logger's text file: .txt, .dat, .tsv, .lvm, and .csv that is not in okid's own form (read_logger()).
 
     group: which part, where a file holds several of different length or rate: the number that the error message
     lists (UFF, MDF4, TDMS), the path inside the file (HDF5), variable names with commas (.mat). fs: Hz, overrides what
     the file says. InputError of one line names the file and what is wrong with it.
     """
-    record = _READERS[_ending(path, EXTENSIONS)](path, group)
+    if fs is not None and not 0.0 < fs < float("inf"):
+        raise InputError(f"sample rate is {fs}, expected Hz above 0")
+    ending = _ending(path, EXTENSIONS)
+    if fs is not None and ending in LOGGER_EXTENSIONS:
+        _only_part(path, group)
+        return read_logger(path, fs)
+    record = _READERS[ending](path, group)
     if fs is not None:
-        if not 0.0 < fs < float("inf"):
-            raise InputError(f"sample rate is {fs}, expected Hz above 0")
         record.fs_hz = float(fs)
     return record
 

@@ -135,7 +135,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="okid-convert",
         description="Convert measured samples, identified models or logs of CAN frames by file name extension. "
-        f"Samples: {', '.join(EXTENSIONS)} (the last three only read). Models: .json (okid.result/1) to "
+        f"Samples: {', '.join(EXTENSIONS)} (from .tdms on only read). Models: .json (okid.result/1) to "
         f"{', '.join(RESULT_EXTENSIONS)}. Events: .jsonl (okid run --events) to .mcap. "
         "Logs: .log (candump -L), .asc, .blf, .trc, .db, .mf4, .can.csv.",
         epilog="examples: okid-convert run.mf4 run.csv --channels force,a1,a2; "
