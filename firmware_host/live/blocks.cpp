@@ -56,7 +56,7 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
         if (okid_jackknife_create(&to, &config, memory.get(), bytes) != OKID_OK)
             throw failure(exit_usage, "[identification]: the sums for standard deviations cannot be made");
     };
-    linear_mass_ = !is_subspace(identify.method);
+    linear_mass_ = !is_subspace(identify.method) || identify.method == OKID_METHOD_N4SID_SSARX;
     const live_jackknives needed(identify, sums_, analytic);
     if (needed.linear) create(needed.config(1), linear_block_, linear_);
     create(needed.config(0), anew_block_, anew_);

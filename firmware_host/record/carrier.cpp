@@ -80,34 +80,6 @@ bool run_factor(const record_level& level, const okid_identify_config_t& config,
     return okid_identify_run_factor(identifier, factor, &model) >= 0;
 }
 
-/// The modes of a model, whoever found them.
-std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
-                                 int count, int n_y) {
-    std::vector<mode_shift> out;
-    for (int k = 0; k < count; ++k) {
-        mode_shift& mode = out.emplace_back();
-        mode.frequency_hz = frequency[k];
-        mode.damping_ratio = damping[k];
-        for (int i = 0; i < n_y; ++i) mode.shape.emplace_back(re[k * n_y + i], im[k * n_y + i]);
-    }
-    return out;
-}
-
-std::vector<mode_shift> modes_in(const replicate_model& model, double dt) {
-    const auto most = static_cast<std::size_t>(model.n_z / 2), n_y = static_cast<std::size_t>(model.n_y);
-    std::vector<double> f(most), zeta(most), mpc(most), re(most * n_y), im(most * n_y);
-    std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
-    okid_modes_t modes{};
-    modes.frequency_hz = f.data();
-    modes.damping_ratio = zeta.data();
-    modes.mpc = mpc.data();
-    modes.shape_re = re.data();
-    modes.shape_im = im.data();
-    const okid_model_t view = model.view();
-    if (!model.found() || okid_modal_analyse(&view, dt, &modes, work.data(), work.size()) < 0) return {};
-    return modes_in(f.data(), zeta.data(), re.data(), im.data(), modes.count, model.n_y);
-}
-
 /// Place of a mode among those of a model, or -1.
 template <class Mode> int place_of(const std::vector<mode_shift>& all, const Mode& mode) {
     int best = -1;

@@ -195,8 +195,7 @@ void find_deviations(long long rows, const std::vector<replicate_model>& replica
     work.context.sigma = deviations_of(work.model, replicates, options.mass);
     if (work.context.mass) add_deviations(*work.context.sigma, *work.context.mass);
     if (!work.context.refined) // the likelihood knows no p
-        remark_finite_p(work.config, rows, work.model, *work.context.sigma, again_with(work.set, work.at_rest),
-                        work.context.warnings);
+        remark_finite_p(work, rows, *work.context.sigma, work.context.warnings);
 }
 
 /// What the library is asked for, with the horizon that the records bear.

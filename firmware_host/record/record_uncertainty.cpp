@@ -101,18 +101,18 @@ replicate_model keep(const okid_model_t& model) {
 }
 
 /// The modes that stand elsewhere in `other` by more than two deviations, as text.
-std::string moved(const okid_identified_t& model, const okid_identified_t& other, const deviations& sigma) {
+std::string moved(const okid_identified_t& model, const std::vector<mode_shift>& other, const deviations& sigma) {
     std::string text;
-    for (int k = 0; k < model.mode_count; ++k) {
+    for (int k = 0; k < model.mode_count && !other.empty(); ++k) {
         const auto at = static_cast<std::size_t>(k);
         const double f = model.frequency_hz[k], zeta = model.damping_ratio[k];
         if (!(sigma.frequency_hz[at] > 0) || !(sigma.damping_ratio[at] > 0)) continue;
-        int near = 0;
-        for (int i = 1; i < other.mode_count; ++i)
-            if (std::abs(other.frequency_hz[i] - f) < std::abs(other.frequency_hz[near] - f)) near = i;
-        const double df = (other.frequency_hz[near] - f) / sigma.frequency_hz[at];
-        const double dz = (other.damping_ratio[near] - zeta) / sigma.damping_ratio[at];
-        if (std::abs(other.frequency_hz[near] - f) > 0.05 * f || std::max(std::abs(df), std::abs(dz)) <= 2) continue;
+        const auto distance = [f](const mode_shift& mode) { return std::abs(mode.frequency_hz - f); };
+        const mode_shift& near = *std::min_element(
+            other.begin(), other.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+        const double df = (near.frequency_hz - f) / sigma.frequency_hz[at];
+        const double dz = (near.damping_ratio - zeta) / sigma.damping_ratio[at];
+        if (distance(near) > 0.05 * f || std::max(std::abs(df), std::abs(dz)) <= 2) continue;
         text += fmt::format("{}mode {} by {:+.1f} σ in f and {:+.1f} σ in ζ", text.empty() ? "" : ", ", k + 1, df, dz);
     }
     return text;
@@ -176,26 +176,63 @@ deviations deviations_of(const okid_identified_t& model, const std::vector<repli
     return statistics.finish();
 }
 
-void remark_finite_p(const okid_identify_config_t& config, long long rows, const okid_identified_t& model,
-                     const deviations& sigma, const identify_again& again, remarks& said) {
-    if (config.n_u == 0 || is_subspace(config.method)) return;
-    okid_identify_config_t longer = config;
-    longer.p = 2 * config.p;
-    longer.rows = model.rows;
-    longer.order = model.n_z;
-    if (rows < 10LL * unknowns_of(config.method, config.n_u, config.n_y, longer.p)) return;
-    std::string text;
-    try {
-        again(longer, [&](okid_identify_t*, const okid_identified_t& other) { text = moved(model, other, sigma); });
-    } catch (const failure&) {
-        return; // no memory for it: no remark
+/// The modes of a model, whoever found them.
+std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
+                                 int count, int n_y) {
+    std::vector<mode_shift> out;
+    for (int k = 0; k < count; ++k) {
+        mode_shift& mode = out.emplace_back();
+        mode.frequency_hz = frequency[k];
+        mode.damping_ratio = damping[k];
+        for (int i = 0; i < n_y; ++i) mode.shape.emplace_back(re[k * n_y + i], im[k * n_y + i]);
     }
+    return out;
+}
+
+std::vector<mode_shift> modes_in(const replicate_model& model, double dt) {
+    const auto most = static_cast<std::size_t>(model.n_z / 2), n_y = static_cast<std::size_t>(model.n_y);
+    std::vector<double> f(most), zeta(most), mpc(most), re(most * n_y), im(most * n_y);
+    std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
+    okid_modes_t modes{};
+    modes.frequency_hz = f.data();
+    modes.damping_ratio = zeta.data();
+    modes.mpc = mpc.data();
+    modes.shape_re = re.data();
+    modes.shape_im = im.data();
+    const okid_model_t view = model.view();
+    if (!model.found() || okid_modal_analyse(&view, dt, &modes, work.data(), work.size()) < 0) return {};
+    return modes_in(f.data(), zeta.data(), re.data(), im.data(), modes.count, model.n_y);
+}
+
+void remark_finite_p(const record_work& work, long long rows, const deviations& sigma, remarks& said) {
+    const okid_identify_config_t& config = work.config;
+    if (config.n_u == 0 || is_subspace(config.method)) return;
+    okid_jackknife_config_t shape{};
+    shape.identify = config;
+    shape.identify.p = 2 * config.p;
+    shape.identify.rows = work.model.rows;
+    shape.identify.order = shape.identify.max_order = work.model.n_z;
+    if (rows < 10LL * unknowns_of(config.method, config.n_u, config.n_y, shape.identify.p)) return;
+    const std::int32_t lags = okid_identify_lags(&shape.identify);
+    shape.sums = okid_accumulator_defaults(config.n_u, config.n_y, lags);
+    shape.sums.edges = shape.sums.bulk = shape.sums.buffer = 1;
+    const sums longer(shape.sums);
+    const std::size_t history = work.at_rest ? 0 : static_cast<std::size_t>(lags);
+    std::unique_ptr<std::byte[]> block;
+    if (!longer.handle ||
+        feed_pieces(longer.handle, work.set, cut(work.set.records, history, 1)[0], static_cast<std::size_t>(lags)) < 0)
+        return;
+    okid_jackknife_t* jackknife = begin_jackknife(shape, 0, work, longer.handle, block);
+    okid_model_t found{};
+    double share = 0;
+    if (!jackknife || okid_jackknife_delete(jackknife, nullptr, 1, &found, &share) < 0) return;
+    const std::string text = moved(work.model, modes_in(keep(found), work.model.dt), sigma);
     if (!text.empty())
         said.emplace_back(
             "finite_p_bias",
             fmt::format("p {} instead of {} moves {}: a bias that ± does not show. Use --p {} or more, or "
                         "an n4sid method",
-                        longer.p, config.p, text, longer.p));
+                        shape.identify.p, config.p, text, shape.identify.p));
 }
 
 } // namespace okid_host

@@ -3,12 +3,10 @@
 #pragma once
 #include "record.hpp"
 #include "result/deviations.hpp"
-#include "result/stabilization.hpp"
 
 #include <okid/accumulator.h>
 
 #include <complex>
-#include <functional>
 #include <optional>
 #include <vector>
 
@@ -45,9 +43,14 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
 deviations deviations_of(const okid_identified_t& model, const std::vector<replicate_model>& replicates,
                          const mass_plan& plan);
 
-/// Does a horizon of 2 p say something else than p, by more than two standard deviations? Then a remark names the modes:
-/// the bias of a finite p, which no deviation sees. Nothing when `rows` regression rows are too few for 2 p.
-void remark_finite_p(const okid_identify_config_t& config, long long rows, const okid_identified_t& model,
-                     const deviations& sigma, const identify_again& again, remarks& said);
+/// The modes of a model, whoever found them; of a replicate none where it has none.
+std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
+                                 int count, int n_y);
+std::vector<mode_shift> modes_in(const replicate_model& model, double dt);
+
+/// Does a horizon of 2 p, at the order and the ridge of the model, say something else than p by more than two standard
+/// deviations? Then a remark names the modes: the bias of a finite p, which no deviation sees. Nothing when `rows` regression
+/// rows are too few for 2 p, or memory is.
+void remark_finite_p(const record_work& work, long long rows, const deviations& sigma, remarks& said);
 
 } // namespace okid_host

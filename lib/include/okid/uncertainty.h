@@ -96,7 +96,7 @@ typedef struct okid_jackknife_config_t {
     okid_identify_config_t identify; ///< of the full model; its `order` is not read
     okid_accumulator_config_t sums;  ///< of the whole: okid_accumulator_config(). edges = 1, slots = 0
     int32_t linear; ///< 1: the full model's change to first order in place of a model of the rest, at a fraction of
-                    ///< the cost; okid-era with inputs and the system's Hankel matrix, n4sid-moesp, n4sid-cva
+                    ///< the cost; not with OKID_HANKEL_INNOVATIONS and _LITERAL
 } okid_jackknife_config_t;
 
 /// Of an identifier and of the sums it is given.
@@ -129,9 +129,10 @@ OKID_NODISCARD OKID_API okid_status_t okid_jackknife_begin_linear(okid_jackknife
                                                                   okid_accumulator_t* whole,
                                                                   const okid_identified_t* full);
 
-/// The model of the whole without one part. With `linear` to first order, in its own states; of the n4sid methods B and D
+/// The model of the whole without one part. With `linear` to first order, in its own states; of MOESP and CVA B and D
 /// are those of the full model.
-/// @param part    in, the sums of the part; see okid_accumulator_remove(), also for `weight`
+/// @param part    in, the sums of the part; see okid_accumulator_remove(), also for `weight`. NULL, not with `linear`: nothing
+///                is left out, for sums of another horizon than the full model's: at its order and ridge
 /// @param model   out, valid until the next call (K is NULL)
 /// @param share   out, share of the information in the part: of the energy of the channels, each counting alike, so
 ///                that a part with a hammer hit weighs more than one of ringing down

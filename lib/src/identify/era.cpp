@@ -85,7 +85,13 @@ bool project(okid_era& e, int order, const okid_real_t* rhs, int count) {
 } // namespace
 
 okid::era_view okid::view_of(const okid_era_t* self) {
-    return {self->height, self->breadth, self->rank, self->left, self->values, self->right};
+    return {self->height,
+            self->breadth,
+            self->rank,
+            self->left,
+            self->values,
+            self->right,
+            correlated(*self) ? self->correlation.right : nullptr};
 }
 
 size_t okid_era_memsize(const okid_era_config_t* config) {

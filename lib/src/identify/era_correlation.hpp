@@ -10,10 +10,11 @@ namespace okid {
 /// block (i, j) = first[i + j]; rows x cols blocks of n_y x n_u, column-major.
 void fill_hankel(int n_u, int n_y, int rows, int cols, const okid_real_t* first, okid_real_t* out);
 
-/// The decomposition that an ERA holds: U (height x rank), singular values, V^T (rank x breadth).
+/// The decomposition that an ERA holds: U (height x rank), singular values, V^T (rank x breadth). With correlations
+/// N^(-1/2) U and the factor Q^T of F (breadth rows), else nullptr.
 struct era_view {
     int height, breadth, rank;
-    const okid_real_t *left, *values, *right;
+    const okid_real_t *left, *values, *right, *basis;
 };
 era_view view_of(const okid_era_t* self);
 

@@ -8,18 +8,26 @@
 
 namespace okid {
 
-/// okid-era with inputs: A, B, C and D, in the states of the right singular vectors.
+/// okid-era and okid-era-dc: A, B, C and D, in the states of the right singular vectors; without inputs A and C. What is
+/// decomposed is H = N^(1/2) T F, T a Hankel matrix (era_correlation.cpp); of okid-era N and F are 1. G = T F V.
 struct linear_era {
     okid_observer_config_t observer;
-    int n, q, rows, height, tall, breadth, last; ///< tall: a block row more than height; last: of the Markov parameters
-    double *test, *score, *solve;                ///< [-theta^T; I] by rows of the Gram matrix; its product; q x n_y
-    okid_real_t *hankel, *change, *across;       ///< dH(0), tall; dH(0) V; U^T dH(0)
-    okid_real_t *late, *early, *late_next, *early_next, *first, *input; ///< H(0), H(1) outside U and V: see begin()
-    okid_real_t *pencil, *known, *sum, *A, *B, *C, *D;
+    okid_era_config_t shape;
+    int n, n_y, q, height, tall, breadth, seen,
+        last;                        ///< T: height x breadth, tall: a block row more; F: breadth x seen
+    double *test, *score, *solve;    ///< [-theta^T; I] by rows of the Gram matrix; its product; q x n_y
+    okid_real_t *hankel, *whole;     ///< T, dT, tall; T of okid-era-dc
+    okid_real_t *change, *across;    ///< N^(-1/2) dH V, tall; U^T dH
+    okid_real_t *held, *base, *room; ///< U^T N^(1/2) T; F V
+    okid_real_t *left, *right;       ///< N^(1/2) U, V^T
+    okid_real_t *late, *early, *late_next, *early_next, *first, *first_next; ///< what is outside U and V: see outside()
+    okid_real_t *rows, *normal, *input, *beside, *lean, *inputs; ///< of the least squares for B: see begin_inputs()
+    okid_real_t *pencil, *known, *sum, *A, *B, *C, *D, *out_C;
+    okid_real_t* moved; ///< change of the correlations of a record without inputs
+    const okid_real_t* values;
     noise_work spread; ///< error of theta -> change of the Markov parameters
-    double ridge;
+    double ridge, samples;
     okid_identify* by;
-    era_view era;
     int order;
 
     void lay_out(const okid_identify& shape, int largest, arena& memory);
@@ -28,8 +36,18 @@ struct linear_era {
     okid_model_t along(const double* gram, double step);
 
   private:
+    bool correlated() const { return shape.tau > 0; }
+    int stands(int row) const;
+    void through(const okid_real_t* T, const okid_real_t* x, int count, okid_real_t* out) const;
+    void back(const okid_real_t* T, const okid_real_t* x, int count, okid_real_t keep, okid_real_t* out) const;
+    void begin_theta();
+    void outside(const okid_real_t* T);
+    bool begin_inputs(const okid_real_t* T);
     void change_theta(const double* gram);
+    void change_covariances(const double* gram);
+    void change_products(const okid_real_t* blocks);
     void change_pencil();
+    void change_inputs();
 };
 
 /// MOESP and CVA: A and C; B and D are those of the model.
@@ -54,6 +72,33 @@ struct linear_subspace {
     bool weigh(bool cva);
     bool ask_for();
     void to_sums(double* from, int count, double* to, bool transposed);
+};
+
+/// SSARX: A, B, C and D as the regression of its states gives them.
+struct linear_ssarx {
+    int size;                      ///< rows of the Gram matrix
+    double *known, *left;          ///< regressors; what the regression leaves, by q, then by the rows of the sums
+    double *turn, *across;         ///< S^-1 O applied to the future less M V^T; V^T less it
+    double *past, *future, *spare; ///< F and R F of the past, and of the future by T
+    double *phi, *omega, *reach;   ///< the same by q; S^-1 T_1 of it; what a change of T meets
+    double *dual, *drive;          ///< S^-1 O; future rows of `across`
+    double *right, *moved;         ///< columns that a change of the sums is applied to; the products
+    double *toeplitz, *arx, *turned, *shifted, *found;
+    double *normal, *regression, *change, *solved, *level, *solve;
+    okid_real_t *A, *B, *C, *D;
+    okid_identify* by;
+    subspace_view view;
+    int order;
+
+    void lay_out(const okid_identify& shape, int largest, arena& memory);
+    okid_status_t begin(okid_identify& by, const okid_identified_t& full);
+    okid_model_t along(const double* gram, double step);
+
+  private:
+    bool regress();
+    void ask_for();
+    void to_sums(double* rows, int count, double* to, bool transposed);
+    void change_of_states();
 };
 
 } // namespace okid

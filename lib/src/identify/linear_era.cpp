@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    first-order change of an okid-era model by a change of the sums
-// METHOD     d theta = (dG_yv - theta dG_vv) (V V^T)^-1; Markov parameters by the linearised recursion (40); the pencil in
-//            the singular subspaces U, V of H(0): A = (U^T H(0) V)^-1 U^T H(1) V, B = (U^T H(0) V)^-1 U^T H(0) E_u,
-//            C = E_y^T H(0) V, with dU S = (1 - U U^T)(dH V + H dV), dV S = (1 - V V^T)(dH^T U + H^T dU), two terms each
+// PURPOSE    first-order change of an okid-era or okid-era-dc model by a change of the sums
+// METHOD     d theta = (dG_yv - theta dG_vv) (V V^T)^-1; Markov parameters by the linearised recursion (40), or correlations of
+//            the outputs over their variances. Then the pencil in the singular subspaces U, V of H(0) = N^(1/2) T(0) F,
+//            A = (U^T H(0) V)^-1 U^T H(1) V, G = T(0) F V, C its first block, B = G_r^+ T(0) E_u, with
+//            dU S = (1 - U U^T)(dH V + H dV), dV S = (1 - V V^T)(dH^T U + H^T dU), two terms each; dH = N^(1/2) (dT F + T dF)
 // REFERENCE  paper eq. (39), (40), (43)-(54); Doehler, Mevel (2013); docs/numerics.md, uncertainty
 // NUMERICS   what the third term of dU, dV would add is of third order in the noise (singular values left out over those taken)
-// WORKSPACE  Hankel matrix, 4 (h + b) n_z; a change takes 2 n^2 n_y + 2 q^2 n_y + 4 last p n_y^2 n_u + 4 h b n_z flop
+// WORKSPACE  one or two Hankel matrices, 4 (h + b) n_z; a change takes 2 n^2 n_y + 2 q^2 n_y + 4 last p n_y^2 n_u + 4 h b n_z
+//            flop (okid-era-dc three times the last)
 #include "identify/linear.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace okid {
 
@@ -27,36 +30,127 @@ int row_of(const okid_observer_config_t& c, int k) { return k < c.n_u ? k : k + 
 
 void linear_era::lay_out(const okid_identify& s, int largest, arena& memory) {
     observer = s.observer_config;
+    shape = s.era_config;
     n = s.n;
+    n_y = s.n_y;
     q = s.q;
-    rows = s.config.rows;
-    height = rows * s.n_y;
-    tall = height + s.n_y;
-    breadth = rows * s.n_u;
+    height = (shape.rows + shape.xi * shape.tau) * n_y;
+    tall = height + n_y;
+    breadth = (shape.cols + shape.zeta * shape.tau) * s.width;
+    seen = correlated() ? (shape.zeta + 1) * shape.rows * n_y : breadth;
     last = s.markov_last;
-    test = memory.take<double>(area(n, s.n_y));
-    score = memory.take<double>(area(n, s.n_y));
-    solve = memory.take<double>(area(q, s.n_y));
+    const int n_u = s.n_u, w = s.width;
     hankel = memory.take<real>(area(tall, breadth));
+    whole = memory.take<real>(correlated() ? area(tall, breadth) : 0);
     change = memory.take<real>(area(tall, largest));
-    for (real** each : {&late, &early_next}) *each = memory.take<real>(area(height, largest));
-    for (real** each : {&across, &early, &late_next}) *each = memory.take<real>(area(breadth, largest));
-    first = memory.take<real>(area(s.n_y, breadth));
-    input = memory.take<real>(area(height, s.n_u));
+    room = memory.take<real>(area(std::max(breadth, seen), std::max({largest, n_y, w})));
+    for (real** each : {&held, &base}) *each = memory.take<real>(area(breadth, largest));
+    for (real** each : {&late, &early_next, &left}) *each = memory.take<real>(area(height, largest));
+    for (real** each : {&across, &early, &late_next, &right}) *each = memory.take<real>(area(seen, largest));
+    first = memory.take<real>(area(n_y, seen));
+    first_next = memory.take<real>(area(height, n_y));
     for (real** each : {&pencil, &known, &sum, &A}) *each = memory.take<real>(area(largest, largest));
-    B = memory.take<real>(area(largest, s.n_u));
-    C = memory.take<real>(area(s.n_y, largest));
-    D = memory.take<real>(area(s.n_y, s.n_u));
+    for (real** each : {&C, &out_C}) *each = memory.take<real>(area(n_y, largest));
+    if (n_u == 0) {
+        moved = memory.take<real>(area(last + 1, n_y * w));
+        score = memory.take<double>(area(n_y, 1));
+        return;
+    }
+    rows = memory.take<real>(area(shape.rows * n_y, largest));
+    normal = memory.take<real>(area(largest, largest));
+    lean = memory.take<real>(area(largest, seen));
+    input = memory.take<real>(area(shape.rows * n_y, n_u));
+    beside = memory.take<real>(area(n_u, seen));
+    for (real** each : {&B, &inputs}) *each = memory.take<real>(area(largest, n_u));
+    D = memory.take<real>(area(n_y, n_u));
+    test = memory.take<double>(area(n, n_y));
+    score = memory.take<double>(area(n, n_y));
+    solve = memory.take<double>(area(q, n_y));
     spread.lay_out(observer, 1, last, memory);
 }
 
-/// late, early: what of H(1) V and U^T H(1) is outside U and V; their next terms; E H(0) outside V, H(0) E_u outside U.
-okid_status_t linear_era::begin(okid_identify& identifier, const okid_identified_t& full) {
-    by = &identifier;
-    order = full.n_z;
-    ridge = full.observer_info.ridge > 1e-10 ? full.observer_info.ridge : 0; // smaller ones were taken out again
-    era = view_of(by->era);
-    const int n_u = observer.n_u, n_y = observer.n_y;
+/// How often a block row of T stands in what is decomposed: N.
+int linear_era::stands(int row) const {
+    int count = correlated() ? 0 : 1;
+    for (int a = 0; correlated() && a <= shape.xi; ++a)
+        count += row >= a * shape.tau && row < a * shape.tau + shape.rows;
+    return count;
+}
+
+/// out (breadth x count) <- F x^T, x count x seen; F made of this T.
+void linear_era::through(const real* T, const real* x, int count, real* out) const {
+    if (!correlated()) {
+        for (int c = 0; c < breadth; ++c)
+            for (int k = 0; k < count; ++k) out[area(k, breadth) + size_t(c)] = x[c * count + k];
+        return;
+    }
+    std::fill(out, out + area(breadth, count), real{0});
+    const int own = shape.rows * n_y, wide = shape.cols * shape.n_u;
+    for (int b = 0; b <= shape.zeta; ++b)
+        multiply(true, true, wide, count, own, 1, T, tall, x + area(b * own, count), count, 1,
+                 out + b * shape.tau * shape.n_u, breadth);
+}
+
+/// out (count x seen) <- x F + keep out, x count x breadth.
+void linear_era::back(const real* T, const real* x, int count, real keep, real* out) const {
+    if (!correlated()) {
+        for (size_t k = 0; k < area(count, breadth); ++k) out[k] = x[k] + (keep != 0 ? out[k] : 0);
+        return;
+    }
+    const int own = shape.rows * n_y, wide = shape.cols * shape.n_u;
+    for (int b = 0; b <= shape.zeta; ++b)
+        multiply(false, true, count, own, wide, 1, x + area(b * shape.tau * shape.n_u, count), count, T, tall, keep,
+                 out + area(b * own, count), count);
+}
+
+/// late, early, first: what of H(1) V, U^T H(1) and C is outside U and V; their next terms. `change` holds T F V, `room`
+/// U^T H(1) before F.
+void linear_era::outside(const real* T) {
+    const auto weigh = [&](real* column) {
+        for (int y = 0; y < height; ++y) column[y] *= static_cast<real>(stands(y / n_y));
+    };
+    back(T, room, order, 0, early);
+    multiply(false, false, order, seen, order, -1, known, order, right, order, 1, early, order);
+    for (int k = 0; k < order; ++k) {
+        const real* later = change + area(k, tall) + n_y;
+        std::copy(later, later + height, late + area(k, height));
+        weigh(late + area(k, height));
+    }
+    multiply(false, false, height, order, order, -1, left, height, known, order, 1, late, height);
+    multiply(true, false, order, breadth, height, 1, late, height, T, tall, 0, room, order);
+    back(T, room, order, 0, late_next);
+    through(T, early, order, room);
+    multiply(false, false, height, order, breadth, 1, T, tall, room, breadth, 0, early_next, height);
+    for (int k = 0; k < order; ++k) weigh(early_next + area(k, height));
+    for (int j = 0; j < breadth; ++j) std::copy(T + area(j, tall), T + area(j, tall) + n_y, room + area(j, n_y));
+    back(T, room, n_y, 0, first);
+    multiply(false, false, n_y, seen, order, -1, C, n_y, right, order, 1, first, n_y);
+    through(T, first, n_y, room);
+    multiply(false, false, height, n_y, breadth, 1, T, tall, room, breadth, 0, first_next, height);
+    for (int o = 0; o < n_y; ++o) weigh(first_next + area(o, height));
+}
+
+/// rows = G_r, normal = factor of G_r^T G_r, inputs = B, input = T E_u - G_r B; beside = input^T T F, lean = G_r^T (T F - G V^T).
+bool linear_era::begin_inputs(const real* T) {
+    const int own = shape.rows * n_y, n_u = shape.n_u;
+    for (int k = 0; k < order; ++k)
+        std::copy(change + area(k, tall), change + area(k, tall) + own, rows + area(k, own));
+    for (int j = 0; j < n_u; ++j) std::copy(T + area(j, tall), T + area(j, tall) + own, input + area(j, own));
+    multiply(true, false, order, order, own, 1, rows, own, rows, own, 0, normal, order);
+    multiply(true, false, order, breadth, own, 1, rows, own, T, tall, 0, room, order);
+    back(T, room, order, 0, lean);
+    multiply(false, false, order, seen, order, -1, normal, order, right, order, 1, lean, order);
+    multiply(true, false, order, n_u, own, 1, rows, own, input, own, 0, inputs, order);
+    if (linalg::cholesky(order, normal, order) != 0) return false;
+    linalg::cholesky_solve(order, normal, order, inputs, order, n_u);
+    multiply(false, false, own, n_u, order, -1, rows, own, inputs, order, 1, input, own);
+    multiply(true, false, n_u, breadth, own, 1, input, own, T, tall, 0, room, n_u);
+    back(T, room, n_u, 0, beside);
+    return true;
+}
+
+void linear_era::begin_theta() {
+    const int n_u = observer.n_u;
     std::fill(test, test + area(n, n_y), 0.0);
     for (int o = 0; o < n_y; ++o) {
         for (int k = 0; k < q; ++k)
@@ -64,34 +158,46 @@ okid_status_t linear_era::begin(okid_identify& identifier, const okid_identified
         test[area(o, n) + static_cast<size_t>(n_u + o)] = 1;
     }
     begin_spread(observer, by->theta, by->markov, last, spread);
-    fill_hankel(n_u, n_y, rows + 1, rows, by->markov + area(n_u, n_y), hankel);
-    const real* H1 = hankel + n_y;
-    multiply(false, true, height, order, breadth, 1, H1, tall, era.right, era.rank, 0, late, height);
-    multiply(true, false, order, breadth, height, 1, era.left, era.height, H1, tall, 0, early, order);
-    multiply(true, false, order, order, height, 1, era.left, era.height, late, height, 0, known, order);
-    multiply(false, false, height, order, order, -1, era.left, era.height, known, order, 1, late, height);
-    multiply(false, false, order, breadth, order, -1, known, order, era.right, era.rank, 1, early, order);
-    multiply(true, false, breadth, order, height, 1, hankel, tall, late, height, 0, late_next, breadth);
-    multiply(false, true, height, order, breadth, 1, hankel, tall, early, order, 0, early_next, height);
-    for (int j = 0; j < breadth; ++j)
-        std::copy(hankel + area(j, tall), hankel + area(j, tall) + n_y, first + area(j, n_y));
-    for (int j = 0; j < n_u; ++j)
-        std::copy(hankel + area(j, tall), hankel + area(j, tall) + height, input + area(j, height));
-    for (int j = 0; j < order; ++j) { // C = E U S, A = S^-1 U^T H(1) V
-        if (!(era.values[j] > 0)) return OKID_ERR_NUMERIC;
-        for (int o = 0; o < n_y; ++o) C[j * n_y + o] = era.left[area(j, era.height) + size_t(o)] * era.values[j];
-        for (int i = 0; i < order; ++i) pencil[j * order + i] = known[j * order + i] / era.values[i];
+}
+
+okid_status_t linear_era::begin(okid_identify& identifier, const okid_identified_t& full) {
+    by = &identifier;
+    order = full.n_z;
+    ridge = full.observer_info.ridge > 1e-10 ? full.observer_info.ridge : 0; // smaller ones were taken out again
+    samples = static_cast<double>(full.regression_rows);
+    const era_view era = view_of(by->era);
+    values = era.values;
+    if (!(values[order - 1] > 0)) return OKID_ERR_NUMERIC;
+    if (by->n_u > 0) begin_theta();
+    const int w = shape.n_u;
+    fill_hankel(w, n_y, tall / n_y, breadth / w, (by->n_u > 0 ? by->markov : by->sequence) + area(w, n_y), hankel);
+    if (correlated()) std::copy(hankel, hankel + area(tall, breadth), whole);
+    const real* T = correlated() ? whole : hankel;
+    for (int k = 0; k < order; ++k)
+        for (int y = 0; y < height; ++y) // of okid-era-dc N^(-1/2) U is there
+            left[area(k, height) + size_t(y)] =
+                era.left[area(k, era.height) + size_t(y)] * static_cast<real>(stands(y / n_y));
+    if (correlated())
+        multiply(false, false, order, seen, era.breadth, 1, era.right, era.rank, era.basis, era.breadth, 0, right,
+                 order);
+    else
+        for (int c = 0; c < seen; ++c)
+            std::copy(era.right + area(c, era.rank), era.right + area(c, era.rank) + order, right + area(c, order));
+    through(T, right, order, base);
+    multiply(false, false, tall, order, breadth, 1, T, tall, base, breadth, 0, change, tall);
+    multiply(true, false, order, order, height, 1, left, height, change + n_y, tall, 0, known, order);
+    if (correlated()) multiply(true, false, order, breadth, height, 1, left, height, T, tall, 0, held, order);
+    multiply(true, false, order, breadth, height, 1, left, height, T + n_y, tall, 0, room, order);
+    for (int j = 0; j < order; ++j) { // A = S^-1 U^T H(1) V
+        std::copy(change + area(j, tall), change + area(j, tall) + n_y, C + area(j, n_y));
+        for (int i = 0; i < order; ++i) pencil[j * order + i] = known[j * order + i] / values[i];
     }
-    multiply(false, false, n_y, breadth, order, -1, C, n_y, era.right, era.rank, 1, first, n_y);
-    for (int c = 0; c < n_u; ++c)
-        for (int i = 0; i < order; ++i) B[c * order + i] = era.right[c * era.rank + i] * era.values[i];
-    multiply(false, false, height, n_u, order, -1, era.left, era.height, B, order, 1, input, height);
-    return OKID_OK;
+    outside(T);
+    return by->n_u == 0 || begin_inputs(T) ? OKID_OK : OKID_ERR_NUMERIC;
 }
 
 /// spread.error <- d theta
 void linear_era::change_theta(const double* gram) {
-    const int n_y = observer.n_y;
     multiply(false, false, n, n_y, n, 1, gram, n, test, n, 0, score, n);
     for (int o = 0; o < n_y; ++o)
         for (int k = 0; k < q; ++k) {
@@ -103,11 +209,25 @@ void linear_era::change_theta(const double* gram) {
         for (int o = 0; o < n_y; ++o) spread.error[k * n_y + o] = static_cast<real>(solve[o * q + k]);
 }
 
+/// moved <- change of the correlations; score <- relative change of the deviations they are scaled by.
+void linear_era::change_covariances(const double* gram) {
+    const double* scale = by->covariance.scale;
+    const auto over = [&](int a, int b, size_t entry) { return gram[entry] / (samples * scale[a] * scale[b]); };
+    for (int o = 0; o < n_y; ++o) score[o] = over(o, o, area(o, n + 1)) / 2;
+    for (int k = 0; k <= last; ++k)
+        for (int c = 0; c < n_y; ++c)
+            for (int o = 0; o < n_y; ++o) {
+                const int at = (k * n_y + c) * n_y + o;
+                moved[at] = static_cast<real>(over(o, c, area(k * n_y + c, n) + size_t(o)) -
+                                              (score[o] + score[c]) * static_cast<double>(by->sequence[at]));
+            }
+}
+
 /// sum <- d(U^T H(1) V) - U^T dH(0) V A; known <- U^T dH(0) V
 void linear_era::change_pencil() {
-    const real* s = era.values;
-    multiply(true, false, order, order, height, 1, era.left, era.height, change, tall, 0, known, order);
-    multiply(true, false, order, order, height, 1, era.left, era.height, change + observer.n_y, tall, 0, sum, order);
+    const real* s = values;
+    multiply(true, false, order, order, height, 1, left, height, change, tall, 0, known, order);
+    multiply(true, false, order, order, height, 1, left, height, change + n_y, tall, 0, sum, order);
     multiply(false, false, order, order, order, -1, known, order, pencil, order, 1, sum, order);
     const auto add = [&](auto factor) {
         for (int j = 0; j < order; ++j)
@@ -115,39 +235,73 @@ void linear_era::change_pencil() {
     };
     multiply(true, false, order, order, height, 1, change, tall, late, height, 0, A, order);
     add([&](int i, int) { return 1 / s[i]; });
-    multiply(false, false, order, order, breadth, 1, across, order, late_next, breadth, 0, A, order);
+    multiply(false, true, order, order, seen, 1, across, order, late_next, order, 0, A, order);
     add([&](int i, int) { return 1 / (s[i] * s[i]); });
-    multiply(false, true, order, order, breadth, 1, early, order, across, order, 0, A, order);
+    multiply(false, true, order, order, seen, 1, early, order, across, order, 0, A, order);
     add([&](int, int j) { return 1 / s[j]; });
     multiply(true, false, order, order, height, 1, early_next, height, change, tall, 0, A, order);
     add([&](int, int j) { return 1 / (s[j] * s[j]); });
 }
 
+/// B <- (G_r^T G_r)^-1 (dG_r^T (T E_u - G_r B) + G_r^T (dT E_u - dG_r B)), dG = change + (T F - G V^T) across^T S^-1
+void linear_era::change_inputs() {
+    const int own = shape.rows * n_y, n_u = shape.n_u;
+    const real* s = values;
+    real* turned = room; // seen x n_u: across^T S^-1 B
+    for (int c = 0; c < n_u; ++c)
+        for (int i = 0; i < order; ++i) B[c * order + i] = inputs[c * order + i] / s[i];
+    multiply(true, false, seen, n_u, order, 1, across, order, B, order, 0, turned, seen);
+    multiply(false, true, order, n_u, seen, 1, across, order, beside, n_u, 0, B, order);
+    for (int c = 0; c < n_u; ++c)
+        for (int i = 0; i < order; ++i) B[c * order + i] /= s[i];
+    multiply(false, false, order, n_u, seen, -1, lean, order, turned, seen, 1, B, order);
+    multiply(true, false, order, n_u, own, 1, change, tall, input, own, 1, B, order);
+    multiply(true, false, order, n_u, own, 1, rows, own, hankel, tall, 1, B, order);
+    multiply(true, false, order, order, own, 1, rows, own, change, tall, 0, known, order);
+    multiply(false, false, order, n_u, order, -1, known, order, inputs, order, 1, B, order);
+    linalg::cholesky_solve(order, normal, order, B, order, n_u);
+}
+
+/// change, across <- dH(0) V and U^T dH(0), out of the change of the blocks.
+void linear_era::change_products(const real* blocks) {
+    const int w = shape.n_u;
+    fill_hankel(w, n_y, tall / n_y, breadth / w, blocks + area(w, n_y), hankel);
+    multiply(false, false, tall, order, breadth, 1, hankel, tall, base, breadth, 0, change, tall);
+    multiply(true, false, order, breadth, height, 1, left, height, hankel, tall, 0, room, order);
+    back(whole, room, order, 0, across);
+    if (!correlated()) return;
+    back(hankel, held, order, 1, across);
+    through(hankel, right, order, room);
+    multiply(false, false, tall, order, breadth, 1, whole, tall, room, breadth, 1, change, tall);
+}
+
 okid_model_t linear_era::along(const double* gram, double step) {
-    const int n_u = observer.n_u, n_y = observer.n_y;
-    const real by_step = static_cast<real>(step), *s = era.values;
-    change_theta(gram);
-    spread_error(observer, last, spread);
-    fill_hankel(n_u, n_y, rows + 1, rows, spread.markov + area(n_u, n_y), hankel);
-    multiply(false, true, tall, order, breadth, 1, hankel, tall, era.right, era.rank, 0, change, tall);
-    multiply(true, false, order, breadth, height, 1, era.left, era.height, hankel, tall, 0, across, order);
+    const int n_u = by->n_u;
+    const real by_step = static_cast<real>(step);
+    if (n_u > 0) {
+        change_theta(gram);
+        spread_error(observer, last, spread);
+    } else {
+        change_covariances(gram);
+    }
+    change_products(n_u > 0 ? spread.markov : moved);
     change_pencil();
-    multiply(true, false, order, n_u, height, 1, change, tall, input, height, 0, B, order);
-    for (int c = 0; c < n_u; ++c)
-        for (int i = 0; i < order; ++i) B[c * order + i] = B[c * order + i] / s[i] + across[c * order + i];
-    multiply(false, false, order, n_u, order, -1, known, order, era.right, era.rank, 1, B, order);
-    for (int c = 0; c < n_u; ++c)
-        for (int i = 0; i < order; ++i)
-            B[c * order + i] = era.right[c * era.rank + i] + by_step * B[c * order + i] / s[i];
-    multiply(false, true, n_y, order, breadth, 1, first, n_y, across, order, 0, C, n_y);
+    if (n_u > 0) change_inputs();
+    for (int k = 0; k < order * n_u; ++k) B[k] = inputs[k] + by_step * B[k];
+    for (int k = 0; k < n_y * n_u; ++k) D[k] = by->markov[k] + by_step * spread.markov[k];
+    multiply(true, false, n_y, order, height, 1, first_next, height, change, tall, 0, out_C, n_y);
+    for (int k = 0; k < order * n_y; ++k) out_C[k] /= values[k / n_y];
+    multiply(false, true, n_y, order, seen, 1, first, n_y, across, order, 1, out_C, n_y);
     for (int j = 0; j < order; ++j) {
         for (int o = 0; o < n_y; ++o)
-            C[j * n_y + o] = era.left[area(j, era.height) + size_t(o)] * s[j] +
-                             by_step * (C[j * n_y + o] / s[j] + change[area(j, tall) + size_t(o)]);
-        for (int i = 0; i < order; ++i) A[j * order + i] = pencil[j * order + i] + by_step * sum[j * order + i] / s[i];
+            out_C[j * n_y + o] =
+                C[j * n_y + o] + by_step * (out_C[j * n_y + o] / values[j] + change[area(j, tall) + size_t(o)]);
+        for (int i = 0; i < order; ++i)
+            A[j * order + i] = pencil[j * order + i] + by_step * sum[j * order + i] / values[i];
     }
-    for (int k = 0; k < n_y * n_u; ++k) D[k] = by->markov[k] + by_step * spread.markov[k];
-    return {n_u, n_y, order, A, B, C, D, nullptr};
+    for (int k = 0; n_u == 0 && k < order * n_y; ++k)
+        out_C[k] *= static_cast<real>(by->covariance.scale[k % n_y] * std::exp(step * score[k % n_y]));
+    return {n_u, n_y, order, A, B, out_C, D, nullptr};
 }
 
 } // namespace okid

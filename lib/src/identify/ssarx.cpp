@@ -55,20 +55,24 @@ void ssarx::lay_out(const subspace_sizes& z, arena& memory) {
     gain = memory.take<double>(kalman_work(n, z.n_y));
 }
 
+void fill_correction(const subspace_sizes& z, const double* theta, double* out) {
+    std::fill(out, out + at(0, z.w, z.h), 0.0);
+    for (int a = 0; a < z.i; ++a)
+        for (int lag = 0; lag <= a; ++lag) // v_(i+a-lag); lag 0 is u alone
+            for (int c = 0; c < (lag == 0 ? z.n_u : z.m); ++c) {
+                const double* from = theta + at(0, (z.i - lag) * z.m + c, z.n_y);
+                double* to = out + at(a * z.n_y, (a - lag) * z.m + c, z.h);
+                for (int o = 0; o < z.n_y; ++o) to[o] = -from[o];
+            }
+}
+
 /// theta, then corrected = T [future rows of L], in strips of some 64 rows as far as they reach.
 void ssarx::correct(const subspace_sizes& z, const hankel_factor& f, double* solve) const {
     const int q = z.w + z.n_u;
     for (int c = 0; c < q; ++c)
         std::copy(f.L + at(q, c, f.size), f.L + at(q + z.n_y, c, f.size), theta + at(0, c, z.n_y));
     solve_lower_right(q, f.L, f.size, theta, z.n_y, z.n_y, solve);
-    std::fill(toeplitz, toeplitz + at(0, z.w, z.h), 0.0);
-    for (int a = 0; a < z.i; ++a)
-        for (int lag = 0; lag <= a; ++lag) // v_(i+a-lag); lag 0 is u alone
-            for (int c = 0; c < (lag == 0 ? z.n_u : z.m); ++c) {
-                const double* from = theta + at(0, (z.i - lag) * z.m + c, z.n_y);
-                double* to = toeplitz + at(a * z.n_y, (a - lag) * z.m + c, z.h);
-                for (int o = 0; o < z.n_y; ++o) to[o] = -from[o];
-            }
+    fill_correction(z, theta, toeplitz);
     for (int a = 0; a < z.i; ++a)
         for (int o = 0; o < z.n_y; ++o) toeplitz[at(a * z.n_y + o, a * z.m + z.n_u + o, z.h)] = 1;
     std::fill(corrected, corrected + at(0, 2 * z.w, z.h), 0.0); // sums over rows of different reach read beyond it

@@ -111,7 +111,9 @@ void expect(okid_subspace_t* self, int order, bool condition) {
 double condition_of(const okid_subspace_t* self) { return self->hankel.condition; }
 
 subspace_view view_of(const okid_subspace_t* self) {
+    const ssarx& states = self->ssarx;
     return {self->sizes,        self->hankel.L,      self->cut.weight, self->projection.gamma,
+            states.theta,       states.corrected,    states.basis,     states.next,
             self->hankel.place, self->config.method, self->cut.carried};
 }
 

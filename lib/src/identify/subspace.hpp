@@ -105,10 +105,14 @@ struct ssarx {
     bool last_block(const subspace_sizes& z, const hankel_factor& f, int orders) const;
 };
 
-/// What linear_subspace reads; it stands until the next decomposition. weight: S of CVA, h x h lower.
+/// out (h x w) <- the part of an ARX model in future samples, to be added to them: block (a, a - lag) = -Ybar_lag.
+void fill_correction(const subspace_sizes& z, const double* theta, double* out);
+
+/// What linear_subspace and linear_ssarx read; it stands until the next decomposition. weight: S of CVA and SSARX, h x h lower.
 struct subspace_view {
     subspace_sizes sizes;
     const double *L, *weight, *gamma;
+    const double *theta, *corrected, *basis, *next; ///< of SSARX
     const int* place;
     int32_t method, carried;
 };

@@ -33,17 +33,13 @@ struct okid_jackknife {
     okid_run_sums_t run;             ///< of a part that is one run
     okid::linear_era era;
     okid::linear_subspace subspace;
+    okid::linear_ssarx ssarx;
 };
 
 namespace {
 
-bool has_derivative(const okid_identify_config_t& c) {
-    return c.method == OKID_METHOD_OKID_ERA ? c.n_u > 0 && c.hankel == OKID_HANKEL_SYSTEM
-                                            : c.method == OKID_METHOD_N4SID_MOESP || c.method == OKID_METHOD_N4SID_CVA;
-}
-
 bool valid(const okid_jackknife_config_t& c) {
-    if (c.linear != 0 && !has_derivative(c.identify)) return false;
+    if (c.linear != 0 && c.identify.hankel != OKID_HANKEL_SYSTEM) return false; // it has no derivative
     const int32_t lags = okid_identify_lags(&c.identify);
     return lags > 0 && c.identify.solver == OKID_SOLVER_DENSE && okid_accumulator_memsize(&c.sums) > 0 &&
            c.sums.n_u == c.identify.n_u && c.sums.n_y == c.identify.n_y && c.sums.lags == lags && c.sums.edges != 0 &&
@@ -58,7 +54,9 @@ void lay_out_linear(okid_jackknife& s, okid::arena& memory) {
     for (double** each : {&s.mean, &s.part_mean, &s.run.head, &s.run.tail}) *each = memory.take<double>(n);
     for (double** each : {&s.run.sum, &s.run.mean}) *each = memory.take<double>(m);
     s.run.S = memory.take<double>(m * n);
-    if (shape.by_subspace)
+    if (shape.config.method == OKID_METHOD_N4SID_SSARX)
+        s.ssarx.lay_out(shape, shape.max_order, memory);
+    else if (shape.by_subspace)
         s.subspace.lay_out(shape, shape.max_order, memory);
     else
         s.era.lay_out(shape, shape.max_order, memory);
@@ -212,29 +210,35 @@ okid_status_t okid_jackknife_begin_linear(okid_jackknife_t* self, okid_identify_
     okid_status_t status = okid_accumulator_energy(whole, mine.detrend, s.energy);
     if (status != OKID_OK) return status;
     if (mine.detrend != OKID_DETREND_NONE) okid_accumulator_lag_means(whole, s.mean);
-    status = by->by_subspace ? s.subspace.begin(*by, *full) : s.era.begin(*by, *full);
+    status = s.ssarx.size > 0      ? s.ssarx.begin(*by, *full)
+             : s.subspace.size > 0 ? s.subspace.begin(*by, *full)
+                                   : s.era.begin(*by, *full);
     if (status == OKID_OK) s.whole = whole;
     return status;
 }
 
 okid_status_t okid_jackknife_delete(okid_jackknife_t* self, okid_accumulator_t* part, double weight,
                                     okid_model_t* model, double* share) {
-    if (self == nullptr || self->whole == nullptr || part == nullptr || model == nullptr || share == nullptr)
+    if (self == nullptr || self->whole == nullptr || model == nullptr || share == nullptr ||
+        (part == nullptr && self->config.linear != 0))
         return OKID_ERR_NULL;
     okid_jackknife& s = *self;
-    okid_status_t status = okid_accumulator_energy(part, s.config.identify.detrend, s.taken);
+    okid_status_t status =
+        part == nullptr ? OKID_OK : okid_accumulator_energy(part, s.config.identify.detrend, s.taken);
     if (s.config.linear != 0) {
         if (status == OKID_OK) status = gram_of_part(s, part);
         if (status != OKID_OK) return status;
         *share = share_of(s, weight);
         const double step = -weight / (1 - *share);
-        *model = s.subspace.size > 0 ? s.subspace.along(s.gram, step) : s.era.along(s.gram, step);
+        *model = s.ssarx.size > 0      ? s.ssarx.along(s.gram, step)
+                 : s.subspace.size > 0 ? s.subspace.along(s.gram, step)
+                                       : s.era.along(s.gram, step);
         return OKID_OK;
     }
     if (status == OKID_OK) status = okid_accumulator_copy(s.rest, s.whole);
-    if (status == OKID_OK) status = okid_accumulator_remove(s.rest, part, weight);
+    if (status == OKID_OK && part != nullptr) status = okid_accumulator_remove(s.rest, part, weight);
     if (status != OKID_OK) return status;
-    *share = share_of(s, weight);
+    *share = part != nullptr ? share_of(s, weight) : 0;
     okid_identified_t found;
     status = okid::replicate(*s.identifier, s.rest, s.order, &found);
     if (status < 0) return status;
