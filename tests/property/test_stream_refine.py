@@ -47,12 +47,13 @@ def modes(result: okid.Result, truth: Array) -> tuple[Array, Array]:
 CASES = [("w1", 5.0, "growing", 24)]
 if SLOW:
     CASES = [(name, noise, kept, 40) for name in ("w1", "w2") for noise in (1.0, 5.0) for kept in ("growing", "window")]
+    CASES.append(("w3", 5.0, "window", 40))
 
 
 @pytest.mark.parametrize(("name", "noise", "kept", "records"), CASES)
 def test_errors_reach_the_cramer_rao_bound(name: str, noise: float, kept: str, records: int) -> None:
     """Of all samples fed, those included that arm the lags; of a window, of the samples in it."""
-    s, samples = getattr(systems, name)(), {"w1": 20000, "w2": 30000}[name]
+    s, samples = getattr(systems, name)(), {"w1": 20000, "w2": 30000, "w3": 100000}[name]
     truth, ratios, inside = np.concatenate(s.modes()), [], []
     half = len(s.M)
     for seed in range(records):
@@ -247,6 +248,9 @@ def test_a_slow_mode_of_a_fast_stream() -> None:
     assert result.refinement is not None and result.refinement.converged
     values, sigma = modes(result, np.array([0.5]))
     assert np.all(sigma > 0) and np.all(abs(values - [0.5, 0.01]) < 4 * sigma) and np.all(sigma < [1e-4, 1e-4])
+    offline = okid.identify(record[:, :1], record[:, 1:], fs=fs)
+    assert offline.refinement is not None and offline.refinement.converged
+    assert np.all(abs(modes(offline, np.array([0.5]))[0] - values) < 0.1 * sigma)
     named = stream(record, 1, fs, 20_000, method="n4sid-cva", rows=40, order=2)
     assert named.refinement is None and "refine_failed" in {w.code for w in named.warnings}
 
