@@ -8,6 +8,13 @@
 
 namespace okid {
 
+/// What is asked of a change of the sums, G: its products with some columns.
+struct asked_of_gram {
+    const double* columns; ///< size x count
+    int count;
+    double* products; ///< to be filled in
+};
+
 /// okid-era and okid-era-dc: A, B, C and D, in the states of the right singular vectors; without inputs A and C. What is
 /// decomposed is H = N^(1/2) T F, T a Hankel matrix (era_correlation.cpp); of okid-era N and F are 1. G = T F V.
 struct linear_era {
@@ -32,19 +39,20 @@ struct linear_era {
 
     void lay_out(const okid_identify& shape, int largest, arena& memory);
     okid_status_t begin(okid_identify& by, const okid_identified_t& full);
-    /// The model plus step times its derivative along a symmetric change of the Gram matrix.
-    okid_model_t along(const double* gram, double step);
+    asked_of_gram asks() const { return {test, n_y, score}; }
+    /// The model plus step times its derivative along the change of the Gram matrix whose products and diagonal are there.
+    okid_model_t along(const double* diagonal, double step);
 
   private:
     bool correlated() const { return shape.tau > 0; }
     int stands(int row) const;
     void through(const okid_real_t* T, const okid_real_t* x, int count, okid_real_t* out) const;
     void back(const okid_real_t* T, const okid_real_t* x, int count, okid_real_t keep, okid_real_t* out) const;
-    void begin_theta();
+    void begin_test();
     void outside(const okid_real_t* T);
     bool begin_inputs(const okid_real_t* T);
-    void change_theta(const double* gram);
-    void change_covariances(const double* gram);
+    void change_theta(const double* diagonal);
+    void change_covariances();
     void change_products(const okid_real_t* blocks);
     void change_pencil();
     void change_inputs();
@@ -56,8 +64,8 @@ struct linear_subspace {
     double *dual, *whitened;              ///< W^-1 Gamma, h x n_z; S^-1 Gamma
     double *cross, *root, *back, *normal; ///< n_z x n_z: Gamma^T W^-1 Z W^-1 Gamma; M; M^-1; factor of Gamma_^T Gamma_
     double *ask, *next, *turned;          ///< functionals x h: F, F Z W^-1; h x functionals
-    double *left, *right, *rows; ///< 4 functionals x size, size x 2 n_z, and before they are in the order of the sums
-    double *moved, *seen, *found, *spare, *solve;
+    double *left, *right, *rows;          ///< 4 functionals x size, size x 2 n_z; room for either
+    double *moved, *found, *solve;
     double *pencil, *A, *C;
     okid_real_t *out_A, *out_C;
     okid_identify* by;
@@ -66,7 +74,8 @@ struct linear_subspace {
 
     void lay_out(const okid_identify& shape, int largest, arena& memory);
     okid_status_t begin(okid_identify& by, const okid_identified_t& full);
-    okid_model_t along(const double* gram, double step);
+    asked_of_gram asks() const { return {right, 2 * order, moved}; }
+    okid_model_t along(double step);
 
   private:
     bool weigh(bool cva);
@@ -92,7 +101,8 @@ struct linear_ssarx {
 
     void lay_out(const okid_identify& shape, int largest, arena& memory);
     okid_status_t begin(okid_identify& by, const okid_identified_t& full);
-    okid_model_t along(const double* gram, double step);
+    asked_of_gram asks() const { return {right, 3 * order + by->n_u + by->n_y, moved}; }
+    okid_model_t along(double step);
 
   private:
     bool regress();

@@ -51,9 +51,11 @@ void linear_era::lay_out(const okid_identify& s, int largest, arena& memory) {
     first_next = memory.take<real>(area(height, n_y));
     for (real** each : {&pencil, &known, &sum, &A}) *each = memory.take<real>(area(largest, largest));
     for (real** each : {&C, &out_C}) *each = memory.take<real>(area(n_y, largest));
+    test = memory.take<double>(area(n, n_y));
+    score = memory.take<double>(area(n, n_y));
+    solve = memory.take<double>(area(std::max(q, 1), n_y));
     if (n_u == 0) {
         moved = memory.take<real>(area(last + 1, n_y * w));
-        score = memory.take<double>(area(n_y, 1));
         return;
     }
     rows = memory.take<real>(area(shape.rows * n_y, largest));
@@ -63,9 +65,6 @@ void linear_era::lay_out(const okid_identify& s, int largest, arena& memory) {
     beside = memory.take<real>(area(n_u, seen));
     for (real** each : {&B, &inputs}) *each = memory.take<real>(area(largest, n_u));
     D = memory.take<real>(area(n_y, n_u));
-    test = memory.take<double>(area(n, n_y));
-    score = memory.take<double>(area(n, n_y));
-    solve = memory.take<double>(area(q, n_y));
     spread.lay_out(observer, 1, last, memory);
 }
 
@@ -149,15 +148,16 @@ bool linear_era::begin_inputs(const real* T) {
     return true;
 }
 
-void linear_era::begin_theta() {
-    const int n_u = observer.n_u;
+/// test: what the residuals are made of, without inputs the outputs themselves.
+void linear_era::begin_test() {
+    const int n_u = by->n_u;
     std::fill(test, test + area(n, n_y), 0.0);
     for (int o = 0; o < n_y; ++o) {
-        for (int k = 0; k < q; ++k)
+        for (int k = 0; n_u > 0 && k < q; ++k)
             test[area(o, n) + static_cast<size_t>(row_of(observer, k))] = -static_cast<double>(by->theta[k * n_y + o]);
         test[area(o, n) + static_cast<size_t>(n_u + o)] = 1;
     }
-    begin_spread(observer, by->theta, by->markov, last, spread);
+    if (n_u > 0) begin_spread(observer, by->theta, by->markov, last, spread);
 }
 
 okid_status_t linear_era::begin(okid_identify& identifier, const okid_identified_t& full) {
@@ -168,7 +168,7 @@ okid_status_t linear_era::begin(okid_identify& identifier, const okid_identified
     const era_view era = view_of(by->era);
     values = era.values;
     if (!(values[order - 1] > 0)) return OKID_ERR_NUMERIC;
-    if (by->n_u > 0) begin_theta();
+    begin_test();
     const int w = shape.n_u;
     fill_hankel(w, n_y, tall / n_y, breadth / w, (by->n_u > 0 ? by->markov : by->sequence) + area(w, n_y), hankel);
     if (correlated()) std::copy(hankel, hankel + area(tall, breadth), whole);
@@ -197,29 +197,30 @@ okid_status_t linear_era::begin(okid_identify& identifier, const okid_identified
 }
 
 /// spread.error <- d theta
-void linear_era::change_theta(const double* gram) {
-    multiply(false, false, n, n_y, n, 1, gram, n, test, n, 0, score, n);
+void linear_era::change_theta(const double* diagonal) {
     for (int o = 0; o < n_y; ++o)
         for (int k = 0; k < q; ++k) {
             const auto row = static_cast<size_t>(row_of(observer, k));
-            solve[o * q + k] = score[area(o, n) + row] + ridge * test[area(o, n) + row] * gram[row * area(n + 1, 1)];
+            solve[o * q + k] = score[area(o, n) + row] + ridge * test[area(o, n) + row] * diagonal[row];
         }
     observer_change(observer, by->observer_work, solve);
     for (int k = 0; k < q; ++k)
         for (int o = 0; o < n_y; ++o) spread.error[k * n_y + o] = static_cast<real>(solve[o * q + k]);
 }
 
-/// moved <- change of the correlations; score <- relative change of the deviations they are scaled by.
-void linear_era::change_covariances(const double* gram) {
+/// moved <- change of the correlations; solve <- relative change of the deviations they are scaled by.
+void linear_era::change_covariances() {
     const double* scale = by->covariance.scale;
-    const auto over = [&](int a, int b, size_t entry) { return gram[entry] / (samples * scale[a] * scale[b]); };
-    for (int o = 0; o < n_y; ++o) score[o] = over(o, o, area(o, n + 1)) / 2;
+    const auto over = [&](int o, int c, int k) {
+        return score[area(o, n) + size_t(k * n_y + c)] / (samples * scale[o] * scale[c]);
+    };
+    for (int o = 0; o < n_y; ++o) solve[o] = over(o, o, 0) / 2;
     for (int k = 0; k <= last; ++k)
         for (int c = 0; c < n_y; ++c)
             for (int o = 0; o < n_y; ++o) {
                 const int at = (k * n_y + c) * n_y + o;
-                moved[at] = static_cast<real>(over(o, c, area(k * n_y + c, n) + size_t(o)) -
-                                              (score[o] + score[c]) * static_cast<double>(by->sequence[at]));
+                moved[at] =
+                    static_cast<real>(over(o, c, k) - (solve[o] + solve[c]) * static_cast<double>(by->sequence[at]));
             }
 }
 
@@ -275,14 +276,14 @@ void linear_era::change_products(const real* blocks) {
     multiply(false, false, tall, order, breadth, 1, whole, tall, room, breadth, 1, change, tall);
 }
 
-okid_model_t linear_era::along(const double* gram, double step) {
+okid_model_t linear_era::along(const double* diagonal, double step) {
     const int n_u = by->n_u;
     const real by_step = static_cast<real>(step);
     if (n_u > 0) {
-        change_theta(gram);
+        change_theta(diagonal);
         spread_error(observer, last, spread);
     } else {
-        change_covariances(gram);
+        change_covariances();
     }
     change_products(n_u > 0 ? spread.markov : moved);
     change_pencil();
@@ -300,7 +301,7 @@ okid_model_t linear_era::along(const double* gram, double step) {
             A[j * order + i] = pencil[j * order + i] + by_step * sum[j * order + i] / values[i];
     }
     for (int k = 0; n_u == 0 && k < order * n_y; ++k)
-        out_C[k] *= static_cast<real>(by->covariance.scale[k % n_y] * std::exp(step * score[k % n_y]));
+        out_C[k] *= static_cast<real>(by->covariance.scale[k % n_y] * std::exp(step * solve[k % n_y]));
     return {n_u, n_y, order, A, B, out_C, D, nullptr};
 }
 

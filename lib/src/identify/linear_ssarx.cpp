@@ -170,10 +170,9 @@ void linear_ssarx::change_of_states() {
     multiply(true, false, all, n, z.h, 1, omega, z.h, shifted, z.h, 1, found, all);
 }
 
-okid_model_t linear_ssarx::along(const double* gram, double step) {
+okid_model_t linear_ssarx::along(double step) {
     const subspace_sizes& z = view.sizes;
     const int n = order, k = n + z.n_u, e = n + z.n_y, nf = k + z.n_u + e, all = 2 * nf;
-    multiply(false, false, size, 2 * n + k + z.n_y, size, 1, gram, size, right, size, 0, moved, size);
     change_of_states();
     for (int r = 0; r < n; ++r)
         for (int f = 0; f < nf; ++f)

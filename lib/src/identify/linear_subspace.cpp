@@ -37,9 +37,7 @@ void linear_subspace::lay_out(const okid_identify& s, int largest, arena& memory
     right = memory.take<double>(area(size, 2 * largest));
     rows = memory.take<double>(area(tallest, size));
     moved = memory.take<double>(area(size, 2 * largest));
-    seen = memory.take<double>(area(4 * functionals, 2 * largest));
     found = memory.take<double>(area(functionals, largest));
-    spare = memory.take<double>(area(functionals, largest));
     solve = memory.take<double>(solve_work(std::max({size, tallest, h})));
     C = memory.take<double>(area(n_y, largest));
     out_A = memory.take<okid_real_t>(area(largest, largest));
@@ -138,33 +136,28 @@ okid_status_t linear_subspace::begin(okid_identify& identifier, const okid_ident
     multiply(false, false, nf, h, h, 1, next, nf, L33, size, 0, future + nf, all);
     solve_lower_right(size, view.L, size, rows, all, all, solve);
     to_sums(rows, all, left, false);
+    for (int c = 0; c < size; ++c)
+        for (int r = 0; r < 2 * nf; ++r) left[at(2 * nf + r, c, all)] += left[at(r, c, all)]; // z + e
     return OKID_OK;
 }
 
-okid_model_t linear_subspace::along(const double* gram, double step) {
+/// found <- (z + e of ask) P + z Q of ask, P = G z' M^-1, Q = G e' M^-1, and of next with P M^-1, for CVA less P + Q, and Q M^-1.
+okid_model_t linear_subspace::along(double step) {
     const int n = order, nf = 3 * n + n_y, all = 4 * nf;
-    const bool cva = view.method == OKID_SUBSPACE_CVA;
-    multiply(false, false, size, 2 * n, size, 1, gram, size, right, size, 0, moved, size);
-    multiply(false, false, all, 2 * n, size, 1, left, all, moved, size, 0, seen, all);
-    // Of the 4 x 2 blocks of `seen`: rows z of ask and next, e of ask and next; columns z, e.
-    const auto part = [&](int row, int column) { return seen + at(row * nf, column * n, all); };
-    const auto change_of_z = [&](int which, double* to) {
-        for (int k = 0; k < n; ++k)
-            for (int r = 0; r < nf; ++r)
-                to[at(r, k, nf)] =
-                    part(which, 0)[at(r, k, all)] + part(which, 1)[at(r, k, all)] + part(2 + which, 0)[at(r, k, all)];
-    };
-    change_of_z(1, spare);
-    std::copy(spare, spare + at(0, n, nf), found);
-    if (cva) { // less dW Gm M
-        for (int k = 0; k < n; ++k)
-            for (int r = 0; r < nf; ++r) spare[at(r, k, nf)] += part(3, 1)[at(r, k, all)];
-        multiply(false, false, nf, n, n, -1, spare, nf, root, n, 1, found, nf);
-    }
-    multiply(false, false, nf, n, n, 1, found, nf, back, n, 0, spare, nf);
-    change_of_z(0, found);
-    for (size_t k = 0; k < area(nf, n); ++k) spare[k] += found[k];
-    multiply(false, false, nf, n, n, 1, spare, nf, back, n, 0, found, nf);
+    const size_t one = area(size, n);
+    double *P = rows, *Q = P + one, *later_P = Q + one, *later_Q = later_P + one;
+    multiply(false, false, size, n, n, 1, moved, size, back, n, 0, P, size);
+    multiply(false, false, size, n, n, 1, moved + one, size, back, n, 0, Q, size);
+    if (view.method == OKID_SUBSPACE_CVA)
+        for (size_t k = 0; k < one; ++k) later_P[k] = -(P[k] + Q[k]);
+    else
+        std::fill(later_P, later_P + one, 0.0);
+    multiply(false, false, size, n, n, 1, P, size, back, n, 1, later_P, size);
+    multiply(false, false, size, n, n, 1, Q, size, back, n, 0, later_Q, size);
+    multiply(false, false, nf, n, size, 1, left, all, Q, size, 0, found, nf);
+    multiply(false, false, nf, n, size, 1, left + nf, all, later_Q, size, 1, found, nf);
+    multiply(false, false, nf, n, size, 1, left + 2 * nf, all, P, size, 1, found, nf);
+    multiply(false, false, nf, n, size, 1, left + 3 * nf, all, later_P, size, 1, found, nf);
     for (int k = 0; k < n; ++k)
         for (int r = 0; r < n; ++r) A[at(r, k, n)] = found[at(n + r, k, nf)] + found[at(2 * n + k, r, nf)];
     multiply(false, false, n, n, n, -1, found, nf, pencil, n, 1, A, n);

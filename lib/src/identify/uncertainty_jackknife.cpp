@@ -6,7 +6,7 @@
 // REFERENCE  docs/numerics.md, uncertainty
 // NUMERICS   codes: the sums without the block are exact; doubles: a rounding of the whole. Linear: the sums of a block are
 //            taken about the means of the whole, which is the derivative of the centred sums
-// WORKSPACE  an identifier, one accumulator, 2 m doubles, or the Gram matrix of a block and linear.hpp's; no heap
+// WORKSPACE  an identifier, one accumulator, 2 m doubles, or room for the Gram matrix of a block and linear.hpp's; no heap
 #include <okid/uncertainty.h>
 
 #include "accumulate/lag_means.h"
@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 using std::size_t;
 
@@ -28,9 +29,11 @@ struct okid_jackknife {
     okid::followed_era followed;
     void *identifier_block, *rest_block;
     size_t identifier_bytes, rest_bytes;
-    double *gram, *mean, *part_mean; ///< linear: Gram matrix of a part; lag-row means of the whole, of a part
-    int size;                        ///< of gram
-    okid_run_sums_t run;             ///< of a part that is one run
+    double *gram, *mean,
+        *part_mean;      ///< linear: Gram matrix of a part, or room for it; lag-row means of the whole, of a part
+    double* diagonal;    ///< of the Gram matrix of a part
+    int size;            ///< of gram
+    okid_run_sums_t run; ///< of a part that is one run
     okid::linear_era era;
     okid::linear_subspace subspace;
     okid::linear_ssarx ssarx;
@@ -51,7 +54,7 @@ void lay_out_linear(okid_jackknife& s, okid::arena& memory) {
     s.size = shape.n;
     s.gram = memory.take<double>(static_cast<size_t>(s.size) * static_cast<size_t>(s.size));
     const auto n = static_cast<size_t>(s.size), m = static_cast<size_t>(s.channels);
-    for (double** each : {&s.mean, &s.part_mean, &s.run.head, &s.run.tail}) *each = memory.take<double>(n);
+    for (double** each : {&s.mean, &s.part_mean, &s.diagonal, &s.run.head, &s.run.tail}) *each = memory.take<double>(n);
     for (double** each : {&s.run.sum, &s.run.mean}) *each = memory.take<double>(m);
     s.run.S = memory.take<double>(m * n);
     if (shape.config.method == OKID_METHOD_N4SID_SSARX)
@@ -82,10 +85,12 @@ size_t lay_out(okid_jackknife& s, okid::arena& memory) {
     return memory.bytes();
 }
 
-/// gram <- that of one run, by columns: the first from the sums, the others along the diagonals (what enters less what
-/// leaves). To remove means it is made about those of lag 0 and then moved to those of every lag row of the whole.
-void gram_of_run(const okid_jackknife& s, const okid_run_sums_t& run) {
-    const int m = s.channels, n = s.size, p = n / m - 1;
+/// asked.products <- G asked.columns, G the Gram matrix of one run: some columns at a time, the first from the sums, the others
+/// along the diagonals (what enters less what leaves). To remove means it is made about those of lag 0, and its products moved
+/// to those of every lag row of the whole.
+void multiply_run(const okid_jackknife& s, const okid_run_sums_t& run, const okid::asked_of_gram& asked) {
+    constexpr int some = 64;
+    const int m = s.channels, n = s.size, p = n / m - 1, wide = std::min(std::max(1, some / m), p) * m;
     const bool centred = s.config.identify.detrend != OKID_DETREND_NONE;
     const auto rows = static_cast<double>(run.rows);
     double* sum = s.part_mean; // of the lag rows
@@ -98,45 +103,61 @@ void gram_of_run(const okid_jackknife& s, const okid_run_sums_t& run) {
         run.head[i] -= s.mean[i % m];
         run.tail[i] -= s.mean[i % m];
     }
-    const auto column_of = [&](int j) { return s.gram + static_cast<size_t>(j) * static_cast<size_t>(n); };
-    for (int c = 0; c < m; ++c)
-        for (int i = 0; i < n; ++i) column_of(c)[i] = run.S[i * m + c];
-    for (int j = m; j < n; ++j) {
-        double* column = column_of(j);
-        const double *before = column_of(j - m), enters = run.head[j - m], leaves = run.tail[j - m];
-        for (int i = 0; i < m; ++i) column[i] = column_of(i)[j];
-        for (int i = m; i < n; ++i) column[i] = before[i - m] + enters * run.head[i - m] - leaves * run.tail[i - m];
+    double *strip = s.gram + okid::at(0, m, n), *last = s.gram; // the columns in hand behind the m before them
+    for (int first = 0; first < n; first += wide) {
+        const int count = std::min(wide, n - first);
+        for (int j = first; j < first + count; ++j) {
+            double* column = strip + okid::at(0, j - first, n);
+            const double* before = column - okid::at(0, m, n);
+            for (int i = 0; i < m; ++i) column[i] = run.S[j < m ? i * m + j : j * m + i];
+            for (int i = m; j < m && i < n; ++i) column[i] = run.S[i * m + j];
+            const double enters = j < m ? 0 : run.head[j - m], leaves = j < m ? 0 : run.tail[j - m];
+            for (int i = m; j >= m && i < n; ++i)
+                column[i] = before[i - m] + enters * run.head[i - m] - leaves * run.tail[i - m];
+            s.diagonal[j] = column[j];
+        }
+        okid::linalg::multiply(false, false, n, asked.count, count, 1, strip, n, asked.columns + first, n, first > 0,
+                               asked.products, n);
+        std::copy(strip + okid::at(0, count - m, n), strip + okid::at(0, count, n), last);
     }
     if (!centred) return;
     double* apart = run.head; // of the means, lag row for lag row
     for (int i = 0; i < n; ++i) {
         sum[i] -= rows * (s.mean[i % m] + s.mean[i]) / 2;
         apart[i] = s.mean[i] - s.mean[i % m];
+        s.diagonal[i] -= 2 * sum[i] * apart[i];
     }
-    for (int j = 0; j < n; ++j) {
-        double* column = column_of(j);
-        const double step = apart[j], own = sum[j];
-        for (int i = 0; i < n; ++i) column[i] -= own * apart[i] + sum[i] * step;
+    for (int k = 0; k < asked.count; ++k) {
+        const double* x = asked.columns + okid::at(0, k, n);
+        const double by_sum = std::inner_product(sum, sum + n, x, 0.0),
+                     by_step = std::inner_product(apart, apart + n, x, 0.0);
+        double* y = asked.products + okid::at(0, k, n);
+        for (int i = 0; i < n; ++i) y[i] -= by_sum * apart[i] + by_step * sum[i];
     }
 }
 
-/// gram <- that of the part about the means of the whole.
-okid_status_t gram_of_part(okid_jackknife& s, okid_accumulator_t* part) {
+/// The same for any part, about the means of the whole.
+okid_status_t multiply_part(okid_jackknife& s, okid_accumulator_t* part, const okid::asked_of_gram& asked) {
     const okid_detrend_t detrend = s.config.identify.detrend;
-    if (s.config.sums.forgetting == 1 && okid_accumulator_run(part, OKID_DETREND_NONE, &s.run) == OKID_OK) {
-        gram_of_run(s, s.run);
+    if (s.config.sums.forgetting == 1 && s.size > s.channels &&
+        okid_accumulator_run(part, OKID_DETREND_NONE, &s.run) == OKID_OK) {
+        multiply_run(s, s.run, asked);
         return OKID_OK;
     }
     const okid_status_t status = okid_accumulator_gram(part, detrend, s.gram, nullptr);
-    if (status != OKID_OK || detrend == OKID_DETREND_NONE) return status;
-    const double rows = okid_accumulator_lag_means(part, s.part_mean); // its own means, and how far they are away
-    for (int c = 0; c < s.size; ++c) s.part_mean[c] -= s.mean[c];
-    double* column = s.gram;
-    for (int c = 0; c < s.size; ++c, column += s.size) {
-        const double factor = rows * s.part_mean[c];
-        for (int r = 0; r < s.size; ++r) column[r] += factor * s.part_mean[r];
+    if (status != OKID_OK) return status;
+    if (detrend != OKID_DETREND_NONE) {
+        const double rows = okid_accumulator_lag_means(part, s.part_mean); // its own means, and how far they are away
+        for (int c = 0; c < s.size; ++c) s.part_mean[c] -= s.mean[c];
+        for (int c = 0; c < s.size; ++c) {
+            const double factor = rows * s.part_mean[c];
+            for (int r = 0; r < s.size; ++r) s.gram[okid::at(r, c, s.size)] += factor * s.part_mean[r];
+        }
     }
-    return status;
+    for (int c = 0; c < s.size; ++c) s.diagonal[c] = s.gram[okid::at(c, c, s.size)];
+    okid::linalg::multiply(false, false, s.size, asked.count, s.size, 1, s.gram, s.size, asked.columns, s.size, 0,
+                           asked.products, s.size);
+    return OKID_OK;
 }
 
 /// Share of the part, each channel counting alike; what is left of the whole keeps a little too.
@@ -226,13 +247,17 @@ okid_status_t okid_jackknife_delete(okid_jackknife_t* self, okid_accumulator_t* 
     okid_status_t status =
         part == nullptr ? OKID_OK : okid_accumulator_energy(part, s.config.identify.detrend, s.taken);
     if (s.config.linear != 0) {
-        if (status == OKID_OK) status = gram_of_part(s, part);
+        if (status == OKID_OK)
+            status = multiply_part(s, part,
+                                   s.ssarx.size > 0      ? s.ssarx.asks()
+                                   : s.subspace.size > 0 ? s.subspace.asks()
+                                                         : s.era.asks());
         if (status != OKID_OK) return status;
         *share = share_of(s, weight);
         const double step = -weight / (1 - *share);
-        *model = s.ssarx.size > 0      ? s.ssarx.along(s.gram, step)
-                 : s.subspace.size > 0 ? s.subspace.along(s.gram, step)
-                                       : s.era.along(s.gram, step);
+        *model = s.ssarx.size > 0      ? s.ssarx.along(step)
+                 : s.subspace.size > 0 ? s.subspace.along(step)
+                                       : s.era.along(s.diagonal, step);
         return OKID_OK;
     }
     if (status == OKID_OK) status = okid_accumulator_copy(s.rest, s.whole);
