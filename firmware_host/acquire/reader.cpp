@@ -18,6 +18,7 @@
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
+#include <utility>
 
 namespace okid_host {
 namespace {
@@ -27,6 +28,12 @@ constexpr int look_ms = 100;                 // how often a vanished interface i
 constexpr auto busy = std::chrono::milliseconds(2), rest = std::chrono::milliseconds(1);
 constexpr auto publish_every = std::chrono::milliseconds(20);
 constexpr int batches_between_looks = 64;
+
+/// Another number whenever something happened to the bus that is to be told at once.
+std::uint64_t happenings(const drv_stats_t& counts) {
+    return 2 * (counts.bus_off + counts.restarts + counts.error_passive + counts.link_down + counts.reopened) +
+           static_cast<std::uint64_t>(counts.link_is_down);
+}
 
 } // namespace
 
@@ -137,14 +144,17 @@ void bus_reader::run() {
     // The kernel stamps CAN frames: on a busy bus many are taken at once instead of one at a time. A line is stamped here.
     const bool may_rest = source_.ops == &drv_source_socketcan;
     int moved = 0;
+    std::uint64_t happened = 0;
     auto published = clock::now(), before = published;
     while (!stopping_) {
         wait(moved < 0);
         moved = drain();
         const auto now = clock::now();
-        if (now - published >= publish_every) {
+        const std::uint64_t before_it = std::exchange(happened, happenings(source_.counts));
+        if (happened != before_it || now - published >= publish_every) {
             published = now;
             publish_stats();
+            if (happened != before_it) wake_.signal();
         }
         if (may_rest && moved > 0 && now - before < busy) std::this_thread::sleep_for(rest);
         before = now;

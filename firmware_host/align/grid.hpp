@@ -62,7 +62,7 @@ struct grid_bus_counts {
 
 struct grid_channel_counts {
     std::int64_t expected = 0, received = 0;
-    std::int64_t uncertain = 0; ///< places at which one sample may be missing, unmarked
+    std::int64_t uncertain = 0; ///< places at which samples may be missing, unmarked
     double place_std_s = 0;     ///< by which the place beside channels of other buses is not known
 };
 
@@ -151,12 +151,15 @@ class grid {
         double spread = 0, tail_late = 0; ///< how late the last frame of a burst was, of late and now, periods
         std::array<double, 2> usual{};    ///< how late the least late was, of the decision time before and of this one
         std::int64_t usual_from = 0;      ///< the place at which this one began
+        double busy = 0;                  ///< the share of the bursts of late that are later than polls are
+        double few_least = 0,
+               few_worst = 0; ///< how late the least late of some bursts was, of these and at worst of late
         std::int64_t tail = 0, tail_ns = 0;  ///< place and stamp of the newest frame placed, for the line
         std::int64_t ahead = 0;              ///< frames in a row that came before their time
         std::int64_t in_burst = 0;           ///< frames of the burst at hand
         std::int64_t frames = 0, bursts = 0; ///< of all bursts, for the share of those that hold several
-        std::int64_t uncertain = 0;          ///< times polls slipped past a sample, unless it was one that is missing
-        std::int64_t slips = 0;              ///< by so many places the line is behind the samples for it
+        std::int64_t uncertain = 0; ///< times polls slipped past a sample, or samples are missing: nobody knows
+        std::int64_t slips = 0;     ///< by so many places the line is behind the samples for it
         std::int64_t slip_at = never, lost_at = never; ///< places of the newest slip and loss
         // The newest frames: what lies before all of them does not come any more (a frame may be eight places late).
         std::array<std::int64_t, 9> recent{};
@@ -210,6 +213,8 @@ class grid {
     double usually_late(const lane& l) const;
     void note_lateness(lane& l, std::int64_t index);
     void judge_late(lane& l, bool ended);
+    bool proved(const lane& l, std::int64_t lost) const;
+    bool told_of_loss(const lane& l) const;
     bool may_slip(const lane& l) const;
     bool bursts_alike(const lane& l, std::int64_t& times) const;
     double place_std_s(const lane& l) const;

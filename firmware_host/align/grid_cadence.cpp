@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 namespace okid_host {
 namespace {
@@ -31,6 +32,7 @@ constexpr double looks_again = 0.125;      // of the decision time
 constexpr double a_silence = 0.125;        // of the decision time
 constexpr double cut_off = 0.055;          // of the decision time: frames at the end of a stream that tell a loss
 constexpr std::int64_t cut_off_bursts = 8; // and at least so many times something was handed over
+constexpr double held_up_s = 0.1;          // a busy computer may be late by so much until the stream ends
 constexpr double ends_alike = 0.75;        // of the bursts have the size of the one before
 constexpr double full_later = 0.5;         // periods by which a full burst is later than usual when a sample is missing
 constexpr double a_sample = 0.65;          // periods by which all are later when a sample is missing, at least
@@ -40,6 +42,12 @@ constexpr double alike_late = 0.3;         // periods
 constexpr std::int64_t slip_apart = 2500;  // samples: clocks within 400 ppm slip past each other no more often
 constexpr double silent = 0.4;             // of the time a silent lane has: then its last burst is taken for cut off
 constexpr double least_spread = 0.15;      // periods
+constexpr double no_poll = 1.3;            // periods: nobody who looks regularly is later
+constexpr double scattered = 0.25;         // of the bursts are: the computer is busy
+constexpr double tail_share = 1.0 / 64;    // of a burst, of how many they are
+constexpr double alike_length = 0.6;       // of the mean of unit vectors whose angle is a lateness
+constexpr double alike_sure = 6;           // once in 400 times so without a reason
+constexpr double forgets_few = 0.98;       // eight bursts, of how late the least late of eight was
 constexpr double forgets_spread = 0.998;   // a burst, of how late the last frame of a burst was
 constexpr std::int64_t ahead_frames = 512; // in a row before their time: the line is wrong
 
@@ -60,6 +68,8 @@ void grid::begin_cadence(lane& l, double due_ns) {
     l.ahead = l.in_burst = 0;
     l.usual = {HUGE_VAL, HUGE_VAL};
     l.usual_from = l.last;
+    l.few_least = HUGE_VAL;
+    l.few_worst = l.busy = 0;
     l.patience = static_cast<double>(hold_);
     l.late.reserve(most_held_ + 1);
 }
@@ -156,8 +166,13 @@ void grid::judge_late(lane& l, bool ended) {
         const double more = l.least - usually_late(l);
         const auto lost = static_cast<std::int64_t>(std::floor(more + 1 - a_sample));
         const bool slips = lost == 1 && alike && may_slip(l);
+        if (lost > 0 && !slips && waited <= l.patience && !proved(l, lost)) {
+            ++l.uncertain;
+            place_late(l, l.which - l.placed + 1);
+            return;
+        }
         if (lost > 0 && !slips) {
-            l.uncertain += alike && (lost == 1 || in_two_steps(l));
+            l.uncertain += alike && !told_of_loss(l) && (lost == 1 || in_two_steps(l));
             place_after_loss(l, lost);
             return;
         }
@@ -171,6 +186,23 @@ void grid::judge_late(lane& l, bool ended) {
         place_late(l, seen && catches_up(l) ? waiting : 1); // a burst that was cut off
     else if (waiting >= most_held_ - 1)
         place_late(l, 1 + waiting / 4); // more than can wait came in less than the decision time: a stall made up for
+}
+
+/// The end of the stream has cut the decision time off: is it a loss all the same? The bus told of one, or nobody is held up
+/// so long, or all are late by whole samples (Rayleigh's test), and on a busy computer so few were never so late before.
+bool grid::proved(const lane& l, std::int64_t lost) const {
+    if (static_cast<double>(lost) > held_up_s * rate_hz_ || told_of_loss(l)) return true;
+    if (l.busy > scattered && l.least - l.few_worst <= a_sample) return false;
+    double ends = 0;
+    std::complex<double> sum = 0;
+    for (std::size_t i = l.placed; i < l.late.size(); ++i) {
+        if (i + 1 < l.late.size() &&
+            static_cast<double>(l.late[i + 1].time_ns - l.late[i].time_ns) <= same_burst * period_ns_)
+            continue;
+        sum += std::polar(1.0, 6.2831853 * lateness(l, l.late[i], i - l.placed));
+        ++ends;
+    }
+    return std::abs(sum) > alike_length * ends && std::norm(sum) > alike_sure * ends;
 }
 
 /// The oldest that wait are late by about a sample, and soon everything is later still: they were late, and what is missing
@@ -256,12 +288,18 @@ bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
            std::abs(later) > full_later;
 }
 
+/// The bus told of a loss no later than before the first frame that is about as early as any.
+bool grid::told_of_loss(const lane& l) const {
+    return std::any_of(l.late.begin() + static_cast<std::ptrdiff_t>(l.placed),
+                       l.late.begin() + static_cast<std::ptrdiff_t>(l.which) + 1,
+                       [](const late_frame& each) { return each.loss != 0; });
+}
+
 /// Bursts that all end alike came a period later: polls have slipped past a sample by drift, or one sample is missing.
 /// Nothing that arrives differs. The first comes by itself again and again, but not again soon, and the second hardly ever,
 /// unless the bus tells of it or the lane loses frames.
 bool grid::may_slip(const lane& l) const {
-    for (std::size_t i = l.placed; i <= l.which; ++i)
-        if (l.late[i].loss) return false;
+    if (told_of_loss(l)) return false;
     const std::int64_t silence = (l.late[l.placed].time_ns - l.time_ns) / std::llround(period_ns_);
     return l.last + silence - std::max(l.slip_at, l.lost_at) > slip_apart;
 }
@@ -326,6 +364,12 @@ void grid::end_burst(lane& l, std::int64_t index) {
         if (l.tail_late < 1) l.spread = std::max(forgets_spread * l.spread, l.tail_late);
     }
     note_lateness(l, index);
+    l.busy += tail_share * ((l.tail_late > no_poll) - l.busy);
+    l.few_least = std::min(l.few_least, l.tail_late);
+    if (l.bursts % cut_off_bursts == 0) {
+        l.few_worst = std::max(forgets_few * l.few_worst, l.few_least);
+        l.few_least = HUGE_VAL;
+    }
     l.ahead = l.tail_late < -most_early ? l.ahead + l.in_burst : 0;
     l.frames += l.in_burst;
     ++l.bursts;

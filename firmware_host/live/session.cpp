@@ -74,7 +74,7 @@ session::session(const live_config& config, const session_options& options)
       hammer_(config, stream_.sums().lags()), losses_(config.buses.size()), health_(config.buses.size()),
       clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)), rate_(config.rate_hz),
-      updates_(maker_, options.live && options.identify, config.n_u + config.n_y) {
+      updates_(maker_, options.live && options.identify, config.n_u + config.n_y, options.most_waiting) {
     if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
     open_virtual();
     if (config.publish.samples) feed_.emplace(config, virtual_ ? virtual_->size() : 0);
@@ -420,8 +420,9 @@ void session::remark_places(result_context& about) const {
             about.warnings.emplace_back(
                 "place_uncertain",
                 fmt::format(
-                    "\"{}\" comes in bursts without a counter: at {} place{} the polls slipped past a sample, or a "
-                    "sample is missing there and the channel is late by it from then on; only a counter tells",
+                    "\"{}\" has no counter: at {} place{} its frames began to come later. Polls slipped past a "
+                    "sample, or whoever sends was late to the end of the stream, or samples are missing there and the "
+                    "channel is late by them from then on; only a counter tells",
                     name, counts.uncertain, counts.uncertain == 1 ? "" : "s"));
         double worst = 0; // of R: the phase of the delay beside that of the damping
         for (int k = 0; k < model.mode_count; ++k)

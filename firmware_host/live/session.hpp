@@ -41,6 +41,7 @@ struct session_options {
     bool identify = true;                   ///< false: samples, gaps and counts only; no trigger, no result
     bool table = true;                      ///< modes and result on stdout, unless something else goes there
     session_listener* listener = nullptr;
+    std::size_t most_waiting = update_thread::most_waiting; ///< numbers that may wait for the mathematics
 };
 
 class session : public stream_target, private grid_sink {

@@ -133,6 +133,7 @@ def test_error_passive_bus_off_and_restart(adapter: Adapter, live: Run) -> None:
     assert (counts["received"], counts["lost"], counts["state"]) == (100, 30, "error-active")
     assert (counts["errors"]["bus_off"], counts["errors"]["restarted"]) == (1, 1)
     print(f"\nbus-off told after {1e3 * late:.0f} ms")
+    assert late < 0.1
 
 
 def test_unplugged_and_plugged_again(adapter: Adapter, live: Run) -> None:

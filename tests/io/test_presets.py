@@ -8,19 +8,14 @@ from __future__ import annotations
 
 import binascii
 import math
-import os
 import random
 import struct
-import time
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import cantools
 import program
 import pytest
-from lines import Run, line, of_type
+from lines import Run, line, of_type, witmotion
 
 ROOT = Path(__file__).resolve().parents[2]
 RATE = 100
@@ -157,11 +152,6 @@ def test_what_is_refused(tmp_path: Path, channel: str, expected: str) -> None:
     assert expected in done.stderr, done.stderr
 
 
-def witmotion(x: int, y: int, z: int) -> bytes:
-    body = b"\x55\x51" + struct.pack("<hhhh", x, y, z, 2500)
-    return body + bytes([sum(body) & 0xFF])
-
-
 def vectornav(n: int, x: float, y: float, z: float) -> bytes:
     body = b"\x01\x01\x01" + struct.pack("<Qfff", n * 10_000_000, x, y, z)  # TimeStartup and Accel of the common group
     return b"\xfa" + body + binascii.crc_hqx(body, 0).to_bytes(2, "big")
@@ -223,88 +213,3 @@ def test_unknown_preset_tells_which_there_are(tmp_path: Path) -> None:
         assert piece in done.stderr, done.stderr
     done = program.okid("check")
     assert done.returncode == 2 and "the file to check is missing" in done.stderr
-
-
-@contextmanager
-def punctual() -> Iterator[None]:
-    """This thread before all others, where we may ask for it: a sensor is not late because a computer is busy."""
-    before = os.sched_getscheduler(0), os.sched_getparam(0)
-    with suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(5))
-    yield
-    with suppress(PermissionError):
-        os.sched_setscheduler(0, *before)
-
-
-def send_bursts(
-    device: Path, config: Path, packets: list[bytes], rate: int, lost: set[int], fault: str
-) -> tuple[list[dict], float]:
-    """Eight packets at once, in real time.
-
-    @return the events of the run, and how late we wrote a burst, or okid read it, at worst [s]
-    """
-    late_s = 0.0
-    with line(device) as ours, punctual():
-        run = Run(config)
-        begin = time.monotonic() + 0.5
-        for first in range(0, len(packets), 8):
-            due = begin + (first + 8) / rate
-            time.sleep(max(0.0, due - time.monotonic()))
-            late_s = max(late_s, time.monotonic() - due)
-            burst = b""
-            for n in range(first, first + 8):
-                whole = packets[n]
-                if n in lost:
-                    whole = b"" if fault == "lost" else whole[:4] + bytes([whole[4] ^ 1]) + whole[5:]
-                burst += whole
-            ours.write(burst)
-            while (waited := time.monotonic() - due) < 4.0 / rate and ours.unread():
-                time.sleep(0.001)
-            late_s = max(late_s, waited)
-        time.sleep(0.3)
-        run.stop()
-        return run.finish(), late_s
-
-
-def read_bursts(folder: Path, fault: str) -> None:
-    """One run of 16 s: what arrived is counted, and the gaps stand where packets are missing."""
-    folder.mkdir()
-    device, config, rate, count = folder / "sensor", folder / "a.toml", 25, 400
-    config.write_text(
-        f'[acquisition]\nrate_hz = {rate}\n[[bus]]\nname = "s"\npreset = "wt901"\nbaud = 115200\ndevice = "{device}"\n'
-        '[[channel]]\nname = "x"\npreset = "wt901.x"\ndof = 1\n'
-        '[identification]\nmethod = "n4sid-cva"\nrows = 10\norder = 2\nupdate_s = 1.0\nsigma_blocks = 0\n'
-    )
-    lost = {66, 67, 68, 123, 204, 205, 276} if fault != "none" else set()
-    draw, motion = random.Random(4), [0.0, 0.0]
-    packets = []
-    for n in range(count):
-        motion = [1.6 * motion[0] - 0.96 * motion[1] + draw.gauss(0, 800), motion[0]]
-        packets.append(witmotion(round(motion[0]), n, 0))
-    for _ in range(3):  # where the computer let one of us be late the bursts were not those of the sensor
-        events, late_s = send_bursts(device, config, packets, rate, lost, fault)
-        stats = of_type(events, "stats")[-1]["bus"]["s"]
-        assert stats["duplicate"] == 0 and stats["received"] == count - len(lost)
-        assert stats["damaged"] == (len(lost) if fault == "check sum" else 0)
-        if late_s < 1.5 / rate:
-            break
-    else:
-        pytest.fail(f"this computer was {1e3 * late_s:.0f} ms late, three times: where the gaps are cannot be judged")
-    gaps = of_type(events, "gap")
-    marked = {n for gap in gaps for n in range(gap["first"], gap["last"] + 1)}
-    assert len(marked) == len(lost), (fault, marked, stats)
-    assert all(min(abs(n - m) for m in lost) < 8 for n in marked), (fault, sorted(marked), late_s)
-    if fault == "check sum":
-        assert marked == lost and {gap["cause"] for gap in gaps} == {"crc"}
-
-
-def test_bursts_of_a_sensor_without_a_counter(tmp_path: Path) -> None:
-    """Bursts of eight packets: no gap but those of lost packets, and no sample too many. Three sensors side by side:
-    one loses nothing, one loses packets, one sends packets that are damaged.
-
-    Slow ones (25 Hz, every 320 ms), so that a computer with other work is seldom late by samples. test_cadence looks at
-    every place, with a clock of its own.
-    """
-    with ThreadPoolExecutor(3) as pool:
-        for one in [pool.submit(read_bursts, tmp_path / fault, fault) for fault in ("none", "lost", "check sum")]:
-            one.result()

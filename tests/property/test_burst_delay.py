@@ -46,8 +46,8 @@ sigma_blocks = 0
 """
 
 
-def play(folder: Path, every_s: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    """@return the last stats, the result"""
+def play(folder: Path, every_s: float, lost: tuple[int, ...] = ()) -> tuple[dict[str, Any], dict[str, Any]]:
+    """@param lost  samples of the force. @return the last stats, the result"""
     force = np.random.default_rng(4).integers(-8000, 8000, 8000)
     answer, state = [], np.zeros(2)
     for value in force:
@@ -58,7 +58,8 @@ def play(folder: Path, every_s: float) -> tuple[dict[str, Any], dict[str, Any]]:
         due = n / 1000
         held = np.ceil(due / every_s + 1e-9) * every_s if every_s else due
         rows.append((due, f"can0 200#{(response & 0xFFFF).to_bytes(2, 'little').hex()}{n.to_bytes(2, 'little').hex()}"))
-        rows.append((float(held) + 1e-4, f"can1 100#{(value & 0xFFFF).to_bytes(2, 'little').hex()}"))
+        if n not in lost:
+            rows.append((float(held) + 1e-4, f"can1 100#{(value & 0xFFFF).to_bytes(2, 'little').hex()}"))
     rows.sort(key=lambda row: row[0])
     (folder / "a.log").write_text(
         "".join(f"({1.7e9 + t:.6f}) {text.upper().replace('CAN', 'can')}\n" for t, text in rows)
@@ -86,6 +87,17 @@ def test_bursts_that_end_anywhere_and_punctual_frames_are_known(tmp_path: Path) 
         stats, result = play(tmp_path, every_s)
         assert stats["channel"]["force"].get("place_std_us", 0) < 60
         assert stats["channel"]["force"]["missing"] == 0
+
+
+def test_a_place_that_nobody_can_know(tmp_path: Path) -> None:
+    """One sample that is lost looks like a poll that slips past one: warned of. A second one soon proves both."""
+    for lost, uncertain, missing in (((), 0, 0), ((4000,), 1, 0), ((4000, 5500), 2, 2)):
+        stats, result = play(tmp_path, 0.016, lost)
+        channel = stats["channel"]["force"]
+        assert (channel.get("uncertain", 0), channel["missing"]) == (uncertain, missing), lost
+        assert channel["expected"] == channel["received"] + channel["missing"]
+        said = [warning["text"] for warning in result["warnings"] if warning["code"] == "place_uncertain"]
+        assert len(said) == (uncertain > 0) and all('"force"' in text for text in said)
 
 
 RIG = """rate_hz = 1000.0

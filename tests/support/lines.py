@@ -95,6 +95,11 @@ def node_config(
     return path
 
 
+def witmotion(x: int, y: int, z: int) -> bytes:
+    body = b"\x55\x51" + struct.pack("<hhhh", x, y, z, 2500)
+    return body + bytes([sum(body) & 0xFF])
+
+
 class Run:
     """`okid run` in the background; result() waits for its end and gives what it told."""
 

@@ -233,8 +233,7 @@ static void test_stalls_make_no_gap() {
     }
 }
 
-/// Streams that end anywhere, in bursts, behind a stall, or while one is made up for: nothing is missing at the end, but for
-/// one sample once in 1,000 times.
+/// Streams that end anywhere, in bursts, behind a stall, or while one is made up for: nothing is missing at the end.
 static void test_any_end() {
     std::int64_t runs = 0, runs_false = 0;
     for (const double rate_hz : {200.0, 800.0, 1000.0, 2000.0})
@@ -254,11 +253,52 @@ static void test_any_end() {
                 play(rate_hz, pick(random, -60, 60), static_cast<int>(end_s * rate_hz), behind(stalls, usual), {}, out);
                 ++runs;
                 runs_false += out.marked > 0;
-                TEST_ASSERT_TRUE(out.marked <= 1);
             }
     std::printf("ends: %lld of %lld with a false gap\n", static_cast<long long>(runs_false),
                 static_cast<long long>(runs));
-    TEST_ASSERT_TRUE(500 * runs_false <= runs); // what was late to the very end looks like a loss
+    TEST_ASSERT_EQUAL_INT64(0, runs_false);
+}
+
+/// A computer that gets busy less than the decision time before the end (every burst is late by what a gamma law gives, few by
+/// little), or is so all the time (many by little): that is no loss. Among frames that are punctual one of a sample or of
+/// 0.2 s there is found.
+static void test_busy_until_the_end() {
+    std::int64_t wrong = 0, uncertain = 0, told = 0;
+    const unsigned runs = 4 * seeds();
+    for (unsigned seed = 1; seed <= runs; ++seed) {
+        std::mt19937 random(seed);
+        const double rate_hz = std::array<double, 4>{200, 800, 1000, 2000}[random() % 4];
+        const int burst = std::array<int, 4>{1, 4, 8, 16}[random() % 4], samples = static_cast<int>(6 * rate_hz);
+        const double left_s = pick(random, 0.05, 0.6), busy_s = random() % 3 ? 6 - left_s : 0;
+        const double shape = busy_s > 0 ? pick(random, 0.7, 4) : pick(random, 0.2, 0.6);
+        std::gamma_distribution<double> late(shape, pick(random, 1e-3, 6e-3)), punctual(2, 0.02e-3);
+        int handed = -1;
+        double here_s = 0;
+        const law bursts = [&](double t) {
+            const int n = static_cast<int>(std::lround(t * rate_hz)) / burst;
+            if (n != handed) here_s = (n + 1) * burst / rate_hz + (t >= busy_s ? late(random) : punctual(random));
+            handed = n;
+            return here_s;
+        };
+        rows out(1);
+        play(rate_hz, 0, samples, bursts, {}, out);
+        wrong += out.marked > 0;
+        uncertain += out.uncertain;
+        TEST_ASSERT_EQUAL_INT64(samples, out.at - out.marked);
+        const int at = static_cast<int>((5.95 - pick(random, 0.1, 0.6)) * rate_hz);
+        for (const int length : {1, static_cast<int>(0.2 * rate_hz)}) {
+            std::set<int> lost;
+            for (int i = 0; i < length && at + i < samples - 0.1 * rate_hz; ++i) lost.insert(at + i);
+            rows lacking(1);
+            play(rate_hz, 0, samples, [&](double t) { return t + punctual(random); }, lost, lacking);
+            told += lacking.marked == static_cast<std::int64_t>(lost.size());
+        }
+    }
+    std::printf("busy at the end: %lld of %u with a false gap, %lld places uncertain; losses there: %lld of %u found\n",
+                static_cast<long long>(wrong), runs, static_cast<long long>(uncertain), static_cast<long long>(told),
+                2 * runs);
+    TEST_ASSERT_TRUE(static_cast<double>(wrong) <= 0.01 * runs);
+    TEST_ASSERT_TRUE(static_cast<double>(told) >= 0.99 * 2 * runs);
 }
 
 /// Polls of 16 and 32 ms up to 2 kHz: nothing is missing, and of the losses at least 99 % are found. Where every poll ends
@@ -396,6 +436,7 @@ int main(void) {
     RUN_TEST(test_bursts_beside_a_punctual_bus);
     RUN_TEST(test_stalls_make_no_gap);
     RUN_TEST(test_any_end);
+    RUN_TEST(test_busy_until_the_end);
     RUN_TEST(test_polls_and_losses);
     RUN_TEST(test_slips_are_no_losses);
     RUN_TEST(test_packets_that_lack_a_sample);
