@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  tell lines from modes
-// METHOD   the amplitude of a response at the mode's frequency, block by block: that of a vibration driven by chance wanders
-//          (its spread is half its mean), that of a line stays. A multiple of a stronger vibration moves in phase with the power
+// METHOD   the amplitude along the mode's shape at its frequency, block by block: that of a vibration driven by chance wanders
+//          (its spread is half its mean), that of a line stays. A record silent before its force has no line louder than that
+//          silence. A multiple of a stronger vibration moves in phase with the power
 //          of that vibration (Kim & Powers 1979, in the time domain). A line of the force, a harmonic of a drive say, is in the
 //          responses too: where the force has a narrow peak and the responses over the force have none, there is no mode
 #include "lines.hpp"
@@ -19,11 +20,14 @@ using complex = std::complex<double>;
 constexpr double steady = 0.25;          // spread over mean of an amplitude; 0.52 for noise in a narrow band
 constexpr std::size_t fewest_blocks = 8; // to speak of a spread
 constexpr std::size_t line_blocks = 64;
+constexpr double loudest_silence =
+    0.07; // half the amplitude of a line of 3 % of the spread in the tenth of a record after a hit
 constexpr double line_periods = 8;    // at least so many in a block
 constexpr double line_damping = 0.01; // a pole damped more is no line
 constexpr double unresolved = 2;      // decay times in the record below which nobody can tell
 constexpr double mains_tolerance = 0.003;
 constexpr double multiple_tolerance = 0.015;
+constexpr double multiple_damping = 0.002, exact_multiple = 5e-4, most_order_of_line = 20; // of a machine's speed
 constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / sqrt(blocks)
 constexpr double stronger = 10; // amplitude of the vibration over that of its multiple
 constexpr double coupled_periods = 6;
@@ -33,9 +37,9 @@ constexpr double resonant = 2;        // power of the responses over that of the
 constexpr std::size_t averaged = 4;   // segments of a spectrum, at least
 constexpr std::size_t shortest = 128; // samples of a segment
 
-/// Amplitudes at a frequency, block by block under a Hann window.
-std::vector<complex> amplitudes(const record_level& level, std::size_t m, std::size_t channel, double frequency_hz,
-                                std::size_t block) {
+/// Amplitudes at a frequency, block by block under a Hann window, of channels with these weights from the first on.
+std::vector<complex> amplitudes(const record_level& level, std::size_t m, std::size_t first_channel,
+                                const std::vector<complex>& weights, double frequency_hz, std::size_t block) {
     std::vector<complex> out;
     const complex turn = std::polar(1.0, -2 * M_PI * frequency_hz / level.fs_hz);
     for (const sample_rows& rows : level.records) {
@@ -45,7 +49,10 @@ std::vector<complex> amplitudes(const record_level& level, std::size_t m, std::s
             complex sum = 0;
             for (std::size_t i = 0; i < block; ++i, phase *= turn) {
                 const double hann = 1 - std::cos(2 * M_PI * static_cast<double>(i) / static_cast<double>(block));
-                sum += hann * rows[(first + i) * m + channel] * phase;
+                complex along = 0;
+                for (std::size_t c = 0; c < weights.size(); ++c)
+                    along += weights[c] * rows[(first + i) * m + first_channel + c];
+                sum += hann * along * phase;
             }
             phase /= std::abs(phase);
             if (!std::isnan(sum.real())) out.push_back(sum / static_cast<double>(block));
@@ -81,8 +88,8 @@ bool near_multiple(double frequency_hz, double base, double tolerance) {
 /// Does the response at n f follow the n-th power of that at f?
 bool follows(const record_level& level, std::size_t m, std::size_t channel, double base, int n) {
     const auto block = static_cast<std::size_t>(coupled_periods * level.fs_hz / base) + 1;
-    const std::vector<complex> a = amplitudes(level, m, channel, base, block),
-                               b = amplitudes(level, m, channel, n * base, block);
+    const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
+                               b = amplitudes(level, m, channel, {1}, n * base, block);
     if (a.size() < 2 * fewest_blocks || b.size() != a.size() || strength(a) < stronger * strength(b)) return false;
     complex sum = 0;
     double both = 0;
@@ -100,16 +107,26 @@ const record_level& seen_by(const std::vector<record_level>& levels, double freq
     return levels[k];
 }
 
-bool is_line(const record_level& level, std::size_t m, std::size_t channel, const consensus_mode& mode) {
+/// What the outputs are multiplied with to give the amplitude where the mode is largest.
+std::vector<complex> weights_along(std::vector<complex> shape) {
+    double square = 0;
+    for (const complex& entry : shape) square += std::norm(entry);
+    const double most = std::abs(shape[largest(shape)]);
+    for (complex& entry : shape) entry = std::conj(entry) * (most / square);
+    return shape;
+}
+
+bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
     std::size_t longest = 0;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
     const double seconds = static_cast<double>(longest) / level.fs_hz;
-    if (2 * M_PI * mode.damping_ratio * mode.frequency_hz * seconds < unresolved) return true;
-    if (mode.damping_ratio > line_damping) return false;
+    const bool endless = 2 * M_PI * mode.damping_ratio * mode.frequency_hz * seconds < unresolved;
+    if (!endless && mode.damping_ratio > line_damping) return false;
     const auto periods = static_cast<std::size_t>(line_periods * level.fs_hz / mode.frequency_hz) + 1;
-    const std::vector<complex> a =
-        amplitudes(level, m, channel, mode.frequency_hz, std::max(periods, longest / line_blocks));
-    return a.size() >= fewest_blocks && spread_over_mean(a) < steady;
+    const std::vector<complex> a = amplitudes(level, m, n_u, weights_along(mode.shape), mode.frequency_hz,
+                                              std::max(periods, longest / line_blocks));
+    if (at_rest && strength(a) > loudest_silence) return false;
+    return endless || (a.size() >= fewest_blocks && spread_over_mean(a) < steady);
 }
 
 /// Powers of a range of channels, each in units of its spread, added up.
@@ -145,15 +162,31 @@ bool is_line_of_force(const record_level& level, std::size_t m, std::size_t n_u,
     return response.at / force.at < resonant * beside;
 }
 
+/// A sharp pole at a multiple of a line: where the speed of a machine wanders, its n-th multiple wanders n times as far, so that
+/// its amplitude in a block need not stay.
+bool is_multiple_of_line(const std::vector<consensus_mode>& modes, const consensus_mode& mode) {
+    return mode.damping_ratio < multiple_damping &&
+           std::any_of(
+               modes.begin(), modes.end(),
+               [&](const consensus_mode& base) {
+                   const double n = std::round(mode.frequency_hz / base.frequency_hz);
+                   return n >= 2 && n <= most_order_of_line &&
+                          std::count_if(base.why.begin(), base.why.end(),
+                                        [](const std::string& code) { return code == "tone" || code == "pickup"; }) >
+                              0 &&
+                          std::abs(mode.frequency_hz - n * base.frequency_hz) < exact_multiple * mode.frequency_hz;
+               });
+}
+
 } // namespace
 
-void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::size_t n_y,
+void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::size_t n_y, bool at_rest,
                 std::vector<consensus_mode>& modes) {
     const std::size_t m = n_u + n_y;
     for (consensus_mode& mode : modes) {
         const std::size_t channel = n_u + largest(mode.shape);
         const record_level& level = seen_by(levels, mode.frequency_hz);
-        if (is_line(level, m, channel, mode)) {
+        if (is_line(level, m, n_u, at_rest, mode)) {
             const bool mains = near_multiple(mode.frequency_hz, 50, mains_tolerance) ||
                                near_multiple(mode.frequency_hz, 60, mains_tolerance);
             mode.why.emplace_back(mains ? "pickup" : "tone");
@@ -173,6 +206,8 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
             break;
         }
     }
+    for (consensus_mode& mode : modes)
+        if (mode.confident() && is_multiple_of_line(modes, mode)) mode.why.emplace_back("harmonic");
 }
 
 } // namespace okid_host

@@ -7,7 +7,8 @@
 namespace okid_host {
 
 /// Adds "tone", "pickup" or "harmonic" to the modes that are no vibration of the structure by itself.
-void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::size_t n_y,
+/// @param at_rest  the records are silent before their forces
+void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::size_t n_y, bool at_rest,
                 std::vector<consensus_mode>& modes);
 
 } // namespace okid_host

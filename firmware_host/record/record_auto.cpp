@@ -286,7 +286,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     tell("looking with several methods, horizons and rates");
     const auto runs = look_at(levels, n_u, n_y, work.at_rest, options.threads);
     auto modes = find_agreement(runs);
-    mark_lines(levels, set.n_u, set.n_y, modes);
+    mark_lines(levels, set.n_u, set.n_y, work.at_rest, modes);
     mark_slow(set, options.fs_hz, modes);
     keep_wanted(options, modes);
     modes = worth_telling(std::move(modes), options.all_modes);

@@ -40,13 +40,52 @@ std::vector<record_level> table_test(double mode_hz, unsigned seed) {
     return {level};
 }
 
+/// Two outputs beside each other: a hit after some silence, or noise all the time, of one mode; a line with it.
+record_level answered(double mode_hz, double mode_damping, bool hit, double line_hz, double line, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    record_level level;
+    level.fs_hz = fs;
+    level.top = 0.48;
+    level.samples = count;
+    sample_rows& rows = level.records.emplace_back();
+    const std::complex<double> pole = std::exp(
+        2 * M_PI * mode_hz / fs * std::complex<double>(-mode_damping, std::sqrt(1 - mode_damping * mode_damping)));
+    std::complex<double> state = 0;
+    double square = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        state = pole * state + (hit ? (i == 20 ? 1.0 : 0.0) : normal(random));
+        square += std::norm(state) / 2 / count;
+        rows.insert(rows.end(), {state.imag(), -0.5 * state.imag()});
+    }
+    const double hum = 2 * M_PI * line_hz / fs;
+    for (std::size_t i = 0; i < 2 * count; ++i)
+        rows[i] =
+            rows[i] / std::sqrt(square) + line * std::sin(hum * static_cast<double>(i / 2)) + 0.01 * normal(random);
+    return level;
+}
+
+std::vector<consensus_mode> listed(const record_level& level, bool at_rest, std::vector<consensus_mode> modes) {
+    mark_lines({level}, 0, 2, at_rest, modes);
+    return modes;
+}
+
+consensus_mode pole(double frequency_hz, double damping_ratio, std::complex<double> second) {
+    consensus_mode mode;
+    mode.frequency_hz = frequency_hz;
+    mode.damping_ratio = damping_ratio;
+    mode.agreement = 1;
+    mode.shape = {1.0, second};
+    return mode;
+}
+
 std::vector<std::string> why(double mode_hz, double listed_hz, double listed_damping) {
     std::vector<consensus_mode> modes(1);
     modes[0].frequency_hz = listed_hz;
     modes[0].damping_ratio = listed_damping;
     modes[0].agreement = 1;
     modes[0].shape = {1.0};
-    mark_lines(table_test(mode_hz, 7), 1, 1, modes);
+    mark_lines(table_test(mode_hz, 7), 1, 1, false, modes);
     return modes[0].why;
 }
 
@@ -67,8 +106,35 @@ static void a_mode_stays_one_wherever_it_lies() {
     for (const double mode : {7.95, 8.3, 9.0, 9.1, 20.3}) TEST_ASSERT_EQUAL_UINT64(0, why(mode, mode, damping).size());
 }
 
+/// In each output the mode beside it makes the amplitude of the line wander; along its shape that mode cancels.
+static void a_line_is_seen_along_its_shape() {
+    const auto modes = listed(answered(8, 0.02, false, 7.3, 0.3, 3), false, {pole(7.3, 2e-4, 1), pole(8, 0.02, -0.5)});
+    TEST_ASSERT_EQUAL_UINT64(1, modes[0].why.size());
+    TEST_ASSERT_EQUAL_STRING("tone", modes[0].why[0].c_str());
+    TEST_ASSERT_EQUAL_UINT64(0, modes[1].why.size());
+}
+
+static void what_rings_after_silence_is_no_line() {
+    const record_level level = answered(3, 8e-4, true, 11, 0, 5); // decays by a factor of three in the record
+    TEST_ASSERT_EQUAL_UINT64(1, listed(level, false, {pole(3, 8e-4, -0.5)})[0].why.size());
+    TEST_ASSERT_EQUAL_UINT64(0, listed(level, true, {pole(3, 8e-4, -0.5)})[0].why.size());
+    TEST_ASSERT_EQUAL_UINT64(1,
+                             listed(level, true, {pole(4.5, 8e-4, 1)})[0].why.size()); // quieter than the silence may be
+}
+
+static void a_multiple_of_a_line_is_no_mode() {
+    const record_level level = answered(9.02, 0.001, false, 3, 1, 9);
+    const auto modes = listed(level, false, {pole(3, 1e-5, 1), pole(9.0, 0.001, -0.5), pole(9.02, 0.001, -0.5)});
+    TEST_ASSERT_EQUAL_STRING("tone", modes[0].why.at(0).c_str());
+    TEST_ASSERT_EQUAL_STRING("harmonic", modes[1].why.at(0).c_str());
+    TEST_ASSERT_EQUAL_UINT64(0, modes[2].why.size());
+}
+
 int main() {
     UNITY_BEGIN();
+    RUN_TEST(a_line_is_seen_along_its_shape);
+    RUN_TEST(what_rings_after_silence_is_no_line);
+    RUN_TEST(a_multiple_of_a_line_is_no_mode);
     RUN_TEST(a_multiple_of_the_drive_is_no_mode);
     RUN_TEST(a_mode_stays_one_wherever_it_lies);
     return UNITY_END();
