@@ -39,6 +39,7 @@ LIMITS |= {
     "handed_over_over_bare_calm": (20.0, "p99 from a line to the thread that identifies, of that of a bare reader"),
     "handed_over_over_bare_busy": (5.0, "the same beside two busy processors"),
 }
+LATENCY_MS = {"calm": 10.0, "busy": 100.0}  # p99, W2 at 1 kHz on a pseudo terminal; busy: beside two busy processors
 LIMITS |= {
     "read_csv_over_pyarrow": (1.5, "of the time pyarrow needs for the same table"),
     "read_csv_memory_over_numbers": (1.3, "of the numbers themselves, a table of 51 MB"),
@@ -93,7 +94,11 @@ def main() -> int:
         if name.startswith("slicot_") and name not in SLICOT:
             print(f"      {name:44} {float(value):8.2f}")
     for row in bench["rows"]:
-        if row["kernel"] == "direct":
+        if row.get("name") == "latency":  # of a bare reader where this machine itself is later than that
+            bound_ms = max(LATENCY_MS[row["case"]], row["bare_p99_ms"])
+            value, name = row["handed_over_p99_ms"], f"handed_over_p99_ms_{row['case']}"
+            judge(name, value, value <= bound_ms, f"<= {bound_ms:.3g}", "ms from a line to the thread that identifies")
+        if row.get("kernel") == "direct":
             n_u, n_y = SIZES[row["case"]]
             m, p = n_u + n_y, row["p"]
             value = row["state_bytes"] / (8 * (m * (n_u + p * m + n_y) + 2 * p * m))
