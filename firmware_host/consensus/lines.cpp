@@ -27,7 +27,6 @@ constexpr double line_damping = 0.01; // a pole damped more is no line
 constexpr double unresolved = 2;      // decay times in the record below which nobody can tell
 constexpr double mains_tolerance = 0.003;
 constexpr double multiple_tolerance = 0.015;
-constexpr double multiple_damping = 0.002, exact_multiple = 5e-4, most_order_of_line = 20; // of a machine's speed
 constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / sqrt(blocks)
 constexpr double stronger = 10; // amplitude of the vibration over that of its multiple
 constexpr double coupled_periods = 6;
@@ -162,22 +161,6 @@ bool is_line_of_force(const record_level& level, std::size_t m, std::size_t n_u,
     return response.at / force.at < resonant * beside;
 }
 
-/// A sharp pole at a multiple of a line: where the speed of a machine wanders, its n-th multiple wanders n times as far, so that
-/// its amplitude in a block need not stay.
-bool is_multiple_of_line(const std::vector<consensus_mode>& modes, const consensus_mode& mode) {
-    return mode.damping_ratio < multiple_damping &&
-           std::any_of(
-               modes.begin(), modes.end(),
-               [&](const consensus_mode& base) {
-                   const double n = std::round(mode.frequency_hz / base.frequency_hz);
-                   return n >= 2 && n <= most_order_of_line &&
-                          std::count_if(base.why.begin(), base.why.end(),
-                                        [](const std::string& code) { return code == "tone" || code == "pickup"; }) >
-                              0 &&
-                          std::abs(mode.frequency_hz - n * base.frequency_hz) < exact_multiple * mode.frequency_hz;
-               });
-}
-
 } // namespace
 
 void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::size_t n_y, bool at_rest,
@@ -206,8 +189,6 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
             break;
         }
     }
-    for (consensus_mode& mode : modes)
-        if (mode.confident() && is_multiple_of_line(modes, mode)) mode.why.emplace_back("harmonic");
 }
 
 } // namespace okid_host
