@@ -301,7 +301,7 @@ result_context prepare(lag_work& work) {
         record_options own = work.options;
         own.outputs = one.outputs;
         check_moving(one.set, own);
-        check_different_inputs(one.set, own);
+        check_different_inputs(moments_of(one.set), own);
         const missing_count here = count_missing(one.set);
         missing.samples += here.samples;
         missing.gaps += here.gaps;

@@ -211,7 +211,6 @@ void configure(const record_options& options, const missing_count& missing, reco
     config.fs_hz = options.fs_hz;
     work.analytic = options.analytic && options.refine != "yes"; // else its sums are not those of `identifier`
     config.detrend = options.detrend == "mean" && !work.at_rest ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
-    if (!work.at_rest) remark_early_hit(work.set, is_subspace(config.method) ? config.rows : config.p, work.context);
 }
 
 void tell(const record_options& options, const char* stage) {
@@ -338,12 +337,17 @@ record_result identify_records(record_set records, const record_options& options
     work.set.complete = missing.samples == 0;
     work.context = describe_records(work.set, options, missing);
     check_moving(work.set, options);
-    check_different_inputs(work.set, options);
+    std::vector<input_moments> about = moments_of(work.set);
+    check_different_inputs(about, options);
     if (options.detrend == "linear") detrend_linear(work.set, options);
     // Several records are each centred first, so that an offset that moved between them does no harm.
     const bool own_means_first = options.detrend == "mean" && (work.set.records.size() > 1 || work.at_rest);
     if (own_means_first) remove_means(work.set);
     configure(options, missing, work);
+    if (options.detrend == "linear" || own_means_first) about = moments_of(work.set);
+    if (!work.at_rest)
+        remark_early_hit(work.set, about, is_subspace(work.config.method) ? work.config.rows : work.config.p,
+                         work.context);
 
     okid_accumulator_t* accumulator = nullptr;
     std::unique_ptr<std::byte[]> sums;

@@ -460,7 +460,7 @@ record_result identify_auto(record_set records, const record_options& given) {
     if (!all) work.set = without_outputs(work.set, screened.kept);
     const record_options options = all ? given : without_outputs(given, screened.kept);
     check_moving(work.set, options);
-    check_different_inputs(work.set, options);
+    check_different_inputs(moments_of(work.set), options);
     const missing_count missing = count_missing(work.set);
     work.context = describe_records(work.set, options, missing);
     if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened

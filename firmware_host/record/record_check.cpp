@@ -33,41 +33,29 @@ const std::string& name_of(std::size_t channel, const record_options& options) {
     return channel < n_u ? options.inputs[channel] : options.outputs[channel - n_u];
 }
 
-/// What some inputs are about: complete samples, their mean, the products of what is left of them.
-struct input_moments {
-    double count = 0;
-    Eigen::VectorXd mean;
-    Eigen::MatrixXd products;
-
-    explicit input_moments(Eigen::Index n_u)
-        : mean(Eigen::VectorXd::Zero(n_u)), products(Eigen::MatrixXd::Zero(n_u, n_u)), apart_(n_u) {}
-
-    /// Of a piece that stays in the cache (samples x inputs), which is centred by it. Chan, Golub, LeVeque (1983).
-    void add(Eigen::Ref<Eigen::MatrixXd> piece) {
-        if (piece.rows() == 0) return;
-        const auto more = static_cast<double>(piece.rows()), both = count + more;
-        for (Eigen::Index r = 0; r < mean.size(); ++r) {
-            const double own = piece.col(r).mean();
-            apart_[r] = own - mean[r];
-            piece.col(r).array() -= own;
-            for (Eigen::Index c = 0; c <= r; ++c) {
-                products(r, c) += piece.col(r).dot(piece.col(c)) + count * more / both * (apart_[r] * apart_[c]);
-                products(c, r) = products(r, c);
-            }
+/// Add a piece that stays in the cache (samples x inputs), which is centred by it. Chan, Golub, LeVeque (1983).
+void add_piece(Eigen::Ref<Eigen::MatrixXd> piece, input_moments& to) {
+    if (piece.rows() == 0) return;
+    const auto more = static_cast<double>(piece.rows()), both = to.count + more;
+    Eigen::VectorXd apart(to.mean.size());
+    for (Eigen::Index r = 0; r < to.mean.size(); ++r) {
+        const double own = piece.col(r).mean();
+        apart[r] = own - to.mean[r];
+        piece.col(r).array() -= own;
+        for (Eigen::Index c = 0; c <= r; ++c) {
+            to.products(r, c) += piece.col(r).dot(piece.col(c)) + to.count * more / both * (apart[r] * apart[c]);
+            to.products(c, r) = to.products(r, c);
         }
-        mean += apart_ * (more / both);
-        count = both;
     }
-
-  private:
-    Eigen::VectorXd apart_;
-};
+    to.mean += apart * (more / both);
+    to.count = both;
+}
 
 /// Over the samples of a record that have all inputs.
 input_moments moments_of(const record_set& set, const record_data& record) {
     constexpr Eigen::Index most = 256;
     const auto n_u = static_cast<Eigen::Index>(set.n_u);
-    input_moments out(n_u);
+    input_moments out{0, Eigen::VectorXd::Zero(n_u), Eigen::MatrixXd::Zero(n_u, n_u)};
     Eigen::MatrixXd piece(most, n_u);
     Eigen::Index held = 0;
     const double* u = set.rows(record);
@@ -84,32 +72,31 @@ input_moments moments_of(const record_set& set, const record_data& record) {
             for (Eigen::Index c = 0; c < n_u; ++c) piece(held, c) = u[c];
             ++held;
         }
-        out.add(piece.topRows(held));
+        add_piece(piece.topRows(held), out);
         held = 0;
     }
     return out;
 }
 
 /// Correlation of the inputs over all samples that have them all; each record about its own mean.
-Eigen::MatrixXd input_correlation(const record_set& set) {
-    const auto size = static_cast<Eigen::Index>(set.n_u);
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size, size);
-    for (const record_data& record : set.records) sum += moments_of(set, record).products;
+Eigen::MatrixXd input_correlation(const std::vector<input_moments>& about) {
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(about.front().mean.size(), about.front().mean.size());
+    for (const input_moments& one : about) sum += one.products;
     const Eigen::VectorXd scale = sum.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
     return scale.asDiagonal() * sum * scale.asDiagonal();
 }
 
 /// Surely not half of the energy about the medians lies in the first p samples of the records: a median is within one
 /// standard deviation of the mean, and about no value is there less energy than about the mean.
-bool surely_later(const record_set& set, int p) {
+bool surely_later(const record_set& set, const std::vector<input_moments>& about, int p) {
     double early = 0, total = 0;
-    for (const record_data& record : set.records) {
-        const input_moments about = moments_of(set, record);
+    for (std::size_t r = 0; r < set.records.size(); ++r) {
+        const record_data& record = set.records[r];
         for (std::size_t k = 0; k < set.n_u; ++k) {
             const auto at = static_cast<Eigen::Index>(k);
-            const double energy = about.products(at, at), spread = std::sqrt(energy / std::max(about.count, 1.0));
+            const double energy = about[r].products(at, at), spread = std::sqrt(energy / std::max(about[r].count, 1.0));
             for (std::size_t i = 0; i < std::min(record.count, static_cast<std::size_t>(p)); ++i) {
-                const double most = std::abs(set.rows(record)[i * set.channels() + k] - about.mean[at]) + spread;
+                const double most = std::abs(set.rows(record)[i * set.channels() + k] - about[r].mean[at]) + spread;
                 early += most * most;
             }
             total += energy;
@@ -119,6 +106,12 @@ bool surely_later(const record_set& set, int p) {
 }
 
 } // namespace
+
+std::vector<input_moments> moments_of(const record_set& set) {
+    std::vector<input_moments> out;
+    for (const record_data& record : set.records) out.push_back(moments_of(set, record));
+    return out;
+}
 
 void check_moving(const record_set& set, const record_options& options) {
     for (std::size_t k = 0; k < set.channels(); ++k) {
@@ -158,10 +151,10 @@ void check_not_a_line(const record_set& set, const record_data& record, const st
                                       record.path, k < set.n_u ? "input" : "output", name_of(k, options)));
 }
 
-void check_different_inputs(const record_set& set, const record_options& options) {
+void check_different_inputs(const std::vector<input_moments>& about, const record_options& options) {
     const auto n_u = static_cast<Eigen::Index>(options.inputs.size());
-    if (n_u == 0 || (n_u == 1 && set.records.size() == 1)) return; // a single one moves: check_moving()
-    Eigen::MatrixXd left = input_correlation(set);
+    if (n_u == 0 || (n_u == 1 && about.size() == 1)) return; // a single one moves: check_moving()
+    Eigen::MatrixXd left = input_correlation(about);
     for (Eigen::Index k = 0; k < n_u; ++k) { // what is left of an input after the earlier ones explain what they can
         if (left(k, k) < 1e-10)
             throw failure(
@@ -247,8 +240,8 @@ void remark_exchanged(const std::vector<std::string>& units, const record_option
     }
 }
 
-void remark_early_hit(const record_set& set, int p, result_context& context) {
-    if (surely_later(set, p)) return;
+void remark_early_hit(const record_set& set, const std::vector<input_moments>& about, int p, result_context& context) {
+    if (surely_later(set, about, p)) return;
     double early = 0, total = 0;
     std::vector<double> values;
     for (const record_data& record : set.records)

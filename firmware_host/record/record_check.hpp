@@ -3,13 +3,26 @@
 #pragma once
 #include "record.hpp"
 
+#include <Eigen/Core>
+#include <vector>
+
 namespace okid_host {
+
+/// What some inputs are about: complete samples, their mean, the products of what is left of them.
+struct input_moments {
+    double count = 0;
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd products;
+};
+
+/// Of each record, over its samples that have all inputs.
+std::vector<input_moments> moments_of(const record_set& set);
 
 /// A channel that never moves makes any model a guess.
 void check_moving(const record_set& set, const record_options& options);
 
-/// Inputs that repeat each other share their effect in any proportion.
-void check_different_inputs(const record_set& set, const record_options& options);
+/// Inputs that repeat each other share their effect in any proportion; `about`: moments_of() the records.
+void check_different_inputs(const std::vector<input_moments>& about, const record_options& options);
 
 /// Largest magnitude in each channel of a record.
 std::vector<double> largest_of(const record_set& set, const record_data& record);
@@ -32,6 +45,7 @@ void remark_noisy_output(result_context& context);
 void remark_exchanged(const std::vector<std::string>& units, const record_options& options, remarks& said);
 
 /// A hit within the first p samples of every record serves as history only, and is lost: adds the remark hit_at_start.
-void remark_early_hit(const record_set& set, int p, result_context& context);
+/// `about`: moments_of() the records.
+void remark_early_hit(const record_set& set, const std::vector<input_moments>& about, int p, result_context& context);
 
 } // namespace okid_host

@@ -122,7 +122,11 @@ def identify(
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
         "hit_dofs": hit_dofs, "threads": threads,
     }  # fmt: skip
-    return of_host(host_result.identify(options, inputs, outputs))  # type: ignore[no-any-return]
+    said = {key: value for key, value in options.items() if value is not _UNSAID.get(key)}
+    return of_host(host_result.identify(said, inputs, outputs))  # type: ignore[no-any-return]
+
+
+_UNSAID: dict[str, Any] = identify.__kwdefaults__ or {}  # what the library takes where nothing is said
 
 
 def stabilization(

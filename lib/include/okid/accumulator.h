@@ -20,9 +20,9 @@
 /// then the doubles are added to pairs of 64-bit integers, value = high 2^48 + low with 0 <= low < 2^48, whose range of
 /// 2^111 holds full-scale 32-bit products (2^62) for 2^49 rows. Sums of the codes themselves are 64-bit integers:
 /// 2^31 2^32 = 2^63; OKID_ERR_RANGE stands before 2^32 rows of int32 codes (2^40 of int24, 2^48 of int16) are reached.
-/// With `bulk` = 1 calls of more than some two thousand int16 samples (or doubles: see below) go through an FFT (overlap-save,
-/// cross-spectra added, inverse transform rounded back to integers): about a third to a tenth of the work at 40 to 80 lags, and the same
-/// integers, because a batch is only taken while the proven error of its sums stays below 1/2. Sums of doubles are then right
+/// With `bulk` = 1 calls of more than some hundred int16 samples (or doubles: see below) go through an FFT (windows whose ends the
+/// direct kernel adds, cross-spectra added, the inverse transform rounded to integers): a third to a tenth of the work at 20 to 80 lags,
+/// and the same integers, because a batch is only taken while the proven error of its sums stays below 1/2. Sums of doubles are then right
 /// to some 100 eps of the energy of their channels, as plain sums of many samples are; how calls are cut changes last bits.
 #ifndef OKID_ACCUMULATOR_H
 #define OKID_ACCUMULATOR_H

@@ -158,47 +158,29 @@ static void flush_spectrum(okid_accumulator_t* a) {
     acc_bulk(a)->energy = 0;
 }
 
-/// Sum of squares of a channel over all windows of a batch, the largest of the channels; windows overlap by p samples.
-static double batch_energy(const okid_accumulator_t* a, const spectrum_plan_t* plan, const int16_t* codes) {
-    const int32_t m = a->m, p = plan->p, fresh = plan->fresh, total = spectrum_samples(plan);
-    const double* x = acc_x(a);
-    int64_t most = 0;
-    for (int32_t c = 0; c < m; ++c) {
-        int64_t sum = 0;
-        for (int32_t n = 0; n < p; ++n) sum += (int64_t)x[n * m + c] * (int64_t)x[n * m + c];
-        for (int32_t n = 0; n < total; ++n) {
-            const int64_t square =
-                (int64_t)codes[(size_t)n * (size_t)m + (size_t)c] * codes[(size_t)n * (size_t)m + (size_t)c];
-            const int again = n % fresh >= fresh - p && n < total - fresh; // the next window begins with it
-            sum += again ? 2 * square : square;
-        }
-        if (sum > most) most = sum;
-    }
-    return (double)most;
-}
-
 /// May this batch of codes go into the spectra, what they hold brought out before where needed?
-static int room_for_batch(okid_accumulator_t* a, const int16_t* codes) {
+static int room_for_batch(okid_accumulator_t* a, const int16_t* codes, size_t count) {
     bulk_t* bulk = acc_bulk(a);
-    const double energy = batch_energy(a, &bulk->plan, codes);
+    const double energy = okid_spectrum_energy(a->m, codes, (int32_t)count);
     if (okid_spectrum_error(&bulk->plan, bulk->energy + energy) >= 0.5) flush_spectrum(a);
     if (okid_spectrum_error(&bulk->plan, energy) >= 0.5) return 0;
     bulk->energy += energy;
     return 1;
 }
 
-/// The FFT path: take one batch when the call is long enough and sums of codes stay exact; returns the samples taken.
+/// The FFT path: take a batch where a window can be filled and sums of codes stay exact; returns the samples taken.
 static size_t feed_bulk(okid_accumulator_t* a, source_t source, size_t count) {
     bulk_t* bulk = acc_bulk(a);
     const int16_t* codes = source.kind == FROM_INT16 ? (const int16_t*)source.at : NULL;
     const double* numbers = source.kind == FROM_DOUBLE ? (const double*)source.at : NULL;
-    const size_t m = (size_t)a->m, total = (size_t)spectrum_samples(&bulk->plan), lags = acc_lag_count(a);
-    if ((!codes && !numbers) || count < total) return 0;
+    const size_t m = (size_t)a->m, most = (size_t)spectrum_samples(&bulk->plan), lags = acc_lag_count(a);
+    if ((!codes && !numbers) || count < (size_t)bulk->plan.length) return 0;
+    const size_t total = count < most ? count : most;
     flush(a);
-    if (codes && !room_for_batch(a, codes)) return 0;
+    if (codes && !room_for_batch(a, codes, total)) return 0;
     double* x = acc_x(a);
     keep_head(a, x);
-    okid_spectrum_pick().absorb(&bulk->plan, acc_spectra(a), x, codes, numbers);
+    okid_spectrum_pick().absorb(&bulk->plan, acc_spectra(a), x, codes, numbers, (int32_t)total);
     if (!(bulk->energy > 0)) bulk->energy = 1; // silence counts as rows too
     double* sum = acc_slot_data(a, a->open) + acc_slot_sum(a);
     if (numbers) add_rows(sum, numbers, m, total);

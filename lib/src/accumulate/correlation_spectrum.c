@@ -128,7 +128,7 @@ int okid_correlation_gather(okid_correlation_t* s) {
     const place_t a = place_of(s);
     const double energy = find_spectra(s, &a);
     if (cor_codes(s)) {
-        const spectrum_plan_t plan = {s->m, s->config.lags, s->points, 0, 0};
+        const spectrum_plan_t plan = {s->m, s->config.lags, s->points, 0, 0, 0};
         if (okid_spectrum_error(&plan, s->energy + energy) >= 0.5) okid_correlation_bring_out(s);
         if (okid_spectrum_error(&plan, energy) >= 0.5) return 0;
     }

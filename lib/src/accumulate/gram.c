@@ -33,6 +33,28 @@ static void add_ends(const okid_accumulator_t* a, double* gram, double sign, con
 #define ADD_ENTRY(i, j, i2, j2) (gram[(j) * n + (i)] += gram[(j2) * n + (i2)])
 #include "gram_sums.h"
 
+/// The same of one unbroken run alone, the usual case: each entry in one step from the one a lag before. @return 0: it is another case
+static int gram_of_run(const okid_accumulator_t* a, double* gram) {
+    acc_piece_t run;
+    if (a->closed > 0 || a->base_weight > 0 || !acc_piece(a, 0, &run) || !run.head || !run.tail) return 0;
+    const size_t m = (size_t)a->m, n = (size_t)a->width, p = (size_t)a->config.lags;
+    double *const head = gram, *const tail = gram + n; // in order, below the diagonal meanwhile
+    for (size_t b = 0, j = 0; b <= p; ++b)
+        for (size_t c = 0; c < m; ++c, ++j)
+            for (size_t i = 0; i < m && i < j; ++i) gram[j * n + i] = run.data[i * n + (p - b) * m + c];
+    for (size_t i = m, l = 0; i < n; i += m, ++l)
+        for (size_t c = 0; c < m; ++c) {
+            head[i + c] = run.head[acc_end(a, l, c)];
+            tail[i + c] = run.tail[acc_end(a, l, c)];
+        }
+    for (size_t j = m; j < n; ++j) {
+        const double enters = head[j], leaves = tail[j], *before = gram + (j - m) * n;
+        double* const column = gram + j * n;
+        for (size_t i = m; i < j; ++i) column[i] = head[i] * enters - tail[i] * leaves + before[i - m];
+    }
+    return 1;
+}
+
 // Codes with forgetting: exact slots, a fading base in double.
 static double slot_number(const okid_accumulator_t* a, const double* data, size_t k) {
     if (!acc_has_codes(a)) return data[k];
@@ -250,7 +272,7 @@ okid_status_t okid_accumulator_gram(okid_accumulator_t* self, okid_detrend_t det
         gram_of_exact(self, gram);
     else if (acc_has_codes(self))
         gram_of_mixed(self, gram);
-    else
+    else if (!gram_of_run(self, gram))
         gram_of_double(self, gram);
     const size_t m = (size_t)self->m, n = (size_t)self->width;
     for (size_t i = 0; i < n; ++i) {

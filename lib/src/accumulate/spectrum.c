@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    the lagged sums of 16-bit codes and of doubles by FFT, one source for every instruction set
-// METHOD     overlap-save with windows of N = p + L samples. z = current + i full (current: the window with its first p
-//            samples zero) gives both spectra of a channel from one complex transform; the cross-spectra
-//            Current_r conj(Full_c) of all windows are added, one inverse transform at the end gives
-//            S_b(r, c) = sum_k current_r[k] full_c[k - b], b = 0..p, without wrap-around. Channels lie across SIMD lanes, so
-//            that a butterfly never shuffles; four windows are transformed before the cross-spectra are touched once
+// METHOD     the record in windows of N samples, each transformed once: two windows as one complex signal z = a + i b. The real part
+//            of its circular correlation with itself is the sum of both, so that P_rc(f) = Z_r conj(Z_c) and what -f mirrors is
+//            added without taking a and b apart; one inverse transform at the end gives S_b(r, c) at b and S_b(c, r) at N - b.
+//            What wraps around the end of a window, and what the samples before it give instead, are the products of its first p
+//            samples alone: the direct kernel adds them. Channels lie across SIMD lanes, so that a butterfly never shuffles (up
+//            to 4 channels: two windows side by side); pairs of channels by turning the lanes of one side, half of all pairs
 // REFERENCE  Stockham radix 4: Van Loan, Computational Frameworks for the FFT (1992), 1.7; error: Higham, Accuracy and
 //            Stability of Numerical Algorithms (2002), theorem 24.2
 // NUMERICS   the sums are integers: rounding makes them exact while the error stays below 1/2, see okid_spectrum_error().
 //            Of doubles that error remains: as that of plain sums a small multiple of eps times the energy
-// WORKSPACE  okid_spectrum_doubles(); about 5 m log2 N + 4 m^2 flop a sample
+// WORKSPACE  okid_spectrum_doubles(); about 2.5 m log2 N + 2 m^2 (1 + p^2/N) flop a sample
 #include "spectrum.h"
 #include "isa.h"
+#include "kernel.h"
 
 #include <math.h>
 #include <string.h>
@@ -19,28 +21,34 @@
 #define ABSORB OKID_FOR_ISA(okid_spectrum_absorb_)
 #define FLUSH OKID_FOR_ISA(okid_spectrum_flush_)
 #define TRANSFORM OKID_FOR_ISA(okid_spectrum_transform_)
+#define OKID_KERNEL OKID_FOR_ISA(okid_kernel_)
 
+okid_kernel_fn OKID_KERNEL;
 enum { V = SPECTRUM_LANES };
 typedef double lanes_t __attribute__((vector_size(V * sizeof(double)), aligned(8)));
 
-/// Memory: twiddles cos, sin (N each); two work arrays of N complex lane vectors; the spectra of a batch (current and full,
-/// N/2 + 1 frequencies); the cross-spectra, frequency-major: for each frequency, row and group a complex lane vector.
+enum { TRANSFORMS = 2, MOST_SPECTRA = 4 };
+
+/// Memory: twiddles cos, sin (N each); one array of N complex lane vectors for each transform of a call, and a spare one; the
+/// cross-spectra, frequency-major: for each of N/2 + 1 frequencies a complex lane vector a turn; what the ends of the windows
+/// give (m x m(p+1), as the sums); 2 p samples of differences and p of codes for it.
 typedef struct map_t {
-    double *cosine, *sine, *work, *spare, *current, *full, *cross;
-    size_t window; ///< doubles of one window's spectra of all groups
+    double *cosine, *sine, *work, *spare, *cross, *ends, *differences, *first;
+    size_t array; ///< doubles of one
 } map_t;
 
 static map_t map_of(const spectrum_plan_t* plan, double* memory) {
-    const size_t n = (size_t)plan->length, half = n / 2 + 1, g = (size_t)plan->groups;
+    const size_t n = (size_t)plan->length, lags = (size_t)plan->m * (size_t)plan->p;
     map_t a;
+    a.array = 2 * V * n;
     a.cosine = memory;
     a.sine = a.cosine + n;
-    a.work = a.sine + n;
-    a.spare = a.work + 2 * V * n;
-    a.window = 2 * V * half * g;
-    a.current = a.spare + 2 * V * n;
-    a.full = a.current + SPECTRUM_BATCH * a.window;
-    a.cross = a.full + SPECTRUM_BATCH * a.window;
+    a.spare = a.sine + n;
+    a.work = a.spare + a.array;
+    a.cross = a.work + a.array * (size_t)(TRANSFORMS * plan->groups);
+    a.ends = a.cross + 2 * V * (n / 2 + 1) * (size_t)plan->turns;
+    a.differences = a.ends + (size_t)plan->m * ((size_t)plan->m + lags);
+    a.first = a.differences + 2 * lags;
     return a;
 }
 
@@ -97,99 +105,127 @@ static double* transform(const map_t* a, int total) {
     return x;
 }
 
-/// Window `index` of the batch into z = current + i full for one group; @return largest energy of its channels.
-static double load_codes(const spectrum_plan_t* plan, const map_t* a, const double* history, const int16_t* codes,
-                         int index, int group) {
-    const int m = plan->m, p = plan->p, first = group * V, lanes = m - first < V ? m - first : V;
-    double energy[V] = {0};
-    for (int k = 0; k < plan->length; ++k) {
-        const int n = index * plan->fresh + k - p; // sample of this call
-        double* z = a->work + 2 * V * (size_t)k;
-        for (int c = 0; c < lanes; ++c) {
-            const size_t at = (size_t)n * (size_t)m + (size_t)(first + c);
-            const double x = n < 0 ? history[(n + p) * m + first + c] : codes[at];
-            z[c] = k < p ? 0 : x;
-            z[V + c] = x;
-            energy[c] += x * x;
-        }
-        for (int c = lanes; c < V; ++c) z[c] = z[V + c] = 0;
-    }
-    double most = 0;
-    for (int c = 0; c < lanes; ++c) most = energy[c] > most ? energy[c] : most;
-    return most;
+/// The samples of a call, whichever they are.
+typedef struct given_t {
+    const int16_t* codes;
+    const double* numbers;
+    int32_t count;
+} given_t;
+
+static double sample_of(const given_t* given, size_t at) {
+    return given->codes ? given->codes[at] : given->numbers[at];
 }
 
-/// The same of numbers, whose energy nobody needs.
-static inline __attribute__((always_inline)) void load_numbers(const spectrum_plan_t* plan, const map_t* a,
-                                                               const double* history, const double* numbers, int index,
-                                                               int first, const int lanes) {
-    const int m = plan->m, p = plan->p, before = p - index * plan->fresh; // samples of the window in the history
-    for (int k = 0; k < plan->length; ++k) {
-        const double* row =
-            k < before ? history + (size_t)((index * plan->fresh + k) * m) : numbers + (size_t)(k - before) * (size_t)m;
-        double* z = a->work + 2 * V * (size_t)k;
-        for (int c = 0; c < lanes; ++c) {
-            z[c] = k < p ? 0 : row[first + c];
-            z[V + c] = row[first + c];
-        }
-        for (int c = lanes; c < V; ++c) z[c] = z[V + c] = 0;
-    }
+/// Channels of `count` rows into lanes of the rows of z, zeros behind them up to `total`.
+static inline __attribute__((always_inline)) void load_rows_of(double* z, const int16_t* codes, const double* numbers,
+                                                               int m, int count, int total, const int lanes) {
+    for (int k = 0; k < count; ++k, z += 2 * V)
+        for (int c = 0; c < lanes; ++c) z[c] = codes ? codes[k * m + c] : numbers[k * m + c];
+    for (int k = count; k < total; ++k, z += 2 * V)
+        for (int c = 0; c < lanes; ++c) z[c] = 0;
 }
 
-static void load_group(const spectrum_plan_t* plan, const map_t* a, const double* history, const double* numbers,
-                       int index, int group) {
-    const int first = group * V, lanes = plan->m - first < V ? plan->m - first : V;
-    if (lanes == V)
-        load_numbers(plan, a, history, numbers, index, first, V);
-    else if (lanes == V / 2)
-        load_numbers(plan, a, history, numbers, index, first, V / 2);
+/// One window of one group of channels.
+static void load_window(const spectrum_plan_t* plan, const given_t* given, double* z, int index, int group) {
+    const int m = plan->m, first = group * V, left = m - first < V ? m - first : V, total = plan->length;
+    const int64_t behind = (int64_t)given->count - (int64_t)index * total;
+    const int count = behind < 0 ? 0 : behind < total ? (int)behind : total;
+    const size_t at = count > 0 ? (size_t)index * (size_t)total * (size_t)m + (size_t)first : 0;
+    if (given->codes)
+        load_rows_of(z, given->codes + at, NULL, m, count, total, left);
+    else if (left == V)
+        load_rows_of(z, NULL, given->numbers + at, m, count, total, V);
+    else if (left == V / 2)
+        load_rows_of(z, NULL, given->numbers + at, m, count, total, V / 2);
     else
-        load_numbers(plan, a, history, numbers, index, first, lanes);
+        load_rows_of(z, NULL, given->numbers + at, m, count, total, left);
 }
 
-/// Current = (Z[f] + conj Z[N-f]) / 2, Full = (Z[f] - conj Z[N-f]) / 2i.
-static void split_spectra(const spectrum_plan_t* plan, const map_t* a, const double* z, int index, int group) {
-    const int total = plan->length;
-    const size_t stride = 2 * V * (size_t)plan->groups;
-    double* current = a->current + (size_t)index * a->window + 2 * V * (size_t)group;
-    double* full = a->full + (size_t)index * a->window + 2 * V * (size_t)group;
-    for (int f = 0; f <= total / 2; ++f, current += stride, full += stride) {
-        const double *low = z + 2 * V * (size_t)f, *high = z + 2 * V * (size_t)((total - f) % total);
-        const lanes_t zr = GET(low), zi = GET(low + V), wr = GET(high), wi = -GET(high + V);
-        PUT(current, 0.5 * (zr + wr));
-        PUT(current + V, 0.5 * (zi + wi));
-        PUT(full, 0.5 * (zi - wi));
-        PUT(full + V, 0.5 * (wr - zr));
+/// ends += the first samples of a window times what stands before them, less what the circular correlation takes for it.
+static void add_ends(const spectrum_plan_t* plan, const map_t* a, const given_t* given, const double* history,
+                     int index) {
+    const int m = plan->m, p = plan->p, total = plan->length, start = index * total;
+    const int count = given->count - start < total ? given->count - start : total, rows = count < p ? count : p;
+    const size_t lags = (size_t)(m * p), from = (size_t)start * (size_t)m;
+    const double* first = given->codes ? a->first : given->numbers + from;
+    for (size_t i = 0; given->codes && i < (size_t)(rows * m); ++i) a->first[i] = given->codes[from + i];
+    for (int j = 0; j < p; ++j)
+        for (int c = 0; c < m; ++c) {
+            const size_t to = (size_t)(j * m + c), wrapped = from + (size_t)(total - p) * (size_t)m + to;
+            const double known = index == 0 ? history[to] : sample_of(given, from - lags + to);
+            a->differences[to] = known - (total - p + j < count ? sample_of(given, wrapped) : 0);
+        }
+    OKID_KERNEL(a->ends, first, a->differences, m, m, p, rows);
+}
+
+#define TURN(v, a, b, c, d, e, f, g, h) __builtin_shufflevector(v, v, a, b, c, d, e, f, g, h)
+#define TURN_0(v) (v)
+#define TURN_1(v) TURN(v, 1, 2, 3, 4, 5, 6, 7, 0)
+#define TURN_2(v) TURN(v, 2, 3, 4, 5, 6, 7, 0, 1)
+#define TURN_3(v) TURN(v, 3, 4, 5, 6, 7, 0, 1, 2)
+#define TURN_4(v) TURN(v, 4, 5, 6, 7, 0, 1, 2, 3)
+#define TURN_5(v) TURN(v, 5, 6, 7, 0, 1, 2, 3, 4)
+#define TURN_6(v) TURN(v, 6, 7, 0, 1, 2, 3, 4, 5)
+#define TURN_7(v) TURN(v, 7, 0, 1, 2, 3, 4, 5, 6)
+#define HALF_1(v) TURN(v, 1, 2, 3, 0, 5, 6, 7, 4)
+#define HALF_2(v) TURN(v, 2, 3, 0, 1, 6, 7, 4, 5)
+/// cross += Z_r conj(Z_c), lane r of one side against lane r + turn of the other, all spectra at once.
+#define ADD_TURN(turn)                                                                                                 \
+    do {                                                                                                               \
+        lanes_t re = GET(to), im = GET(to + V);                                                                        \
+        _Pragma("GCC unroll 4") for (int k = 0; k < spectra; ++k) {                                                    \
+            const lanes_t cr = turn(o[2 * k]), ci = turn(o[2 * k + 1]);                                                \
+            re += z[2 * k] * cr;                                                                                       \
+            im += z[2 * k + 1] * cr;                                                                                   \
+            re += z[2 * k + 1] * ci;                                                                                   \
+            im -= z[2 * k] * ci;                                                                                       \
+        }                                                                                                              \
+        PUT(to, re);                                                                                                   \
+        PUT(to + V, im);                                                                                               \
+        to += 2 * V;                                                                                                   \
+    } while (0)
+
+/// Z and the mirrored conj(Z) of frequency f of each transform.
+#define GET_SPECTRA(into, group)                                                                                       \
+    _Pragma("GCC unroll 2") for (int k = 0; k < spectra; k += 2) {                                                     \
+        const double* x = done[k / 2 * groups + (group)];                                                              \
+        const double *low = x + 2 * V * (size_t)f, *high = x + 2 * V * (size_t)((total - f) & (total - 1));            \
+        (into)[2 * k] = GET(low);                                                                                      \
+        (into)[2 * k + 1] = GET(low + V);                                                                              \
+        (into)[2 * k + 2] = GET(high);                                                                                 \
+        (into)[2 * k + 3] = -GET(high + V);                                                                            \
     }
-}
 
-/// cross[f][r][group] += Current_r conj(Full), all windows of the batch at once; Full of a frequency stays in registers.
-static void add_cross(const spectrum_plan_t* plan, const map_t* a) {
-    const int m = plan->m, groups = plan->groups;
-    const size_t row = 2 * V * (size_t)groups;
-    for (int f = 0; f <= plan->length / 2; ++f)
+static inline __attribute__((always_inline)) void add_cross(const spectrum_plan_t* plan, const map_t* a,
+                                                            double* const* done, const int spectra) {
+    const int groups = plan->groups, total = plan->length;
+    double* to = a->cross;
+    for (int f = 0; f <= total / 2; ++f)
         for (int g = 0; g < groups; ++g) {
-            const double *full = a->full + (size_t)f * row + 2 * V * (size_t)g, *current = a->current + (size_t)f * row;
-            double* cross = a->cross + (size_t)(f * m) * row + 2 * V * (size_t)g;
-            lanes_t fr[SPECTRUM_BATCH], fi[SPECTRUM_BATCH];
-#pragma GCC unroll 4
-            for (int b = 0; b < SPECTRUM_BATCH; ++b) {
-                fr[b] = GET(full + (size_t)b * a->window);
-                fi[b] = GET(full + (size_t)b * a->window + V);
+            lanes_t z[2 * MOST_SPECTRA], other[2 * MOST_SPECTRA];
+            const lanes_t* o = z;
+            GET_SPECTRA(z, g)
+            ADD_TURN(TURN_0);
+            if (plan->share == 2) {
+                ADD_TURN(HALF_1);
+                ADD_TURN(HALF_2);
+                continue;
             }
-            for (int r = 0; r < m; ++r, cross += row) {
-                const double* mine = current + 2 * V * (size_t)(r / V) + r % V;
-                lanes_t re = GET(cross), im = GET(cross + V);
-#pragma GCC unroll 4
-                for (int b = 0; b < SPECTRUM_BATCH; ++b, mine += a->window) {
-                    const double cr = mine[0], ci = mine[V];
-                    re += cr * fr[b];
-                    im += ci * fr[b];
-                    re += ci * fi[b];
-                    im -= cr * fi[b];
-                }
-                PUT(cross, re);
-                PUT(cross + V, im);
+            ADD_TURN(TURN_1);
+            ADD_TURN(TURN_2);
+            ADD_TURN(TURN_3);
+            ADD_TURN(TURN_4);
+            o = other;
+            for (int h = g + 1; h < groups; ++h) {
+                GET_SPECTRA(other, h)
+                ADD_TURN(TURN_0);
+                ADD_TURN(TURN_1);
+                ADD_TURN(TURN_2);
+                ADD_TURN(TURN_3);
+                ADD_TURN(TURN_4);
+                ADD_TURN(TURN_5);
+                ADD_TURN(TURN_6);
+                ADD_TURN(TURN_7);
             }
         }
 }
@@ -201,30 +237,35 @@ double* TRANSFORM(const double* cosine, const double* sine, double* work, double
 }
 
 okid_spectrum_absorb_fn ABSORB;
-double ABSORB(const spectrum_plan_t* plan, double* memory, const double* history, const int16_t* codes,
-              const double* numbers) {
-    const map_t a = map_of(plan, memory);
-    double energy = 0;
-    for (int b = 0; b < SPECTRUM_BATCH; ++b) {
-        double most = 0;
-        for (int g = 0; g < plan->groups; ++g) {
-            const double e = codes ? load_codes(plan, &a, history, codes, b, g) : 0;
-            if (numbers) load_group(plan, &a, history, numbers, b, g);
-            most = e > most ? e : most;
-            split_spectra(plan, &a, transform(&a, plan->length), b, g);
+void ABSORB(const spectrum_plan_t* plan, double* memory, const double* history, const int16_t* codes,
+            const double* numbers, int32_t count) {
+    map_t a = map_of(plan, memory);
+    const given_t given = {codes, numbers, count};
+    const int share = plan->share, total = plan->length, groups = plan->groups;
+    double *done[TRANSFORMS * SPECTRUM_GROUPS], *next = a.work;
+    int transforms = 0;
+    for (int64_t from = 0; from < count; from += 2 * share * total, ++transforms)
+        for (int g = 0; g < groups; ++g, next += a.array) {
+            a.work = next;
+            for (int part = 0; part < 2; ++part)
+                for (int half = 0; half < share; ++half)
+                    load_window(plan, &given, next + part * V + half * (V / 2),
+                                2 * share * transforms + share * part + half, g);
+            done[transforms * groups + g] = transform(&a, total);
+            if (done[transforms * groups + g] == a.spare) a.spare = next; // of no one any more
         }
-        energy += most;
-    }
-    add_cross(plan, &a);
-    return energy;
+    if (transforms == 1)
+        add_cross(plan, &a, done, 2);
+    else
+        add_cross(plan, &a, done, 4);
+    for (int index = 0; index * total < count; ++index) add_ends(plan, &a, &given, history, index);
 }
 
-/// The spectra of rows r and r + 1 side by side: X = R_r + i R_(r+1) as N points, conjugated for the inverse transform.
-static void load_rows(const spectrum_plan_t* plan, const map_t* a, int r, int group) {
-    const int m = plan->m, groups = plan->groups, total = plan->length, pair = r + 1 < m;
+/// Two cross-spectra of the flush side by side: X = A + iB as N points, conjugated for the inverse transform.
+static void load_turns(const spectrum_plan_t* plan, const map_t* a, int k) {
+    const int turns = plan->turns, total = plan->length, pair = k + 1 < turns;
     for (int f = 0; f <= total / 2; ++f) {
-        const double* one = a->cross + 2 * V * (size_t)((f * m + r) * groups + group);
-        const double* two = one + 2 * V * (size_t)groups;
+        const double *one = a->cross + 2 * V * (size_t)(f * turns + k), *two = one + 2 * V;
         const lanes_t none = {0};
         const lanes_t ar = GET(one), ai = GET(one + V), br = pair ? GET(two) : none, bi = pair ? GET(two + V) : none;
         double* low = a->work + 2 * V * (size_t)f;
@@ -237,44 +278,85 @@ static void load_rows(const spectrum_plan_t* plan, const map_t* a, int r, int gr
     }
 }
 
+/// Where the numbers of the k-th cross-spectrum belong: channels of the two sides, how far one is turned.
+typedef struct turn_t {
+    int row, column, by;
+} turn_t;
+
+static turn_t turn_of(const spectrum_plan_t* plan, int k) {
+    for (int g = 0; g < plan->groups; ++g)
+        for (int h = g; h < plan->groups; ++h) {
+            const int count = h > g ? V : plan->share == 2 ? 3 : V / 2 + 1;
+            if (k < count) return (turn_t){g * V, h * V, k};
+            k -= count;
+        }
+    return (turn_t){0, 0, 0};
+}
+
+/// The sums of one pair of channels: `at` the lane of a correlation, lag b at b, lag -b at N - b; sign and scale taken out.
+static void put_pair(const spectrum_plan_t* plan, const double* at, double scale, int r, int c, double* sums) {
+    const int m = plan->m, p = plan->p, width = m * (p + 1), total = plan->length;
+    for (int b = 0; b <= p; ++b) {
+        const double forward = at[2 * V * (size_t)b] * scale;
+        const double back = at[2 * V * (size_t)((total - b) & (total - 1))] * scale;
+        sums[r * width + (p - b) * m + c] += forward;
+        if (r != c) sums[c * width + (p - b) * m + r] += back;
+    }
+}
+
 okid_spectrum_flush_fn FLUSH;
 void FLUSH(const spectrum_plan_t* plan, double* memory, double* sums, int of_codes) {
     const map_t a = map_of(plan, memory);
-    const int m = plan->m, p = plan->p, width = m * (p + 1);
-    const double scale = 1.0 / plan->length;
-    for (int r = 0; r < m; r += 2)
-        for (int g = 0; g < plan->groups; ++g) {
-            load_rows(plan, &a, r, g);
-            const double* x = transform(&a, plan->length); // conj of N (row r + i row r+1)
-            const int first = g * V, lanes = m - first < V ? m - first : V;
-            for (int b = 0; b <= p; ++b)
-                for (int c = 0; c < lanes; ++c) {
-                    const double* at = x + 2 * V * (size_t)b + c;
-                    double* to = sums + r * width + (p - b) * m + first + c;
-                    *to = of_codes ? nearbyint(at[0] * scale) : *to + at[0] * scale;
-                    if (r + 1 < m) to[width] = of_codes ? nearbyint(-at[V] * scale) : to[width] - at[V] * scale;
-                }
+    const int m = plan->m, per = V / plan->share;
+    const size_t count = (size_t)(m * m) * (size_t)(plan->p + 1);
+    const double scale = 0.5 / plan->length; // each frequency was counted with its mirror
+    if (of_codes) memset(sums, 0, count * sizeof *sums);
+    for (int k = 0; k < plan->turns; k += 2) {
+        load_turns(plan, &a, k);
+        const double* x = transform(&a, plan->length); // conj of N (one + i two)
+        for (int part = 0; part < 2 && k + part < plan->turns; ++part) {
+            const turn_t turn = turn_of(plan, k + part);
+            for (int l = 0; l < V; ++l) {
+                const int own = l % per, r = turn.row + own, c = turn.column + (own + turn.by) % per;
+                const int again = turn.row == turn.column && 2 * turn.by == per && 2 * own >= per; // (c, r) was there
+                if (r < m && c < m && !again) put_pair(plan, x + l + V * part, part ? -scale : scale, r, c, sums);
+            }
         }
-    memset(a.cross, 0, 2 * V * (size_t)(plan->length / 2 + 1) * (size_t)(m * plan->groups) * sizeof(double));
+    }
+    for (size_t i = 0; i < count; ++i) sums[i] = (of_codes ? nearbyint(sums[i]) : sums[i]) + a.ends[i];
+    memset(a.cross, 0, (size_t)(a.differences - a.cross) * sizeof(double)); // and the ends
 }
 
 #ifdef OKID_KERNEL_IS_BASE
 spectrum_plan_t okid_spectrum_plan(int32_t m, int32_t p) {
-    spectrum_plan_t plan = {m, p, 128, 0, (m + V - 1) / V};
-    while (plan.length < 8 * (p + 1)) plan.length *= 2;
-    plan.fresh = plan.length - p;
+    spectrum_plan_t plan = {m, p, 128, m <= V / 2 ? 2 : 1, (m + V - 1) / V, 0};
+    const int32_t apart = plan.groups * (plan.groups - 1) / 2 * V;
+    plan.turns = plan.share == 2 ? V / 4 + 1 : plan.groups * (V / 2 + 1) + apart;
+    while (plan.length < (plan.share == 2 ? 6 : 10) * (p + 1))
+        plan.length *= 2; // measured: ends against work at the flush
     return plan;
 }
 
 int okid_spectrum_pays(int32_t m, int32_t p) {
-    const int32_t groups = (m + V - 1) / V, rows = m > V ? m : V;
-    return 2 * m * m * (p + 1) >=
-           250 * groups * rows; // measured: ties with the direct kernel at m, p = 4, 62; 8, 15; 13, 18
+    const spectrum_plan_t plan = okid_spectrum_plan(m, p);
+    return 2 * m * m * (p + 1) * plan.share >=
+           500 * plan.groups + 150 * plan.turns; // measured: ties with the direct kernel at m, p = 4, 13; 8, 9; 13, 10
 }
 
 size_t okid_spectrum_doubles(const spectrum_plan_t* plan) {
-    const size_t n = (size_t)plan->length, half = n / 2 + 1, g = (size_t)plan->groups;
-    return 2 * n + 4 * V * n + 2 * SPECTRUM_BATCH * 2 * V * half * g + 2 * V * half * g * (size_t)plan->m;
+    const size_t n = (size_t)plan->length, m = (size_t)plan->m, lags = m * (size_t)plan->p;
+    return 2 * n + 2 * V * n * (size_t)(1 + TRANSFORMS * plan->groups) + 2 * V * (n / 2 + 1) * (size_t)plan->turns +
+           m * (m + lags) + 3 * lags;
+}
+
+double okid_spectrum_energy(int32_t m, const int16_t* codes, int32_t count) {
+    int64_t most = 0;
+    for (int32_t c = 0; c < m; ++c) {
+        int64_t sum = 0;
+        for (const int16_t* x = codes + c; x < codes + (size_t)count * (size_t)m; x += m) sum += (int64_t)*x * *x;
+        if (sum > most) most = sum;
+    }
+    return (double)most;
 }
 
 void okid_spectrum_create(const spectrum_plan_t* plan, double* memory) {
@@ -283,19 +365,24 @@ void okid_spectrum_create(const spectrum_plan_t* plan, double* memory) {
 }
 
 void okid_spectrum_tables(int total, double* cosine, double* sine) {
-    for (int k = 0; k < total; ++k) {
-        const double angle = 6.283185307179586476925 * k / total;
-        cosine[k] = cos(angle);
-        sine[k] = sin(angle);
+    const int quarter = total / 4;
+    for (int k = 0; k <= quarter / 2; ++k) { // the first eighth; the rest repeats it
+        const double angle = 6.283185307179586476925 * k / total, c = cos(angle), s = sin(angle);
+        cosine[k] = sine[quarter - k] = c;
+        sine[k] = cosine[quarter - k] = s;
+    }
+    for (int k = quarter; k < total; ++k) {
+        cosine[k] = -sine[k - quarter];
+        sine[k] = cosine[k - quarter];
     }
 }
 
 double okid_spectrum_error(const spectrum_plan_t* plan, double energy) {
     // Each transform: relative error log2(N) eta in the 2-norm, eta = u + 4 u (sqrt 2 + u) < 7 u, u = 2^-53 (Higham 24.2). Two
-    // forward ones and the sums bend an entry by at most (2 log2(N) 7 u + 1e4 u) E, E the sum over windows of
-    // |current| |full| <= energy; the inverse one by log2(N) 7 u times the 2-norm of all N entries, <= sqrt(N) E.
+    // windows in one transform and the sums bend an entry by at most (2 log2(N) 7 u + 1e4 u) E, E the sum over windows of
+    // |z_r| |z_c| <= energy; the inverse one, of two sequences, by log2(N) 7 u times the 2-norm of all entries, <= sqrt(2 N) E.
     const double u = 1.1102230246251565e-16, stages = log2((double)plan->length);
-    return energy * u * (14 * stages + 64 + 7 * stages * sqrt((double)plan->length));
+    return energy * u * (14 * stages + 64 + 10 * stages * sqrt((double)plan->length));
 }
 
 spectrum_kernels_t okid_spectrum_pick(void) {

@@ -7,18 +7,19 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { SPECTRUM_LANES = 8, SPECTRUM_BATCH = 4 };
+enum { SPECTRUM_LANES = 8, SPECTRUM_BATCH = 4, SPECTRUM_GROUPS = 32 };
 
 /// Sizes for m channels and p lags.
 typedef struct spectrum_plan_t {
     int32_t m, p;
-    int32_t length; ///< N, points of a transform, a power of two
-    int32_t fresh;  ///< L = N - p, new samples a transform takes
+    int32_t length; ///< N, samples of a window, a power of two
+    int32_t share;  ///< windows side by side in the lanes: 2 of up to half as many channels
     int32_t groups; ///< of SPECTRUM_LANES channels
+    int32_t turns;  ///< cross-spectra of a lane vector each
 } spectrum_plan_t;
 
-/// What one call of the absorb function takes: SPECTRUM_BATCH * fresh samples.
-static inline int32_t spectrum_samples(const spectrum_plan_t* plan) { return SPECTRUM_BATCH * plan->fresh; }
+/// The most that one call of the absorb function takes.
+static inline int32_t spectrum_samples(const spectrum_plan_t* plan) { return SPECTRUM_BATCH * plan->length; }
 
 spectrum_plan_t okid_spectrum_plan(int32_t m, int32_t p);
 
@@ -32,11 +33,13 @@ void okid_spectrum_create(const spectrum_plan_t* plan, double* memory);
 /// Sums gathered since the last flush are exact after rounding while this stays below 1/2.
 double okid_spectrum_error(const spectrum_plan_t* plan, double energy);
 
-/// Absorb spectrum_samples() samples, codes or numbers (the other one NULL), that follow the p samples of `history` (time
-/// order, m numbers each). @return of codes the largest energy (sum of squares over the windows) of a channel, for
-/// okid_spectrum_error()
-typedef double okid_spectrum_absorb_fn(const spectrum_plan_t* plan, double* memory, const double* history,
-                                       const int16_t* codes, const double* numbers);
+/// Of some codes the largest sum of squares of a channel, for okid_spectrum_error().
+double okid_spectrum_energy(int32_t m, const int16_t* codes, int32_t count);
+
+/// Absorb `count` samples, up to spectrum_samples(), codes or numbers (the other one NULL), that follow the p samples of
+/// `history` (time order, m numbers each).
+typedef void okid_spectrum_absorb_fn(const spectrum_plan_t* plan, double* memory, const double* history,
+                                     const int16_t* codes, const double* numbers, int32_t count);
 
 /// Bring out the sums S (m x m(p+1), row-major, as the direct kernel orders them) and begin anew: of codes written as exact
 /// integers, else added to what stands there.

@@ -25,6 +25,24 @@ constexpr double died_out = 1e-14, least_decay = 1e-6, denormal = 1e-200;
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
+/// In eight sums, so that none waits for the other.
+bool all_finite(const double* x, size_t count) {
+    double sums[8] = {};
+    size_t i = 0;
+    for (; i + 8 <= count; i += 8)
+        for (size_t k = 0; k < 8; ++k) sums[k] += x[i + k] * 0.0;
+    for (; i < count; ++i) sums[0] += x[i] * 0.0;
+    return std::all_of(sums, sums + 8, [](double one) { return one == 0; });
+}
+
+/// Plain products and quotients: std::complex looks for infinite parts, which settles() and run() exclude.
+std::complex<double> times(std::complex<double> a, std::complex<double> b) {
+    return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+}
+std::complex<double> over(std::complex<double> a, std::complex<double> b) {
+    return times(a, std::conj(b)) / (b.real() * b.real() + b.imag() * b.imag());
+}
+
 } // namespace
 
 modal_filters::modal_filters(int inputs, int outputs, int states, arena& memory)
@@ -175,7 +193,7 @@ void modal_filters::two_states(int s, int t) {
     const double first = a == n_u && b == n_u, inputs = a < n_u && b < n_u ? with_v_[at(a, b, n_u + 2 * lanes_)] : 0;
     const auto solve = [&](complex w, complex q, complex z) { // of the second state or of its conjugate
         const complex v = of(w_, s);
-        return (v * with_input(s, b) + w * q + inputs + first - of(z_, s) * z) / (1.0 - v * w);
+        return over(times(v, with_input(s, b)) + times(w, q) + inputs + first - times(of(z_, s), z), 1.0 - times(v, w));
     };
     const complex w = of(w_, t), q = with_input(t, a), z = of(z_, t);
     const complex h1 = solve(std::conj(w), std::conj(q), std::conj(z)), h2 = solve(w, q, z);
@@ -187,13 +205,15 @@ void modal_filters::two_states(int s, int t) {
     if (p && r) sums[at(i + 1, j + 1, base)] = (h1.real() - h2.real()) / 2;
 }
 
-void modal_filters::run(const double* v, int count) {
+bool modal_filters::run(const double* v, int count) {
     const int m = n_u + n_y;
     place_lanes();
     const int wide = n_u + 2 * lanes_, driven = blocks_ * n_u;
     okid_filters_t filters{area(n_u, 1), area(m, 1), area(lanes_, 1), 0, w_, w_ + lanes_, drive_, z_, with_v_};
     const auto step = okid_recursion_pick().filters;
     for (int n = 0; n < count; n += stretch, v += at(0, stretch, m)) {
+        const int some = std::min(stretch, count - n);
+        if (!all_finite(v, area(some, m))) return false;
         int last = driven; // w^t that has died out needs no product any more
         for (int k = driven; k < lanes_; ++k)
             if (std::hypot(z_[k], z_[lanes_ + k]) < died_out)
@@ -201,7 +221,7 @@ void modal_filters::run(const double* v, int count) {
             else
                 last = k + 1;
         filters.active = okid_recursion_padded(area(last, 1));
-        step(&filters, v, static_cast<size_t>(std::min(stretch, count - n)));
+        step(&filters, v, area(some, 1));
         for (int k = 0; k < 2 * lanes_; ++k)
             if (std::abs(z_[k]) < denormal) z_[k] = 0;
     }
@@ -218,6 +238,7 @@ void modal_filters::run(const double* v, int count) {
     for (int s = 0; s < blocks_ * (n_u + 1); ++s)
         for (int t = 0; t <= s; ++t) two_states(s, t);
     used = count;
+    return true;
 }
 
 void modal_filters::complete_sums() {

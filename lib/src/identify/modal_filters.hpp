@@ -27,8 +27,8 @@ struct modal_filters {
     /// Do all modes die out fast enough for run()?
     bool settles() const;
     /// The same of `count` samples without a gap at once, from start() on: only products of signals with inputs and outputs are
-    /// summed, those of two signals follow from z(t+1) = w z(t) + u(t) on both sides.
-    void run(const double* v, int count);
+    /// summed, those of two signals follow from z(t+1) = w z(t) + u(t) on both sides. @return false: there is a gap
+    bool run(const double* v, int count);
     void complete_sums();
 
     /// out += sum over outputs of M_k Z M_l^T for every two modes; Z of two sets of filters, M = [c1 -c2; c2 c1].

@@ -111,11 +111,8 @@ struct output_error {
     bool record(const double* v, int count, double* first) {
         std::fill(first, first + area(n_z, unknowns + 1), 0.0);
         filters.start();
-        const double* last = v + at(0, count, n_u + n_y);
-        if (settles && std::all_of(v, last, [](double x) { return std::isfinite(x); })) {
-            filters.run(v, count);
-            return end_run(first);
-        }
+        if (settles && filters.run(v, count)) return end_run(first);
+        filters.start();
         bool running = true;
         double* give_back = first;
         for (int t = 0; t < count; ++t, v += n_u + n_y) {

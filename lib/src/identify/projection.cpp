@@ -47,7 +47,8 @@ void projection::lay_out(const subspace_sizes& z, arena& memory) {
     solve = memory.take<double>(solve_work(std::max(z.h, width)));
     seen = memory.take<double>(area(n, z.i) * static_cast<size_t>(p));
     step = memory.take<double>(2 * area(n, n));
-    grams = memory.take<double>(area(n, n) * static_cast<size_t>(z.i + 1));
+    grams =
+        memory.take<double>(std::max(area(n, n) * static_cast<size_t>(z.i + 1), area(n, z.i) * static_cast<size_t>(p)));
     lagged = memory.take<double>(2 * area(n, n));
     equations = memory.take<double>(area(p * z.n_u, p * z.n_u));
     root = memory.take<double>(std::max({area(p, z.n_u), area(z.i, 1), area(z.n_y, 1)}));

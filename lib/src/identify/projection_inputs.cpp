@@ -84,15 +84,18 @@ void projection::direct_part(const subspace_sizes& z, int order, const state_mod
         }
 }
 
-/// equations -= the same of Gamma^T T_k: columns of Gamma^T H L11 for each unknown, some columns of L11 at a time.
+/// equations -= the same of Gamma^T T_k: columns of Gamma^T H L11 for all unknowns of an input, some columns of L11 at a time.
 void projection::projected_part(const subspace_sizes& z, const hankel_factor& f, int order) const {
     const int n = order, p = z.n_y + n, P = p * z.n_u;
+    double* across = grams; // free by now: each of the p transposed, i x n
+    for (int e = 0; e < p; ++e)
+        for (int r = 0; r < n; ++r)
+            for (int k = 0; k < z.i; ++k) across[at(k, e * n + r, z.i)] = seen[at(r, e * z.i + k, n)];
     for (int first = 0; first < z.a; first += chunk_columns) {
         const int wide = std::min(chunk_columns, z.a - first), from = first / z.i; // channels before it: zeros
         for (int c = from; c < z.n_u; ++c)
-            for (int e = 0; e < p; ++e)
-                multiply(false, false, n, wide, z.i, 1, seen + at(0, e * z.i, n), n, f.L + at(c * z.i, first, f.size),
-                         f.size, 0, chunk + at(0, c * p + e, n * wide), n);
+            multiply(true, false, wide, n * p, z.i, 1, f.L + at(c * z.i, first, f.size), f.size, across, z.i, 0,
+                     chunk + at(0, c * p, n * wide), wide);
         for (int j = from * p; j < P; j += 64)
             multiply(true, false, P - j, std::min(64, P - j), n * wide, -1, chunk + at(0, j, n * wide), n * wide,
                      chunk + at(0, j, n * wide), n * wide, 1, equations + at(j, j, P), P);

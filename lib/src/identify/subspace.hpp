@@ -65,8 +65,9 @@ struct projection {
     double *states, *later;      ///< X_i, X_(i+1), n x width
     double *outputs, *drive;     ///< y_i less what the model says, n_y x width; Gamma^T H, n x a
     double *gain, *solve;        ///< work of kalman_gain() and of the solves
-    double *seen, *step;       ///< joint_inputs(): column e of Gamma^T T_k, k = 0.. (p of n x i); its recursion, n x n
-    double *grams, *lagged;    ///< sums of (C A^b)^T C A^b, i + 1 of n x n; Horner scheme, two of n x n
+    double *seen, *step; ///< joint_inputs(): column e of Gamma^T T_k, k = 0.. (p of n x i); its recursion, n x n
+    double *grams,
+        *lagged; ///< sums of (C A^b)^T C A^b, i + 1 of n x n, then `seen` transposed; Horner scheme, two of n x n
     double *equations, *root;  ///< p n_u x p n_u; its diagonal, and scratch
     double *chunk, *remainder; ///< columns of Gamma^T H L11 by unknown; (I - Gamma Gamma^T) cross
 

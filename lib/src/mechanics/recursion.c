@@ -152,17 +152,31 @@ static void filter_tiles(const okid_filters_t* f, const double* rows, size_t cou
     }
 }
 
-/// An input times `channels` (1 to 4) numbers of a row from `first` on.
-static void input_tile(const okid_filters_t* f, const double* rows, size_t count, size_t input, size_t first,
-                       int channels) {
-    double sums[4] = {0};
-    if (channels == 4)
-        for (size_t n = 0; n < count; ++n)
-            for (size_t k = 0; k < 4; ++k) sums[k] += rows[n * f->m + input] * rows[n * f->m + first + k];
-    else
-        for (int k = 0; k < channels; ++k)
-            for (size_t n = 0; n < count; ++n) sums[k] += rows[n * f->m + input] * rows[n * f->m + first + (size_t)k];
-    for (int k = 0; k < channels; ++k) f->sums[(first + (size_t)k) * (f->n_u + 2 * f->states) + input] += sums[k];
+typedef double four_t __attribute__((vector_size(4 * sizeof(double))));
+
+/// An input times 4 numbers of a row from `first` on, in four sums that do not wait for each other.
+static void input_tile(const okid_filters_t* f, const double* rows, size_t count, size_t input, size_t first) {
+    four_t sums[4] = {{0}};
+    size_t n = 0;
+    for (; n + 4 <= count; n += 4)
+#pragma GCC unroll 4
+        for (size_t k = 0; k < 4; ++k) {
+            const double* row = rows + (n + k) * f->m;
+            four_t v;
+            memcpy(&v, row + first, sizeof v);
+            sums[k] += row[input] * v;
+        }
+    for (; n < count; ++n)
+        for (size_t k = 0; k < 4; ++k) sums[0][k] += rows[n * f->m + input] * rows[n * f->m + first + k];
+    sums[0] = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    for (size_t k = 0; k < 4; ++k) f->sums[(first + k) * (f->n_u + 2 * f->states) + input] += sums[0][k];
+}
+
+/// The same of one number.
+static void input_number(const okid_filters_t* f, const double* rows, size_t count, size_t input, size_t at) {
+    double sum = 0;
+    for (size_t n = 0; n < count; ++n) sum += rows[n * f->m + input] * rows[n * f->m + at];
+    f->sums[at * (f->n_u + 2 * f->states) + input] += sum;
 }
 
 okid_filters_fn FILTERS;
@@ -175,11 +189,11 @@ void FILTERS(const okid_filters_t* self, const double* rows, size_t count) {
             filter_tiles(&f, rows, count, k, first, g + 1 == groups, (int)channels);
             first += channels;
         }
-    for (size_t c = 0; c < f.n_u; ++c)
-        for (size_t r = 0; r < f.m; r += 4) {
-            const size_t channels = f.m - r < 4 ? f.m - r : 4;
-            input_tile(&f, rows, count, c, r, (int)channels);
-        }
+    for (size_t c = 0; c < f.n_u; ++c) {
+        size_t r = 0;
+        for (; r + 4 <= f.m; r += 4) input_tile(&f, rows, count, c, r);
+        for (; r < f.m; ++r) input_number(&f, rows, count, c, r);
+    }
 }
 
 #ifdef OKID_KERNEL_IS_BASE
