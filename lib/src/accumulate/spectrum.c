@@ -132,7 +132,7 @@ static void load_window(const spectrum_plan_t* plan, const given_t* given, doubl
     const int count = behind < 0 ? 0 : behind < total ? (int)behind : total;
     const size_t at = count > 0 ? (size_t)index * (size_t)total * (size_t)m + (size_t)first : 0;
     if (given->codes)
-        load_rows_of(z, given->codes + at, NULL, m, count, total, left);
+        load_rows_of(z, given->codes + at, given->numbers, m, count, total, left);
     else if (left == V)
         load_rows_of(z, NULL, given->numbers + at, m, count, total, V);
     else if (left == V / 2)
