@@ -158,6 +158,7 @@ static void add_ends(const spectrum_plan_t* plan, const map_t* a, const given_t*
     OKID_KERNEL(a->ends, first, a->differences, m, m, p, rows);
 }
 
+#if defined(__AVX2__) || defined(__AVX512F__)
 #define TURN(v, a, b, c, d, e, f, g, h) __builtin_shufflevector(v, v, a, b, c, d, e, f, g, h)
 #define TURN_0(v) (v)
 #define TURN_1(v) TURN(v, 1, 2, 3, 4, 5, 6, 7, 0)
@@ -184,11 +185,25 @@ static void add_ends(const spectrum_plan_t* plan, const map_t* a, const given_t*
         PUT(to + V, im);                                                                                               \
         to += 2 * V;                                                                                                   \
     } while (0)
+#else // few registers: lane by lane, or the compiler fills the stack with vectors
+enum { TURN_0 = 16 * V, TURN_1, TURN_2, TURN_3, TURN_4, TURN_5, TURN_6, TURN_7, HALF_0 = 8 * V, HALF_1, HALF_2 };
+static __attribute__((noinline)) void add_turn(double* to, const lanes_t* a, const lanes_t* b, int turn, int spectra) {
+    const double *z = (const double*)a, *o = (const double*)b;
+    const int by = turn % 16, per = turn / 16;
+    for (int k = 0; k < spectra; ++k, z += 2 * V, o += 2 * V)
+        for (int l = 0; l < V; ++l) {
+            const int c = l / per * per + (l % per + by) % per;
+            to[l] += z[l] * o[c] + z[V + l] * o[V + c];
+            to[V + l] += z[V + l] * o[c] - z[l] * o[V + c];
+        }
+}
+#define ADD_TURN(turn) (add_turn(to, z, o, turn, spectra), to += 2 * V)
+#endif
 
 /// Z and the mirrored conj(Z) of frequency f of each transform.
 #define GET_SPECTRA(into, group)                                                                                       \
     _Pragma("GCC unroll 2") for (int k = 0; k < spectra; k += 2) {                                                     \
-        const double* x = done[k / 2 * groups + (group)];                                                              \
+        const double* x = arrays + a->array * done[k / 2 * groups + (group)];                                          \
         const double *low = x + 2 * V * (size_t)f, *high = x + 2 * V * (size_t)((total - f) & (total - 1));            \
         (into)[2 * k] = GET(low);                                                                                      \
         (into)[2 * k + 1] = GET(low + V);                                                                              \
@@ -196,8 +211,8 @@ static void add_ends(const spectrum_plan_t* plan, const map_t* a, const given_t*
         (into)[2 * k + 3] = -GET(high + V);                                                                            \
     }
 
-static inline __attribute__((always_inline)) void add_cross(const spectrum_plan_t* plan, const map_t* a,
-                                                            double* const* done, const int spectra) {
+static inline __attribute__((always_inline)) void
+add_cross(const spectrum_plan_t* plan, const map_t* a, const double* arrays, const uint8_t* done, const int spectra) {
     const int groups = plan->groups, total = plan->length;
     double* to = a->cross;
     for (int f = 0; f <= total / 2; ++f)
@@ -242,7 +257,9 @@ void ABSORB(const spectrum_plan_t* plan, double* memory, const double* history, 
     map_t a = map_of(plan, memory);
     const given_t given = {codes, numbers, count};
     const int share = plan->share, total = plan->length, groups = plan->groups;
-    double *done[TRANSFORMS * SPECTRUM_GROUPS], *next = a.work;
+    const double* const arrays = a.spare;
+    double* next = a.work;
+    uint8_t done[TRANSFORMS * SPECTRUM_GROUPS]; // the array each result is in
     int transforms = 0;
     for (int64_t from = 0; from < count; from += 2 * share * total, ++transforms)
         for (int g = 0; g < groups; ++g, next += a.array) {
@@ -251,13 +268,14 @@ void ABSORB(const spectrum_plan_t* plan, double* memory, const double* history, 
                 for (int half = 0; half < share; ++half)
                     load_window(plan, &given, next + part * V + half * (V / 2),
                                 2 * share * transforms + share * part + half, g);
-            done[transforms * groups + g] = transform(&a, total);
-            if (done[transforms * groups + g] == a.spare) a.spare = next; // of no one any more
+            const double* result = transform(&a, total);
+            done[transforms * groups + g] = (uint8_t)((size_t)(result - arrays) / a.array);
+            if (result == a.spare) a.spare = next; // of no one any more
         }
     if (transforms == 1)
-        add_cross(plan, &a, done, 2);
+        add_cross(plan, &a, arrays, done, 2);
     else
-        add_cross(plan, &a, done, 4);
+        add_cross(plan, &a, arrays, done, 4);
     for (int index = 0; index * total < count; ++index) add_ends(plan, &a, &given, history, index);
 }
 
