@@ -259,7 +259,7 @@ void ABSORB(const spectrum_plan_t* plan, double* memory, const double* history, 
     const int share = plan->share, total = plan->length, groups = plan->groups;
     const double* const arrays = a.spare;
     double* next = a.work;
-    uint8_t done[TRANSFORMS * SPECTRUM_GROUPS]; // the array each result is in
+    uint8_t done[TRANSFORMS * SPECTRUM_GROUPS] = {0}; // the array each result is in
     int transforms = 0;
     for (int64_t from = 0; from < count; from += 2 * share * total, ++transforms)
         for (int g = 0; g < groups; ++g, next += a.array) {
