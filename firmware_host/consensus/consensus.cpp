@@ -29,7 +29,6 @@ constexpr double periods_well = 1.5;    // where its damping is sharp
 constexpr double one_half = 0.5;        // votes and agreement
 constexpr double scatter_scale = 0.6;   // relative scatter of damping over the runs that halves the agreement
 constexpr int fewest_runs = 3;
-constexpr double surely_two = 0.9; // agreement of the weaker of two above which both are modes
 
 double median(std::vector<double> values) {
     if (values.empty()) return NAN;
@@ -240,17 +239,13 @@ consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c)
     return mode;
 }
 
-/// A weaker cluster beside a stronger one of the same shape: one mode of a structure that changes with its amplitude. What
-/// stands in for such a mode depends on method and horizon (agreement up to 0.75 on measured records); a pair that all runs
-/// see, an absorber's say, are two.
+/// A weaker cluster beside a stronger one of the same shape: one mode of a structure that changes with its amplitude.
 void mark_split(std::vector<consensus_mode>& modes) {
     std::vector<std::size_t> split;
     for (std::size_t i = 0; i < modes.size(); ++i)
         for (const consensus_mode& other : modes) {
             const consensus_mode& mode = modes[i];
-            if (&other == &mode || other.agreement <= mode.agreement || !other.confident() ||
-                mode.agreement > surely_two)
-                continue;
+            if (&other == &mode || other.agreement <= mode.agreement || !other.confident()) continue;
             const double apart = std::abs(mode.frequency_hz - other.frequency_hz);
             const double widths = mode.frequency_hz * mode.damping_ratio + other.frequency_hz * other.damping_ratio;
             if (apart < std::max(2.5 * widths, same_frequency * other.frequency_hz) &&

@@ -144,7 +144,7 @@ LINES = "expected JSON lines as `okid run` or `okid replay` writes them with --e
         ("--record", "run.okj", f"{RECORD}: `okid convert run.okj run.csv` makes one"),
         ("--record", "can.csv", f"{RECORD}: `okid-convert can.csv run.csv --config CONFIG.toml"),
         ("--record", "dir", f"is a folder, {RECORD}"),
-        ("--record", "words.txt", "the extension is '.txt', expected one of .csv, .uff"),
+        ("--record", "words.txt", "no table of numbers was found"),
         ("--events", "result.json", f"is a result of okid, {LINES}"),
         ("--events", "run.csv", f"is a table of samples (CSV), {LINES}: give it with --record"),
         ("--events", "frame.toml", f"is a CONFIG.toml, {LINES}: give it with --config"),
