@@ -159,6 +159,7 @@ static void add_ends(const spectrum_plan_t* plan, const map_t* a, const given_t*
 }
 
 #if defined(__AVX2__) || defined(__AVX512F__)
+#define ADD_CROSS static inline __attribute__((always_inline)) void
 #define TURN(v, a, b, c, d, e, f, g, h) __builtin_shufflevector(v, v, a, b, c, d, e, f, g, h)
 #define TURN_0(v) (v)
 #define TURN_1(v) TURN(v, 1, 2, 3, 4, 5, 6, 7, 0)
@@ -185,7 +186,8 @@ static void add_ends(const spectrum_plan_t* plan, const map_t* a, const given_t*
         PUT(to + V, im);                                                                                               \
         to += 2 * V;                                                                                                   \
     } while (0)
-#else // few registers: lane by lane, or the compiler fills the stack with vectors
+#else // few registers: lane by lane, or the compiler fills the stack with vectors; nor do those lie below a transform
+#define ADD_CROSS static __attribute__((noinline)) void
 enum { TURN_0 = 16 * V, TURN_1, TURN_2, TURN_3, TURN_4, TURN_5, TURN_6, TURN_7, HALF_0 = 8 * V, HALF_1, HALF_2 };
 static __attribute__((noinline)) void add_turn(double* to, const lanes_t* a, const lanes_t* b, int turn, int spectra) {
     const double *z = (const double*)a, *o = (const double*)b;
@@ -211,8 +213,8 @@ static __attribute__((noinline)) void add_turn(double* to, const lanes_t* a, con
         (into)[2 * k + 3] = -GET(high + V);                                                                            \
     }
 
-static inline __attribute__((always_inline)) void
-add_cross(const spectrum_plan_t* plan, const map_t* a, const double* arrays, const uint8_t* done, const int spectra) {
+ADD_CROSS add_cross(const spectrum_plan_t* plan, const map_t* a, const double* arrays, const uint8_t* done,
+                    const int spectra) {
     const int groups = plan->groups, total = plan->length;
     double* to = a->cross;
     for (int f = 0; f <= total / 2; ++f)
