@@ -140,7 +140,7 @@ std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& mod
     std::optional<deviations> sigma;
     std::vector<std::vector<mode_shift>> moved;
     if (!replicates.empty()) sigma = deviations_of(model, replicates, {});
-    for (const replicate_model& replicate : replicates) moved.push_back(modes_in(replicate, model.dt));
+    for (const replicate_model& replicate : replicates) moved.push_back(modes_in(replicate.view(), model.dt));
     const auto here =
         modes_in(model.frequency_hz, model.damping_ratio, model.shape_re, model.shape_im, model.mode_count, model.n_y);
     for (std::size_t i = 0; i < wanted.size(); ++i) {

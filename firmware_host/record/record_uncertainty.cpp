@@ -176,34 +176,6 @@ deviations deviations_of(const okid_identified_t& model, const std::vector<repli
     return statistics.finish();
 }
 
-/// The modes of a model, whoever found them.
-std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
-                                 int count, int n_y) {
-    std::vector<mode_shift> out;
-    for (int k = 0; k < count; ++k) {
-        mode_shift& mode = out.emplace_back();
-        mode.frequency_hz = frequency[k];
-        mode.damping_ratio = damping[k];
-        for (int i = 0; i < n_y; ++i) mode.shape.emplace_back(re[k * n_y + i], im[k * n_y + i]);
-    }
-    return out;
-}
-
-std::vector<mode_shift> modes_in(const replicate_model& model, double dt) {
-    const auto most = static_cast<std::size_t>(model.n_z / 2), n_y = static_cast<std::size_t>(model.n_y);
-    std::vector<double> f(most), zeta(most), mpc(most), re(most * n_y), im(most * n_y);
-    std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
-    okid_modes_t modes{};
-    modes.frequency_hz = f.data();
-    modes.damping_ratio = zeta.data();
-    modes.mpc = mpc.data();
-    modes.shape_re = re.data();
-    modes.shape_im = im.data();
-    const okid_model_t view = model.view();
-    if (!model.found() || okid_modal_analyse(&view, dt, &modes, work.data(), work.size()) < 0) return {};
-    return modes_in(f.data(), zeta.data(), re.data(), im.data(), modes.count, model.n_y);
-}
-
 void remark_finite_p(const record_work& work, long long rows, const deviations& sigma, remarks& said) {
     const okid_identify_config_t& config = work.config;
     if (config.n_u == 0 || is_subspace(config.method)) return;
@@ -226,7 +198,7 @@ void remark_finite_p(const record_work& work, long long rows, const deviations& 
     okid_model_t found{};
     double share = 0;
     if (!jackknife || okid_jackknife_delete(jackknife, nullptr, 1, &found, &share) < 0) return;
-    const std::string text = moved(work.model, modes_in(keep(found), work.model.dt), sigma);
+    const std::string text = moved(work.model, modes_in(found, work.model.dt), sigma);
     if (!text.empty())
         said.emplace_back(
             "finite_p_bias",

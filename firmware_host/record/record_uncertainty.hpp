@@ -27,12 +27,6 @@ struct replicate_model {
     okid_model_t view() const { return {n_u, n_y, n_z, A.data(), B.data(), C.data(), D.data(), nullptr}; }
 };
 
-/// How far a mode moves without one block; shapes with the largest entry of the whole's held.
-struct mode_shift {
-    double frequency_hz = 0, damping_ratio = 0;
-    std::vector<std::complex<double>> shape;
-};
-
 struct record_work;
 
 /// Leave out each of so many equal blocks in turn. The records of `work` are what `whole` was fed with. Analytic: to first
@@ -42,11 +36,6 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
 /// Deviations of the modes, and of M, K, R where the plan wants them.
 deviations deviations_of(const okid_identified_t& model, const std::vector<replicate_model>& replicates,
                          const mass_plan& plan);
-
-/// The modes of a model, whoever found them; of a replicate none where it has none.
-std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
-                                 int count, int n_y);
-std::vector<mode_shift> modes_in(const replicate_model& model, double dt);
 
 /// Does a horizon of 2 p, at the order and the ridge of the model, say something else than p by more than two standard
 /// deviations? Then a remark names the modes: the bias of a finite p, which no deviation sees. Nothing when `rows` regression

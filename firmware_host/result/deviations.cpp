@@ -3,6 +3,8 @@
 
 #include "error.hpp"
 
+#include <okid/modal.h>
+
 #include <fmt/format.h>
 
 namespace okid_host {
@@ -56,6 +58,32 @@ deviations replicate_statistics::finish() {
 
 okid_model_t model_view(const okid_identified_t& model) {
     return {model.n_u, model.n_y, model.n_z, model.A, model.B, model.C, model.D, nullptr};
+}
+
+std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
+                                 int count, int n_y) {
+    std::vector<mode_shift> out;
+    for (int k = 0; k < count; ++k) {
+        mode_shift& mode = out.emplace_back();
+        mode.frequency_hz = frequency[k];
+        mode.damping_ratio = damping[k];
+        for (int i = 0; i < n_y; ++i) mode.shape.emplace_back(re[k * n_y + i], im[k * n_y + i]);
+    }
+    return out;
+}
+
+std::vector<mode_shift> modes_in(const okid_model_t& model, double dt) {
+    const auto most = static_cast<std::size_t>(model.n_z / 2), n_y = static_cast<std::size_t>(model.n_y);
+    std::vector<double> f(most), zeta(most), mpc(most), re(most * n_y), im(most * n_y);
+    std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
+    okid_modes_t modes{};
+    modes.frequency_hz = f.data();
+    modes.damping_ratio = zeta.data();
+    modes.mpc = mpc.data();
+    modes.shape_re = re.data();
+    modes.shape_im = im.data();
+    if (model.n_z < 2 || okid_modal_analyse(&model, dt, &modes, work.data(), work.size()) < 0) return {};
+    return modes_in(f.data(), zeta.data(), re.data(), im.data(), modes.count, model.n_y);
 }
 
 std::string plus_minus(double deviation) { return std::isfinite(deviation) ? fmt::format("±{:.2g}", deviation) : "-"; }

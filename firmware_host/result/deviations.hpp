@@ -6,6 +6,7 @@
 #include <okid/uncertainty.h>
 
 #include <cmath>
+#include <complex>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -49,6 +50,17 @@ void check_statistics(okid_status_t status);
 
 /// The model alone.
 okid_model_t model_view(const okid_identified_t& model);
+
+/// A mode, or how far it moves without one block; shapes with the largest entry of the whole's held.
+struct mode_shift {
+    double frequency_hz = 0, damping_ratio = 0;
+    std::vector<std::complex<double>> shape;
+};
+
+/// The modes of a model, whoever found them; none where it has none.
+std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
+                                 int count, int n_y);
+std::vector<mode_shift> modes_in(const okid_model_t& model, double dt);
 
 /// "±0.00012", or "-" where nothing is known.
 std::string plus_minus(double deviation);

@@ -44,29 +44,20 @@ struct response {
 };
 
 bool find_poles(const okid_identified_t& model, response& out) {
-    const auto most = static_cast<std::size_t>(model.n_z / 2), n_y = static_cast<std::size_t>(model.n_y);
-    std::vector<double> f(most), zeta(most), mpc(most), re(most * n_y), im(most * n_y);
-    std::vector<std::byte> work(okid_modal_memsize(model.n_y, model.n_z));
-    okid_modes_t modes{};
-    modes.frequency_hz = f.data();
-    modes.damping_ratio = zeta.data();
-    modes.mpc = mpc.data();
-    modes.shape_re = re.data();
-    modes.shape_im = im.data();
-    const okid_model_t view = model_view(model);
-    if (model.n_z < 2 || okid_modal_analyse(&view, model.dt, &modes, work.data(), work.size()) < 0) return false;
-    std::vector<std::size_t> kept;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(modes.count); ++k)
-        if (zeta[k] < vibration && f[k] * model.dt < grid_end) kept.push_back(k);
+    std::vector<mode_shift> kept = modes_in(model_view(model), model.dt);
+    kept.erase(std::remove_if(kept.begin(), kept.end(),
+                              [&](const mode_shift& mode) {
+                                  return !(mode.damping_ratio < vibration && mode.frequency_hz * model.dt < grid_end);
+                              }),
+               kept.end());
     out.dt = model.dt;
     out.lambda.resize(static_cast<Index>(kept.size()));
     out.shape.resize(model.n_y, out.lambda.size());
-    for (std::size_t j = 0; j < kept.size(); ++j) {
-        const std::size_t k = kept[j];
-        const double w = 2 * M_PI * f[k];
-        out.lambda[static_cast<Index>(j)] = complex(-zeta[k] * w, w * std::sqrt(1 - zeta[k] * zeta[k]));
-        for (std::size_t i = 0; i < n_y; ++i)
-            out.shape(static_cast<Index>(i), static_cast<Index>(j)) = complex(re[k * n_y + i], im[k * n_y + i]);
+    for (Index j = 0; j < out.lambda.size(); ++j) {
+        const mode_shift& mode = kept[static_cast<std::size_t>(j)];
+        const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
+        out.lambda[j] = complex(-zeta * w, w * std::sqrt(1 - zeta * zeta));
+        out.shape.col(j) = Eigen::Map<const VectorXcd>(mode.shape.data(), model.n_y);
     }
     return !kept.empty();
 }

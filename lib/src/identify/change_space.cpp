@@ -8,6 +8,7 @@
 // WORKSPACE  change.cpp; an eigendecomposition of i n_y, then per mode 8 i n_y (2 n_y)^2 flop
 #include "change.hpp"
 
+#include "identify/triangular.hpp"
 #include "linalg/linalg.hpp"
 
 #include <algorithm>
@@ -23,8 +24,6 @@ using std::size_t;
 
 constexpr double most_damping = 0.2;
 constexpr double ridge = 1e-10;
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
 /// scale <- 1 / rms of each channel over the rows of the past.
 okid_status_t find_scale(okid_change& s) {

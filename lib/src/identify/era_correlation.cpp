@@ -10,6 +10,7 @@
 //            are those of nearly orthonormal columns
 // WORKSPACE  T, F, G and the factors of F
 #include "identify/era_correlation.hpp"
+#include "identify/triangular.hpp"
 
 #include "linalg/linalg.hpp"
 
@@ -21,8 +22,6 @@ namespace {
 
 using linalg::multiply;
 using std::size_t;
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
 } // namespace
 

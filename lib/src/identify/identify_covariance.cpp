@@ -10,6 +10,7 @@
 // WORKSPACE  factor of rows + 1 blocks of outputs, (n_y (rows + 1))^2 doubles, n_y (rows + 1) (3 n_z + n_y), and
 //            kalman_work(); (n_y rows)^3/3 flop once, 2 (n_y rows)^2 n_z a model with K
 #include "identify/identify.hpp"
+#include "identify/triangular.hpp"
 
 #include "identify/riccati.hpp"
 #include "linalg/linalg.hpp"
@@ -24,8 +25,6 @@ namespace {
 
 using linalg::multiply;
 constexpr double ridge = 1e-10; // of the unit-diagonal covariance: arrays with more sensors than moving modes
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
 int past_rows(const okid_identify& s) { return s.config.rows * s.n_y; }
 

@@ -9,6 +9,7 @@
 //            noise Se vanishes and with it their part
 // WORKSPACE  the sequence of blocks, in the object
 #include "identify/identify.hpp"
+#include "identify/triangular.hpp"
 
 #include "linalg/linalg.hpp"
 
@@ -19,8 +20,6 @@ using std::size_t;
 
 namespace okid {
 namespace {
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
 /// root (n x n) <- lower factor of the symmetric matrix entry(r, c), or, where that is singular, the roots of its diagonal.
 template <class Entry> void take_root(int n, Entry entry, okid_real_t* root) {

@@ -22,8 +22,6 @@ namespace {
 constexpr double no_pivot = 1e16;        // condition of what rounding has made singular
 constexpr double rounding_ridge = 1e-12; // more than this is needed only by what rounding has made indefinite
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 double factor_condition(const okid_identify& s) {
     const auto* factor = reinterpret_cast<const okid_real_t*>(s.gram);
     double least = 1;

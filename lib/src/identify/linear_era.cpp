@@ -21,8 +21,6 @@ using real = okid_real_t;
 
 namespace {
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 /// Place of regressor k of theta among the rows of the Gram matrix.
 int row_of(const okid_observer_config_t& c, int k) { return k < c.n_u ? k : k + c.n_y; }
 

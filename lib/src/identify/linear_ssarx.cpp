@@ -17,12 +17,6 @@ namespace okid {
 using linalg::multiply;
 using std::size_t;
 
-namespace {
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
-} // namespace
-
 void linear_ssarx::lay_out(const okid_identify& s, int largest, arena& memory) {
     const int n_u = s.n_u, n_y = s.n_y, most_known = largest + n_u, most_left = largest + n_y;
     size = s.n;

@@ -17,12 +17,6 @@ namespace okid {
 using linalg::multiply;
 using std::size_t;
 
-namespace {
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
-} // namespace
-
 void linear_subspace::lay_out(const okid_identify& s, int largest, arena& memory) {
     size = s.n;
     n_y = s.n_y;

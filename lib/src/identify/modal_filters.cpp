@@ -23,8 +23,6 @@ namespace {
 constexpr int batch = 64, stretch = 256; // samples of sample(), of run()
 constexpr double died_out = 1e-14, least_decay = 1e-6, denormal = 1e-200;
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 /// In eight sums, so that none waits for the other.
 bool all_finite(const double* x, size_t count) {
     double sums[8] = {};

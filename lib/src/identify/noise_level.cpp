@@ -24,8 +24,6 @@ using std::size_t;
 constexpr int draws = 3, iterations = 10;
 constexpr double margin = 1.5;
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 /// d Y_n = d Ybar^I_n + sum_h (d theta^y_h Y_(n-h) + theta^y_h d Y_(n-h)). Blocks of a stack stand one below the other,
 /// the newest on top and p zeros at the bottom, so that each sum is one product.
 void propagate(const okid_observer_config_t& c, int last, const noise_work& w) {

@@ -18,8 +18,6 @@ using linalg::multiply;
 using std::size_t;
 constexpr double equations_floor = 1e-13;
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 struct output_error {
     modal_filters filters;
     int n_u, n_y, n_z, unknowns;

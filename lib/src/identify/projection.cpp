@@ -23,8 +23,6 @@ namespace {
 
 constexpr int chunk_columns = 8;
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 } // namespace
 
 void projection::lay_out(const subspace_sizes& z, arena& memory) {

@@ -8,9 +8,6 @@
 
 namespace okid {
 
-/// Numbers in a matrix.
-inline std::size_t area(int rows, int cols) { return at(0, cols, rows); }
-
 /// Sizes, and where the signals stand. A pair of poles w has two entries everywhere: real and imaginary part.
 struct refine_layout {
     int n_u, n_y, n_z, runs;

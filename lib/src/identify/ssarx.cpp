@@ -22,8 +22,6 @@ namespace {
 
 constexpr double excitation_floor = 1e-13;
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 /// X <- (Cholesky factor of G) solve; G (n x n, lower) gets a small floor. false: not positive
 bool solve_symmetric(int n, double* g, double* x, int count) {
     for (int k = 0; k < n; ++k) g[at(k, k, n)] *= 1 + excitation_floor;

@@ -30,8 +30,6 @@ namespace {
 
 constexpr int most_rows = 32768, default_order = 128;
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 bool valid(const okid_subspace_config_t& c) {
     return c.n_u >= 0 && c.n_y >= 1 && c.rows >= 2 && c.max_order >= 0 && c.ridge >= 0 && c.ridge <= 1 &&
            c.method >= OKID_SUBSPACE_MOESP && c.method <= OKID_SUBSPACE_SSARX && c.n_u <= most_rows &&

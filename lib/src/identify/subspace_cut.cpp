@@ -23,8 +23,6 @@ namespace {
 
 constexpr double weight_floor = 1e-12, least_square = 1e-9, least_shown = 1e-12; // squares over the first one
 
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-
 } // namespace
 
 int orthonormalise(int rows, int columns, double* x, double* core, int top) {

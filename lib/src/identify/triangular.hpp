@@ -13,6 +13,9 @@ inline std::size_t at(int row, int col, int ld) {
     return static_cast<std::size_t>(col) * static_cast<std::size_t>(ld) + static_cast<std::size_t>(row);
 }
 
+/// Numbers in a matrix.
+inline std::size_t area(int rows, int cols) { return at(0, cols, rows); }
+
 constexpr int solve_block = 32;
 
 /// Doubles of work for the two solves below with `count` right-hand sides.

@@ -8,6 +8,7 @@
 // WORKSPACE  a Hankel matrix and 3 h n + 2 n b numbers; 12 h b n flop in the place of some 4 h b^2 + 9 b^3
 #include "identify/era_correlation.hpp"
 #include "identify/identify.hpp"
+#include "identify/triangular.hpp"
 #include "linalg/linalg.hpp"
 
 #include <algorithm>
@@ -20,8 +21,6 @@ namespace {
 
 using linalg::multiply;
 constexpr int steps = 2;
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
 
 } // namespace
 

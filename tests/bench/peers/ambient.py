@@ -12,12 +12,11 @@ would pick in its diagram, and the poles nearest to them at its highest orders a
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from responses import run, table
+from responses import main
 from scipy.signal import cont2discrete, dlsim
 
 RECORDS = ("bridge_sim", "tower_wn1", "tower_wn2", "tower_wn3", "frame3_flex_decay")
@@ -112,10 +111,4 @@ def of_pyoma(f: Any, y: Any, modes: list[Any]) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    what, place, *rest = sys.argv[1:]
-    if what == "make":
-        make(Path(place), Path(rest[0]) if rest else None)
-    elif what == "table":
-        table(Path(place))
-    else:
-        run(what, Path(place), {"okid": of_okid, "pyoma": of_pyoma}[what])
+    main(make, {"okid": of_okid, "pyoma": of_pyoma})

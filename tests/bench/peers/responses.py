@@ -144,11 +144,16 @@ def table(folder: Path) -> None:
             print(f"| {who} | {name} | {hit} | {cells[0]} | {cells[1]} | {seconds:.2f} |")
 
 
-if __name__ == "__main__":
+def main(make: Any, ways: dict[str, Any]) -> None:
+    """`make FOLDER [DATA]`, `table FOLDER`, or one of the ways and the folder."""
     what, place, *rest = sys.argv[1:]
     if what == "make":
         make(Path(place), Path(rest[0]) if rest else None)
     elif what == "table":
         table(Path(place))
     else:
-        run(what, Path(place), {"okid": of_okid, "sdypy": of_sdypy}[what])
+        run(what, Path(place), ways[what])
+
+
+if __name__ == "__main__":
+    main(make, {"okid": of_okid, "sdypy": of_sdypy})

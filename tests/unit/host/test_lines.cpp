@@ -14,18 +14,28 @@ namespace {
 constexpr double fs = 120, drive = 1, damping = 0.01;
 constexpr std::size_t count = 9600, multiples = 13;
 
-/// Force and acceleration of one mode; the drive runs in the middle of the record only.
-std::vector<record_level> table_test(double mode_hz, unsigned seed) {
-    std::mt19937 random(seed);
-    std::normal_distribution<double> normal;
+record_level one_record() {
     record_level level;
     level.fs_hz = fs;
     level.top = 0.48;
     level.samples = count;
-    sample_rows& rows = level.records.emplace_back();
-    const double w = 2 * M_PI * mode_hz, dt = 1 / fs;
-    const std::complex<double> pole =
-        std::exp(std::complex<double>(-damping, std::sqrt(1 - damping * damping)) * w * dt);
+    level.records.emplace_back();
+    return level;
+}
+
+/// What a mode is multiplied with from sample to sample.
+std::complex<double> pole_of(double hz, double zeta) {
+    return std::exp(2 * M_PI * hz / fs * std::complex<double>(-zeta, std::sqrt(1 - zeta * zeta)));
+}
+
+/// Force and acceleration of one mode; the drive runs in the middle of the record only.
+std::vector<record_level> table_test(double mode_hz, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    record_level level = one_record();
+    sample_rows& rows = level.records.front();
+    const double dt = 1 / fs;
+    const std::complex<double> pole = pole_of(mode_hz, damping);
     std::complex<double> state = 0;
     double phase = 0;
     for (std::size_t i = 0; i < count; ++i) {
@@ -44,13 +54,9 @@ std::vector<record_level> table_test(double mode_hz, unsigned seed) {
 record_level answered(double mode_hz, double mode_damping, bool hit, double line_hz, double line, unsigned seed) {
     std::mt19937 random(seed);
     std::normal_distribution<double> normal;
-    record_level level;
-    level.fs_hz = fs;
-    level.top = 0.48;
-    level.samples = count;
-    sample_rows& rows = level.records.emplace_back();
-    const std::complex<double> pole = std::exp(
-        2 * M_PI * mode_hz / fs * std::complex<double>(-mode_damping, std::sqrt(1 - mode_damping * mode_damping)));
+    record_level level = one_record();
+    sample_rows& rows = level.records.front();
+    const std::complex<double> pole = pole_of(mode_hz, mode_damping);
     std::complex<double> state = 0;
     double square = 0;
     for (std::size_t i = 0; i < count; ++i) {

@@ -56,12 +56,16 @@ class _Layout:
     separator: str | None
     comma: bool  # decimal comma
     first: int  # line of the first row, from 0
-    width: int
+    shape: str  # of that row, as _shape() has it
     encoding: str
     lines: list[str]
     names: list[str] = field(default_factory=list)
     units: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+
+    @property
+    def width(self) -> int:
+        return len(self.shape)
 
 
 def _cells(line: str, separator: str | None) -> list[str]:
@@ -128,7 +132,7 @@ def _lay_out(path: Path) -> _Layout:
                 continue
             numbers = sum("n" in column for column in zip(*shapes[first : first + rows], strict=True))
             if best is None or numbers > best[0]:
-                best = numbers, _Layout(separator, comma, first, len(shapes[first]), encoding, lines)
+                best = numbers, _Layout(separator, comma, first, shapes[first], encoding, lines)
     if best is None:
         raise InputError("no table of numbers was found, expected lines of numbers below the names of the channels")
     _name_columns(best[1])
@@ -141,8 +145,7 @@ def is_plain(path: str | Path) -> bool:
         layout = _lay_out(Path(path))
     above = [line for line in layout.lines[: layout.first] if line.strip() and not line.startswith("#")]
     strange = layout.separator is None or (layout.comma and layout.separator != ";") or layout.encoding != "utf-8-sig"
-    stamps = "s" in _shape(layout.lines[layout.first], layout.separator, layout.comma)
-    return len(above) == 1 and not strange and not stamps
+    return len(above) == 1 and not strange and "s" not in layout.shape
 
 
 def _looks_like_units(row: list[str]) -> bool:
@@ -197,8 +200,7 @@ def _table(path: Path, layout: _Layout) -> list[Any]:
             body = ["\t".join(line.split()) for line in body]
         source, skip, encoding = io.BytesIO("\n".join(body).encode()), 0, "utf-8"
     keys = [f"{k}" for k in range(layout.width)]
-    shape = _shape(layout.lines[layout.first], layout.separator, layout.comma)
-    kinds = {keys[k]: arrow.string() for k, kind in enumerate(shape) if kind == "s"}
+    kinds = {keys[k]: arrow.string() for k, kind in enumerate(layout.shape) if kind == "s"}
     table = text.read_csv(
         source,
         text.ReadOptions(use_threads=False, skip_rows=skip, column_names=keys, encoding=encoding.replace("-sig", "")),
@@ -326,8 +328,7 @@ def _stated_rate(lines: list[str]) -> float | None:
 
 def _times(layout: _Layout, columns: list[Any], found: dict[int, Real]) -> tuple[int, Real] | None:
     """The column of the time, in s, and its place; the first one that is one."""
-    shape = _shape(layout.lines[layout.first], layout.separator, layout.comma)
-    for place, kind in enumerate(shape):
+    for place, kind in enumerate(layout.shape):
         if kind == "s":
             return place, _stamps(layout, columns[place])
         unit = _time_unit(layout, place) if place in found else None
@@ -343,11 +344,6 @@ def _times(layout: _Layout, columns: list[Any], found: dict[int, Real]) -> tuple
     return None
 
 
-def _decimal(layout: _Layout) -> str:
-    named = {"\t": "tab", ";": "semicolon", ",": "comma", None: "blanks"}[layout.separator]
-    return f"separated by {named}" + (", decimal comma" if layout.comma else "")
-
-
 def read_logger(path: str | Path, fs: float | None = None) -> Record:
     """Read a text file of a logger or spreadsheet: samples (N, m), NaN = missing, with rate, names and units found.
 
@@ -360,7 +356,7 @@ def read_logger(path: str | Path, fs: float | None = None) -> Record:
     with reading(file, "a logger's text file"):
         layout = _lay_out(file)
         columns = _table(file, layout)
-        arrays = {k: _numbers(layout, k, one) for k, one in enumerate(columns) if layout.names[k] or len(one)}
+        arrays = {k: _numbers(layout, k, one) for k, one in enumerate(columns)}
         found = {k: array for k, array in arrays.items() if array is not None}
         time = None if fs is not None else _times(layout, columns, found)
         stated = _stated_rate(layout.lines[: layout.first])
@@ -376,14 +372,17 @@ def read_logger(path: str | Path, fs: float | None = None) -> Record:
                 layout.remarks.append(f"a line above the data states {stated:.9g} Hz, the time says {rate:.9g} Hz")
         elif stated is not None and fs is None:
             layout.remarks.append(f"{stated:.9g} Hz by a line above the data")
-        kept = [k for k, array in found.items() if (time is None or k != time[0]) and not np.all(np.isnan(array))]
+        others = {k: array for k, array in arrays.items() if time is None or k != time[0]}
+        kept = [k for k, array in others.items() if array is not None and not np.all(np.isnan(array))]
         if not kept:
             raise InputError("no channel of numbers beside the time")
-        left = [layout.names[k] for k, a in arrays.items() if a is None and (time is None or k != time[0])]
+        left = [layout.names[k] for k, array in others.items() if array is None]
         layout.remarks += [f"{name} is left out: it holds no numbers" for name in left]
         samples = np.full((int(rows[-1]) + 1, len(kept)), np.nan)
         samples[rows] = np.column_stack([found[k] for k in kept])
-        layout.remarks.insert(0, f"read as a logger's file: data from line {layout.first + 1}, {_decimal(layout)}")
+        parted = {"\t": "tab", ";": "semicolon", ",": "comma", None: "blanks"}[layout.separator]
+        form = f"data from line {layout.first + 1}, separated by {parted}" + ", decimal comma" * layout.comma
+        layout.remarks.insert(0, f"read as a logger's file: {form}")
         header = "\n".join(line.rstrip() for line in layout.lines[: layout.first] if line.strip())[:4000]
         return Record(
             [layout.names[k] for k in kept], samples, fs if fs is not None else rate, [layout.units[k] for k in kept],
