@@ -19,7 +19,7 @@ OLD = '{"the result": "of the run before"}'
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = simulate_rig(tmp_path_factory.mktemp("interrupt"), rig_text(120.0))
-    (folder / "long.toml").write_text(rig_text(600.0, 1000.0))
+    (folder / "long.toml").write_text(rig_text(200.0, 1000.0))
     return folder
 
 

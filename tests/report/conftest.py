@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -72,11 +73,20 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {"frame": _frame(folder), "wide": _wide(folder), "ambient": _ambient(folder)}
 
 
+def described(_self: Pictures, _drawing: Any, text: str, kind: str = "fig") -> str:
+    """Instead of Pictures.inline: a picture that is empty but for its description."""
+    return f'<svg class="{kind}" role="img" aria-label="{escape(text, quote=True)}"></svg>'
+
+
 @pytest.fixture
 def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests that read the words of a page: its pictures, most of its cost, are empty but for their descriptions."""
-
-    def described(_self: Pictures, _drawing: Any, text: str, kind: str = "fig") -> str:
-        return f'<svg class="{kind}" role="img" aria-label="{escape(text, quote=True)}"></svg>'
-
+    """For tests that read the words of a page: its pictures are most of its cost."""
     monkeypatch.setattr(Pictures, "inline", described)
+
+
+@pytest.fixture(scope="module")
+def words_only_in_module() -> Iterator[None]:
+    """The same for a whole file and the pages it makes once."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Pictures, "inline", described)
+        yield

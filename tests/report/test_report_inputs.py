@@ -193,6 +193,7 @@ def test_records_of_other_formats(small: tuple[Path, Any, Any], tmp_path: Path) 
     assert "Time histories" in html
 
 
+@pytest.mark.usefixtures("words_only")
 def test_the_report_of_a_result_in_memory(tmp_path: Path) -> None:
     u, y = demo_record(1500)
     result = okid.identify(u, y, fs=FS, p=15, sigma_blocks=0)

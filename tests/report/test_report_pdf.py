@@ -43,6 +43,7 @@ def test_no_browser_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("words_only")
 def test_a_browser_that_fails_leaves_nothing(
     result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

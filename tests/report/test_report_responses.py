@@ -12,9 +12,11 @@ import pytest
 from okid.report.compose import build
 from okid.report.loaded import loaded_from
 
+pytestmark = pytest.mark.usefixtures("words_only_in_module")
+
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> str:
+def page(tmp_path_factory: pytest.TempPathFactory, words_only_in_module: None) -> str:
     force, y = okid.demo_record()
     result = okid.identify(force, y, fs=1000.0, input_names=["f"], output_names=["a", "b", "c"], sigma_blocks=0)
     path = tmp_path_factory.mktemp("check") / "run.csv"

@@ -10,6 +10,7 @@
 #include <drv/ring.h>
 #include <memory>
 #include <numeric>
+#include <seeds.h>
 #include <unity.h>
 #include <vector>
 
@@ -127,7 +128,7 @@ fault_plan_t plan_of(std::uint32_t seed) {
 
 unsigned seeds() {
     if (std::getenv("OKID_FAULT_SEEDS")) return static_cast<unsigned>(std::atoi(std::getenv("OKID_FAULT_SEEDS")));
-    return std::getenv("OKID_SLOW") ? 10000 : 1000;
+    return draw_seeds(1000, 10000);
 }
 
 std::string title(const char* what, const fault_plan_t& plan, const outcome& o) {
