@@ -34,7 +34,7 @@ def chromium() -> str:
 
 
 @pytest.fixture(scope="session")
-def browser(chromium: str) -> Iterator[Any]:
+def one_browser(chromium: str) -> Iterator[Any]:
     """Without a window, driven by playwright, which runs in a process only once: one browser for all tests."""
     from playwright.sync_api import sync_playwright
 
@@ -42,3 +42,11 @@ def browser(chromium: str) -> Iterator[Any]:
         one = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-dev-shm-usage"])
         yield one
         one.close()
+
+
+@pytest.fixture
+def browser(one_browser: Any) -> Iterator[Any]:
+    """Its pages are closed behind each test: a live page goes on drawing."""
+    yield one_browser
+    for context in one_browser.contexts:
+        context.close()

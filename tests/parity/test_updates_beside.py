@@ -92,6 +92,11 @@ def test_the_result_is_that_of_replay(made: Path, keys: str) -> None:
     before, truth = replayed(made, path)
     events, result, _ = fed(made, path)
     assert result == truth
+    said = {warning["code"]: warning["text"] for warning in json.loads(truth)["warnings"]}
+    mixed = keys in (NAMED, 'method = "auto"\n') or "restart_on_change" in keys  # what was before with what came after
+    assert {"changed", "restarted"} & set(said) == {"changed" if mixed else "restarted"}
+    assert not mixed or "the structure changed near t = 2" in said["changed"]
+    assert keys != NAMED or "A - K C" in said["predictor_unstable"]
     assert json.loads(truth)["modes"] and of_type(before, "change") == of_type(events, "change") != []
     assert of_type(before, "gap") == of_type(events, "gap") != []
     told, all_made = of_type(events, "stats")[-1]["updates"], of_type(before, "stats")[-1]["updates"]

@@ -4,17 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from html import escape
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import okid
 import pytest
 from okid import report
 from okid.demo import demo_record
-from okid.report.svg import Pictures
 from report_files import write_csv, write_events
+from words_only import leave_pictures_out
 
 HOSTILE = ["<script>alert(1)</script>", 'a$b</script><img src=x onerror="alert(2)">', "acc '3' & ]]> $\\frac$"]
 
@@ -73,20 +71,15 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {"frame": _frame(folder), "wide": _wide(folder), "ambient": _ambient(folder)}
 
 
-def described(_self: Pictures, _drawing: Any, text: str, kind: str = "fig") -> str:
-    """Instead of Pictures.inline: a picture that is empty but for its description."""
-    return f'<svg class="{kind}" role="img" aria-label="{escape(text, quote=True)}"></svg>'
-
-
 @pytest.fixture
 def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests that read the words of a page: its pictures are most of its cost."""
-    monkeypatch.setattr(Pictures, "inline", described)
+    leave_pictures_out(monkeypatch)
 
 
 @pytest.fixture(scope="module")
 def words_only_in_module() -> Iterator[None]:
     """The same for a whole file and the pages it makes once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Pictures, "inline", described)
+        leave_pictures_out(patch)
         yield

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from okid._errors import InputError
 from okid.data.whole_file import whole_file
@@ -100,6 +99,8 @@ def _filters(columns: Real, fs_hz: float, forces: int) -> tuple[Real, Real]:
 def _record(year: Year, columns: Real, number: int) -> Real:
     """One record (samples, 4): force at the first storey and accelerations, with noise; ambient: forces at all storeys,
     of which the first is told."""
+    from scipy.signal import lfilter  # takes a second to load, which every call of okid-campaign would pay
+
     forces = 3 if year.ambient else 1
     top, bottom = _filters(columns, year.fs_hz, forces)
     rng = np.random.default_rng([year.seed, 2, number])
