@@ -95,6 +95,37 @@ def test_decoded_samples(tmp_path: Path) -> None:
     assert (tmp_path / "r.csv").read_text() == (OLD / "record.csv").read_text()
 
 
+@pytest.mark.parametrize("name", [*METHODS, "ambient", "refined"])
+def test_identify(name: str, tmp_path: Path) -> None:
+    given: list[Any] = ["--outputs", "acc1,acc2", "--hold", "zoh", "--p", 10, "--rows", 20, "--order", 4, "--quiet"]
+    given += ["--method", name if name in METHODS else "okid-era"]
+    given += ["--detrend", "none" if name == "refined" else "mean", "--sigma-blocks", 0 if name == "refined" else 8]
+    given += [] if name == "ambient" else ["--inputs", "force1"]
+    given += ["--input-dofs", "1", "--output-dofs", "1,2"] if name in METHODS else []
+    given += ["--refine", "--stabilization"] if name == "refined" else []
+    done("identify", OLD / "record.csv", *given, "--json", tmp_path / "r.json")
+    compare(json.loads((tmp_path / "r.json").read_text()), json.loads((OLD / "results" / f"{name}.json").read_text()))
+
+
+def test_records_merged(tmp_path: Path) -> None:
+    """Two records from rest under a linear force, order and warnings found by itself."""
+    given: list[Any] = [
+        "--inputs",
+        "force1",
+        "--outputs",
+        "acc1,acc2",
+        "--hold",
+        "foh",
+        "--start",
+        "rest",
+        "--rows",
+        10,
+    ]
+    given += ["--method", "n4sid-moesp", "--sigma-blocks", 8, "--input-dofs", "1", "--output-dofs", "1,2", "--quiet"]
+    done("identify", OLD / "record.csv", OLD / "record.csv", *given, "--json", tmp_path / "r.json")
+    compare(json.loads((tmp_path / "r.json").read_text()), json.loads((OLD / "results" / "merged.json").read_text()))
+
+
 @pytest.mark.parametrize("name", [*METHODS, "ambient", "refined", "merged"])
 def test_result_is_reported(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """okid-report reads an old result and shows its modes; pictures are those of one kind of result each."""
