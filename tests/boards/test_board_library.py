@@ -9,7 +9,6 @@ is also taken apart by the package `cobs` and CRC-32 by zlib, which share nothin
 from __future__ import annotations
 
 import json
-import os
 import re
 import struct
 import subprocess
@@ -23,9 +22,9 @@ import numpy as np
 import pytest
 import yaml
 from cobs import cobs
+from program import PROGRAM
 
 ROOT, HERE = core_feed.ROOT, Path(__file__).resolve().parent
-PROGRAM = Path(os.environ.get("OKID_PROGRAM", ROOT / "build" / "okid")).absolute()
 STRICT = ["-Wall", "-Wextra", "-Werror", "-O1"]
 
 

@@ -6,22 +6,20 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import okid
 import pytest
+from methods import METHODS
 from okid import report
+from program import okid as run_okid
+from words_only import leave_pictures_out
 
 HERE = Path(__file__).resolve().parent
 OLD = HERE / "0.1.0"
-sys.path.insert(0, str(HERE.parent / "property"))
-from program import okid as run_okid  # noqa: E402
-from words_only import leave_pictures_out  # noqa: E402
 
-METHODS = ["okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"]
 # Relative; another processor or BLAS adds in another order. A small difference of large numbers has fewer digits.
 LOOSE = {"std": 1e-4, "damping_ratio": 1e-6, "R": 1e-5, "mkr": 1e-6, "Y": 1e-7, "percent": 1e-6, "doubtful": 1e-4}
 # Depend on the signs and order that the SVD happens to choose, or say which release wrote them.

@@ -28,6 +28,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+from program import PROGRAM
+
 ROOT = Path(__file__).parents[2]
 NUMBER = re.compile(r"(±?)(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)")
 LEAST_CONFIG = """[acquisition]
@@ -92,7 +94,7 @@ class Reader:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        program = Path(os.environ.get("OKID_PROGRAM", ROOT / "build" / "okid")).absolute()
+        program = Path(PROGRAM)
         path = [str(program.parent), str(Path(sys.executable).parent), os.environ["PATH"]]
         self.environment = {**os.environ, "PATH": os.pathsep.join(path), "OKID": str(ROOT), "NO_COLOR": "1"}
         self.environment["OKID_PROGRAM"] = str(program)
@@ -145,8 +147,7 @@ class Reader:
 
 @cache
 def help_of(*words: str) -> str:
-    program = Path(os.environ.get("OKID_PROGRAM", ROOT / "build" / "okid"))
-    first = str(program) if words[0] == "okid" else str(Path(sys.executable).parent / words[0])
+    first = PROGRAM if words[0] == "okid" else str(Path(sys.executable).parent / words[0])
     done = subprocess.run([first, *words[1:], "--help"], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, (words, done.stderr)
     return done.stdout

@@ -5,19 +5,18 @@ the tables are those of the headers."""
 from __future__ import annotations
 
 import ctypes
-import os
 import pathlib
 import re
 import subprocess
 
-import pytest
 from command_help import ROOT
 from markdown_pages import blocks
+from program import PROGRAM
 from reference_tables import REFERENCE, codes, rows, sections
 
 PAGE = REFERENCE / "c-api.md"
 INCLUDE = ROOT / "lib" / "include" / "okid"
-ARCHIVE = pathlib.Path(os.environ.get("OKID_PROGRAM", ROOT / "build" / "okid")).absolute().parent / "libokid.a"
+ARCHIVE = pathlib.Path(PROGRAM).parent / "libokid.a"
 
 
 def backend_libraries() -> list[str]:
@@ -27,7 +26,6 @@ def backend_libraries() -> list[str]:
     return ["-llapacke", "-lopenblas"] if library.okid_backend() == b"lapacke" else []
 
 
-@pytest.mark.skipif(not ARCHIVE.exists(), reason=f"{ARCHIVE} is not built")
 def test_the_program(tmp_path: pathlib.Path) -> None:
     found = blocks(PAGE)
     program = next(block.text for block in found if block.language == "c" and "int main" in block.text)

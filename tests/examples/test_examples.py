@@ -16,11 +16,12 @@ import time
 from pathlib import Path
 
 import numpy as np
+import program
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
-PROGRAM = Path(os.environ.get("OKID_PROGRAM", ROOT / "build" / "okid")).absolute()
+PROGRAM = Path(program.PROGRAM)
 SCALE = (0.0002, 0.0006, 0.0005, 0.0003)  # of the codes of the rig's frames
 CHANNELS = ["force1", "acc1", "acc2", "acc3"]
 

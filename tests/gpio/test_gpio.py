@@ -16,10 +16,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from program import PROGRAM as OKID
 from two_masses import rig_text
 
 BUILD = Path(os.environ.get("OKID_BUILD", str(Path(__file__).parents[2] / "build")))
-OKID = os.environ.get("OKID_PROGRAM", str(BUILD / "okid"))
 
 
 APIS = [1, 2] if (BUILD / "gpio" / "gpio_lines_1").exists() else [2]  # where the system has 2.x, that alone

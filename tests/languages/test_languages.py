@@ -14,9 +14,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from program import PROGRAM
 
 ROOT = Path(__file__).resolve().parents[2]
-BUILD = Path(os.environ.get("OKID_PROGRAM", ROOT / "build" / "okid")).absolute().parent
+BUILD = Path(PROGRAM).parent
 INCLUDE = [f"-I{ROOT / part}" for part in ("lib/include", "firmware_host/include", "drivers/include")]
 RECORD = """
 rand ('seed', 3); n = 4000; fs = 100; f = 12.5; zeta = 0.02;

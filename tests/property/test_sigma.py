@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import systems
+from methods import METHODS
 from numpy.typing import NDArray
 from okid import InputError, Session, identify
 from program import okid
@@ -30,9 +31,6 @@ def deviations(modes: Sequence[Any]) -> Array:
 
 def found(method: str, **options: Any) -> Any:
     return identify(U, Y, fs=W1.fs, method=method, order=6, **options)
-
-
-METHODS = ["okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"]
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = os.environ.get("OKID_PROGRAM") or str(ROOT / "build" / "okid")
+PROGRAM = str(Path(os.environ.get("OKID_PROGRAM") or ROOT / "build" / "okid").absolute())
 
 
 def okid(*arguments: object, status: int | None = None) -> subprocess.CompletedProcess[str]:
