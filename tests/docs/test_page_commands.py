@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +28,14 @@ PAGES = [
     "howto/report.md",
     "howto/frequency-responses.md",
     "migration/candump.md",
+    "howto/acquisition-scripts.md",
+    "howto/install.md",
 ]
 ELSEWHERE = {  # what a line begins with: where it is run
     r"okid (?:run|record) |okid (?:simulate|replay) .* --to |okid init .* --(?:listen|device) ": "tests/vcan, tests/io",
     r"okid bench": "make bench",
     r"okid-live": "tests/live",
-    r"okid-capture": "tests/capture",
+    r"okid-capture (?:emulate|sync|\w+ (?:--interface|--port))": "tests/capture",
     r"okid-campaign": "tests/campaign",
 }
 RIG = """rate_hz = 250.0
@@ -44,6 +47,21 @@ force_dofs = [1]
 sense_dofs = [1, 2, 3]
 noise_percent = 1.0
 """
+PLACES = {
+    "/usr/share/doc/okid/examples/": "",
+    "/etc/okid/okid.toml": "frame.toml",
+}  # where the page has a file: where it is here
+NODE = """[acquisition]
+rate_hz = 250.0
+[[bus]]
+name = "usb"
+type = "serial"
+device = "/dev/ttyACM0"
+framing = "ascii"
+""" + "".join(
+    f'[[channel]]\nname = "{name}"\nrole = "{role}"\nfield = {field}\n'
+    for field, (name, role) in enumerate([("force1", "force"), ("acc1", "acceleration"), ("acc2", "acceleration")])
+)
 GEOMETRY = "[geometry]\nnodes = [[0, 0, 0]]\ndofs = [{}]\n".format(", ".join(['[1, "x"]'] * 6))
 
 
@@ -57,6 +75,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pages")
     (folder / "rig.toml").write_text(RIG)
     (folder / "bridge.toml").write_text(GEOMETRY)
+    (folder / "node.toml").write_text(NODE)
     (folder / "runs").mkdir()
     begin = (
         "okid simulate rig.toml --quiet --log run.log --config frame.toml --csv simulated.csv\n"
@@ -67,6 +86,8 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     Reader(folder).run(Block("the files of all pages", 0, "sh", begin))
     record = okid.read_csv(folder / "simulated.csv")
+    np.savetxt(folder / "run.bin", record.samples[:, :3], fmt="%.5f", delimiter=",")
+    okid.formats.write_log(folder / "run.blf", okid.formats.read_log(folder / "run.log"))
     u, y = record.samples[:, :1], record.samples[:, 1:]
     both = [u, y, u, y]
     names = ["force1", "acc1", "acc2", "acc3", "force", "a1", "a2", "a3"]
@@ -82,7 +103,8 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def commands(page: str) -> list[str]:
     shell = [block.text for block in blocks(ROOT / "docs" / page) if block.language in SHELL]
-    return [" ".join([program, *words]) for text in shell for program, words in command_lines(text)]
+    lines = [" ".join([program, *words]) for text in shell for program, words in command_lines(text)]
+    return [reduce(lambda line, place: line.replace(*place), PLACES.items(), line) for line in lines]
 
 
 @pytest.mark.parametrize("page", PAGES)
