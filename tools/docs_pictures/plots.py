@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -199,6 +201,29 @@ def speed() -> str:
     return keep("speed.svg", figure)
 
 
+def latency() -> str:
+    """Line to identification, and line to the event with the modes, calm and beside a load: `bench_latency`."""
+    file = runs.FOLDER / "latency.json"
+    file.write_text('{"rows": [], "ratios": {}}')
+    build = Path(runs.OKID).parent
+    subprocess.run(["cmake", "--build", build, "--target", "bench_latency", "--", "--quiet"], check=True)
+    subprocess.run([build / "tests" / "bench_latency", file], check=True, stdout=subprocess.DEVNULL)
+    figure, axes = plt.subplots(1, 2, figsize=(8.2, 2.8), sharex=True, sharey=True)
+    titles = {"calm": "calm machine", "busy": "beside two busy processors"}
+    for axis, row in zip(axes, json.loads(file.read_text())["rows"], strict=True):
+        for name, label, colour in (
+            ("bare", "a bare reader", GREY),
+            ("handed_over", "sample handed over", BLUE),
+            ("modes", "modes told", ORANGE),
+        ):
+            begin, count = np.array(row["histograms_ms"][name]).T
+            axis.step(begin, 100 * count / count.sum(), where="post", color=colour, label=label)
+        axis.set(xscale="log", xlabel="behind the line [ms]", title=titles[row["case"]])
+    axes[0].set_ylabel("% of all")
+    axes[0].legend(frameon=False, fontsize=8)
+    return keep("latency.svg", figure)
+
+
 def settling() -> str:
     """Damping of the first mode, update by update, with its ± 2 σ, of a replay of the frame."""
     runs.frame()
@@ -244,4 +269,4 @@ def finite_p() -> str:
 
 
 def make() -> list[str]:
-    return [one() for one in (hits, holds, wrong_hold, sigma, shapes, speed, settling, finite_p)]
+    return [one() for one in (hits, holds, wrong_hold, sigma, shapes, speed, latency, settling, finite_p)]
