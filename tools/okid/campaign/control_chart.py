@@ -2,10 +2,10 @@
 """Control charts of standardised residuals, with limits for a stated probability of a false alarm in a year.
 
 Two charts: the smallest T^2 of three groups in a row (sudden change), and that of an exponentially weighted mean (small
-change that stays; Lowry et al. 1992). A single outlying group, such as one bad record, is in neither. Limits are not
+change that stays; Lowry et al. 1992). One or two outlying groups, such as bad records, are in neither. Limits are not
 read from tables: years without damage are simulated through the same regression on the same temperatures, with as few
-training groups and with the persistence of the residuals (Gaussian, first order); the limit is the quantile of the
-largest value of a year. Half of the probability goes to each chart.
+training groups, with the persistence (first order) and the tails (Student's t) of the residuals; the limit is the
+quantile of the largest value of a year. Half of the probability goes to each chart.
 """
 
 from __future__ import annotations
@@ -46,10 +46,13 @@ class _Chart:
     """The values of the charts group by group, of one campaign or many: residuals (..., d)."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
-        self._state, self._held = np.zeros(shape), np.zeros(shape)
-        self._waits = self._was_far = np.zeros(shape[:-1], dtype=np.bool_)
+        self._state = np.zeros(shape)
+        self._held = [np.zeros(shape)] * (IN_A_ROW - 1)
+        self._far_before = np.zeros(shape[:-1], dtype=np.int64)
         self._row = [np.zeros(shape[:-1])] * IN_A_ROW
-        self._far = shape[-1] + 6.0 * np.sqrt(2.0 * shape[-1]) + 15.0  # T^2 of a group that waits for another one
+        d = shape[-1]
+        self._far = d + 6.0 * np.sqrt(2.0 * d) + 15.0  # T^2 of a group that waits for others
+        self._ordinary = d + 3.0 * np.sqrt(2.0 * d)  # of one behind it that shows that nothing has changed
 
     def _take(self, white: Real, flags: Any) -> None:
         """One more group where the flags are set."""
@@ -61,13 +64,19 @@ class _Chart:
         self._row = [np.where(flags, one, old) for one, old in zip(row, self._row, strict=True)]
 
     def add(self, white: Real) -> tuple[Real, Real, Real]:
-        """T^2 (...,) of groups in a row, of the mean, alone. A far group waits: it counts when the next is far too."""
+        """T^2 (...,) of groups in a row, of the mean, alone.
+
+        A far group and those behind it wait until they are IN_A_ROW, or until an ordinary one tells that it was alone.
+        """
         single = np.sum(white**2, axis=-1)
-        far = single > self._far
-        self._take(self._held, far & self._waits)
-        self._take(white, ~far | self._was_far)
-        self._waits, self._was_far, self._held = far & ~self._was_far, far, white
-        row = np.where(self._waits, 0.0, np.minimum.reduce(self._row))
+        goes_on = single > np.where(self._far_before > 0, self._ordinary, self._far)
+        far_now = np.where(goes_on, self._far_before + 1, 0)
+        for held in self._held:
+            self._take(held, far_now == IN_A_ROW)
+        self._take(white, (far_now == 0) | (far_now >= IN_A_ROW))
+        self._far_before, self._held = far_now, [*self._held[1:], white]
+        waits = (far_now > 0) & (far_now < IN_A_ROW)
+        row = np.where(waits, 0.0, np.minimum.reduce(self._row))
         return row, np.sum(self._state**2, axis=-1) * (2.0 - MEMORY) / MEMORY, single
 
 
@@ -78,17 +87,19 @@ def charts(white: Real) -> Charts:
 
 
 class _Null:
-    """Simulated campaigns without damage: `count` of them at a time, d residuals of unit variance with the correlation
-    and the persistence of the training."""
+    """Simulated campaigns without damage: `count` of them at a time, d residuals of unit variance with the correlation,
+    the persistence and the tails of the training."""
 
     def __init__(self, rng: np.random.Generator, count: int, model: Regression) -> None:
-        self._rng, self._rho = rng, model.persistence
+        self._rng, self._rho, self._tails = rng, model.persistence, model.tails
         self._fresh = np.sqrt(1.0 - model.persistence**2)
         self._root = np.linalg.cholesky(model.correlation).T
         self._now = self._new((count, len(model.persistence)))
 
     def _new(self, shape: tuple[int, ...]) -> Real:
-        return self._rng.standard_normal(shape) @ self._root
+        if np.isinf(self._tails):
+            return np.asarray(self._rng.standard_normal(shape) @ self._root)
+        return np.asarray(self._rng.standard_t(self._tails, shape) * np.sqrt(1.0 - 2.0 / self._tails) @ self._root)
 
     def step(self) -> Real:
         """Residuals of the next group (count, d)."""

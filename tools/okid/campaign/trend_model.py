@@ -6,6 +6,7 @@ Every mode has its own rows and weights: a mode that a group does not show (weig
 
 from __future__ import annotations
 
+from math import inf, lgamma, log, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 _LEAST_EIGENVALUE = 0.02  # of a correlation matrix whose entries come from different rows
+_TAILS = (3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0)  # degrees of freedom; the variance is finite
 _FAR = 8.0  # robust standard deviations: such a row of the training is an accident
 
 
@@ -22,7 +24,7 @@ class Regression(NamedTuple):
 
     coefficients (k, d) about `centre_c`, and their standard deviations; variance (d,) of the residuals of weight 1 with
     freedom (d,) degrees of freedom, correlation (d, d) shrunk to none; inverse (d, k, k) of X'WX; persistence (d,):
-    lag-1 correlation of the residuals, 0 .. 0.95.
+    lag-1 correlation of the residuals, 0 .. 0.95; tails: degrees of freedom of their Student's t, inf = Gaussian.
     """
 
     coefficients: Real
@@ -34,6 +36,7 @@ class Regression(NamedTuple):
     freedom: Real
     persistence: Real
     lag1: Real
+    tails: float
 
 
 def design(temperature: Real | None, centre_c: float, order: int, count: int) -> Real:
@@ -78,7 +81,33 @@ def fit(y: Real, X: Real, centre_c: float, weight: Real) -> Regression:
     n = seen.sum(axis=0)
     persistence = np.clip(lag1 + (k + 3.0 * lag1) / n, 0.0, 0.95)
     deviations = np.sqrt(np.einsum("dkk->kd", inverse) * variance)
-    return Regression(coefficients, deviations, centre_c, variance, correlation, inverse, n - k, persistence, lag1)
+    fresh = residual[1:] - persistence * residual[:-1]
+    tails = tails_of([fresh[seen[1:, j] & seen[:-1, j], j] for j in range(y.shape[1])])
+    return Regression(
+        coefficients, deviations, centre_c, variance, correlation, inverse, n - k, persistence, lag1, tails
+    )
+
+
+def tails_of(columns: list[Real]) -> float:
+    """Degrees of freedom of the Student's t that is likeliest for all columns, each with its own scale.
+
+    Gaussian (inf) unless the likelihood speaks for tails by more than the one parameter that they cost (Akaike 1974).
+    """
+    columns = [one for one in columns if len(one) > 2 and np.any(one != 0.0)]
+
+    def likelihood(nu: float) -> float:
+        total = 0.0
+        for one in columns:
+            scale = float(np.mean(one**2))
+            for _ in range(50):  # of the scale, by its own fixed point
+                scale = float(np.mean((nu + 1.0) * one**2 / (nu + one**2 / scale)))
+            constant = lgamma((nu + 1.0) / 2.0) - lgamma(nu / 2.0) - 0.5 * log(nu * pi * scale)
+            total += len(one) * constant - (nu + 1.0) / 2.0 * float(np.sum(np.log1p(one**2 / (nu * scale))))
+        return total
+
+    gaussian = -0.5 * sum(len(one) * (log(2.0 * pi * float(np.mean(one**2))) + 1.0) for one in columns)
+    best = max(_TAILS, key=likelihood)
+    return best if likelihood(best) - gaussian > 1.0 else inf
 
 
 def far_rows(y: Real, X: Real, weight: Real) -> Flags:

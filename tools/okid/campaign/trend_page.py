@@ -196,14 +196,16 @@ def _series_section(series: SeriesTrend, pictures: Pictures, trend: Trend) -> pa
 
 
 def _chart_words(series: SeriesTrend, trend: Trend) -> str:
-    assert series.limits is not None
+    assert series.limits is not None and series.regression is not None
+    nu = series.regression.tails
+    tails = "Gaussian" if np.isinf(nu) else f"Student's t with {nu:g} degrees of freedom:"
     return (
         f"Limits: the probability of any alarm in a year of {series.limits.per_year} groups of a structure that does "
         f"not change is {100 * trend.false_alarm_per_year:g} %, half of it for each chart, found with "
-        f"{series.limits.simulated} simulated years (Gaussian residuals with the persistence of the training, refitted "
+        f"{series.limits.simulated} simulated years ({tails} residuals with the persistence of the training, refitted "
         f"on {int(np.sum(series.training))} training groups). T²: squared distance of all watched modes of a group "
         "from what its temperature lets expect, the smallest of three groups in a row; EWMA: the same of a "
-        "weighted mean (0.2 of the newest group). A single outlying group, such as one bad record, is in neither."
+        "weighted mean (0.2 of the newest group). One or two outlying groups, such as bad records, are in neither."
     )
 
 
