@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 namespace okid_host {
@@ -35,9 +36,10 @@ void sync_folder(const std::string& folder) {
     close(fd);
 }
 
-/// A rename that replaces nothing; some file systems do not know it.
+/// A rename that replaces nothing; some file systems do not know it. The C library has renameat2() from 2.28 on only.
 int rename_new(const std::string& from, const std::string& to) {
-    if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+    constexpr unsigned noreplace = 1; // RENAME_NOREPLACE
+    if (syscall(SYS_renameat2, AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), noreplace) == 0) return 0;
     if (errno != EINVAL && errno != ENOSYS) return errno;
     if (access(to.c_str(), F_OK) == 0) return EEXIST;
     return std::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;

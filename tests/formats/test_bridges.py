@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 import soundfile
 from hypothesis import given
 from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 from nptdms import ChannelObject, TdmsWriter
 from okid.data.records import Record
 from okid.formats import read_mcap, read_sound, read_tdms, write_mcap
@@ -47,6 +49,24 @@ def test_mcap_as_its_own_reader_sees_it(tmp_path: Path) -> None:
 def test_any_record_comes_back(tmp_path: Path, record: Record) -> None:
     write_mcap(tmp_path / "a.mcap", record)
     assert_same(read_mcap(tmp_path / "a.mcap"), record)
+
+
+@steady
+@given(records())
+def test_ros2_messages_have_the_same_bits(tmp_path: Path, record: Record) -> None:
+    """As the decoder of ROS 2 messages sees them: a topic a channel, NaN for a missing sample."""
+    path = tmp_path / "a.ros2.mcap"
+    write_mcap(path, record)
+    seen: dict[str, list[float]] = {}
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        assert reader.get_header().profile == "ros2"
+        for schema, channel, _, message in reader.iter_decoded_messages():
+            assert schema is not None and schema.name == "std_msgs/msg/Float64"
+            assert re.fullmatch(r"/okid/signals/[A-Za-z_][A-Za-z0-9_]*", channel.topic)
+            seen.setdefault(channel.topic, []).append(message.data)
+    assert len(seen) == (len(record.names) if len(record.samples) else 0)
+    np.testing.assert_array_equal(np.array(list(seen.values())).T.reshape(record.samples.shape), record.samples)
 
 
 def test_what_mcap_cannot_hold_is_refused(tmp_path: Path) -> None:

@@ -15,15 +15,22 @@ import socket
 import stat
 import struct
 import subprocess
+import sys
 import termios
 import threading
 import time
+import urllib.parse
 import urllib.request
 from collections.abc import Iterator
 from datetime import datetime
 from typing import Any
 
+import okid as okid_package
 import pytest
+from line_protocol_parser import parse_line
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader, make_reader
+from mcap_ros2.decoder import DecoderFactory
 from program import PROGRAM, okid
 from two_masses import rig_text, simulate_rig
 from waiting import until
@@ -410,27 +417,17 @@ def test_home_assistant_is_told_when_it_is_asked_for(rig: pathlib.Path) -> None:
         assert f"'track', 'eq', {track}" in one["value_template"]
 
 
-POINT = re.compile(r"([a-z_]+)((?:,[a-z]+=(?:[^ ,=\\]|\\.)+)+) ([a-z_]+=[^ ,]+(?:,[a-z_]+=[^ ,]+)*) (\d+)")
-
-
-def points(text: str) -> list[tuple[str, dict[str, str], dict[str, str], int]]:
-    """A reader of line protocol of the tests' own: measurement, tags, fields, ns; every line is one."""
-    out = []
-    for line in text.splitlines():
-        found = POINT.fullmatch(line)
-        assert found, line
-        tags = dict(one.split("=") for one in found[2][1:].split(","))
-        out.append((found[1], tags, dict(one.split("=") for one in found[3].split(",")), int(found[4])))
-    return out
+def points(text: str) -> list[tuple[str, dict[str, str], dict[str, Any], int]]:
+    """Line protocol as another reader takes it: measurement, tags, fields, ns; every line is one."""
+    found = [parse_line(line) for line in text.splitlines()]
+    return [(one["measurement"], one["tags"], one["fields"], one["time"]) for one in found]
 
 
 def assert_influx(text: str, events: list[str]) -> None:
     """Every frequency of every tracked mode with the digits of the event, at its time."""
     start = json.loads(events[0])
     begin = datetime.fromisoformat(start["wall_time"]).timestamp()
-    seen = [
-        (int(tags["mode"]), float(of["frequency_hz"]), ns) for name, tags, of, ns in points(text) if name == "okid_mode"
-    ]
+    seen = [(int(tags["mode"]), of["frequency_hz"], ns) for name, tags, of, ns in points(text) if name == "okid_mode"]
     wanted = [
         (mode["track"], mode["frequency_hz"], event["t"])
         for event in numbers(events, "modes")
@@ -442,13 +439,70 @@ def assert_influx(text: str, events: list[str]) -> None:
     last = [
         of for name, tags, of, _ in points(text) if name == "okid_bus" and tags == {"rig": "Frame_7_b", "bus": "can0"}
     ][-1]
-    assert float(last["received"]) == numbers(events, "stats")[-1]["bus"]["can0"]["received"]
+    assert last["received"] == numbers(events, "stats")[-1]["bus"]["can0"]["received"]
 
 
 def test_influx_lines_in_a_file(rig: pathlib.Path) -> None:
     with replaying(rig, 'influx = "out.lp"') as run:
         assert run.wait(60) == 0
     assert_influx((rig / "out.lp").read_text(), file_lines(rig))
+
+
+@contextlib.contextmanager
+def database(folder: pathlib.Path) -> Iterator[tuple[int, int]]:
+    """An InfluxDB with the database `rig`; its ports for HTTP and for datagrams."""
+    web, ear = free_port(), free_port(socket.SOCK_DGRAM)
+    (folder / "influxdb.conf").write_text(
+        f'reporting-disabled = true\nbind-address = "127.0.0.1:{free_port()}"\n'
+        f'[meta]\ndir = "{folder}/meta"\n[data]\ndir = "{folder}/data"\nwal-dir = "{folder}/wal"\n'
+        f'[http]\nbind-address = "127.0.0.1:{web}"\n'
+        f'[[udp]]\nenabled = true\nbind-address = "127.0.0.1:{ear}"\ndatabase = "rig"\nbatch-timeout = "100ms"\n'
+    )
+    command = ["influxd", "-config", folder / "influxdb.conf"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
+        try:
+            until(lambda: asked(web, "CREATE DATABASE rig"), seconds=30)
+            yield web, ear
+        finally:
+            server.kill()
+
+
+def asked(web: int, question: str) -> Any:
+    """The answer of the database, None while it does not listen."""
+    data = urllib.parse.urlencode({"db": "rig", "epoch": "ns", "q": question}).encode()
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{web}/query", data, timeout=10) as answer:
+            return json.load(answer)["results"][0]
+    except OSError:
+        return None
+
+
+@pytest.mark.parametrize("way", ["http", "udp"])
+def test_a_database_holds_what_was_told(rig: pathlib.Path, tmp_path: pathlib.Path, way: str) -> None:
+    """InfluxDB itself gives back the bits of every frequency at its time; of datagrams those that came."""
+    with database(tmp_path) as (web, ear):
+        address = f"http://127.0.0.1:{web}/write?db=rig" if way == "http" else f"udp://127.0.0.1:{ear}"
+        with replaying(rig, f'influx = "{address}"') as run:
+            assert run.wait(60) == 0
+        events = file_lines(rig)
+        begin = datetime.fromisoformat(json.loads(events[0])["wall_time"]).timestamp()
+        wanted = {
+            (mode["track"], round(event["t"], 1)): (mode["frequency_hz"], mode["damping_ratio"])
+            for event in numbers(events, "modes")
+            for mode in event["modes"]
+            if mode["track"] is not None
+        }
+
+        def held() -> dict[tuple[int, float], tuple[float, float]]:
+            found = asked(web, "SELECT frequency_hz, damping_ratio, mode FROM okid_mode WHERE rig = 'Frame_7_b'")
+            rows = found["series"][0]["values"] if "series" in found else []
+            return {(int(mode), round(ns / 1e9 - begin, 1)): (f, zeta) for ns, f, zeta, mode in rows}
+
+        until(lambda: len(held()) == len(wanted) or (way == "udp" and len(held()) > 50))
+        got = held()
+        assert len(wanted) > 100 and all(wanted[key] == value for key, value in got.items())
+        bus = asked(web, "SELECT LAST(received) FROM okid_bus WHERE bus = 'can0'")["series"][0]["values"][0][1]
+        assert bus == numbers(events, "stats")[-1]["bus"]["can0"]["received"] or way == "udp"
 
 
 def test_influx_lines_by_datagrams(rig: pathlib.Path) -> None:
@@ -537,6 +591,70 @@ def test_wrong_addresses(rig: pathlib.Path, section: str, texts: list[str]) -> N
     assert done.returncode == 2
     for text in texts:
         assert text in done.stderr, done.stderr
+
+
+@contextlib.contextmanager
+def into_mcap(rig: pathlib.Path, target: pathlib.Path) -> Iterator[tuple[subprocess.Popen[str], subprocess.Popen[str]]]:
+    """A replay, held until okid-convert listens to it, and that okid-convert."""
+    path = rig / "mcap.sock"
+    path.unlink(missing_ok=True)
+    with replaying(rig, 'socket = "mcap.sock"\nsamples = true', "--speed", "30") as run:
+        connected(path).close()  # it listens
+        run.send_signal(signal.SIGSTOP)
+        command = [sys.executable, "-m", "okid.formats.command", str(path), str(target)]
+        environment = os.environ | {"PYTHONPATH": str(pathlib.Path(okid_package.__file__).parents[1])}
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as writer:
+            until(target.exists)
+            run.send_signal(signal.SIGCONT)
+            yield run, writer
+
+
+@pytest.mark.parametrize("name", ["live.mcap", "live.ros2.mcap"])
+def test_a_live_mcap_file(rig: pathlib.Path, tmp_path: pathlib.Path, name: str) -> None:
+    """To the last line of the run, as readers of MCAP and of ROS 2 see it; a slow reader may have lost some."""
+    target = tmp_path / name
+    with into_mcap(rig, target) as (run, writer):
+        assert run.wait(60) == 0
+        assert writer.stdout is not None and "events and blocks of signals" in writer.stdout.read()
+    assert writer.returncode == 0
+    wanted = [
+        (mode["track"], mode["frequency_hz"])
+        for event in numbers(file_lines(rig), "modes")
+        for mode in event["modes"]
+        if mode["track"] is not None
+    ]
+    with target.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        if name == "live.mcap":
+            seen = [(channel.topic, json.loads(one.data)) for _, channel, one in reader.iter_messages()]
+            listed = [mode for topic, one in seen if topic == "/modes" for mode in one["modes"]]
+            modes = [(mode["track"], mode["frequency_hz"]) for mode in listed if mode["track"] is not None]
+            signals = [one for topic, one in seen if topic == "/signals"]
+            numbered = [one["sample"] for one in signals]
+            assert len(numbered) > 1000 and numbered == sorted(set(numbered))
+        else:
+            read = [(channel.topic, one.data) for _, channel, _, one in reader.iter_decoded_messages()]
+            heads = [(re.fullmatch(r"/okid/mode(\d)/frequency_hz", topic), value) for topic, value in read]
+            modes = [(int(head[1]), value) for head, value in heads if head]
+            assert sum(topic == "/okid/signals/force1" for topic, _ in read) > 1000
+            told = [json.loads(text) for topic, text in read if topic == "/okid/events"]
+            assert (told[0]["type"], told[-1]["type"]) == ("start", "result")
+    assert len(modes) > 50 and set(modes) <= set(wanted)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_live_mcap_file_cut_off(rig: pathlib.Path, tmp_path: pathlib.Path, number: signal.Signals) -> None:
+    """SIGTERM ends it well; after SIGKILL what was written is read up to the last chunk."""
+    target = tmp_path / "cut.mcap"
+    with into_mcap(rig, target) as (_, writer):
+        until(lambda: target.stat().st_size > 30_000)
+        writer.send_signal(number)
+        assert writer.wait(20) == (0 if number == signal.SIGTERM else -number)
+    count = 0
+    with target.open("rb") as file, contextlib.suppress(EndOfFile):
+        for _ in NonSeekingReader(file).iter_messages(log_time_order=False):
+            count += 1
+    assert count > 100
 
 
 def test_hang_up_opens_the_events_file_again(rig: pathlib.Path) -> None:

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import hashlib
+import signal
+import socket
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from okid._errors import Error, InputError
@@ -23,18 +26,21 @@ from okid.formats.by_name import (
     write_result,
 )
 from okid.formats.log_names import LOG_EXTENSIONS, is_frame_csv
-from okid.formats.mcap_file import write_events_mcap
+from okid.formats.mcap_file import write_events_mcap, write_live_mcap
 from okid.formats.mdf4 import holds_frames
 from okid.formats.result_tree import load_result
 from okid.formats.uff import uff_losses
+from okid.live.feed import LineSplitter
 
 EXIT_DONE, EXIT_USAGE = 0, 2
 _FRAMES_ONLY = (".log", ".asc", ".blf", ".trc", ".db")
 
 
 def _kind(path: Path, read: bool) -> str:
-    """ "frames", "record", "result", "events" or "either" by the name; files .csv and .mf4 are looked into."""
+    """ "live", "frames", "record", "result", "events" or "either" by the name; files .csv and .mf4 are looked into."""
     ending = path.suffix.lower()
+    if read and path.is_socket():
+        return "live"
     if ending == ".okj":
         raise InputError(f"{path}: a journal is read and written by the program: okid convert {path} OUT.log")
     if ending == ".json" and read:
@@ -64,7 +70,7 @@ def _check_pair(source: Path, target: Path, given: str, wanted: str, config: str
         )
     if config is not None and (given, wanted) != ("frames", "record"):
         raise InputError("--config says which bits of CAN frames are which channel: IN holds frames, OUT samples")
-    if given == "events" and target.suffix.lower() != ".mcap":
+    if given in ("events", "live") and target.suffix.lower() != ".mcap":
         raise InputError(f"{target}: events are written as .mcap")
     if given == "record" and wanted == "frames":
         raise InputError(
@@ -126,6 +132,25 @@ def _convert_result(args: argparse.Namespace, source: Path, target: Path) -> str
     return f"{target}: {len(raw['modes'])} modes of {len(raw['outputs'])} outputs"
 
 
+def _live_lines(path: Path) -> Iterator[bytes]:
+    """The lines of `[publish] socket` until the run ends, or Ctrl-C or SIGTERM comes."""
+    with socket.socket(socket.AF_UNIX) as wire:
+        wire.connect(str(path))
+
+        def end(_number: int, _frame: object) -> None:
+            with contextlib.suppress(OSError):
+                wire.shutdown(socket.SHUT_RDWR)
+
+        before = {each: signal.signal(each, end) for each in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            lines = LineSplitter()
+            while data := wire.recv(1 << 18):
+                yield from lines.add(data)
+        finally:
+            for each, handler in before.items():
+                signal.signal(each, handler)
+
+
 def _note(remarks: Sequence[str]) -> None:
     for remark in remarks:
         print(f"okid-convert: note: {remark}", file=sys.stderr)
@@ -136,12 +161,13 @@ def _parser() -> argparse.ArgumentParser:
         prog="okid-convert",
         description="Convert measured samples, identified models or logs of CAN frames by file name extension. "
         f"Samples: {', '.join(EXTENSIONS)} (from .tdms on only read). Models: .json (okid.result/1) to "
-        f"{', '.join(RESULT_EXTENSIONS)}. Events: .jsonl (okid run --events) to .mcap. "
+        f"{', '.join(RESULT_EXTENSIONS)}. Events: .jsonl (okid run --events), or the socket of [publish] "
+        "while a run goes on, to .mcap; *.ros2.mcap is for ROS 2. "
         "Logs: .log (candump -L), .asc, .blf, .trc, .db, .mf4, .can.csv.",
         epilog="examples: okid-convert run.mf4 run.csv --channels force,a1,a2; "
         "okid-convert result.json modes.uff --geometry frame.toml; okid-convert trace.blf trace.log",
     )
-    parser.add_argument("source", metavar="IN", help="file to read")
+    parser.add_argument("source", metavar="IN", help="file to read, or socket of a run")
     parser.add_argument("target", metavar="OUT", help="file to write, whole or not at all")
     parser.add_argument("--fs", type=float, metavar="HZ", help="sample rate, overrides that of the file")
     parser.add_argument("--channels", metavar="a,b", help="only these channels, in this order")
@@ -176,6 +202,8 @@ def _run(args: argparse.Namespace) -> str:
     if given == "events":
         with source.open("rb") as lines:
             return f"{target}: {write_events_mcap(target, lines)} events"
+    if given == "live":
+        return f"{target}: {write_live_mcap(target, _live_lines(source))} events and blocks of signals"
     return _convert_result(args, source, target) if given == "result" else _convert_record(args, source, target)
 
 
