@@ -79,10 +79,9 @@ void read_band(const config_place& place, const toml::table& t, identification_c
 
 void read_identification(const toml::table& file, live_config& config) {
     identification_config& out = config.identification;
-    const toml::table* table = file["identification"].as_table();
-    if (!table) return;
+    const toml::table *table = file["identification"].as_table(), none; // without the section its defaults, too
     const config_place place{config.path, "[identification]"};
-    const toml::table& t = *table;
+    const toml::table& t = table ? *table : none;
     out.method = chosen_method(t);
     const bool agreed = out.method == "auto";
     out.hankel = t["hankel"].value_or(out.hankel);
@@ -105,7 +104,7 @@ void read_identification(const toml::table& file, live_config& config) {
     out.order = static_cast<int>(t["order"].value_or(std::int64_t{0}));
     out.window_s = t["window_s"].value<double>();
     out.forgetting = t["forgetting"].value<double>();
-    out.update_s = t["update_s"].value_or(out.update_s);
+    out.update_s = t["update_s"].value_or(std::max(out.update_s, 1 / config.rate_hz));
     out.sigma_blocks = static_cast<int>(t["sigma_blocks"].value_or(std::int64_t{out.sigma_blocks}));
     if (out.sigma_blocks > 0 && out.sigma_blocks < fewest_blocks)
         refuse_key(

@@ -59,6 +59,7 @@ CASES: list[tuple[str, str, Callable[[], tuple[Real, Real]], dict[str, Any]]] = 
     ("few_rows", r"for 69 unknowns per output, 10 for each are advised", lambda: frame(700), {"p": 20}),
     ("ill_conditioned", r"condition|repeat|noise", twice, {"p": 20}),
     ("order_reduced", r"order", frame, {"p": 20, "order": 60}),
+    ("p_reduced", r"^p is \d+ instead of 4096", frame, {"p": 4096, "method": "okid-era"}),
     ("no_modes", r"order 1 as asked for has no vibration mode", frame, {"p": 20, "order": 1}),
     ("order_unclear", r"order", one_sine, {"method": "n4sid-moesp"}),
     (
