@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+// The limits that the headers state: the least and the most of a key are taken, what is beyond them is not (memory of 0 bytes).
+#include <okid/accumulator.h>
+#include <okid/change.h>
+#include <okid/correlation.h>
+#include <okid/refine.h>
+#include <okid/stabilization.h>
+#include <okid/steps/square_root.h>
+#include <okid/steps/subspace.h>
+#include <unity.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+#define TAKEN(kind, ...) (okid_##kind##_memsize(&(okid_##kind##_config_t){__VA_ARGS__}) > 0)
+/// `key` of a config that is fine otherwise; later members of an initialiser win.
+#define LIMITS(kind, fine, key, least, most)                                                                           \
+    do {                                                                                                               \
+        const long long low = (least), high = (most);                                                                  \
+        okid_##kind##_config_t config = fine;                                                                          \
+        for (int beyond = 0; beyond < 2; ++beyond) {                                                                   \
+            config.key = (int32_t)(low - beyond);                                                                      \
+            TEST_ASSERT_EQUAL_MESSAGE(!beyond, okid_##kind##_memsize(&config) > 0, #kind " " #key ", least");          \
+            config.key = (int32_t)(high + beyond);                                                                     \
+            TEST_ASSERT_EQUAL_MESSAGE(!beyond, okid_##kind##_memsize(&config) > 0, #kind " " #key ", most");           \
+        }                                                                                                              \
+    } while (0)
+
+static void of_the_sums(void) {
+    const okid_accumulator_config_t sums = {.n_u = 1, .n_y = 1, .lags = 2, .forgetting = 1, .block = 8, .edges = 1};
+    LIMITS(accumulator, sums, n_u, 0, 255);
+    LIMITS(accumulator, sums, n_y, 1, 255);
+    LIMITS(accumulator, sums, lags, 1, 4096);
+    LIMITS(accumulator, sums, slots, 0, 65536);
+    LIMITS(accumulator, sums, spare_slots, 0, 65536);
+    LIMITS(accumulator, sums, buffer, 0, 65536);
+    const okid_square_root_config_t root = {.n_u = 1, .n_y = 1, .lags = 2, .forgetting = 1, .block = 1};
+    LIMITS(square_root, root, n_u, 0, 255);
+    LIMITS(square_root, root, n_y, 1, 255);
+    LIMITS(square_root, root, lags, 1, 4096);
+    LIMITS(square_root, root, batch, 0, 1024);
+    LIMITS(square_root, root, slots, 0, 65536);
+    LIMITS(square_root, root, spare_slots, 0, 65536);
+    const okid_correlation_config_t lagged = {.n_u = 1, .n_y = 1, .lags = 256, .slots = 1, .forgetting = 1};
+    LIMITS(correlation, lagged, n_u, 1, 255);
+    LIMITS(correlation, lagged, n_y, 1, 255);
+    LIMITS(correlation, lagged, lags, 1, 65536);
+    LIMITS(correlation, lagged, own_lags, 0, 256);
+    LIMITS(correlation, lagged, slots, 1, 4096);
+    LIMITS(correlation, lagged, buffer, 0, 65536);
+}
+
+static void memory_that_fades_needs_blocks(void) {
+    for (int block = 0; block < 3; ++block)
+        for (int fades = 0; fades < 2; ++fades) {
+            const double forgetting = fades ? 0.99 : 1;
+            const int taken = block > 0 || !fades;
+            TEST_ASSERT_EQUAL(taken, TAKEN(accumulator, .n_u = 1, .n_y = 1, .lags = 2, .block = block,
+                                           .forgetting = forgetting, .edges = 1));
+            TEST_ASSERT_EQUAL(
+                taken, TAKEN(square_root, .n_u = 1, .n_y = 1, .lags = 2, .block = block, .forgetting = forgetting));
+            TEST_ASSERT_EQUAL(taken, TAKEN(correlation, .n_u = 1, .n_y = 1, .lags = 4, .block = block, .slots = 1,
+                                           .forgetting = forgetting));
+        }
+    TEST_ASSERT_FALSE(TAKEN(accumulator, .n_u = 1, .n_y = 1, .lags = 2, .block = 8, .forgetting = 0.99));
+    for (int wrong = 0; wrong < 3; ++wrong) {
+        const double forgetting = (const double[]){0, -0.5, 1.001}[wrong];
+        TEST_ASSERT_FALSE(
+            TAKEN(accumulator, .n_u = 1, .n_y = 1, .lags = 2, .block = 8, .edges = 1, .forgetting = forgetting));
+        TEST_ASSERT_FALSE(TAKEN(square_root, .n_u = 1, .n_y = 1, .lags = 2, .block = 8, .forgetting = forgetting));
+        TEST_ASSERT_FALSE(
+            TAKEN(correlation, .n_u = 1, .n_y = 1, .lags = 4, .block = 8, .slots = 1, .forgetting = forgetting));
+    }
+}
+
+static void of_what_is_made_of_them(void) {
+    const okid_change_config_t change = okid_change_defaults(1, 1, 8, 100);
+    LIMITS(change, change, rows, 3, 512); // 2 rows of one output hold no mode
+    LIMITS(change, change, blocks, 0, 1024);
+    okid_change_config_t wide = okid_change_defaults(4, 4, 512, 100); // 2 i (n_u + n_y) = 8192
+    TEST_ASSERT_TRUE(okid_change_memsize(&wide) > 0);
+    wide.n_y = 5;
+    TEST_ASSERT_EQUAL(0, okid_change_memsize(&wide));
+    for (int order = -2; order <= 9; ++order)
+        TEST_ASSERT_EQUAL(order >= 0 && order % 2 == 0 && order <= 7,
+                          TAKEN(change, .n_y = 1, .rows = 8, .order = order, .fs_hz = 100));
+    const okid_subspace_config_t subspace = {.n_u = 1, .n_y = 1, .rows = 4};
+    LIMITS(subspace, subspace, rows, 2, 8192); // 2 i (n_u + n_y) = 32768
+    LIMITS(subspace, subspace, method, OKID_SUBSPACE_MOESP, OKID_SUBSPACE_SSARX);
+    const okid_refine_config_t refine = okid_refine_defaults(1, 1, 4);
+    LIMITS(refine, refine, blocks, 2, 64);
+    LIMITS(refine, refine, offset, 0, 1);
+    const okid_stabilization_config_t poles = okid_stabilization_defaults(1, 1024, 16);
+    LIMITS(stabilization, poles, max_poles, 1, 1024); // models times poles: 2^20
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(of_the_sums);
+    RUN_TEST(memory_that_fades_needs_blocks);
+    RUN_TEST(of_what_is_made_of_them);
+    return UNITY_END();
+}
