@@ -57,6 +57,18 @@ record_options checked(const asked& given) {
     return options;
 }
 
+/// The same again and again, as of many records one after the other, is read once.
+record_options options_of(const char* text) {
+    static thread_local std::string last;
+    static thread_local record_options known;
+    if (last != text) {
+        last.clear();
+        known = checked(read_record(text));
+        last = text;
+    }
+    return known;
+}
+
 /// Rows whose numbers stand side by side, `side` of them.
 template <class Number, std::size_t side>
 void copy_rows(const char* at, std::ptrdiff_t stride, std::size_t count, std::size_t width, double* out) {
@@ -173,7 +185,7 @@ std::vector<set_up> read_set_ups(const std::vector<std::string>& names, int32_t 
 template <class Fill>
 okid_host_result_t* identify(const char* options, int32_t records, const size_t* counts, const char* const* names,
                              okid_host_stage_t stage, void* context, Fill fill) {
-    record_options wanted = checked(read_record(options));
+    record_options wanted = options_of(options);
     if (stage) wanted.stage = [&](const char* text) { stage(context, text); };
     record_set set;
     set.n_u = wanted.inputs.size();

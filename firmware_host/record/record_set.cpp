@@ -21,7 +21,7 @@ bool is_whole(const record_set& set, const record_data& record) {
 
 } // namespace
 
-/// In vectors: nearly always they all are.
+/// In vectors: nearly always they all are, and then so is their sum.
 bool all_finite(const double* x, std::size_t count) {
     using lanes = double __attribute__((vector_size(16)));
     lanes sums[4] = {};
@@ -31,10 +31,11 @@ bool all_finite(const double* x, std::size_t count) {
         for (std::size_t k = 0; k < 4; ++k) {
             lanes v;
             std::memcpy(&v, x + i + 2 * k, sizeof v);
-            sums[k] += v * 0.0;
+            sums[k] += v;
         }
     const lanes sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
-    return sum[0] + sum[1] == 0 && std::all_of(x + i, x + count, [](double one) { return std::isfinite(one); });
+    const auto finite = [](double one) { return std::isfinite(one); };
+    return std::all_of(std::isfinite(sum[0] + sum[1]) ? x + i : x, x + count, finite);
 }
 
 void record_set::add(std::string path, const double* from, std::size_t rows) {

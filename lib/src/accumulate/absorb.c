@@ -64,7 +64,7 @@ static void sum_codes(okid_accumulator_t* a, const double* x, int32_t count) {
     const int32_t m = a->m, p = a->config.lags;
     double* partial = acc_at(a, a->partial_at);
     if (a->config.sample != OKID_SAMPLE_INT32) {
-        kernel(partial, x + acc_lag_count(a), x, m, m, p, count);
+        kernel(partial, x + acc_lag_count(a), x, m, m, p, count, p + count);
         return;
     }
     const size_t numbers = (size_t)(p + count) * (size_t)m, sums = acc_sum_count(a);
@@ -76,16 +76,17 @@ static void sum_codes(okid_accumulator_t* a, const double* x, int32_t count) {
         low[i] = code - upper * 65536;
     }
     const double *now_high = high + acc_lag_count(a), *now_low = low + acc_lag_count(a);
-    kernel(partial, now_high, high, m, m, p, count);
-    kernel(partial + sums, now_high, low, m, m, p, count);
-    kernel(partial + sums, now_low, high, m, m, p, count);
-    kernel(partial + 2 * sums, now_low, low, m, m, p, count);
+    kernel(partial, now_high, high, m, m, p, count, p + count);
+    kernel(partial + sums, now_high, low, m, m, p, count, p + count);
+    kernel(partial + sums, now_low, high, m, m, p, count, p + count);
+    kernel(partial + 2 * sums, now_low, low, m, m, p, count, p + count);
 }
 #endif
 
 static void run_kernel(okid_accumulator_t* a, const double* x, int32_t count) {
     if (!acc_has_codes(a)) {
-        okid_kernel_pick()(acc_slot_data(a, a->open), x + acc_lag_count(a), x, a->m, a->m, a->config.lags, count);
+        okid_kernel_pick()(acc_slot_data(a, a->open), x + acc_lag_count(a), x, a->m, a->m, a->config.lags, count,
+                           a->config.lags + count);
         return;
     }
     const int64_t limit = fold_rows(a->config.sample);

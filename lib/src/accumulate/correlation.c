@@ -106,7 +106,7 @@ static void sum_band(const okid_correlation_t* s, cor_number_t* sums, const cor_
         int64_t* high = s->config.sample == OKID_SAMPLE_INT32 ? &sums[cor_sum_count(s)].code : NULL;
         okid_kernel_integer(&sums->code, high, &now->code, &window->code, m, w, p, s->pending);
     } else {
-        okid_kernel_pick()(&sums->real, &now->real, &window->real, m, w, p, s->pending);
+        okid_kernel_pick()(&sums->real, &now->real, &window->real, m, w, p, s->pending, p + s->pending);
     }
 }
 

@@ -66,7 +66,7 @@ static void tiles(double* S, int ld, const double* current, const double* window
 }
 
 okid_kernel_fn OKID_KERNEL;
-void OKID_KERNEL(double* S, const double* current, const double* window, int m, int w, int p, int count) {
+void OKID_KERNEL(double* S, const double* current, const double* window, int m, int w, int p, int count, int held) {
     const int width = w * (p + 1);
     if (width < TILE) { // a handful of numbers: no tile fits
         for (int n = 0; n < count; ++n)
@@ -76,10 +76,12 @@ void OKID_KERNEL(double* S, const double* current, const double* window, int m, 
     }
     const int groups = (m + MAX_ROWS - 1) / MAX_ROWS;
     for (int c = 0; c < width; c += TILE) {
-        const int start = c + TILE <= width ? c : width - TILE;
+        const int start = c + TILE <= width ? c : width - TILE, left = held - start / w;
+        if (left <= 0) break;
         for (int g = 0, r = 0; g < groups; ++g) {
             const int rows = (m - r + groups - g - 1) / (groups - g);
-            tiles(S + r * width + start, width, current + r, window + start, m, w, count, rows, c - start);
+            tiles(S + r * width + start, width, current + r, window + start, m, w, left < count ? left : count, rows,
+                  c - start);
             r += rows;
         }
     }

@@ -8,8 +8,10 @@
 /// S(r, c) += sum_n current[n m + r] window[n w + c], r < m, c < w (p+1), n < count. S is row-major, rows of w (p+1).
 /// `current` holds m count numbers, `window` w (p + count) that begin p samples earlier, in time order, so that the lag window
 /// of a sample is contiguous. Where all m channels are lagged (w = m), current = window + p m unless codes are split.
-/// The sums begin with what stands in S and add sample by sample: how a run is cut into calls changes no bit.
-typedef void okid_kernel_fn(double* S, const double* current, const double* window, int m, int w, int p, int count);
+/// The sums begin with what stands in S and add sample by sample: how a run is cut into calls changes no bit. Samples of the
+/// window from `held` on (usually p + count: none) are zeros and may be passed over.
+typedef void okid_kernel_fn(double* S, const double* current, const double* window, int m, int w, int p, int count,
+                            int held);
 
 /// The fastest kernel this processor runs; a constant choice for one machine.
 okid_kernel_fn* okid_kernel_pick(void);

@@ -155,7 +155,7 @@ static void add_ends(const spectrum_plan_t* plan, const map_t* a, const given_t*
             const double known = index == 0 ? history[to] : sample_of(given, from - lags + to);
             a->differences[to] = known - (total - p + j < count ? sample_of(given, wrapped) : 0);
         }
-    OKID_KERNEL(a->ends, first, a->differences, m, m, p, rows);
+    OKID_KERNEL(a->ends, first, a->differences, m, m, p, rows, p);
 }
 
 #if defined(__AVX2__) || defined(__AVX512F__)

@@ -113,22 +113,15 @@ void hankel_factor::restore_units() const {
     }
 }
 
-/// Lower triangle of L <- the Gram matrix with unit diagonal and ridge.
-void hankel_factor::fill_unit(const double* gram, double ridge) const {
+/// Lower triangle of L <- the Gram matrix with unit diagonal and ridge. @return its 1-norm, without the ridge
+double hankel_factor::fill_unit(const double* gram, double ridge) const {
+    double* sums = estimate;
+    std::fill(sums, sums + size, 1.0);
     for (int c = 0; c < size; ++c) {
         double* column = L + at(0, c, size);
         const double* from = gram + at(0, place[c], size);
         column[c] = 1 + ridge;
         for (int r = c + 1; r < size; ++r) column[r] = from[place[r]] * unit[r] * unit[c];
-    }
-}
-
-/// 1-norm of the symmetric matrix in the lower triangle of L.
-double hankel_factor::norm_of_unit() const {
-    double* sums = estimate;
-    std::fill(sums, sums + size, 1.0);
-    for (int c = 0; c < size; ++c) {
-        const double* column = L + at(0, c, size);
         double below = 0;
         for (int r = c + 1; r < size; ++r) {
             below += std::abs(column[r]);
@@ -147,8 +140,7 @@ okid_status_t hankel_factor::from_gram(row_order order, const double* gram, doub
     ridge = std::max(ridge, first_ridge);
     for (const double last = std::max(ridge, last_ridge);; ridge *= 100) {
         if (ridge > last) return OKID_ERR_NUMERIC;
-        fill_unit(gram, ridge);
-        const double size_of_all = tells_condition ? norm_of_unit() : 0;
+        const double size_of_all = fill_unit(gram, ridge);
         if (linalg::cholesky(size, L, size) != 0) continue;
         if (tells_condition) condition = linalg::cholesky_condition(size, L, size, size_of_all, estimate);
         break;

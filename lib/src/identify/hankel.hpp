@@ -36,8 +36,7 @@ struct hankel_factor {
     void place_rows(row_order order, bool outputs_last);
     okid_status_t dead_channel(row_order order, okid_subspace_info_t* info) const;
     okid_status_t excitation(row_order order, okid_subspace_info_t* info) const;
-    void fill_unit(const double* gram, double ridge) const;
-    double norm_of_unit() const;
+    double fill_unit(const double* gram, double ridge) const;
     void restore_units() const;
 };
 

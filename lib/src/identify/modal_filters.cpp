@@ -205,13 +205,13 @@ void modal_filters::two_states(int s, int t) {
 
 bool modal_filters::run(const double* v, int count) {
     const int m = n_u + n_y;
+    if (n_u == 0 && !all_finite(v, area(count, m))) return false;
     place_lanes();
     const int wide = n_u + 2 * lanes_, driven = blocks_ * n_u;
     okid_filters_t filters{area(n_u, 1), area(m, 1), area(lanes_, 1), 0, w_, w_ + lanes_, drive_, z_, with_v_};
     const auto step = okid_recursion_pick().filters;
     for (int n = 0; n < count; n += stretch, v += at(0, stretch, m)) {
         const int some = std::min(stretch, count - n);
-        if (!all_finite(v, area(some, m))) return false;
         int last = driven; // w^t that has died out needs no product any more
         for (int k = driven; k < lanes_; ++k)
             if (std::hypot(z_[k], z_[lanes_ + k]) < died_out)
@@ -223,6 +223,8 @@ bool modal_filters::run(const double* v, int count) {
         for (int k = 0; k < 2 * lanes_; ++k)
             if (std::abs(z_[k]) < denormal) z_[k] = 0;
     }
+    for (int c = 0; c < m; ++c) // what is no number stays none in the sums with the first input
+        if (!std::isfinite(with_v_[at(0, c, wide)])) return false;
     const auto copy = [&](int from, int to) {
         for (int c = 0; c < n_u; ++c) sums[at(to, c, base)] = with_v_[at(from, c, wide)];
         for (int o = 0; o < n_y; ++o) with_y[at(to, o, base)] = with_v_[at(from, n_u + o, wide)];

@@ -77,9 +77,18 @@ static void check_direct(kernels_t kernel, const int16_t* codes, int m, int w, i
     for (int n = 0; n < p + COUNT; ++n)
         for (int c = 0; c < w; ++c) lagged[n * w + c] = codes[n * m + c];
     memset(sums, 0, sizeof sums);
-    kernel.direct(sums, x + p * m, lagged, m, w, p, FIRST);
-    kernel.direct(sums, x + (p + FIRST) * m, lagged + FIRST * w, m, w, p, COUNT - FIRST);
+    kernel.direct(sums, x + p * m, lagged, m, w, p, FIRST, p + FIRST);
+    kernel.direct(sums, x + (p + FIRST) * m, lagged + FIRST * w, m, w, p, COUNT - FIRST, p + COUNT - FIRST);
     expect_sums(kernel.name, sums, codes, m, w, p, COUNT);
+    static double short_of[MOST * MOST * MOST];
+    for (int held = 0; held <= p + COUNT; held += 7) { // zeros behind `held` are passed over or not: the same sums
+        for (int i = 0; i < w * (p + COUNT); ++i) lagged[i] = i < w * held ? codes[i] : 0;
+        memset(sums, 0, sizeof sums);
+        memset(short_of, 0, sizeof short_of);
+        kernel.direct(sums, x + p * m, lagged, m, w, p, COUNT, p + COUNT);
+        kernel.direct(short_of, x + p * m, lagged, m, w, p, COUNT, held);
+        TEST_ASSERT_EQUAL_MEMORY(sums, short_of, sizeof sums);
+    }
 }
 
 /// Every remainder of channels and window widths against the tiles of each kernel.
