@@ -73,7 +73,6 @@ def comparison_section(m: Material) -> page.Section | None:
     mac = modal.mac_matrix(own, other)
     pairs = pairs_of(a, b, mac)
     drawing = figures.figure(min(7.4, 2.7 + 0.5 * len(other)), min(6.6, 1.9 + 0.5 * len(own)))
-    drawing.set_layout_engine("constrained", w_pad=0.12)
     labels = [f"{k + 1}: {a.frequency_hz[k]:.2f} Hz" for k in a.confident[:MOST_MODES]]
     axes = drawing.add_subplot()
     figures.draw_mac(axes, own, labels, other)

@@ -189,7 +189,6 @@ def _automac(m: Material) -> page.Section:
     shown = _shown(m, MOST_SQUARES)
     size = min(6.6, 1.9 + 0.5 * len(shown))
     drawing = figures.figure(size + 0.8, size)
-    drawing.set_layout_engine("constrained", w_pad=0.12)  # the square is fitted after the layout
     labels = [f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz" for k in shown]
     figures.draw_mac(drawing.add_subplot(), m.result.shapes[shown], labels)
     words = "MAC of every pair of modes: full ink is 1 (the same shape), no ink 0. Off the diagonal it should be pale."

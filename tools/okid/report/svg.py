@@ -12,6 +12,7 @@ from itertools import count
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from okid.report.layout import arrange
 from okid.result import figures
 
 INK = {
@@ -69,12 +70,7 @@ def _raw(drawing: Figure) -> str:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*missing from.*font")  # the reader's browser has its own fonts
         canvas = FigureCanvasSVG(drawing)
-        engine = drawing.get_layout_engine()
-        if engine is not None:
-            engine.execute(drawing)
-        drawing.set_layout_engine("none")
-        for axes in drawing.axes:  # the layout solver is not repeatable in its last digits
-            axes.set_position(tuple(round(x, 4) for x in axes.get_position(original=True).bounds))
+        arrange(drawing)
         buffer = io.StringIO()
         # savefig would draw everything twice
         canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]

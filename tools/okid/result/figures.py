@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from okid.frf import Frf
@@ -59,8 +59,8 @@ _MARKS = {
 
 
 def figure(width: float, height: float) -> Figure:
-    """A new figure of this size in inches with a layout that keeps labels apart."""
-    return Figure(figsize=(width, height), layout="constrained", facecolor="none")
+    """A new figure of this size in inches; what shows it gives its axes their places."""
+    return Figure(figsize=(width, height), facecolor="none")
 
 
 def short(name: str, longest: int = LONGEST_LABEL) -> str:
@@ -87,9 +87,7 @@ def log_axis(ax: Axes) -> None:
     decades = float(np.log10(high / low)) if 0.0 < low < high else 1.0
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0,) if decades > 2.0 else (1.0, 2.0, 5.0), numticks=7))
     ax.yaxis.set_major_formatter(FuncFormatter(_power))
-    ax.yaxis.set_minor_formatter(NullFormatter())
-    if decades <= 2.0:
-        ax.yaxis.set_minor_locator(LogLocator(subs=()))
+    ax.yaxis.set_minor_locator(NullLocator())
 
 
 def draw_singular_values(ax: Axes, values: Real, order: int) -> None:
