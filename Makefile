@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-languages test-package package docs docs-pictures score bench bench-check bench-peers \
+.PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-languages test-package package docs docs-pictures score bench bench-quick bench-check bench-peers \
 	fuzz lint format sanitize sanitize-all coverage sbom audit clean
 
 help: ## this list
@@ -71,7 +71,16 @@ bench: build ## speed of the kernels and of whole identifications as ratios with
 	@$(PYTHON) tests/bench/identify_beside.py build/bench.json
 	@$(PYTHON) tests/bench/campaign.py 1000 5 build/bench.json
 	@OKID_PROGRAM=build/okid $(PYTHON) tests/bench/files.py build/bench.json
+	@$(PYTHON) tests/bench/whole_answers.py build/bench.json
 	@cmake --build build --target bench_latency -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_latency build/bench.json
+
+bench-quick: build ## what takes two minutes of it, judged with wide margins
+	@tools/setup.sh bench
+	@tools/setup.sh test
+	@OPENBLAS_NUM_THREADS=1 build/okid bench --only kernels --save build/bench-quick.json >/dev/null
+	@for part in python_call identify_beside files whole_answers; do \
+	  OKID_PROGRAM=build/okid $(PYTHON) tests/bench/$$part.py build/bench-quick.json || exit 1; done
+	@$(PYTHON) tools/bench_check.py build/bench-quick.json --wide
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
 	@$(PYTHON) tools/bench_check.py build/bench.json

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-OKID = os.environ.get("OKID_PROGRAM", "okid")
+OKID = str(Path(given).resolve()) if (given := os.environ.get("OKID_PROGRAM")) else "okid"
 INPUTS = ["Force1", "Force4"]
 OUTPUTS = [f"Accel{k}" for k in range(1, 7)]
 RIG = """rate_hz = 1000.0
