@@ -29,6 +29,23 @@ volatile std::sig_atomic_t writing = 0;
 
 constexpr std::size_t buffer_bytes = std::size_t{1} << 20;
 
+/// Interrupts wait while it lives: between a temporary file and its name in `unfinished`.
+class interrupts_wait {
+  public:
+    interrupts_wait() {
+        sigset_t these;
+        sigemptyset(&these);
+        for (const int one : {SIGINT, SIGTERM}) sigaddset(&these, one);
+        pthread_sigmask(SIG_BLOCK, &these, &before_);
+    }
+    ~interrupts_wait() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+    interrupts_wait(const interrupts_wait&) = delete;
+    interrupts_wait& operator=(const interrupts_wait&) = delete;
+
+  private:
+    sigset_t before_{};
+};
+
 /// A link that somebody else put into a folder where many may write: what it leads to is not meant.
 bool planted_link(const std::string& path) {
     struct stat link{}, folder{};
@@ -96,11 +113,14 @@ whole_file::whole_file(std::string path) : path_(std::move(path)) {
     if (exists && access(path_.c_str(), W_OK) != 0) cannot_write(path_, errno);
     target_ = resolved(path_);
     temporary_ = target_ + ".XXXXXX";
-    fd_ = mkostemp(temporary_.data(), O_CLOEXEC);
-    if (fd_ < 0) cannot_write(path_, errno);
-    if (temporary_.size() < sizeof unfinished) {
-        std::memcpy(unfinished, temporary_.c_str(), temporary_.size() + 1);
-        writing = 1;
+    {
+        const interrupts_wait until_it_is_known;
+        fd_ = mkostemp(temporary_.data(), O_CLOEXEC);
+        if (fd_ < 0) cannot_write(path_, errno);
+        if (temporary_.size() < sizeof unfinished) {
+            std::memcpy(unfinished, temporary_.c_str(), temporary_.size() + 1);
+            writing = 1;
+        }
     }
     const mode_t mask = umask(0);
     umask(mask);
@@ -111,15 +131,15 @@ whole_file::~whole_file() {
     if (fd_ < 0) return;
     close(fd_);
     if (temporary_.empty()) return;
-    writing = 0;
     unlink(temporary_.c_str());
+    writing = 0;
 }
 
 void whole_file::give_up(int reason) {
     if (fd_ >= 0) close(fd_);
     fd_ = -1;
-    writing = 0;
     if (!temporary_.empty()) unlink(temporary_.c_str());
+    writing = 0;
     cannot_write(path_ == "-" ? "stdout" : path_, reason);
 }
 
