@@ -189,7 +189,7 @@ std::vector<std::complex<double>> in_units(const std::vector<std::complex<double
 }
 
 void describe_modes(const std::vector<listed_pair>& found, const std::vector<double>& scale, std::size_t n_u,
-                    std::vector<listed_mode>& modes, record_work& work) {
+                    bool deviations_wanted, std::vector<listed_mode>& modes, record_work& work) {
     result_context& context = work.context;
     deviations sigma;
     for (const auto& [mode, carried] : found) {
@@ -211,8 +211,7 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
             sigma.shape_im.push_back(known ? carried->shape_im_std[i] * unit : NAN);
         }
     }
-    if (std::any_of(sigma.frequency_hz.begin(), sigma.frequency_hz.end(), [](double s) { return std::isfinite(s); }))
-        context.sigma = std::move(sigma);
+    if (deviations_wanted) context.sigma = std::move(sigma);
 }
 
 [[noreturn]] void throw_no_modes(const std::vector<listed_pair>& found, std::size_t runs) {
@@ -300,7 +299,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     if (options.band) work.context.band_hz = *options.band;
     for (const record_level& level : levels) work.context.rates_hz.push_back(level.fs_hz);
     std::vector<listed_mode> listed;
-    describe_modes(found, scale, set.n_u, listed, work);
+    describe_modes(found, scale, set.n_u, options.sigma_blocks > 0, listed, work);
     return listed;
 }
 

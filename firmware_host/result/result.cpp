@@ -190,6 +190,18 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
     return out;
 }
 
+/// "12.3 Hz, 45.6 Hz": confident modes whose standard deviations were wanted and cannot be given.
+std::string modes_without_deviation(const okid_identified_t& model, const result_context& context) {
+    std::string out;
+    if (!context.sigma) return out;
+    const std::vector<mode_verdict> verdicts = mode_verdicts(model, context);
+    for (std::size_t k = 0; k < verdicts.size(); ++k)
+        if (verdicts[k].confident &&
+            !(std::isfinite(context.sigma->frequency_hz[k]) && std::isfinite(context.sigma->damping_ratio[k])))
+            out += fmt::format("{}{:.4g} Hz", out.empty() ? "" : ", ", model.frequency_hz[k]);
+    return out;
+}
+
 } // namespace
 
 nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma) {
@@ -310,6 +322,11 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
         if (code) out.emplace_back(code, note_text(model, bit));
     }
     out.insert(out.end(), context.warnings.begin(), context.warnings.end());
+    const std::string without = modes_without_deviation(model, context);
+    if (!without.empty())
+        out.emplace_back("no_deviation",
+                         fmt::format("no ± for {}: with some block of the record left out, the model does not hold it",
+                                     without));
     return out;
 }
 
