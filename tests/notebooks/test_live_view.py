@@ -35,6 +35,21 @@ def test_the_view_tells_what_the_session_finds() -> None:
     assert "a1" not in view.told and view.told.startswith(f"{view.session.samples} samples")
 
 
+def test_a_session_shows_itself_as_it_is_fed() -> None:
+    force, acceleration = okid.demo_record()
+    rows = np.hstack([force, acceleration])
+    session = okid.Session(["shaker"], ["a1", "a2", "a3"], fs=1000.0, p=20)
+    shown = session._repr_mimebundle_()
+    (view,) = session._views
+    assert "application/vnd.jupyter.widget-view+json" in shown[0] and shown[0] == session._repr_mimebundle_()[0]
+    session.feed(rows[:3000])
+    assert view.told.startswith("3000 samples") and len(view.modes) == len(session.modes()) > 0
+    masked = np.ma.masked_array(rows[3000:4000], mask=False)
+    masked.mask[:, 2] = True
+    view.feed(masked)
+    assert session.samples == 4000 and view._kept.shape == (4000, 4) and np.isnan(view._kept[3000:, 2]).all()
+
+
 def test_lanes_keep_extremes_and_gaps() -> None:
     values = np.zeros((4000, 2))
     values[1234, 0], values[2000:2100, 1] = 7.0, np.nan

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """A Session that shows itself live in a notebook: signals, modes with ±, stabilization to pick from, moving shapes.
 
-view = okid.notebook.LiveView(session)     # last line of a cell shows it; needs `okid[notebook]`
+session                                    # last line of a cell: the session shows itself; needs `okid[notebook]`
 for block in my_acquisition():
-    view.feed(block)                       # as session.feed(); the picture follows at most ten times a second
+    session.feed(block)                    # the picture follows at most ten times a second
+view = okid.notebook.LiveView(session)     # the same with options of its own, and as an object:
 view.picked                                # poles that were clicked on in the diagram
 """
 
@@ -18,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import IdentificationError, InputError
-from okid.abi.arguments import unmasked
 from okid.modal import normalised
 from okid.result.parts import Mode
 
@@ -66,8 +66,8 @@ def _row(mode: Mode) -> dict[str, Any]:
 
 
 class LiveView(anywidget.AnyWidget):
-    """The picture of a session. `seconds` of the newest samples are kept and drawn; `update_s` of stream between two
-    identifications. feed() takes what Session.feed() takes; clear() leaves the session as it is."""
+    """The picture of a session, drawn anew as that is fed. `seconds` of the newest samples are kept and drawn,
+    `update_s` of stream between two identifications."""
 
     _esm = files("okid").joinpath("web", "notebook.js").read_text(encoding="utf-8")
     signals = traitlets.Dict().tag(sync=True)
@@ -84,19 +84,21 @@ class LiveView(anywidget.AnyWidget):
         self._kept = np.empty((0, len(session.names)))
         self._most = max(2, round(seconds * session.fs))
         self._drawn_at = 0.0
-        self._next = update_s
+        self._next = self.session.samples / self.session.fs + update_s
+        session._views.append(self)
 
     def feed(self, samples: ArrayLike) -> int:
-        """Session.feed() of the block, and what it shows."""
-        status = self.session.feed(samples)
-        block = unmasked(samples if isinstance(samples, np.ndarray) else self.session._in_order(samples))
+        """Session.feed() of the block."""
+        return self.session.feed(samples)
+
+    def took(self, block: NDArray[Any]) -> None:
+        """The session has taken in the block."""
         self._kept = np.concatenate([self._kept, np.asarray(block, dtype=np.float64)])[-self._most :]
         if self.session.samples / self.session.fs >= self._next:
             self._next = self.session.samples / self.session.fs + self._update_s
             self.update()
         elif time.monotonic() - self._drawn_at >= _DRAW_S:
             self._draw()
-        return status
 
     def _draw(self) -> None:
         self._drawn_at = time.monotonic()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,9 @@ from okid.abi.sums import Stats
 from okid.identification.stream import HostStream
 from okid.result.parts import Mode
 from okid.result.result import Result
+
+if TYPE_CHECKING:
+    from okid.notebook import LiveView
 
 
 def _named(what: str, given: Sequence[str] | int, letter: str, least: int) -> list[str]:
@@ -97,6 +100,7 @@ class Session:
         if band is not None:
             named["band"] = ":".join(map(str, band))
         self._stream = HostStream({**options, **named}, config)
+        self._views: list[LiveView] = []  # what shows the samples as they come
         used = self._stream.options
         self.inputs, self.outputs = list(used["inputs"]), list(used["outputs"])
         self.fs = float(used["fs"])
@@ -161,6 +165,15 @@ class Session:
             f"{self.method}, {self.samples} samples, {self.rows} equations>"
         )
 
+    def _repr_mimebundle_(self, **asked: Any) -> Any:
+        """In Jupyter: okid.notebook.LiveView, which follows every feed(); a line of text without anywidget."""
+        try:
+            from okid.notebook import LiveView
+        except InputError as fault:
+            return {"text/plain": f"{self!r}\n{fault}"}
+        view = self._views[0] if self._views else LiveView(self)
+        return view._repr_mimebundle_(**asked)
+
     def __enter__(self) -> Self:
         return self
 
@@ -177,7 +190,10 @@ class Session:
         """
         if type(samples) is not np.ndarray:
             samples = self._in_order(samples)
-        return self._stream.add(samples)
+        status = self._stream.add(samples)
+        for view in self._views:
+            view.took(samples)
+        return status
 
     def _in_order(self, samples: ArrayLike) -> NDArray[Any]:
         """What is no plain array: columns of a frame go by their names, what is masked is missing."""
