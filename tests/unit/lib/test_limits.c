@@ -94,10 +94,39 @@ static void of_what_is_made_of_them(void) {
     LIMITS(stabilization, poles, max_poles, 1, 1024); // models times poles: 2^20
 }
 
+/// What 0 stands for, as the headers say: the same memory as the number itself, and another than the next.
+static void defaults_are_numbers(void) {
+    const struct {
+        size_t usual, named, next;
+    } each[] = {
+        {okid_change_memsize(&(okid_change_config_t){.n_u = 1, .n_y = 1, .rows = 8, .fs_hz = 100}),
+         okid_change_memsize(&(okid_change_config_t){.n_u = 1, .n_y = 1, .rows = 8, .fs_hz = 100, .blocks = 20}),
+         okid_change_memsize(&(okid_change_config_t){.n_u = 1, .n_y = 1, .rows = 8, .fs_hz = 100, .blocks = 21})},
+        {okid_square_root_memsize(&(okid_square_root_config_t){.n_u = 1, .n_y = 1, .lags = 8, .forgetting = 1}),
+         okid_square_root_memsize(
+             &(okid_square_root_config_t){.n_u = 1, .n_y = 1, .lags = 8, .batch = 32, .forgetting = 1}),
+         okid_square_root_memsize(
+             &(okid_square_root_config_t){.n_u = 1, .n_y = 1, .lags = 8, .batch = 48, .forgetting = 1})},
+        {okid_accumulator_memsize(&(okid_accumulator_config_t){.n_u = 1, .n_y = 1, .lags = 8, .forgetting = 1}),
+         okid_accumulator_memsize(
+             &(okid_accumulator_config_t){.n_u = 1, .n_y = 1, .lags = 8, .forgetting = 1, .buffer = 256}),
+         okid_accumulator_memsize(
+             &(okid_accumulator_config_t){.n_u = 1, .n_y = 1, .lags = 8, .forgetting = 1, .buffer = 300})},
+        {okid_subspace_memsize(&(okid_subspace_config_t){.n_u = 1, .n_y = 1, .rows = 200}),
+         okid_subspace_memsize(&(okid_subspace_config_t){.n_u = 1, .n_y = 1, .rows = 200, .max_order = 128}),
+         okid_subspace_memsize(&(okid_subspace_config_t){.n_u = 1, .n_y = 1, .rows = 200, .max_order = 160})},
+    };
+    for (size_t k = 0; k < sizeof each / sizeof *each; ++k) {
+        TEST_ASSERT_TRUE(each[k].usual > 0 && each[k].usual < each[k].next);
+        TEST_ASSERT_EQUAL(each[k].named, each[k].usual);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(of_the_sums);
     RUN_TEST(memory_that_fades_needs_blocks);
     RUN_TEST(of_what_is_made_of_them);
+    RUN_TEST(defaults_are_numbers);
     return UNITY_END();
 }
