@@ -50,7 +50,7 @@ LIMITS |= {
 LIMITS |= {
     "auto_over_cva_W1": (60.0, "method auto: times as long as n4sid-cva with its deviations"),
     "auto_over_cva_W2": (60.0, "the same"),
-    "report_over_empty_axes": (2.0, "a report: times as long as its empty axes"),
+    "report_over_empty_axes": (1.5, "a report: times as long as its empty axes"),
 }
 LIMITS["campaign_worker_mb"] = (500.0, "MB of a worker, whatever the number of records")
 # Whole identifications by n4sid-moesp, times faster than SLICOT's MOESP with Cholesky at the same block rows and order.

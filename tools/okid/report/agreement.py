@@ -72,7 +72,6 @@ def history_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Secti
             ax.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
         if place == len(shown) - 1:
             error.set_xlabel("time [s]")
-    drawing.align_ylabels()
     kind = "simulated from the inputs alone" if excerpt.simulated else "predicted one sample ahead"
     where = "around the hardest hit" if excerpt.hit else "where the responses are largest"
     words = f"{len(excerpt.time_s)} samples {where}, {kind}. Shown: {len(shown)} of {len(m.result.outputs)} outputs."

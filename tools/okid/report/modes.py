@@ -169,8 +169,11 @@ def _complexity(m: Material) -> page.Section:
     bands = -(-len(shown) // columns)
     drawing = figures.figure(1.6 * columns, 1.75 * bands)
     for place, k in enumerate(shown, 1):
-        axes = drawing.add_subplot(bands, columns, place, projection="polar")
-        figures.draw_compass(axes, m.result.shapes[k], f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz")
+        figures.draw_compass(
+            drawing.add_subplot(bands, columns, place),
+            m.result.shapes[k],
+            f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz",
+        )
     words = (
         "Every entry of a shape in the complex plane: proportionally damped structures lie on one line. MPD: mean "
         "deviation from that line; MCF = 1 − MPC; both 0 for a real mode."

@@ -168,7 +168,6 @@ def frf_section(m: Material) -> tuple[page.Section, list[tuple[int, int]]]:
         if with_coherence:
             axes[2].set_ylabel("coher.")
         axes[-1].set_xlabel("frequency [Hz]")
-        drawing.align_ylabels(axes)
     title = "Frequency responses" if data is None else "Frequency responses, measured and synthesised"
     text = "frequency responses of the model" + ("" if data is None else " and of the record")
     picture = m.pictures.inline(drawing, text)

@@ -232,16 +232,22 @@ def draw_shape(ax: Axes, shape: Complex, labels: Sequence[str], title: str) -> N
 
 
 def draw_compass(ax: Axes, shape: Complex, title: str) -> None:
-    """The entries of one mode as arrows in the complex plane (a polar axes): a real mode lies on one line."""
+    """The entries of one mode as arrows in the complex plane: a real mode lies on one line."""
     turned = normalised(shape)
-    for entry in turned:
-        ax.plot([0.0, float(np.angle(entry))], [0.0, float(np.abs(entry))], color=BLUE, lw=1.0, alpha=0.8)
-    ax.plot(np.angle(turned), np.abs(turned), "o", ms=2.5, color=BLUE)
-    ax.set_ylim(0.0, 1.08)
-    ax.set_yticks([0.5, 1.0], [])
-    ax.set_xticks(np.radians([0, 90, 180, 270]), ["0°", "90°", "180°", "270°"])
-    ax.tick_params(labelsize=6, pad=-2)
-    ax.set_title(title, fontsize=8.0, pad=8)
+    round_about = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 73))
+    for radius, colour in ((0.5, GRID), (1.0, GRID), (1.08, EDGE)):
+        ax.plot(radius * round_about.real, radius * round_about.imag, color=colour, lw=0.7)
+    for at, text in enumerate(("0°", "90°", "180°", "270°")):
+        across, up = np.cos(at * np.pi / 2.0), np.sin(at * np.pi / 2.0)
+        ax.plot([0.0, across], [0.0, up], color=GRID, lw=0.6)
+        ax.text(1.3 * across, 1.22 * up, text, ha="center", va="center", fontsize=6.0, color=EDGE)
+    ax.plot([0.0 * turned.real, turned.real], [0.0 * turned.imag, turned.imag], color=BLUE, lw=1.0, alpha=0.8)
+    ax.plot(turned.real, turned.imag, "o", ms=2.5, color=BLUE)
+    ax.set_xlim(-1.45, 1.45)
+    ax.set_ylim(-1.3, 1.3)
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    ax.set_title(title, fontsize=8.0)
 
 
 def draw_mac(ax: Axes, shapes: Complex, labels: Sequence[str], other: Complex | None = None) -> None:
