@@ -2,7 +2,7 @@
 # What stands beside the program: documents, and with OKID_PACKAGE man pages and completions, made by the program itself.
 option(OKID_PACKAGE "man pages and completions too, for an install or a package" OFF)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/okid COMPONENT program
-        FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.ipynb")
+        FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.ipynb" PATTERN "*.json" PATTERN "*.xml")
 install(FILES ${PROJECT_SOURCE_DIR}/tests/replay/demo_rig.toml DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/okid/examples
         RENAME rig.toml COMPONENT program)
 install(FILES ${PROJECT_SOURCE_DIR}/drivers/proto/okid.dbc DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/okid/examples
