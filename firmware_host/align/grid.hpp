@@ -151,9 +151,8 @@ class grid {
         double spread = 0, tail_late = 0; ///< how late the last frame of a burst was, of late and now, periods
         std::array<double, 2> usual{};    ///< how late the least late was, of the decision time before and of this one
         std::int64_t usual_from = 0;      ///< the place at which this one began
-        double busy = 0;                  ///< the share of the bursts of late that are later than polls are
-        double few_least = 0,
-               few_worst = 0; ///< how late the least late of some bursts was, of these and at worst of late
+        double known = 0;                 ///< bursts of late, and the shares of them that were less late than edges
+        std::array<double, 9> share{};
         std::int64_t tail = 0, tail_ns = 0;  ///< place and stamp of the newest frame placed, for the line
         std::int64_t ahead = 0;              ///< frames in a row that came before their time
         std::int64_t in_burst = 0;           ///< frames of the burst at hand
@@ -204,6 +203,8 @@ class grid {
     double lateness(const lane& l, const drv_frame_t& frame, std::size_t before) const;
     void settle_overdue(std::int64_t now_ns);
     void settle(lane& l, std::int64_t now_ns, bool all);
+    bool together(const lane& l, std::size_t which) const;
+    std::size_t burst_end(const lane& l, std::size_t of) const;
     void look_at_late(lane& l);
     void place_late(lane& l, std::size_t count);
     std::array<double, 4> least_late(const lane& l) const;
@@ -213,8 +214,10 @@ class grid {
     double usually_late(const lane& l) const;
     void note_lateness(lane& l, std::int64_t index);
     void judge_late(lane& l, bool ended);
-    bool proved(const lane& l, std::int64_t lost) const;
-    bool told_of_loss(const lane& l) const;
+    void judge_shift(lane& l, bool alike, std::int64_t times, double waited, bool ended);
+    bool shift_stays(const lane& l, double more, std::int64_t times, bool ended) const;
+    bool steady(const lane& l, std::size_t begin, std::size_t end, bool ended) const;
+    bool told_of_loss(const lane& l, std::size_t last) const;
     bool may_slip(const lane& l) const;
     bool bursts_alike(const lane& l, std::int64_t& times) const;
     double place_std_s(const lane& l) const;

@@ -9,8 +9,8 @@
 #include "grid.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <complex>
 
 namespace okid_host {
 namespace {
@@ -24,7 +24,7 @@ constexpr double told_periods = 20;        // a frame later than this tells noth
 constexpr double rate_ppm = 300;           // by which a sensor may miss its nominal rate
 constexpr double same_burst = 0.5;         // periods between two frames that were handed over together
 constexpr double one_beat = 0.7;           // a silence of a period, give or take so much, held no loss
-constexpr double one_burst = 1.5;          // periods; a silence longer by so much than others is not of the bursts
+constexpr double longer_silence = 1.5;     // periods; a silence longer by so much than others is not of the bursts
 constexpr double as_late = 0.3;            // periods
 constexpr double about_one = 1.1;          // periods: less than a loss makes all later frames late by
 constexpr double catching_up = 0.5;        // periods by which the newest frames are earlier than those before
@@ -42,14 +42,16 @@ constexpr double alike_late = 0.3;         // periods
 constexpr std::int64_t slip_apart = 2500;  // samples: clocks within 400 ppm slip past each other no more often
 constexpr double silent = 0.4;             // of the time a silent lane has: then its last burst is taken for cut off
 constexpr double least_spread = 0.15;      // periods
-constexpr double no_poll = 1.3;            // periods: nobody who looks regularly is later
-constexpr double scattered = 0.25;         // of the bursts are: the computer is busy
-constexpr double tail_share = 1.0 / 64;    // of a burst, of how many they are
-constexpr double alike_length = 0.6;       // of the mean of unit vectors whose angle is a lateness
-constexpr double alike_sure = 6;           // once in 400 times so without a reason
-constexpr double forgets_few = 0.98;       // eight bursts, of how late the least late of eight was
+constexpr double sure = 13.8;              // once in a million times so by chance
+constexpr double apart = 0.25;             // shares of two scatters that are alike
+constexpr double slack = 0.2;              // periods, between them
+constexpr double newest = 0.5;             // of the decision time
+constexpr double most_known = 256;         // bursts that tell how late they are
+constexpr double longest_decision = 0.75;  // of the time a silent lane has
 constexpr double forgets_spread = 0.998;   // a burst, of how late the last frame of a burst was
 constexpr std::int64_t ahead_frames = 512; // in a row before their time: the line is wrong
+
+constexpr std::array<double, 9> edges{0.2, 0.45, 0.65, 1.65, 2.65, 4.65, 8.65, 16.65, 32.65}; // lateness, periods
 
 std::uint64_t tick_of(std::int64_t index) { return static_cast<std::uint64_t>(index + (std::int64_t{1} << 40)); }
 
@@ -68,8 +70,6 @@ void grid::begin_cadence(lane& l, double due_ns) {
     l.ahead = l.in_burst = 0;
     l.usual = {HUGE_VAL, HUGE_VAL};
     l.usual_from = l.last;
-    l.few_least = HUGE_VAL;
-    l.few_worst = l.busy = 0;
     l.patience = static_cast<double>(hold_);
     l.late.reserve(most_held_ + 1);
 }
@@ -108,12 +108,27 @@ void grid::settle_overdue(std::int64_t now_ns) {
         if (l.heard && !l.late.empty()) settle(l, now_ns, false);
 }
 
-/// How late the frames are that came since: up to the first one that is on time.
+/// Was this one of those that wait handed over together with the one before it?
+bool grid::together(const lane& l, std::size_t which) const {
+    return static_cast<double>(l.late[which].time_ns - l.late[which - 1].time_ns) <= same_burst * period_ns_;
+}
+
+/// The last of those that wait that was handed over together with this one.
+std::size_t grid::burst_end(const lane& l, std::size_t of) const {
+    while (of + 1 < l.late.size() && together(l, of + 1)) ++of;
+    return of;
+}
+
+/// How late the frames are that came since: up to the first one that is on time. Of a burst whose end
+/// is lost nobody knows how late it is: what follows tells.
 void grid::look_at_late(lane& l) {
     for (; l.seen < l.late.size() && (l.seen == l.placed || l.least > l.on_time); ++l.seen) {
         const double late = lateness(l, l.late[l.seen], l.seen - l.placed);
-        if (l.seen == l.placed || late < l.least + as_late) l.which = l.seen;
-        l.least = l.seen == l.placed ? late : std::min(l.least, late);
+        const bool told = l.seen > l.placed + 1 || (l.late[l.seen].loss && 2 * l.frames >= 3 * l.bursts);
+        const bool anew = l.seen == l.placed || (told && !together(l, l.seen) && burst_end(l, l.placed) + 1 == l.seen &&
+                                                 !told_of_loss(l, l.seen - 1));
+        if (anew || late < l.least + as_late) l.which = l.seen;
+        l.least = anew ? late : std::min(l.least, late);
     }
 }
 
@@ -151,58 +166,105 @@ void grid::settle(lane& l, std::int64_t now_ns, bool all) {
 
 /// All frames that wait are late.
 void grid::judge_late(lane& l, bool ended) {
-    const auto hold = static_cast<double>(hold_);
     const double waited = static_cast<double>(l.late.back().heard_ns - l.late[l.placed].heard_ns) / period_ns_;
-    const double enough = ended ? cut_off * hold : l.patience;
     std::int64_t times = 0;
-    const bool alike = (ended || waited > enough) && bursts_alike(l, times), seen = !ended || times >= cut_off_bursts;
-    if (seen && waited > enough && only_late(l, ended)) {
-        place_late(l, l.which - l.placed + 1);
-        return;
-    }
-    if (seen && waited > enough && catches_up(l)) {
-        l.patience = waited + looks_again * hold;
-    } else if (seen && waited > enough) {
-        const double more = l.least - usually_late(l);
-        const auto lost = static_cast<std::int64_t>(std::floor(more + 1 - a_sample));
-        const bool slips = lost == 1 && alike && may_slip(l);
-        if (lost > 0 && !slips && waited <= l.patience && !proved(l, lost)) {
-            ++l.uncertain;
-            place_late(l, l.which - l.placed + 1);
-            return;
-        }
-        if (lost > 0 && !slips) {
-            l.uncertain += alike && !told_of_loss(l) && (lost == 1 || in_two_steps(l));
-            place_after_loss(l, lost);
-            return;
-        }
-        l.uncertain += lost <= 0 && more > half_a_sample;
-        if (slips) slip(l, 1);
-        place_late(l, l.which - l.placed + 1);
-        return;
-    }
-    const std::size_t waiting = l.late.size() - l.placed;
+    const bool enough = waited > (ended ? cut_off * static_cast<double>(hold_) : l.patience);
+    const bool alike = enough && bursts_alike(l, times);
+    const std::size_t before = l.placed, waiting = l.late.size() - l.placed;
+    if (enough && (!ended || times >= cut_off_bursts)) judge_shift(l, alike, times, waited, ended);
+    if (l.placed != before) return;
     if (ended)
-        place_late(l, seen && catches_up(l) ? waiting : 1); // a burst that was cut off
+        place_late(l, 1); // a burst that was cut off
     else if (waiting >= most_held_ - 1)
         place_late(l, 1 + waiting / 4); // more than can wait came in less than the decision time: a stall made up for
 }
 
-/// The end of the stream has cut the decision time off: is it a loss all the same? The bus told of one, or nobody is held up
-/// so long, or all are late by whole samples (Rayleigh's test), and on a busy computer so few were never so late before.
-bool grid::proved(const lane& l, std::int64_t lost) const {
-    if (static_cast<double>(lost) > held_up_s * rate_hz_ || told_of_loss(l)) return true;
-    if (l.busy > scattered && l.least - l.few_worst <= a_sample) return false;
-    double ends = 0;
-    std::complex<double> sum = 0;
-    for (std::size_t i = l.placed; i < l.late.size(); ++i) {
-        if (i + 1 < l.late.size() &&
-            static_cast<double>(l.late[i + 1].time_ns - l.late[i].time_ns) <= same_burst * period_ns_)
-            continue;
-        sum += std::polar(1.0, 6.2831853 * lateness(l, l.late[i], i - l.placed));
-        ++ends;
+/// They are late for long enough: it was they that were late, or polls slipped, or samples are missing, or more must come.
+void grid::judge_shift(lane& l, bool alike, std::int64_t times, double waited, bool ended) {
+    const std::size_t first = l.which - l.placed + 1;
+    const double look_again = waited + looks_again * static_cast<double>(hold_);
+    if (only_late(l, ended)) {
+        place_late(l, first);
+        return;
     }
-    return std::abs(sum) > alike_length * ends && std::norm(sum) > alike_sure * ends;
+    if (catches_up(l)) {
+        if (ended)
+            place_late(l, l.late.size() - l.placed);
+        else
+            l.patience = look_again;
+        return;
+    }
+    const double more = l.least - usually_late(l);
+    const auto lost = static_cast<std::int64_t>(std::floor(more + 1 - a_sample));
+    if (lost <= 0 || (lost == 1 && alike && may_slip(l))) {
+        l.uncertain += lost <= 0 && more > half_a_sample;
+        if (lost > 0) slip(l, 1);
+        place_late(l, first);
+        return;
+    }
+    const bool told = told_of_loss(l, l.which);
+    const bool stays = shift_stays(l, more, times, ended);
+    if (told || stays || (ended && static_cast<double>(lost) > held_up_s * rate_hz_)) {
+        const std::size_t end = burst_end(l, l.placed);
+        const bool cut = end < l.which && lateness(l, l.late[end], end - l.placed) < l.least - as_late;
+        if (cut && !told_of_loss(l, end)) {
+            place_late(l, end - l.placed + 1);
+            return;
+        }
+        if (!told && stays && !steady(l, l.placed, l.which + 1, ended)) { // they were late, and the loss is behind them
+            place_late(l, first);
+            return;
+        }
+        l.uncertain += alike && !told && (lost == 1 || in_two_steps(l));
+        place_after_loss(l, lost);
+        return;
+    }
+    const double since = static_cast<double>(l.late.back().time_ns - l.late[l.placed].time_ns) / period_ns_;
+    if (!ended &&
+        std::max(since, static_cast<double>(opened_ - next_)) < longest_decision * static_cast<double>(lag_)) {
+        l.patience = look_again;
+        return;
+    }
+    ++l.uncertain;
+    place_late(l, first);
+}
+
+/// All are later than what came in time before, and that is no chance, for many of so few ever were; and the newest are
+/// steady: how late a busy computer is changes all the time, a sample that is missing does not come back.
+/// @param more   periods by which they are later;  times: how often something was handed over
+bool grid::shift_stays(const lane& l, double more, std::int64_t times, bool ended) const {
+    const double known = l.known + 1;
+    double in_time = 0.5;
+    for (std::size_t k = 0; k < edges.size() && edges[k] <= more; ++k) in_time = l.share[k];
+    const double seen = in_time * l.known, at_least = std::max(0.0, seen - 2 * std::sqrt(seen)); // so many by 2 sigma
+    in_time = std::min(std::max(at_least, 0.5) / known, 1 - 0.5 / known);
+    if (-static_cast<double>(times) * std::log1p(-in_time) < sure) return false;
+    const std::int64_t begin_ns =
+        l.late.back().time_ns - std::llround(newest * static_cast<double>(hold_) * period_ns_);
+    std::int64_t bursts = 0;
+    std::size_t begin = l.late.size();
+    while (begin > l.placed && (l.late[begin - 1].time_ns >= begin_ns || bursts <= cut_off_bursts)) {
+        --begin;
+        bursts += begin == l.placed || !together(l, begin);
+    }
+    return steady(l, begin, l.late.size(), ended);
+}
+
+/// Is how late these bursts are, each beside the least late that follow it, no more scattered than before?
+bool grid::steady(const lane& l, std::size_t begin, std::size_t end, bool ended) const {
+    std::array<double, edges.size()> below{};
+    double count = 0, least = HUGE_VAL;
+    for (std::size_t i = end; i-- > begin;) {
+        if (i + 1 == l.late.size() || together(l, i + 1)) continue;
+        const double late = lateness(l, l.late[i], i - l.placed);
+        least = std::min(least, late);
+        for (std::size_t k = 0; k < edges.size(); ++k) below[k] += late < least + edges[k] + slack;
+        ++count;
+    }
+    const double few = ended ? 0 : 1 / std::sqrt(count) + 1 / std::sqrt(l.known + 1), most_apart = std::max(apart, few);
+    for (std::size_t k = 0; k < edges.size(); ++k)
+        if (count > 0 && l.share[k] - below[k] / count > most_apart) return false;
+    return true;
 }
 
 /// The oldest that wait are late by about a sample, and soon everything is later still: they were late, and what is missing
@@ -269,7 +331,7 @@ bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
     std::int64_t same = 0, ends = 0, several = 0;
     times = 1;
     for (std::size_t i = l.placed + 1; i < l.late.size(); ++i) {
-        if (static_cast<double>(l.late[i].time_ns - l.late[i - 1].time_ns) <= same_burst * period_ns_) continue;
+        if (together(l, i)) continue;
         same += before > 1 && i - begin == before;
         ends += lateness(l, l.late[i - 1], i - 1 - l.placed) < l.least + alike_late;
         before = i - begin;
@@ -288,10 +350,10 @@ bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
            std::abs(later) > full_later;
 }
 
-/// The bus told of a loss no later than before the first frame that is about as early as any.
-bool grid::told_of_loss(const lane& l) const {
+/// The bus told of a loss no later than before this frame.
+bool grid::told_of_loss(const lane& l, std::size_t last) const {
     return std::any_of(l.late.begin() + static_cast<std::ptrdiff_t>(l.placed),
-                       l.late.begin() + static_cast<std::ptrdiff_t>(l.which) + 1,
+                       l.late.begin() + static_cast<std::ptrdiff_t>(last) + 1,
                        [](const late_frame& each) { return each.loss != 0; });
 }
 
@@ -299,7 +361,7 @@ bool grid::told_of_loss(const lane& l) const {
 /// Nothing that arrives differs. The first comes by itself again and again, but not again soon, and the second hardly ever,
 /// unless the bus tells of it or the lane loses frames.
 bool grid::may_slip(const lane& l) const {
-    if (told_of_loss(l)) return false;
+    if (told_of_loss(l, l.which)) return false;
     const std::int64_t silence = (l.late[l.placed].time_ns - l.time_ns) / std::llround(period_ns_);
     return l.last + silence - std::max(l.slip_at, l.lost_at) > slip_apart;
 }
@@ -325,7 +387,7 @@ void grid::place_after_loss(lane& l, std::int64_t lost) {
     std::size_t last = first, place = first;
     while (last < l.which && lateness(l, l.late[last], last - first) >= l.least + as_late) ++last;
     for (std::size_t i = first + 1; i <= last; ++i)
-        if (silence(i) > silence(place) + one_burst) place = i;
+        if (silence(i) > silence(place) + longer_silence) place = i;
     std::int64_t told = 0;
     const std::size_t end = last + (l.which > last ? 2 : 1); // the last of a burst may be the one
     for (std::size_t i = end; i-- > first;) {
@@ -363,13 +425,10 @@ void grid::end_burst(lane& l, std::int64_t index) {
         (void)drv_clock_fit_add(&l.clock, tick_of(l.tail + l.slips), l.tail_ns);
         if (l.tail_late < 1) l.spread = std::max(forgets_spread * l.spread, l.tail_late);
     }
+    const double later = l.tail_late - usually_late(l);
+    l.known = std::min(l.known + 1, most_known);
+    for (std::size_t k = 0; k < edges.size(); ++k) l.share[k] += ((later < edges[k]) - l.share[k]) / l.known;
     note_lateness(l, index);
-    l.busy += tail_share * ((l.tail_late > no_poll) - l.busy);
-    l.few_least = std::min(l.few_least, l.tail_late);
-    if (l.bursts % cut_off_bursts == 0) {
-        l.few_worst = std::max(forgets_few * l.few_worst, l.few_least);
-        l.few_least = HUGE_VAL;
-    }
     l.ahead = l.tail_late < -most_early ? l.ahead + l.in_burst : 0;
     l.frames += l.in_burst;
     ++l.bursts;

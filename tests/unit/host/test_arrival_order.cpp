@@ -2,17 +2,14 @@
 // Frames without a counter as adapters hand them over: several at a time under one stamp, equal values, behind stalls that
 // are made up for, beside a punctual bus, from polls up to 2 kHz. The next frame is the next sample, and what was lost is
 // told from what was late. The delays here are drawn by other laws than the code has in mind (uniform, bimodal, ramps).
-#include "align/grid.hpp"
+#include "arrival_laws.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <functional>
 #include <memory>
 #include <random>
-#include <seeds.h>
 #include <set>
 #include <unity.h>
 #include <vector>
@@ -21,123 +18,6 @@ using namespace okid_host;
 
 void setUp(void) {}
 void tearDown(void) {}
-
-namespace {
-
-constexpr std::int64_t day_ns = 1700000000000000000;
-
-/// Channel c of identifier 0x100 + c on bus buses[c]; its number is the number of the sample.
-live_config make_config(double rate_hz, const std::vector<std::size_t>& buses) {
-    live_config config;
-    config.rate_hz = rate_hz;
-    config.buses.resize(4);
-    for (std::size_t c = 0; c < buses.size(); ++c) {
-        channel_config channel;
-        channel.name = "c" + std::to_string(c);
-        channel.bus = buses[c];
-        channel.frame.id = static_cast<std::uint32_t>(0x100 + c);
-        channel.layout.length = 32;
-        channel.layout.scale = 1;
-        drv_signal_prepare(&channel.layout);
-        config.channels.push_back(channel);
-    }
-    return config;
-}
-
-drv_frame_t make_frame(std::size_t channel, std::size_t bus, std::int64_t value, double time_s) {
-    drv_frame_t frame{};
-    frame.id = static_cast<std::uint32_t>(0x100 + channel);
-    frame.bus = static_cast<std::uint8_t>(bus);
-    frame.len = 4;
-    frame.time_ns = day_ns + std::llround(time_s * 1e6) * 1000;
-    for (int i = 0; i < 4; ++i) frame.data[i] = static_cast<std::uint8_t>(value >> 8 * i);
-    return frame;
-}
-
-/// Rows as they come out; how many are not what a lossless, aligned stream would give.
-struct rows : grid_sink {
-    explicit rows(std::size_t n) : width(n), previous(n, NAN) {}
-    std::size_t width;
-    std::vector<double> previous;
-    std::int64_t at = 0, torn = 0, unlike = 0, marked = 0, uncertain = 0;
-    std::set<std::int64_t> values; ///< numbers of channel 0 that came out
-    void on_sample(std::int64_t, const double* row) override {
-        for (std::size_t c = 0; c < width; ++c) {
-            torn += row[c] == row[c] && previous[c] == previous[c] && row[c] - previous[c] != 1;
-            unlike += row[c] == row[c] && row[0] == row[0] && row[c] != row[0];
-            previous[c] = row[c] == row[c] ? row[c] : previous[c] + 1;
-        }
-        if (row[0] == row[0]) values.insert(static_cast<std::int64_t>(row[0]));
-        ++at;
-    }
-    void on_missing(std::int64_t, std::int64_t count) override {
-        at += count;
-        for (double& each : previous) each += static_cast<double>(count);
-    }
-    void on_gap(const grid_gap& gap) override { marked += gap.count; }
-};
-
-unsigned seeds() { return draw_seeds(150, 1000); }
-
-/// Arrival of the sample of time t; calls come in order.
-using law = std::function<double(double)>;
-
-/// One lane, 30 s. @return what came out against what was sent
-void play(double rate_hz, double ppm, int samples, const law& arrival, const std::set<int>& lost, rows& out) {
-    const live_config config = make_config(rate_hz, {0});
-    grid on(config, out);
-    double heard_s = 0;
-    for (int n = 0; n < samples; ++n) {
-        heard_s = std::max(heard_s, arrival(n / rate_hz * (1 + 1e-6 * ppm)));
-        if (!lost.count(n)) on.push(make_frame(0, 0, n, heard_s));
-    }
-    on.finish();
-    const grid_channel_counts counts = on.channel(0);
-    out.uncertain = counts.uncertain;
-    TEST_ASSERT_EQUAL_INT64(counts.expected, counts.received + out.marked);
-    TEST_ASSERT_EQUAL_UINT64(0, on.bus(0).duplicate + on.bus(0).out_of_order);
-}
-
-struct stall {
-    double at_s, length_s, faster; ///< faster = 0: made up for at once; else at so many times the rate
-};
-
-/// What a law gives behind stalls of the sender.
-law behind(const std::vector<stall>& stalls, law usual) {
-    return [stalls, usual](double t) {
-        double out = usual(t);
-        for (const stall& s : stalls)
-            if (t >= s.at_s) {
-                const double free_s = s.at_s + s.length_s + (s.faster > 0 ? (t - s.at_s) / s.faster : 0);
-                out = std::max(out, free_s);
-            }
-        return out;
-    };
-}
-
-/// Delays of a scheduler: mostly short, now and then some milliseconds.
-law scheduled(double short_s, double long_s, double often, std::mt19937& random) {
-    return [=, &random](double t) {
-        std::uniform_real_distribution<double> one(0, 1);
-        const double kind = one(random), size = one(random);
-        return t + (kind < often ? long_s : short_s) * size;
-    };
-}
-
-/// A host that polls every `every_s`, each poll late by a uniform delay.
-law polled(double every_s, double late_s, double phase, std::mt19937& random) {
-    return [=, &random, poll = std::make_shared<std::pair<double, double>>(-1e9, 0.0)](double t) {
-        const double due = (std::ceil(t / every_s - phase) + phase) * every_s;
-        if (due > poll->first) *poll = {due, due + late_s * std::uniform_real_distribution<double>(0, 1)(random)};
-        return poll->second;
-    };
-}
-
-double pick(std::mt19937& random, double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-}
-
-} // namespace
 
 /// Logs of two identifiers, so many frames at a time under one stamp, joined anywhere.
 static void test_frames_of_one_read_stay_together() {
@@ -258,48 +138,6 @@ static void test_any_end() {
     std::printf("ends: %lld of %lld with a false gap\n", static_cast<long long>(runs_false),
                 static_cast<long long>(runs));
     TEST_ASSERT_EQUAL_INT64(0, runs_false);
-}
-
-/// A computer that gets busy less than the decision time before the end (every burst is late by what a gamma law gives, few by
-/// little), or is so all the time (many by little): that is no loss. Among frames that are punctual one of a sample or of
-/// 0.2 s there is found.
-static void test_busy_until_the_end() {
-    std::int64_t wrong = 0, uncertain = 0, told = 0;
-    const unsigned runs = std::max(600U, 4 * seeds()); // a rate is judged: not of fewer
-    for (unsigned seed = 1; seed <= runs; ++seed) {
-        std::mt19937 random(seed);
-        const double rate_hz = std::array<double, 4>{200, 800, 1000, 2000}[random() % 4];
-        const int burst = std::array<int, 4>{1, 4, 8, 16}[random() % 4], samples = static_cast<int>(6 * rate_hz);
-        const double left_s = pick(random, 0.05, 0.6), busy_s = random() % 3 ? 6 - left_s : 0;
-        const double shape = busy_s > 0 ? pick(random, 0.7, 4) : pick(random, 0.2, 0.6);
-        std::gamma_distribution<double> late(shape, pick(random, 1e-3, 6e-3)), punctual(2, 0.02e-3);
-        int handed = -1;
-        double here_s = 0;
-        const law bursts = [&](double t) {
-            const int n = static_cast<int>(std::lround(t * rate_hz)) / burst;
-            if (n != handed) here_s = (n + 1) * burst / rate_hz + (t >= busy_s ? late(random) : punctual(random));
-            handed = n;
-            return here_s;
-        };
-        rows out(1);
-        play(rate_hz, 0, samples, bursts, {}, out);
-        wrong += out.marked > 0;
-        uncertain += out.uncertain;
-        TEST_ASSERT_EQUAL_INT64(samples, out.at - out.marked);
-        const int at = static_cast<int>((5.95 - pick(random, 0.1, 0.6)) * rate_hz);
-        for (const int length : {1, static_cast<int>(0.2 * rate_hz)}) {
-            std::set<int> lost;
-            for (int i = 0; i < length && at + i < samples - 0.1 * rate_hz; ++i) lost.insert(at + i);
-            rows lacking(1);
-            play(rate_hz, 0, samples, [&](double t) { return t + punctual(random); }, lost, lacking);
-            told += lacking.marked == static_cast<std::int64_t>(lost.size());
-        }
-    }
-    std::printf("busy at the end: %lld of %u with a false gap, %lld places uncertain; losses there: %lld of %u found\n",
-                static_cast<long long>(wrong), runs, static_cast<long long>(uncertain), static_cast<long long>(told),
-                2 * runs);
-    TEST_ASSERT_TRUE(static_cast<double>(wrong) <= 0.01 * runs);
-    TEST_ASSERT_TRUE(static_cast<double>(told) >= 0.99 * 2 * runs);
 }
 
 /// Polls of 16 and 32 ms up to 2 kHz: nothing is missing, and of the losses at least 99 % are found. Where every poll ends
@@ -437,7 +275,6 @@ int main(void) {
     RUN_TEST(test_bursts_beside_a_punctual_bus);
     RUN_TEST(test_stalls_make_no_gap);
     RUN_TEST(test_any_end);
-    RUN_TEST(test_busy_until_the_end);
     RUN_TEST(test_polls_and_losses);
     RUN_TEST(test_slips_are_no_losses);
     RUN_TEST(test_packets_that_lack_a_sample);
