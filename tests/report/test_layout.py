@@ -53,6 +53,17 @@ def test_numbers_of_any_size_stand_apart(scale: float) -> None:
         assert (scale == 1.0) == (not any(text.startswith("1e") for text in texts))
 
 
+def test_a_name_of_two_lines_and_a_narrow_axis_in_one_column() -> None:
+    with matplotlib.rc_context(cast(Any, figures.STYLE)):
+        drawing = figures.figure(9.6, 6.0)
+        for place, (top, name) in enumerate([(1.0, "a sensor below\n[mm/s²]"), (1e5, "error"), (1.0, "")]):
+            ax = drawing.add_subplot(3, 1, place + 1)
+            ax.set_ylim(0.0, top)  # its last mark stands at the end of the axis
+            ax.set_ylabel(name)
+        arrange(drawing)
+        check(drawing)
+
+
 def test_upright_names_a_key_above_and_axes_one_above_the_other() -> None:
     with matplotlib.rc_context(cast(Any, figures.STYLE)):
         names = [f"tower level {k} north" for k in range(10)]

@@ -62,7 +62,9 @@ def _written(axis: Any) -> Written:
 
 def _named(axis: Any) -> float:
     label = axis.label
-    return LINE * float(label.get_fontsize()) + axis.labelpad if label.get_text() and label.get_visible() else 0.0
+    if not label.get_text() or not label.get_visible():
+        return 0.0
+    return LINE * float(label.get_fontsize()) * (1 + label.get_text().count("\n")) + float(axis.labelpad)
 
 
 def _need(ax: Axes, x: Written, y: Written) -> Need:
@@ -77,7 +79,11 @@ def _need(ax: Axes, x: Written, y: Written) -> Need:
     if key is not None and key.get_bbox_to_anchor() is not ax.bbox:
         own = key.get_window_extent()
         outside = max(0.0, (own.y1 - ax.bbox.y1) * 72.0 / ax.figure.dpi)
-    return Need(left, last if x.high else 0.0, bottom, max(title, outside, 12.0 if y.factor else 0.0))
+    half = (
+        0.5 * LINE * float(y.axis.get_major_ticks(1)[0].label1.get_fontsize()) if y.texts else 0.0
+    )  # of the last text
+    top = max(title, outside, 12.0 if y.factor else 0.0, half)
+    return Need(left, last if x.high else 0.0, max(bottom, half), top)
 
 
 def _cell(ax: Axes) -> tuple[Span, Span]:
@@ -151,11 +157,15 @@ def arrange(drawing: Figure) -> None:
     written = [(_written(ax.xaxis), _written(ax.yaxis)) for ax in placed]
     needs, cells = [_need(ax, *both) for ax, both in zip(placed, written, strict=True)], [_cell(ax) for ax in placed]
     wide, high = (72.0 * float(x) for x in drawing.get_size_inches())
-    columns = _shared([x for x, _ in cells], [n.left for n in needs], [n.right for n in needs], wide)
-    rows = _shared([y for _, y in cells], [n.top for n in needs], [n.bottom for n in needs], high)
-    rooms: dict[Span, float] = {}  # names of the axes of a column stand in line
+    rooms: dict[Span, float] = {}  # names of the axes of a column stand in line, left of the widest text
     for (x, _), (_, own) in zip(cells, written, strict=True):
         rooms[x] = max(rooms.get(x, 0.0), own.wide)
+    needs = [
+        n._replace(left=max(n.left, _named(ax.yaxis) + rooms[x] + TICK)) if ax.axison and _named(ax.yaxis) else n
+        for ax, n, (x, _) in zip(placed, needs, cells, strict=True)
+    ]
+    columns = _shared([x for x, _ in cells], [n.left for n in needs], [n.right for n in needs], wide)
+    rows = _shared([y for _, y in cells], [n.top for n in needs], [n.bottom for n in needs], high)
     for ax, (x, y) in zip(placed, cells, strict=True):
         left, right = columns[(round(x[0], 6), round(x[1], 6))]
         top, bottom = rows[(round(y[0], 6), round(y[1], 6))]
