@@ -203,7 +203,8 @@ void grid::judge_shift(lane& l, bool alike, std::int64_t times, double waited, b
         return;
     }
     const bool told = told_of_loss(l, l.which);
-    const bool stays = shift_stays(l, more, times, ended);
+    const bool few = ended && lost == 1 && times < 4 * cut_off_bursts; // of one sample little is seen
+    const bool stays = !few && shift_stays(l, more, times, ended);
     if (told || stays || (ended && static_cast<double>(lost) > held_up_s * rate_hz_)) {
         const std::size_t end = burst_end(l, l.placed);
         const bool cut = end < l.which && lateness(l, l.late[end], end - l.placed) < l.least - as_late;
