@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 
@@ -18,7 +19,7 @@ import okid
 import pytest
 from command_help import ROOT
 from markdown_pages import blocks
-from page_runner import Block, Reader
+from page_runner import Block, Reader, blocks_of, compare
 from test_command_lines import SHELL, command_lines
 
 SLOW = os.environ.get("OKID_SLOW") == "1"
@@ -123,3 +124,12 @@ def test_commands_run(page: str, prepared: Path, tmp_path: Path) -> None:
         run.run(Block(page, 0, "sh", line + lacking))
         count += 1
     assert count >= 2
+
+
+if SLOW:
+
+    def test_the_campaign_of_its_page(tmp_path: Path) -> None:
+        """A year of 1,460 records, half a minute: what the page shows is what comes first."""
+        command, shown = blocks_of(ROOT / "docs" / "howto" / "campaigns.md")[:2]
+        said = Reader(tmp_path).run(command)
+        compare(replace(shown, text=shown.text + "…\n"), said[said.index("1460 records summed") :])
