@@ -324,9 +324,9 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
     out.insert(out.end(), context.warnings.begin(), context.warnings.end());
     const std::string without = modes_without_deviation(model, context);
     if (!without.empty())
-        out.emplace_back("no_deviation",
-                         fmt::format("no ± for {}: with some block of the record left out, the model does not hold it",
-                                     without));
+        out.emplace_back(
+            "no_deviation",
+            fmt::format("no ± for {}: with some block of the record left out, the model does not hold it", without));
     return out;
 }
 

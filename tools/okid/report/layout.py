@@ -64,7 +64,8 @@ def _named(axis: Any) -> float:
     label = axis.label
     if not label.get_text() or not label.get_visible():
         return 0.0
-    return LINE * float(label.get_fontsize()) * (1 + label.get_text().count("\n")) + float(axis.labelpad)
+    lines = 1 + str(label.get_text()).count("\n")
+    return LINE * float(label.get_fontsize()) * lines + float(axis.labelpad)
 
 
 def _need(ax: Axes, x: Written, y: Written) -> Need:
