@@ -32,14 +32,16 @@ ROLES = ("force",) * 2 + ("acceleration",) * 6
 COMMON = 'restart_on_change = true\n[record]\n[publish]\nsocket = "live.sock"\nsamples = true\n'
 
 
-def played(tty: Line, seconds: float, rate: int = RATE) -> int:
-    """W2 in real time: who is late makes up for it. @return samples"""
+def played(tty: Line, seconds: float, rate: int = RATE, goes_on: Callable[[], bool] = lambda: False) -> int:
+    """W2 in real time, again and again as long as it goes on: who is late makes up for it. @return samples"""
     codes, in_packet = w2_codes(round(seconds * rate)).tolist(), rate // 250
-    begin = time.monotonic()
-    for at in range(0, len(codes), in_packet):
+    begin, at = time.monotonic(), 0
+    while at < len(codes) or goes_on():
         time.sleep(max(0.0, begin + at / rate - time.monotonic()))
-        tty.write(packet(at, codes[at : at + in_packet]))
-    return len(codes)
+        place = at % len(codes)
+        tty.write(packet(at, codes[place : place + in_packet]))
+        at += in_packet
+    return at
 
 
 def nothing_is_missing(events: list[dict[str, Any]], samples: int) -> None:
@@ -122,12 +124,21 @@ def test_what_is_given_up_and_in_which_order(tmp_path: Path) -> None:
         run = Run(path, "--json", tmp_path / "live.json")
         with watching(tmp_path / "live.sock") as watch:
             done: list[int] = []
-            sender = threading.Thread(target=lambda: done.append(played(tty, SECONDS + 6, FAST)))
+
+            def published() -> list[bool]:
+                return [one["on"] for one in of_type(run.events(), "overload") if one["step"] == "publishing"]
+
+            until = time.monotonic() + 150  # the stream goes on until publishing was given up and has come back
+            sender = threading.Thread(
+                target=lambda: done.append(
+                    played(tty, SECONDS, FAST, lambda: published()[-1:] != [False] and time.monotonic() < until)
+                )
+            )
             sender.start()
             time.sleep(1.0)
             with hardly_any_processor(run.process.pid) as breathe:
-                for turn in range(1, 601):
-                    if "publishing" in [one["step"] for one in of_type(run.events(), "overload")]:
+                for turn in range(1, 1201):
+                    if published():
                         break
                     time.sleep(0.1)
                     if turn % 35 == 0:
@@ -145,7 +156,7 @@ def test_what_is_given_up_and_in_which_order(tmp_path: Path) -> None:
         else:
             assert one["step"] != "pictures" or "publishing" not in standing
         (standing.add if one["on"] else standing.remove)(one["step"])
-    told = [one["on"] for one in of_type(events, "overload") if one["step"] == "publishing"]
+    told = published()
     assert told and not told[-1]  # a slow machine may still leave out pictures in the end
     assert len(watch.blocks) < done[0] / FAST / 0.05 - 3
     (first,) = (tmp_path / "runs").glob("*-0001.okj")
