@@ -66,7 +66,7 @@ def test_nothing_waits_for_mathematics(tmp_path: Path, keys: str) -> None:
     path = node_config(tmp_path, "[identification]\n" + keys + COMMON, RATE, ROLES)
     with line(tmp_path / "tty") as tty:
         run = Run(path, "--json", tmp_path / "live.json")
-        with watching(tmp_path / "live.sock") as watch, busy_processors(2):
+        with watching(tmp_path / "live.sock") as watch, busy_processors(6):
             samples = played(tty, SECONDS)
             while tty.unread():
                 time.sleep(0.01)
