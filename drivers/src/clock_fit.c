@@ -4,7 +4,7 @@
 //          delays are one-sided, its low quantile carried to the edge: q(a) - (q(2a) - q(a)) / (g - 1), g being the
 //          growth of the quantiles there. A line with a prior on its
 //          rate goes through the last 64 points by Huber weights. A pair far off the line is held back; eight that
-//          agree are a step of the host clock or a restart of the device
+//          agree are a step of the host clock or a restart of the device; where they may be late only, eight and a second
 // SOURCE   own; chosen by simulation among minimum, low quantile, carried quantile and median (test_clock_fit.c)
 #include <drv/clock_fit.h>
 
@@ -20,6 +20,8 @@ static const double longest_block_s = 8.0; // … after this with any
 static const double edge = 1.0 / 64;       // the low quantile
 static const double abrupt = 0.5;          // jitters: what the first guess of the edge counts against the blocks
 static const double huber = 2.0;           // in scatters
+static const double longest_stall_s = 6.0; // a sender may be late by so much, …
+static const double stall_lasts_s = 1.0;   // … but not by the same for so long
 static const double rate_wander = 2e-6;    // by which a rate may have moved across a step
 
 int drv_clock_fit_init(drv_clock_fit_t* self, const drv_clock_config_t* config) {
@@ -122,6 +124,8 @@ static void fit(drv_clock_fit_t* self) {
     int32_t count = self->points < DRV_CLOCK_BLOCKS ? (int32_t)self->points : DRV_CLOCK_BLOCKS;
     double least = 1e-9 + 0.1 / self->config.tick_hz;                  // a stamp is not finer than its tick
     if (count < KNOWN) least = fmax(least, self->config.jitter_s / 4); // few points tell no scatter
+    // The median of what a line leaves of few points is too small (Rousseeuw and Leroy 1987, section 5.1).
+    const double few = count < KNOWN ? 1 : 1 + 5.0 / (count - 2);
     double scatter = fmax(least, self->scatter);
     for (int round = 0; round < ROUNDS; ++round) {
         for (int32_t i = 0; i < count; ++i) {
@@ -132,7 +136,7 @@ static void fit(drv_clock_fit_t* self) {
         self->since = self->point_at[(self->points - 1) % DRV_CLOCK_BLOCKS];
         solve_line(self, weight, count, scatter);
         for (int32_t i = 0; i < count; ++i) left[i] = fabs(self->point[i] - line_at(self, self->point_at[i]));
-        scatter = fmax(least, 1.4826 * median(left, count));
+        scatter = fmax(least, 1.4826 * few * median(left, count));
     }
     self->scatter = scatter;
 }
@@ -197,9 +201,13 @@ static drv_clock_verdict_t suspect(drv_clock_fit_t* self, uint64_t stamp, int64_
         self->suspect = host_s - device_s - line_at(self, device_s);
         self->suspect_is_restart = step < -0.1 || step > 2; // stamps may come a little out of order
         self->suspects = 0;
+        self->suspect_since_s = device_s;
     }
     self->suspect_device = device;
+    const int maybe_late = self->config.jitter == DRV_CLOCK_LATE && !self->suspect_is_restart && self->points > 0 &&
+                           self->suspect > 0 && self->suspect < longest_stall_s;
     if (++self->suspects < BELIEVED) return DRV_CLOCK_OUTLIER;
+    if (maybe_late && device_s - self->suspect_since_s < stall_lasts_s) return DRV_CLOCK_OUTLIER;
     int known = self->points > 0; // without a line it was the first pair that was wrong
     begin(self, device, host_ns);
     if (!known) return DRV_CLOCK_USED;

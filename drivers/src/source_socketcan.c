@@ -20,6 +20,7 @@
 #include <linux/sock_diag.h>
 #include <net/if.h>
 #include <net/if_arp.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,6 +39,7 @@ typedef struct socketcan_t {
     int poll_fd;       ///< epoll set of fd and watch_fd
     int watch_fd;      ///< tells of changes of interfaces, -1 = netlink cannot be had
     int gone;          ///< the interface vanished: bind anew when it is back
+    int behind;        ///< the link was lost behind frames that still wait in the socket: its error comes before them
     int bound;         ///< index of the interface the socket is bound to
     uint32_t counted;  ///< the kernel's drop counter of this socket, as far as it stands in the counts
     uint32_t placed;   ///< the same as of the frame delivered last
@@ -47,6 +49,8 @@ typedef struct socketcan_t {
     drv_host_clock_t clock;
     drv_link_t link; ///< as last read; its counters are the base of the next difference
     char interface[DRV_NAME_BYTES];
+    char adapter[sizeof(((drv_usb_t*)0)->serial)]; ///< its interface is looked for at every opening, "" = by name
+    int32_t adapter_channel;
     struct can_filter filters[DRV_MAX_FILTERS];
     int filter_count;
     int buffer_bytes;
@@ -96,6 +100,37 @@ static void set_options(drv_source_t* self, const socketcan_t* state, int fd) {
     ask_for_stamps(self, fd);
 }
 
+/// The name that the adapter's interface has now. @return 0 or -errno with the reason
+static int find_interface(drv_source_t* self, socketcan_t* state) {
+    if (state->adapter[0] == '\0') return 0;
+    int code = drv_link_find("/sys", state->adapter, state->adapter_channel, state->interface);
+    if (code == 0) return 0;
+    if (code == -ENOTUNIQ)
+        snprintf(self->error, sizeof self->error, "adapter %s: several have this serial number, name the port instead",
+                 state->adapter);
+    else
+        snprintf(self->error, sizeof self->error, "adapter %s: no such USB adapter has a CAN interface %d",
+                 state->adapter, (int)state->adapter_channel);
+    return code;
+}
+
+/// What the interface is now. By netlink: an ioctl with a name that is not there makes the kernel start modprobe, twice when
+/// root asks, and wait for it. @return 0 or -errno
+static int look_at_interface(int fd, const char* name, drv_link_t* out) {
+    const int code = drv_link_read(name, out);
+    if (code == 0 || code == -ENODEV) return code;
+    struct ifreq request; // netlink cannot be had
+    memset(&request, 0, sizeof request);
+    memcpy(request.ifr_name, name, strlen(name));
+    if (ioctl(fd, SIOCGIFHWADDR, &request) != 0) return -errno;
+    out->is_can = request.ifr_hwaddr.sa_family == ARPHRD_CAN;
+    if (ioctl(fd, SIOCGIFFLAGS, &request) != 0) return -errno;
+    out->up = (request.ifr_flags & IFF_UP) != 0;
+    if (ioctl(fd, SIOCGIFINDEX, &request) != 0) return -errno;
+    out->index = request.ifr_ifindex;
+    return 0;
+}
+
 /// A bound socket, or -errno with the reason.
 static int make_socket(drv_source_t* self, socketcan_t* state, int* up) {
     int fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
@@ -105,29 +140,23 @@ static int make_socket(drv_source_t* self, socketcan_t* state, int* up) {
             return explain(self, EAFNOSUPPORT, state->interface, "this kernel has no CAN (no AF_CAN or no can-raw)");
         return explain(self, code, state->interface, strerror(code));
     }
-    struct ifreq request;
-    memset(&request, 0, sizeof request);
-    memcpy(request.ifr_name, state->interface, sizeof state->interface);
-    int code = 0;
+    drv_link_t link;
+    int code = -look_at_interface(fd, state->interface, &link);
     const char* why = "there is no such interface";
-    if (ioctl(fd, SIOCGIFHWADDR, &request) != 0)
-        code = errno;
-    else if (request.ifr_hwaddr.sa_family != ARPHRD_CAN)
-        code = ENODEV, why = "is not a CAN interface";
-    else if (ioctl(fd, SIOCGIFFLAGS, &request) != 0)
-        code = errno;
+    if (code == 0 && !link.is_can) code = ENODEV, why = "is not a CAN interface";
     if (code == 0) {
-        *up = (request.ifr_flags & IFF_UP) != 0;
+        *up = link.up;
         set_options(self, state, fd);
         struct sockaddr_can address;
         memset(&address, 0, sizeof address);
         address.can_family = AF_CAN;
-        address.can_ifindex = (int)if_nametoindex(state->interface);
-        if (address.can_ifindex == 0 || bind(fd, (struct sockaddr*)&address, sizeof address) != 0)
-            code = address.can_ifindex == 0 ? ENODEV : errno;
-        state->bound = address.can_ifindex;
+        address.can_ifindex = state->bound = link.index;
+        if (bind(fd, (struct sockaddr*)&address, sizeof address) != 0) code = errno;
     }
-    if (code == 0) return fd;
+    if (code == 0) {
+        memcpy(self->counts.interface, state->interface, sizeof state->interface);
+        return fd;
+    }
     close(fd);
     return explain(self, code, state->interface, code == ENODEV ? why : strerror(code));
 }
@@ -207,13 +236,20 @@ static int socketcan_open(drv_source_t* self, const drv_source_config_t* config)
     self->error[0] = '\0';
     self->state = NULL;
     const char* name = config->interface_count > 0 ? config->interfaces[0] : "";
-    if (name[0] == '\0' || strlen(name) >= DRV_NAME_BYTES)
+    const char* adapter = config->adapter;
+    if (adapter && (adapter[0] == '\0' || strlen(adapter) >= sizeof(((socketcan_t*)0)->adapter)))
+        return explain(self, EINVAL, adapter, "serial number or port of a USB adapter: 1 to 127 characters");
+    if (!adapter && (name[0] == '\0' || strlen(name) >= DRV_NAME_BYTES))
         return explain(self, EINVAL, name, "an interface name has 1 to 15 characters");
     if (config->filter_count > DRV_MAX_FILTERS)
         return explain(self, EINVAL, name, "at most 512 identifiers can be asked for");
     socketcan_t* state = calloc(1, sizeof *state);
     if (!state) return explain(self, ENOMEM, name, "out of memory");
-    memcpy(state->interface, name, strlen(name));
+    if (adapter)
+        memcpy(state->adapter, adapter, strlen(adapter));
+    else
+        memcpy(state->interface, name, strlen(name));
+    state->adapter_channel = config->adapter_channel;
     state->buffer_bytes = config->buffer_bytes > 0 ? config->buffer_bytes : DRV_RECEIVE_BUFFER;
     state->filter_count = config->filters ? config->filter_count : 0;
     for (int i = 0; i < state->filter_count; ++i) {
@@ -224,12 +260,14 @@ static int socketcan_open(drv_source_t* self, const drv_source_config_t* config)
     }
     lay_out_batch(state);
     (void)drv_host_clock_look_now(&state->clock);
-    int up = 0;
-    state->fd = make_socket(self, state, &up);
-    int code = state->fd < 0 ? state->fd : 0;
+    int up = 0, code = find_interface(self, state);
+    if (code == 0) {
+        state->fd = make_socket(self, state, &up);
+        code = state->fd < 0 ? state->fd : 0;
+    }
     if (code == 0 && !up) {
         close(state->fd);
-        code = explain(self, ENETDOWN, name, "is down");
+        code = explain(self, ENETDOWN, state->interface, "is down");
     }
     if (code == 0) code = make_poll_set(self, state);
     if (code) {
@@ -270,10 +308,12 @@ static void place_drops(drv_source_t* self, socketcan_t* state, uint32_t now) {
     state->placed = now;
 }
 
-static void link_lost(drv_source_t* self, socketcan_t* state, int gone) {
+/// The interface is down or gone. Frames that wait in the socket came before that.
+static void link_lost(drv_source_t* self, socketcan_t* state, int gone, int behind) {
     if (!self->counts.link_is_down) ++self->counts.link_down;
     self->counts.link_is_down = 1;
-    state->loss |= DRV_LOSS_LINK;
+    state->behind = behind;
+    if (!behind) state->loss |= DRV_LOSS_LINK;
     if (gone && !state->gone) {
         read_drop_counter(self, state);
         (void)epoll_ctl(state->poll_fd, EPOLL_CTL_DEL, state->fd, NULL);
@@ -284,7 +324,7 @@ static void link_lost(drv_source_t* self, socketcan_t* state, int gone) {
 /// Bind anew when the interface is there again. @return 1 when it is
 static int try_again(drv_source_t* self, socketcan_t* state) {
     int up = 0;
-    if (if_nametoindex(state->interface) == 0) return 0;
+    if (find_interface(self, state) != 0) return 0;
     int fd = make_socket(self, state, &up);
     if (fd < 0) return 0;
     if (add_to_poll_set(state, fd) != 0) {
@@ -304,12 +344,19 @@ static int try_again(drv_source_t* self, socketcan_t* state) {
 /// Nothing was to be read: has the interface changed?
 static void hear_of_link(drv_source_t* self, socketcan_t* state) {
     drv_link_t link;
-    if (state->watch_fd < 0 || !drv_link_changes(state->watch_fd, state->interface, &link)) return;
-    if (link.index == 0 && drv_link_read(state->interface, &link) != 0) return;
+    struct pollfd news = {.fd = state->watch_fd, .events = POLLIN};
+    if (state->watch_fd < 0 || poll(&news, 1, 0) <= 0) return;
+    // A name can change under the socket; that of an adapter which is away may belong to another one by now.
+    if (state->adapter[0] && !state->gone && if_indextoname((unsigned)state->bound, state->interface))
+        memcpy(self->counts.interface, state->interface, sizeof state->interface);
+    if (!drv_link_changes(state->watch_fd, state->interface, &link)) return;
+    if (state->adapter[0] && state->gone) return;
     if (link.gone) return; // the socket says so itself
+    // News may be old: down while it was renamed, up and heard by now; of the interface that had this name before.
+    if ((link.index != state->bound || !link.up) && drv_link_read(state->interface, &link) != 0) return;
     int renamed = link.index != state->bound;
     if (renamed || !link.up)
-        link_lost(self, state, renamed);
+        link_lost(self, state, renamed, !renamed && state->behind);
     else
         self->counts.link_is_down = state->gone;
     take_link(self, state, &link);
@@ -377,20 +424,25 @@ static int take_message(drv_source_t* self, socketcan_t* state, int index, drv_f
     memcpy(frame->data, raw->data, fd_frame ? 64 : 8);
     frame->loss = state->loss;
     state->loss = 0;
-    self->counts.link_is_down = 0;
+    if (!state->behind) self->counts.link_is_down = 0;
     ++self->counts.received;
     return 1;
 }
 
 /// The socket failed. @return 0 when the interface explains it, else -errno
 static int socket_failed(drv_source_t* self, socketcan_t* state, int code) {
-    if (code == EAGAIN || code == EWOULDBLOCK || code == EINTR) return 0;
+    if (code == EAGAIN || code == EWOULDBLOCK) {
+        if (state->behind) state->loss |= DRV_LOSS_LINK;
+        state->behind = 0;
+        return 0;
+    }
+    if (code == EINTR) return 0;
     if (code == ENETDOWN || code == ENODEV || code == ENXIO) {
-        link_lost(self, state, code != ENETDOWN);
+        link_lost(self, state, code != ENETDOWN, code == ENETDOWN);
         return 0;
     }
     ++self->counts.read_errors;
-    if (code != ENOBUFS && code != ENOMEM) link_lost(self, state, 1); // whatever it is: a fresh socket
+    if (code != ENOBUFS && code != ENOMEM) link_lost(self, state, 1, 0); // whatever it is: a fresh socket
     return explain(self, code, state->interface, strerror(code));
 }
 

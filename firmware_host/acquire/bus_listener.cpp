@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "bus_listener.hpp"
 
+#include "reader.hpp"
+
 namespace okid_host {
 
-bus_listener::bus_listener(const std::string& interface, std::size_t bus) : bus_(static_cast<std::uint8_t>(bus)) {
+bus_listener::bus_listener(const bus_config& wanted, std::size_t bus) : bus_(static_cast<std::uint8_t>(bus)) {
     source_.ops = &drv_source_socketcan;
     drv_source_config_t config{};
-    config.interfaces[0] = interface.c_str();
-    config.interface_count = 1;
+    name_interface(wanted, config);
     open_ = source_.ops->open(&source_, &config) == 0;
 }
 

@@ -3,19 +3,19 @@
 // the capture lets nothing else pass.
 #pragma once
 #include "align/stream_check.hpp"
+#include "config/config.hpp"
 
 #include <drv/source.h>
 
 #include <array>
 #include <cstdint>
-#include <string>
 
 namespace okid_host {
 
 class bus_listener {
   public:
     /// An interface that cannot be opened is not heard: the capture says why.
-    bus_listener(const std::string& interface, std::size_t bus);
+    bus_listener(const bus_config& config, std::size_t bus);
     ~bus_listener();
     bus_listener(const bus_listener&) = delete;
     bus_listener& operator=(const bus_listener&) = delete;

@@ -23,7 +23,8 @@ std::vector<bus_event> bus_watch::look(const drv_stats_t& now) {
     if (more(&drv_stats_t::link_down)) out.push_back({"link_down", "went down or away; waiting for it", true});
     if (!now.link_is_down && (seen_.link_is_down || more(&drv_stats_t::link_down)))
         out.push_back({"link_up", "is up again", true});
-    if (more(&drv_stats_t::bus_off)) out.push_back({"bus_off", bus_off_text(interface_, now), true});
+    if (more(&drv_stats_t::bus_off))
+        out.push_back({"bus_off", bus_off_text(now.interface[0] ? now.interface : interface_, now), true});
     if (more(&drv_stats_t::restarts)) out.push_back({"restarted", "restarted after bus-off", true});
     if (more(&drv_stats_t::error_passive))
         out.push_back(

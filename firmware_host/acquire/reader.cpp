@@ -35,22 +35,26 @@ std::uint64_t happenings(const drv_stats_t& counts) {
            static_cast<std::uint64_t>(counts.link_is_down);
 }
 
+/// What messages call it.
+std::string told_name(const bus_config& bus) {
+    if (bus.on_line()) return bus.device;
+    return bus.adapter.empty() ? bus.interface : bus.adapter;
+}
+
 } // namespace
 
 std::size_t bus_reader::most_waiting() { return ring_frames / 4 * 3; }
 
 bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_event& wake, watermark& mark)
-    : interface_(config_of_all.buses[bus].on_line() ? config_of_all.buses[bus].device
-                                                    : config_of_all.buses[bus].interface),
-      bus_(static_cast<std::uint8_t>(bus)), wake_(wake), stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), mark_(mark),
+    : interface_(told_name(config_of_all.buses[bus])), bus_(static_cast<std::uint8_t>(bus)), wake_(wake),
+      stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), mark_(mark),
       block_(new std::byte[drv_ring_memsize(ring_frames)]()), batch_(64) {
     ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));
     const bus_config& mine = config_of_all.buses[bus];
     const std::vector<drv_filter_t> frames = wanted_frames(config_of_all, bus);
     source_.ops = mine.serial() ? &drv_source_serial : mine.on_line() ? &drv_source_slcan : &drv_source_socketcan;
     drv_source_config_t config{};
-    config.interfaces[0] = interface_.c_str();
-    config.interface_count = 1;
+    name_interface(mine, config);
     if (mine.on_line()) config.line = line_settings(mine, config_of_all.rate_hz);
     // The load of a bus is that of all its frames: then nothing is left out by the kernel.
     if (frames.size() <= DRV_MAX_FILTERS && !mine.bitrate) {
@@ -62,7 +66,7 @@ bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_e
     if (code != 0) {
         close(stop_fd_);
         if (mine.on_line()) throw_line_failure(-code, interface_, source_.error);
-        throw_interface_failure(-code, interface_, source_.error);
+        throw_bus_failure(-code, mine, source_.error);
     }
     queue_fd_ = epoll_create1(EPOLL_CLOEXEC);
     publish_stats();
@@ -174,6 +178,39 @@ std::vector<std::string> can_interfaces() {
     }
     std::sort(out.begin(), out.end());
     return out;
+}
+
+std::string interface_of(const bus_config& bus) {
+    char name[DRV_NAME_BYTES] = "";
+    if (bus.adapter.empty()) return bus.interface;
+    (void)drv_link_find("/sys", bus.adapter.c_str(), bus.adapter_channel, name);
+    return name;
+}
+
+void name_interface(const bus_config& bus, drv_source_config_t& config) {
+    config.interfaces[0] = bus.interface.c_str();
+    config.interface_count = 1;
+    config.adapter = bus.adapter.empty() ? nullptr : bus.adapter.c_str();
+    config.adapter_channel = bus.adapter_channel;
+}
+
+std::vector<std::string> usb_adapters() {
+    std::vector<std::string> out;
+    for (const std::string& name : can_interfaces()) {
+        drv_usb_t usb{};
+        if (drv_link_usb("/sys", name.c_str(), &usb) != 0) continue;
+        const std::string serial = usb.serial[0] ? printable(usb.serial, 40) : "no serial number";
+        out.push_back(fmt::format("{} ({}, port {})", name, serial, usb.port));
+    }
+    return out;
+}
+
+void throw_bus_failure(int code, const bus_config& bus, const std::string& reason) {
+    if (bus.adapter.empty() || (code != ENODEV && code != ENOTUNIQ))
+        throw_interface_failure(code, interface_of(bus), reason);
+    const std::vector<std::string> there = usb_adapters();
+    throw failure(exit_device, fmt::format("{}; USB adapters with CAN: {}", printable(reason, 300),
+                                           there.empty() ? "none" : list_names(there)));
 }
 
 void throw_interface_failure(int code, const std::string& interface, const std::string& reason) {

@@ -39,7 +39,7 @@ class bus_reader {
     /// Counts of the source and of the ring, as of the last time the thread looked (at most 0.1 s ago).
     drv_stats_t stats() const;
     std::uint64_t ring_overrun() const { return drv_ring_overrun(ring_); }
-    const std::string& interface() const { return interface_; } ///< or the device of a line
+    const std::string& interface() const { return interface_; } ///< or the adapter, or the device of a line
     bool filtered() const { return filtered_; } ///< the kernel lets nothing pass that no channel asks for
 
   private:
@@ -65,8 +65,20 @@ class bus_reader {
     drv_stats_t seen_{};
 };
 
+/// The interface that a socketcan bus has now, "" = its adapter is not there.
+std::string interface_of(const bus_config& bus);
+
+/// Which interface a source is to open. `bus` outlives the opening.
+void name_interface(const bus_config& bus, drv_source_config_t& config);
+
+/// The same as throw_interface_failure, of a bus that may be an adapter.
+[[noreturn]] void throw_bus_failure(int code, const bus_config& bus, const std::string& reason);
+
 /// The text and exit code for an interface that cannot be opened: what was found on this machine and what to do.
 [[noreturn]] void throw_interface_failure(int code, const std::string& interface, const std::string& reason);
+
+/// CAN interfaces of USB adapters with serial number and port, for messages.
+std::vector<std::string> usb_adapters();
 
 /// Names of the CAN interfaces of this machine.
 std::vector<std::string> can_interfaces();

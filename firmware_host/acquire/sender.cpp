@@ -21,8 +21,8 @@ int is_stopping(void* flag) { return static_cast<const std::atomic<bool>*>(flag)
 } // namespace
 
 sync_sender::sync_sender(const bus_config& bus) : bus_(bus) {
-    const int code = drv_sink_open(&sink_, bus.interface.c_str());
-    if (code != 0) throw_interface_failure(-code, bus.interface, sink_.error);
+    const int code = drv_sink_open(&sink_, interface_of(bus).c_str());
+    if (code != 0) throw_bus_failure(-code, bus, sink_.error);
 }
 
 sync_sender::~sync_sender() {
@@ -55,7 +55,7 @@ bool sync_sender::send(const drv_frame_t& frame, int patience_ms) {
     int code = sink_.fd < 0 ? -ENXIO : drv_sink_write(&sink_, &frame, patience_ms);
     if (code == -ENXIO || code == -ENODEV) {
         drv_sink_close(&sink_);
-        code = drv_sink_open(&sink_, bus_.interface.c_str());
+        code = drv_sink_open(&sink_, interface_of(bus_).c_str());
         if (code == 0) code = drv_sink_write(&sink_, &frame, patience_ms);
     }
     if (code == 0) return true;

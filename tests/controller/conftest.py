@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -28,7 +29,7 @@ def bring_up(bitrate: int = 1_000_000, *options: str) -> None:
 
 
 def interrupts(name: str, processor: int) -> None:
-    (line,) = [each for each in Path("/proc/interrupts").read_text().splitlines() if each.endswith(name)]
+    (line,) = [each for each in Path("/proc/interrupts").read_text().splitlines() if re.search(rf"\b{name}\b", each)]
     Path(f"/proc/irq/{line.split(':')[0].strip()}/smp_affinity").write_text(str(1 << processor))
 
 
@@ -65,11 +66,13 @@ def play(log: Path, *options: str) -> str:
 class Witness:
     """candump beside okid, with a buffer that holds whole runs: what came past the controller."""
 
-    def __init__(self, folder: Path) -> None:
-        self.log = folder / "witness.log"
+    def __init__(self, folder: Path, interface: str = "can0") -> None:
+        self.log, self.interface = folder / "witness.log", interface
         before = self.listeners()
         with self.log.open("w") as out:
-            self.process = subprocess.Popen(["candump", "-L", "-r", "100000000", "can0,0:0,#FFFFFFFF"], stdout=out)
+            self.process = subprocess.Popen(
+                ["candump", "-L", "-r", "100000000", f"{interface},0:0,#FFFFFFFF"], stdout=out
+            )
         for _ in range(400):
             if self.listeners() > before:
                 return
@@ -77,9 +80,8 @@ class Witness:
             time.sleep(0.02)
         raise AssertionError("candump never listened")
 
-    @staticmethod
-    def listeners() -> int:
-        return Path("/proc/net/can/rcvlist_all").read_text().count(" can0 ")
+    def listeners(self) -> int:
+        return Path("/proc/net/can/rcvlist_all").read_text().count(f" {self.interface} ")
 
     def lines(self) -> list[str]:
         size = -1
@@ -93,8 +95,16 @@ class Witness:
         return [line.split()[2] for line in text.splitlines() if len(line.split()) == 3]
 
 
-def listen(folder: Path, *options: str, config: str = "a.toml") -> Run:
-    return Run(folder, *options, config=config, interface="can0")
+def listen(folder: Path, *options: str, config: str = "a.toml", interface: str = "can0") -> Run:
+    return Run(folder, *options, config=config, interface=interface)
+
+
+def end(run: Run) -> list[dict]:
+    """@return its events; whether its numbers make a model does not matter"""
+    time.sleep(0.3)
+    run.process.send_signal(signal.SIGINT)
+    assert run.process.wait(30) in (0, 3), run.messages()
+    return run.events()
 
 
 def on_can0(folder: Path, **changes: str) -> Path:

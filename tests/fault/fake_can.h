@@ -49,6 +49,7 @@ static struct {
     int socket_error, bind_error, netlink_error, no_stamps, no_force;
     int listen_error, flags_error, poll_set_error, poll_add_error; ///< bind() of netlink, SIOCGIFFLAGS, epoll_...
     int late_answers;                                              ///< EAGAIN so often before a question is answered
+    int modprobes; ///< asked for an interface that is not there in the way that makes a kernel look for a module
     // sockets
     int can_fd, watch_fd, query_fd, can_sockets;
     int filters, buffer;
@@ -184,7 +185,10 @@ int bind(int fd, const struct sockaddr* address, socklen_t length) {
     if (fake.listen_error) return fake_fault(fake.listen_error);
     struct sockaddr_nl netlink;
     memcpy(&netlink, address, sizeof netlink);
-    if (netlink.nl_groups) fake.watch_fd = fd;
+    if (netlink.nl_groups)
+        fake.watch_fd = fd;
+    else if (fake.watch_fd == fd) // that one was closed, and its number is used again
+        fake.watch_fd = -1;
     return 0;
 }
 
@@ -225,10 +229,14 @@ int ioctl(int fd, unsigned long request, ...) {
     va_start(list, request);
     struct ifreq* about = va_arg(list, struct ifreq*);
     va_end(list);
-    if (!fake.index || strcmp(about->ifr_name, fake.name) != 0) return fake_fault(ENODEV);
+    if (!fake.index || strcmp(about->ifr_name, fake.name) != 0) {
+        ++fake.modprobes;
+        return fake_fault(ENODEV);
+    }
     if (request == SIOCGIFFLAGS && fake.flags_error) return fake_fault(fake.flags_error);
     if (request == SIOCGIFHWADDR) about->ifr_hwaddr.sa_family = (sa_family_t)fake.type;
     if (request == SIOCGIFFLAGS) about->ifr_flags = fake.up ? IFF_UP : 0;
+    if (request == SIOCGIFINDEX) about->ifr_ifindex = fake.index;
     return 0;
 }
 
@@ -239,8 +247,6 @@ int epoll_create1(int flags) {
 int epoll_ctl(int set, int what, int fd, struct epoll_event* event) {
     return fake.poll_add_error ? fake_fault(fake.poll_add_error) : (int)syscall(SYS_epoll_ctl, set, what, fd, event);
 }
-
-unsigned if_nametoindex(const char* name) { return strcmp(name, fake.name) == 0 ? (unsigned)fake.index : 0; }
 
 static void fake_control(struct msghdr* header, int type, const void* value, size_t bytes) {
     struct cmsghdr part;

@@ -202,7 +202,7 @@ def test_unplugged_and_plugged_in_again(tmp_path: Path) -> None:
 def test_simulate_plays_a_node(tmp_path: Path) -> None:
     rig = Rig(tmp_path, seconds=1.0)
     with line(rig.device) as ours:
-        reader = Reader(ours.fd)
+        reader = Reader(ours)
         done = program.okid("simulate", tmp_path / "rig.toml", "--to", rig.device, "--config", tmp_path / "node.toml")
         assert done.returncode == 0, done.stderr
         packets = unpack(reader.packets(250))
@@ -223,7 +223,7 @@ def test_a_link_in_this_folder_is_a_device(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     with line(rig.device) as ours:
         Path("node").symlink_to(rig.device)
-        reader = Reader(ours.fd)
+        reader = Reader(ours)
         done = program.okid("simulate", "rig.toml", "--to", "node")
         assert done.returncode == 0, done.stderr
         assert [row for _, _, rows in unpack(reader.packets(250)) for row in rows] == rig.codes

@@ -184,7 +184,9 @@ def test_rotation_while_it_runs(tmp_path: Path, codes: list[list[int]]) -> None:
     whole = events(old) + events(now)
     assert [event["type"] for event in whole].count("start") == 1 and whole[-1]["type"] == "result"
     times = [event["t"] for event in whole if event["type"] == "modes"]
-    assert times == sorted(times) and max(b - a for a, b in zip(times, times[1:], strict=False)) < 0.51
+    left_out = [event for event in whole if event["type"] == "stats"][-1]["updates"]["skipped"]
+    due = round((times[-1] - times[0]) / 0.5) + 1
+    assert times == sorted(set(times)) and due - left_out <= len(times) <= due  # a busy machine leaves some out
 
 
 def test_command_at_an_alarm(tmp_path: Path, codes: list[list[int]]) -> None:

@@ -6,10 +6,10 @@ from __future__ import annotations
 import cmath
 import contextlib
 import math
-import os
 import random
 import threading
 from collections.abc import Iterator
+from io import FileIO
 from pathlib import Path
 
 import can
@@ -51,15 +51,15 @@ def wire(first: Path, second: Path) -> Iterator[tuple[Line, Line]]:
     """Two devices with a null-modem cable between them."""
     with line(first) as a, line(second) as b:
         for source, target in ((a, b), (b, a)):
-            threading.Thread(target=carry, args=(source.fd, target.fd), daemon=True).start()
+            threading.Thread(target=carry, args=(source.own(), target.own()), daemon=True).start()
         yield a, b
 
 
-def carry(source: int, target: int) -> None:
-    with contextlib.suppress(OSError):
-        while data := os.read(source, 4096):
+def carry(source: FileIO, target: FileIO) -> None:
+    with source, target, contextlib.suppress(OSError):
+        while data := source.read(4096):
             while data:
-                data = data[os.write(target, data) :]
+                data = data[target.write(data) :]
 
 
 def message(identifier: int, n: int, value: int) -> can.Message:
@@ -74,17 +74,16 @@ def test_frames_of_python_can_are_identified(tmp_path: Path) -> None:
     lost = {n for n in range(50, 950) if draw.random() < 0.03}
     with wire(tmp_path / "okid", tmp_path / "python"):
         run = Run(config, "--duration", 1.0)
-        bus = can.Bus(interface="slcan", channel=str(tmp_path / "python"), sleep_after_open=0)
-        state = [0.0, 0.0]
-        for n in range(1000):
-            force = draw.randint(-9000, 9000)
-            state = [1.6 * state[0] - 0.9 * state[1] + 0.1 * force, state[0]]
-            bus.send(message(0x100, n, force))
-            bus.send(can.Message(arbitration_id=0x7DF, is_remote_frame=True, is_extended_id=False))
-            if n not in lost:
-                bus.send(message(0x18F02D0B, n, round(state[0] + draw.gauss(0, 20))))
-        events = run.finish()
-        bus.shutdown()
+        with can.Bus(interface="slcan", channel=str(tmp_path / "python"), sleep_after_open=0) as bus:
+            state = [0.0, 0.0]
+            for n in range(1000):
+                force = draw.randint(-9000, 9000)
+                state = [1.6 * state[0] - 0.9 * state[1] + 0.1 * force, state[0]]
+                bus.send(message(0x100, n, force))
+                bus.send(can.Message(arbitration_id=0x7DF, is_remote_frame=True, is_extended_id=False))
+                if n not in lost:
+                    bus.send(message(0x18F02D0B, n, round(state[0] + draw.gauss(0, 20))))
+            events = run.finish()
     gaps = [n for gap in of_type(events, "gap") for n in range(gap["first"], gap["last"] + 1)]
     assert sorted(gaps) == sorted(lost)
     stats = of_type(events, "stats")[-1]
@@ -106,8 +105,10 @@ def test_a_log_is_played_onto_an_adapter(tmp_path: Path) -> None:
         for n, (identifier, extended, data) in enumerate(sent):
             name = f"{identifier:08X}" if extended else f"{identifier:03X}"
             log.write(f"({n * 0.001:.6f}) can0 {name}#{data.hex().upper()}\n")
-    with wire(tmp_path / "okid", tmp_path / "python"):
-        bus = can.Bus(interface="slcan", channel=str(tmp_path / "python"), sleep_after_open=0)
+    with (
+        wire(tmp_path / "okid", tmp_path / "python"),
+        can.Bus(interface="slcan", channel=str(tmp_path / "python"), sleep_after_open=0) as bus,
+    ):
         done = program.okid("replay", tmp_path / "a.log", "--to", tmp_path / "okid", "--speed", "max")
         assert done.returncode == 0, done.stderr
         assert f"300 frames played onto {tmp_path / 'okid'}" in done.stdout
@@ -116,7 +117,6 @@ def test_a_log_is_played_onto_an_adapter(tmp_path: Path) -> None:
             received = bus.recv(timeout=10)
             assert received is not None, len(got)
             got.append((received.arbitration_id, received.is_extended_id, bytes(received.data)))
-        bus.shutdown()
     assert got == sent
     done = program.okid("replay", tmp_path / "a.log", "--to", tmp_path / "okid")
     assert done.returncode == 4 and "there is no such device" in done.stderr

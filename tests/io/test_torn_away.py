@@ -22,6 +22,7 @@ from pathlib import Path
 import program
 import pytest
 from lines import Line, Run, line, of_type
+from sensor import sensor
 
 SECONDS = 60.0 if os.environ.get("OKID_SLOW") else 4.0
 TEXT_BUS = '[[bus]]\nname = "{name}"\ntype = "serial"\nframing = "ascii"\ndevice = "{device}"\n'
@@ -57,7 +58,8 @@ def test_the_next_sample_is_the_next_sample(tmp_path: Path, burst: int) -> None:
         while not list((tmp_path / "runs").glob("*.okj")):
             assert run.poll() is None
             time.sleep(0.01)
-        sent = handed_over(tty, 1000, burst, {1.0: 0.15, 1.9: 0.3, 2.7: 0.15})
+        with sensor():
+            sent = handed_over(tty, 1000, burst, {1.0: 0.15, 1.9: 0.3, 2.7: 0.15})
         while tty.unread():
             time.sleep(0.01)
         run.send_signal(signal.SIGINT)
@@ -95,12 +97,13 @@ def counted(tty: Line, seed: int, begin: float) -> None:
 
 
 def uncounted(tty: Line, begin: float) -> None:
-    for n in range(int(200 * SECONDS)):
-        time.sleep(max(0.0, begin + n / 200 - time.monotonic()))
-        tty.write(b"%d\n" % n)
+    with sensor():
+        for n in range(int(200 * SECONDS)):
+            time.sleep(max(0.0, begin + n / 200 - time.monotonic()))
+            tty.write(b"%d\n" % n)
 
 
-@pytest.mark.parametrize("hogs", [0, 2])
+@pytest.mark.parametrize("hogs", [0, 1, 2])
 def test_two_buses_and_a_line_through_stops(tmp_path: Path, hogs: int) -> None:
     """The program is stopped for 1.5 s: the line is late then, the adapters are too, and all of it is in the samples.
     The journal of it gives the same result."""

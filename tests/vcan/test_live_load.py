@@ -149,6 +149,13 @@ def test_two_buses_and_a_line(tmp_path: Path, capfd: pytest.CaptureFixture[str])
     sh("ip", "link", "set", "vcan1", "up")
     disk = Path(tempfile.mkdtemp(dir="/dev/shm"))  # where a write takes as long here as elsewhere
     (tmp_path / "a.toml").write_text(config(tmp_path, disk))
+    for bus in (0, 1):
+        (tmp_path / f"{bus}.bin").write_bytes(can_frames(codes, bus))
+    files = f"{tmp_path}/0.bin,{tmp_path}/1.bin"
+    part = samples * FRAMES // 4
+    alone = json.loads(sh(str(FLOOD), "vcan0,vcan1", str(part), str(RATE * FRAMES), files, seconds=600).stdout)[
+        "seconds"
+    ]
     line = Line(tmp_path / "tty")
     live = Run(tmp_path)
     with watching(tmp_path / "live.sock") as watch:
@@ -157,9 +164,6 @@ def test_two_buses_and_a_line(tmp_path: Path, capfd: pytest.CaptureFixture[str])
             time.sleep(0.01)
         feeder = threading.Thread(target=feed, args=(line, samples))
         feeder.start()
-        for bus in (0, 1):
-            (tmp_path / f"{bus}.bin").write_bytes(can_frames(codes, bus))
-        files = f"{tmp_path}/0.bin,{tmp_path}/1.bin"
         sent = sh(str(FLOOD), "vcan0,vcan1", str(samples * FRAMES), str(RATE * FRAMES), files, seconds=SECONDS * 10)
         took = json.loads(sent.stdout)["seconds"]
         feeder.join()
@@ -171,8 +175,7 @@ def test_two_buses_and_a_line(tmp_path: Path, capfd: pytest.CaptureFixture[str])
     with capfd.disabled():
         rate = samples * FRAMES / took
         print(f"\n2 x {rate:.0f} frames/s and a line for {took:.1f} s; frame in to modes out: {summary(waits)}")
-    assert rate > RATE * FRAMES / 3, "the sender was so slow that this is no load"
-    assert np.percentile(waits, 99) < 2e3 * took, "modes came far later than the whole stream took"
+    assert rate > 0.5 * part / alone, "half of what the sender sends when nobody listens"
     nothing_lost(last, ("can0", "can1", "line"))
     assert last["bus"]["can0"]["received"] == last["bus"]["can1"]["received"] == samples * FRAMES
     assert {channel["received"] for channel in last["channel"].values()} == {samples}
@@ -183,6 +186,10 @@ def test_two_buses_and_a_line(tmp_path: Path, capfd: pytest.CaptureFixture[str])
     updates = last["updates"]
     assert len(waits) >= 1 and updates["made"] + updates["skipped"] >= (SECONDS - 2) / UPDATE_S
     (first,) = disk.glob("*-0001.okj")
+    begin = time.monotonic()
     sh(OKID, "replay", str(first), "--json", str(tmp_path / "again.json"), seconds=600)
+    an_update_ms = 1e3 * (time.monotonic() - begin) / (updates["made"] + updates["skipped"])
+    # Two buses at full speed leave no processor for mathematics: it catches up behind them.
+    assert np.percentile(waits, 99) < 1e3 * took + 15 * an_update_ms, an_update_ms
     assert (tmp_path / "again.json").read_bytes() == (tmp_path / "r.json").read_bytes()
     shutil.rmtree(disk)

@@ -81,6 +81,8 @@ LOADS = [
 @pytest.mark.parametrize(("kind", "rate", "count"), LOADS)
 def test_load(kind: str, rate: int, count: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     row = {}
+    part = max(count // 4, 1000)
+    alone = json.loads(sh(str(TOOLS / "vcan_flood"), "vcan0", str(part), str(rate), kind, seconds=120).stdout)
     for program in ("okid", *(("candump", "python-can") if SLOW else ())):
         receiver = Receiver(program, count, tmp_path)
         if not rate:  # nobody reads until all is sent: what the receive buffer holds
@@ -93,7 +95,11 @@ def test_load(kind: str, rate: int, count: int, tmp_path: Path, capfd: pytest.Ca
     with capfd.disabled():
         paced = f"{rate}/s" if rate else "flat out, nobody reading"
         lost = ", ".join(f"{program} {count - got}" for program, got in row.items())
-        print(f"\n{kind} {paced}, {count} frames in {flood['seconds']} s: lost {lost}")
+        of_alone = count / flood["seconds"] * alone["seconds"] / part
+        print(
+            f"\n{kind} {paced}, {count} frames in {flood['seconds']} s: lost {lost}; {of_alone:.2f} of the rate alone"
+        )
+    assert of_alone > 0.5 or not rate  # flat out: what a full buffer costs the sender
     assert okid == {
         "received": count,
         "missing": 0,

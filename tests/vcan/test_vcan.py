@@ -152,6 +152,26 @@ def test_link_down_and_up(short: Path) -> None:
     assert "went down" in live.messages()
 
 
+def test_frames_that_waited_when_the_link_went_down(short: Path) -> None:
+    """They are no loss, and the gap is behind them, though the kernel tells of the link before it hands them out."""
+    live = Run(short)
+    play(part(short, "one.log", 0, 1200), "-t")
+    time.sleep(0.3)
+    live.process.send_signal(signal.SIGSTOP)
+    play(part(short, "two.log", 1200, 2400), "-t")
+    sh("ip", "link", "set", "vcan0", "down")
+    live.process.send_signal(signal.SIGCONT)
+    time.sleep(0.5)
+    sh("ip", "link", "set", "vcan0", "up")
+    time.sleep(0.3)
+    play(part(short, "three.log", 2600, 6000), "-t")
+    events = live.stop()
+    gaps = {(e["first"], e["last"], e["cause"]) for e in events if e["type"] == "gap"}
+    assert gaps == {(1200, 1299, "link_down")}
+    assert [e["event"] for e in events if e["type"] == "bus"] == ["link_down", "link_up"]
+    assert (bus(events)["received"], bus(events)["lost_by"]["link_down"]) == (5800, 200)
+
+
 def test_interface_deleted_and_made_anew(short: Path) -> None:
     live = Run(short)
     play(part(short, "one.log", 0, 2400), "-t")

@@ -64,7 +64,7 @@ typedef struct drv_clock_fit_t {
     int64_t points;
     // Pairs that do not fit, but perhaps fit each other.
     int32_t suspects, suspect_is_restart;
-    double suspect;
+    double suspect, suspect_since_s; ///< how far off, and since when by the device
     int64_t suspect_device;
     /// @endcond
     uint64_t used;       ///< pairs in the fit

@@ -51,6 +51,24 @@ typedef struct drv_link_t {
     uint64_t rx_over_errors;    ///< times the controller's receive queue overran
 } drv_link_t;
 
+/// Where on USB an interface sits.
+typedef struct drv_usb_t {
+    char port[32];    ///< the port of its adapter as the kernel names it, "1-1.4"
+    char serial[128]; ///< serial number of its adapter, "" = it has none
+} drv_usb_t;
+
+/// @param sysfs  "/sys"
+/// @return 0, or -ENODEV when this interface is not one of USB
+int drv_link_usb(const char* sysfs, const char* interface, drv_usb_t* out);
+
+/// The CAN interface of a USB adapter, whatever its name is today.
+/// @param sysfs    "/sys"
+/// @param adapter  its serial number, or the port it is plugged into
+/// @param channel  which of its interfaces, 0 first
+/// @param name     out; untouched when there is none
+/// @return 0, -ENODEV no such adapter or channel, -ENOTUNIQ several adapters have this serial number
+int drv_link_find(const char* sysfs, const char* adapter, int32_t channel, char name[16]);
+
 /// Ask the kernel for an interface. @return 0, -ENODEV when there is none, or another -errno
 int drv_link_read(const char* interface, drv_link_t* out);
 

@@ -53,11 +53,14 @@ typedef struct drv_source_config_t {
     const char*
         interfaces[DRV_MAX_BUSES]; ///< socket: the first one; log: those to deliver, frame.bus is the index here
     int32_t interface_count;       ///< log: 0 = deliver every interface as bus 0
-    const char* path;              ///< log only
-    const drv_filter_t* filters;   ///< socket only; NULL = everything
-    int32_t filter_count;          ///< of them
-    int32_t buffer_bytes;          ///< receive buffer asked for, 0 = DRV_RECEIVE_BUFFER
-    drv_line_config_t line;        ///< serial and slcan only
+    /// socket: of this USB adapter (drv_link_find) instead of interfaces[0]; NULL = none
+    const char* adapter;
+    int32_t adapter_channel;     ///< of it
+    const char* path;            ///< log only
+    const drv_filter_t* filters; ///< socket only; NULL = everything
+    int32_t filter_count;        ///< of them
+    int32_t buffer_bytes;        ///< receive buffer asked for, 0 = DRV_RECEIVE_BUFFER
+    drv_line_config_t line;      ///< serial and slcan only
 } drv_source_config_t;
 
 /// How frames were stamped, best last.
@@ -99,6 +102,8 @@ typedef struct drv_stats_t {
     drv_bus_state_t state;  ///< of the controller, as last told
     uint32_t restart_ms;    ///< of the interface; 0 = it stays off after bus-off, or is virtual
     uint32_t bitrate;       ///< of the interface, bit/s; 0 = virtual
+    /// socket: bound to this one now or last, "" = a source of another kind
+    char interface[DRV_NAME_BYTES];
     char last_error[DRV_ERROR_TEXT_BYTES]; ///< what the newest error message said, "" = there was none
 } drv_stats_t;
 

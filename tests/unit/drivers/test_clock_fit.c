@@ -153,6 +153,45 @@ static void test_sigma_is_honest(void) {
     }
 }
 
+/// After six to ten seconds, too, where there are few points to tell their own scatter.
+static void test_sigma_is_honest_early(void) {
+    enum { SEEDS = 1000 };
+    int far = 0;
+    for (uint64_t i = 0; i < SEEDS; ++i) {
+        seed(1500 + i);
+        rig_t rig;
+        start(&rig, 1 + (int)(i % 3), i & 1 ? NORMAL : EXPONENTIAL, 0);
+        double ppm = 0, sigma_ppm = 0, seconds = 6.5 + (double)(i % 5);
+        (void)play(&rig, 100, 0, seconds, 0);
+        TEST_ASSERT_EQUAL_INT(0, drv_clock_fit_rate(&rig.fit, &ppm, &sigma_ppm));
+        far += fabs(ppm - rig.ppm) > 5 * sigma_ppm;
+    }
+    TEST_ASSERT_TRUE(far <= 2);
+}
+
+/// A sender that is late for a while by the same is no step of the host's clock; a step by as much, which stays, is one.
+static void test_stalls_of_a_sender(void) {
+    for (uint64_t i = 0; i < 200; ++i) {
+        seed(1700 + i);
+        rig_t rig;
+        start(&rig, (int)(i % 4), (delay_t)(i / 4 % 3), 0);
+        double error = 0, sigma = 0, t = 8;
+        (void)play(&rig, 100, 0, t, t);
+        for (int stall = 0; stall < 20; ++stall, t += 1) {
+            rig.host_step_s = 0.03 + 0.4 * uniform();
+            (void)play(&rig, 100, t, t + 0.1 + 0.7 * uniform(), t);
+            rig.host_step_s = 0;
+            (void)play(&rig, 100, t + 0.8, t + 1, t);
+        }
+        TEST_ASSERT_EQUAL_UINT64(0, rig.fit.host_steps + rig.fit.restarts);
+        TEST_ASSERT_TRUE(play(&rig, 100, t, t + 8, t) < allowed(&rig, 150e-6));
+        t += 8, rig.host_step_s = 0.03 + 0.4 * uniform();
+        int told = 0;
+        for (int k = 0; k < 150; ++k) told += event(&rig, t + 0.01 * (double)k, &error, &sigma) == DRV_CLOCK_HOST_STEP;
+        TEST_ASSERT_EQUAL_INT(1, told);
+    }
+}
+
 static void test_host_clock_is_set(void) {
     for (uint64_t i = 0; i < 1000; ++i) {
         seed(2000 + i);
@@ -277,6 +316,8 @@ int main(void) {
     RUN_TEST(test_what_is_asked_for);
     RUN_TEST(test_milliseconds);
     RUN_TEST(test_sigma_is_honest);
+    RUN_TEST(test_sigma_is_honest_early);
+    RUN_TEST(test_stalls_of_a_sender);
     RUN_TEST(test_host_clock_is_set);
     RUN_TEST(test_device_begins_anew);
     RUN_TEST(test_pauses_over_wraps);

@@ -4,7 +4,10 @@
 
 #include <drv/link.h>
 
+#include <ftw.h>
 #include <stdlib.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <unity.h>
 
 static _Alignas(8) char message[FAKE_MESSAGE_BYTES];
@@ -132,6 +135,88 @@ static void test_news_of_one_interface(void) {
     close(fd);
 }
 
+// A sysfs of our own: interfaces with type and index, and what their device links lead to.
+static char sysfs[] = "/tmp/okid-link-XXXXXX";
+
+static const char* path_of(const char* folder, const char* file) {
+    static char path[256];
+    snprintf(path, sizeof path, "%s/%s/%s", sysfs, folder, file);
+    for (char* slash = path + strlen(sysfs) + 1; (slash = strchr(slash, '/')); *slash++ = '/') {
+        *slash = '\0';
+        (void)mkdir(path, 0700);
+    }
+    return path;
+}
+
+static void write_line(const char* folder, const char* file, const char* text) {
+    FILE* out = fopen(path_of(folder, file), "we");
+    TEST_ASSERT_NOT_NULL(out);
+    fprintf(out, "%s\n", text);
+    fclose(out);
+}
+
+static void add_adapter(const char* port, const char* serial) {
+    char folder[64], driven[160];
+    snprintf(folder, sizeof folder, "devices/pci0/usb1/%s", port);
+    snprintf(driven, sizeof driven, "%s/%s:1.0", folder, port);
+    write_line(folder, "idVendor", "1d50");
+    write_line(driven, "bInterfaceNumber", "00");
+    if (serial) write_line(folder, "serial", serial);
+}
+
+static void add_interface(const char* name, const char* type, const char* index, const char* port) {
+    char folder[64], device[64];
+    snprintf(folder, sizeof folder, "class/net/%s", name);
+    snprintf(device, sizeof device, "../../../devices/pci0/usb1/%s/%s:1.0", port, port);
+    write_line(folder, "type", type);
+    write_line(folder, "ifindex", index);
+    if (port[0]) TEST_ASSERT_EQUAL_INT(0, symlink(device, path_of(folder, "device")));
+}
+
+static int remove_one(const char* path, const struct stat* what, int kind, struct FTW* where) {
+    (void)what, (void)kind, (void)where;
+    return remove(path);
+}
+
+static void test_usb_adapters(void) {
+    TEST_ASSERT_NOT_NULL(mkdtemp(sysfs));
+    add_adapter("1-1", "0042");
+    add_adapter("1-2.4", "twin");
+    add_adapter("1-3", "twin");
+    add_adapter("1-4", NULL);
+    add_interface("can7", "280", "9", "1-1");
+    add_interface("can3", "280", "12", "1-1"); // the second channel: made later, whatever it is called
+    add_interface("can0", "280", "3", "1-2.4");
+    add_interface("shaker", "280", "4", "1-3");
+    add_interface("can1", "280", "5", "1-4");
+    add_interface("vcan0", "280", "1", "");
+    add_interface("eth0", "1", "2", "1-1"); // of a composite device: no CAN
+    char name[16] = "kept";
+    TEST_ASSERT_EQUAL_INT(0, drv_link_find(sysfs, "0042", 0, name));
+    TEST_ASSERT_EQUAL_STRING("can7", name);
+    TEST_ASSERT_EQUAL_INT(0, drv_link_find(sysfs, "0042", 1, name));
+    TEST_ASSERT_EQUAL_STRING("can3", name);
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_find(sysfs, "0042", 2, name));
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_find(sysfs, "0042", -1, name));
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_find(sysfs, "004", 0, name));
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_find(sysfs, "", 0, name));
+    TEST_ASSERT_EQUAL_STRING("can3", name);
+    TEST_ASSERT_EQUAL_INT(-ENOTUNIQ, drv_link_find(sysfs, "twin", 0, name));
+    TEST_ASSERT_EQUAL_INT(0, drv_link_find(sysfs, "1-2.4", 0, name));
+    TEST_ASSERT_EQUAL_STRING("can0", name);
+    TEST_ASSERT_EQUAL_INT(0, drv_link_find(sysfs, "1-4", 0, name));
+    TEST_ASSERT_EQUAL_STRING("can1", name);
+    drv_usb_t usb;
+    TEST_ASSERT_EQUAL_INT(0, drv_link_usb(sysfs, "shaker", &usb));
+    TEST_ASSERT_EQUAL_STRING("1-3", usb.port);
+    TEST_ASSERT_EQUAL_STRING("twin", usb.serial);
+    TEST_ASSERT_EQUAL_INT(0, drv_link_usb(sysfs, "can1", &usb));
+    TEST_ASSERT_EQUAL_STRING("", usb.serial);
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_usb(sysfs, "vcan0", &usb));
+    TEST_ASSERT_EQUAL_INT(-ENODEV, drv_link_find("/nowhere", "0042", 0, name));
+    TEST_ASSERT_EQUAL_INT(0, nftw(sysfs, remove_one, 8, FTW_DEPTH | FTW_PHYS));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_every_field);
@@ -140,5 +225,6 @@ int main(void) {
     RUN_TEST(test_cut_and_damaged_messages);
     RUN_TEST(test_questions_and_answers);
     RUN_TEST(test_news_of_one_interface);
+    RUN_TEST(test_usb_adapters);
     return UNITY_END();
 }

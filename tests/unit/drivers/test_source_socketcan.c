@@ -275,6 +275,45 @@ static void test_unplugged_and_back(void) {
     TEST_ASSERT_EQUAL_UINT64(200, stats().link_down);
 }
 
+/// For a name that is not there an ioctl starts modprobe, and the reader would wait for it while the interface comes back.
+static void test_no_ioctl_asks_for_an_interface_that_is_away(void) {
+    TEST_ASSERT_EQUAL_INT(0, open_source());
+    fake_fail(ENODEV);
+    fake_tell(RTM_DELLINK);
+    fake.index = 0;
+    for (int i = 0; i < 100; ++i) TEST_ASSERT_EQUAL_INT(0, read_some());
+    TEST_ASSERT_EQUAL_INT(0, fake.modprobes);
+    fake.index = 6;
+    fake_tell(RTM_NEWLINK);
+    TEST_ASSERT_EQUAL_INT(0, read_some());
+    TEST_ASSERT_EQUAL_UINT64(1, stats().reopened);
+}
+
+/// The kernel tells that the link is down before it hands out the frames that had come: none is missing in front of them.
+static void test_frames_that_wait_when_the_link_goes(void) {
+    TEST_ASSERT_EQUAL_INT(0, open_source());
+    fake_fail(ENETDOWN);
+    for (uint32_t id = 1; id <= 3; ++id) fake_put(item(id, 0));
+    fake.up = 0;
+    fake_tell(RTM_NEWLINK);
+    TEST_ASSERT_EQUAL_INT(0, read_some());
+    TEST_ASSERT_EQUAL_INT(1, stats().link_is_down);
+    TEST_ASSERT_EQUAL_INT(3, read_some());
+    for (int i = 0; i < 3; ++i) TEST_ASSERT_EQUAL_INT(0, frames[i].loss);
+    TEST_ASSERT_EQUAL_INT(1, stats().link_is_down);
+    TEST_ASSERT_EQUAL_INT(0, read_some());
+    fake.up = 1;
+    fake_tell(RTM_NEWLINK);
+    TEST_ASSERT_EQUAL_INT(0, read_some());
+    TEST_ASSERT_EQUAL_INT(0, stats().link_is_down);
+    fake_put(item(4, 0));
+    fake_put(item(5, 0));
+    TEST_ASSERT_EQUAL_INT(2, read_some());
+    TEST_ASSERT_EQUAL_INT(DRV_LOSS_LINK, frames[0].loss);
+    TEST_ASSERT_EQUAL_INT(0, frames[1].loss);
+    TEST_ASSERT_EQUAL_UINT64(1, stats().link_down);
+}
+
 static void test_back_without_netlink(void) {
     fake.netlink_error = EPERM;
     TEST_ASSERT_EQUAL_INT(0, open_source());
@@ -292,9 +331,10 @@ static void test_back_without_netlink(void) {
 }
 
 static void test_what_the_system_has_no_room_for(void) {
+    fake.netlink_error = EPERM;
     fake.flags_error = EIO;
     TEST_ASSERT_EQUAL_INT(-EIO, open_source());
-    fake.flags_error = 0;
+    fake.netlink_error = fake.flags_error = 0;
     fake.poll_set_error = EMFILE;
     TEST_ASSERT_EQUAL_INT(-EMFILE, open_source());
     TEST_ASSERT_EQUAL_STRING("interface can0: Too many open files", source.error);
@@ -407,6 +447,8 @@ int main(void) {
     RUN_TEST(test_a_broken_socket_is_made_anew);
     RUN_TEST(test_link_down_and_up);
     RUN_TEST(test_unplugged_and_back);
+    RUN_TEST(test_no_ioctl_asks_for_an_interface_that_is_away);
+    RUN_TEST(test_frames_that_wait_when_the_link_goes);
     RUN_TEST(test_back_without_netlink);
     RUN_TEST(test_what_the_system_has_no_room_for);
     RUN_TEST(test_another_device_takes_the_name);
