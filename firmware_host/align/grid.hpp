@@ -74,12 +74,14 @@ struct lane_start {
     std::vector<std::int64_t> before;   ///< frames of each lane that had come
     std::int64_t first_ns = 0, newest_ns = 0, frames = 0;
     std::int64_t close = 0, shared = 0, ends = 0; ///< frames close behind one of the lane, of the bus; bursts
+    std::int64_t begins = 0, finishes = 0;        ///< bursts of the bus whose first, whose last frame was of the lane
     double end_ns = 0;
     std::array<double, 2> spread_ns{}; ///< how late the last frames of bursts were behind their numbers: least and most
     std::array<double, 2> least_ns{};  ///< of each half: by how much the earliest arrival was behind its number
     std::array<std::int64_t, 2> count{};
 
     void add(std::int64_t number, std::int64_t time_ns, std::int64_t middle_ns, double period_ns);
+    double earliest_ns(double period_ns) const;
     double due_ns(double period_ns) const;
     bool bursty() const;
 };
@@ -160,6 +162,18 @@ class grid {
         std::int64_t uncertain = 0; ///< times polls slipped past a sample, or samples are missing: nobody knows
         std::int64_t slips = 0;     ///< by so many places the line is behind the samples for it
         std::int64_t slip_at = never, lost_at = never; ///< places of the newest slip and loss
+        // How late the least late of each eighth of the decision time was, less how far the line has moved since.
+        std::array<double, 64> floors{};
+        std::size_t floor_count = 0;
+        double floor_now = 0, moved = 0;
+        std::int64_t floor_from = 0;
+        // Of a lane of single frames: bursts of two between others on the raster of polls, the places of the newest.
+        double silence = 0, inside = 0; ///< before the burst at hand and before its newest, periods
+        double pairs = 0, singles = 0;  ///< how many of all bursts
+        std::array<std::int64_t, 32> pair_at{};
+        std::size_t pair_count = 0;
+        std::int64_t newest_pair = never, slips_before = 0;
+        bool flickers = false; ///< polls are about to slip, or just have; how many before
         // The newest frames: what lies before all of them does not come any more (a frame may be eight places late).
         std::array<std::int64_t, 9> recent{};
         std::size_t recent_at = 0;
@@ -179,6 +193,7 @@ class grid {
     void hold_until_anchored(lane& l, const drv_frame_t& frame);
     bool placed_by_time() const;
     void gather_starts(std::vector<lane_start>& starts);
+    std::size_t first_of_sample(const std::vector<lane_start>& starts, std::size_t bus) const;
     std::int64_t start_offset(const std::vector<lane_start>& starts, std::size_t l, std::size_t root) const;
     void settle_start(lane& l, const lane_start& start);
     void anchor();
@@ -210,15 +225,26 @@ class grid {
     std::array<double, 4> least_late(const lane& l) const;
     bool in_two_steps(const lane& l) const;
     bool catches_up(const lane& l) const;
+    bool on_the_move(const lane& l) const;
     bool only_late(const lane& l, bool ended) const;
     double usually_late(const lane& l) const;
     void note_lateness(lane& l, std::int64_t index);
     void judge_late(lane& l, bool ended);
     void judge_shift(lane& l, bool alike, std::int64_t times, double waited, bool ended);
     bool shift_stays(const lane& l, double more, std::int64_t times, bool ended) const;
+    std::int64_t floor_periods() const { return hold_ / 8; }
+    bool restless(const lane& l) const;
+    static double step_over_sigma(const std::vector<double>& values, std::size_t behind, double& by);
+    bool floors_apart(const lane& l, double& by, double& sigma) const;
     bool steady(const lane& l, std::size_t begin, std::size_t end, bool ended) const;
     bool told_of_loss(const lane& l, std::size_t last) const;
     bool may_slip(const lane& l) const;
+    bool flickered(const lane& l) const;
+    double silence_before(const lane& l, std::size_t which) const;
+    static bool on_raster(double silence);
+    static bool is_pair(const lane& l);
+    void note_pair(lane& l, double silence_behind);
+    bool pairs_gather(const lane& l, double pairs, double behind) const;
     bool bursts_alike(const lane& l, std::int64_t& times) const;
     double place_std_s(const lane& l) const;
     static void slip(lane& l, std::int64_t by);

@@ -8,6 +8,8 @@
 //          change the order of frames
 #include "grid.hpp"
 
+#include "grid_bounds.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,43 +17,33 @@
 namespace okid_host {
 namespace {
 
-constexpr double least_early = 0.25;       // periods by which arrivals are taken to be early of the line, at least
-constexpr double most_early = 0.5;         // and at most: what is earlier has the wrong place
-constexpr double remembers = 0.999;        // a frame, of how early the earliest was
-constexpr double longest_beat_s = 1;       // a lane that pauses longer has stalled
-constexpr double clock_set_ns = -1e9;      // so early is nothing but a clock that was set
-constexpr double told_periods = 20;        // a frame later than this tells nothing of the line
-constexpr double rate_ppm = 300;           // by which a sensor may miss its nominal rate
-constexpr double same_burst = 0.5;         // periods between two frames that were handed over together
-constexpr double one_beat = 0.7;           // a silence of a period, give or take so much, held no loss
-constexpr double longer_silence = 1.5;     // periods; a silence longer by so much than others is not of the bursts
-constexpr double as_late = 0.3;            // periods
-constexpr double about_one = 1.1;          // periods: less than a loss makes all later frames late by
-constexpr double catching_up = 0.5;        // periods by which the newest frames are earlier than those before
-constexpr double looks_again = 0.125;      // of the decision time
-constexpr double a_silence = 0.125;        // of the decision time
-constexpr double cut_off = 0.055;          // of the decision time: frames at the end of a stream that tell a loss
-constexpr std::int64_t cut_off_bursts = 8; // and at least so many times something was handed over
-constexpr double held_up_s = 0.1;          // a busy computer may be late by so much until the stream ends
-constexpr double ends_alike = 0.75;        // of the bursts have the size of the one before
-constexpr double full_later = 0.5;         // periods by which a full burst is later than usual when a sample is missing
-constexpr double a_sample = 0.65;          // periods by which all are later when a sample is missing, at least
-constexpr double half_a_sample = 0.55;     // periods: later than before by so much, one may be missing
-constexpr double one_step = 0.3;           // periods by which a sample and the step of lateness may differ
-constexpr double alike_late = 0.3;         // periods
-constexpr std::int64_t slip_apart = 2500;  // samples: clocks within 400 ppm slip past each other no more often
+constexpr double least_early = 0.25;     // periods by which arrivals are taken to be early of the line, at least
+constexpr double remembers = 0.999;      // a frame, of how early the earliest was
+constexpr double longest_beat_s = 1;     // a lane that pauses longer has stalled
+constexpr double clock_set_ns = -1e9;    // so early is nothing but a clock that was set
+constexpr double told_periods = 20;      // a frame later than this tells nothing of the line
+constexpr double rate_ppm = 300;         // by which a sensor may miss its nominal rate
+constexpr double same_burst = 0.5;       // periods between two frames that were handed over together
+constexpr double one_beat = 0.7;         // a silence of a period, give or take so much, held no loss
+constexpr double longer_silence = 1.5;   // periods; a silence longer by so much than others is not of the bursts
+constexpr double sure_of_number = 0.2;   // periods, deviation
+constexpr double looks_again = 0.125;    // of the decision time
+constexpr double a_silence = 0.125;      // of the decision time
+constexpr double cut_off = 0.055;        // of the decision time: frames at the end of a stream that tell a loss
+constexpr double held_up_s = 0.1;        // a busy computer may be late by so much until the stream ends
+constexpr double half_a_sample = 0.55;   // periods: later than before by so much, one may be missing
+constexpr double raster = 0.3;           // periods by which polls may miss their raster
+constexpr std::int64_t flicker_ends = 8; // frames: a flicker lasts until the slip
+constexpr double one_poll = 0.2;         // periods between two samples of one poll, at most
+constexpr double go_on = 0.25;           // of the pairs before the shift are as many behind it, at least
+constexpr double early_by_one = 0.35;    // periods by which arrivals that are a period early may differ
+constexpr double no_chance = 9.2;        // once in ten thousand times so by chance
+constexpr double pairs_remembered = 1.0 / 65536; // a burst forgets so much of how often two came together
 constexpr double silent = 0.4;             // of the time a silent lane has: then its last burst is taken for cut off
-constexpr double least_spread = 0.15;      // periods
-constexpr double sure = 13.8;              // once in a million times so by chance
-constexpr double apart = 0.25;             // shares of two scatters that are alike
-constexpr double slack = 0.2;              // periods, between them
-constexpr double newest = 0.5;             // of the decision time
 constexpr double most_known = 256;         // bursts that tell how late they are
 constexpr double longest_decision = 0.75;  // of the time a silent lane has
 constexpr double forgets_spread = 0.998;   // a burst, of how late the last frame of a burst was
 constexpr std::int64_t ahead_frames = 512; // in a row before their time: the line is wrong
-
-constexpr std::array<double, 9> edges{0.2, 0.45, 0.65, 1.65, 2.65, 4.65, 8.65, 16.65, 32.65}; // lateness, periods
 
 std::uint64_t tick_of(std::int64_t index) { return static_cast<std::uint64_t>(index + (std::int64_t{1} << 40)); }
 
@@ -69,7 +61,9 @@ void grid::begin_cadence(lane& l, double due_ns) {
     l.tail = l.last;
     l.ahead = l.in_burst = 0;
     l.usual = {HUGE_VAL, HUGE_VAL};
-    l.usual_from = l.last;
+    l.usual_from = l.floor_from = l.last;
+    l.floor_count = 0;
+    l.floor_now = HUGE_VAL;
     l.patience = static_cast<double>(hold_);
     l.late.reserve(most_held_ + 1);
 }
@@ -195,17 +189,25 @@ void grid::judge_shift(lane& l, bool alike, std::int64_t times, double waited, b
         return;
     }
     const double more = l.least - usually_late(l);
-    const auto lost = static_cast<std::int64_t>(std::floor(more + 1 - a_sample));
-    if (lost <= 0 || (lost == 1 && alike && may_slip(l))) {
+    auto lost = static_cast<std::int64_t>(std::floor(more + 1 - a_sample));
+    double by = 0, by_std = 0;
+    const bool never_calm = restless(l), apart_now = never_calm && floors_apart(l, by, by_std);
+    if (apart_now && lost > 0) lost = std::max<std::int64_t>(1, std::llround(by));
+    const bool flicker = lost == 1 && flickered(l);
+    if (lost <= 0 || flicker || (lost == 1 && alike && may_slip(l))) {
         l.uncertain += lost <= 0 && more > half_a_sample;
         if (lost > 0) slip(l, 1);
+        if (flicker) { // that was one
+            l.slip_at = never;
+            l.pair_count = 0;
+        }
         place_late(l, first);
         return;
     }
     const bool told = told_of_loss(l, l.which);
     const bool few = ended && lost == 1 && times < 4 * cut_off_bursts; // of one sample little is seen
-    const bool stays = !few && shift_stays(l, more, times, ended);
-    if (told || stays || (ended && static_cast<double>(lost) > held_up_s * rate_hz_)) {
+    const bool stays = !few && (!never_calm || apart_now) && !on_the_move(l) && shift_stays(l, more, times, ended);
+    if (told || stays || (ended && !never_calm && static_cast<double>(lost) > held_up_s * rate_hz_)) {
         const std::size_t end = burst_end(l, l.placed);
         const bool cut = end < l.which && lateness(l, l.late[end], end - l.placed) < l.least - as_late;
         if (cut && !told_of_loss(l, end)) {
@@ -216,7 +218,7 @@ void grid::judge_shift(lane& l, bool alike, std::int64_t times, double waited, b
             place_late(l, first);
             return;
         }
-        l.uncertain += alike && !told && (lost == 1 || in_two_steps(l));
+        l.uncertain += (alike && !told && (lost == 1 || in_two_steps(l))) || by_std > sure_of_number;
         place_after_loss(l, lost);
         return;
     }
@@ -230,141 +232,63 @@ void grid::judge_shift(lane& l, bool alike, std::int64_t times, double waited, b
     place_late(l, first);
 }
 
-/// All are later than what came in time before, and that is no chance, for many of so few ever were; and the newest are
-/// steady: how late a busy computer is changes all the time, a sample that is missing does not come back.
-/// @param more   periods by which they are later;  times: how often something was handed over
-bool grid::shift_stays(const lane& l, double more, std::int64_t times, bool ended) const {
-    const double known = l.known + 1;
-    double in_time = 0.5;
-    for (std::size_t k = 0; k < edges.size() && edges[k] <= more; ++k) in_time = l.share[k];
-    const double seen = in_time * l.known, at_least = std::max(0.0, seen - 2 * std::sqrt(seen)); // so many by 2 sigma
-    in_time = std::min(std::max(at_least, 0.5) / known, 1 - 0.5 / known);
-    if (-static_cast<double>(times) * std::log1p(-in_time) < sure) return false;
-    const std::int64_t begin_ns =
-        l.late.back().time_ns - std::llround(newest * static_cast<double>(hold_) * period_ns_);
-    std::int64_t bursts = 0;
-    std::size_t begin = l.late.size();
-    while (begin > l.placed && (l.late[begin - 1].time_ns >= begin_ns || bursts <= cut_off_bursts)) {
-        --begin;
-        bursts += begin == l.placed || !together(l, begin);
+/// Before one that waits, periods.
+double grid::silence_before(const lane& l, std::size_t which) const {
+    const std::int64_t before_ns = which > l.placed ? l.late[which - 1].time_ns : l.time_ns;
+    return static_cast<double>(l.late[which].time_ns - before_ns) / period_ns_;
+}
+
+/// A silence of so many periods is that between one poll and the next, or the one after that.
+bool grid::on_raster(double silence) { return std::abs(silence - 1) < raster || std::abs(silence - 2) < raster; }
+
+/// The burst at hand: two of one poll.
+bool grid::is_pair(const lane& l) { return l.in_burst == 2 && l.inside < one_poll && on_raster(l.silence); }
+
+/// A burst has ended. One sample a poll, and now two of them between polls on their raster: one poll was too early for its
+/// sample. If many such come and the polls have not slipped when they end, that is due to a loss meanwhile.
+void grid::note_pair(lane& l, double silence_behind) {
+    l.singles += 1 - pairs_remembered * l.singles;
+    l.pairs -= pairs_remembered * l.pairs;
+    if (l.flickers && l.last - l.newest_pair > slip_apart) {
+        l.uncertain += l.slips == l.slips_before;
+        l.flickers = false;
     }
-    return steady(l, begin, l.late.size(), ended);
+    if (!is_pair(l) || !on_raster(silence_behind)) return;
+    ++l.pairs;
+    l.newest_pair = l.pair_at[l.pair_count++ % l.pair_at.size()] = l.last;
+    if (l.flickers || 2 * l.frames >= 3 * l.bursts || !pairs_gather(l, 0, 0)) return;
+    l.flickers = true;
+    l.slips_before = l.slips;
 }
 
-/// Is how late these bursts are, each beside the least late that follow it, no more scattered than before?
-bool grid::steady(const lane& l, std::size_t begin, std::size_t end, bool ended) const {
-    std::array<double, edges.size()> below{};
-    double count = 0, least = HUGE_VAL;
-    for (std::size_t i = end; i-- > begin;) {
-        if (i + 1 == l.late.size() || together(l, i + 1)) continue;
-        const double late = lateness(l, l.late[i], i - l.placed);
-        least = std::min(least, late);
-        for (std::size_t k = 0; k < edges.size(); ++k) below[k] += late < least + edges[k] + slack;
-        ++count;
+/// Up to the newest frame placed there are more pairs than by chance.
+/// @param pairs  1 if the burst at hand is one that is not counted yet;  behind: how many a frame there are behind it
+bool grid::pairs_gather(const lane& l, double pairs, double behind) const {
+    const double known = l.pairs + pairs;
+    const std::size_t most = std::min(l.pair_count, l.pair_at.size());
+    std::int64_t since = l.last;
+    for (std::size_t k = 0;; ++k) {
+        const auto frames = static_cast<double>(l.last - since + 1);
+        const double expected = (1 + known - pairs) / (1 + l.singles) * frames;
+        if (expected < pairs && behind * frames <= go_on * pairs &&
+            pairs * std::log(pairs / expected) - pairs + expected > no_chance)
+            return true;
+        if (k >= most) return false;
+        since = l.pair_at[(l.pair_count - 1 - k) % l.pair_at.size()];
+        if (pairs == 0 && l.last - since > flicker_ends) return false;
+        ++pairs;
     }
-    const double few = ended ? 0 : 1 / std::sqrt(count) + 1 / std::sqrt(l.known + 1), most_apart = std::max(apart, few);
-    for (std::size_t k = 0; k < edges.size(); ++k)
-        if (count > 0 && l.share[k] - below[k] / count > most_apart) return false;
-    return true;
 }
 
-/// The oldest that wait are late by about a sample, and soon everything is later still: they were late, and what is missing
-/// is missing behind them.
-bool grid::only_late(const lane& l, bool ended) const {
-    const std::int64_t begin_ns = l.late[l.placed].heard_ns, end_ns = l.late.back().heard_ns;
-    const bool soon = ended || l.late[l.which].heard_ns < begin_ns + (end_ns - begin_ns) / 2;
-    return soon && l.least < std::min(l.spread + least_spread, about_one);
-}
-
-/// How late those that wait are at least, in each quarter of their time.
-std::array<double, 4> grid::least_late(const lane& l) const {
-    const std::int64_t begin_ns = l.late[l.placed].heard_ns, span_ns = l.late.back().heard_ns - begin_ns;
-    std::array<double, 4> least{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL}; // of each quarter
-    for (std::size_t i = l.placed; i < l.late.size(); ++i) {
-        const std::int64_t heard_ns = l.late[i].heard_ns - begin_ns;
-        double& its =
-            least[span_ns > 0 ? static_cast<std::size_t>(std::min<std::int64_t>(3, 4 * heard_ns / span_ns)) : 3];
-        its = std::min(its, lateness(l, l.late[i], i - l.placed));
-    }
-    return least;
-}
-
-/// One sample less late than at first: polls slipped past one among those that wait, and of the loss one may be hidden.
-bool grid::in_two_steps(const lane& l) const {
-    const std::array<double, 4> least = least_late(l);
-    double most = l.least;
-    for (const double quarter : least) most = quarter < HUGE_VAL ? std::max(most, quarter) : most;
-    return std::abs(most - l.least - 1) < one_step;
-}
-
-/// The last quarter is less late than all before it, or the quarters are less and less late behind a stall: whoever was held
-/// up is making up for it.
-bool grid::catches_up(const lane& l) const {
-    const std::array<double, 4> least = least_late(l);
-    const bool less_and_less = least[3] < least[2] - catching_up && least[2] < least[1] - catching_up;
-    return less_and_less || least[3] < std::min({least[0], least[1], least[2]}) - catching_up;
-}
-
-/// How late the least late of a decision time was, of late: a clock that runs otherwise than the line makes all of them late
-/// little by little, a loss by a sample at once.
-double grid::usually_late(const lane& l) const {
-    const bool half = l.last - l.usual_from >= hold_ / 2 && l.usual[1] < HUGE_VAL;
-    if (l.usual[0] < HUGE_VAL) return half ? std::max(l.usual[0], l.usual[1]) : l.usual[0];
-    return half ? l.usual[1] : 0;
-}
-
-/// The last frame of a burst was late by l.tail_late. All are later by a sample than in the decision time before, and that is
-/// still on time: polls have slipped past a sample, or one is missing.
-void grid::note_lateness(lane& l, std::int64_t index) {
-    if (index - l.usual_from >= hold_) {
-        l.uncertain += l.usual[1] < HUGE_VAL && l.usual[1] - l.usual[0] > a_sample;
-        l.usual = {l.usual[1], HUGE_VAL};
-        l.usual_from = index;
-    }
-    if (l.tail_late > -most_early) l.usual[1] = std::min(l.usual[1], l.tail_late);
-}
-
-/// Did those that wait come in bursts that all end alike? Packets of so many samples are no polls: their first one after a
-/// loss is full, and later by what is missing.
-/// @param times  out: how often something was handed over
-bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
-    std::size_t begin = l.placed, before = 0, first = 0;
-    std::int64_t same = 0, ends = 0, several = 0;
-    times = 1;
-    for (std::size_t i = l.placed + 1; i < l.late.size(); ++i) {
-        if (together(l, i)) continue;
-        same += before > 1 && i - begin == before;
-        ends += lateness(l, l.late[i - 1], i - 1 - l.placed) < l.least + alike_late;
-        before = i - begin;
-        several += before > 1;
-        if (times == 1) first = before;
-        begin = i;
-        ++times;
-    }
-    const auto most = static_cast<std::int64_t>(ends_alike * static_cast<double>(times - 2));
-    if (times < cut_off_bursts || several <= most || std::max(same, ends) <= most) return false;
-    const double bursts = static_cast<double>(times - 1), usual = static_cast<double>(begin - l.placed) / bursts;
-    const auto first_ns = static_cast<double>(l.late[l.placed].time_ns);
-    const double usual_ns = (static_cast<double>(l.late[begin].time_ns) - first_ns) / bursts;
-    const double later = (first_ns - static_cast<double>(l.time_ns) - usual_ns) / period_ns_ - 1;
-    return l.spread > as_late || std::abs(static_cast<double>(first) - usual) > full_later ||
-           std::abs(later) > full_later;
-}
-
-/// The bus told of a loss no later than before this frame.
-bool grid::told_of_loss(const lane& l, std::size_t last) const {
-    return std::any_of(l.late.begin() + static_cast<std::ptrdiff_t>(l.placed),
-                       l.late.begin() + static_cast<std::ptrdiff_t>(last) + 1,
-                       [](const late_frame& each) { return each.loss != 0; });
-}
-
-/// Bursts that all end alike came a period later: polls have slipped past a sample by drift, or one sample is missing.
-/// Nothing that arrives differs. The first comes by itself again and again, but not again soon, and the second hardly ever,
-/// unless the bus tells of it or the lane loses frames.
-bool grid::may_slip(const lane& l) const {
-    if (told_of_loss(l, l.which)) return false;
-    const std::int64_t silence = (l.late[l.placed].time_ns - l.time_ns) / std::llround(period_ns_);
-    return l.last + silence - std::max(l.slip_at, l.lost_at) > slip_apart;
+/// A sensor whose samples come ever later against the polls of an adapter is missed by a poll now and then, and ever more
+/// often, before every poll misses it: until then pairs of samples come, many more than usual. Before a loss there are none,
+/// and behind a loss they go on.
+bool grid::flickered(const lane& l) const {
+    if (2 * l.frames >= 3 * l.bursts || told_of_loss(l, l.which)) return false;
+    double behind = 0;
+    for (std::size_t i = l.placed + 2; i + 1 < l.late.size(); ++i)
+        behind += together(l, i) && !together(l, i - 1) && !together(l, i + 1) && on_raster(silence_before(l, i - 1));
+    return pairs_gather(l, is_pair(l), behind / static_cast<double>(l.late.size() - l.placed));
 }
 
 /// The line stays, the samples on it are others.
@@ -381,10 +305,7 @@ void grid::slip(lane& l, std::int64_t by) {
 /// the oldest that waits; else before that one, and how much later they may be missing goes along.
 void grid::place_after_loss(lane& l, std::int64_t lost) {
     const std::size_t first = l.placed;
-    const auto silence = [&](std::size_t i) {
-        const std::int64_t before = i > first ? l.late[i - 1].time_ns : l.time_ns;
-        return static_cast<double>(l.late[i].time_ns - before) / period_ns_;
-    };
+    const auto silence = [&](std::size_t i) { return silence_before(l, i); };
     std::size_t last = first, place = first;
     while (last < l.which && lateness(l, l.late[last], last - first) >= l.least + as_late) ++last;
     for (std::size_t i = first + 1; i <= last; ++i)
@@ -447,13 +368,26 @@ double grid::place_std_s(const lane& l) const {
 /// Only the last frame of a burst tells the line. An arrival is never early: where arrivals are quantised (USB polls) their
 /// least delay goes slowly to and fro, and the earliest of late tell where it is now, and how far it goes.
 void grid::follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, double late_ns) {
-    if (static_cast<double>(frame.time_ns - l.tail_ns) > same_burst * period_ns_) end_burst(l, index);
+    const double silence = static_cast<double>(frame.time_ns - l.tail_ns) / period_ns_;
+    if (silence > same_burst) {
+        note_pair(l, silence);
+        end_burst(l, index);
+        l.silence = silence;
+    }
+    l.inside = silence;
     ++l.in_burst;
     l.tail_late = late_ns / period_ns_;
     const bool tells = late_ns < told_periods * period_ns_ && late_ns > -most_early * period_ns_;
     l.tail = tells || l.clock.points == 0 ? index : index + 1; // one that is too late or too early is no tail
     l.tail_ns = frame.time_ns;
     std::int64_t expected = 0;
+    if (l.ahead >= flicker_ends && 2 * l.frames < 3 * l.bursts && std::abs(l.tail_late + 1) < early_by_one) {
+        slip(l, -1); // polls that are ever later against the samples have got one earlier
+        l.ahead = 0;
+        l.tail_late += 1;
+        l.pair_count = 0;
+        l.tail = index;
+    }
     if (l.ahead > ahead_frames) {
         l.slip_at = never; // back again
         begin_cadence(l, static_cast<double>(frame.time_ns));
@@ -464,8 +398,11 @@ void grid::follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, do
         const double early = static_cast<double>(expected - frame.time_ns) / period_ns_;
         if (early <= most_early) l.early = std::max(remembers * l.early, early);
         const double line_ns = static_cast<double>(expected) - l.early * period_ns_;
-        for (double& least : l.usual) least += (l.phase_ns - line_ns) / period_ns_;
-        l.tail_late += (l.phase_ns - line_ns) / period_ns_;
+        const double moved = (l.phase_ns - line_ns) / period_ns_;
+        for (double& least : l.usual) least += moved;
+        l.moved += moved;
+        l.floor_now += moved;
+        l.tail_late += moved;
         l.phase_ns = line_ns;
         l.on_time = 0.5 + std::clamp(l.early, least_early, most_early);
     } else if (late_ns < 0) {

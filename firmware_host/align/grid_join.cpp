@@ -3,7 +3,8 @@
 // METHOD   lanes whose counters stand close together count the same samples. Every other lane is placed by the time its
 //          first frame was due: frames are gathered for half a second, and the earliest arrivals among them give the line
 //          (a single stamp may be late by a whole burst). Lanes of one bus whose frames are handed over several at a time
-//          stay together by arrival count, unless their lines are more than a sample apart
+//          stay together by arrival count, unless their lines are more than a sample apart, or bursts end with frames of
+//          both, so that both lines are known
 #include "grid.hpp"
 
 #include "wrapped_step.hpp"
@@ -18,7 +19,7 @@ namespace {
 constexpr double gather_s = 0.5;      // frames of so long tell where a lane stands
 constexpr double gather_periods = 8;  // and of at least so many periods
 constexpr double agree = 0.3;         // periods: the two halves of the gathered frames tell the same line
-constexpr double together = 0.25;     // periods: frames so close were handed over together
+constexpr double close_by = 0.25;     // periods: frames so close were handed over together
 constexpr double bursty_share = 0.1;  // of a lane's frames: from then on its stamps are those of bursts
 constexpr double burst_offset = 1.25; // periods by which the lines of two bursty lanes may differ and count as one
 constexpr double looks_late =
@@ -36,7 +37,7 @@ std::int64_t kinship(unsigned bits) { return bits >= 9 ? 64 : std::max<std::int6
 void lane_start::add(std::int64_t number, std::int64_t time_ns, std::int64_t middle_ns, double period_ns) {
     if (frames == 0) first_ns = newest_ns = time_ns;
     const double late_ns = static_cast<double>(time_ns - first_ns) - static_cast<double>(number) * period_ns;
-    if (frames > 0 && static_cast<double>(time_ns - newest_ns) >= together * period_ns) {
+    if (frames > 0 && static_cast<double>(time_ns - newest_ns) >= close_by * period_ns) {
         // The frame before this one was the last of its burst.
         spread_ns[0] = ends == 0 ? end_ns : std::min(spread_ns[0], end_ns);
         spread_ns[1] = ends == 0 ? end_ns : std::max(spread_ns[1], std::min(end_ns, spread_ns[0] + period_ns));
@@ -45,16 +46,21 @@ void lane_start::add(std::int64_t number, std::int64_t time_ns, std::int64_t mid
     end_ns = late_ns;
     const std::size_t half = time_ns > middle_ns;
     least_ns[half] = count[half]++ == 0 ? late_ns : std::min(least_ns[half], late_ns);
-    close += frames > 0 && static_cast<double>(time_ns - newest_ns) < together * period_ns;
+    close += frames > 0 && static_cast<double>(time_ns - newest_ns) < close_by * period_ns;
     newest_ns = time_ns;
     ++frames;
 }
 
-/// When the lane's first frame was due by the earliest arrivals.
-double lane_start::due_ns(double period_ns) const {
+/// The line of the earliest arrivals at the lane's first frame.
+double lane_start::earliest_ns(double period_ns) const {
     const double first = count[0] ? least_ns[0] : least_ns[1], second = count[1] ? least_ns[1] : least_ns[0];
     const bool both = count[0] >= half_least && count[1] >= half_least && std::abs(first - second) < agree * period_ns;
-    double due = static_cast<double>(first_ns) + (both ? (first + second) / 2 : std::min(first, second));
+    return static_cast<double>(first_ns) + (both ? (first + second) / 2 : std::min(first, second));
+}
+
+/// When the lane's first frame was due by the earliest arrivals.
+double lane_start::due_ns(double period_ns) const {
+    double due = earliest_ns(period_ns);
     // Who looks now and then is late by up to a period at every look: by half of it on the mean where all looks tell alike.
     if (ends > 0 && static_cast<double>(close) > bursty_share * static_cast<double>(frames))
         due -= looks_late * std::max(0.0, period_ns - (spread_ns[1] - spread_ns[0]));
@@ -116,6 +122,7 @@ const grid::lane* grid::kin_of(const lane& l, std::uint64_t counter, std::int64_
 void grid::gather_starts(std::vector<lane_start>& starts) {
     std::vector<std::int64_t> numbers(lanes_.size(), 0), arrived(lanes_.size(), 0);
     std::vector<std::int64_t> bus_ns(buses_.size(), std::numeric_limits<std::int64_t>::min() / 2);
+    std::vector<lane_start*> newest_of(buses_.size(), nullptr);
     const std::int64_t middle_ns = all_heard_ns_ + std::llround(gather_ns() / 2);
     for (const auto& [which, frame] : held_) {
         const auto w = static_cast<std::size_t>(which);
@@ -141,9 +148,29 @@ void grid::gather_starts(std::vector<lane_start>& starts) {
         l.counter = counter;
         ++arrived[w];
         its.shared += frame.time_ns - bus_ns[l.bus] < one_read;
+        if (newest_of[l.bus] && static_cast<double>(frame.time_ns - bus_ns[l.bus]) >= close_by * period_ns_) {
+            ++newest_of[l.bus]->finishes;
+            ++its.begins;
+        }
+        newest_of[l.bus] = &its;
         bus_ns[l.bus] = frame.time_ns;
         its.add(numbers[w], frame.time_ns, middle_ns, period_ns_);
     }
+}
+
+/// Which lane of a bus has the first frame of a sample, by the order of arrival: the one heard first. But a stream may begin
+/// in the midst of a sample: if bursts begin with another one, whose identifier is lower too, it is that.
+std::size_t grid::first_of_sample(const std::vector<lane_start>& starts, std::size_t bus) const {
+    std::size_t heard = lanes_.size(), begins = lanes_.size();
+    std::int64_t bursts = 0;
+    for (std::size_t i = 0; i < lanes_.size(); ++i) {
+        if (!starts[i].frame || lanes_[i].sequence || lanes_[i].bus != bus) continue;
+        if (heard == lanes_.size() || starts[i].frame < starts[heard].frame) heard = i;
+        if (begins == lanes_.size() || starts[i].begins > starts[begins].begins) begins = i;
+        bursts += starts[i].begins;
+    }
+    const bool nearly_all = bursts >= half_least && 3 * starts[begins].begins > 2 * bursts;
+    return nearly_all && starts[begins].frame->id < starts[heard].frame->id ? begins : heard;
 }
 
 /// By how many samples the first frame of lane `l` stands behind that of `root`, whose counters do not tell.
@@ -152,9 +179,17 @@ std::int64_t grid::start_offset(const std::vector<lane_start>& starts, std::size
     const double apart = (own.due_ns(period_ns_) - other.due_ns(period_ns_)) / period_ns_;
     if (!lanes_[l].sequence && !lanes_[root].sequence && lanes_[l].bus == lanes_[root].bus &&
         (own.bursty() || other.bursty())) {
-        const auto by_count = static_cast<double>(
-            own.before[root] > 0 ? own.before[root] - 1 : 1 - std::max<std::int64_t>(1, other.before[l]));
-        if (std::abs(apart - by_count) <= burst_offset) return std::llround(by_count);
+        const std::size_t first = first_of_sample(starts, lanes_[l].bus);
+        const auto sample = [&](std::size_t of) {
+            const std::int64_t before = of == first ? 1 : starts[of].before[first];
+            return before > 0 ? before - 1 : -starts[first].before[of];
+        };
+        const std::int64_t by_count = sample(l) - sample(root);
+        if (std::min(own.finishes, other.finishes) >= 2 * half_least) { // the last of a burst tells its line
+            const double exact = (own.earliest_ns(period_ns_) - other.earliest_ns(period_ns_)) / period_ns_;
+            if (std::abs(exact - std::round(exact)) < agree) return std::llround(exact);
+        }
+        if (std::abs(apart - static_cast<double>(by_count)) <= burst_offset) return by_count;
     }
     return std::llround(apart);
 }

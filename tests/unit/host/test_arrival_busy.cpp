@@ -101,6 +101,79 @@ static void test_busy_for_a_while() {
     TEST_ASSERT_TRUE(static_cast<double>(found) >= 0.99 * runs);
 }
 
+/// A sender that gets the processor for one sample every 2 to 8 ms for 0.5 to 3 s: later and later, until it makes up for it, as
+/// fast as it can or at 1.3 to 5 times the rate. Nothing is missing.
+static void test_falls_behind() {
+    std::int64_t wrong = 0, marked = 0;
+    const unsigned runs = std::max(150U, seeds());
+    for (unsigned seed = 1; seed <= runs; ++seed) {
+        std::mt19937 random(seed);
+        const double rate_hz = std::array<double, 3>{500, 1000, 2000}[random() % 3];
+        const double from_s = pick(random, 1, 4), to_s = from_s + pick(random, 0.5, 3);
+        const double faster = random() % 2 ? pick(random, 1.3, 5) : 50;
+        double here_s = 0;
+        const law sender = [&](double t) {
+            const bool starved = here_s > from_s && here_s < to_s;
+            const double slice_s = starved ? pick(random, 2e-3, 8e-3) : 1 / (faster * rate_hz);
+            return here_s = std::max(t, here_s + slice_s) + 1e-5 * pick(random, 0, 1);
+        };
+        rows out(1);
+        play(rate_hz, 0, static_cast<int>(20 * rate_hz), sender, {}, out);
+        wrong += out.marked > 0;
+        marked += out.marked;
+    }
+    std::printf("falls behind: %lld of %u with a false gap, %lld samples\n", static_cast<long long>(wrong), runs,
+                static_cast<long long>(marked));
+    TEST_ASSERT_TRUE(static_cast<double>(wrong) <= 0.01 * runs);
+}
+
+/// A computer that is late by 5 to 20 ms at every burst, from the first to the last, by what is uniform, exponential, or wanders
+/// (late bursts follow late ones): that is no loss. One of a sample, a burst or 40 samples is found, or counted as uncertain.
+static void test_always_late() {
+    std::int64_t wrong = 0, made = 0, found = 0, told = 0;
+    const unsigned runs = std::max(120U, seeds()); // a rate is judged
+    for (unsigned seed = 1; seed <= runs; ++seed) {
+        std::mt19937 random(seed);
+        const double rate_hz = random() % 2 ? 1000 : 2000;
+        const int burst = std::array<int, 3>{1, 8, 16}[random() % 3], samples = static_cast<int>(10 * rate_hz);
+        std::exponential_distribution<double> behind_s(250);
+        std::normal_distribution<double> one(0, 1);
+        double here_s = 0, wander = 0;
+        std::vector<double> arrivals;
+        for (int n = 0; n < samples; ++n) {
+            if (n % burst == 0) {
+                wander = 0.9 * wander + 0.436 * one(random);
+                const double late_s = seed % 3 == 0   ? pick(random, 0, 0.015)
+                                      : seed % 3 == 1 ? std::min(0.015, behind_s(random))
+                                                      : 0.0075 * (1 + std::tanh(wander));
+                here_s = std::max(here_s, (n + burst) / rate_hz + 0.005 + late_s);
+            }
+            arrivals.push_back(here_s);
+        }
+        const law again = [&](double t) { return arrivals[static_cast<std::size_t>(std::lround(t * rate_hz))]; };
+        rows out(1);
+        play(rate_hz, 0, samples, again, {}, out);
+        wrong += out.marked > 0;
+        for (const int length : {1, burst, 40}) {
+            const int at = static_cast<int>(pick(random, 1.5, 8.5) * rate_hz);
+            std::set<int> lost;
+            for (int i = 0; i < length; ++i) lost.insert(at + i);
+            rows lacking(1);
+            play(rate_hz, 0, samples, again, lost, lacking);
+            const bool exact = lacking.marked > 0 && std::abs(lacking.marked - length) <= 1;
+            ++made;
+            found += exact;
+            told += exact || lacking.uncertain > 0;
+        }
+    }
+    std::printf("always late: %lld of %u with a false gap; %lld of %lld losses found, give or take one, %lld found or "
+                "uncertain\n",
+                static_cast<long long>(wrong), runs, static_cast<long long>(found), static_cast<long long>(made),
+                static_cast<long long>(told));
+    TEST_ASSERT_TRUE(wrong <= runs / 500); // none of 120
+    TEST_ASSERT_TRUE(static_cast<double>(told) >= 0.99 * static_cast<double>(made));
+}
+
 /// Lines that fail their check sum, anywhere in bursts and across their borders: as the bus tells of them with the next line
 /// that is whole, their places are known to the sample.
 static void test_damage_across_bursts() {
@@ -136,6 +209,8 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_busy_until_the_end);
     RUN_TEST(test_busy_for_a_while);
+    RUN_TEST(test_falls_behind);
+    RUN_TEST(test_always_late);
     RUN_TEST(test_damage_across_bursts);
     return UNITY_END();
 }

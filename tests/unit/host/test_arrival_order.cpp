@@ -50,6 +50,38 @@ static void test_frames_of_one_read_stay_together() {
         }
 }
 
+/// So many frames a read, and the stream begins behind the first, second, … of them, in the midst of a sample: reads that end
+/// with the last channel of a sample, or with each of them, tell where samples begin.
+static void test_a_stream_that_begins_anywhere() {
+    for (const int channels : {2, 3})
+        for (const int samples : {1, 2, 8})
+            for (const int more : {0, 1}) // a frame more: then reads end anywhere
+                for (int begin = 0; begin < 2 * channels; ++begin) {
+                    const live_config config =
+                        make_config(1000, std::vector<std::size_t>(static_cast<std::size_t>(channels), 0));
+                    rows out(static_cast<std::size_t>(channels));
+                    grid on(config, out);
+                    std::vector<drv_frame_t> batch;
+                    for (int k = 0; k < 3000 * channels; ++k) {
+                        const int n = k / channels, c = k % channels;
+                        batch.push_back(make_frame(static_cast<std::size_t>(c), 0, n, n * 1e-3 + c * 0.05e-3));
+                        if (static_cast<int>(batch.size()) < samples * channels + more) continue;
+                        for (drv_frame_t& frame : batch) {
+                            frame.time_ns = batch.back().time_ns + 20000;
+                            if (k >= samples * channels + more || &frame - batch.data() >= begin) on.push(frame);
+                        }
+                        batch.clear();
+                    }
+                    on.finish();
+                    char text[80];
+                    std::snprintf(text, sizeof text, "%d channels, %d samples and %d a read, from frame %d", channels,
+                                  samples, more, begin);
+                    TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.unlike, text);
+                    TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.torn, text);
+                    TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.marked, text);
+                }
+}
+
 /// A hammer at rest sends the same number for ever.
 static void test_equal_values_are_samples() {
     const live_config config = make_config(1000, {0, 0});
@@ -271,6 +303,7 @@ static void test_losses_among_stalls() {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_frames_of_one_read_stay_together);
+    RUN_TEST(test_a_stream_that_begins_anywhere);
     RUN_TEST(test_equal_values_are_samples);
     RUN_TEST(test_bursts_beside_a_punctual_bus);
     RUN_TEST(test_stalls_make_no_gap);
