@@ -5,7 +5,8 @@
 // REFERENCE  docs/numerics.md section 2, "B,D,z0 by output error"
 // NUMERICS   needs independent eigenvectors; unstable eigenvalues grow until the numbers end (the caller looks). run() divides
 //            by 1 - |w|^2: not below 1e-6
-// WORKSPACE  base^2 + (64 + n_y) base numbers; base^2 flop a sample, run() 2 base (n_u + n_y), base = n_z n_u + n_z + n_u
+// WORKSPACE  base^2 + (64 + n_y) base numbers and what okid_filters_t takes; base = n_z n_u + n_z + n_u. base^2 flop a sample,
+//            run() (2.5 n_z + 9 n_u + n_z n_u / 2) (n_u + n_y)
 #include "identify/modal_filters.hpp"
 
 #include "mechanics/recursion.h"
@@ -20,7 +21,7 @@ using std::size_t;
 
 namespace {
 
-constexpr int batch = 64, stretch = 256; // samples of sample(), of run()
+constexpr int batch = 64, stretch = OKID_FILTERS_STRETCH, block = OKID_FILTERS_BLOCK; // samples of sample(), of run()
 constexpr double died_out = 1e-14, least_decay = 1e-6, denormal = 1e-200;
 
 /// In eight sums, so that none waits for the other.
@@ -58,11 +59,14 @@ modal_filters::modal_filters(int inputs, int outputs, int states, arena& memory)
     state_ = memory.take<double>(area(base, 1));
     signals_ = memory.take<double>(area(base, batch));
     outputs_ = memory.take<double>(area(n_y, batch));
-    const int most = static_cast<int>(okid_recursion_padded(area(n_z, n_u + 1)));
-    w_ = memory.take<double>(area(2, most));
-    drive_ = memory.take<double>(area(most, n_u));
-    z_ = memory.take<double>(area(2, most));
-    with_v_ = memory.take<double>(area(n_u + 2 * most, n_u + n_y));
+    const int most = static_cast<int>(okid_filters_padded(area(n_z, 1))), m = n_u + n_y;
+    const int wide = static_cast<int>(okid_filters_padded(area(m, 1)));
+    powers_ = memory.take<double>(area(2 * most, block + 1));
+    filter_states_ = memory.take<double>(area(2 * most, n_u + 1));
+    filter_sums_ = memory.take<double>(area(2 * wide, n_z * (n_u + 1)));
+    filter_lags_ = memory.take<double>(area(wide, n_u * block));
+    filter_work_ = memory.take<double>(okid_filters_work(area(n_u, 1), area(n_z, 1)));
+    with_v_ = memory.take<double>(area(n_u + 2 * n_z * (n_u + 1), m));
 }
 
 bool modal_filters::decompose(const okid_real_t* A, const okid_real_t* C) {
@@ -154,23 +158,45 @@ bool modal_filters::settles() const {
     return true;
 }
 
-/// w, z and drive of every lane: group c of input c, the last one free.
-void modal_filters::place_lanes() {
+/// Powers of w, the states at the beginning, no sums.
+void modal_filters::place_powers() {
     blocks_ = 0;
     for (int k = 0; k < n_z; k += size(k)) ++blocks_;
-    lanes_ = static_cast<int>(okid_recursion_padded(area(blocks_, n_u + 1)));
-    for (double* both : {w_, z_}) std::fill(both, both + 2 * lanes_, 0.0);
-    std::fill(drive_, drive_ + at(0, n_u, lanes_), 0.0);
-    std::fill(with_v_, with_v_ + at(0, n_u + n_y, n_u + 2 * lanes_), 0.0);
-    for (int c = 0, lane = 0; c <= n_u; ++c)
-        for (int k = 0; k < n_z; k += size(k), ++lane) {
-            w_[lane] = re_[k];
-            w_[lanes_ + lane] = im_[k];
-            if (c < n_u)
-                drive_[at(lane, c, lanes_)] = 1;
-            else
-                z_[lane] = 1;
+    lanes_ = blocks_ * (n_u + 1);
+    padded_ = static_cast<int>(okid_filters_padded(area(blocks_, 1)));
+    const int m = static_cast<int>(okid_filters_padded(area(n_u + n_y, 1))), step = 2 * padded_;
+    std::fill(powers_, powers_ + at(0, block + 1, step), 0.0);
+    std::fill(filter_states_, filter_states_ + at(0, n_u + 1, step), 0.0);
+    std::fill(filter_sums_, filter_sums_ + at(0, 2 * lanes_, m), 0.0);
+    std::fill(filter_lags_, filter_lags_ + at(0, n_u * block, m), 0.0);
+    for (int k = 0, mode = 0; k < n_z; k += size(k), ++mode) {
+        filter_states_[at(mode, n_u, step)] = 1;
+        std::complex<double> power = 1;
+        for (int j = 0; j <= block; ++j, power = times(power, {re_[k], im_[k]})) {
+            double* to = powers_ + okid_filters_power(area(mode, 1), area(j, 1));
+            to[0] = power.real();
+            to[4] = power.imag();
         }
+    }
+}
+
+/// Signals times rows, out of the sums over blocks and within them.
+void modal_filters::sum_lanes() {
+    const int m = n_u + n_y, wide = n_u + 2 * lanes_;
+    const int padded = static_cast<int>(okid_filters_padded(area(m, 1)));
+    for (int c = 0; c < m; ++c) {
+        double* column = with_v_ + at(0, c, wide);
+        for (int i = 0; i < n_u; ++i) column[i] = filter_lags_[at(c, i * block, padded)];
+        for (int lane = 0; lane < lanes_; ++lane)
+            for (int part = 0; part < 2; ++part) {
+                double sum = filter_sums_[at(c, 2 * lane + part, padded)];
+                const int group = lane / blocks_;
+                const double* power = powers_ + okid_filters_power(area(lane % blocks_, 1), 0) + 4 * part;
+                for (int d = 1; group < n_u && d < block; ++d, power += 8)
+                    sum += *power * filter_lags_[at(c, group * block + d, padded)];
+                column[n_u + part * lanes_ + lane] = sum;
+            }
+    }
 }
 
 /// Sums of the state of lane s with that of lane t.
@@ -181,7 +207,14 @@ void modal_filters::two_states(int s, int t) {
         for (int b = lane % blocks_; b > 0; --b) k += size(k);
         return n_u + lane / blocks_ * n_z + k;
     };
-    const auto of = [&](const double* both, int lane) { return complex(both[lane], both[lanes_ + lane]); };
+    const auto z_of = [&](int lane) {
+        const double* its = filter_states_ + at(lane % blocks_, lane / blocks_, 2 * padded_);
+        return complex(its[0], its[padded_]);
+    };
+    const auto w_of = [&](int lane) {
+        const double* its = powers_ + okid_filters_power(area(lane % blocks_, 1), 1);
+        return complex(its[0], its[4]);
+    };
     const auto with_input = [&](int lane, int group) {
         if (group == n_u) return complex(0);
         const double* column = with_v_ + at(n_u, group, n_u + 2 * lanes_);
@@ -190,10 +223,10 @@ void modal_filters::two_states(int s, int t) {
     const int a = s / blocks_, b = t / blocks_;
     const double first = a == n_u && b == n_u, inputs = a < n_u && b < n_u ? with_v_[at(a, b, n_u + 2 * lanes_)] : 0;
     const auto solve = [&](complex w, complex q, complex z) { // of the second state or of its conjugate
-        const complex v = of(w_, s);
-        return over(times(v, with_input(s, b)) + times(w, q) + inputs + first - times(of(z_, s), z), 1.0 - times(v, w));
+        const complex v = w_of(s);
+        return over(times(v, with_input(s, b)) + times(w, q) + inputs + first - times(z_of(s), z), 1.0 - times(v, w));
     };
-    const complex w = of(w_, t), q = with_input(t, a), z = of(z_, t);
+    const complex w = w_of(t), q = with_input(t, a), z = z_of(t);
     const complex h1 = solve(std::conj(w), std::conj(q), std::conj(z)), h2 = solve(w, q, z);
     const int i = signal(s), j = signal(t);
     const bool p = im_[(i - n_u) % n_z] > 0, r = im_[(j - n_u) % n_z] > 0;
@@ -206,23 +239,25 @@ void modal_filters::two_states(int s, int t) {
 bool modal_filters::run(const double* v, int count) {
     const int m = n_u + n_y;
     if (n_u == 0 && !all_finite(v, area(count, m))) return false;
-    place_lanes();
-    const int wide = n_u + 2 * lanes_, driven = blocks_ * n_u;
-    okid_filters_t filters{area(n_u, 1), area(m, 1), area(lanes_, 1), 0, w_, w_ + lanes_, drive_, z_, with_v_};
+    place_powers();
+    const int wide = n_u + 2 * lanes_;
+    okid_filters_t filters{area(n_u, 1),   area(m, 1),   area(blocks_, 1), area(blocks_, 1), powers_,
+                           filter_states_, filter_sums_, filter_lags_,     filter_work_};
     const auto step = okid_recursion_pick().filters;
     for (int n = 0; n < count; n += stretch, v += at(0, stretch, m)) {
-        const int some = std::min(stretch, count - n);
-        int last = driven; // w^t that has died out needs no product any more
-        for (int k = driven; k < lanes_; ++k)
-            if (std::hypot(z_[k], z_[lanes_ + k]) < died_out)
-                z_[k] = z_[lanes_ + k] = 0;
+        double* z = filter_states_ + at(0, n_u, 2 * padded_);
+        int last = 0; // w^t that has died out needs no product any more
+        for (int k = 0; k < blocks_; ++k)
+            if (std::hypot(z[k], z[padded_ + k]) < died_out)
+                z[k] = z[padded_ + k] = 0;
             else
                 last = k + 1;
-        filters.active = okid_recursion_padded(area(last, 1));
-        step(&filters, v, area(some, 1));
-        for (int k = 0; k < 2 * lanes_; ++k)
-            if (std::abs(z_[k]) < denormal) z_[k] = 0;
+        filters.lasting = area(last, 1);
+        step(&filters, v, area(std::min(stretch, count - n), 1));
+        for (int k = 0; k < 2 * padded_ * (n_u + 1); ++k)
+            if (std::abs(filter_states_[k]) < denormal) filter_states_[k] = 0;
     }
+    sum_lanes();
     for (int c = 0; c < m; ++c) // what is no number stays none in the sums with the first input
         if (!std::isfinite(with_v_[at(0, c, wide)])) return false;
     const auto copy = [&](int from, int to) {

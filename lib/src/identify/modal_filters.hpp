@@ -42,16 +42,18 @@ struct modal_filters {
     bool sort_modes();
     void advance(double* x) const;
     void flush();
-    void place_lanes();
+    void place_powers();
+    void sum_lanes();
     void two_states(int s, int t);
 
     okid_real_t *a_, *vectors_, *re_, *im_, *eigen_;
     double *shapes_, *shared_;            // C V, (C V)^T C V
     double *state_, *signals_, *outputs_; // now; a batch of samples
     int waiting_ = 0;
-    int blocks_ = 0, lanes_ = 0; // of run(): modes, a pair one; complex states, padded: (group, mode)
-    double *w_, *drive_, *z_;    // re and im of w and z; lanes x n_u
-    double* with_v_;             // signals times rows, n_u + 2 lanes x n_u + n_y
+    int blocks_ = 0, lanes_ = 0; // of run(): modes, a pair one; complex states: (group, mode)
+    int padded_ = 0;             // modes
+    double *powers_, *filter_states_, *filter_sums_, *filter_lags_, *filter_work_; // okid_filters_t
+    double* with_v_; // signals times rows, n_u + 2 lanes x n_u + n_y
 };
 
 } // namespace okid

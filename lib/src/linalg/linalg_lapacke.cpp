@@ -4,6 +4,7 @@
 // NUMERICS   LAPACK's; workspace sizes are asked from LAPACK itself
 #include "linalg.hpp"
 
+#include "cholesky.h"
 #include "condition.hpp"
 #include "tridiagonal.h"
 
@@ -11,6 +12,7 @@
 #include <cblas.h>
 #include <cmath>
 #include <lapacke.h>
+#include <type_traits>
 
 extern "C" void openblas_set_num_threads(int) __attribute__((weak));
 
@@ -219,7 +221,11 @@ void warm_up() {
     (void)done;
 }
 
-template <class Real> int cholesky(int n, Real* a, int lda) { return potrf(n, a, lda); }
+template <class Real> int cholesky(int n, Real* a, int lda) {
+    if constexpr (std::is_same_v<Real, double>)
+        if (okid_cholesky_fn* own = okid_cholesky_pick(n)) return own(n, a, static_cast<size_t>(lda));
+    return potrf(n, a, lda);
+}
 
 template <class Real> void cholesky_solve(int n, const Real* l, int ldl, Real* b, int ldb, int count) {
     potrs(n, count, l, ldl, b, ldb);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    what goes from sample to sample along a record, one source for every instruction set
 // METHOD     follow: one product a sample, [estimate; next state] = M [u; y; x], its columns summed in two chains so that
-//            additions do not wait for each other; simulation and prediction side by side. filters: modes lie across lanes, and
-//            stay with the sums of a tile of channels in registers over all samples of a call
+//            additions do not wait for each other; simulation and prediction side by side. filters: eight samples at a
+//            time by the powers of w, so that no sample waits for the one before and no mode is multiplied once for each input
 // NUMERICS   plain recursions; the predictor is A - K C as one matrix
 // WORKSPACE  none
 #include "recursion.h"
@@ -14,13 +14,10 @@
 #define FILTERS OKID_FOR_ISA(okid_filters_)
 
 #if defined(__AVX512F__)
-#define CHANNELS 8
 enum { LANES = 8, VECTORS = 4 };
 #elif defined(__AVX2__)
-#define CHANNELS 4
 enum { LANES = 4, VECTORS = 4 };
 #else
-#define CHANNELS 4
 enum { LANES = 2, VECTORS = 4 };
 #endif
 typedef double lanes_t __attribute__((vector_size(LANES * sizeof(double))));
@@ -106,93 +103,167 @@ void FOLLOW(const okid_follow_t* self, const double* rows, size_t count) {
     if (predicted != f.predicted) memcpy(f.predicted, predicted, f.ld * sizeof *predicted);
 }
 
-/// The states of lane k on, times `channels` numbers of a row from `first` on; `last`: they are left behind where they end.
-static inline __attribute__((always_inline)) void filter_tile(const okid_filters_t* f, const double* rows, size_t count,
-                                                              size_t k, size_t first, int last, const int channels) {
-    const size_t n_u = f->n_u, m = f->m, states = f->states;
-    const double* drive = f->drive + k;
-    const lanes_t wr = load(f->w_re + k), wi = load(f->w_im + k);
-    lanes_t a = load(f->state + k), b = load(f->state + states + k), re[CHANNELS] = {{0}}, im[CHANNELS] = {{0}};
-    for (size_t n = 0; n < count; ++n, rows += m) {
+typedef double four_t __attribute__((vector_size(4 * sizeof(double)), aligned(8)));
+#define FOUR(p) (*(const four_t*)(p))
+#define ADD_FOUR(p, v) (*(four_t*)(p) += (v))
+enum { BLOCK = OKID_FILTERS_BLOCK, STRETCH = OKID_FILTERS_STRETCH, BLOCKS = STRETCH / BLOCK, MODES = 3, GROUPS = 3 };
+
+/// From the states before a block to those behind its `count` rows; of input g u stands at inputs + g * STRETCH.
+static inline __attribute__((always_inline)) void filter_states(const okid_filters_t* f, const double* inputs,
+                                                                const double* from, double* to, const size_t count) {
+    const size_t K = okid_filters_padded(f->modes);
+    for (size_t k = 0; k < K; k += 4) {
+        const double *powers = f->powers + okid_filters_power(k, 0), *over = powers + 8 * count, *u = inputs;
+        const four_t wr = FOUR(over), wi = FOUR(over + 4);
+        for (size_t g = 0, at = k; g <= f->n_u; ++g, at += 2 * K, u += STRETCH) {
+            const four_t a = FOUR(from + at), b = FOUR(from + at + K);
+            four_t re[2] = {{0}}, im[2] = {{0}};
+            if (g < f->n_u)
 #pragma GCC unroll 8
-        for (int c = 0; c < channels; ++c) {
-            const double v = rows[first + (size_t)c];
-            re[c] += v * a;
-            im[c] += v * b;
+                for (size_t j = 0; j < count; ++j) {
+                    const double* power = powers + 8 * (count - 1 - j);
+                    re[j % 2] += u[j] * FOUR(power);
+                    im[j % 2] += u[j] * FOUR(power + 4);
+                }
+            re[0] = re[0] + re[1] + wr * a; // last: the next block waits for it
+            im[0] = im[0] + im[1] + wr * b;
+            re[0] -= wi * b;
+            im[0] += wi * a;
+            memcpy(to + at, re, sizeof *re);
+            memcpy(to + at + K, im, sizeof *im);
         }
-        lanes_t driven = {0};
-        for (size_t c = 0; c < n_u; ++c) driven += rows[c] * load(drive + c * states);
-        const lanes_t next = wr * a + (driven - wi * b);
-        b = wr * b + wi * a;
-        a = next;
-    }
-    double* to = f->sums + first * (n_u + 2 * states) + n_u + k;
-    for (int c = 0; c < channels; ++c, to += n_u + 2 * states) {
-        store(to, load(to) + re[c]);
-        store(to + states, load(to + states) + im[c]);
-    }
-    if (!last) return;
-    store(f->state + k, a);
-    store(f->state + states + k, b);
-}
-
-static void filter_tiles(const okid_filters_t* f, const double* rows, size_t count, size_t k, size_t first, int last,
-                         int channels) {
-    switch (channels) {
-    case 1: filter_tile(f, rows, count, k, first, last, 1); break;
-    case 2: filter_tile(f, rows, count, k, first, last, 2); break;
-    case 3: filter_tile(f, rows, count, k, first, last, 3); break;
-    case 4: filter_tile(f, rows, count, k, first, last, 4); break;
-#if CHANNELS > 4
-    case 5: filter_tile(f, rows, count, k, first, last, 5); break;
-    case 6: filter_tile(f, rows, count, k, first, last, 6); break;
-    case 7: filter_tile(f, rows, count, k, first, last, 7); break;
-#endif
-    default: filter_tile(f, rows, count, k, first, last, CHANNELS); break;
     }
 }
 
-typedef double four_t __attribute__((vector_size(4 * sizeof(double))));
+/// Of two blocks of four channels: the sums of w^j v(t0 + j), `modes` modes from k on.
+static inline __attribute__((always_inline)) void filter_tile(const okid_filters_t* f, const double* v, size_t k,
+                                                              double* to, const int modes) {
+    const double* power[MODES];
+    four_t sums[2][2 * MODES] = {{{0}}};
+    for (int r = 0; r < modes; ++r) power[r] = f->powers + okid_filters_power(k + (size_t)r, 0);
+#pragma GCC unroll 8
+    for (size_t j = 0; j < BLOCK; ++j) {
+        const four_t first = FOUR(v + 4 * j), second = FOUR(v + 4 * (BLOCK + j));
+#pragma GCC unroll 3
+        for (int r = 0; r < modes; ++r) {
+            const double re = power[r][8 * j], im = power[r][8 * j + 4];
+            sums[0][2 * r] += re * first;
+            sums[0][2 * r + 1] += im * first;
+            sums[1][2 * r] += re * second;
+            sums[1][2 * r + 1] += im * second;
+        }
+    }
+    for (size_t b = 0; b < 2; ++b)
+        for (int r = 0; r < 2 * modes; ++r)
+            memcpy(to + 4 * (2 * (b * f->modes + k) + (size_t)r), sums[b] + r, sizeof(four_t));
+}
 
-/// An input times 4 numbers of a row from `first` on, in four sums that do not wait for each other.
-static void input_tile(const okid_filters_t* f, const double* rows, size_t count, size_t input, size_t first) {
-    four_t sums[4] = {{0}};
-    size_t n = 0;
-    for (; n + 4 <= count; n += 4)
+/// The states of mode k at the blocks' beginnings times the sums over the blocks, of `groups` groups from the first on.
+static inline __attribute__((always_inline)) void filter_groups(const okid_filters_t* f, const double* products,
+                                                                const double* starts, size_t k, size_t first,
+                                                                double* sums, const int groups) {
+    const size_t K = okid_filters_padded(f->modes), M = okid_filters_padded(f->m), each = 2 * K * (f->n_u + 1);
+    four_t re[GROUPS] = {{0}}, im[GROUPS] = {{0}}, minus[GROUPS] = {{0}}, more[GROUPS] = {{0}};
+    starts += 2 * K * first + k;
+    products += 8 * k;
+    for (size_t b = 0; b < BLOCKS; ++b, starts += each, products += 8 * f->modes) {
+        const four_t pr = FOUR(products), pi = FOUR(products + 4);
+#pragma GCC unroll 3
+        for (int g = 0; g < groups; ++g) {
+            const double a = starts[2 * K * (size_t)g], i = starts[2 * K * (size_t)g + K];
+            re[g] += a * pr;
+            minus[g] += i * pi;
+            im[g] += a * pi;
+            more[g] += i * pr;
+        }
+    }
+    for (int g = 0; g < groups; ++g) {
+        double* to = sums + ((first + (size_t)g) * f->modes + k) * 2 * M;
+        ADD_FOUR(to, re[g] - minus[g]);
+        ADD_FOUR(to + M, im[g] + more[g]);
+    }
+}
+
+/// Of one number u what it adds to the sums of its pairs with `count` rows of four channels.
+static inline __attribute__((always_inline)) void filter_pairs(double u, const double* v, four_t* sums,
+                                                               const size_t count) {
 #pragma GCC unroll 4
-        for (size_t k = 0; k < 4; ++k) {
-            const double* row = rows + (n + k) * f->m;
-            four_t v;
-            memcpy(&v, row + first, sizeof v);
-            sums[k] += row[input] * v;
-        }
-    for (; n < count; ++n)
-        for (size_t k = 0; k < 4; ++k) sums[0][k] += rows[n * f->m + input] * rows[n * f->m + first + k];
-    sums[0] = (sums[0] + sums[1]) + (sums[2] + sums[3]);
-    for (size_t k = 0; k < 4; ++k) f->sums[(first + k) * (f->n_u + 2 * f->states) + input] += sums[0][k];
+    for (size_t d = 0; d < count; ++d) sums[d] += u * FOUR(v + 4 * d);
 }
 
-/// The same of one number.
-static void input_number(const okid_filters_t* f, const double* rows, size_t count, size_t input, size_t at) {
-    double sum = 0;
-    for (size_t n = 0; n < count; ++n) sum += rows[n * f->m + input] * rows[n * f->m + at];
-    f->sums[at * (f->n_u + 2 * f->states) + input] += sum;
+/// The pairs of an input and four channels within each block, by their distance: up to 3, every second input in sums of its
+/// own, so that none waits; then from 4 on.
+static void filter_lags(const double* u, const double* v, size_t M, double* to) {
+    four_t near[2][4] = {{{0}}}, far[4] = {{0}};
+    for (size_t b = 0; b < STRETCH; b += BLOCK) {
+        const double *in = u + b, *row = v + 4 * b;
+        filter_pairs(in[0], row, near[0], 4);
+        filter_pairs(in[1], row + 4, near[1], 4);
+        filter_pairs(in[2], row + 8, near[0], 4);
+        filter_pairs(in[3], row + 12, near[1], 4);
+        filter_pairs(in[4], row + 16, near[0], 4);
+        filter_pairs(in[5], row + 20, near[1], 3);
+        filter_pairs(in[6], row + 24, near[0], 2);
+        filter_pairs(in[7], row + 28, near[1], 1);
+        filter_pairs(in[0], row + 16, far, 4);
+        filter_pairs(in[1], row + 20, far, 3);
+        filter_pairs(in[2], row + 24, far, 2);
+        filter_pairs(in[3], row + 28, far, 1);
+    }
+    for (size_t d = 0; d < 4; ++d) ADD_FOUR(to + d * M, near[0][d] + near[1][d]);
+    for (size_t d = 0; d < 4; ++d) ADD_FOUR(to + (4 + d) * M, far[d]);
+}
+
+/// Columns first .. of some rows, as wide as they are asked for; behind the last row and column zeros, which add nothing.
+static void filter_columns(const double* rows, size_t count, size_t m, size_t first, double* to) {
+    const size_t some = m - first < 4 ? m - first : 4;
+    rows += first;
+    if (some == 4)
+        for (size_t n = 0; n < count; ++n) memcpy(to + 4 * n, rows + n * m, sizeof(four_t));
+    for (size_t c = 0; some < 4 && c < 4; ++c)
+        for (size_t n = 0; n < count; ++n) to[4 * n + c] = c < some ? rows[n * m + c] : 0;
+    memset(to + 4 * count, 0, 4 * (STRETCH - count) * sizeof *to);
 }
 
 okid_filters_fn FILTERS;
 void FILTERS(const okid_filters_t* self, const double* rows, size_t count) {
     const okid_filters_t f = *self;
-    const size_t groups = (f.m + CHANNELS - 1) / CHANNELS;
-    for (size_t k = 0; k < f.active; k += LANES)
-        for (size_t g = 0, first = 0; g < groups; ++g) {
-            const size_t channels = (f.m - first + groups - g - 1) / (groups - g);
-            filter_tiles(&f, rows, count, k, first, g + 1 == groups, (int)channels);
-            first += channels;
+    const size_t M = okid_filters_padded(f.m), each = 2 * okid_filters_padded(f.modes) * (f.n_u + 1);
+    double *inputs = f.work, *four = inputs + STRETCH * f.n_u, *starts = four + 4 * STRETCH;
+    double* products = starts + (BLOCKS + 1) * each;
+    for (size_t g = 0; g < f.n_u; ++g)
+        for (size_t n = 0; n < STRETCH; ++n) inputs[g * STRETCH + n] = n < count ? rows[n * f.m + g] : 0;
+    memcpy(starts, f.state, each * sizeof *starts);
+    for (size_t b = 0; b < BLOCKS; ++b) {
+        double* from = starts + b * each;
+        const size_t begin = b * BLOCK, left = count > begin ? count - begin : 0;
+        if (left >= BLOCK)
+            filter_states(&f, inputs + begin, from, from + each, BLOCK);
+        else
+            filter_states(&f, inputs + begin, from, from + each, left);
+    }
+    memcpy(f.state, starts + BLOCKS * each, each * sizeof *starts);
+    for (size_t c = 0; c < f.m; c += 4) {
+        filter_columns(rows, count, f.m, c, four);
+        for (size_t b = 0; b < BLOCKS; b += 2)
+            for (size_t k = 0; k < f.modes; k += MODES) {
+                const double* v = four + 4 * b * BLOCK;
+                double* to = products + 8 * b * f.modes;
+                switch (f.modes - k) {
+                case 1: filter_tile(&f, v, k, to, 1); break;
+                case 2: filter_tile(&f, v, k, to, 2); break;
+                default: filter_tile(&f, v, k, to, MODES); break;
+                }
+            }
+        for (size_t k = 0; k < f.modes; ++k) {
+            const size_t groups = f.n_u + (k < f.lasting);
+            for (size_t g = 0; g < groups; g += GROUPS) switch (groups - g) {
+                case 1: filter_groups(&f, products, starts, k, g, f.sums + c, 1); break;
+                case 2: filter_groups(&f, products, starts, k, g, f.sums + c, 2); break;
+                default: filter_groups(&f, products, starts, k, g, f.sums + c, GROUPS); break;
+                }
         }
-    for (size_t c = 0; c < f.n_u; ++c) {
-        size_t r = 0;
-        for (; r + 4 <= f.m; r += 4) input_tile(&f, rows, count, c, r);
-        for (; r < f.m; ++r) input_number(&f, rows, count, c, r);
+        for (size_t g = 0; g < f.n_u; ++g) filter_lags(inputs + g * STRETCH, four, M, f.lags + g * BLOCK * M + c);
     }
 }
 

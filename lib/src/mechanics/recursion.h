@@ -28,15 +28,33 @@ typedef struct okid_follow_t {
 /// All of `count` rows [u; y]; a y that is NaN counts in no sum and corrects no state. u must be finite.
 typedef void okid_follow_fn(const okid_follow_t* self, const double* rows, size_t count);
 
-/// z <- w z + drive u for `states` complex numbers (padded): re at state, im behind them; drive: states x n_u. sums ([u, re,
-/// im] x m, ld n_u + 2 states) += what stands before each sample times its row [u; y].
+enum { OKID_FILTERS_BLOCK = 8, OKID_FILTERS_STRETCH = 16 * OKID_FILTERS_BLOCK };
+
+/// z(t+1) = w z(t) + u(t) of `modes` numbers w for every input, and w^t, times the rows [u; y] of their time. K and M: modes
+/// and m, padded to whole vectors (okid_filters_padded). Of a block from t0 on, z(t0 + j) = w^j z(t0) + what its own inputs
+/// add: the sum over t of z(t) v(t) is `sums` + that over d of w^(d-1) `lags` d.
 typedef struct okid_filters_t {
-    size_t n_u, m, states;
-    size_t active; ///< of the states, padded; the others are zero and stay
-    const double *w_re, *w_im, *drive;
-    double *state, *sums;
+    size_t n_u, m, modes;
+    size_t lasting;       ///< modes, from the first on, whose w^t is in the sums
+    const double* powers; ///< of four modes after four: w^0 .. w^BLOCK, each four real and four imaginary parts
+    double* state;        ///< of every input, then w^t: K real and K imaginary parts
+    double* sums;         ///< (n_u + 1) x modes x 2 x M: z(t0) times the sum over j of w^j v(t0 + j)
+    double* lags;         ///< n_u x BLOCK x M: u(s) v(s + d) of the pairs within blocks, d = 0 ..
+    double* work;         ///< okid_filters_work() numbers
 } okid_filters_t;
 
+static inline size_t okid_filters_padded(size_t count) { return (count + 3) / 4 * 4; }
+static inline size_t okid_filters_work(size_t n_u, size_t modes) {
+    const size_t blocks = OKID_FILTERS_STRETCH / OKID_FILTERS_BLOCK;
+    return OKID_FILTERS_STRETCH * (n_u + 4) + 2 * (blocks + 1) * (n_u + 1) * okid_filters_padded(modes) +
+           8 * blocks * modes;
+}
+/// Where the real part of w^j of a mode stands among the powers; the imaginary one four behind it.
+static inline size_t okid_filters_power(size_t mode, size_t j) {
+    return 8 * (mode / 4 * (OKID_FILTERS_BLOCK + 1) + j) + mode % 4;
+}
+
+/// Adds `count` rows: OKID_FILTERS_STRETCH, the last time fewer.
 typedef void okid_filters_fn(const okid_filters_t* self, const double* rows, size_t count);
 
 typedef struct okid_recursion_t {

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The per-sample kernels of every instruction set this processor has, not only the fastest: sums of products over the
-// lag window, direct and by FFT, against a plain loop in 64-bit integers.
+// lag window, direct and by FFT, against a plain loop in 64-bit integers; filters of modes against a plain
+// recursion, Cholesky factors against the matrix they are of.
 #include "accumulate/kernel.h"
 #include "accumulate/spectrum.h"
+#include "linalg/cholesky.h"
+#include "mechanics/recursion.h"
 #include "modal_rig.h"
 
+#include <complex.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unity.h>
@@ -18,8 +22,16 @@ okid_spectrum_absorb_fn okid_spectrum_absorb_avx2 __attribute__((weak)),
     okid_spectrum_absorb_avx512 __attribute__((weak));
 okid_spectrum_flush_fn okid_spectrum_flush_avx2 __attribute__((weak)), okid_spectrum_flush_avx512 __attribute__((weak));
 
+okid_filters_fn okid_filters_base;
+okid_filters_fn okid_filters_avx2 __attribute__((weak)), okid_filters_avx512 __attribute__((weak));
+
+okid_cholesky_fn okid_cholesky_base __attribute__((weak)); // not on every linear-algebra backend
+okid_cholesky_fn okid_cholesky_avx2 __attribute__((weak)), okid_cholesky_avx512 __attribute__((weak));
+
 typedef struct kernels_t {
     const char* name;
+    okid_cholesky_fn* cholesky;
+    okid_filters_fn* filters;
     okid_kernel_fn* direct;
     okid_spectrum_absorb_fn* absorb;
     okid_spectrum_flush_fn* flush;
@@ -28,18 +40,21 @@ typedef struct kernels_t {
 static kernels_t kernels[3];
 static int count_of_kernels;
 
-static void add(const char* name, okid_kernel_fn* direct, okid_spectrum_absorb_fn* absorb,
-                okid_spectrum_flush_fn* flush) {
-    if (direct) kernels[count_of_kernels++] = (kernels_t){name, direct, absorb, flush};
+static void add(const char* name, okid_cholesky_fn* cholesky, okid_filters_fn* filters, okid_kernel_fn* direct,
+                okid_spectrum_absorb_fn* absorb, okid_spectrum_flush_fn* flush) {
+    if (direct) kernels[count_of_kernels++] = (kernels_t){name, cholesky, filters, direct, absorb, flush};
 }
 
 static void find_kernels(void) {
-    add("base", okid_kernel_base, okid_spectrum_absorb_base, okid_spectrum_flush_base);
+    add("base", okid_cholesky_base, okid_filters_base, okid_kernel_base, okid_spectrum_absorb_base,
+        okid_spectrum_flush_base);
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        add("avx2", okid_kernel_avx2, okid_spectrum_absorb_avx2, okid_spectrum_flush_avx2);
+        add("avx2", okid_cholesky_avx2, okid_filters_avx2, okid_kernel_avx2, okid_spectrum_absorb_avx2,
+            okid_spectrum_flush_avx2);
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-        add("avx512", okid_kernel_avx512, okid_spectrum_absorb_avx512, okid_spectrum_flush_avx512);
+        add("avx512", okid_cholesky_avx512, okid_filters_avx512, okid_kernel_avx512, okid_spectrum_absorb_avx512,
+            okid_spectrum_flush_avx512);
 #endif
 }
 
@@ -143,10 +158,104 @@ static void sums_by_fft_are_exact(void) {
     }
 }
 
+/// Filters of `modes` modes in stretches against a recursion sample by sample; of the last mode w^t is left out.
+static void check_filters(kernels_t kernel, int n_u, int m, int modes, int count) {
+    enum { MOST_M = 13, MOST_MODES = 7, MOST_COUNT = 300, MOST_U = 4 };
+    static double v[MOST_M * MOST_COUNT];
+    uint64_t seed = (uint64_t)(1000 * n_u + 100 * m + 10 * modes + count);
+    for (int i = 0; i < m * count; ++i) v[i] = rig_normal(&seed);
+    const size_t K = okid_filters_padded((size_t)modes), M = okid_filters_padded((size_t)m), groups = (size_t)n_u + 1;
+    double powers[16 * MOST_MODES * (OKID_FILTERS_BLOCK + 1)] = {0}, state[16 * (MOST_U + 1)] = {0},
+                                                          sums[32 * MOST_MODES * (MOST_U + 1)] = {0},
+                                                          lags[16 * OKID_FILTERS_BLOCK * MOST_U] = {0};
+    double complex w[MOST_MODES], z[MOST_U + 1][MOST_MODES] = {{0}}, want[MOST_U + 1][MOST_MODES][MOST_M] = {{{0}}};
+    for (int k = 0; k < modes; ++k) {
+        w[k] = (0.999 - 0.01 * k) * cexp(0.3 * I * (k + 1));
+        for (size_t j = 0; j <= OKID_FILTERS_BLOCK; ++j) {
+            powers[okid_filters_power((size_t)k, j)] = creal(cpow(w[k], (double)j));
+            powers[okid_filters_power((size_t)k, j) + 4] = cimag(cpow(w[k], (double)j));
+        }
+        z[n_u][k] = state[(size_t)n_u * 2 * K + (size_t)k] = 1;
+    }
+    double* work = malloc(okid_filters_work((size_t)n_u, (size_t)modes) * sizeof *work);
+    const okid_filters_t filters = {(size_t)n_u, (size_t)m, (size_t)modes, (size_t)(modes - 1), powers, state,
+                                    sums,        lags,      work};
+    for (int n = 0; n < count; n += OKID_FILTERS_STRETCH) {
+        const int some = count - n < OKID_FILTERS_STRETCH ? count - n : OKID_FILTERS_STRETCH;
+        kernel.filters(&filters, v + m * n, (size_t)some);
+    }
+    for (int n = 0; n < count; ++n)
+        for (int g = 0; g <= n_u; ++g)
+            for (int k = 0; k < modes; ++k) {
+                for (int c = 0; c < m; ++c) want[g][k][c] += z[g][k] * v[m * n + c];
+                z[g][k] = w[k] * z[g][k] + (g < n_u ? v[m * n + g] : 0);
+            }
+    char what[80];
+    snprintf(what, sizeof what, "%s: %d inputs of %d channels, %d modes, %d rows", kernel.name, n_u, m, modes, count);
+    for (size_t g = 0; g < groups; ++g)
+        for (size_t k = 0; k < (size_t)modes; ++k) {
+            const double complex end = state[g * 2 * K + k] + I * state[g * 2 * K + K + k];
+            TEST_ASSERT_TRUE_MESSAGE(cabs(end - z[g][k]) < 1e-10, what);
+            for (size_t c = 0; c < (size_t)m; ++c) {
+                const double* at = sums + (g * (size_t)modes + k) * 2 * M + c;
+                double complex got = at[0] + I * at[M];
+                for (size_t d = 1; g < (size_t)n_u && d < OKID_FILTERS_BLOCK; ++d)
+                    got += cpow(w[k], (double)d - 1) * lags[(g * OKID_FILTERS_BLOCK + d) * M + c];
+                const int left_out = g == (size_t)n_u && k + 1 == (size_t)modes;
+                TEST_ASSERT_TRUE_MESSAGE(cabs(got - (left_out ? 0 : want[g][k][c])) < 1e-9, what);
+            }
+        }
+    free(work);
+}
+
+static void filters_are_those_of_a_recursion(void) {
+    const int counts[] = {1, 7, 8, 127, 128, 129, 300};
+    for (int k = 0; k < count_of_kernels; ++k)
+        for (int n_u = 0; n_u <= 4; ++n_u)
+            for (int m = n_u + 1; m <= 13; ++m)
+                for (int modes = 1; modes <= 7; ++modes)
+                    check_filters(kernels[k], n_u, m, modes, counts[(n_u + m + modes) % 7]);
+}
+
+/// The factor of a random matrix with a leading dimension of its own, what stands above the diagonal being no number; then the
+/// same with a number below zero on the diagonal: no positive pivot.
+static void check_cholesky(kernels_t kernel, int n, int ld) {
+    enum { MOST = 100 };
+    static double random[MOST * MOST], a[MOST * MOST], l[MOST * MOST];
+    uint64_t seed = (uint64_t)n;
+    for (int i = 0; i < n * n; ++i) random[i] = rig_normal(&seed);
+    for (int c = 0; c < n; ++c)
+        for (int r = 0; r < ld; ++r) {
+            double sum = r == c ? 0.01 * n : 0;
+            for (int k = 0; r < n && k < n; ++k) sum += random[r * n + k] * random[c * n + k];
+            l[c * ld + r] = a[c * ld + r] = r >= c && r < n ? sum : NAN;
+        }
+    char what[60];
+    snprintf(what, sizeof what, "%s: %d rows of %d", kernel.name, n, ld);
+    TEST_ASSERT_EQUAL_MESSAGE(0, kernel.cholesky(n, l, (size_t)ld), what);
+    for (int c = 0; c < n; ++c)
+        for (int r = 0; r < ld; ++r) {
+            double sum = 0;
+            for (int k = 0; k <= c && r < n; ++k) sum += l[k * ld + r] * l[k * ld + c];
+            const int below = r >= c && r < n;
+            TEST_ASSERT_TRUE_MESSAGE(below ? fabs(sum - a[c * ld + r]) < 1e-13 * n * n : isnan(l[c * ld + r]), what);
+        }
+    a[n / 2 * ld + n / 2] = -1;
+    TEST_ASSERT_EQUAL_MESSAGE(n / 2 + 1, kernel.cholesky(n, a, (size_t)ld), what);
+}
+
+static void factors_are_those_of_the_matrix(void) {
+    for (int k = 0; k < count_of_kernels; ++k)
+        for (int n = 1; n <= 97 && kernels[k].cholesky; n += n < 40 ? 1 : 19)
+            for (int beyond = 0; beyond < 4; beyond += 3) check_cholesky(kernels[k], n, n + beyond);
+}
+
 int main(void) {
     find_kernels();
     UNITY_BEGIN();
     RUN_TEST(direct_sums_are_exact);
     RUN_TEST(sums_by_fft_are_exact);
+    RUN_TEST(filters_are_those_of_a_recursion);
+    RUN_TEST(factors_are_those_of_the_matrix);
     return UNITY_END();
 }
