@@ -15,6 +15,8 @@ from distributed.scheduler import KilledWorker
 from okid.campaign import run
 from okid.campaign.run import run_campaign
 from okid.campaign.tables import make_tables
+from okid.campaign.trend import analyse, series_of
+from okid.campaign.virtual_year import Year
 from rig_records import SMALL, campaign, facts
 
 CODES = np.zeros((1500, 4), np.int16)
@@ -58,6 +60,24 @@ def test_bad_record_is_left_out_and_told(tmp_path: Path, client: Any, kind: str)
     assert words in reason and "\n" not in reason and str(tmp_path) not in reason
     row = make_tables(spec, outcome)["records"].set_index("record").loc[f"records/{victim.name}"]
     assert row["status"] == "skipped" and row["reason"] == reason
+
+
+def test_damage_is_found_among_bad_records(tmp_path: Path, client: Any) -> None:
+    """50 records of a frame under temperature, three of them bad, each in another way: the drop of two modes by 1.5 %
+    and 1.8 % is an alarm within five records, the bad ones are three lines."""
+    year = Year(records=50, samples=2048, days=50.0, damage=0.075, damaged=3, damage_day=35.0, seed=5)
+    spec = campaign(tmp_path, year)
+    records = sorted((tmp_path / "records").iterdir())
+    for k, kind in ((4, "cut"), (20, "text"), (37, "columns")):
+        BAD[kind][0](records[k])
+    outcome = run_campaign(spec, client)
+    assert sorted(one.name for one in outcome.skipped) == [f"records/{records[k].name}" for k in (4, 20, 37)]
+    (one,) = series_of(make_tables(spec, outcome))
+    analyse(one, spec.trend)
+    assert one.watched == [1, 2, 3], one.remarks
+    since = (one.time_s - one.time_s[0]) / 86400.0
+    first = since[one.alarms[0][0]]
+    assert 35.0 - since[0] <= first <= 41.0 + 1e-6, one.alarms
 
 
 def test_group_of_bad_records_has_a_fault(tmp_path: Path, client: Any) -> None:

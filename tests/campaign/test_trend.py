@@ -143,7 +143,7 @@ def test_heat_beyond_the_training_is_told() -> None:
 def short_campaign(seed: int, drop: float) -> SeriesTrend:
     """50 groups of 3 modes of a scatter of 0.2 %, one in ten of them not found, 5 % of the groups wrong in some way.
 
-    From group 35 on the lower two are `drop` lower. The scatter is not Gaussian, as the limits take it to be.
+    From group 35 on the lower two are `drop` lower. The scatter is not Gaussian, as the simulated years take it to be.
     """
     rng = np.random.default_rng([seed, 50])
     one = series(seed, count=50)
@@ -166,33 +166,6 @@ def short_campaign(seed: int, drop: float) -> SeriesTrend:
     return one
 
 
-def long_campaign(seed: int, heavy: bool, bad: float) -> SeriesTrend:
-    """1,000 groups of a healthy structure, one value in ten missing; a share of the groups has a wrong second mode."""
-    one, rng = series(seed, count=1000), np.random.default_rng([seed, 1000])
-    one.temperature_c = None
-    wrong = rng.random(1000) < bad
-    wrong[500:502] |= bad > 0  # and once in two groups running
-    for k, track in enumerate(one.tracks):
-        e = rng.laplace(size=1000) / np.sqrt(2.0) if heavy else rng.standard_normal(1000)
-        track.frequency_hz = F0[k] * (1.0 + 2e-3 * e) * np.where(wrong & (k == 1), 1.1, 1.0)
-        track.frequency_hz[rng.random(1000) < 0.1] = np.nan
-    return one
-
-
-@pytest.mark.parametrize(("heavy", "bad"), [(True, 0.0), (False, 0.02)])
-def test_heavy_tails_and_bad_records_are_no_alarm(monkeypatch: pytest.MonkeyPatch, heavy: bool, bad: float) -> None:
-    """Twelve campaigns of 5.7 watched years at 5 % a year: 3 +- 1.5 with an alarm (10 where limits ignore either)."""
-    monkeypatch.setattr(control_chart, "_SIMULATED", 400)
-    monkeypatch.setattr(trend, "find_change", lambda *_: None)
-    alarmed = 0
-    for seed in range(12):
-        one = long_campaign(seed, heavy, bad)
-        analyse(one, Trend(training_share=0.3, false_alarm_per_year=0.05))
-        assert one.regression is not None and heavy == (one.regression.tails < 12.0)
-        alarmed += bool(one.alarms)
-    assert alarmed <= 7
-
-
 def test_a_drop_is_found_among_bad_records(monkeypatch: pytest.MonkeyPatch) -> None:
     """1.5 % in two modes of 50 groups, trained on 15: within 5 groups in 95 of 100; without it the stated rate."""
     monkeypatch.setattr(control_chart, "_SIMULATED", 400)
@@ -208,4 +181,4 @@ def test_a_drop_is_found_among_bad_records(monkeypatch: pytest.MonkeyPatch) -> N
         analyse(healthy, Trend(training_share=0.3, false_alarm_per_year=0.2))
         false += bool(healthy.alarms)
     assert found >= 95
-    assert false <= 14  # 35 groups of 122 a year at 20 %: 6 +- 2.4 expected of Gaussian scatter
+    assert false <= 13  # 35 groups of 122 a year at 20 %: 6.2 +- 2.4 expected

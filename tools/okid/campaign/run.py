@@ -21,6 +21,7 @@ from okid.campaign.spec import CampaignSpec
 from okid.campaign.state_folder import StateFolder, same_faults, still_valid
 from okid.campaign.sums_file import GroupSums
 from okid.campaign.tasks import Slice, finish_group, hash_records, merge_batch, run_batch
+from okid.shown.notebook_html import own_fields
 
 FAN_IN = 8
 _HASHED_AT_ONCE = 64
@@ -39,6 +40,9 @@ class Outcome:
     skipped: list[Skipped] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     read: int = 0
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 @dataclass

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from okid.campaign import trend_model
 from okid.campaign.change_point import ChangePoint, find_change
-from okid.campaign.control_chart import Charts, Limits, charts, limits
+from okid.campaign.control_chart import Charts, Limits, Ranks, bounded, charts, groups_needed, limits
 from okid.campaign.spec import Trend
-from okid.campaign.trend_model import Regression, design, far_rows
+from okid.campaign.trend_model import Flags, Regression, design
 
 Real = NDArray[np.float64]
 SEEN = 0.5  # share of the groups a mode must be in to be drawn
@@ -178,6 +178,32 @@ def _tell_missing(series: SeriesTrend, n: int, weight: Real, others: dict[int, i
             series.remarks.append(f"{middle[number]:.4g} Hz is in {count} of {there} training groups: not watched")
 
 
+def _clean(series: SeriesTrend, y: Real, X: Real, weight: Real) -> tuple[Real, int]:
+    """Weights (n, d) for a scatter that follows the temperature, and none for accidents of the training, in place.
+
+    Returns the usual spread (d,) of the training and how many of its groups have an accident.
+    """
+    flags = series.training
+    usual, left = trend_model.usual_spread(y[flags], X[flags], weight[flags])
+    if X.shape[1] > 1:
+        warm = X[:, 1]
+        slope = trend_model.scatter_slope(left, usual, warm[flags])
+        if np.any(slope):
+            weight *= np.exp(-slope * np.clip(warm, np.min(warm[flags]), np.max(warm[flags]))[:, None])
+            usual, left = trend_model.usual_spread(y[flags], X[flags], weight[flags])
+            most = slope[np.argmax(np.abs(slope))]
+            series.remarks.append(
+                f"the scatter in the training follows the temperature ({100.0 * np.expm1(most):+.0f} % in 10 °C): "
+                "the weights allow for it"
+            )
+    far = trend_model.far(left, usual)
+    if np.any(far):
+        weight[flags] *= ~far
+        count = int(np.sum(far))
+        series.remarks.append(f"{count} values of the training lie far from the others of their mode: not used")
+    return usual, int(np.sum(np.any(far, axis=1)))
+
+
 def analyse(series: SeriesTrend, spec: Trend) -> None:
     """Regression, charts, alarms and change of one series, written into it. Deterministic for a given `spec.seed`."""
     found = _choose(series, spec)
@@ -185,56 +211,71 @@ def analyse(series: SeriesTrend, spec: Trend) -> None:
         return
     y, weight, X = found
     flags, t = series.training, series.temperature_c
-    far = far_rows(y[flags], X[flags], weight[flags])
-    if np.any(far):
-        weight[flags] *= ~far
-        count = int(np.sum(far))
-        series.remarks.append(f"{count} values of the training lie far from the others of their mode: not used")
+    usual, wrong = _clean(series, y, X, weight)
     centre = 0.0 if t is None else float(np.mean(t[series.rows][flags]))
     model = trend_model.fit(y[flags], X[flags], centre, weight[flags])
     series.regression = model
     if np.any(model.variance <= 0.0):
         series.not_watched("a mode does not move at all in the training")
         return
-    white = trend_model.standardised(y, X, model, weight)
-    _charts(series, spec, white, X, weight)
-    change = find_change(white, flags, X, weight, model, spec.seed)
+    fitted = trend_model.standardised(y[flags], X[flags], model, weight[flags], fitted=True)
+    left = weight * (np.where(weight > 0, y, 0.0) - X @ model.coefficients)
+    far = np.any(trend_model.far(left, usual), axis=1)
+    ranks = Ranks(fitted[np.any(weight[flags] > 0, axis=1)])
+    scored = ranks.scored(trend_model.standardised(y, X, model, weight))
+    _charts(series, spec, scored, X, weight, far, wrong)
+    if series.charts is not None:
+        weight[series.charts.alone] = 0.0
+        scored[series.charts.alone] = 0.0
+    change = find_change(bounded(scored), flags, X, weight, model, spec.seed)
     if change is not None and change.p_value <= _SURE:
         series.change = change
-        seen = weight > 0
-        raw = np.where(seen, y, np.nan) - X @ model.coefficients
-        series.shift_hz = np.full(y.shape[1], np.nan)
-        series.shift_std_hz = np.full(y.shape[1], np.nan)
-        inflation = (1.0 + model.persistence) / (1.0 - model.persistence)  # of the variance of a mean
-        before, after = seen[: change.at].sum(axis=0), seen[change.at :].sum(axis=0)
-        for k in np.flatnonzero((before > 0) & (after > 0)):
-            series.shift_hz[k] = np.nanmean(raw[change.at :, k]) - np.nanmean(raw[: change.at, k])
-            series.shift_std_hz[k] = np.sqrt(model.variance[k] * inflation[k] * (1.0 / before[k] + 1.0 / after[k]))
+        _measure_shift(series, y, X, weight, usual)
     _remarks(series, model)
 
 
-def _charts(series: SeriesTrend, spec: Trend, white: Real, X: Real, weight: Real) -> None:
+def _measure_shift(series: SeriesTrend, y: Real, X: Real, weight: Real, usual: Real) -> None:
+    """Means of the residuals after the change less those before, without accidents on either side."""
+    assert series.regression is not None and series.change is not None
+    model, at = series.regression, series.change.at
+    raw = np.where(weight > 0, y, np.nan) - X @ model.coefficients
+    for side in (slice(None, at), slice(at, None)):
+        for k in np.flatnonzero(np.any(np.isfinite(raw[side]), axis=0)):
+            own = raw[side, k]
+            own[trend_model.far(weight[side, k] * (own - np.nanmedian(own)), usual[k])] = np.nan
+    seen = np.isfinite(raw)
+    before, after = seen[:at].sum(axis=0), seen[at:].sum(axis=0)
+    inflation = (1.0 + model.persistence) / (1.0 - model.persistence)  # of the variance of a mean
+    series.shift_hz, series.shift_std_hz = np.full((2, y.shape[1]), np.nan)
+    for k in np.flatnonzero((before > 0) & (after > 0)):
+        series.shift_hz[k] = np.nanmean(raw[at:, k]) - np.nanmean(raw[:at, k])
+        series.shift_std_hz[k] = np.sqrt(model.variance[k] * inflation[k] * (1.0 / before[k] + 1.0 / after[k]))
+
+
+def _charts(
+    series: SeriesTrend, spec: Trend, scored: Real, X: Real, weight: Real, far: Flags, wrong: int,
+) -> None:  # fmt: skip
     watched = ~series.training
     if not np.any(watched):
         series.not_watched("no group after the training period")
         return
     assert series.regression is not None
     spacing = float(np.median(np.diff(series.time_s[series.rows])))
-    per_year = round(_YEAR_S / spacing) if spacing > 0.0 else len(white)
+    per_year = round(_YEAR_S / spacing) if spacing > 0.0 else len(scored)
     sides = [(X[rows], weight[rows]) for rows in (~watched, watched)]
-    series.limits = limits(sides[0], sides[1], series.regression, per_year, spec.false_alarm_per_year, spec.seed)
-    found = charts(white[watched])
-    whole = np.full((3, len(white)), np.nan)
-    whole[:, watched] = found
-    series.charts = Charts(*whole)
-    t2, mean, single = whole
+    rate = spec.false_alarm_per_year
+    needed = groups_needed(wrong, len(sides[0][0]), per_year, rate)
+    series.limits = limits(sides[0], sides[1], series.regression, per_year, rate, needed, spec.seed)
+    found = charts(scored[watched], far[watched], needed)
+    (t2, mean), alone = np.full((2, len(scored)), np.nan), np.zeros(len(scored), dtype=np.bool_)
+    t2[watched], mean[watched], alone[watched] = found
+    series.charts = Charts(t2, mean, alone)
+    series.odd = [int(row) for row in series.rows[alone]]
     for k in np.flatnonzero(watched):
         said = [name for name, value, limit in (("T²", t2[k], series.limits.t2), ("EWMA", mean[k], series.limits.mean))
                 if value > limit]  # fmt: skip
         if said:
             series.alarms.append((int(series.rows[k]), " and ".join(said)))
-        elif single[k] > series.limits.single:
-            series.odd.append(int(series.rows[k]))
     if series.odd:
         named = ", ".join(series.groups[row] for row in series.odd[:_NAMED])
         more = f" and {len(series.odd) - _NAMED} more" if len(series.odd) > _NAMED else ""

@@ -7,7 +7,7 @@ Every mode has its own rows and weights: a mode that a group does not show (weig
 from __future__ import annotations
 
 from math import inf, lgamma, log, pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 _LEAST_EIGENVALUE = 0.02  # of a correlation matrix whose entries come from different rows
 _TAILS = (3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0)  # degrees of freedom; the variance is finite
-_FAR = 8.0  # robust standard deviations: such a row of the training is an accident
+_NEAR_ZERO = 0.05  # standard deviations: a residual that is less tells no more of the scatter
+FAR = 8.0  # robust standard deviations: such a row of the training is an accident
 
 
 class Regression(NamedTuple):
@@ -106,13 +107,14 @@ def tails_of(columns: list[Real]) -> float:
         return total
 
     gaussian = -0.5 * sum(len(one) * (log(2.0 * pi * float(np.mean(one**2))) + 1.0) for one in columns)
-    best = max(_TAILS, key=likelihood)
-    return best if likelihood(best) - gaussian > 1.0 else inf
+    most, best = max((likelihood(nu), nu) for nu in _TAILS)
+    return best if most - gaussian > 1.0 else inf
 
 
-def far_rows(y: Real, X: Real, weight: Real) -> Flags:
-    """Values (n, d) far from what the others of their column tell: least absolute deviations, then the median."""
-    out = np.zeros(y.shape, dtype=np.bool_)
+def usual_spread(y: Real, X: Real, weight: Real) -> tuple[Real, Real]:
+    """Robust standard deviations (d,) of the columns, and their residuals (n, d): of least absolute deviations, then
+    the median; NaN where there is no value."""
+    left, usual = np.full(y.shape, np.nan), np.zeros(y.shape[1])
     for j in range(y.shape[1]):
         rows = np.flatnonzero(weight[:, j] > 0)
         Xw, yw = weight[rows, j, None] * X[rows], weight[rows, j] * y[rows, j]
@@ -120,16 +122,42 @@ def far_rows(y: Real, X: Real, weight: Real) -> Flags:
         for _ in range(30):
             w = 1.0 / np.sqrt(np.maximum(np.abs(yw - Xw @ b), 1e-6 * scale + 1e-300))
             b = np.linalg.lstsq(w[:, None] * Xw, w * yw, rcond=None)[0]
-        left = np.abs(yw - Xw @ b)
-        usual = 1.4826 * float(np.median(left)) * np.sqrt(len(rows) / max(1, len(rows) - X.shape[1]))
-        out[rows, j] = left > _FAR * usual if usual > 0.0 else False
-    return out
+        left[rows, j] = yw - Xw @ b
+        usual[j] = (
+            1.4826 * float(np.median(np.abs(left[rows, j]))) * np.sqrt(len(rows) / max(1, len(rows) - X.shape[1]))
+        )
+    return usual, left
+
+
+def far(residual: Real, usual: Any) -> Flags:
+    """Residuals of weight 1 that are an accident by the usual spread of the training, of each column; NaN is none."""
+    return np.asarray((np.abs(residual) > FAR * usual) & (usual > 0.0))
+
+
+def scatter_slope(left: Real, usual: Real, temperature: Real) -> Real:
+    """Change of the logarithm of the scatter with the regressor `temperature` (n,), of each column (d,) of residuals.
+
+    Least squares of log |residual| (Harvey 1976); 0 where it is not above two of its standard deviations.
+    """
+    slope = np.zeros(left.shape[1])
+    for j in np.flatnonzero(usual > 0.0):
+        rows = np.isfinite(left[:, j])
+        size = np.log(np.maximum(np.abs(left[rows, j]), _NEAR_ZERO * usual[j]))
+        x = temperature[rows] - np.mean(temperature[rows])
+        power = float(np.sum(x**2))
+        if len(x) < 3 or power <= 0.0:
+            continue
+        found = float(np.sum(x * size)) / power
+        rest = size - np.mean(size) - found * x
+        deviation = np.sqrt(float(np.sum(rest**2)) / (len(x) - 2) / power)
+        slope[j] = found if abs(found) > 2.0 * deviation else 0.0
+    return slope
 
 
 def filled(z: Real, seen: Flags, correlation: Real) -> Real:
     """Standardised residuals (..., n, d) with what is missing (seen (n, d) false) as the others of its row expect it.
 
-    z' R^-1 z of such a row is that of the columns that were seen alone.
+    z' R^-1 z of such a row is that of the columns that were seen alone. `correlation` (..., d, d).
     """
     out = np.where(seen, z, 0.0)
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
@@ -137,27 +165,34 @@ def filled(z: Real, seen: Flags, correlation: Real) -> Real:
         if np.all(pattern) or not np.any(pattern):
             continue
         rows = np.flatnonzero(which.ravel() == p)
-        guess = np.linalg.solve(correlation[np.ix_(pattern, pattern)], correlation[np.ix_(pattern, ~pattern)])
+        known = correlation[..., pattern, :]
+        guess = np.linalg.solve(known[..., pattern], known[..., ~pattern])
         out[..., rows[:, None], np.flatnonzero(~pattern)] = out[..., rows[:, None], np.flatnonzero(pattern)] @ guess
     return out
 
 
 def whitened(z: Real, correlation: Real) -> Real:
     """Rows (..., d) without the correlation of their columns."""
-    return z @ np.linalg.inv(np.linalg.cholesky(correlation)).T
+    return np.asarray(z @ np.swapaxes(np.linalg.inv(np.linalg.cholesky(correlation)), -1, -2))
 
 
-def standardised(y: Real, X: Real, model: Regression, weight: Real) -> Real:
-    """Residuals (n, d) over their standard deviation and that of the fit at that temperature, filled and whitened.
+def standardised(y: Real, X: Real, model: Regression, weight: Real, fitted: bool = False) -> Real:
+    """Residuals (n, d) over their standard deviation at that temperature, filled and whitened.
 
-    Of a new row of the same structure each is about N(0, 1): the whole row has the squared length T^2.
+    Each is about N(0, 1): the whole row has the squared length T^2. `fitted`: the rows are those of the fit, whose
+    residuals are smaller than the scatter by their leverage; those of new rows are larger.
     """
     seen = weight > 0
     left = weight * (np.where(seen, y, 0.0) - X @ model.coefficients)
-    z = left / np.sqrt(model.variance * (1.0 + leverage(X, model, weight)))
+    z = left / np.sqrt(model.variance * spread_at(leverage(X, model, weight), fitted))
     return whitened(filled(z, seen, model.correlation), model.correlation)
 
 
 def leverage(X: Real, model: Regression, weight: Real) -> Real:
     """w^2 x' (X'WX)^-1 x of each row and column (n, d): how far its temperature lies from those of the training."""
     return np.asarray(weight**2 * np.einsum("nk,dkl,nl->nd", X, model.inverse, X))
+
+
+def spread_at(lever: Real, fitted: bool) -> Real:
+    """Variance of a residual with that leverage over the variance of the scatter."""
+    return np.maximum(1.0 - lever, _LEAST_EIGENVALUE) if fitted else 1.0 + lever

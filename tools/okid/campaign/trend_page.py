@@ -79,8 +79,9 @@ def _over_temperature(series: SeriesTrend, pictures: Pictures) -> str:
 def _chart_picture(series: SeriesTrend, pictures: Pictures) -> str:
     assert series.charts is not None and series.limits is not None
     drawing = figures.figure(9.6, 4.0)
+    needed = series.limits.needed
     pairs = (
-        (series.charts.t2, series.limits.t2, "T² of three in a row [-]"),
+        (series.charts.t2, series.limits.t2, f"T² of {needed} of {needed + 1} [-]"),
         (series.charts.mean, series.limits.mean, "EWMA T² [-]"),
     )
     for place, (values, limit, name) in enumerate(pairs, 1):
@@ -204,8 +205,9 @@ def _chart_words(series: SeriesTrend, trend: Trend) -> str:
         f"not change is {100 * trend.false_alarm_per_year:g} %, half of it for each chart, found with "
         f"{series.limits.simulated} simulated years ({tails} residuals with the persistence of the training, refitted "
         f"on {int(np.sum(series.training))} training groups). T²: squared distance of all watched modes of a group "
-        "from what its temperature lets expect, the smallest of three groups in a row; EWMA: the same of a "
-        "weighted mean (0.2 of the newest group). One or two outlying groups, such as bad records, are in neither."
+        "from what its temperature lets expect, by its rank among those of the training; charted is what "
+        f"{series.limits.needed} of {series.limits.needed + 1} groups in a row exceed; EWMA: the same of a weighted "
+        "mean (0.2 of the newest group). Fewer outlying groups, such as bad records, are in neither."
     )
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from okid._errors import InputError
 from okid.data.whole_file import whole_file
-from okid.structure import Structure
+from okid.mechanics.structure import Structure
 
 Real = NDArray[np.float64]
 MASSES = np.array([1.0, 0.8, 1.2])  # kg
