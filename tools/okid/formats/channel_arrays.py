@@ -117,10 +117,10 @@ def record_of_arrays(
         labels = list(names)
         marks = list(name_units) if len(name_units) == len(labels) else marks
     return Record(
-        [_clean(label) for label in labels], np.hstack(blocks), rate, [_clean(m) for m in marks], remarks=remarks
+        [clean(label) for label in labels], np.hstack(blocks), rate, [clean(m) for m in marks], remarks=remarks
     )
 
 
-def _clean(text: str) -> str:
+def clean(text: str) -> str:
     """A foreign name or unit without control characters and blanks at the ends."""
     return "".join(c if c.isprintable() else " " for c in text).strip()

@@ -16,11 +16,13 @@ from okid._errors import InputError
 from okid.data.records import Record
 from okid.formats.channel_arrays import record_of_arrays, stated_rate
 from okid.formats.foreign_library import library, reading, writing
+from okid.formats.mat_exports import exported, texts
 from okid.formats.result_tree import result_dict, result_tree
 from okid.result.result import Result
 
 _SIGNATURE_73 = b"\x89HDF\r\n\x1a\n"
 _MOST_BYTES = 2**31 - 1  # of one variable in version 5
+_MOST_LEVELS = 8  # of structs and cells within each other
 
 
 def _cells(texts: list[str]) -> NDArray[np.object_]:
@@ -71,24 +73,27 @@ def _is_73(path: str | Path) -> bool:
     return head.startswith(_SIGNATURE_73) or head[512:520] == _SIGNATURE_73
 
 
-def _texts(value: NDArray[Any]) -> list[str] | None:
-    """A text or a cell array of texts as a list; None for anything else."""
-    if value.dtype.kind == "U":
-        return [str(one) for one in value.reshape(-1)] or [""]
-    if value.dtype.kind != "O":
-        return None
-    flat = [np.asarray(one) for one in value.reshape(-1, order="F")]
-    if all(one.dtype.kind == "U" and one.size <= 1 for one in flat):
-        return [str(one.reshape(-1)[0]) if one.size else "" for one in flat]
-    return None
+def _value_5(value: Any, level: int = 0) -> Any:
+    """A variable of loadmat(); structs as dictionaries, arrays of structs as lists of them."""
+    if level > _MOST_LEVELS or not isinstance(value, np.ndarray) or value.dtype.names is None:
+        return value
+    made = [{key: _value_5(one[key], level + 1) for key in value.dtype.names} for one in value.reshape(-1)]
+    return made[0] if len(made) == 1 else made
 
 
 def _variables_5(path: str | Path) -> dict[str, Any]:
-    return {key: value for key, value in loadmat(path, appendmat=False).items() if not key.startswith("__")}
+    return {key: _value_5(value) for key, value in loadmat(path, appendmat=False).items() if not key.startswith("__")}
 
 
-def _value_73(file: Any, item: Any) -> Any:
-    """One variable of a 7.3 file as loadmat() would give it: transposed, texts and cells of texts decoded."""
+def _value_73(file: Any, item: Any, level: int = 0) -> Any:
+    """One variable of a 7.3 file as _value_5() would give it: transposed, texts and cells of texts decoded.
+
+    Fields of an array of structs are cells, one a struct.
+    """
+    if level > _MOST_LEVELS:
+        raise InputError(f"structs and cells are nested more than {_MOST_LEVELS} deep")
+    if hasattr(item, "keys"):
+        return {key: _value_73(file, item[key], level + 1) for key in item}
     kind = item.attrs.get("MATLAB_class", b"")
     kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
     if "MATLAB_empty" in item.attrs:
@@ -99,7 +104,7 @@ def _value_73(file: Any, item: Any) -> Any:
     if kind == "cell" or array.dtype.kind == "O":
         cells = np.empty(array.size, dtype=object)
         for k, one in enumerate(array.reshape(-1)):
-            cells[k] = _value_73(file, file[one])
+            cells[k] = _value_73(file, file[one], level + 1)
         return cells
     if array.dtype.names == ("real", "imag"):
         array = array["real"] + 1j * array["imag"]
@@ -109,8 +114,7 @@ def _value_73(file: Any, item: Any) -> Any:
 def _variables_73(path: str | Path) -> dict[str, Any]:
     h5py = library("h5py", "MATLAB 7.3")
     with h5py.File(path, "r") as file:
-        items = [(key, file[key]) for key in file if not key.startswith("#")]
-        return {key: _value_73(file, item) for key, item in items if isinstance(item, h5py.Dataset)}
+        return {key: _value_73(file, file[key]) for key in file if not key.startswith("#")}
 
 
 def _wanted(variables: dict[str, Any], group: int | str | None) -> dict[str, Any]:
@@ -129,24 +133,29 @@ def read_mat(path: str | Path, group: int | str | None = None) -> Record:
 
     Foreign files: vectors are channels, matrices samples x channels ("y" becomes y1, y2 ..); fs, sample_rate .. (Hz),
     dt, Ts .. (s) or an even vector t, time (s) give the rate; cell arrays names and units are used when they fit.
-    group: variable names with commas, when not all have the same number of samples. InputError of one line otherwise.
+    Exports of Testlab (structs with x_values and y_values) and Dewesoft (Data1_NAME, Data1_time_NAME, Sample_rate) by
+    what they state themselves. group: variable names with commas, when not all have the same number of samples, or the
+    number of a raster of an export. InputError of one line otherwise.
     """
     with reading(path, "a MATLAB file"):
         variables = _variables_73(path) if _is_73(path) else _variables_5(path)
-        own = _texts(variables["okid_record"]) if "okid_record" in variables else None
+        own = texts(variables["okid_record"]) if "okid_record" in variables else None
         if own and group is None:
             return Record.described(variables["samples"], json.loads("".join(own)))
         if "okid_result" in variables and group is None:
             raise InputError("holds an identified model, expected measured samples")
+        foreign = exported(variables, group)
+        if foreign is not None:
+            return foreign
         taken = _wanted(variables, group)
         arrays = {
             key: value for key, value in taken.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiubc"
         }
         rates = {key: rate for key, value in arrays.items() if (rate := stated_rate(key, value)) is not None}
-        texts = {key: _texts(np.asarray(variables[key])) or [] for key in ("names", "units") if key in variables}
+        listed = {key: texts(np.asarray(variables[key])) or [] for key in ("names", "units") if key in variables}
         return record_of_arrays(
             {key: value for key, value in arrays.items() if key not in rates}, rates,
-            names=texts.get("names", []), name_units=texts.get("units", []),
+            names=listed.get("names", []), name_units=listed.get("units", []),
         )  # fmt: skip
 
 
@@ -154,7 +163,7 @@ def read_mat_result(path: str | Path) -> dict[str, Any]:
     """The okid.result/1 dictionary that write_mat() stored. InputError when the file holds none."""
     with reading(path, "a MATLAB file"):
         variables = _variables_73(path) if _is_73(path) else _variables_5(path)
-        found = _texts(variables["okid_result"]) if "okid_result" in variables else None
+        found = texts(variables["okid_result"]) if "okid_result" in variables else None
         if not found:
             raise InputError("holds no okid.result/1")
         return result_dict(json.loads("".join(found)))

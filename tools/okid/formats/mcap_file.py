@@ -9,6 +9,7 @@ A name that ends in .ros2.mcap gets messages of std_msgs in CDR instead, as ROS 
 from __future__ import annotations
 
 import json
+import os
 import re
 import struct
 from collections.abc import Iterable, Sequence
@@ -204,7 +205,9 @@ def write_live_mcap(path: str | Path, lines: Iterable[bytes | str]) -> int:
     """Write the lines of `[publish] socket` as they come, signals too: the file grows meanwhile, and what was written
     can be read whenever the process ends; its index is written when the lines end. @return how many lines."""
     library("mcap.writer", "MCAP")
-    with open(path, "wb") as out:
+    if Path(path).is_symlink():  # replaced, not followed, as whole files are
+        Path(path).unlink()
+    with open(path, "wb", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW, 0o666)) as out:
         return _write_lines(path, out, lines, 1 << 16)
 
 
