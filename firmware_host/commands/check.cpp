@@ -21,6 +21,8 @@ namespace {
 
 std::string memory_text(const live_config& config) {
     const identification_config& id = config.identification;
+    if (id.window_s && id.window == "auto")
+        return fmt::format("a window of at most {:g} s, each update chooses how much", *id.window_s);
     if (id.window_s) return fmt::format("a window of {:g} s", *id.window_s);
     if (id.forgetting) return fmt::format("forgetting {:g} a sample", *id.forgetting);
     return "everything since the start";

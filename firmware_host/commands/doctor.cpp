@@ -72,7 +72,16 @@ bool check_kernel(findings& out) {
     return false;
 }
 
-void check_interface(findings& out, const bus_config& bus) {
+void check_interface(findings& out, const bus_config& config) {
+    bus_config bus = config;
+    bus.interface = interface_of(config);
+    if (bus.interface.empty()) {
+        const std::vector<std::string> there = usb_adapters();
+        out.missing(fmt::format("bus {} (adapter {})", bus.name, bus.adapter),
+                    "no such USB adapter; with CAN there are: " + (there.empty() ? "none" : list_names(there)),
+                    "plug it in; several with one serial number are told apart by their port");
+        return;
+    }
     const std::string what = fmt::format("bus {} ({})", bus.name, bus.interface);
     drv_link_t link{};
     const int code = drv_link_read(bus.interface.c_str(), &link);
@@ -111,12 +120,13 @@ void check_line(findings& out, const bus_config& bus) {
 
 void check_buses(findings& out, const std::optional<live_config>& config, bool kernel_has_can) {
     if (!config) {
-        const std::vector<std::string> there = can_interfaces();
+        const std::vector<std::string> there = can_interfaces(), usb = usb_adapters();
         if (!there.empty())
             out.well("CAN interfaces", list_names(there));
         else if (kernel_has_can)
             out.missing("CAN interfaces", "none",
                         "plug an adapter in, or sudo ip link add vcan0 type vcan && sudo ip link set vcan0 up");
+        if (!usb.empty()) out.well("USB adapters with CAN", list_names(usb));
         return;
     }
     for (const bus_config& bus : config->buses) {

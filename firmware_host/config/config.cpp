@@ -65,6 +65,26 @@ void require_key(const config_place& place, const toml::table& table, const char
     if (!table.contains(key)) refuse_entry(place, table, fmt::format("\"{}\" is missing: {}", key, why));
 }
 
+/// An interface by its name, or that of an adapter, whose name may change.
+void read_adapter(const config_place& place, const toml::table& table, bus_config& bus) {
+    const toml::node* adapter = table.get("adapter");
+    const toml::node* channel = table.get("adapter_channel");
+    if (!adapter) {
+        require_key(place, table, "interface",
+                    "a socketcan bus needs one, such as interface = \"can0\", or the serial number of a USB adapter: "
+                    "adapter = \"...\"");
+        if (channel) refuse_key(place, *channel, "adapter_channel", "it needs adapter beside it");
+        return;
+    }
+    if (const toml::node* name = table.get("interface"))
+        refuse_key(place, *name, "interface", "adapter stands beside it: one of the two");
+    bus.adapter = *table["adapter"].value<std::string>();
+    bus.adapter_channel = table["adapter_channel"].value_or(0);
+    bus.interface = name_in_logs(bus.name);
+    if (bus.adapter.size() >= sizeof drv_usb_t::serial)
+        refuse_key(place, *adapter, "adapter", "a serial number or a port has at most 127 characters");
+}
+
 bus_config read_bus(const config_place& place, const toml::table& table) {
     bus_config bus;
     require_key(place, table, "name", "every bus has a name");
@@ -85,8 +105,7 @@ bus_config read_bus(const config_place& place, const toml::table& table) {
     }
     read_line(place, table, bus);
     read_sending(place, table, bus);
-    if (bus.type == "socketcan")
-        require_key(place, table, "interface", "a socketcan bus needs one, such as interface = \"can0\"");
+    if (bus.type == "socketcan") read_adapter(place, table, bus);
     if (bus.type == "replay") require_key(place, table, "file", "a replay bus needs a candump -L log");
     if (bus.interface.size() >= DRV_NAME_BYTES)
         refuse_key(place, *table.get("interface"), "interface", "an interface name has at most 15 characters");
@@ -119,7 +138,10 @@ void read_buses(const std::string& path, const toml::table& file, live_config& c
                 if (mine && *mine == (key[0] == 'i' ? other.interface : other.device))
                     refuse_key(place, *table.get(key), key, fmt::format("bus \"{}\" uses it already", other.name));
             }
-            if (bus.on_line() && other.interface == bus.interface)
+            if (!bus.adapter.empty() && other.adapter == bus.adapter && other.adapter_channel == bus.adapter_channel)
+                refuse_key(place, *table.get("adapter"), "adapter",
+                           fmt::format("bus \"{}\" uses this channel of it already", other.name));
+            if ((bus.on_line() || !bus.adapter.empty()) && other.interface == bus.interface)
                 refuse_key(place, *table.get("name"), "name",
                            fmt::format("\"{}\" would stand for two buses in a log", bus.interface));
         }

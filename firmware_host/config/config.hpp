@@ -24,6 +24,8 @@ struct bus_config {
     std::string dbc_name;  ///< as the config has it
     bool fd = false;
     std::optional<double> bitrate, dbitrate;
+    std::string adapter;     ///< serial number or port of a USB adapter in place of an interface
+    int adapter_channel = 0; ///< which interface of it
     // What okid sends.
     std::optional<double> sync_hz;
     drv_frame_t sync_frame{};
@@ -79,6 +81,7 @@ struct identification_config {
     std::string method = "auto", hankel = "system", hold = "auto", detrend = "mean", refine = "no";
     int p = 40, rows = 0, order = 0; ///< rows 0 = 2 p, n4sid 30, okid without a force p; order 0 = automatic
     std::optional<double> window_s, forgetting;
+    std::string window = "fixed"; ///< "auto": each update chooses how much of window_s it rests on
     double update_s = 0.5;
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th

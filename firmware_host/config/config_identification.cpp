@@ -34,6 +34,18 @@ std::string window_fault(const identification_config& wanted, std::size_t n_u, s
                        horizon, by_rows ? "rows" : "p");
 }
 
+std::string chosen_window_fault(const identification_config& wanted) {
+    if (wanted.window != "auto") return "";
+    if (wanted.method == "auto")
+        return "\"auto\" compares windows of the sums of one method: expected a method such as \"okid-era\"";
+    if (!wanted.window_s) return "\"auto\" needs window_s, the longest window";
+    if (wanted.sigma_blocks == 0)
+        return "\"auto\" compares windows by their standard deviations: expected sigma_blocks above 0";
+    if (wanted.refine != "no")
+        return "\"auto\" and refine exclude each other: refined modes rest on sums of all of window_s";
+    return "";
+}
+
 namespace {
 
 /// An option of one method alone means the method that release 0.1 took by default.
@@ -42,7 +54,7 @@ std::string chosen_method(const toml::table& t) {
     for (const char* key : {"p", "rows", "order", "hankel", "forgetting"})
         if (t.contains(key) && t[key].value<std::string>() != "auto" && t[key].value<std::string>() != "system")
             return "okid-era";
-    return "auto";
+    return t["window"].value<std::string>() == "auto" ? "okid-era" : "auto";
 }
 
 /// Keys of one method beside auto, and of auto beside one method.
@@ -113,6 +125,9 @@ void read_identification(const toml::table& file, live_config& config) {
     const auto sigma = t["sigma"].value_or(std::string(t.contains("sigma_blocks") ? "jackknife" : "analytic"));
     out.analytic = sigma == "analytic";
     if (sigma == "none") out.sigma_blocks = 0;
+    out.window = t["window"].value_or(out.window);
+    if (const std::string fault = chosen_window_fault(out); !fault.empty())
+        refuse_key(place, *t.get("window"), "window", fault);
     if (out.window_s && out.forgetting)
         refuse_key(place, *t.get("forgetting"), "forgetting",
                    "window_s is given too; a window and forgetting together are not available, choose one");

@@ -25,6 +25,8 @@ constexpr key_owner owners[] = {
     {"counter_field", "serial", "serial with framing = \"ascii\""},
     {"counter_bits", "serial", "serial with framing = \"ascii\""},
     {"btr", "slcan", "slcan"},
+    {"adapter", "socketcan", "socketcan"},
+    {"adapter_channel", "socketcan", "socketcan"},
     {"interface", "socketcan replay", "socketcan or replay; a serial line has a device"},
     {"dbc", "socketcan slcan replay", "socketcan, slcan or replay; the channels of a serial bus have a field"},
     {"fd", "socketcan slcan replay", "socketcan, slcan or replay"},
@@ -95,14 +97,18 @@ const char* framing_name(drv_framing_t framing) {
     return names[framing];
 }
 
+std::string name_in_logs(const std::string& name) {
+    std::string out = name.substr(0, DRV_NAME_BYTES - 1);
+    std::replace_if(out.begin(), out.end(), [](unsigned char c) { return c <= ' ' || c > 126; }, '_');
+    return out;
+}
+
 void read_line(const config_place& place, const toml::table& table, bus_config& bus) {
     check_owners(place, table, bus);
     if (!bus.on_line()) return;
     require(place, table, "device", "one, such as device = \"/dev/serial/by-id/usb-...\"");
     bus.baud = table["baud"].value_or(usual_baud);
-    bus.interface = bus.name.substr(0, DRV_NAME_BYTES - 1);
-    std::replace_if(
-        bus.interface.begin(), bus.interface.end(), [](unsigned char c) { return c <= ' ' || c > 126; }, '_');
+    bus.interface = name_in_logs(bus.name);
     if (bus.device.size() >= DRV_PATH_BYTES)
         refuse_key(place, *table.get("device"), "device",
                    fmt::format("a device has a path of at most {} characters", int{DRV_PATH_BYTES} - 1));

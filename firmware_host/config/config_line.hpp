@@ -6,6 +6,9 @@
 
 namespace okid_host {
 
+/// What stands in a log for a bus without an interface of its own.
+std::string name_in_logs(const std::string& name);
+
 /// Device, baud, framing, counter and registers of `bus`; refuses them on a bus of another type.
 void read_line(const config_place& place, const toml::table& table, bus_config& bus);
 

@@ -87,9 +87,11 @@ void copy_side(const okid_host_columns_t& from, std::size_t first, std::size_t c
     for (; from.channel_stride == side_by_side && done < from.channels;) {
         const char* at = static_cast<const char*>(from.data) + static_cast<std::ptrdiff_t>(done) * side_by_side +
                          static_cast<std::ptrdiff_t>(first) * from.row_stride;
-        const std::size_t left = from.channels - done, some = left >= 4 ? 4 : left >= 2 ? 2 : 1;
-        const auto copy = some == 4 ? copy_rows<Number, 4> : some == 2 ? copy_rows<Number, 2> : copy_rows<Number, 1>;
-        copy(at, from.row_stride, count, width, to + done);
+        static constexpr decltype(&copy_rows<Number, 1>) copies[] = {
+            copy_rows<Number, 1>, copy_rows<Number, 2>, copy_rows<Number, 3>, copy_rows<Number, 4>,
+            copy_rows<Number, 5>, copy_rows<Number, 6>, copy_rows<Number, 7>, copy_rows<Number, 8>};
+        const std::size_t some = std::min<std::size_t>(from.channels - done, 8);
+        copies[some - 1](at, from.row_stride, count, width, to + done);
         done += some;
     }
     for (std::size_t c = done; c < from.channels; ++c) {
@@ -116,7 +118,7 @@ copy_t copy_of(const okid_host_columns_t& from, const char* what) {
 }
 
 /// The rows [u; y] of a record behind those of the set, some at a time through a buffer that stays in the cache.
-/// @return false: some are missing or infinite
+/// @return false: some are missing, infinite or beyond what is measured
 bool append_rows(const okid_host_columns_t& u, const okid_host_columns_t& y, std::size_t count, record_set& set) {
     constexpr std::size_t most = 128;
     const copy_t copies[] = {copy_of(u, "u"), copy_of(y, "y")};
@@ -127,7 +129,7 @@ bool append_rows(const okid_host_columns_t& u, const okid_host_columns_t& y, std
         const std::size_t some = std::min(most, count - first);
         copies[0](u, first, some, width, rows.data());
         copies[1](y, first, some, width, rows.data() + set.n_u);
-        finite = finite && all_finite(rows.data(), some * width);
+        finite = finite && all_measured(rows.data(), some * width);
         set.samples.insert(set.samples.end(), rows.data(), rows.data() + some * width);
     }
     return finite;

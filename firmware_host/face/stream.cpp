@@ -62,7 +62,10 @@ std::vector<double> each(const char* name, const std::string& list, std::size_t 
         out.push_back(number_of(name, list.substr(at, comma - at), expected.c_str()));
         at = comma + 1;
     }
-    if (out.size() <= 1) out.assign(channels, out.empty() ? otherwise : out.front());
+    if (out.size() <= 1) {
+        const double all = out.empty() ? otherwise : out.front(); // a copy: assign() may take no element of its own
+        out.assign(channels, all);
+    }
     if (out.size() != channels) refuse(name, fmt::format("{} numbers", out.size()), expected);
     return out;
 }
@@ -86,7 +89,7 @@ int bits_of(okid_sample_t sample) {
 
 struct stream_request {
     record_request record;
-    std::string window_s, forgetting, update_s, codes, scale, offset, saturated = "keep";
+    std::string window_s, window, forgetting, update_s, codes, scale, offset, saturated = "keep";
     bool restart_on_change = true, states_only = false;
 };
 
@@ -96,6 +99,11 @@ void take_memory(const stream_request& given, stream_config& config) {
     wanted.forgetting = positive("forgetting", given.forgetting, 1, "a factor");
     wanted.update_s = positive("update_s", given.update_s, 1e5, "seconds").value_or(wanted.update_s);
     wanted.restart_on_change = given.restart_on_change;
+    if (!given.window.empty()) wanted.window = given.window;
+    if (wanted.window != "fixed" && wanted.window != "auto")
+        refuse("window", '"' + wanted.window + '"', "fixed or auto");
+    if (const std::string fault = chosen_window_fault(wanted); !fault.empty())
+        throw failure(exit_usage, "window: " + fault);
     if (wanted.window_s && wanted.forgetting)
         throw failure(exit_usage, "window_s and forgetting exclude each other: give one of them, or neither");
     if (const std::string fault = window_fault(wanted, config.inputs.size(), config.outputs.size(), config.rate_hz);
@@ -139,6 +147,7 @@ void start_from(const live_config& config, stream_request& to) {
     r.sigma = wanted.sigma_blocks == 0 ? "none" : wanted.analytic ? "analytic" : "jackknife";
     if (wanted.sigma_blocks > 0) r.sigma_blocks = std::to_string(wanted.sigma_blocks);
     to.window_s = text_of(wanted.window_s);
+    to.window = wanted.window;
     to.forgetting = text_of(wanted.forgetting);
     to.update_s = text_of(wanted.update_s);
     to.restart_on_change = wanted.restart_on_change;
@@ -162,6 +171,7 @@ std::string stream_json(const stream_config& config) {
                         {"hold", wanted.hold},
                         {"detrend", wanted.detrend},
                         {"window_s", or_null(wanted.window_s)},
+                        {"window", wanted.window},
                         {"forgetting", or_null(wanted.forgetting)},
                         {"update_s", wanted.update_s},
                         {"sigma", wanted.sigma_blocks == 0 ? "none"
@@ -179,16 +189,18 @@ stream_config read_stream(const char* text, const live_config* config) {
     if (config) start_from(*config, given);
     option_places places = places_of(given.record);
     for (const auto& [name, place] :
-         {std::pair{"window_s", &given.window_s}, std::pair{"forgetting", &given.forgetting},
-          std::pair{"update_s", &given.update_s}, std::pair{"codes", &given.codes}, std::pair{"scale", &given.scale},
-          std::pair{"offset", &given.offset}, std::pair{"saturated", &given.saturated}})
+         {std::pair{"window_s", &given.window_s}, std::pair{"window", &given.window},
+          std::pair{"forgetting", &given.forgetting}, std::pair{"update_s", &given.update_s},
+          std::pair{"codes", &given.codes}, std::pair{"scale", &given.scale}, std::pair{"offset", &given.offset},
+          std::pair{"saturated", &given.saturated}})
         places.texts.emplace_back(name, place);
     places.flags.emplace_back("restart_on_change", &given.restart_on_change);
     places.flags.emplace_back("states_only", &given.states_only);
     read_options(text, places);
     if (config && config->identification.method != "auto" && given.record.method == "auto") // of the file's own method
         given.record.p = given.record.rows = "", given.record.order = "auto", given.record.hankel = "system";
-    if (given.record.method.empty() && !given.forgetting.empty()) given.record.method = "okid-era";
+    if (given.record.method.empty() && (!given.forgetting.empty() || given.window == "auto"))
+        given.record.method = "okid-era";
     if (given.record.method == "auto" && !given.forgetting.empty())
         refuse("forgetting", given.forgetting, "none with method auto, which keeps the samples of a window: window_s");
     const std::string& method = given.record.method;

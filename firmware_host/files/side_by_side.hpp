@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Threads that do not disturb: no signal is delivered to them, and what they are given comes out the same for any number.
 #pragma once
-#include <csignal>
+#include "signals_wait.hpp"
+
 #include <cstddef>
 #include <functional>
-#include <pthread.h>
 #include <thread>
 #include <utility>
 
@@ -12,12 +12,8 @@ namespace okid_host {
 
 /// A thread that no signal is delivered to.
 template <class Run> std::thread quiet_thread(Run&& run) {
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    std::thread out(std::forward<Run>(run));
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    return out;
+    const signals_wait until_it_runs;
+    return std::thread(std::forward<Run>(run));
 }
 
 /// Call work(0) … work(count - 1), so many at a time and in this order; returns when all are done. Each call must leave the

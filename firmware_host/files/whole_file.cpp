@@ -3,6 +3,7 @@
 #include "whole_file.hpp"
 
 #include "error.hpp"
+#include "signals_wait.hpp"
 
 #include <cerrno>
 #include <csignal>
@@ -28,23 +29,6 @@ volatile std::sig_atomic_t writing = 0;
 }
 
 constexpr std::size_t buffer_bytes = std::size_t{1} << 20;
-
-/// Interrupts wait while it lives: between a temporary file and its name in `unfinished`.
-class interrupts_wait {
-  public:
-    interrupts_wait() {
-        sigset_t these;
-        sigemptyset(&these);
-        for (const int one : {SIGINT, SIGTERM}) sigaddset(&these, one);
-        pthread_sigmask(SIG_BLOCK, &these, &before_);
-    }
-    ~interrupts_wait() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-    interrupts_wait(const interrupts_wait&) = delete;
-    interrupts_wait& operator=(const interrupts_wait&) = delete;
-
-  private:
-    sigset_t before_{};
-};
 
 /// A link that somebody else put into a folder where many may write: what it leads to is not meant.
 bool planted_link(const std::string& path) {
@@ -114,7 +98,7 @@ whole_file::whole_file(std::string path) : path_(std::move(path)) {
     target_ = resolved(path_);
     temporary_ = target_ + ".XXXXXX";
     {
-        const interrupts_wait until_it_is_known;
+        const signals_wait until_it_is_known{SIGINT, SIGTERM};
         fd_ = mkostemp(temporary_.data(), O_CLOEXEC);
         if (fd_ < 0) cannot_write(path_, errno);
         if (temporary_.size() < sizeof unfinished) {

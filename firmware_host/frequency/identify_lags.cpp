@@ -300,9 +300,10 @@ result_context prepare(lag_work& work) {
     for (set_up& one : work.set_ups) {
         record_options own = work.options;
         own.outputs = one.outputs;
+        const missing_count here = count_missing(one.set);
+        check_measured(here, one.set, own);
         check_moving(one.set, own);
         check_different_inputs(moments_of(one.set), own);
-        const missing_count here = count_missing(one.set);
         missing.samples += here.samples;
         missing.gaps += here.gaps;
         one.set.complete = here.samples == 0;

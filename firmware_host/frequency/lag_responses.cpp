@@ -58,7 +58,7 @@ class block_correlator {
     void add_block(const double* rows, std::size_t first, std::size_t last) {
         const std::size_t before = std::min(first, lags_);
         std::vector<bool> there;
-        for (std::size_t i = first - before; i < last; ++i) there.push_back(all_finite(rows + i * m_, m_));
+        for (std::size_t i = first - before; i < last; ++i) there.push_back(all_measured(rows + i * m_, m_));
         // `late`: the block itself; `early`: with the past in front, `lags_` places later than its time
         const auto transform = [&](bool early, auto value) {
             std::vector<double> x(size_, 0.0);

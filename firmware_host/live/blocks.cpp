@@ -177,11 +177,11 @@ void live_blocks::delete_parts(okid_accumulator_t* whole, replicate_statistics& 
 }
 
 /// Groups of consecutive slots with about equal rows.
-void live_blocks::delete_slots(okid_accumulator_t* whole, replicate_statistics& to) {
+void live_blocks::delete_slots(okid_accumulator_t* whole, std::int32_t from, replicate_statistics& to) {
     const std::int32_t slots = okid_accumulator_slots(whole);
-    const std::int64_t rows = okid_accumulator_rows(whole);
-    std::int64_t seen = 0;
-    for (std::int32_t first = 0, group = 1; first < slots; ++group) {
+    std::int64_t rows = okid_accumulator_rows(whole), seen = 0;
+    for (std::int32_t k = 0; k < from; ++k) rows -= okid_accumulator_slot_rows(whole, k);
+    for (std::int32_t first = from, group = 1; first < slots; ++group) {
         std::int32_t last = first;
         do seen += okid_accumulator_slot_rows(whole, last++);
         while (last < slots && seen * static_cast<std::int64_t>(blocks_) < group * rows);
@@ -193,28 +193,36 @@ void live_blocks::delete_slots(okid_accumulator_t* whole, replicate_statistics& 
 }
 
 /// The derivative where it serves, else identifications without each block, for which a window becomes one record.
-bool live_blocks::begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass) {
+bool live_blocks::begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass,
+                        std::int32_t first) {
     jackknife_ = linear_;
     if (linear_ && (linear_mass_ || !mass)) {
-        if (okid_jackknife_begin_linear(linear_, by, whole, &model) == OKID_OK) return true;
+        if (okid_jackknife_begin_linear(linear_, by, gather(whole, first), &model) == OKID_OK) return true;
     }
-    return begin_anew(whole, model);
+    return begin_anew(whole, model, first);
 }
 
-bool live_blocks::begin_anew(okid_accumulator_t* whole, const okid_identified_t& model) {
+bool live_blocks::begin_anew(okid_accumulator_t* whole, const okid_identified_t& model, std::int32_t first) {
     jackknife_ = anew_;
-    okid_accumulator_t* all = whole;
-    if (window()) {
-        all = parts_[0].sums;
-        okid_accumulator_reset(all);
-        if (okid_accumulator_take_slots(all, whole, 0, okid_accumulator_slots(whole)) != OKID_OK) return false;
-    }
-    return okid_jackknife_begin(anew_, all, &model) == OKID_OK;
+    return okid_jackknife_begin(anew_, window() ? together(whole, first) : whole, &model) == OKID_OK;
+}
+
+okid_accumulator_t* live_blocks::gather(okid_accumulator_t* whole, std::int32_t first) {
+    return first > 0 ? together(whole, first) : whole;
+}
+
+/// The slots of a window from one on, together.
+okid_accumulator_t* live_blocks::together(okid_accumulator_t* whole, std::int32_t first) {
+    okid_accumulator_t* all = parts_[0].sums;
+    okid_accumulator_reset(all);
+    check_statistics(okid_accumulator_take_slots(all, whole, first, okid_accumulator_slots(whole) - first));
+    return all;
 }
 
 std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, okid_identify_t* by,
-                                             const okid_identified_t& model, const mass_plan& plan) {
-    if (!begin(whole, by, model, plan.wanted())) return std::nullopt;
+                                             const okid_identified_t& model, const mass_plan& plan,
+                                             std::int32_t first) {
+    if (!begin(whole, by, model, plan.wanted(), first)) return std::nullopt;
     std::unique_ptr<replicate_statistics> with_mass;
     if (plan.wanted()) with_mass = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, plan, dt_);
     replicate_statistics& statistics = with_mass ? *with_mass : *modes_;
@@ -222,14 +230,14 @@ std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, okid_ide
         most_of_one_ = 0;
         statistics.begin(model_view(model));
         if (window())
-            delete_slots(whole, statistics);
+            delete_slots(whole, first, statistics);
         else
             delete_parts(whole, statistics);
         return statistics.finish();
     };
     deviations out = without_each();
     if (jackknife_ == linear_ && linear_ && most_of_one_ > most_of_one_block) {
-        if (!begin_anew(whole, model)) return std::nullopt;
+        if (!begin_anew(whole, model, first)) return std::nullopt;
         out = without_each();
     }
     if (out.replicates < fewest_blocks) return std::nullopt;

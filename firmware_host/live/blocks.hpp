@@ -64,9 +64,13 @@ class live_blocks {
     /// Begin anew, as the whole does.
     void reset();
 
+    /// A window from slot `first` on, as one record from 1 on. Valid until the next call of this or of sigma().
+    okid_accumulator_t* gather(okid_accumulator_t* whole, std::int32_t first);
+
     /// Standard deviations of `model`, which the last run of `by` identified from `whole`; none with too few blocks.
+    /// @param first  of a window: the model was identified from what gather() gives of this slot
     std::optional<deviations> sigma(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model,
-                                    const mass_plan& plan);
+                                    const mass_plan& plan, std::int32_t first = 0);
 
   private:
     struct part : owned_sums {
@@ -80,10 +84,12 @@ class live_blocks {
     template <class Code> void begin_with(okid_accumulator_t* sums, std::vector<Code>& codes);
     void pair_up();
     void delete_parts(okid_accumulator_t* whole, replicate_statistics& to);
-    void delete_slots(okid_accumulator_t* whole, replicate_statistics& to);
+    void delete_slots(okid_accumulator_t* whole, std::int32_t from, replicate_statistics& to);
+    okid_accumulator_t* together(okid_accumulator_t* whole, std::int32_t first);
     void leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to);
-    bool begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass);
-    bool begin_anew(okid_accumulator_t* whole, const okid_identified_t& model);
+    bool begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass,
+               std::int32_t first);
+    bool begin_anew(okid_accumulator_t* whole, const okid_identified_t& model, std::int32_t first);
 
     okid_accumulator_config_t whole_, sums_{};
     std::size_t m_, blocks_;

@@ -133,7 +133,7 @@ class pump {
             if (!target_.heard()) say("okid: waiting for frames on {} ...\n", readers_.front()->interface());
             for (std::size_t i = 0; i < readers_.size(); ++i)
                 if (readers_[i]->filtered() && !target_.check().unheard(i).empty())
-                    listeners_.push_back(std::make_unique<bus_listener>(readers_[i]->interface(), i));
+                    listeners_.push_back(std::make_unique<bus_listener>(config_.buses[i], i));
         } else if (listening_ == 1 && passed_s > 3) {
             listening_ = 2;
             listeners_.clear();

@@ -84,6 +84,7 @@ void identifier::create_accumulator(const stream_config& config) {
     blocks_ = std::make_unique<live_blocks>(sums_config_, identify_config_, config.wanted.sigma_blocks,
                                             config.wanted.analytic, config.states_only);
     blocks_->set_units(scale_, offset_);
+    if (config.wanted.window == "auto") chooser_ = std::make_unique<window_chooser>(config);
 }
 
 void identifier::create_identifier(const stream_config& config) {
@@ -159,8 +160,9 @@ std::vector<double> identifier::predicted_percent() {
     if (agreed_) return agreed_->found().context.prediction_percent.value_or(std::vector<double>());
     const std::size_t size = m_ * static_cast<std::size_t>(lags() + 1), n_u = m_ - static_cast<std::size_t>(model_.n_y);
     std::vector<double> gram(size * size), out;
-    const std::int64_t rows = okid_accumulator_rows(accumulator_);
-    if (okid_accumulator_gram(accumulator_, identify_config_.detrend, gram.data(), nullptr) < 0) return out;
+    okid_accumulator_t* sums = chooser_ ? blocks_->gather(accumulator_, chooser_->chosen().first) : accumulator_;
+    const std::int64_t rows = okid_accumulator_rows(sums);
+    if (okid_accumulator_gram(sums, identify_config_.detrend, gram.data(), nullptr) < 0) return out;
     for (std::size_t i = 0; i < m_ - n_u; ++i) {
         const double variance = gram[(n_u + i) * (size + 1)] / static_cast<double>(rows);
         const auto innovation = static_cast<double>(model_.innovation[i * (m_ - n_u + 1)]);
@@ -181,6 +183,7 @@ void identifier::restart() {
     okid_accumulator_reset(accumulator_);
     if (blocks_) blocks_->reset();
     if (refiner_) refiner_->reset();
+    if (chooser_) chooser_->reset();
 }
 
 /// A row of raw numbers to those kept for auto, with the watch over it.
@@ -317,6 +320,7 @@ void identifier::reset_counts() {
     samples_ = due_ = blind_until_ = restarts_ = 0;
     change_at_.reset();
     before_ = {};
+    if (chooser_) chooser_->reset();
 }
 
 /// The first bytes of a state, those of its correlation sums.
@@ -420,7 +424,8 @@ okid_status_t identifier::run(const mass_plan& mass) {
         return status;
     }
     flush();
-    const okid_status_t status = okid_identify_run(identify_, accumulator_, &realised_);
+    const okid_status_t status = chooser_ ? chooser_->run(accumulator_, identify_, *blocks_, realised_)
+                                          : okid_identify_run(identify_, accumulator_, &realised_);
     model_ = realised_;
     if (status >= 0 && refiner_) refiner_->refine(model_);
     return status;
@@ -457,6 +462,7 @@ std::int64_t identifier::basis() {
     if (agreed_) return agreed_->basis();
     const okid_accumulator_stats_t counts = held();
     const std::int64_t all = counts.samples + counts.missing; // as in a file: missing samples are samples of the record
+    if (chooser_ && chooser_->chosen().first > 0) return chooser_->chosen().rows;
     return memory_samples_ > 0 ? std::min(all, memory_samples_) : all;
 }
 

@@ -5,6 +5,7 @@
 #include "blocks.hpp"
 #include "stream_config.hpp"
 #include "sum_refiner.hpp"
+#include "window_choice.hpp"
 
 #include <okid/accumulator.h>
 #include <okid/identify.h>
@@ -62,9 +63,12 @@ class identifier {
     std::optional<deviations> sigma(const mass_plan& plan) {
         if (agreed_) return agreed_->found().context.sigma;
         if (refiner_ && refiner_->refined()) return refiner_->sigma(model_, plan);
-        return blocks_ && samples_ >= blind_until_ ? blocks_->sigma(accumulator_, identify_, model_, plan)
-                                                   : std::nullopt;
+        return blocks_ && samples_ >= blind_until_
+                   ? blocks_->sigma(accumulator_, identify_, model_, plan, chooser_ ? chooser_->chosen().first : 0)
+                   : std::nullopt;
     }
+    /// What of the window the model of the last run() rests on; none where that is not chosen.
+    const window_choice* window() const { return chooser_ ? &chooser_->chosen() : nullptr; }
     /// Of each output 100 (1 - innovation / spread), both RMS: what the model of the last run() says of the next sample.
     std::vector<double> predicted_percent();
     const okid_identify_config_t& config() const { return identify_config_; }
@@ -125,6 +129,7 @@ class identifier {
     okid_identified_t model_{}, realised_{};
     std::unique_ptr<live_blocks> blocks_;
     std::unique_ptr<sum_refiner> refiner_;
+    std::unique_ptr<window_chooser> chooser_;
 
     bool restart_on_change_ = false, watched_ = false; ///< the watch has a model
     std::unique_ptr<std::byte[]> watch_block_;

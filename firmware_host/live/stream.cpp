@@ -15,8 +15,10 @@
 namespace okid_host {
 namespace {
 
-/// What a model rests on, s; 0 where nothing is forgotten.
+/// What a model rests on at least, s; 0 where nothing is forgotten.
 double memory_s(const stream_config& config) {
+    if (config.wanted.window == "auto")
+        return static_cast<double>(window_chooser::fewest_rows(config)) / config.rate_hz;
     if (config.wanted.window_s) return *config.wanted.window_s;
     const double lambda = config.wanted.forgetting.value_or(1.0);
     return lambda < 1 ? 1 / ((1 - lambda) * config.rate_hz) : 0;
@@ -152,6 +154,11 @@ result_context stream::context(remarks said) {
             if (out.refined && !out.refined->converged) out.warnings.push_back(refine_unconverged(*out.refined));
         }
     }
+    if (const window_choice* chosen = identifier_.window(); chosen && chosen->against)
+        out.warnings.emplace_back("window_shortened",
+                                  fmt::format("the result rests on the newest {:.4g} s of the window: {}",
+                                              static_cast<double>(chosen->rows) / config_.rate_hz,
+                                              window_reason(*chosen, config_.rate_hz)));
     if (stats.missing > 0 && !agreed)
         out.warnings.push_back(missing_samples({stats.missing, stats.gaps}, stats.samples + stats.missing));
     if (identifier_.restarts() > 0)

@@ -5,6 +5,7 @@
 
 #include "result/method.hpp"
 #include "stream_memory.hpp"
+#include "window_choice.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -79,8 +80,10 @@ okid_accumulator_config_t sums_config_of(const stream_config& config) {
     a.edges = 1;
     if (wanted.window_s) {
         const std::int64_t window = std::max<std::int64_t>(1, std::llround(*wanted.window_s * config.rate_hz));
-        const std::int64_t block =
-            std::clamp(update, std::max<std::int64_t>(1, window / 64), std::max<std::int64_t>(1, window / 20));
+        const std::int64_t finest = wanted.window == "auto" ? window_chooser::slots : 64,
+                           coarsest = wanted.window == "auto" ? finest : 20;
+        const std::int64_t block = std::clamp(update, std::max<std::int64_t>(1, window / finest),
+                                              std::max<std::int64_t>(1, window / coarsest));
         a.block = static_cast<std::int32_t>(std::min<std::int64_t>(block, INT32_MAX));
         a.slots = static_cast<std::int32_t>(
             std::max<std::int64_t>(1, std::llround(static_cast<double>(window) / static_cast<double>(a.block))));

@@ -121,6 +121,9 @@ void update_maker::tell_modes(const deviations* sigma, update_report& out) {
                           {"window_s", seconds(basis)},
                           {"samples", basis},
                           {"settled", state.settled}});
+    if (const window_choice* chosen = stream_.sums().window())
+        out.events.back()["window_reason"] =
+            chosen->against ? ordered_json(window_reason(*chosen, rate_hz_)) : ordered_json(nullptr);
 }
 
 /// One alarm as long as any mode is away: the farthest has its name on it, the others stand in "modes".

@@ -7,10 +7,13 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -21,12 +24,27 @@ namespace {
     throw failure(code, fmt::format("[publish] socket {}: {}", printable(path), text));
 }
 
+sockaddr_un address_of(const std::string& path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    return address;
+}
+
+/// Never in the place of a file that came there meanwhile, where the file system can tell.
+bool rename_alone(const std::string& from, const std::string& to) {
+    constexpr unsigned no_replace = 1; // RENAME_NOREPLACE; the call is younger than glibc 2.17
+    if (syscall(SYS_renameat2, AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), no_replace) == 0) return true;
+    return (errno == ENOSYS || errno == EINVAL) && rename(from.c_str(), to.c_str()) == 0;
+}
+
 /// Out of the way with what a program that died left behind.
-void remove_stale(const std::string& path, const sockaddr_un& address) {
+void remove_stale(const std::string& path) {
     struct stat found{};
     if (lstat(path.c_str(), &found) != 0) return;
     if (!S_ISSOCK(found.st_mode)) refuse(exit_usage, path, "found another file there, expected a socket or nothing");
     const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    const sockaddr_un address = address_of(path);
     const int result = connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof address);
     const int why = errno;
     close(probe);
@@ -40,18 +58,21 @@ void remove_stale(const std::string& path, const sockaddr_un& address) {
 } // namespace
 
 subscribers::subscribers(const std::string& path) : path_(path) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
-    remove_stale(path, address);
+    remove_stale(path);
+    // Who waits for the file may connect at once: it gets its name when it is listened to. A name as long as its own fits too.
+    std::string before = path;
+    before.back() = before.back() == '~' ? '-' : '~';
+    const sockaddr_un address = address_of(before);
+    remove_stale(before);
     fd_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    // Nobody can connect before listen(): the mode is right by then.
-    if (fd_ < 0 || bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        chmod(path.c_str(), 0660) != 0 || listen(fd_, static_cast<int>(most)) != 0) {
-        const int why = errno;
-        if (fd_ >= 0) close(fd_);
-        refuse(exit_usage, path, fmt::format("cannot be made: {}", std::strerror(why)));
-    }
+    const bool bound = fd_ >= 0 && bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    const bool named = bound && chmod(before.c_str(), 0660) == 0 && listen(fd_, static_cast<int>(most)) == 0 &&
+                       rename_alone(before, path);
+    const int why = errno;
+    if (named) return;
+    if (bound) unlink(before.c_str());
+    if (fd_ >= 0) close(fd_);
+    refuse(exit_usage, path, fmt::format("cannot be made: {}", std::strerror(why)));
 }
 
 subscribers::~subscribers() {

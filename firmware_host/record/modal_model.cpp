@@ -29,13 +29,7 @@ void put_modes(const std::vector<listed_mode>& modes, refined_arrays& to, okid_i
         }
     }
     model.mode_count = static_cast<std::int32_t>(modes.size());
-    model.frequency_hz = to.frequency.data();
-    model.damping_ratio = to.damping.data();
-    model.mpc = to.mpc.data();
-    model.emac = to.emac.data();
-    model.cmi = to.cmi.data();
-    model.shape_re = to.shape_re.data();
-    model.shape_im = to.shape_im.data();
+    to.show_modes(model);
 }
 
 void put_states(const std::vector<listed_mode>& modes, refined_arrays& to, okid_identified_t& model) {

@@ -302,6 +302,7 @@ void detrend_linear(record_set& set, const record_options& options) {
 }
 
 result_context describe_records(const record_set& set, const record_options& options, const missing_count& missing) {
+    check_measured(missing, set, options);
     const std::size_t total = set.count();
     result_context context;
     context.method = options.method;

@@ -113,6 +113,17 @@ std::vector<input_moments> moments_of(const record_set& set) {
     return out;
 }
 
+void check_measured(const missing_count& missing, const record_set& set, const record_options& options) {
+    if (missing.beyond == 0) return;
+    throw failure(exit_usage,
+                  fmt::format("{}: {} \"{}\" is {:g} at sample {} (from 0), expected less than {:g}: it was not "
+                              "measured. Leave the field of a missing sample empty, NaN in arrays",
+                              set.records[missing.beyond_record].path,
+                              missing.beyond_channel < set.n_u ? "input" : "output",
+                              name_of(missing.beyond_channel, options), missing.beyond, missing.beyond_sample,
+                              no_measured_value));
+}
+
 void check_moving(const record_set& set, const record_options& options) {
     for (std::size_t k = 0; k < set.channels(); ++k) {
         const channel_movement found = movement_of(set, k);
@@ -173,11 +184,17 @@ void check_different_inputs(const std::vector<input_moments>& about, const recor
 
 void check_explains(const result_context& context) {
     constexpr double least_percent = 5;
-    double best = -1e300;
+    double best = -HUGE_VAL;
     for (const auto* fits : {&context.simulation_percent, &context.prediction_percent})
         for (const double fit : fits->value_or(std::vector<double>{}))
             if (std::isfinite(fit)) best = std::max(best, fit);
     if (best >= least_percent) return;
+    if (best == -HUGE_VAL)
+        throw failure(
+            exit_no_model,
+            "no model: no stretch of the record can judge it: 20 samples in a row, and twice the order, have to "
+            "be without a missing input",
+            OKID_ERR_TOO_SHORT);
     throw failure(
         exit_no_model,
         fmt::format(

@@ -18,6 +18,9 @@ struct input_moments {
 /// Of each record, over its samples that have all inputs.
 std::vector<input_moments> moments_of(const record_set& set);
 
+/// Refuses a number that no sensor gives.
+void check_measured(const missing_count& missing, const record_set& set, const record_options& options);
+
 /// A channel that never moves makes any model a guess.
 void check_moving(const record_set& set, const record_options& options);
 

@@ -156,13 +156,7 @@ bool make_model(const okid_identified_t& start, const okid_refined_t& found, ref
     model.D = to.D.data();
     model.K = to.K.data();
     if (!find_modes(start, to, model)) return false;
-    model.frequency_hz = to.frequency.data();
-    model.damping_ratio = to.damping.data();
-    model.mpc = to.mpc.data();
-    model.emac = to.emac.data();
-    model.cmi = to.cmi.data();
-    model.shape_re = to.shape_re.data();
-    model.shape_im = to.shape_im.data();
+    to.show_modes(model);
     find_markov(model_view(model), model.markov_count, to.markov);
     model.markov = to.markov.data();
     return true;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <fmt/format.h>
 
@@ -16,26 +17,31 @@ bool is_complete(const double* row, std::size_t channels) {
 
 /// A record without a gap.
 bool is_whole(const record_set& set, const record_data& record) {
-    return set.complete || all_finite(set.rows(record), record.count * set.channels());
+    return set.complete || all_measured(set.rows(record), record.count * set.channels());
 }
 
 } // namespace
 
-/// In vectors: nearly always they all are, and then so is their sum.
-bool all_finite(const double* x, std::size_t count) {
+/// In vectors: nearly always they all are, and then so is the sum of their magnitudes.
+bool all_measured(const double* x, std::size_t count) {
     using lanes = double __attribute__((vector_size(16)));
+    using bits = std::uint64_t __attribute__((vector_size(16)));
+    constexpr bits magnitude = {~(std::uint64_t{1} << 63), ~(std::uint64_t{1} << 63)};
     lanes sums[4] = {};
     std::size_t i = 0;
     for (; i + 8 <= count; i += 8)
 #pragma GCC unroll 4
         for (std::size_t k = 0; k < 4; ++k) {
-            lanes v;
+            bits v;
             std::memcpy(&v, x + i + 2 * k, sizeof v);
-            sums[k] += v;
+            v &= magnitude;
+            lanes one;
+            std::memcpy(&one, &v, sizeof one);
+            sums[k] += one;
         }
     const lanes sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
-    const auto finite = [](double one) { return std::isfinite(one); };
-    return std::all_of(std::isfinite(sum[0] + sum[1]) ? x + i : x, x + count, finite);
+    const auto measured = [](double one) { return std::abs(one) < no_measured_value; };
+    return std::all_of(measured(sum[0] + sum[1]) ? x + i : x, x + count, measured);
 }
 
 void record_set::add(std::string path, const double* from, std::size_t rows) {
@@ -58,6 +64,15 @@ missing_count count_missing(const record_set& set) {
         const double* row = set.rows(record);
         for (std::size_t i = 0; i < record.count; ++i, row += set.channels()) {
             const bool gone = !is_complete(row, set.channels());
+            const double* beyond = std::find_if(row, row + set.channels(), [](double one) {
+                return std::isfinite(one) && std::abs(one) >= no_measured_value;
+            });
+            if (beyond != row + set.channels() && out.beyond == 0) {
+                out.beyond = *beyond;
+                out.beyond_record = static_cast<std::size_t>(&record - set.records.data());
+                out.beyond_sample = i;
+                out.beyond_channel = static_cast<std::size_t>(beyond - row);
+            }
             out.samples += gone;
             out.gaps += gone && !in_gap;
             in_gap = gone;

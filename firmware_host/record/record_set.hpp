@@ -30,11 +30,16 @@ struct record_set {
     void add(std::string path, std::vector<double> rows, std::size_t begin, std::size_t end);
 };
 
-/// Is none of these numbers missing or infinite?
-bool all_finite(const double* x, std::size_t count);
+/// No sensor gives as much in any unit: a program's word for "no value", 1e37 or 3.4e38 for instance.
+constexpr double no_measured_value = 1e30;
+
+/// Is each of these numbers there, and one that a sensor can have given?
+bool all_measured(const double* x, std::size_t count);
 
 struct missing_count {
     long long samples = 0, gaps = 0; ///< samples with any channel missing, and the runs they form
+    double beyond = 0;               ///< the first number that no sensor gives, 0: there is none
+    std::size_t beyond_record = 0, beyond_sample = 0, beyond_channel = 0;
 };
 missing_count count_missing(const record_set& set);
 /// What is to be said of them, of so many samples: (code, text).

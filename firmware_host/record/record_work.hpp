@@ -15,6 +15,17 @@ struct refined_arrays {
     std::vector<double> A, B, C, D, K, markov, frequency, damping, mpc, emac, cmi, shape_re, shape_im;
     std::vector<double> innovation, mean;               ///< of a modal model
     std::vector<double> C_without_skew, D_without_skew; ///< where outputs come late
+
+    /// The model looks into the modes that are here.
+    void show_modes(okid_identified_t& model) const {
+        model.frequency_hz = frequency.data();
+        model.damping_ratio = damping.data();
+        model.mpc = mpc.data();
+        model.emac = emac.data();
+        model.cmi = cmi.data();
+        model.shape_re = shape_re.data();
+        model.shape_im = shape_im.data();
+    }
 };
 
 /// Records, configuration and model. The model looks into `memory` (of `identifier`) or, refined, into `refined`.

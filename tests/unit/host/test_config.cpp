@@ -79,7 +79,7 @@ void refuse(const std::string& text, std::initializer_list<const char*> words) {
     TEST_FAIL_MESSAGE(text.c_str());
 }
 
-void refuse_change(const char* from, const char* to, std::initializer_list<const char*> words) {
+void refuse_change(const char* from, const std::string& to, std::initializer_list<const char*> words) {
     refuse(replaced(good, from, to), words);
 }
 
@@ -154,6 +154,13 @@ static void test_not_available() {
     refuse_change("p = 20", "method = \"n4sid-cvo\"", {"method", "did you mean \"n4sid-cva\"?"});
     refuse_change("p = 20", "forgetting = 0.999", {"forgetting", "window_s", "choose one"});
     refuse_change("p = 20", "detrend = \"linear\"", {"detrend", "linear"});
+    refuse_change("window_s = 10", "window = \"auto\"", {"window", "needs window_s, the longest window"});
+    refuse_change("window_s = 10", "window_s = 10\nwindow = \"auto\"\nmethod = \"auto\"",
+                  {"window", "expected a method such as \"okid-era\""});
+    refuse_change("window_s = 10", "window_s = 10\nwindow = \"auto\"\nsigma = \"none\"",
+                  {"window", "expected sigma_blocks above 0"});
+    refuse_change("window_s = 10", "window_s = 10\nwindow = \"auto\"\nrefine = \"yes\"",
+                  {"window", "refine exclude each other"});
     refuse_change("interface = \"vcan0\"", "type = \"serial\"\ndevice = \"/dev/ttyUSB0\"",
                   {"dbc", "found on a bus of type serial", "the channels of a serial bus have a field"});
     refuse_change("interface = \"vcan0\"", "type = \"usb\"",
@@ -194,6 +201,26 @@ static void test_a_geometry_is_taken_in_silence() {
     const live_config config =
         load(good + "[geometry]\nnodes = [[0, 0, 0]]\ndofs = [[1, \"x\"], [1, \"+y\"], [1, \"-z\"]]\n");
     TEST_ASSERT_EQUAL_INT(0, config.warnings.size());
+}
+
+static void test_an_adapter_in_place_of_an_interface() {
+    live_config config = load(replaced(good, "interface = \"vcan0\"", "adapter = \"1-1.4\"\nadapter_channel = 1"));
+    TEST_ASSERT_EQUAL_STRING("1-1.4", config.buses[0].adapter.c_str());
+    TEST_ASSERT_EQUAL_INT(1, config.buses[0].adapter_channel);
+    TEST_ASSERT_EQUAL_STRING("can0", config.buses[0].interface.c_str()); // in logs
+    refuse_change("interface = \"vcan0\"", "", {"\"interface\" is missing", "adapter = "});
+    refuse_change("interface = \"vcan0\"", "interface = \"vcan0\"\nadapter = \"0042\"",
+                  {"line 6", "\"interface\"", "one of the two"});
+    refuse_change("interface = \"vcan0\"", "interface = \"vcan0\"\nadapter_channel = 1",
+                  {"line 7", "\"adapter_channel\"", "needs adapter"});
+    refuse_change("interface = \"vcan0\"", "adapter = \"\"", {"line 6", "\"adapter\"", "expected text"});
+    refuse_change("interface = \"vcan0\"", "adapter = \"" + std::string(128, '4') + "\"",
+                  {"line 6", "\"adapter\"", "at most 127"});
+    refuse_change("interface = \"vcan0\"", "type = \"slcan\"\ndevice = \"/dev/ttyACM0\"\nadapter = \"0042\"",
+                  {"\"adapter\"", "on a bus of type slcan"});
+    const char* second = "[[bus]]\nname = \"two\"\nadapter = \"0042\"\n[[channel]]";
+    const std::string one = replaced(good, "interface = \"vcan0\"", "adapter = \"0042\"");
+    refuse(replaced(one, "[[channel]]", second), {"\"adapter\"", "bus \"can0\" uses this channel of it already"});
 }
 
 static void test_alarm() {
@@ -247,6 +274,7 @@ int main(void) {
     RUN_TEST(test_channels);
     RUN_TEST(test_syntax_and_files);
     RUN_TEST(test_a_geometry_is_taken_in_silence);
+    RUN_TEST(test_an_adapter_in_place_of_an_interface);
     RUN_TEST(test_alarm);
     RUN_TEST(test_publish);
     return UNITY_END();
