@@ -15,7 +15,7 @@ $bin/ruff format --check --config tools/pyproject.toml -q tools tests || { echo 
 
 # Its own compile commands: clang cannot read the precompiled headers of gcc.
 cmake -S . -B build/tidy -G Ninja -DOKID_BUILD_TESTS=OFF -DOKID_UNITY=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON --log-level=WARNING >/dev/null || exit 1
-tidy() { xargs -r -P 2 -n 4 $bin/clang-tidy --quiet -p build/tidy "$@" 2>/dev/null || { echo "lint: clang-tidy found something"; bad=1; }; }
+tidy() { xargs -r -P "${JOBS:-2}" -n 4 $bin/clang-tidy --quiet -p build/tidy "$@" 2>/dev/null || { echo "lint: clang-tidy found something"; bad=1; }; }
 analyser='clang-analyzer-*,-clang-analyzer-optin.performance.Padding,-clang-analyzer-unix.StdCLibraryFunctions'
 analyser+=',-clang-analyzer-security.insecureAPI.DeprecatedOrUnsafeBufferHandling'
 built() { git ls-files "$@" | while read -r file; do grep -q "/$file\"" build/tidy/compile_commands.json && echo "$file"; done; }

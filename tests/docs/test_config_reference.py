@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from command_help import ROOT
+from page_runner import LEAST_CONFIG
 from program import okid
 from reference_tables import REFERENCE, codes, rows, sections
 
@@ -70,30 +71,12 @@ def test_keys_of_a_lamp(folder: pathlib.Path) -> None:
         assert said(folder, f"[lamps]\ngo = {{ {key} = 1979-05-27 }}\n").endswith(f"expected {value}")
 
 
-LEAST = """[acquisition]
-rate_hz = 1000.0
-[[bus]]
-name = "can0"
-interface = "can0"
-[[channel]]
-name = "f"
-role = "force"
-can_id = 1
-start_bit = 0
-length = 16
-[[channel]]
-name = "a"
-role = "acceleration"
-can_id = 1
-start_bit = 16
-length = 16
-"""
 SHOWN = {
     "acquisition": ("decimate",),
-    "bus": ("type", "clock", "fd"),
+    "bus": ("type", "clock", "fd", "adapter_channel"),
     "channel": ("extended", "byte_order", "signed", "value", "scale", "offset"),
     "identification": (
-        "method", "hankel", "order", "hold", "detrend", "refine", "update_s", "sigma", "sigma_blocks",
+        "method", "hankel", "order", "hold", "detrend", "refine", "window", "update_s", "sigma", "sigma_blocks",
         "restart_on_change", "mkr",
     ),
     "alarm": ("enabled", "k_sigma", "baseline_updates", "false_alarm"),
@@ -102,12 +85,12 @@ SHOWN = {
     "record": ("directory", "segment_mb", "max_mb", "pretrigger_s"),
     "publish": ("samples",),
 }  # fmt: skip
-NEEDED = {"trigger": 'source = "level"\nchannel = "f"\nlevel = 2.0\n', "hammer": "level = 20.0\n"}
+NEEDED = {"trigger": 'source = "level"\nchannel = "force"\nlevel = 2.0\n', "hammer": "level = 20.0\n"}
 
 
 def shown(folder: pathlib.Path, more: str = "", rate: str = "1000.0") -> dict[str, Any]:
     """What `okid check --json` says of the least config and some lines more."""
-    (folder / "c.toml").write_text(LEAST.replace("1000.0", rate) + more)
+    (folder / "c.toml").write_text(LEAST_CONFIG.replace("1000.0", rate) + more)
     said: dict[str, Any] = json.loads(okid("check", folder / "c.toml", "--json", status=0).stdout)
     del said["sections"]
     return said
@@ -117,7 +100,7 @@ def shown(folder: pathlib.Path, more: str = "", rate: str = "1000.0") -> dict[st
 def test_defaults_are_those_of_the_program(folder: pathlib.Path, section: str) -> None:
     """A section that is not there is one without a key; `okid check` shows what stands then."""
     said, table = (
-        shown(folder, f"[{section}]\n{NEEDED.get(section, '')}" if section not in LEAST else ""),
+        shown(folder, f"[{section}]\n{NEEDED.get(section, '')}" if section not in LEAST_CONFIG else ""),
         page_rows(section),
     )
     values = {"acquisition": said, "bus": said["buses"][0], "channel": said["channels"][1]}.get(section) or said[

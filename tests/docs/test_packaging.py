@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recipes for other package managers ask for what tools/pyproject.toml asks for; nobody here can build them."""
+"""Recipes for other package managers ask for what tools/pyproject.toml asks for."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ def test_the_conda_recipe_follows_the_package() -> None:
     text = (ROOT / "packaging/conda/recipe.yaml").read_text(encoding="utf-8")
     package = tomllib.loads((ROOT / "tools/pyproject.toml").read_text(encoding="utf-8"))
     run = set(re.findall(r"- (\S+ \S+)", text.split("  run:")[1].split("tests:")[0]))
-    wanted = {f"python {package['project']['requires-python']}"}
+    wanted = set()
     for requirement in package["project"]["dependencies"]:
         name, limits = re.fullmatch(r"([\w-]+)(\S+)", requirement).groups()  # type: ignore[union-attr]
         wanted.add(f"{OTHER_NAMES.get(name, name)} {limits}")
     assert run == wanted
+    least = package["project"]["requires-python"].removeprefix(">=")
+    assert f'match(python, "<{least}")' in text and text.count("    - python\n") == 2  # for each Python, host and run
     assert f'version: "{package["project"]["version"]}"' in text
     host = text.split("  host:")[1].split("  run:")[0]
     for requirement in package["build-system"]["requires"]:

@@ -129,6 +129,7 @@ def test_live_from_serial_line(rig: Path) -> None:
     sender.start()
     shown = run([*script("live_from_serial_line.py"), os.ttyname(slave), "921600", "250", str(len(samples))], rig)
     judge(shown, rig)
+    sender.join()
     os.close(master), os.close(slave)
 
 

@@ -10,6 +10,7 @@ import stat
 import pytest
 from okid import InputError
 from okid.data.whole_file import safe_part, whole_file
+from okid.formats.mcap_file import write_live_mcap
 from okid.report.targets import write_whole
 from program import okid
 
@@ -51,6 +52,14 @@ def test_a_link_of_the_name_itself_is_replaced(victim: pathlib.Path, tmp_path: p
     with whole_file(target) as part:
         part.write_text("new")
     assert victim.read_text() == "mine" and not target.is_symlink() and target.read_text() == "new"
+
+
+def test_a_live_file_neither(victim: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    target = tmp_path / "open" / "live.mcap"
+    target.symlink_to(victim)
+    with pytest.raises(InputError, match="expected 'start'"):
+        write_live_mcap(target, ['{"type": "modes"}'])
+    assert victim.read_text() == "mine" and not target.is_symlink()
 
 
 def test_nobody_else_reaches_it_meanwhile(tmp_path: pathlib.Path) -> None:

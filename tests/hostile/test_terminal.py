@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 from okid import InputError
-from okid._shown import shown
+from okid._errors import shown
 from program import okid
 
 EVIL = "\x1b]0;pwned\x07\x1b[2J\r\x08\u202egnp\u2066\x9b31m"

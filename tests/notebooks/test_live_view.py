@@ -126,3 +126,7 @@ def test_pictures_have_one_style() -> None:
         assert drawn.lstrip().startswith("<?xml") and okid.plots.STYLE["axes.labelcolor"] in drawn
     with pytest.raises(okid.InputError, match="output 3, force 0"):
         okid.plots.frf(result, output=3)
+    session = okid.Session(["shaker"], ["a1", "a2", "a3"], fs=1000.0, p=20)
+    session.feed(np.hstack([force, acceleration]))
+    with pytest.raises(okid.InputError, match="a stream keeps none"):
+        okid.plots.fit(session.identify())

@@ -132,3 +132,9 @@ def test_no_circle_among_the_rooms_of_the_package(graph: dict[str, set[str]]) ->
         if room(name) != "okid":
             rooms.setdefault(room(name), set()).update(room(other) for other in others)
     assert circles({name: others - {"okid", name} for name, others in rooms.items()}) == []
+
+
+@pytest.mark.parametrize("folder", [HOST, PACKAGE], ids=lambda folder: folder.name)
+def test_few_files_stand_outside_the_rooms(folder: Path) -> None:
+    """A newcomer reads the names of the rooms first."""
+    assert len([file for file in folder.iterdir() if file.is_file()]) <= 8

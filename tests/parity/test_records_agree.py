@@ -293,6 +293,26 @@ def test_refused_records(tmp_path: Path, kind: str, method: str) -> None:
     assert differences(one[1], other[1]) == [] and one[0] == other[0] == 3
 
 
+@pytest.mark.parametrize("method", ["auto", "okid-era", "plscf"])
+@pytest.mark.parametrize("value", [1e37, -3.4028234663852886e38, 9.96921e36])
+def test_a_fill_value_is_refused_where_it_stands(tmp_path: Path, value: float, method: str) -> None:
+    """Loggers and netCDF write such numbers where they have none: 1e37, the largest float, 9.96921e36."""
+    fill = measured(1000)
+    fill[500:503, 2] = value
+    one, other = both(tmp_path, [measured(1000, seed=2), fill], U, Y, method=method)
+    assert one == other and one[0] == 2
+    assert f'output "{Y[1]}" is {value:g} at sample 500 (from 0), expected less than 1e+30' in one[1]
+
+
+@pytest.mark.parametrize("method", ["okid-era", "n4sid-moesp", "okid-era-dc"])
+def test_a_force_never_there_long_enough_to_judge_a_model(tmp_path: Path, method: str) -> None:
+    sparse = measured(1000)
+    sparse[::16, 0] = np.nan
+    one, other = both(tmp_path, [sparse], U, Y, method=method)
+    assert one == other and one[0] == 3
+    assert "no stretch of the record can judge it" in one[1] and "explains" not in one[1]
+
+
 def test_too_few_modes_and_a_repeated_force(tmp_path: Path) -> None:
     one = measured(2000)
     for arguments, code in (

@@ -138,6 +138,7 @@ def compare(mine: Any, theirs: Any, path: str = "") -> None:
 KINDS: dict[str, dict[str, Any]] = {
     **{method: {"method": method} for method in ("okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx")},
     "window": {"window_s": 6.0},
+    "chosen window": {"window_s": 16.0, "window": "auto"},
     "forgetting": {"forgetting": 0.9985},
     "ambient": {"ambient": True, "order": 6},
     "ambient subspace": {"ambient": True, "method": "n4sid-cva"},
@@ -187,6 +188,7 @@ def test_a_change_of_the_structure(tmp_path: Path, memory: dict[str, Any]) -> No
         ("p = 12", "p = 12\nwindow_s = 0.15"),
         ("p = 12", "p = 5000"),
         ("p = 12", "p = 12\nforgetting = 0.9\nwindow_s = 3.0"),
+        ("p = 12", 'p = 12\nwindow = "auto"'),
         ("p = 12", "p = 12\nsigma_blocks = 4"),
         ('method = "okid-era"', 'method = "okid"'),
         ('method = "okid-era"', 'method = "n4sid-cva"\nhankel = "literal"'),

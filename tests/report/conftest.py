@@ -10,7 +10,7 @@ import numpy as np
 import okid
 import pytest
 from okid import report
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 from report_files import write_csv, write_events
 from words_only import leave_pictures_out
 

@@ -13,7 +13,7 @@ from typing import Any
 import okid
 import pytest
 from okid import report
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 
 OVERLAPS = """() => [...document.querySelectorAll('svg')].flatMap((svg) => {
   const all = [...svg.querySelectorAll('text')].map((e) => [e.getBoundingClientRect(), e.textContent]);

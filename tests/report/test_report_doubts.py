@@ -15,7 +15,7 @@ import pytest
 import report_files
 from okid import report
 from okid.data.records import Record
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 from okid.report.scale import agreement, doubts
 from report_files import FS
 

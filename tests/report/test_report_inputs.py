@@ -13,7 +13,7 @@ import okid
 import pytest
 import report_files
 from okid import report
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 from okid.report.events import read_events
 from okid.report.geometry import read_geometry
 from okid.report.provenance import without_passwords

@@ -10,7 +10,7 @@ from typing import Any
 import okid
 import pytest
 from okid import report
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 
 
 @pytest.fixture(scope="module")

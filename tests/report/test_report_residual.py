@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from okid import frf
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 from okid.report.residual import BOUND_95, BOUND_99, whiteness
 from report_files import FS
 

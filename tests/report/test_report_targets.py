@@ -16,7 +16,7 @@ import okid
 import pytest
 import report_files
 from okid import report
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 from report_files import FS
 
 pytestmark = pytest.mark.usefixtures("words_only")

@@ -13,7 +13,7 @@ import numpy as np
 import okid
 import pytest
 from okid import report
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 from okid.report.events import read_events
 from okid.report.result_warnings import HARMLESS
 from okid.report.stamps import TOLERANCE

@@ -15,7 +15,7 @@ import okid
 import pytest
 import report_files
 from okid import report
-from okid.demo import demo_record
+from okid.record.demo import demo_record
 from okid.report import targets
 from report_files import FS
 

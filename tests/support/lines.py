@@ -17,6 +17,7 @@ import tty
 import zlib
 from array import array
 from collections.abc import Iterable, Iterator
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,11 @@ class Line:
     def write(self, data: bytes) -> None:
         while data:
             data = data[os.write(self.fd, data) :]
+
+    def own(self) -> FileIO:
+        """The same end once more, for a thread that may outlive this one: the number of a descriptor that is closed is
+        given to the next file, of whatever test."""
+        return FileIO(os.dup(self.fd), "r+")
 
     def unread(self) -> int:
         """Bytes that the other end has not read yet."""
@@ -135,19 +141,16 @@ def of_type(events: Iterable[dict[str, Any]], kind: str) -> list[dict[str, Any]]
 class Reader:
     """Collects what arrives at our end of a line."""
 
-    def __init__(self, fd: int) -> None:
-        self._fd, self._data, self._more = fd, bytearray(), threading.Condition()
-        threading.Thread(target=self._read, daemon=True).start()
+    def __init__(self, line: Line) -> None:
+        self._data, self._more = bytearray(), threading.Condition()
+        threading.Thread(target=self._read, args=(line.own(),), daemon=True).start()
 
-    def _read(self) -> None:
-        while True:
-            try:
-                data = os.read(self._fd, 4096)
-            except OSError:
-                return
-            with self._more:
-                self._data += data
-                self._more.notify_all()
+    def _read(self, source: FileIO) -> None:
+        with source, contextlib.suppress(OSError):
+            while data := source.read(4096):
+                with self._more:
+                    self._data += data
+                    self._more.notify_all()
 
     def packets(self, count: int, timeout: float = 30) -> bytes:
         """What has come once it holds so many packets."""

@@ -9,9 +9,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from okid._errors import Error, IdentificationError, InputError
-from okid.demo import demo, demo_frame, demo_record
-from okid.identify import identify, stabilization
-from okid.identify_frf import identify_frf
+from okid.record.demo import demo, demo_frame, demo_record
+from okid.record.identify import identify, stabilization
+from okid.record.identify_frf import identify_frf
 
 if TYPE_CHECKING:
     from okid import frf, modal
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from okid.abi.square_root import SquareRoot
     from okid.abi.sums import Stats
     from okid.data.records import Record, read_csv
-    from okid.grey_box import FittedMode, GreyBox, fit_structure
     from okid.identification.change_test import ChangeTest, ChangeVerdict, ModeShift
     from okid.identification.identifier import Identified, Identifier, usable_p
+    from okid.mechanics.grey_box import FittedMode, GreyBox, fit_structure
+    from okid.mechanics.structure import Structure
+    from okid.mechanics.virtual import Estimate, VirtualSensors
+    from okid.record.setups import identify_setups, merge_setups
     from okid.result.modal_table import ModalTable
     from okid.result.model import Model
     from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping
     from okid.result.result import Result
     from okid.result.stabilization import Cluster, Criteria, OrderPoles, Stabilization
     from okid.session import Session
-    from okid.setups import identify_setups, merge_setups
-    from okid.structure import Structure
-    from okid.virtual import Estimate, VirtualSensors
 
 __all__ = [
     "Accumulator",
@@ -84,7 +84,7 @@ _NAMES = {
     "abi.square_root": "SquareRoot",
     "abi.sums": "Stats",
     "data.records": "Record, read_csv",
-    "grey_box": "FittedMode, GreyBox, fit_structure",
+    "mechanics.grey_box": "FittedMode, GreyBox, fit_structure",
     "identification.change_test": "ChangeTest, ChangeVerdict, ModeShift",
     "identification.identifier": "Identified, Identifier, usable_p",
     "result.modal_table": "ModalTable",
@@ -93,9 +93,9 @@ _NAMES = {
     "result.result": "Result",
     "result.stabilization": "Cluster, Criteria, OrderPoles, Stabilization",
     "session": "Session",
-    "setups": "identify_setups, merge_setups",
-    "structure": "Structure",
-    "virtual": "Estimate, VirtualSensors",
+    "record.setups": "identify_setups, merge_setups",
+    "mechanics.structure": "Structure",
+    "mechanics.virtual": "Estimate, VirtualSensors",
 }  # of the modules; they load when they are first used, NumPy and the libraries with them
 
 _MODULES = ("campaign", "capture", "formats", "frf", "live", "modal", "notebook", "plots", "report")

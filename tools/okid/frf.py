@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
 from okid.abi.arguments import positive
+from okid.shown.notebook_html import own_fields
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -63,6 +64,9 @@ class Frf(NamedTuple):
         return (list(self.inputs) or [f"u{k + 1}" for k in range(n_u)],
                 list(self.outputs) or [f"y{k + 1}" for k in range(n_y)])  # fmt: skip
 
+    def _repr_html_(self) -> str:
+        return own_fields(self)
+
 
 class Spectra(NamedTuple):
     """Measured spectra of outputs: frequency_hz (F,), power (F, n_y, n_y) one-sided, unit^2/Hz, averages used."""
@@ -70,6 +74,9 @@ class Spectra(NamedTuple):
     frequency_hz: Real
     power: Complex
     averages: int
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 def is_hit(u: ArrayLike, fraction: float = 0.05) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
+from okid.shown.notebook_html import own_fields
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -145,6 +146,9 @@ class Poles(NamedTuple):
     frequency_hz: Real
     damping_ratio: Real
     shapes: Complex
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 def poles(A: ArrayLike, C: ArrayLike, dt: float) -> Poles:

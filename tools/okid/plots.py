@@ -104,9 +104,11 @@ def singular_values(result: Result) -> Picture:
 
 @_styled
 def fit(result: Result) -> Picture:
-    """Simulation and prediction fit of each output in percent; "n/a" where the record was not kept."""
-    picture = _sheet(max(4.0, 0.5 * len(result.outputs) + 2.0), 3.2)
+    """Simulation and prediction fit of each output in percent. InputError of a stream: its samples were not kept."""
     both = [[one[name] for name in result.outputs] for one in result.fit]
+    if all(value is None for values in both for value in values):
+        raise InputError("this result has no fit: it takes a record (okid.identify), and a stream keeps none")
+    picture = _sheet(max(4.0, 0.5 * len(result.outputs) + 2.0), 3.2)
     figures.draw_fit(picture.add_subplot(), result.outputs, both[0], both[1])
     return picture
 

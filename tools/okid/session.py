@@ -36,7 +36,8 @@ class Session:
     hankel, forgetting). Named methods keep sums of lagged products; "auto" keeps the samples of the window, without one
     the newest 10 million numbers, and finds in them what okid.identify() finds in the same samples.
     `inputs`, `outputs`: names of the channels, or how many; no inputs = ambient. `fs` Hz. `window_s` forgets what is
-    older (in blocks of about a twentieth of it), `forgetting` fades by that factor a sample, neither keeps everything.
+    older (in blocks of about a twentieth of it); with `window="auto"` each modes() or identify() chooses how much of
+    it, as far as the structure stands still. `forgetting` fades by that factor a sample, neither keeps everything.
     `codes` 16, 24 or 32 takes ADC codes with `scale` and `offset` (value = scale code + offset, one for all channels or
     one each), 0 real numbers. `sigma`, `sigma_blocks`: ± as in okid.identify().
     `restart_on_change`: once the modes have come to rest at three calls of modes() in a row, a change of the structure
@@ -73,6 +74,7 @@ class Session:
         band: tuple[float, float] | None = None,
         decimate: int | None = None,
         window_s: float | None = None,
+        window: str | None = None,
         forgetting: float | None = None,
         update_s: float = 0.5,
         codes: int = 0,
@@ -100,6 +102,7 @@ class Session:
         if band is not None:
             named["band"] = ":".join(map(str, band))
         self._stream = HostStream({**options, **named}, config)
+        self._basis = 0
         self._views: list[LiveView] = []  # what shows the samples as they come
         used = self._stream.options
         self.inputs, self.outputs = list(used["inputs"]), list(used["outputs"])
@@ -138,6 +141,11 @@ class Session:
     def samples(self) -> int:
         """Samples taken in, missing ones included."""
         return self.stats.samples + self.stats.missing
+
+    @property
+    def basis(self) -> int:
+        """Samples that the last modes() rested on: with `window="auto"` as many as were chosen; 0 without modes."""
+        return self._basis
 
     @property
     def rows(self) -> int:
@@ -217,7 +225,9 @@ class Session:
         """The modes by now, with ± when there are enough blocks: an update of `okid run`. [] while there are too few
         samples, or no model is to be had yet (identify() says why). Cost: one identification, a short one a block."""
         found = self._stream.update()
-        return [] if found is None else [Mode.of(one) for one in found.about()["modes"]]
+        about: dict[str, Any] = {"modes": [], "samples": 0} if found is None else found.about()
+        self._basis = int(about["samples"])
+        return [Mode.of(one) for one in about["modes"]]
 
     def identify(self) -> Result:
         """Everything the samples tell by now: model, modes, M, K and R where degrees of freedom are given, warnings.

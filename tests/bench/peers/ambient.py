@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""okid's pLSCF of ambient records and its set-ups with references in common beside pyOMA-2 (pLSCF, SSI-cov in PreGER).
+"""okid's pLSCF and method auto of ambient records and its set-ups with references in common beside pyOMA-2 (pLSCF,
+SSI-cov in PreGER) and koma (SSI-cov; no set-ups).
 
-usage: ambient.py make FOLDER [DATA] | okid FOLDER | pyoma FOLDER | table FOLDER
+usage: ambient.py make FOLDER [DATA] | okid FOLDER | auto FOLDER | pyoma FOLDER | koma FOLDER | table FOLDER
 
 `make` writes outputs and references: chains of six masses under random forces, and records of DATA (shared corpus,
 reference.json) without their inputs; "set-ups": the same in two halves, each with two references and half of the other
-outputs. Each program runs in its own environment; pyOMA-2 is helped: it is told the true frequencies, which a person
-would pick in its diagram, and the poles nearest to them at its highest orders are taken.
+outputs. Each program runs in its own environment; pyOMA-2 and koma are helped: they are told the true frequencies,
+which a person would pick in their diagrams, and the poles nearest to them at the highest orders are taken.
 """
 
 from __future__ import annotations
@@ -79,6 +80,43 @@ def of_okid(f: Any, y: Any, modes: list[Any]) -> list[list[float]]:
     return [[m.frequency_hz, m.damping_ratio] for m in result.confident_modes]
 
 
+def of_auto(f: Any, y: Any, modes: list[Any]) -> list[list[float]]:
+    import okid
+
+    if f[1]:
+        raise ValueError("method auto takes no set-ups")
+    result = okid.identify(None, y, fs=f[0], band=(0.0, 1.3 * max(mode["f"] for mode in modes)))
+    return [[m.frequency_hz, m.damping_ratio] for m in result.confident_modes]
+
+
+def nearest(modes: list[Any], columns: list[tuple[Any, Any]]) -> list[list[float]]:
+    """The median of what each of some orders has nearest to a mode; columns: frequencies, damping ratios."""
+    out = []
+    for mode in modes:
+        near = []
+        for poles, widths in columns:
+            if np.any(np.isfinite(poles)):
+                k = int(np.nanargmin(np.abs(poles - mode["f"])))
+                near.append((poles[k], widths[k]))
+        near = [one for one in near if abs(one[0] / mode["f"] - 1) < 0.05]
+        if near:
+            out.append([float(np.median([one[j] for one in near])) for j in (0, 1)])
+    return out
+
+
+def of_koma(f: Any, y: Any, modes: list[Any]) -> list[list[float]]:
+    from koma.oma import covssi
+    from scipy.signal import decimate
+
+    if f[1]:
+        raise ValueError("koma merges no set-ups")
+    step, most = max(1, int(f[0] / (2.6 * 1.3 * max(mode["f"] for mode in modes)))), TIMES * len(modes)
+    fs, y = float(f[0]) / step, decimate(y, step, axis=0) if step > 1 else y
+    orders = np.arange(most - 18, most + 1, 2)
+    poles, _ = covssi(y, fs, max(30, most // 2), orders, showinfo=False, return_flat=False)
+    return nearest(modes, [(np.abs(one) / 2 / np.pi, -one.real / np.abs(one)) for one in poles])
+
+
 def of_pyoma(f: Any, y: Any, modes: list[Any]) -> list[list[float]]:
     from pyoma2.algorithms import SSI_MS, pLSCF
     from pyoma2.setup import MultiSetup_PreGER, SingleSetup
@@ -95,20 +133,8 @@ def of_pyoma(f: Any, y: Any, modes: list[Any]) -> list[list[float]]:
         setup.decimate_data(q=step)
     setup.add_algorithms(way)
     setup.run_by_name("a")
-    out = []
-    for mode in modes:  # the median of what the ten highest orders have nearest to it
-        columns = range(max(0, way.result.Fn_poles.shape[1] - 10), way.result.Fn_poles.shape[1])
-        near = []
-        for c in columns:
-            poles, widths = way.result.Fn_poles[:, c], way.result.Xi_poles[:, c]
-            if np.any(np.isfinite(poles)):
-                k = int(np.nanargmin(np.abs(poles - mode["f"])))
-                near.append((poles[k], widths[k]))
-        near = [one for one in near if abs(one[0] / mode["f"] - 1) < 0.05]
-        if near:
-            out.append([float(np.median([one[j] for one in near])) for j in (0, 1)])
-    return out
+    return nearest(modes, list(zip(way.result.Fn_poles.T[-10:], way.result.Xi_poles.T[-10:], strict=True)))
 
 
 if __name__ == "__main__":
-    main(make, {"okid": of_okid, "pyoma": of_pyoma})
+    main(make, {"okid": of_okid, "auto": of_auto, "pyoma": of_pyoma, "koma": of_koma})

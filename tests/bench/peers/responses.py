@@ -123,7 +123,7 @@ def run(who: str, folder: Path, way: Any) -> None:
 
 def table(folder: Path) -> None:
     about = json.loads((folder / "about.json").read_text())
-    for who in ("okid", "sdypy", "pyoma"):
+    for who in ("okid", "auto", "sdypy", "pyoma", "koma"):
         if not (folder / f"{who}.json").exists():
             continue
         for name, (found, seconds) in json.loads((folder / f"{who}.json").read_text()).items():

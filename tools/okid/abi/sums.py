@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from okid import abi
 from okid._errors import Error, InputError
 from okid.abi.arguments import unmasked, whole
+from okid.shown.notebook_html import own_fields
 
 _ADD: dict[np.dtype[Any], str] = {  # what a C-contiguous array of samples goes to as it stands
     np.dtype(np.float64): "add",
@@ -32,6 +33,9 @@ class Stats(NamedTuple):
     saturated: int
     rows: int
     dropped: int
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 class Sums:

@@ -193,6 +193,11 @@ def _place_of(args: argparse.Namespace, source: BusConfig | None) -> None:
     if args.interface is not None or source is None:
         return
     slcan = source.type == "slcan"
+    if source.adapter is not None and args.channel is None:
+        raise InputError(
+            f"bus {source.name!r} of the config is the USB adapter {source.adapter}: name its interface of today with "
+            "--channel (`okid doctor` lists them)"
+        )
     args.interface = "slcan" if slcan else "socketcan"
     args.channel = args.channel or (source.device if slcan else source.interface)
     args.bitrate = args.bitrate or (source.bitrate if slcan else None)

@@ -22,6 +22,7 @@ class BusConfig:
     bitrate: int | None = None
     device: str | None = None
     baud: int = 115200
+    adapter: str | None = None
 
     @property
     def serial(self) -> bool:
@@ -83,7 +84,7 @@ def _bus(table: dict[str, Any]) -> BusConfig:
     rate, interface = table["bitrate"], table["interface"] or table["name"]
     return BusConfig(
         table["name"], table["type"], interface, table["fd"], rate if rate is None else int(rate), table["device"],
-        table.get("baud") or 115200,
+        table.get("baud") or 115200, table["adapter"],
     )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from okid._errors import InputError
 from okid.abi import host
 from okid.abi.arguments import unmasked
+from okid.shown.notebook_html import own_fields
 
 Real = NDArray[np.float64]
 
@@ -234,6 +235,9 @@ class Record:
         by_unit = [k for k, (full, unit) in enumerate(self._pairs()) if unit and f"{full} [{unit}]" == name]
         both = by_base + by_unit
         return both[0] if len(both) == 1 else None
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 CsvRecord = Record  # the name of version 0.1

@@ -12,6 +12,7 @@ import numpy as np
 from okid import abi
 from okid._errors import InputError
 from okid.abi.accumulator import Accumulator
+from okid.shown.notebook_html import own_fields, short, summary, table
 
 
 class ModeShift(NamedTuple):
@@ -21,6 +22,9 @@ class ModeShift(NamedTuple):
     damping_ratio: float
     shift: float
     sigma: float
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 class ChangeVerdict(NamedTuple):
@@ -34,6 +38,18 @@ class ChangeVerdict(NamedTuple):
     farthest: int
     blocks: int
     modes: list[ModeShift]
+
+    def _repr_html_(self) -> str:
+        """The mode that moved most, in its standard deviations, has an arrow."""
+        rows = (
+            [f"{k}", f"{one.frequency_hz:.5f}", f"{100.0 * one.damping_ratio:.4f}", short(one.shift, 100.0, "+.3g"),
+             short(one.sigma, 100.0, ".2g"), "←" if self.alarm and k == self.farthest + 1 else ""]
+            for k, one in enumerate(self.modes, 1)
+        )  # fmt: skip
+        said = (
+            f"{'alarm' if self.alarm else 'no alarm'}: p-value {short(self.p_value, form='.3g')}, {self.blocks} blocks"
+        )
+        return summary(said) + table(("mode", "f [Hz]", "ζ [%]", "shift of f [%]", "± [%]", ""), rows)
 
 
 class ChangeTest:

@@ -16,6 +16,7 @@ from okid.abi.arguments import choice, positive, whole
 from okid.abi.square_root import SquareRoot
 from okid.result.model import Model
 from okid.result.parts import Observer
+from okid.shown.notebook_html import own_fields
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -73,6 +74,9 @@ class Identified(NamedTuple):
     def model(self) -> Model:
         """A .. K as a model at work."""
         return Model(self.A, self.B, self.C, self.D, self.K, self.dt)
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 def usable_p(n_u: int, n_y: int, p: int, samples: int) -> int:

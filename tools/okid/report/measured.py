@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from okid._errors import Error, InputError
 from okid.data.records import Record, read_csv
 from okid.frf import Frf, Spectra, h1, is_hit, spectra
-from okid.identify import identify
+from okid.record.identify import identify
 from okid.report.answers import Answer, answers, detrended, fit_of
 from okid.report.loaded import Loaded, known_fit
 from okid.report.residual import Whiteness, whiteness

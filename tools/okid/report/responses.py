@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from okid._errors import Error
 from okid.frf import cmif, synthesise, synthesise_spectra
-from okid.identify_frf import identify_frf
 from okid.modal import mac
+from okid.record.identify_frf import identify_frf
 from okid.report import drawings, page
 from okid.report.material import Material
 from okid.result import figures

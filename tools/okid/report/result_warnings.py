@@ -13,7 +13,7 @@ from okid.report.material import Material
 # Nothing is to be done about these (docs/reference/result.md). Any other code, a newer one too, asks for a look.
 HARMLESS = frozenset({
     "channel_skew", "decimated", "pdc_undetermined", "qr_factor", "reciprocity", "refine_failed", "resampled",
-    "restarted", "unit_converted",
+    "restarted", "unit_converted", "window_shortened",
 })  # fmt: skip
 MILD = ' class="mild"'
 

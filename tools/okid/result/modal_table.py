@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from typing import Any
 
 from okid.result.parts import Mode, known
+from okid.shown.notebook_html import items, short, table
 
 
 def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
@@ -54,19 +54,9 @@ class ModalTable(list[dict[str, Any]]):
         lines = []
         for row in shown:
             cells = [str(row["mode"]), f"{row['frequency_hz']:.5f}"]
-            cells += [_short(row["frequency_std_hz"], 1.0)] * with_std[0]
+            cells += [short(row["frequency_std_hz"], form=".2g")] * with_std[0]
             cells += [f"{100.0 * row['damping_ratio']:.4f}"]
-            cells += [_short(row["damping_ratio_std"], 100.0)] * with_std[1]
-            cells += ["–" if row[key] is None else f"{row[key]:.4f}" for key in ("mpc", "emac", "cmi")]
-            lines.append(
-                "<tr>" + "".join(f'<td style="text-align:right">{escape(cell)}</td>' for cell in cells) + "</tr>"
-            )
-        header = "".join(f'<th style="text-align:right">{escape(name)}</th>' for name in head)
-        said = "".join(f"<li>{escape(warning)}</li>" for warning in self._warnings)
-        return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(lines)}</tbody></table>" + (
-            f"<ul>{said}</ul>" if said else ""
-        )
-
-
-def _short(value: float | None, factor: float) -> str:
-    return "–" if value is None else format(factor * value, ".2g")
+            cells += [short(row["damping_ratio_std"], 100.0, ".2g")] * with_std[1]
+            cells += [short(row[key], form=".4f") for key in ("mpc", "emac", "cmi")]
+            lines.append(cells)
+        return table(head, lines) + items(self._warnings)

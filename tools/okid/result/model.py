@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi, frf
 from okid._errors import InputError
+from okid.shown.notebook_html import own_fields
 
 Real = NDArray[np.float64]
 
@@ -130,3 +131,6 @@ class Model:
         except ImportError:
             raise ImportError("python-control is not installed: pip install control") from None
         return control.StateSpace(self.A, self.B, self.C, self.D, self.dt)
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from okid.shown.notebook_html import own_fields
+
 Real = NDArray[np.float64]
 _Part = Mapping[str, Any]
 
@@ -37,6 +39,9 @@ class Observer(NamedTuple):
     radius_plain: float
     condition: float
     input_excitation: float
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 class Mode(NamedTuple):
@@ -81,6 +86,9 @@ class Mode(NamedTuple):
                    one.get("confident"), one.get("found_in"), tuple(one.get("why") or ()),
                    tuple(one.get("why_text") or one.get("why") or ()))  # fmt: skip
 
+    def _repr_html_(self) -> str:
+        return own_fields(self)
+
 
 class Fit(NamedTuple):
     """100 (1 - |y - yhat| / |y - mean|) for each output by name; None = not available."""
@@ -93,12 +101,18 @@ class Fit(NamedTuple):
         """Of "fit"; null stands for all outputs."""
         return cls(*(dict(fit[key] or dict.fromkeys(outputs)) for key in cls._fields))
 
+    def _repr_html_(self) -> str:
+        return own_fields(self)
+
 
 class Warning(NamedTuple):
     """What speaks against a valid result, or has to be known of it."""
 
     code: str
     text: str
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 @dataclass
@@ -132,6 +146,9 @@ class MassMatrices:
             setattr(found, name, _optional(mkr.get(name)))
         return found
 
+    def _repr_html_(self) -> str:
+        return own_fields(self)
+
 
 @dataclass
 class ProportionalDamping:
@@ -153,6 +170,9 @@ class ProportionalDamping:
         alpha, beta, residual, condition = numbers([pdc.get(k) for k in ("alpha", "beta", "residual", "condition")])
         return cls(float(alpha), float(beta), numbers(pdc["R"]), float(residual), float(condition),
                    pdc.get("alpha_std"), pdc.get("beta_std"))  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 @dataclass(frozen=True)
@@ -179,6 +199,9 @@ class Refinement:
         return cls(part["iterations"], part["converged"], part["samples"], float(gain), float(left), float(white),
                    numbers(list(part["noise_std"].values())), part.get("noise_order", 0))  # fmt: skip
 
+    def _repr_html_(self) -> str:
+        return own_fields(self)
+
 
 @dataclass(frozen=True)
 class Skew:
@@ -201,3 +224,6 @@ class Skew:
         late = np.array([name in part["outputs_corrected"] for name in outputs])
         return cls(numbers(list(part["us"].values())), numbers(list(part["std_us"].values())), late,
                    part["undetermined"], float(numbers(part["scatter"])))  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)

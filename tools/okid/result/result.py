@@ -7,7 +7,6 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,6 +19,7 @@ from okid.result.modal_table import ModalTable
 from okid.result.model import Model
 from okid.result.parts import Fit, MassMatrices, Mode, Observer, ProportionalDamping, Refinement, Skew, Warning, numbers
 from okid.result.stabilization import Criteria, Stabilization, of_identifiers
+from okid.shown.notebook_html import summary
 
 if TYPE_CHECKING:
     from okid.identification.host_result import HostResult
@@ -204,7 +204,7 @@ class Result:
         return f"<Result of {self._head()}, modes at {', '.join(shown[:12])}{' ..' * (len(shown) > 12)} Hz>"
 
     def _repr_html_(self) -> str:
-        return f"<p>{escape(self._head())}</p>" + self.table()._repr_html_()
+        return summary(self._head()) + self.table()._repr_html_()
 
     def stabilization(self, orders: Iterable[int] | None = None, criteria: Criteria | None = None) -> Stabilization:
         """Poles of other orders from the same decomposition, each compared with the order before, and their clusters.

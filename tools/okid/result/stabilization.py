@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from okid import abi
 from okid._errors import Error, InputError
+from okid.shown.notebook_html import own_fields, short, summary, table
 
 if TYPE_CHECKING:
     from okid.identification.identifier import Identified, Identifier
@@ -42,6 +43,9 @@ class OrderPoles(NamedTuple):
         """Frequency, damping and shape all hold."""
         return self.stable_frequency & self.stable_damping & self.stable_shape
 
+    def _repr_html_(self) -> str:
+        return own_fields(self)
+
 
 class Cluster(NamedTuple):
     """Poles that belong together, at most one of each model: medians, and robust spreads over the models (how much the
@@ -63,6 +67,9 @@ class Cluster(NamedTuple):
     order: int
     shape: Complex
 
+    def _repr_html_(self) -> str:
+        return own_fields(self)
+
 
 class Criteria(NamedTuple):
     """A pole holds when the order before has one within `frequency` and `damping` (relative) and `mac`; a cluster is
@@ -72,6 +79,9 @@ class Criteria(NamedTuple):
     damping: float = 0.05
     mac: float = 0.98
     share: float = 0.5
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 class Stabilization(Sequence[OrderPoles]):
@@ -83,6 +93,17 @@ class Stabilization(Sequence[OrderPoles]):
     def __repr__(self) -> str:
         found = ", ".join(f"{mode.frequency_hz:.4g}" for mode in self.modes)
         return f"<Stabilization of {len(self.rows)} models, modes at {found} Hz>"
+
+    def _repr_html_(self) -> str:
+        """The modes of the structure, with their spreads over the models."""
+        rows = (
+            [f"{k}", f"{one.frequency_hz:.5f}", short(one.frequency_spread_hz, form=".2g"),
+             f"{100.0 * one.damping_ratio:.4f}", short(one.damping_ratio_spread, 100.0, ".2g"),
+             short(one.mpc, form=".4f"), f"{one.hits} of {one.models}"]
+            for k, one in enumerate(self.modes, 1)
+        )  # fmt: skip
+        head = ("mode", "f [Hz]", "spread [Hz]", "ζ [%]", "spread [%]", "MPC", "found in models")
+        return summary(f"Stabilization of {len(self.rows)} models") + table(head, rows)
 
     def __len__(self) -> int:
         return len(self.rows)

@@ -15,6 +15,7 @@ from okid import abi
 from okid._errors import InputError
 from okid.result.model import Model
 from okid.result.parts import Mode
+from okid.shown.notebook_html import own_fields
 
 Real = NDArray[np.float64]
 SENSING = ("displacement", "velocity", "acceleration")  # in the order of okid_sensing_t
@@ -139,6 +140,9 @@ class Structure:
         abi.check(status, "M, R and K")
         A, B, D = _sampled(out, 1.0 / fs, _HOLDS[hold])
         return Model(A, B, np.ascontiguousarray(out[2]), D, np.zeros((2 * n, n_y)), 1.0 / fs)
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 def _places(name: str, dofs: Sequence[int], n: int) -> tuple[Any, Any, Any]:

@@ -5,21 +5,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from okid.identify import identify
+from okid.record.identify import identify
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from okid.mechanics.structure import Structure
     from okid.result.result import Result
-    from okid.structure import Structure
 
     Real = NDArray[np.float64]
 
 
 def demo_frame() -> Structure:
     """Three storeys on elastic columns, proportionally damped: 10.96, 31.84 and 45.66 Hz."""
-    from okid.structure import Structure
+    from okid.mechanics.structure import Structure
 
     free = Structure.chain([1.0, 0.8, 1.2], [3e4, 2e4, 2.5e4])
     return Structure(free.M, 1.0 * free.M + 5e-5 * free.K, free.K)

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import IdentificationError, InputError
+from okid.mechanics.structure import Structure
 from okid.modal import mac
 from okid.result.model import Model
 from okid.result.parts import Mode
 from okid.result.result import Result
-from okid.structure import Structure
+from okid.shown.notebook_html import own_fields, short, summary, table
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -33,6 +34,9 @@ class FittedMode(NamedTuple):
     fitted_ratio: float
     mac: float
 
+    def _repr_html_(self) -> str:
+        return own_fields(self)
+
 
 class GreyBox(NamedTuple):
     """`values` and `std` (one sigma) of the parameters; `structure` with these values; `misfit`: rms of what is left in
@@ -44,6 +48,20 @@ class GreyBox(NamedTuple):
     modes: list[FittedMode]
     misfit: float
     correlation: Real
+
+    def _repr_html_(self) -> str:
+        parameters = (
+            [name, short(value), short(self.std.get(name), form=".2g")] for name, value in self.values.items()
+        )
+        modes = (
+            [f"{one.number}", f"{one.frequency_hz:.5f}", f"{one.fitted_hz:.5f}", f"{100.0 * one.damping_ratio:.4f}",
+             f"{100.0 * one.fitted_ratio:.4f}", short(one.mac, form=".4f")]
+            for one in self.modes
+        )  # fmt: skip
+        head = ("mode", "f [Hz]", "fitted [Hz]", "ζ [%]", "fitted [%]", "MAC")
+        return summary(f"GreyBox, misfit {short(self.misfit, form='.3g')}") + (
+            table(("parameter", "value", "±"), parameters) + table(head, modes)
+        )
 
 
 class _Modes(NamedTuple):

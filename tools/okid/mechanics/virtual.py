@@ -18,6 +18,7 @@ from okid._errors import InputError
 from okid.abi import host
 from okid.data.whole_file import whole_file
 from okid.result.model import Model
+from okid.shown.notebook_html import own_fields
 
 Real = NDArray[np.float64]
 
@@ -30,6 +31,9 @@ class Estimate(NamedTuple):
     y_std: Real
     force: Real
     force_std: Real
+
+    def _repr_html_(self) -> str:
+        return own_fields(self)
 
 
 class VirtualSensors:

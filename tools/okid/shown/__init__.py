@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""How objects of any room show themselves."""
