@@ -5,6 +5,7 @@
 //          agreement = found_in x EMAC x (1 + MPC)/2 / (1 + (scatter of damping / 0.6)^2): a mode is believed from one half on
 #include "consensus.hpp"
 
+#include "quantity.hpp"
 #include "result/method.hpp"
 
 #include <algorithm>
@@ -26,8 +27,11 @@ constexpr double share_of_orders = 0.4; // of the orders from its first on
 constexpr int order_reach = 8;          // a pole may be missing for this many states
 constexpr double periods_seen = 0.75;   // of a mode within the horizon
 constexpr double periods_well = 1.5;    // where its damping is sharp
-constexpr double one_half = 0.5;        // votes and agreement
-constexpr double scatter_scale = 0.6;   // relative scatter of damping over the runs that halves the agreement
+constexpr double periods_least = 0.3;   // where several outputs together have periods_seen
+constexpr double beats_seen = 0.75; // of a mode and its neighbour within the horizon: fewer, and a run sees one of both
+constexpr std::size_t fewest_voters = 6; // those with the longest horizons vote in any case
+constexpr double one_half = 0.5;         // votes and agreement
+constexpr double scatter_scale = 0.6;    // relative scatter of damping over the runs that halves the agreement
 constexpr int fewest_runs = 3;
 
 double median(std::vector<double> values) {
@@ -55,9 +59,9 @@ double relative_spread(const std::vector<double>& values, double about) {
 using chain = std::vector<const run_pole*>;
 
 /// Distance of a pole from the end of a chain; infinite when they are not the same.
-double link_cost(const run_pole& pole, const run_pole& last) {
+double link_cost(const run_pole& pole, const run_pole& last, double most_hz) {
     if (last.order < pole.order - order_reach) return INFINITY;
-    const double e = std::abs(pole.frequency_hz / last.frequency_hz - 1);
+    const double e = std::abs(pole.frequency_hz - last.frequency_hz) / std::min(last.frequency_hz, most_hz);
     const double narrow = std::min(pole.damping_ratio, last.damping_ratio),
                  wide = std::max(pole.damping_ratio, last.damping_ratio);
     if (e >= std::max(same_frequency, narrow) || e >= 3 * same_frequency) return INFINITY;
@@ -68,7 +72,7 @@ double link_cost(const run_pole& pole, const run_pole& last) {
 }
 
 /// Continue the chains with the poles of the next order, each by at most one, the nearest first.
-void extend(std::vector<chain>& chains, const std::vector<const run_pole*>& next) {
+void extend(std::vector<chain>& chains, const std::vector<const run_pole*>& next, double most_hz) {
     struct link {
         double cost;
         std::size_t track, pole;
@@ -76,7 +80,7 @@ void extend(std::vector<chain>& chains, const std::vector<const run_pole*>& next
     std::vector<link> links;
     for (std::size_t j = 0; j < next.size(); ++j)
         for (std::size_t t = 0; t < chains.size(); ++t)
-            if (const double cost = link_cost(*next[j], *chains[t].back()); std::isfinite(cost))
+            if (const double cost = link_cost(*next[j], *chains[t].back(), most_hz); std::isfinite(cost))
                 links.push_back({cost, t, j});
     std::sort(links.begin(), links.end(), [](const link& a, const link& b) {
         return std::tie(a.cost, a.track, a.pole) < std::tie(b.cost, b.track, b.pole);
@@ -122,13 +126,18 @@ struct member {
     double rank; // best first
 };
 
+bool in_band(const consensus_run& run, double f) {
+    const double share = run.zoom().folded(f) / run.fs_hz;
+    return share < run.top && share >= run.bottom;
+}
+
 /// Every track of every run, those that can be seen first, the steady and long ones before the others.
 std::vector<member> ranked(const std::vector<consensus_run>& runs) {
     std::vector<member> out;
     for (std::size_t r = 0; r < runs.size(); ++r)
         for (std::size_t t = 0; t < runs[r].tracks.size(); ++t) {
             const run_track& track = runs[r].tracks[t];
-            if (track.frequency_hz >= runs[r].top * runs[r].fs_hz || track.damping_ratio >= overdamped) continue;
+            if (!in_band(runs[r], track.frequency_hz) || track.damping_ratio >= overdamped) continue;
             const double rank = (can_see(runs[r], track.frequency_hz) ? 0.0 : 1e3) + track.damping_spread +
                                 100 * track.frequency_spread - 0.02 * track.length;
             out.push_back({static_cast<int>(r), static_cast<int>(t), &track, rank});
@@ -175,9 +184,69 @@ std::vector<cluster> gather(const std::vector<consensus_run>& runs) {
     return clusters;
 }
 
+/// Hz within which two clusters of one shape may be one vibration.
+double within(double f, double zeta, double other_f, double other_zeta) {
+    return 2.5 * (f * zeta + other_f * other_zeta);
+}
+
+/// Can this run tell two modes so far apart from each other? Each output doubles what it knows of a sample.
+bool can_part(const consensus_run& run, double apart_hz, std::size_t n_y) {
+    return run.horizon_s() * static_cast<double>(n_y) * apart_hz >= beats_seen;
+}
+
+/// Is it a vibration at one rate at least: found by three runs of it, and by half of those that could?
+bool at_one_rate(const std::vector<consensus_run>& runs, const cluster& c) {
+    int levels = 0;
+    for (const consensus_run& run : runs) levels = std::max(levels, run.level + 1);
+    std::vector<int> hits(static_cast<std::size_t>(levels)), could(static_cast<std::size_t>(levels));
+    for (std::size_t r = 0; r < runs.size(); ++r) {
+        if (!can_see(runs[r], c.frequency_hz)) continue;
+        const auto level = static_cast<std::size_t>(runs[r].level);
+        ++could[level];
+        hits[level] += c.holds(static_cast<int>(r));
+    }
+    for (std::size_t k = 0; k < hits.size(); ++k)
+        if (hits[k] >= fewest_runs && hits[k] >= one_half * could[k]) return true;
+    return false;
+}
+
+/// Of each cluster, how far the nearest other vibration is that one rate at least supports; infinite: there is none.
+std::vector<double> spacings(const std::vector<consensus_run>& runs, const std::vector<cluster>& clusters) {
+    std::vector<double> out(clusters.size(), INFINITY);
+    for (const cluster& other : clusters) {
+        if (!at_one_rate(runs, other)) continue;
+        for (std::size_t i = 0; i < clusters.size(); ++i) {
+            const cluster& c = clusters[i];
+            const double apart = std::abs(c.frequency_hz - other.frequency_hz);
+            const double one = within(c.frequency_hz, c.damping_ratio, other.frequency_hz, other.damping_ratio);
+            if (&c == &other || (apart < one && shape_mac(c.members.front().found->shape,
+                                                          other.members.front().found->shape) > same_shape_run))
+                continue;
+            out[i] = std::min(out[i], apart);
+        }
+    }
+    return out;
+}
+
+/// The runs that vote on a mode: those that see it and can tell it from its neighbours, and in any case the six with the
+/// longest horizons of those that see it.
+std::vector<bool> voters(const std::vector<consensus_run>& runs, double f, double spacing_hz, std::size_t n_y) {
+    std::vector<bool> vote(runs.size());
+    std::vector<std::size_t> see;
+    for (std::size_t r = 0; r < runs.size(); ++r) {
+        if (!can_see(runs[r], f)) continue;
+        vote[r] = can_part(runs[r], spacing_hz, n_y);
+        see.push_back(r);
+    }
+    std::stable_sort(see.begin(), see.end(),
+                     [&](std::size_t a, std::size_t b) { return runs[a].horizon_s() > runs[b].horizon_s(); });
+    for (std::size_t i = 0; i < std::min(fewest_voters, see.size()); ++i) vote[see[i]] = true;
+    return vote;
+}
+
 bool sharp(const consensus_run& run, double f) {
-    return (run.method == OKID_METHOD_N4SID_CVA || run.method == OKID_METHOD_N4SID_MOESP) && f < run.top * run.fs_hz &&
-           f * run.rows / run.fs_hz >= periods_well;
+    return (run.method == OKID_METHOD_N4SID_CVA || run.method == OKID_METHOD_N4SID_MOESP) && in_band(run, f) &&
+           f * run.horizon_s() >= periods_well;
 }
 
 /// Root mean square distance of the subspace runs of the mode's level from its values.
@@ -212,14 +281,20 @@ void set_values(const std::vector<consensus_run>& runs, const std::vector<member
     set_scatter(runs, seen, mode);
 }
 
-consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c) {
+consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c, double spacing_hz,
+                       const std::vector<bool>& turned) {
     consensus_mode mode;
     mode.frequency_hz = c.frequency_hz;
-    for (const consensus_run& run : runs) mode.could += can_see(run, mode.frequency_hz);
+    const std::vector<bool> votes = voters(runs, mode.frequency_hz, spacing_hz, c.members.front().found->shape.size());
+    mode.could = static_cast<int>(std::count(votes.begin(), votes.end(), true));
+    mode.spacing_hz = spacing_hz;
+    for (const consensus_run& run : runs)
+        mode.parted +=
+            can_see(run, mode.frequency_hz) && can_part(run, spacing_hz, c.members.front().found->shape.size());
     std::vector<member> seen;
     for (const member& m : c.members) {
         mode.members.emplace_back(m.run, m.track);
-        if (can_see(runs[static_cast<std::size_t>(m.run)], mode.frequency_hz)) seen.push_back(m);
+        if (votes[static_cast<std::size_t>(m.run)]) seen.push_back(m);
     }
     mode.hits = static_cast<int>(seen.size());
     mode.found_in = mode.could ? static_cast<double>(mode.hits) / mode.could : 0;
@@ -227,7 +302,8 @@ consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c)
     const auto med = [&](auto of) { return median_of(seen, of); };
     mode.frequency_hz = med([](const member& m) { return m.found->frequency_hz; });
     mode.damping_ratio = med([](const member& m) { return m.found->damping_ratio; });
-    mode.mpc = med([](const member& m) { return m.found->mpc; });
+    mode.mpc = med(
+        [&](const member& m) { return turned.empty() ? m.found->mpc : shape_collinearity(m.found->shape, turned); });
     mode.emac = med([](const member& m) { return m.found->emac; });
     const double zeta = mode.damping_ratio;
     mode.damping_spread = 1.4826 * med([&](const member& m) { return std::abs(m.found->damping_ratio / zeta - 1); });
@@ -247,9 +323,15 @@ void mark_split(std::vector<consensus_mode>& modes) {
             const consensus_mode& mode = modes[i];
             if (&other == &mode || other.agreement <= mode.agreement || !other.confident()) continue;
             const double apart = std::abs(mode.frequency_hz - other.frequency_hz);
-            const double widths = mode.frequency_hz * mode.damping_ratio + other.frequency_hz * other.damping_ratio;
-            if (apart < std::max(2.5 * widths, same_frequency * other.frequency_hz) &&
-                shape_mac(mode.shape, other.shape) > same_shape_run) {
+            // One or two outputs tell no shapes apart.
+            const double one =
+                mode.shape.size() < 3
+                    ? 0
+                    : std::max(within(mode.frequency_hz, mode.damping_ratio, other.frequency_hz, other.damping_ratio),
+                               same_frequency * other.frequency_hz);
+            // A shadow: no three runs can tell it from the stronger one, and it has its shape.
+            const bool shadow = mode.shape.size() >= 3 && mode.parted < fewest_runs && apart <= mode.spacing_hz;
+            if ((apart < one || shadow) && shape_mac(mode.shape, other.shape) > same_shape_run) {
                 split.push_back(i);
                 break;
             }
@@ -281,9 +363,10 @@ void collect_poles(okid_identify_t* identifier, okid_identified_t& model, consen
         if (okid_identify_poles(identifier, order, &model) < 0) continue;
         for (int k = 0; k < model.mode_count; ++k) {
             run_pole pole{order, model.frequency_hz[k], model.damping_ratio[k], model.mpc[k], model.emac[k], {}};
+            run.zoom().unfold(pole.frequency_hz, pole.damping_ratio);
             for (int i = 0; i < model.n_y; ++i) {
                 const auto at = i + static_cast<std::ptrdiff_t>(k) * model.n_y;
-                pole.shape.emplace_back(model.shape_re[at], model.shape_im[at]);
+                pole.shape.push_back(run.zoom().turned({model.shape_re[at], model.shape_im[at]}));
             }
             run.poles.push_back(std::move(pole));
         }
@@ -297,7 +380,7 @@ void link_tracks(consensus_run& run) {
         for (const run_pole& pole : run.poles)
             if (pole.order == order && pole.damping_ratio > 1e-7 && pole.damping_ratio < most_damping)
                 next.push_back(&pole);
-        extend(chains, next);
+        extend(chains, next, run.fs_hz / 2); // in a band that is folded, of what stands there
     }
     for (const chain& poles : chains) {
         const auto possible = std::count_if(run.orders.begin(), run.orders.end(),
@@ -309,12 +392,27 @@ void link_tracks(consensus_run& run) {
 }
 
 bool can_see(const consensus_run& run, double frequency_hz) {
-    return frequency_hz <= run.top * run.fs_hz && frequency_hz >= periods_seen * run.fs_hz / run.rows;
+    const double periods = std::max(periods_least, periods_seen * std::min(1.0, 3.0 / run.outputs));
+    return in_band(run, frequency_hz) && frequency_hz * run.horizon_s() >= periods;
 }
 
-std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs) {
+std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs, std::vector<bool>* turned) {
     std::vector<consensus_mode> modes;
-    for (const cluster& c : gather(runs)) modes.push_back(mode_of(runs, c));
+    const std::vector<cluster> clusters = gather(runs);
+    const std::vector<double> apart = spacings(runs, clusters);
+    std::vector<bool> quarter = turned ? *turned : std::vector<bool>();
+    for (std::size_t i = 0; i < clusters.size(); ++i) modes.push_back(mode_of(runs, clusters[i], apart[i], quarter));
+    if (turned && quarter.empty()) {
+        std::vector<mode_shape> shapes; // of what would be believed but for its phases
+        for (const consensus_mode& mode : modes)
+            if (mode.found_in >= one_half && mode.hits >= fewest_runs &&
+                2 * mode.agreement >= one_half * (1 + mode.mpc))
+                shapes.push_back(mode.shape);
+        quarter = turned_outputs(shapes);
+        *turned = quarter;
+        for (std::size_t i = 0; i < clusters.size() && !quarter.empty(); ++i)
+            modes[i] = mode_of(runs, clusters[i], apart[i], quarter);
+    }
     std::sort(modes.begin(), modes.end(),
               [](const consensus_mode& a, const consensus_mode& b) { return a.frequency_hz < b.frequency_hz; });
     mark_split(modes);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Modes that several methods, horizons, rates and orders agree on: the numerics behind `--method auto`.
 #pragma once
+#include "zoom.hpp"
+
 #include <okid/identify.h>
 
 #include <complex>
@@ -31,7 +33,12 @@ struct consensus_run {
     int level = 0;    ///< 0: the record's own rate, k: a 2^k-th of it
     double fs_hz = 0; ///< of this level
     int rows = 0;     ///< samples it looks back on
-    double top = 0;   ///< modes above this share of fs_hz are not seen
+    int outputs = 1;
+    double top = 0;    ///< modes above this share of fs_hz are not seen
+    double bottom = 0; ///< nor below this one
+    int band = 0;      ///< of a zoom
+    zoom_band zoom() const { return {fs_hz, band}; }
+    double horizon_s() const { return rows / fs_hz; }
     std::vector<int> orders;
     std::vector<run_pole> poles;
     std::vector<run_track> tracks;
@@ -46,6 +53,8 @@ struct consensus_mode {
     double found_in = 0;                                  ///< hits / could
     double agreement = 0;                                 ///< 0..1: found_in, consistency, phase and scatter together
     int level = 0;                                        ///< the highest rate that sees it well
+    double spacing_hz = 0;                                ///< to the nearest other vibration; infinite: none
+    int parted = 0;                                       ///< runs that can tell it from that one
     std::vector<std::complex<double>> shape;
     std::vector<std::pair<int, int>> members; ///< run, track
     std::vector<std::string> why;             ///< what speaks against it; empty: confident
@@ -61,11 +70,14 @@ void collect_poles(okid_identify_t* identifier, okid_identified_t& model, consen
 /// Link the poles of a run over its orders.
 void link_tracks(consensus_run& run);
 
-/// Can this run see a mode at f Hz: in its band, and with at least three quarters of a period in its horizon?
+/// Can this run see a mode at f Hz: in its band, and with at least three quarters of a period in its horizon (of more than
+/// three outputs together: less)?
 bool can_see(const consensus_run& run, double frequency_hz);
 
 /// Clusters over the runs (tracks linked), ascending in frequency, with votes, values and first codes in `why`.
-std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs);
+/// @param turned  in: outputs known to stand a quarter of a turn off the others (quantity.hpp), empty: not known;
+///                out: those that do. nullptr: shapes are taken as they are
+std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs, std::vector<bool>* turned = nullptr);
 
 /// |a^H b|^2 / (a^H a)(b^H b).
 double shape_mac(const std::vector<std::complex<double>>& a, const std::vector<std::complex<double>>& b);

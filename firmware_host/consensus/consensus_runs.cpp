@@ -15,9 +15,16 @@ namespace okid_host {
 namespace {
 
 constexpr int long_rows = 30, lags_of_observer = 40, most_order = 64;
+/// Block rows x outputs: the states of a Hankel matrix. A plate of 23 modes under one accelerometer has 46, and as many again
+/// of noise beside them. Few channels ask for long horizons, and there they are cheap.
+constexpr int rows_of_outputs = 90;
 constexpr int most_unknowns = 450; ///< block rows x channels: the decomposition costs their third power
 constexpr double short_share = 0.6, middle_share = 0.8;
 constexpr int fewest_rows = 4;
+constexpr int enough_voters = 4, few_voters = 2; ///< runs that tell a mode from its neighbour, that found it
+constexpr double beats_wanted = 1.25;            ///< of both in the horizon: with room for the shorter ones
+constexpr double most_decays = 2;                ///< times in which the mode falls to 1 / e: what is over tells nothing
+constexpr int most_factor = 96;
 
 std::unique_ptr<std::byte[]> memory(std::size_t bytes) {
     return std::unique_ptr<std::byte[]>(bytes ? new (std::nothrow) std::byte[bytes] : nullptr);
@@ -28,6 +35,14 @@ consensus_run run_of(okid_method_t method, int rows) {
     run.method = method;
     run.rows = rows;
     return run;
+}
+
+/// Block rows that so many samples bear.
+int rows_of(int n_u, int n_y, long long samples) {
+    // Ten samples an unknown of one output; what more than three outputs have in common is estimated from all of them.
+    const long long borne = samples * std::max(3, n_y) / 30 / (n_y + 2LL * n_u);
+    const int wanted = std::max(long_rows, (rows_of_outputs + n_y - 1) / n_y);
+    return static_cast<int>(std::min<long long>({wanted, borne, std::max(6, most_unknowns / (n_u + n_y))}));
 }
 
 bool find_poles(const okid_identify_config_t& config, const level_sums& sums, consensus_run& run) {
@@ -46,10 +61,10 @@ bool find_poles(const okid_identify_config_t& config, const level_sums& sums, co
 
 } // namespace
 
-std::vector<consensus_run> plan_runs(int n_u, int n_y, int level, double fs_hz, double top, long long samples) {
+std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_level& level) {
     const int m = n_u + n_y;
-    const int borne = static_cast<int>(std::min<long long>(long_rows, samples / 10 / (n_y + 2LL * n_u)));
-    const int rows = std::min(borne, std::max(6, most_unknowns / m));
+    const long long samples = level.samples;
+    const int rows = rows_of(n_u, n_y, samples);
     const int less = std::max(fewest_rows, static_cast<int>(std::lround(short_share * rows)));
     const int middle = std::max(fewest_rows, static_cast<int>(std::lround(middle_share * rows)));
     std::vector<consensus_run> out;
@@ -57,14 +72,18 @@ std::vector<consensus_run> plan_runs(int n_u, int n_y, int level, double fs_hz, 
         out = {run_of(OKID_METHOD_N4SID_MOESP, rows), run_of(OKID_METHOD_N4SID_MOESP, less),
                run_of(OKID_METHOD_N4SID_CVA, rows), run_of(OKID_METHOD_N4SID_CVA, less),
                run_of(OKID_METHOD_N4SID_SSARX, middle)};
-    int p = n_u > 0 ? okid_identify_usable_p(n_u, n_y, lags_of_observer, samples)
-                    : static_cast<int>(std::min<long long>(lags_of_observer, samples / 20));
+    const int lags = std::max(lags_of_observer, (rows_of_outputs + n_y - 1) / n_y);
+    int p = n_u > 0 ? okid_identify_usable_p(n_u, n_y, lags, samples)
+                    : static_cast<int>(std::min<long long>(lags, samples / 20));
     p = std::min(p, std::max(8, most_unknowns / m));
     if (p * n_y >= fewest_rows) out.push_back(run_of(OKID_METHOD_OKID_ERA, p));
     for (consensus_run& run : out) {
-        run.level = level;
-        run.fs_hz = fs_hz;
-        run.top = top;
+        run.level = number;
+        run.outputs = n_y;
+        run.fs_hz = level.fs_hz;
+        run.top = level.top;
+        run.bottom = level.bottom;
+        run.band = level.band;
         const okid_identify_config_t config = run_config(run, n_u, n_y);
         const int most = is_subspace(run.method) ? (run.rows - 1) * n_y : run.rows * n_y;
         run.orders = consensus_orders(std::min({most_order, most, okid_identify_max_order(&config)}));
@@ -116,21 +135,21 @@ level_sums::level_sums(const record_level& level, int n_u, int n_y, int lags, bo
     }
 }
 
-std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest,
-                                   int threads) {
+std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std::size_t first, int n_u, int n_y,
+                                   bool at_rest, int threads) {
     struct piece { // runs of one level that share their sums
         const record_level* level;
         int lags;
         std::vector<consensus_run> runs;
     };
     std::vector<piece> pieces;
-    for (std::size_t k = 0; k < levels.size(); ++k) {
+    for (std::size_t k = first; k < levels.size(); ++k) {
         const record_level& level = levels[k];
-        const std::size_t first = pieces.size();
-        for (consensus_run& run : plan_runs(n_u, n_y, static_cast<int>(k), level.fs_hz, level.top, level.samples)) {
+        const std::size_t begin = pieces.size();
+        for (consensus_run& run : plan_runs(n_u, n_y, static_cast<int>(k), level)) {
             const okid_identify_config_t config = run_config(run, n_u, n_y);
             const int lags = okid_identify_lags(&config);
-            auto at = std::find_if(pieces.begin() + static_cast<std::ptrdiff_t>(first), pieces.end(),
+            auto at = std::find_if(pieces.begin() + static_cast<std::ptrdiff_t>(begin), pieces.end(),
                                    [lags](const piece& one) { return one.lags >= lags; });
             if (at == pieces.end() || at->lags != lags) at = pieces.insert(at, {&level, lags, {}});
             at->runs.push_back(std::move(run));
@@ -146,6 +165,38 @@ std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int 
     for (piece& one : pieces)
         for (consensus_run& run : one.runs)
             if (!run.orders.empty()) out.push_back(std::move(run));
+    return out;
+}
+
+std::vector<record_level> zoomed_levels(const std::vector<record_level>& levels,
+                                        const std::vector<consensus_mode>& modes, int n_u, int n_y, bool at_rest) {
+    std::vector<record_level> out;
+    const record_level& first = levels.front();
+    const auto shows = [](const record_level& level, double f) {
+        const double share = level.zoom().folded(f) / level.fs_hz;
+        return share > level.bottom && share < level.top;
+    };
+    for (const consensus_mode& mode : modes) {
+        const double decays_s = 1 / (2 * M_PI * mode.frequency_hz * mode.damping_ratio);
+        const double wanted_s = beats_wanted / (n_y * mode.spacing_hz);
+        if (mode.confident() || mode.parted >= enough_voters || mode.hits < few_voters || wanted_s == 0 ||
+            wanted_s > most_decays * decays_s)
+            continue;
+        for (int factor = 2; factor <= most_factor;
+             factor = factor % 3 ? factor * 3 / 2 : factor * 4 / 3) { // 2 3 4 6 8 ..
+            const int rows = rows_of(n_u, n_y, first.samples / factor);
+            if (rows * factor / first.fs_hz < wanted_s) continue;
+            const auto has = [&](const record_level& level) {
+                return level.fs_hz <= first.fs_hz / factor * (1 + 1e-9) && shows(level, mode.frequency_hz);
+            };
+            if (std::any_of(out.begin(), out.end(), has)) break;
+            record_level zoomed =
+                zoomed_level(first, static_cast<std::size_t>(n_u + n_y), factor, mode.frequency_hz, at_rest);
+            if (zoomed.records.empty()) continue;
+            out.push_back(std::move(zoomed));
+            break;
+        }
+    }
     return out;
 }
 

@@ -12,7 +12,7 @@
 namespace okid_host {
 
 /// The runs that a level bears, without poles.
-std::vector<consensus_run> plan_runs(int n_u, int n_y, int level, double fs_hz, double top, long long samples);
+std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_level& level);
 
 /// What the library is asked for by a run.
 okid_identify_config_t run_config(const consensus_run& run, int n_u, int n_y);
@@ -28,9 +28,13 @@ class level_sums {
     okid_accumulator_t* accumulator_ = nullptr;
 };
 
-/// All runs of all levels with their poles linked. Runs that find no model are left out.
+/// All runs of the levels from `first` on with their poles linked. Runs that find no model are left out.
 /// @param threads  at a time, 0: all processors; the result is the same for any number
-std::vector<consensus_run> look_at(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest,
-                                   int threads);
+std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std::size_t first, int n_u, int n_y,
+                                   bool at_rest, int threads);
+
+/// Streams of bands in which modes stand closer to each other than the runs can tell apart.
+std::vector<record_level> zoomed_levels(const std::vector<record_level>& levels,
+                                        const std::vector<consensus_mode>& modes, int n_u, int n_y, bool at_rest);
 
 } // namespace okid_host

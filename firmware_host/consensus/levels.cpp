@@ -21,14 +21,27 @@ constexpr double top_full = 0.48;      // where the record has no filter of its 
 constexpr double edge_power = 0.1;     // of the usual power, above top_decimated: less means an anti-alias filter
 constexpr double no_power = 1e-3;      // of the usual power, below: nothing is excited there
 constexpr double band_step = 0.02;
+constexpr double most_cut_off =
+    0.1; // of the energy, at the beginning: a decay that is over by then has no narrow bands
+constexpr double edge_of_band = 0.04; // of the rate, on each side of a folded band: (0.5 - 0.42) / 2
 constexpr std::size_t spectrum_size = 256;
 
+/// The weights of a kernel; moved up to the middle of a band.
+Eigen::VectorXd weights_of(const fir_kernel& kernel, double middle = 0) {
+    Eigen::VectorXd out(static_cast<Eigen::Index>(2 * kernel.half()));
+    kernel.weights(0, out.data());
+    const double centre = static_cast<double>(kernel.half()) - 1; // of the symmetric weights
+    for (Eigen::Index i = 0; middle > 0 && i < out.size(); ++i)
+        out[i] *= 2 * std::cos(2 * M_PI * middle * (static_cast<double>(i) - centre));
+    return out;
+}
+
 /// Every factor-th sample behind the filter. Silence, where the record began in it, stands before the first.
-sample_rows thinned(const fir_kernel& kernel, std::size_t factor, const sample_rows& rows, std::size_t m,
+sample_rows thinned(const Eigen::VectorXd& weights, std::size_t factor, const sample_rows& rows, std::size_t m,
                     bool at_rest) {
-    const std::size_t taps = 2 * kernel.half(), lead = at_rest ? kernel.half() : 0, count = lead + rows.size() / m;
-    Eigen::VectorXd weights(static_cast<Eigen::Index>(taps)), channel(static_cast<Eigen::Index>(count));
-    kernel.weights(0, weights.data());
+    const auto taps = static_cast<std::size_t>(weights.size());
+    const std::size_t lead = at_rest ? taps / 2 : 0, count = lead + rows.size() / m;
+    Eigen::VectorXd channel(static_cast<Eigen::Index>(count));
     const std::size_t out_count = count < taps ? 0 : (count - taps) / factor + 1;
     sample_rows out(out_count * m);
     for (std::size_t k = 0; k < m; ++k) {
@@ -89,17 +102,29 @@ double top_of(const std::vector<sample_rows>& records, std::size_t n_u, std::siz
     return top;
 }
 
+/// Share of the energy of the records that stands before their sample `count`: what a filter that settles so late cuts off.
+double share_before(const std::vector<sample_rows>& records, std::size_t m, std::size_t count) {
+    double before = 0, all = 0;
+    for (const sample_rows& rows : records)
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            if (std::isnan(rows[i])) continue;
+            all += rows[i] * rows[i];
+            if (i < count * m) before += rows[i] * rows[i];
+        }
+    return all > 0 ? before / all : 1;
+}
+
 } // namespace
 
 std::vector<record_level> make_levels(std::vector<sample_rows> records, std::size_t n_u, std::size_t n_y, double fs_hz,
                                       bool at_rest, int decimate, std::vector<double>& scale) {
     const std::size_t m = n_u + n_y;
-    const fir_kernel kernel(2, 1);
+    const Eigen::VectorXd half = weights_of(fir_kernel(2, 1));
     std::vector<record_level> out(1);
     out[0].fs_hz = fs_hz;
     out[0].records = std::move(records);
     if (decimate > 1) {
-        const fir_kernel first(decimate, 1);
+        const Eigen::VectorXd first = weights_of(fir_kernel(decimate, 1));
         for (sample_rows& rows : out[0].records)
             rows = thinned(first, static_cast<std::size_t>(decimate), rows, m, at_rest);
         out[0].fs_hz /= decimate;
@@ -111,11 +136,35 @@ std::vector<record_level> make_levels(std::vector<sample_rows> records, std::siz
         record_level next;
         next.fs_hz = out.back().fs_hz / 2;
         next.top = std::min(top_decimated, 2 * out.back().top);
-        for (const sample_rows& rows : out.back().records) next.records.push_back(thinned(kernel, 2, rows, m, at_rest));
+        for (const sample_rows& rows : out.back().records) next.records.push_back(thinned(half, 2, rows, m, at_rest));
         next.samples = complete(next.records, m);
         if (next.samples < fewest_samples) break;
         out.push_back(std::move(next));
     }
+    return out;
+}
+
+record_level zoomed_level(const record_level& first, std::size_t m, int factor, double frequency_hz, bool at_rest) {
+    record_level out;
+    out.zoomed = true;
+    out.fs_hz = first.fs_hz / factor;
+    out.band = static_cast<int>(frequency_hz / (out.fs_hz / 2));
+    const double share = out.zoom().folded(frequency_hz) / out.fs_hz;
+    out.bottom = out.band > 0 ? edge_of_band : 0;
+    out.top = out.band > 0 ? 0.5 - edge_of_band : top_decimated;
+    const double most = first.top * first.fs_hz; // and nothing above what the record shows
+    if (share < out.bottom || share > out.top || (out.band + 1) * out.fs_hz / 2 > most + edge_of_band * out.fs_hz)
+        return out;
+    // half the band on each side of its middle: twice as narrow as that of the rate itself
+    const Eigen::VectorXd weights = out.band > 0
+                                        ? weights_of(fir_kernel(2.0 * factor, 1), (out.band + 0.5) / (2 * factor))
+                                        : weights_of(fir_kernel(factor, 1));
+    const auto settles = static_cast<std::size_t>(weights.size()) / 2;
+    if (!at_rest && share_before(first.records, m, settles) > most_cut_off) return out;
+    for (const sample_rows& rows : first.records)
+        out.records.push_back(thinned(weights, static_cast<std::size_t>(factor), rows, m, at_rest));
+    out.samples = complete(out.records, m);
+    if (out.samples < fewest_samples) out.records.clear();
     return out;
 }
 

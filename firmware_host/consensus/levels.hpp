@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The same records at their own rate, half of it, a quarter …: no single rate suits all modes of a structure.
 #pragma once
+#include "zoom.hpp"
+
 #include <cstddef>
 #include <vector>
 
@@ -8,10 +10,14 @@ namespace okid_host {
 
 using sample_rows = std::vector<double>; ///< rows [u; y] of one record, n_u + n_y numbers a sample, NaN = missing
 
-/// Every record at one rate.
+/// Every record at one rate, of one band.
 struct record_level {
     double fs_hz = 0;
-    double top = 0; ///< modes above this share of fs_hz are not seen
+    double top = 0;    ///< modes above this share of fs_hz are not seen, …
+    double bottom = 0; ///< … nor below this one, of a band that is folded
+    int band = 0;      ///< zoom_band
+    bool zoomed = false;
+    zoom_band zoom() const { return {fs_hz, band}; }
     std::vector<sample_rows> records;
     long long samples = 0; ///< complete ones
 };
@@ -22,5 +28,9 @@ struct record_level {
 /// @param scale    out, n_u + n_y: what one unit of a level is in the record
 std::vector<record_level> make_levels(std::vector<sample_rows> records, std::size_t n_u, std::size_t n_y, double fs_hz,
                                       bool at_rest, int decimate, std::vector<double>& scale);
+
+/// A stream of the first level's record that shows a frequency at a `factor`-th of its rate; no samples: it stands at the edge of
+/// its band, where the filter is not flat, or too few samples are left.
+record_level zoomed_level(const record_level& first, std::size_t m, int factor, double frequency_hz, bool at_rest);
 
 } // namespace okid_host

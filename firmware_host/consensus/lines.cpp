@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace okid_host {
 namespace {
@@ -22,15 +23,26 @@ constexpr std::size_t fewest_blocks = 8; // to speak of a spread
 constexpr std::size_t line_blocks = 64;
 constexpr double loudest_silence =
     0.07; // half the amplitude of a line of 3 % of the spread in the tenth of a record after a hit
-constexpr double line_periods = 8;    // at least so many in a block
-constexpr double line_damping = 0.01; // a pole damped more is no line
-constexpr double unresolved = 2;      // decay times in the record below which nobody can tell
+constexpr double line_periods = 8;        // at least so many in a block
+constexpr std::size_t fewest_quarter = 4; // blocks, to compare quiet and loud ones
+constexpr double comes_and_goes = 8;      // loud over quiet quarter of the blocks, all of the signal
+constexpr double stays = 2;               // the same of an amplitude that something else makes
+constexpr double fewest_periods = 3;      // … where a fall is looked for
+constexpr double line_damping = 0.01;     // a pole damped more is no line
+constexpr double unresolved = 2;          // decay times in the record below which nobody can tell
 constexpr double mains_tolerance = 0.003;
 constexpr double multiple_tolerance = 0.015;
 constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / sqrt(blocks)
 constexpr double stronger = 10; // amplitude of the vibration over that of its multiple
 constexpr double coupled_periods = 6;
 constexpr int most_multiple = 5;
+constexpr double lasting =
+    0.5;                    // (sum of amplitudes)^2 over blocks times sum of squares: chance gives 0.79, a decay less
+constexpr double falls = 3; // deviations of a slope: from here on an amplitude falls
+constexpr double as_damped = 2; // factor between the fall of an amplitude and that of the mode's own damping
+constexpr int rate_parts = 8;   // fs / 8, 2 fs / 8 ..: where a converter and its clock leave lines
+constexpr double on_the_rate = 3e-4;
+constexpr double alone = 0.98;        // of the power of a shape in one output
 constexpr double forced = 10;         // power of a line of the force over that beside it
 constexpr double resonant = 2;        // power of the responses over that of the force, at a mode over beside it
 constexpr std::size_t averaged = 4;   // segments of a spectrum, at least
@@ -84,12 +96,20 @@ bool near_multiple(double frequency_hz, double base, double tolerance) {
     return n >= 1 && std::abs(frequency_hz - n * base) < tolerance * base;
 }
 
+/// Does a vibration last, or does the record hold a single decay?
+bool lasts(const std::vector<complex>& a) {
+    double sum = 0, squares = 0;
+    for (const complex& x : a) sum += std::abs(x), squares += std::norm(x);
+    return sum * sum >= lasting * static_cast<double>(a.size()) * squares;
+}
+
 /// Does the response at n f follow the n-th power of that at f?
 bool follows(const record_level& level, std::size_t m, std::size_t channel, double base, int n) {
     const auto block = static_cast<std::size_t>(coupled_periods * level.fs_hz / base) + 1;
     const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
                                b = amplitudes(level, m, channel, {1}, n * base, block);
-    if (a.size() < 2 * fewest_blocks || b.size() != a.size() || strength(a) < stronger * strength(b)) return false;
+    if (a.size() < 2 * fewest_blocks || b.size() != a.size() || strength(a) < stronger * strength(b) || !lasts(a))
+        return false; // the phases of a single decay are those of its hit
     complex sum = 0;
     double both = 0;
     for (std::size_t i = 0; i < a.size(); ++i) {
@@ -102,7 +122,8 @@ bool follows(const record_level& level, std::size_t m, std::size_t channel, doub
 
 const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
     std::size_t k = 0; // the lowest rate that shows it: fewest samples
-    while (k + 1 < levels.size() && frequency_hz < levels[k + 1].top * levels[k + 1].fs_hz) ++k;
+    while (k + 1 < levels.size() && !levels[k + 1].zoomed && frequency_hz < levels[k + 1].top * levels[k + 1].fs_hz)
+        ++k;
     return levels[k];
 }
 
@@ -115,17 +136,96 @@ std::vector<complex> weights_along(std::vector<complex> shape) {
     return shape;
 }
 
+/// Does the amplitude fall as a free vibration of this damping does? One of a line stays, whatever the record's length.
+/// @param a       blocks under a Hann window, of all records
+/// @param decay   of the amplitude from one block to the next, by the mode's damping (natural logarithm)
+bool decays(const std::vector<complex>& a, double decay) {
+    const auto n = static_cast<double>(a.size());
+    if (a.size() < 4) return false;
+    double mean = 0, sxx = 0, sxy = 0, left = 0;
+    for (const complex& x : a) mean += std::log(std::abs(x)) / n;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        const double at = static_cast<double>(i) - (n - 1) / 2;
+        sxx += at * at;
+        sxy += at * std::log(std::abs(a[i]));
+    }
+    const double slope = sxy / sxx;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        const double at = static_cast<double>(i) - (n - 1) / 2;
+        left += std::pow(std::log(std::abs(a[i])) - mean - slope * at, 2);
+    }
+    return -slope > falls * std::sqrt(left / (n - 2) / sxx) && -slope > decay / as_damped && -slope < decay * as_damped;
+}
+
+/// What moves the outputs comes and goes: does the amplitude at the mode's frequency stay, in quiet parts as in loud ones? Then
+/// something else makes it.
+/// @param a      blocks at the frequency
+/// @param whole  of all of the signal, root mean squares of the same blocks
+bool goes_on_alone(const std::vector<complex>& a, const std::vector<double>& whole) {
+    if (a.size() < 4 * fewest_quarter || whole.size() != a.size()) return false;
+    std::vector<std::size_t> order(a.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) { return whole[i] < whole[j]; });
+    const std::size_t quarter = order.size() / 4;
+    double quiet = 0, loud = 0, quiet_all = 0, loud_all = 0;
+    for (std::size_t i = 0; i < quarter; ++i) {
+        const std::size_t low = order[i], high = order[order.size() - 1 - i];
+        quiet += std::abs(a[low]), loud += std::abs(a[high]);
+        quiet_all += whole[low], loud_all += whole[high];
+    }
+    return loud_all > comes_and_goes * quiet_all && loud < stays * quiet;
+}
+
+/// Root mean squares, block by block, of the outputs along the weights.
+std::vector<double> levels_along(const record_level& level, std::size_t m, std::size_t first_channel,
+                                 const std::vector<complex>& weights, std::size_t block) {
+    std::vector<double> out;
+    for (const sample_rows& rows : level.records)
+        for (std::size_t first = 0; first + block <= rows.size() / m; first += block) {
+            double square = 0;
+            for (std::size_t i = first; i < first + block; ++i) {
+                complex along = 0;
+                for (std::size_t c = 0; c < weights.size(); ++c) along += weights[c] * rows[i * m + first_channel + c];
+                square += std::norm(along);
+            }
+            if (!std::isnan(square)) out.push_back(std::sqrt(square / static_cast<double>(block)));
+        }
+    return out;
+}
+
 bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
     std::size_t longest = 0;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
     const double seconds = static_cast<double>(longest) / level.fs_hz;
-    const bool endless = 2 * M_PI * mode.damping_ratio * mode.frequency_hz * seconds < unresolved;
+    const double rate = 2 * M_PI * mode.damping_ratio * mode.frequency_hz;
+    const bool endless = rate * seconds < unresolved;
     if (!endless && mode.damping_ratio > line_damping) return false;
     const auto periods = static_cast<std::size_t>(line_periods * level.fs_hz / mode.frequency_hz) + 1;
-    const std::vector<complex> a = amplitudes(level, m, n_u, weights_along(mode.shape), mode.frequency_hz,
-                                              std::max(periods, longest / line_blocks));
+    const std::size_t block = std::max(periods, longest / line_blocks);
+    const std::vector<complex> weights = weights_along(mode.shape),
+                               a = amplitudes(level, m, n_u, weights, mode.frequency_hz, block);
     if (at_rest && strength(a) > loudest_silence) return false;
-    return endless || (a.size() >= fewest_blocks && spread_over_mean(a) < steady);
+    if (!endless)
+        return (a.size() >= fewest_blocks && spread_over_mean(a) < steady) ||
+               goes_on_alone(a, levels_along(level, m, n_u, weights, block));
+    // Few periods: shorter blocks show whether it falls.
+    const std::size_t shorter = std::max<std::size_t>(
+        static_cast<std::size_t>(fewest_periods * level.fs_hz / mode.frequency_hz) + 1, longest / fewest_blocks);
+    const auto fall = a.size() >= fewest_blocks ? a : amplitudes(level, m, n_u, weights, mode.frequency_hz, shorter);
+    const std::size_t step = a.size() >= fewest_blocks ? block : shorter;
+    if (level.records.size() == 1 && decays(fall, rate * static_cast<double>(step) / level.fs_hz)) return false;
+    return a.size() < fewest_blocks || spread_over_mean(a) < steady;
+}
+
+/// A line that the converter makes: at a simple part of the record's rate, in one output alone.
+bool is_of_the_rate(double fs_hz, const consensus_mode& mode) {
+    double all = 0, most = 0;
+    for (const complex& x : mode.shape) all += std::norm(x), most = std::max(most, std::norm(x));
+    if (mode.shape.size() < 2 || most < alone * all) return false;
+    for (int parts = 3; parts <= rate_parts; ++parts)
+        for (int k = 1; 2 * k < parts; ++k)
+            if (std::abs(mode.frequency_hz / (fs_hz * k / parts) - 1) < on_the_rate) return true;
+    return false;
 }
 
 /// Powers of a range of channels, each in units of its spread, added up.
@@ -169,6 +269,10 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
     for (consensus_mode& mode : modes) {
         const std::size_t channel = n_u + largest(mode.shape);
         const record_level& level = seen_by(levels, mode.frequency_hz);
+        if (is_of_the_rate(levels[0].fs_hz, mode)) {
+            mode.why.emplace_back("pickup");
+            continue;
+        }
         if (is_line(level, m, n_u, at_rest, mode)) {
             const bool mains = near_multiple(mode.frequency_hz, 50, mains_tolerance) ||
                                near_multiple(mode.frequency_hz, 60, mains_tolerance);

@@ -37,6 +37,7 @@ record_options options_of(const stream_config& config) {
     out.band = config.wanted.band;
     out.decimate = config.wanted.decimate;
     out.modes_without_matrices = true;
+    for (const mass_channel& channel : config.mass.outputs) out.sensing.push_back(channel.sensing);
     return out;
 }
 

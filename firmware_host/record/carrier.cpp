@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  standard deviations of the modes of a consensus
-// METHOD   CVA with the long horizon at one rate, at the order where the consensus found all modes of that rate; the same without
-//          one block each
+// METHOD   CVA with the long horizon at one rate, at the order whose poles lie nearest to what the runs agree on; the same without
+//          one block each. A mode that this order lacks, or holds by half, is looked at in up to two others
 #include "carrier.hpp"
 
 #include "record_work.hpp"
@@ -18,6 +18,9 @@ namespace okid_host {
 namespace {
 
 constexpr double carried_shape = 0.8, carried_frequency = 0.01;
+constexpr double farthest = 1;  // half-power bandwidths of a pole from a mode: beyond, it is none
+constexpr int most_orders = 3;  // looked at for the deviations of a mode
+constexpr double doubted = 0.5; // deviation of damping over damping: look at another order
 
 std::unique_ptr<std::byte[]> carrier_memory(std::size_t bytes) {
     return std::unique_ptr<std::byte[]>(bytes ? new (std::nothrow) std::byte[bytes] : nullptr);
@@ -31,23 +34,27 @@ const consensus_run* long_run(const std::vector<consensus_run>& runs, int level)
     return out;
 }
 
-/// The lowest order at which this run found most of the modes.
-int order_with_all(const std::vector<consensus_run>& runs, const consensus_run& run,
-                   const std::vector<consensus_mode>& modes) {
-    int best = 0;
-    std::size_t most = 0;
-    for (const int order : run.orders) {
-        std::size_t count = 0;
-        for (const consensus_mode& mode : modes)
-            for (const auto& [r, t] : mode.members) {
-                if (&runs[static_cast<std::size_t>(r)] != &run || mode.level != run.level || !mode.confident())
-                    continue;
-                const auto& orders = run.tracks[static_cast<std::size_t>(t)].orders;
-                count += std::find(orders.begin(), orders.end(), order) != orders.end();
+/// Orders of this run, the best carrier of the modes wanted first: where its poles lie nearest to what the runs agree on, in
+/// half-power bandwidths. At an order that cuts through a mode its pole is elsewhere, and a block less takes it out.
+std::vector<int> carrying_orders(const consensus_run& run, const std::vector<mode_shift>& wanted) {
+    std::vector<std::pair<double, int>> order;
+    for (const int n : run.orders) {
+        double away = 0;
+        for (const mode_shift& mode : wanted) {
+            double least = farthest;
+            for (const run_pole& pole : run.poles) {
+                if (pole.order != n || shape_mac(pole.shape, mode.shape) < carried_shape) continue;
+                const double f = (pole.frequency_hz / mode.frequency_hz - 1) / mode.damping_ratio;
+                least = std::min(least, std::hypot(f, pole.damping_ratio / mode.damping_ratio - 1));
             }
-        if (count > most) most = count, best = order;
+            away += least * least;
+        }
+        if (away < static_cast<double>(wanted.size()) * farthest * farthest) order.emplace_back(away, n);
     }
-    return best;
+    std::sort(order.begin(), order.end());
+    std::vector<int> out;
+    for (const auto& [away, n] : order) out.push_back(n);
+    return out;
 }
 
 record_set set_of(const record_level& level, std::size_t n_u, std::size_t n_y) {
@@ -153,50 +160,121 @@ std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& mod
     return out;
 }
 
+namespace {
+
+/// One level, its sums, and what is asked of it.
+struct carrier_task {
+    const record_level& level;
+    const consensus_run& run;
+    const level_sums& sums;
+    int n_u, n_y, blocks;
+    bool at_rest, analytic;
+};
+
+/// A mode as the record has it, of a stream that has its band folded. The decay is the same in both.
+void unfold(const zoom_band& zoom, carried_mode& mode) {
+    if (zoom.number == 0) return;
+    const double frequency = mode.frequency_hz;
+    zoom.unfold(mode.frequency_hz, mode.damping_ratio);
+    const double share = frequency / mode.frequency_hz; // of a damping ratio
+    mode.damping_std *= share;
+    for (auto& entry : mode.shape) entry = zoom.turned(entry);
+    for (mode_shift& shift : mode.shifts) {
+        if (zoom.number % 2) shift.frequency_hz = -shift.frequency_hz;
+        shift.damping_ratio *= share;
+        for (auto& entry : shift.shape) entry = zoom.turned(entry);
+    }
+}
+
+/// The modes wanted as the model of one order has them.
+std::vector<std::optional<carried_mode>> carry_at(const carrier_task& task, int order, std::vector<mode_shift> wanted) {
+    const zoom_band zoom = task.level.zoom();
+    std::vector<std::optional<carried_mode>> out(wanted.size());
+    okid_identify_config_t config = run_config(task.run, task.n_u, task.n_y);
+    config.order = config.max_order = order;
+    const std::size_t bytes = okid_identify_memsize(&config);
+    const auto block = carrier_memory(bytes);
+    okid_identify_t* identifier = nullptr;
+    okid_identified_t model{};
+    if (!block || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK ||
+        okid_identify_run(identifier, task.sums.handle(), &model) < 0)
+        return out;
+    const bool nearly_singular = (model.warnings & OKID_NOTE_ILL_CONDITIONED) && model.observer_info.ridge <= 1e-10;
+    const bool exact = nearly_singular && run_factor(task.level, config, task.at_rest, identifier, model);
+    if (nearly_singular && !exact && okid_identify_run(identifier, task.sums.handle(), &model) < 0) return out;
+    std::vector<replicate_model> replicates;
+    if (task.blocks > 0) {
+        record_work work;
+        work.set = set_of(task.level, static_cast<std::size_t>(task.n_u), static_cast<std::size_t>(task.n_y));
+        work.at_rest = task.at_rest;
+        work.config = config;
+        work.model = model;
+        work.identifier = identifier;
+        work.analytic = task.analytic;
+        replicates = leave_out_blocks(work, task.sums.handle(), task.blocks);
+    }
+    for (mode_shift& mode : wanted) {
+        zoom.fold(mode.frequency_hz, mode.damping_ratio);
+        for (auto& entry : mode.shape) entry = zoom.turned(entry);
+    }
+    out = carried_by(model, replicates, wanted);
+    for (auto& one : out) {
+        if (!one) continue;
+        one->exact = exact;
+        unfold(zoom, *one);
+    }
+    return out;
+}
+
+/// Is there a deviation, and one to be believed at once?
+bool surely(const carried_mode& one) { return one.damping_std < doubted * one.damping_ratio; }
+
+/// Of what several orders say of a mode, the one whose deviation of damping is the middle one.
+std::optional<carried_mode> middle(std::vector<carried_mode> all) {
+    if (all.empty()) return std::nullopt;
+    std::stable_sort(all.begin(), all.end(), [](const carried_mode& a, const carried_mode& b) {
+        return (std::isnan(a.damping_std) ? INFINITY : a.damping_std) <
+               (std::isnan(b.damping_std) ? INFINITY : b.damping_std);
+    });
+    return all[(all.size() - 1) / 2];
+}
+
+} // namespace
+
 std::vector<std::optional<carried_mode>> carry(const record_level& level, int number,
                                                const std::vector<consensus_run>& runs,
                                                const std::vector<consensus_mode>& modes, int n_u, int n_y, bool at_rest,
                                                int blocks, bool analytic) {
     std::vector<std::optional<carried_mode>> out(modes.size());
+    std::vector<std::size_t> left; // modes that want an order
+    for (std::size_t i = 0; i < modes.size(); ++i)
+        if (modes[i].level == number && modes[i].confident()) left.push_back(i);
     const consensus_run* run = long_run(runs, number);
-    const int order = run ? order_with_all(runs, *run, modes) : 0;
-    if (order == 0) return out;
-    okid_identify_config_t config = run_config(*run, n_u, n_y);
-    config.order = config.max_order = order;
+    if (!run || left.empty()) return out;
+    const okid_identify_config_t config = run_config(*run, n_u, n_y);
     const level_sums sums(level, n_u, n_y, okid_identify_lags(&config), at_rest);
-    const std::size_t bytes = okid_identify_memsize(&config);
-    const auto block = carrier_memory(bytes);
-    okid_identify_t* identifier = nullptr;
-    okid_identified_t model{};
-    if (!sums.handle() || !block || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK ||
-        okid_identify_run(identifier, sums.handle(), &model) < 0)
-        return out;
-    const bool nearly_singular = (model.warnings & OKID_NOTE_ILL_CONDITIONED) && model.observer_info.ridge <= 1e-10;
-    const bool exact = nearly_singular && run_factor(level, config, at_rest, identifier, model);
-    if (nearly_singular && !exact && okid_identify_run(identifier, sums.handle(), &model) < 0) return out;
-    std::vector<replicate_model> replicates;
-    if (blocks > 0) {
-        record_work work;
-        work.set = set_of(level, static_cast<std::size_t>(n_u), static_cast<std::size_t>(n_y));
-        work.at_rest = at_rest;
-        work.config = config;
-        work.model = model;
-        work.identifier = identifier;
-        work.analytic = analytic;
-        replicates = leave_out_blocks(work, sums.handle(), blocks);
+    if (!sums.handle()) return out;
+    const carrier_task task{level, *run, sums, n_u, n_y, blocks, at_rest, analytic};
+    std::vector<std::vector<carried_mode>> said(modes.size());
+    std::vector<int> used;
+    while (!left.empty() && used.size() < most_orders) {
+        std::vector<mode_shift> wanted;
+        for (const std::size_t i : left)
+            wanted.push_back({modes[i].frequency_hz, modes[i].damping_ratio, modes[i].shape});
+        const std::vector<int> orders = carrying_orders(*run, wanted);
+        const auto next = std::find_if(orders.begin(), orders.end(),
+                                       [&](int n) { return std::find(used.begin(), used.end(), n) == used.end(); });
+        if (next == orders.end()) break;
+        used.push_back(*next);
+        auto found = carry_at(task, *next, wanted);
+        std::vector<std::size_t> still;
+        for (std::size_t k = 0; k < left.size(); ++k) {
+            if (found[k]) said[left[k]].push_back(std::move(*found[k]));
+            if (blocks > 0 && (said[left[k]].empty() || !surely(said[left[k]].back()))) still.push_back(left[k]);
+        }
+        left = std::move(still);
     }
-    std::vector<mode_shift> wanted;
-    std::vector<std::size_t> places;
-    for (std::size_t i = 0; i < modes.size(); ++i) {
-        if (modes[i].level != number || !modes[i].confident()) continue;
-        wanted.push_back({modes[i].frequency_hz, modes[i].damping_ratio, modes[i].shape});
-        places.push_back(i);
-    }
-    auto found = carried_by(model, replicates, wanted);
-    for (std::size_t i = 0; i < places.size(); ++i) {
-        if (found[i]) found[i]->exact = exact;
-        out[places[i]] = std::move(found[i]);
-    }
+    for (std::size_t i = 0; i < modes.size(); ++i) out[i] = middle(std::move(said[i]));
     return out;
 }
 

@@ -30,7 +30,8 @@ constexpr std::size_t most_bases = 5,
                       most_mixed = 3; ///< the strongest vibrations, to explain a mode and to look for more
 constexpr std::size_t most_outputs = 8;
 constexpr int most_factors = 3, most_multiple = 5;
-constexpr double product_periods = 6;      ///< of the slowest factor
+constexpr double product_periods = 6; ///< of the slowest factor
+constexpr double resolved = 2;        ///< beats in a block under a Hann window: fewer, and one leaks into the other
 constexpr std::size_t product_blocks = 16; ///< to speak of a coherence
 constexpr double in_phase = 0.7;           ///< 1: always; the largest of linear structures is below 0.45
 constexpr double then_in_phase = 0.5, then_frequency = 0.025; ///< where the structure is known not to be linear
@@ -178,17 +179,31 @@ double frequency_of(const product& of, const std::vector<listed_mode>& modes) {
     });
 }
 
+/// Samples of a block that holds six periods of the slowest factor, and in which no factor looks like another or like their
+/// product: what leaks from one into the other moves in phase by itself.
+std::size_t block_of(const product_search& s, const product& of) {
+    std::vector<double> apart{frequency_of(of, s.modes)};
+    double slowest = INFINITY, closest = INFINITY;
+    for (const auto& factor : of) {
+        const double f = s.modes[factor.first].frequency_hz;
+        slowest = std::min(slowest, f);
+        for (const double other : apart) closest = std::min(closest, std::abs(f - other));
+        apart.push_back(f);
+    }
+    return static_cast<std::size_t>(std::max(product_periods / slowest, resolved / closest) * s.fs_hz) + 1;
+}
+
 /// How much records follow a product of vibrations; 0 where that cannot be told.
 double following(product_search& s, const std::vector<series>& records, const product& of) {
-    double slowest = INFINITY;
-    for (const auto& factor : of) slowest = std::min(slowest, s.modes[factor.first].frequency_hz);
-    const auto block = static_cast<std::size_t>(product_periods * s.fs_hz / slowest) + 1;
+    const std::size_t block = block_of(s, of);
+    std::size_t count = 0;
+    for (const series& x : records) count += x.size() / block;
+    if (count < product_blocks) return 0;
     const std::vector<complex> b = demodulated(records, frequency_of(of, s.modes) / s.fs_hz, block);
-    if (b.size() < product_blocks) return 0;
     std::vector<complex> together(b.size(), 1);
     for (const auto& [i, n] : of) {
         const std::vector<complex>& a = s.amplitudes(i, block);
-        if (!s.driven && !lasts(a)) return 0;
+        if (!lasts(a)) return 0; // the phases of a single decay are those of its hit
         for (std::size_t t = 0; t < b.size(); ++t) together[t] *= std::pow(n > 0 ? a[t] : std::conj(a[t]), std::abs(n));
     }
     return coherence(b, together);

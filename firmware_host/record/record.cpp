@@ -15,6 +15,7 @@
 #include "record_work.hpp"
 #include "result/method.hpp"
 #include "roving.hpp"
+#include "shape_quantity.hpp"
 
 #include <okid/steps/square_root.h>
 
@@ -373,6 +374,7 @@ record_result identify_records(record_set records, const record_options& options
     record_result result;
     result.model = kept_model(work.model);
     result.context = std::move(work.context);
+    shapes_in_one_quantity(options.sensing, result.model, result.context);
     result.config = work.config;
     result.memory = std::move(work.memory);
     result.identifier = work.identifier;

@@ -37,6 +37,7 @@ struct record_options {
     bool all_modes = false;                        ///< auto lists also what few runs found
     bool modes_without_matrices = false;           ///< auto: what stands in the way of M, K, R is a remark
     std::vector<int> modes;                        ///< numbers of the modes picked by hand (auto); empty: all
+    std::vector<int> sensing;                      ///< okid_sensing_t of each output; empty: all are accelerations
     std::vector<int> hits; ///< where each record was struck, from 1 (-3: at 3, reversed); empty: not told
     std::function<void(const char* stage)> stage; ///< told what begins; may be empty
 };

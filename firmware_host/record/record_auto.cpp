@@ -8,6 +8,7 @@
 #include "carrier.hpp"
 #include "combinations.hpp"
 #include "consensus/lines.hpp"
+#include "consensus/quantity.hpp"
 #include "error.hpp"
 #include "files/side_by_side.hpp"
 #include "modal_gain.hpp"
@@ -20,7 +21,9 @@
 #include "result/hold.hpp"
 #include "roving.hpp"
 #include "screening.hpp"
+#include "shape_quantity.hpp"
 #include "steadiness.hpp"
+#include "unexplained.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -268,6 +271,17 @@ void mark_slow(const record_set& set, double fs_hz, std::vector<consensus_mode>&
         if (mode.frequency_hz * seconds < fewest_periods || mode.could == 0) mode.why.emplace_back("band_edge");
 }
 
+/// Two groups of outputs stand at 90 degrees in all modes: velocities beside accelerations, say, and nobody said so.
+void remark_mixed(const std::vector<bool>& turned, const record_options& options, result_context& context) {
+    std::vector<std::string> groups[2];
+    for (std::size_t i = 0; i < turned.size(); ++i) groups[turned[i]].push_back(options.outputs[i]);
+    context.warnings.emplace_back(
+        "mixed_quantities",
+        fmt::format("{} and {} stand a quarter of a turn apart in every mode, as velocities and "
+                    "accelerations do. Say with --sensing what each measures, for shapes in one quantity",
+                    fmt::join(groups[0], ", "), fmt::join(groups[1], ", ")));
+}
+
 /// Everything up to the modes, their standard deviations and the shapes.
 std::vector<listed_mode> find_modes_agreed(const record_options& options, record_work& work) {
     const auto tell = [&](const char* stage) {
@@ -280,11 +294,22 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
         rows.emplace_back(set.rows(record), set.rows(record) + record.count * set.channels());
     tell("making streams of lower rates");
     std::vector<double> scale;
-    const auto levels =
-        make_levels(std::move(rows), set.n_u, set.n_y, options.fs_hz, work.at_rest, options.decimate, scale);
+    auto levels = make_levels(std::move(rows), set.n_u, set.n_y, options.fs_hz, work.at_rest, options.decimate, scale);
+    const double lowest_hz = periods_of_horizon * levels.back().fs_hz;
     tell("looking with several methods, horizons and rates");
-    const auto runs = look_at(levels, n_u, n_y, work.at_rest, options.threads);
-    auto modes = find_agreement(runs);
+    auto runs = look_at(levels, 0, n_u, n_y, work.at_rest, options.threads);
+    std::vector<bool> turned = turned_by(options.sensing);
+    const bool known = !turned.empty();
+    auto modes = find_agreement(runs, &turned);
+    if (auto zoomed = zoomed_levels(levels, modes, n_u, n_y, work.at_rest); !zoomed.empty()) {
+        tell("looking into bands with many modes");
+        const std::size_t before = levels.size();
+        for (record_level& level : zoomed) levels.push_back(std::move(level));
+        auto more = look_at(levels, before, n_u, n_y, work.at_rest, options.threads);
+        for (consensus_run& run : more) runs.push_back(std::move(run));
+        modes = find_agreement(runs, &turned);
+    }
+    if (!known && !turned.empty()) remark_mixed(turned, options, work.context);
     mark_lines(levels, set.n_u, set.n_y, work.at_rest, modes);
     mark_slow(set, options.fs_hz, modes);
     keep_wanted(options, modes);
@@ -294,8 +319,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     keep_picked(options.modes, found);
     if (std::none_of(found.begin(), found.end(), [](const listed_pair& one) { return one.first.confident(); }))
         throw_no_modes(found, runs.size());
-    work.context.band_hz = {found.empty() ? 0.0 : periods_of_horizon * levels.back().fs_hz,
-                            levels[0].top * levels[0].fs_hz};
+    work.context.band_hz = {found.empty() ? 0.0 : lowest_hz, levels[0].top * levels[0].fs_hz};
     if (options.band) work.context.band_hz = *options.band;
     for (const record_level& level : levels) work.context.rates_hz.push_back(level.fs_hz);
     std::vector<listed_mode> listed;
@@ -408,6 +432,7 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
     work.model.mean = work.refined->mean.data();
     find_gain(work);
     fit_records(work.set, work.model, work.context);
+    if (options.modes.empty()) remark_unexplained(listed, options.fs_hz, work);
     remark_noisy_output(work.context);
     remark_low_fit(*work.context.prediction_percent, false, work.context); // a simulation has only the modes listed
 }
@@ -416,11 +441,14 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
 record_options without_outputs(record_options options, const std::vector<bool>& kept) {
     std::vector<std::string> outputs;
     std::vector<mass_channel> places;
+    std::vector<int> sensing;
     for (std::size_t k = 0; k < kept.size(); ++k) {
         if (!kept[k]) continue;
         outputs.push_back(options.outputs[k]);
         if (!options.mass.outputs.empty()) places.push_back(options.mass.outputs[k]);
+        if (!options.sensing.empty()) sensing.push_back(options.sensing[k]);
     }
+    options.sensing = std::move(sensing);
     options.outputs = std::move(outputs);
     options.mass.outputs = std::move(places);
     return options;
@@ -481,6 +509,7 @@ record_result identify_auto(record_set records, const record_options& given) {
     record_result result;
     result.model = kept_model(work.model);
     result.context = std::move(work.context);
+    shapes_in_one_quantity(given.sensing, result.model, result.context);
     return result;
 }
 

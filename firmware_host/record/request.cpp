@@ -232,7 +232,8 @@ record_options check_request(const record_request& given) {
     const std::string fault = one_of_all ? "" : hankel_fault(given.hankel, options.method, options.inputs.size());
     if (!fault.empty()) usage("--hankel: " + fault);
     options.hits = check_hit_dofs(given);
-    options.mass = check_dofs(given, options, check_sensing(given.sensing, options.outputs.size()));
+    options.sensing = check_sensing(given.sensing, options.outputs.size());
+    options.mass = check_dofs(given, options, options.sensing);
     return options;
 }
 

@@ -19,6 +19,9 @@ class kept_model {
 
     const okid_identified_t& view() const { return view_; }
 
+    /// The copy's own numbers, to be changed.
+    double* own(const double* of_view) { return numbers_.data() + (of_view - numbers_.data()); }
+
   private:
     okid_identified_t view_{};
     std::vector<double> numbers_; // moving a vector keeps its memory, and `view_` right

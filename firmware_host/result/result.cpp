@@ -256,6 +256,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["singular_noise"] = number_json(model.noise_level);
     if (arrays) put_arrays_json(model, context, out);
     out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
+    if (!context.shape_quantity.empty()) out["shape_quantity"] = context.shape_quantity;
     if (agreed) {
         out["band_hz"] = context.band_hz
                              ? ordered_json{number_json(context.band_hz->first), number_json(context.band_hz->second)}

@@ -31,6 +31,7 @@ struct result_context {
     std::optional<std::vector<double>> simulation_percent;     ///< per output; absent live (null)
     std::optional<std::vector<double>> prediction_percent;     ///< per output; absent = null
     std::optional<deviations> sigma;                           ///< of the modes; absent = null
+    std::string shape_quantity;                                ///< of the shapes; empty: what the sensors measure
     std::optional<std::pair<double, double>> band_hz;          ///< where auto looked for modes
     std::vector<double> rates_hz;                              ///< at which rates
     bool all_modes = false;                                    ///< the table lists the doubtful modes of auto too

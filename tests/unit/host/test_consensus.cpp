@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+// Which tracks of which runs make a mode, on tracks written by hand: each bound of the decision from both sides.
+#include "consensus/consensus.hpp"
+#include "consensus/quantity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <unity.h>
+
+using namespace okid_host;
+
+namespace {
+
+using shape = std::vector<std::complex<double>>;
+const shape bending = {1.0, 0.5, -0.4}, torsion = {1.0, -0.8, 0.6};
+
+/// A pole that a run holds at all orders.
+run_track track(double frequency_hz, double damping_ratio, const shape& of, double emac = 1) {
+    run_track out;
+    out.frequency_hz = frequency_hz;
+    out.damping_ratio = damping_ratio;
+    out.mpc = shape_collinearity(of, {});
+    out.emac = emac;
+    out.length = 10;
+    out.shape = of;
+    return out;
+}
+
+/// As many runs as a rate has, without tracks.
+std::vector<consensus_run> rate(int level, double fs_hz, int rows, int outputs, std::size_t count = 6) {
+    consensus_run run;
+    run.method = OKID_METHOD_N4SID_CVA;
+    run.level = level;
+    run.fs_hz = fs_hz;
+    run.rows = rows;
+    run.outputs = outputs;
+    run.top = 0.42;
+    return std::vector<consensus_run>(count, run);
+}
+
+void give(std::vector<consensus_run>& runs, std::size_t first, std::size_t last, const run_track& found) {
+    for (std::size_t r = first; r < last; ++r) runs[r].tracks.push_back(found);
+}
+
+bool has(const consensus_mode& mode, const char* code) {
+    return std::find(mode.why.begin(), mode.why.end(), code) != mode.why.end();
+}
+
+/// One mode at 10 Hz in so many of six runs.
+consensus_mode found_by(std::size_t runs_with, double emac = 1, double damping_scatter = 0) {
+    auto runs = rate(0, 100, 30, 3);
+    for (std::size_t r = 0; r < runs_with; ++r)
+        runs[r].tracks.push_back(track(10, 0.01 * (1 + (r % 2 ? damping_scatter : -damping_scatter)), bending, emac));
+    const auto modes = find_agreement(runs);
+    TEST_ASSERT_EQUAL_UINT64(1, modes.size());
+    return modes[0];
+}
+
+} // namespace
+
+void setUp() {}
+void tearDown() {}
+
+static void half_of_the_runs_make_a_mode() {
+    TEST_ASSERT_TRUE(found_by(6).confident());
+    TEST_ASSERT_TRUE(found_by(4).confident());
+    TEST_ASSERT_TRUE(found_by(3).found_in == 0.5 && !has(found_by(3), "few_runs"));
+    TEST_ASSERT_TRUE(has(found_by(2), "few_runs"));
+}
+
+static void a_short_lived_or_scattering_pole_is_noise() {
+    TEST_ASSERT_TRUE(found_by(6, 0.55).confident());
+    TEST_ASSERT_TRUE(has(found_by(6, 0.45), "noise_shape"));
+    TEST_ASSERT_TRUE(found_by(6, 1, 0.25).confident());
+    TEST_ASSERT_TRUE(has(found_by(6, 1, 0.45), "noise_shape"));
+}
+
+/// Two modes of one output, 0.8 Hz apart: a horizon of 0.3 s sees one pole between them, one of 2.4 s sees both.
+static void only_runs_that_can_part_two_modes_vote_on_them() {
+    auto runs = rate(0, 100, 30, 1);
+    give(runs, 0, 6, track(10.4, 0.06, {1.0}));
+    const auto lower = rate(3, 12.5, 30, 1);
+    runs.insert(runs.end(), lower.begin(), lower.end());
+    give(runs, 6, 12, track(4.0, 0.004, {1.0}));
+    give(runs, 6, 12, track(4.8, 0.004, {1.0}));
+    const auto middle = rate(1, 50, 30, 1); // 0.6 s
+    runs.insert(runs.end(), middle.begin(), middle.end());
+    for (const consensus_mode& mode : find_agreement(runs))
+        if (mode.frequency_hz < 5) {
+            TEST_ASSERT_EQUAL_INT(6, mode.could);
+            TEST_ASSERT_TRUE(mode.confident());
+        }
+}
+
+static void the_longest_horizons_vote_where_none_can_part() {
+    auto runs = rate(0, 100, 30, 1);
+    give(runs, 0, 6, track(10, 0.001, {1.0}));
+    give(runs, 0, 2, track(10.3, 0.001, {1.0})); // of six runs, none of which can
+    const auto modes = find_agreement(runs);
+    TEST_ASSERT_EQUAL_UINT64(2, modes.size());
+    TEST_ASSERT_EQUAL_INT(6, modes[1].could);
+    TEST_ASSERT_TRUE(modes[0].confident() && !modes[1].confident());
+}
+
+/// A pair closer than 2.5 bandwidths is one mode if its shapes are alike, two if they are not; one output cannot tell.
+static void a_close_pair_is_split_only_by_its_shapes() {
+    for (const bool alike : {true, false}) {
+        auto runs = rate(0, 100, 100, 3);
+        give(runs, 0, 6, track(10, 0.01, bending));
+        give(runs, 0, 5, track(10.3, 0.01, alike ? bending : torsion));
+        const auto modes = find_agreement(runs);
+        TEST_ASSERT_EQUAL_UINT64(2, modes.size());
+        TEST_ASSERT_TRUE(modes[0].confident());
+        TEST_ASSERT_EQUAL(alike, has(modes[1], "split"));
+    }
+    auto runs = rate(0, 100, 300, 1);
+    give(runs, 0, 6, track(10, 0.01, {1.0}));
+    give(runs, 0, 5, track(10.3, 0.01, {1.0}));
+    for (const consensus_mode& mode : find_agreement(runs)) TEST_ASSERT_TRUE(mode.confident());
+}
+
+/// Beside a stronger mode of the same shape, further off than its bandwidth, but no run can tell one from the other.
+static void a_shadow_of_a_mode_is_split() {
+    auto runs = rate(0, 100, 30, 3); // 0.3 s x 3 outputs x 0.5 Hz = 0.45 beats
+    give(runs, 0, 6, track(10, 0.001, bending));
+    give(runs, 0, 5, track(10.5, 0.001, bending));
+    auto modes = find_agreement(runs);
+    TEST_ASSERT_TRUE(modes[0].confident() && has(modes[1], "split"));
+    runs = rate(0, 100, 60, 3); // 0.9 beats
+    give(runs, 0, 6, track(10, 0.001, bending));
+    give(runs, 0, 5, track(10.5, 0.001, bending));
+    modes = find_agreement(runs);
+    TEST_ASSERT_TRUE(modes[0].confident() && modes[1].confident());
+}
+
+/// A slow mode: three quarters of a period for one output, less where several look together.
+static void the_horizon_holds_a_mode() {
+    TEST_ASSERT_TRUE(can_see(rate(0, 100, 30, 1)[0], 2.51) && !can_see(rate(0, 100, 30, 1)[0], 2.49));
+    TEST_ASSERT_TRUE(can_see(rate(0, 100, 30, 6)[0], 1.26) && !can_see(rate(0, 100, 30, 6)[0], 1.24));
+    TEST_ASSERT_TRUE(can_see(rate(0, 100, 30, 60)[0], 1.01) && !can_see(rate(0, 100, 30, 60)[0], 0.99));
+    TEST_ASSERT_TRUE(can_see(rate(0, 100, 30, 1)[0], 41.9) && !can_see(rate(0, 100, 30, 1)[0], 42.1));
+}
+
+/// Outputs 1 and 3 measure accelerations, 2 a velocity; the structure has normal modes.
+static void velocities_beside_accelerations_are_no_noise() {
+    const std::complex<double> i(0, 1);
+    const std::vector<double> hz = {4, 9, 15}, real[] = {{1, 0.6, 0.3}, {1, -0.7, -0.5}, {0.4, 0.9, 1}};
+    auto runs = rate(0, 100, 60, 3);
+    for (std::size_t k = 0; k < 3; ++k) {
+        shape of = {real[k][0], real[k][1], real[k][2]};
+        of[1] *= -i;
+        give(runs, 0, 4, track(hz[k], 0.01, of));
+    }
+    for (const consensus_mode& mode : find_agreement(runs)) TEST_ASSERT_TRUE(mode.mpc < 0.6);
+    std::vector<bool> turned;
+    for (const consensus_mode& mode : find_agreement(runs, &turned)) {
+        TEST_ASSERT_TRUE(mode.confident());
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, mode.mpc);
+    }
+    TEST_ASSERT_TRUE(turned == std::vector<bool>({false, true, false}));
+}
+
+static void complex_modes_are_not_turned() {
+    const std::complex<double> i(0, 1);
+    TEST_ASSERT_TRUE(
+        turned_outputs(
+            {{1.0, 0.5 + 0.4 * i, -0.3 + 0.5 * i}, {1.0, -0.6 + 0.5 * i, 0.2 - 0.8 * i}, {0.7, 1.0 + 0.0 * i, 0.5 * i}})
+            .empty());
+    TEST_ASSERT_TRUE(turned_outputs({bending, torsion}).empty());
+}
+
+/// Folding keeps the decay, and gives back what was folded; 430 Hz at 100 samples a second stands at 30 Hz, 380 Hz mirrored at 20.
+static void a_folded_band_keeps_decays() {
+    for (const double f : {430.0, 380.0}) {
+        const zoom_band zoom{100, static_cast<int>(f / 50)};
+        double frequency = f, damping = 0.01;
+        zoom.fold(frequency, damping);
+        TEST_ASSERT_DOUBLE_WITHIN(0.5, f == 430 ? 30 : 20, frequency);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, f * 0.01, frequency * damping);
+        zoom.unfold(frequency, damping);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, f, frequency);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.01, damping);
+    }
+}
+
+int main() {
+    UNITY_BEGIN();
+    RUN_TEST(half_of_the_runs_make_a_mode);
+    RUN_TEST(a_short_lived_or_scattering_pole_is_noise);
+    RUN_TEST(only_runs_that_can_part_two_modes_vote_on_them);
+    RUN_TEST(the_longest_horizons_vote_where_none_can_part);
+    RUN_TEST(a_close_pair_is_split_only_by_its_shapes);
+    RUN_TEST(a_shadow_of_a_mode_is_split);
+    RUN_TEST(the_horizon_holds_a_mode);
+    RUN_TEST(velocities_beside_accelerations_are_no_noise);
+    RUN_TEST(complex_modes_are_not_turned);
+    RUN_TEST(a_folded_band_keeps_decays);
+    return UNITY_END();
+}
