@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.campaign.file_systems import is_remote, opened
 from okid.campaign.spec import CampaignSpec
 from okid.data.input_file import read_input
 
@@ -40,11 +41,9 @@ class ReadRecord:
 
 
 def _fetch(url: str, storage: dict[str, Any]) -> bytes:
-    if "://" not in url:
+    if not is_remote(url):
         return read_input(url, _LARGEST)
-    import fsspec
-
-    with fsspec.open(url, "rb", **storage) as file:
+    with opened(url, storage).open(url, "rb") as file:
         data: bytes = file.read(_LARGEST + 1)
     if len(data) > _LARGEST:
         raise InputError(f"larger than {_LARGEST} bytes")
@@ -59,7 +58,7 @@ def content_hash(url: str, storage: dict[str, Any]) -> str:
 @contextmanager
 def _as_file(url: str, data: bytes) -> Iterator[Path]:
     """A local file with these bytes: the record's own when it is local."""
-    if "://" not in url:
+    if not is_remote(url):
         yield Path(url)
         return
     with tempfile.TemporaryDirectory(prefix="okid-campaign-") as folder:
