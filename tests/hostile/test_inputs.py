@@ -13,7 +13,7 @@ import zlib
 
 import pytest
 from measured_run import Measured, measured
-from okid import InputError
+from okid import InputError, Session
 from okid.data.input_file import DEEPEST, check_input, parse_json, parse_toml, read_input
 from program import PROGRAM
 
@@ -168,3 +168,24 @@ def test_readers_of_python(tmp_path: pathlib.Path) -> None:
     for kind in NESTED.values():
         with pytest.raises(ValueError, match="nested deeper|recursion|Unclosed|Invalid|Expected|Found"):
             parse_toml(kind)
+
+
+@pytest.mark.parametrize("command", ["check", "replay", "convert", "run", "Session"])
+def test_a_slow_grid(tmp_path: pathlib.Path, command: str) -> None:
+    """Release 0.2 ended by a signal: what it refused was a default, which has no place in the file."""
+    text = CONFIG.replace("100.0", "1e-5") + CHANNEL + '[identification]\nmethod = "okid-era"\np = 2\n'
+    (tmp_path / "c.toml").write_text(text)
+    (tmp_path / "x.log").write_text("(1700000000.0) vcan0 100#0011\n(1700100000.0) vcan0 100#0012\n")
+    if command == "Session":
+        with Session.from_config(tmp_path / "c.toml") as session:
+            assert session.fs == 1e-5
+        return
+    arguments: dict[str, tuple[object, ...]] = {
+        "replay": (tmp_path / "x.log", "-c", tmp_path / "c.toml"),
+        "convert": (tmp_path / "x.log", tmp_path / "x.csv", "-c", tmp_path / "c.toml"),
+        "run": (tmp_path / "c.toml", "--duration", 1),
+    }
+    done = measured(command, *arguments.get(command, (tmp_path / "c.toml",)), seconds=60)
+    assert done.returncode in {"replay": (3,), "run": (3, 4)}.get(command, (0,)), done
+    (tmp_path / "c.toml").write_text(text.replace("1e-5", "9e-6"))
+    one_line(measured(command, *arguments.get(command, (tmp_path / "c.toml",)), seconds=60), "from 1e-05 to 1000000")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from okid import abi
 from okid._errors import InputError
 from okid.abi.sums import Sums
+from okid.abi.turns import in_turn
 
 _SAMPLE = {0: abi.SAMPLE_DOUBLE, 16: abi.SAMPLE_INT16, 24: abi.SAMPLE_INT24, 32: abi.SAMPLE_INT32}
 
@@ -103,20 +104,20 @@ class Accumulator(Sums):
         A part of an unbroken record was fed with its own samples and the `lags` samples before them.
         Raises InputError when the two do not fit each other.
         """
-        abi.check(self._call("remove", self.handle, part.handle, weight), "remove")
+        abi.check(self._use_both("remove", part, weight), "remove")
 
     @property
     def slots(self) -> int:
         """Slots of the window that hold rows, the open one included; 1 without a window."""
-        return int(self._call("slots", self.handle))
+        return int(self._use("slots"))
 
     def slot_rows(self, k: int) -> int:
         """Regression rows in slot k, 0 = the oldest."""
-        return int(self._call("slot_rows", self.handle, k))
+        return int(self._use("slot_rows", k))
 
     def take_slots(self, window: Accumulator, first: int, count: int) -> None:
         """Add slots first .. first + count - 1 of a window to this accumulator, which has none itself."""
-        abi.check(self._call("take_slots", self.handle, window.handle, first, count), "take_slots")
+        abi.check(self._use_both("take_slots", window, first, count), "take_slots")
 
     def centre(self) -> None:
         """Take the offsets out of a finished record before it is merged with others: each channel less its own mean.
@@ -124,7 +125,7 @@ class Accumulator(Sums):
         Takes no samples any more afterwards, only merges with accumulators that are centred too.
         Raises InputError with a window, forgetting or without edges.
         """
-        abi.check(self._call("centre", self.handle), "centre")
+        abi.check(self._use("centre"), "centre")
 
     def run_sums(self, detrend: str = "mean") -> tuple[NDArray[np.float64], ...]:
         """S (p+1, m, m), head (p, m), tail (p, m), sum (m) of one unbroken run: see okid_accumulator_run().
@@ -134,13 +135,14 @@ class Accumulator(Sums):
         m, p = self.channels, self.lags
         sums, head, tail, total = np.empty((p + 1, m, m)), np.empty((p, m)), np.empty((p, m)), np.empty(m)
         out = abi.RunSums(*map(abi.pointer, (sums, head, tail, total)))
-        abi.check(self._call("run", self.handle, self._detrend(detrend), out), "run_sums")
+        abi.check(self._use("run", self._detrend(detrend), out), "run_sums")
         return sums.transpose(0, 2, 1), head, tail, total
 
+    @in_turn
     def to_bytes(self) -> bytes:
         """The whole state for a file or another machine: checked by a CRC, the same for every processor."""
-        out = np.empty(int(self._call("serialised_size", self.handle)), np.uint8)
-        abi.check(self._call("serialise", self.handle, out.ctypes.data, out.size), "to_bytes")
+        out = np.empty(int(self._use("serialised_size")), np.uint8)
+        abi.check(self._use("serialise", out.ctypes.data, out.size), "to_bytes")
         return out.tobytes()
 
     @staticmethod
@@ -158,7 +160,7 @@ class Accumulator(Sums):
 
     def restore(self, data: bytes) -> None:
         """Go back to a state of to_bytes() of an accumulator of the same configuration, else InputError."""
-        abi.check(self._call("deserialise", self.handle, data, len(data)), "restore")
+        abi.check(self._use("deserialise", data, len(data)), "restore")
 
     @property
     def arguments(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from okid import abi
 from okid._errors import InputError
 from okid.abi.sums import Sums
+from okid.abi.turns import in_turn
 
 
 class Observer(NamedTuple):
@@ -77,6 +78,7 @@ class SquareRoot(Sums):
         lower, mean = self._matrix("factor", detrend)
         return lower.T, mean
 
+    @in_turn
     def observer(self, detrend: str = "mean", *, ridge_min: float = 0.0, stabilise: bool = True) -> Observer:
         """Observer Markov parameters from the factor; `stabilise` False leaves an unstable ARX model as it is.
 
@@ -95,10 +97,12 @@ class SquareRoot(Sums):
         abi.check(status, "observer")
         return Observer(theta.T, innovation, *(float(getattr(info, name)) for name in Observer._fields[2:]))
 
+    @in_turn
     def snapshot(self) -> bytes:
         """The whole state as bytes: what memcpy would copy."""
         return self._memory().tobytes()
 
+    @in_turn
     def restore(self, snapshot: bytes) -> None:
         """Go back to a snapshot() of the same configuration. InputError when the size differs."""
         memory = self._memory()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The records of a campaign: patterns and URLs expanded by fsspec, with time, temperature and keys of each one."""
+"""The records of a campaign: patterns and URLs expanded, with time, temperature and keys of each one."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from okid._errors import InputError
+from okid.campaign.file_systems import is_remote, opened
 from okid.campaign.spec import CampaignSpec
 from okid.campaign.spec_keys import Place, nearest
 
@@ -50,22 +51,18 @@ def _stamp(info: dict[str, Any]) -> str:
 
 def _expanded(spec: CampaignSpec, pattern: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Name, URL and what the file system says of every file of a pattern."""
-    from fsspec.core import url_to_fs
-    from fsspec.implementations.local import LocalFileSystem
-
-    remote = "://" in pattern
-    place = pattern if remote else str((spec.base / pattern).absolute())
+    remote = is_remote(pattern)
     try:
-        fs, path = url_to_fs(place, **(spec.records.storage if remote else {}))
-        found = fs.glob(path, detail=True)
+        fs = opened(pattern, spec.records.storage)
+        found = fs.glob(pattern if remote else str((spec.base / pattern).absolute()), detail=True)
     except (OSError, ValueError, ImportError) as fault:
-        raise InputError(f'{spec.path}: [records], key "files": {pattern!r}: {fault}') from None
-    local = isinstance(fs, LocalFileSystem)
+        text = " ".join(str(fault).split())[:200]
+        raise InputError(f'{spec.path}: [records], key "files": {pattern!r}: {text}') from None
     base = spec.base.absolute()
     for path, info in found.items():
         if info.get("type") == "directory":
             continue
-        if local:
+        if not remote:
             here = Path(path)
             name = here.relative_to(base).as_posix() if here.is_relative_to(base) else here.as_posix()
             yield name, path, info
