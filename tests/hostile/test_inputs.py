@@ -40,7 +40,7 @@ def one_line(done: Measured, *words: str, program: str = "okid") -> None:
 
 
 def report(*arguments: object) -> Measured:
-    return measured("-m", "okid.report", *arguments, program=sys.executable, seconds=60)
+    return measured("-m", "okid.report", *arguments, program=sys.executable, within_s=60)
 
 
 def journal_with(text: bytes) -> bytes:
@@ -67,15 +67,15 @@ def test_a_nested_config_is_refused(tmp_path: pathlib.Path, kind: str) -> None:
         (tmp_path / "c.toml").write_text(text)
         for command in (("check",), ("simulate", "--log", tmp_path / "x")):
             one_line(
-                measured(command[0], tmp_path / "c.toml", *command[1:], seconds=20), "c.toml", "nested deeper than 32"
+                measured(command[0], tmp_path / "c.toml", *command[1:], within_s=20), "c.toml", "nested deeper than 32"
             )
 
 
 @pytest.mark.parametrize("kind", ["dotted key", "array"])
 def test_a_nested_config_in_a_journal_is_refused(tmp_path: pathlib.Path, kind: str) -> None:
     (tmp_path / "j.okj").write_bytes(journal_with(NESTED[kind].encode()))
-    one_line(measured("replay", tmp_path / "j.okj", seconds=20), "j.okj", "nested deeper than 32")
-    one_line(measured("convert", tmp_path / "j.okj", tmp_path / "j.csv", seconds=20), "j.okj")
+    one_line(measured("replay", tmp_path / "j.okj", within_s=20), "j.okj", "nested deeper than 32")
+    one_line(measured("convert", tmp_path / "j.okj", tmp_path / "j.csv", within_s=20), "j.okj")
 
 
 def test_what_is_written_passes(tmp_path: pathlib.Path) -> None:
@@ -116,7 +116,7 @@ def test_devices_and_pipes_are_refused_by_the_program(tmp_path: pathlib.Path) ->
             ("check", path), ("check", tmp_path / "dbc.toml"), ("run", path), ("identify", path, "--outputs", "a"),
             ("simulate", path, "--log", tmp_path / "x.log"), ("replay", path, "-c", tmp_path / "c.toml"),
         ):  # fmt: skip
-            one_line(measured(*command, seconds=10), path, "device or a named pipe")
+            one_line(measured(*command, within_s=10), path, "device or a named pipe")
     assert not (tmp_path / "x.log").exists()
 
 
@@ -126,7 +126,7 @@ def test_an_open_pipe_is_read(tmp_path: pathlib.Path) -> None:
         input=CONFIG + CHANNEL,
         text=True,
         capture_output=True,
-        timeout=20,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -136,7 +136,7 @@ def test_large_files_are_refused(tmp_path: pathlib.Path) -> None:
     with (tmp_path / "big.toml").open("wb") as file:
         file.truncate(40 << 30)
     for command in (("check", tmp_path / "big.toml"), ("simulate", tmp_path / "big.toml", "--log", "-")):
-        one_line(measured(*command, seconds=20), "big.toml: longer than 67108864 bytes")
+        one_line(measured(*command, within_s=20), "big.toml: longer than 67108864 bytes")
 
 
 def test_the_report_refuses_the_same(tmp_path: pathlib.Path) -> None:
