@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
+from okid.abi.arguments import state_bytes, whole
 from okid.abi.sums import Sums
 from okid.abi.turns import in_turn
 
@@ -67,6 +68,8 @@ class Accumulator(Sums):
             )
         if saturated not in ("keep", "missing"):
             raise InputError(f"saturated is {saturated!r}, expected 'keep' or 'missing'")
+        for name, value in (("n_u", n_u), ("n_y", n_y), ("lags", lags)):
+            whole(name, value, 0, 65536)
         config = abi.AccumulatorConfig(
             n_u, n_y, lags, _SAMPLE[codes], block, slots, forgetting, int(edges), spare_slots,
             int(bulk and codes == 16 and block == 0), int(saturated == "missing"), buffer,
@@ -149,6 +152,7 @@ class Accumulator(Sums):
     def from_bytes(data: bytes) -> Accumulator:
         """An accumulator that goes on where to_bytes() stood, bit for bit. InputError when the bytes are damaged."""
         config = abi.AccumulatorConfig()
+        data = state_bytes(data)
         abi.check(abi.library().okid_accumulator_peek(data, len(data), ctypes.byref(config)), "from_bytes")
         made = Accumulator(
             config.n_u, config.n_y, config.lags, codes=next(k for k, v in _SAMPLE.items() if v == config.sample),
@@ -160,6 +164,7 @@ class Accumulator(Sums):
 
     def restore(self, data: bytes) -> None:
         """Go back to a state of to_bytes() of an accumulator of the same configuration, else InputError."""
+        data = state_bytes(data)
         abi.check(self._use("deserialise", data, len(data)), "restore")
 
     @property

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
+from okid.abi.arguments import state_bytes, whole
 from okid.abi.sums import Sums
 from okid.abi.turns import in_turn
 
@@ -55,6 +56,8 @@ class SquareRoot(Sums):
         spare_slots: int = 0,
         forgetting: float = 1.0,
     ) -> None:
+        for name, value in (("n_u", n_u), ("n_y", n_y), ("lags", lags)):
+            whole(name, value, 0, 65536)
         super().__init__(abi.SquareRootConfig(n_u, n_y, lags, batch, block, slots, spare_slots, forgetting))
 
     def add(self, samples: ArrayLike) -> int:
@@ -105,7 +108,7 @@ class SquareRoot(Sums):
     @in_turn
     def restore(self, snapshot: bytes) -> None:
         """Go back to a snapshot() of the same configuration. InputError when the size differs."""
-        memory = self._memory()
+        memory, snapshot = self._memory(), state_bytes(snapshot)
         if len(snapshot) != memory.size:
             raise InputError(f"the snapshot has {len(snapshot)} bytes, this accumulator {memory.size}")
         memory[:] = np.frombuffer(snapshot, dtype=np.uint8)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import Error, InputError
-from okid.abi.arguments import unmasked, whole
+from okid.abi.arguments import MOST_SAMPLES, unmasked, whole
 from okid.abi.turns import Turn, both, in_turn
 from okid.shown.notebook_html import own_fields
 
@@ -164,7 +164,7 @@ class Sums:
 
     def gap(self, count: int = 0) -> None:
         """Mark `count` missing samples; 0 separates two records."""
-        self._use("gap", whole("count", count, 0))
+        self._use("gap", whole("count", count, 0, MOST_SAMPLES))
 
     def merge(self, other: Self) -> None:
         """Add all of `other` as further records. InputError when the two do not fit each other."""

@@ -110,7 +110,7 @@ def _load_about(folder: Path) -> tuple[dict[str, Any], Trend]:
         return about, Trend(**given)
     except InputError as fault:
         raise InputError(f"{fault}; expected the output folder of okid-campaign run") from None
-    except (ValueError, KeyError, TypeError) as fault:
+    except (ValueError, KeyError, TypeError, ArithmeticError) as fault:
         raise InputError(f"{path}: damaged: {fault}") from None
 
 

@@ -17,6 +17,7 @@ from okid.campaign.spec import CampaignSpec
 from okid.campaign.spec_keys import Place, nearest
 
 EXTENSIONS = (".npy", ".okj", ".log", ".csv", ".uff", ".unv", ".mf4", ".h5", ".hdf5", ".mat", ".parquet")
+_FIRST_S, _LAST_S = -62135596800, 253402300799  # years 1 to 9999
 _STAMPS = ("ETag", "etag", "mtime", "LastModified", "last_modified", "updated", "created")
 
 
@@ -93,6 +94,8 @@ def _seconds(value: Any) -> float | None:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return None
     if isinstance(value, int | float):
+        if not _FIRST_S <= value <= _LAST_S:
+            raise ValueError(f"{value!r} s since 1970")
         return float(value)
     if isinstance(value, str):
         value = datetime.fromisoformat(value)
@@ -133,7 +136,7 @@ def _of_index(
     if spec.records.time == "index":
         try:
             time_s = _seconds(row[spec.records.index_time])
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             raise InputError(
                 f"its time in the index is {row[spec.records.index_time]!r}, expected a date and time"
             ) from None
@@ -179,11 +182,11 @@ def _modified(ref: RecordRef) -> float | None:
     """When the file was written, as the file system says."""
     for part in ref.stamp.split("|")[1:]:
         try:
-            return float(part)
+            return _seconds(float(part))
         except ValueError:
             try:
                 return _seconds(part)
-            except ValueError:
+            except (ValueError, OverflowError):
                 continue
     return None
 
