@@ -349,8 +349,8 @@ static void absurd_content_is_refused(void) {
     void* block = malloc(size);
     okid_accumulator_t* a = NULL;
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &config, block, size));
-    const double samples[] = {1, 2, 3, 5, -1, 2, 4, 1, 0, 3, 2, 2, 7, 1, 1, 1};
-    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(a, samples, 8));
+    const double values[] = {1, 2, 3, 5, -1, 2, 4, 1, 0, 3, 2, 2, 7, 1, 1, 1};
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(a, values, 8));
     const size_t bytes = okid_accumulator_serialised_size(a);
     uint8_t* good = malloc(bytes);
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(a, good, bytes));
