@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The example that reads a serial line, in the test kernel (tests/kernel/virtual): it says that it is open too early."""
+"""The example that reads a serial line, in the test kernel (tests/kernel/virtual): it is open after it says so."""
 
 from __future__ import annotations
 

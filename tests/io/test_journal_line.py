@@ -95,7 +95,7 @@ class Killed:
 
 
 def kills() -> int:
-    return 1000 if os.environ.get("OKID_SLOW") else 200
+    return 1000 if os.environ.get("OKID_SLOW") else 30
 
 
 def test_killed_at_any_instant() -> None:
@@ -167,7 +167,7 @@ def test_a_disk_that_stalls(tmp_path: Path, behind: int) -> None:
     assert numbers == sorted(numbers) and lost == samples - len(numbers)
     if behind > RING:  # all but what the ring holds and what the recorder had in hand when the disk stood still
         assert missing == list(range(before + behind - RING - lost, before + behind - RING))
-        assert 0 < missing[0] - before <= 1024
+        assert 0 <= missing[0] - before <= 1024
     else:
         assert missing == []
     chunks = [chunk for path in (tmp_path / "runs").glob("*.okj") for chunk in journal.read(path)[0]]

@@ -185,7 +185,7 @@ def columns(path: Path) -> dict[str, list[float]]:
         pytest.param(hogs, 2, marks=pytest.mark.realtime),
         (stopped, 0),
         (no_disk, 0),
-        *([(no_memory, 0)] if OWN_KERNEL else []),
+        *([pytest.param(no_memory, 0, marks=pytest.mark.realtime)] if OWN_KERNEL else []),
     ],
 )
 def test_nothing_is_lost_without(
