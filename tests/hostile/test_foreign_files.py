@@ -30,7 +30,7 @@ def secret(tmp_path: Path) -> Path:
 
 
 def convert(source: Path, target: Path) -> Measured:
-    return measured("-m", "okid.formats.command", source, target, program=sys.executable, seconds=120)
+    return measured("-m", "okid.formats.command", source, target, program=sys.executable, within_s=120)
 
 
 def refused(source: Path, target: Path, *words: str) -> None:

@@ -185,7 +185,7 @@ def test_a_slow_grid(tmp_path: pathlib.Path, command: str) -> None:
         "convert": (tmp_path / "x.log", tmp_path / "x.csv", "-c", tmp_path / "c.toml"),
         "run": (tmp_path / "c.toml", "--duration", 1),
     }
-    done = measured(command, *arguments.get(command, (tmp_path / "c.toml",)), seconds=60)
+    done = measured(command, *arguments.get(command, (tmp_path / "c.toml",)), within_s=60)
     assert done.returncode in {"replay": (3,), "run": (3, 4)}.get(command, (0,)), done
     (tmp_path / "c.toml").write_text(text.replace("1e-5", "9e-6"))
-    one_line(measured(command, *arguments.get(command, (tmp_path / "c.toml",)), seconds=60), "from 1e-05 to 1000000")
+    one_line(measured(command, *arguments.get(command, (tmp_path / "c.toml",)), within_s=60), "from 1e-05 to 1000000")

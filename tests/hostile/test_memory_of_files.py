@@ -35,7 +35,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> float:
 
 
 def convert(source: Path, target: Path) -> Measured:
-    return measured("-m", "okid.formats.command", source, target, program=sys.executable, seconds=300)
+    return measured("-m", "okid.formats.command", source, target, program=sys.executable, within_s=300)
 
 
 def refused(done: Measured, *words: str) -> None:
@@ -149,7 +149,7 @@ def sparse_npy(path: Path, rows: int) -> None:
 def test_sparse_arrays(tmp_path: Path) -> None:
     """3.2 GB that take no room on the disk were read whole."""
     sparse_npy(tmp_path / "x.npy", 400_000_000)
-    done = measured("identify", tmp_path / "x.npy", "--outputs", "c1", "--fs", 100, seconds=120)
+    done = measured("identify", tmp_path / "x.npy", "--outputs", "c1", "--fs", 100, within_s=120)
     refused(done, "x.npy: 400000000 samples of 1 channels take 3200 MB, at most 2048 MB are read")
     with pytest.raises(InputError, match="at most 2048 MB"), (tmp_path / "x.npy").open("rb") as file:
         load_npy(file, (tmp_path / "x.npy").stat().st_size)
@@ -163,7 +163,7 @@ def test_sparse_arrays(tmp_path: Path) -> None:
 
 def test_csv_of_a_record(tmp_path: Path, small: float) -> None:
     (tmp_path / "x.csv").write_text("# fs_hz: 100\na,b\n" + "1,2\n" * 700_000)
-    done = measured("identify", tmp_path / "x.csv", "--outputs", "a,b", seconds=120)
+    done = measured("identify", tmp_path / "x.csv", "--outputs", "a,b", within_s=120)
     refused(done, "x.csv", "channels take", "at most 10 MB are read", VARIABLE)
 
 

@@ -95,7 +95,7 @@ class Killed:
 
 
 def kills() -> int:
-    return 1000 if os.environ.get("OKID_SLOW") else 60
+    return 1000 if os.environ.get("OKID_SLOW") else 30
 
 
 def test_killed_at_any_instant() -> None:
