@@ -101,7 +101,7 @@ def test_numbers_of_5000_digits_in_toml(tmp_path: Path, capsys: pytest.CaptureFi
     with pytest.raises(ValueError, match="."):
         parse_toml(f"a = {DIGITS}")
     (tmp_path / "c.toml").write_text(CONFIG + f"[identification]\np = {DIGITS}\n")
-    one_line(measured("check", tmp_path / "c.toml", seconds=60), "c.toml: line 13")
+    one_line(measured("check", tmp_path / "c.toml", within_s=60), "c.toml: line 13")
     (tmp_path / "SPEC.toml").write_text(SPEC.format(more="") + f"band_c = {DIGITS}\n")
     assert campaign(["check", str(tmp_path / "SPEC.toml")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
@@ -243,7 +243,7 @@ def test_messages_name_the_cause(
     tmp_path: Path, what: str, code: int, y: Callable[[float, int], float], words: str
 ) -> None:
     """An impulse was "constant (1)", 1e300 "constant", clipping at one sigma gave "none of 0 runs"."""
-    done = measured("identify", record_of(tmp_path / "x.csv", y), "--inputs", "u", "--outputs", "y", seconds=300)
+    done = measured("identify", record_of(tmp_path / "x.csv", y), "--inputs", "u", "--outputs", "y", within_s=300)
     assert done.returncode == code and len(done.stderr.splitlines()) == 1 and words in done.stderr, done
 
 
@@ -252,6 +252,6 @@ def test_frequency_responses_of_one_part(tmp_path: Path, part: str) -> None:
     """Real parts alone were taken for responses."""
     rows = "".join(f"{k},{1 / (1 + k)}\n" for k in range(100))
     (tmp_path / "x.csv").write_text(f'frequency_hz,"a/f:{part}"\n' + rows)
-    done = measured("identify", "--frf", tmp_path / "x.csv", seconds=120)
+    done = measured("identify", "--frf", tmp_path / "x.csv", within_s=120)
     other = {"re": "imaginary", "im": "real"}[part]
     one_line(done, f"the {other} part of a/f is missing")
