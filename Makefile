@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build demo check test test-slow test-wheel test-controller test-distribution test-embedded test-languages test-package package docs docs-pictures score bench bench-quick bench-check bench-peers \
+.PHONY: help setup build build-tests demo check test test-slow test-programs test-realtime test-wheel test-controller test-distribution test-embedded test-languages test-package package docs docs-pictures score bench bench-quick bench-check bench-peers \
 	fuzz lint format sanitize sanitize-all coverage sbom audit clean
 
 help: ## this list
@@ -27,22 +27,31 @@ check: ## while you work: build and unit tests; T=refine: the unit and Python te
 	@tools/setup.sh test
 	@tests/check "$(T)" $(if $(LF),--lf)
 
-test: ## everything that proves the product, real vcan included
+build-tests:
 	@tools/setup.sh test
 	@[ -e build/okid ] || echo "build: compiling, some minutes the first time"
 	@cmake --preset release -DOKID_BUILD_TESTS=ON --log-level=WARNING >/dev/null
 	@cmake --build build -j$(JOBS) -- --quiet
+
+test: build-tests ## everything that proves the product, real vcan included; judges okid, never the machine
 	@tests/run
 
 test-slow: ## the same with more seeds, more frames, longer loads
 	@OKID_SLOW=1 $(MAKE) --no-print-directory test
+
+test-programs: build-tests ## with large programs of others: Chromium, InfluxDB, Mosquitto, shells, an emulated CAN controller
+	@tools/setup.sh programs
+	@tests/run programs
+
+test-realtime: build-tests ## what judges the clock on the wall: latency, load, priority; on a machine that does nothing else
+	@tests/run realtime
 
 test-wheel: ## the Python package as a stranger installs it: source distribution, wheel, fresh environment
 	@tools/setup.sh test
 	@tests/wheel/run
 
 test-controller: ## okid on CAN controllers and a USB adapter, emulated, with the drivers of the stock kernel
-	@tools/setup.sh test
+	@tools/setup.sh programs
 	@cmake --preset release -DOKID_BUILD_TESTS=ON --log-level=WARNING >/dev/null
 	@cmake --build build -j$(JOBS) --target okid_program vcan_flood -- --quiet
 	@tests/controller/run
@@ -127,7 +136,7 @@ docs: ## the documentation as web pages in build/docs; every warning is an error
 	@tools/docs.sh
 
 docs-pictures: build ## every picture of docs/images, from real runs (some minutes; needs Chromium)
-	@tools/setup.sh test
+	@tools/setup.sh programs
 	@PYTHONPATH=tools $(PYTHON) -m docs_pictures
 
 lint: ## format, clang-tidy, cppcheck, warnings of two compilers, ruff, mypy

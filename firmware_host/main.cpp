@@ -78,6 +78,7 @@ int explain(CLI::App& app, const CLI::ParseError& error, int argc, char** argv) 
 int main(int argc, char** argv) {
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
+    std::signal(SIGXFSZ, SIG_IGN); // a file beyond the limit of its size is a write that fails, with a message
     CLI::App app{"okid: from a cable of sensor frames to natural frequencies, damping ratios and mode shapes", "okid"};
     app.set_version_flag("--version",
                          std::string("okid ") + okid_version() + " (" + okid_backend() + ")" + okid_host::left_out());

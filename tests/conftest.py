@@ -14,11 +14,28 @@ from typing import Any
 
 import pytest
 
+MARKS = (
+    "programs: needs a large program of others (browser, database, broker, shells, emulator): make test-programs",
+    "realtime: judges the clock on the wall, or how busy the processors are: make test-realtime",
+)
+
 sys.path.insert(0, str(Path(__file__).resolve().parent / "support"))
 
 # Under nohup, or behind an & of a script, these are ignored, and what the tests start would inherit that.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    for mark in MARKS:
+        config.addinivalue_line("markers", mark)
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if "chromium" in getattr(item, "fixturenames", ()):
+            item.add_marker("programs")
 
 
 @pytest.fixture(scope="session")

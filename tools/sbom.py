@@ -27,6 +27,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 COMMANDS = {
     "debian": "build",
     "debian-test": "`make test`",
+    "debian-programs": "`make test-programs`",
     "debian-bench": "`make bench`",
     "debian-embedded": "`make test-embedded`",
     "debian-languages": "`make test-languages`",

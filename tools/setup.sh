@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Installs what okid needs: Debian packages from tools/packages/*.txt and Python packages into .venv.
-# usage: tools/setup.sh [build|bench|test|dev|docs|embedded|fuzz|languages|package]   (bench and test include build, the others test)
+# usage: tools/setup.sh [build|bench|test|dev|docs|embedded|fuzz|languages|package|programs]   (bench and test include build, the others test)
 # Idempotent; silent when nothing is missing. Needs root or sudo only when a Debian package is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -14,7 +14,7 @@ if [ "$tier" = bench ]; then
 fi
 [ "$tier" = build ] || lists+=(tools/packages/debian-test.txt)
 case $tier in
-  embedded|fuzz|languages|package) lists+=("tools/packages/debian-$tier.txt") tier=test ;; # Python needs nothing more
+  embedded|fuzz|languages|package|programs) lists+=("tools/packages/debian-$tier.txt") tier=test ;; # Python needs nothing more
   dev|docs) lists+=(tools/packages/debian-fuzz.txt tools/packages/debian-dev.txt) tier=dev ;;
 esac
 
@@ -78,7 +78,7 @@ case $tier in
   build) covers="build test dev" ;;
   test) covers="test dev" ;;
   dev) covers="dev" ;;
-  *) echo "setup: no tier '$tier' (build, bench, test, dev, docs, embedded, fuzz, languages, package)" >&2; exit 2 ;;
+  *) echo "setup: no tier '$tier' (build, bench, test, dev, docs, embedded, fuzz, languages, package, programs)" >&2; exit 2 ;;
 esac
 for one in $covers; do
   if cmp -s tools/pyproject.toml ".venv/.okid-$one"; then exit 0; fi

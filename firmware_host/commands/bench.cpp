@@ -3,6 +3,7 @@
 // least squares on the whole record; and what whole identifications cost (bench_identify.cpp). All in one
 // run, one thread: the ratios count, not the times.
 #include "bench_identify.hpp"
+#include "blas_kernels.hpp"
 #include "commands.hpp"
 #include "files/whole_file.hpp"
 #include "result/result.hpp"
@@ -273,14 +274,19 @@ void run_bench(const bench_options& options) {
     nlohmann::ordered_json ratios = nlohmann::ordered_json::object(), list = nlohmann::ordered_json::array();
     if (options.only != "identifications") rows = bench_kernels(list, ratios);
     if (options.only != "kernels") bench_identifications(list);
-    const nlohmann::ordered_json machine{
-        {"backend", okid_backend()}, {"threads", 1}, {"pointer_bits", 8 * sizeof(void*)}};
+    const blas_kernels blas = blas_in_use();
+    nlohmann::ordered_json machine{{"backend", okid_backend()}, {"threads", 1}, {"pointer_bits", 8 * sizeof(void*)}};
+    if (!blas.name.empty()) machine.update({{"blas", blas.version}, {"blas_kernels", blas.name}});
     const nlohmann::ordered_json all{
         {"schema", "okid.bench/1"}, {"machine", machine}, {"rows", list}, {"ratios", ratios}};
     if (options.json)
         fmt::print("{}\n", all.dump(1));
     else
         print(rows, list, ratios);
+    if (!blas.name.empty() && !options.json) fmt::print("\n{}, kernels for {}\n", blas.version, blas.name);
+    if (!blas.better.empty())
+        fmt::print(stderr, "note: kernels for {} are a fallback on this processor, all times are longer: {}\n",
+                   blas.name, remedy_of(blas));
     if (!options.save.empty()) write_whole_file(options.save, all.dump(1) + "\n");
 }
 

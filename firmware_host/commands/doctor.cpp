@@ -3,6 +3,7 @@
 #include "acquire/can_link.hpp"
 #include "acquire/reader.hpp"
 #include "acquire/serial_line.hpp"
+#include "blas_kernels.hpp"
 #include "commands.hpp"
 #include "config/config.hpp"
 #include "error.hpp"
@@ -273,6 +274,7 @@ findings examine(const std::optional<live_config>& config) {
     if (config) check_outputs(out, *config);
     check_clock(out);
     check_governor(out);
+    check_blas(out);
     return out;
 }
 

@@ -73,16 +73,16 @@ void read_adapter(const config_place& place, const toml::table& table, bus_confi
         require_key(place, table, "interface",
                     "a socketcan bus needs one, such as interface = \"can0\", or the serial number of a USB adapter: "
                     "adapter = \"...\"");
-        if (channel) refuse_key(place, *channel, "adapter_channel", "it needs adapter beside it");
+        if (channel) refuse_key(place, channel, "adapter_channel", "it needs adapter beside it");
         return;
     }
     if (const toml::node* name = table.get("interface"))
-        refuse_key(place, *name, "interface", "adapter stands beside it: one of the two");
+        refuse_key(place, name, "interface", "adapter stands beside it: one of the two");
     bus.adapter = *table["adapter"].value<std::string>();
     bus.adapter_channel = table["adapter_channel"].value_or(0);
     bus.interface = name_in_logs(bus.name);
     if (bus.adapter.size() >= sizeof drv_usb_t::serial)
-        refuse_key(place, *adapter, "adapter", "a serial number or a port has at most 127 characters");
+        refuse_key(place, adapter, "adapter", "a serial number or a port has at most 127 characters");
 }
 
 bus_config read_bus(const config_place& place, const toml::table& table) {
@@ -99,7 +99,7 @@ bus_config read_bus(const config_place& place, const toml::table& table) {
     if (!bus.dbc_name.empty()) bus.dbc = beside(place.path, bus.dbc_name);
     if (const auto file = table["file"].value<std::string>()) {
         if (bus.type != "replay")
-            refuse_key(place, *table.get("file"), "file",
+            refuse_key(place, table.get("file"), "file",
                        fmt::format("only a bus of type replay reads a file, this one is of type {}", bus.type));
         bus.file = beside(place.path, *file);
     }
@@ -108,7 +108,7 @@ bus_config read_bus(const config_place& place, const toml::table& table) {
     if (bus.type == "socketcan") read_adapter(place, table, bus);
     if (bus.type == "replay") require_key(place, table, "file", "a replay bus needs a candump -L log");
     if (bus.interface.size() >= DRV_NAME_BYTES)
-        refuse_key(place, *table.get("interface"), "interface", "an interface name has at most 15 characters");
+        refuse_key(place, table.get("interface"), "interface", "an interface name has at most 15 characters");
     return bus;
 }
 
@@ -132,17 +132,17 @@ void read_buses(const std::string& path, const toml::table& file, live_config& c
         const config_place place{path, entry_name("bus", table, i)};
         bus_config bus = read_bus(place, table);
         for (const bus_config& other : config.buses) {
-            if (other.name == bus.name) refuse_key(place, *table.get("name"), "name", "another [[bus]] has this name");
+            if (other.name == bus.name) refuse_key(place, table.get("name"), "name", "another [[bus]] has this name");
             for (const char* key : {"interface", "device"}) {
                 const auto mine = table[key].value<std::string>();
                 if (mine && *mine == (key[0] == 'i' ? other.interface : other.device))
-                    refuse_key(place, *table.get(key), key, fmt::format("bus \"{}\" uses it already", other.name));
+                    refuse_key(place, table.get(key), key, fmt::format("bus \"{}\" uses it already", other.name));
             }
             if (!bus.adapter.empty() && other.adapter == bus.adapter && other.adapter_channel == bus.adapter_channel)
-                refuse_key(place, *table.get("adapter"), "adapter",
+                refuse_key(place, table.get("adapter"), "adapter",
                            fmt::format("bus \"{}\" uses this channel of it already", other.name));
             if ((bus.on_line() || !bus.adapter.empty()) && other.interface == bus.interface)
-                refuse_key(place, *table.get("name"), "name",
+                refuse_key(place, table.get("name"), "name",
                            fmt::format("\"{}\" would stand for two buses in a log", bus.interface));
         }
         config.buses.push_back(std::move(bus));
@@ -167,7 +167,7 @@ std::size_t bus_of(const config_place& place, const toml::table& table, const li
     const std::string name = *node->value<std::string>();
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-        refuse_key(place, *node, "bus",
+        refuse_key(place, node, "bus",
                    fmt::format("found \"{}\"{}, expected one of: {}", printable(name), did_you_mean(name, names),
                                list_names(names)));
     return static_cast<std::size_t>(found - names.begin());
@@ -195,12 +195,12 @@ std::string bits_key(const drv_signal_t& signal) {
 void share_sequence(const config_place& place, const toml::table& table, std::vector<channel_config>& channels,
                     channel_config& channel, known_channels& known) {
     if (!known.names.insert(channel.name).second)
-        refuse_key(place, *table.get("name"), "name", "another [[channel]] has this name");
+        refuse_key(place, table.get("name"), "name", "another [[channel]] has this name");
     known_channels::message& message = known.messages[frame_key(channel)];
     if (message.counted) {
         const channel_config& other = channels[*message.counted];
         if (channel.sequence && !same_bits(*channel.sequence, *other.sequence))
-            refuse_key(place, *table.get("sequence"), "sequence",
+            refuse_key(place, table.get("sequence"), "sequence",
                        fmt::format("channel \"{}\" of the same message names another counter", other.name));
         if (!channel.sequence) channel.sequence = other.sequence;
     } else if (channel.sequence) {

@@ -43,11 +43,11 @@ void read_alarm(const toml::table& file, live_config& config) {
         out.test_rows = static_cast<int>((*table)["test_rows"].value_or(std::int64_t{0}));
         out.false_alarm = (*table)["false_alarm"].value_or(out.false_alarm);
         if (out.test_s > 0 && file.contains("hammer"))
-            refuse_key(place, *table->get("test_s"), "test_s", "hits of a [hammer] test are no stream to be tested");
+            refuse_key(place, table->get("test_s"), "test_s", "hits of a [hammer] test are no stream to be tested");
         if (table->contains("command")) read_command(*table->get("command"), config);
         if (out.enabled && !sigma && table->contains("enabled"))
             refuse_key(
-                place, *table->get("enabled"), "enabled",
+                place, table->get("enabled"), "enabled",
                 "an alarm compares with standard deviations, and [identification] sigma_blocks = 0 computes none");
     }
     out.enabled = out.enabled && sigma;

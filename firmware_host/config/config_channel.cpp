@@ -27,10 +27,10 @@ const dbc_message& find_message(const config_place& place, const toml::node& nod
             continue;
         }
         if (message.fault.empty()) return message;
-        refuse_key(place, node, "message",
+        refuse_key(place, &node, "message",
                    fmt::format("message {} cannot be used: {}", printable(name), message.fault));
     }
-    refuse_key(place, node, "message",
+    refuse_key(place, &node, "message",
                fmt::format("found \"{}\"{}, expected a message of {}: {}", printable(name), did_you_mean(name, names),
                            dbc.path, list_names(names, 16)));
 }
@@ -46,17 +46,18 @@ const dbc_signal& find_signal(const config_place& place, const toml::node& node,
         if (!wrong && drv_signal_bytes(&layout) > message.length) wrong = "the signal ends beyond the message";
         if (!wrong && layout.scale == 0) wrong = "the factor of the signal is 0";
         if (wrong)
-            refuse_key(place, node, key, fmt::format("{}: line {}, signal {}: {}", dbc.path, signal.line, name, wrong));
+            refuse_key(place, &node, key,
+                       fmt::format("{}: line {}, signal {}: {}", dbc.path, signal.line, name, wrong));
         return signal;
     }
-    refuse_key(place, node, key,
+    refuse_key(place, &node, key,
                fmt::format("found \"{}\"{}, expected a signal of message {}: {}", printable(name),
                            did_you_mean(name, names), message.name, list_names(names, 16)));
 }
 
 void check_sequence(const config_place& place, const toml::node& node, const drv_signal_t& signal) {
     if (signal.value != DRV_VALUE_INTEGER || signal.is_signed || signal.length < 2 || signal.length > 63)
-        refuse_key(place, node, "sequence", "a counter is an unsigned integer of 2 to 63 bits");
+        refuse_key(place, &node, "sequence", "a counter is an unsigned integer of 2 to 63 bits");
 }
 
 /// `sequence = { start_bit = 0, length = 16, byte_order = "little" }`
@@ -65,30 +66,30 @@ drv_signal_t sequence_of_table(const config_place& place, const toml::table& tab
     signal.scale = 1;
     const auto whole = [&](const char* key, std::int64_t low, std::int64_t high) {
         const toml::node* node = table.get(key);
-        if (!node) refuse_key(place, table, "sequence", fmt::format("\"{}\" is missing in it", key));
+        if (!node) refuse_key(place, &table, "sequence", fmt::format("\"{}\" is missing in it", key));
         const auto value = node->value_exact<std::int64_t>();
         if (!value || *value < low || *value > high)
             refuse_key(
-                place, *node, "sequence",
+                place, node, "sequence",
                 fmt::format("{}: found {}, expected a whole number from {} to {}", key, found_value(*node), low, high));
         return static_cast<std::uint16_t>(*value);
     };
     for (const auto& [key, node] : table)
         if (key.str() != "start_bit" && key.str() != "length" && key.str() != "byte_order")
-            refuse_key(place, node, "sequence",
+            refuse_key(place, &node, "sequence",
                        fmt::format("unknown \"{}\" in it; known: start_bit, length, byte_order",
                                    printable(std::string(key.str()))));
     signal.start_bit = whole("start_bit", 0, 511);
     signal.length = whole("length", 2, 63);
     const std::string order = table["byte_order"].value_or(std::string("little"));
     if (order != "little" && order != "big" && order != "intel" && order != "motorola")
-        refuse_key(place, table, "sequence",
+        refuse_key(place, &table, "sequence",
                    fmt::format("byte_order: found \"{}\", expected little or big", printable(order)));
     signal.big_endian = order == "big" || order == "motorola";
     const char* wrong = drv_signal_prepare(&signal);
     if (!wrong && message_bytes && drv_signal_bytes(&signal) > message_bytes)
         wrong = "the counter ends beyond the message";
-    if (wrong) refuse_key(place, table, "sequence", wrong);
+    if (wrong) refuse_key(place, &table, "sequence", wrong);
     return signal;
 }
 
@@ -107,7 +108,7 @@ void resolve_sequence(const config_place& place, const toml::table& table, const
         return;
     }
     if (!message)
-        refuse_key(place, *node, "sequence",
+        refuse_key(place, node, "sequence",
                    "the name of a signal needs a channel with message and signal of a dbc; expected { start_bit = 0, "
                    "length = 16 }");
     const dbc_signal& signal = find_signal(place, *node, "sequence", *dbc, *message, *node->value<std::string>());
@@ -128,7 +129,7 @@ void resolve_selectors(const config_place& place, const toml::node& node, const 
                             : channel.selectors.size() == message.signals.size() ? "has multiplexors in a circle"
                                                                                  : nullptr;
         if (wrong)
-            refuse_key(place, node, "signal",
+            refuse_key(place, &node, "signal",
                        fmt::format("{}: line {}: the signal is multiplexed, but message {} {}", dbc.path, inner->line,
                                    message.name, wrong));
         channel.selectors.push_back(
@@ -151,7 +152,7 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
                      channel_config& channel) {
     for (const char* key : {"can_id", "pgn", "extended", "start_bit", "length", "byte_order", "signed", "value"})
         if (const toml::node* node = table.get(key))
-            refuse_key(place, *node, key,
+            refuse_key(place, node, key,
                        "a channel has either message and signal of a dbc, or can_id and start_bit, not both");
     const toml::node *message_node = table.get("message"), *signal_node = table.get("signal");
     if (!message_node || !signal_node)
@@ -159,7 +160,7 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
                      fmt::format("\"{}\" is missing beside \"{}\"", message_node ? "signal" : "message",
                                  message_node ? "message" : "signal"));
     if (!dbc)
-        refuse_key(place, *message_node, "message",
+        refuse_key(place, message_node, "message",
                    fmt::format("bus \"{}\" has no dbc, expected dbc = \"FILE.dbc\" in its [[bus]]", bus.name));
     channel.message = *message_node->value<std::string>();
     channel.signal = *signal_node->value<std::string>();
@@ -170,7 +171,7 @@ void resolve_by_name(const config_place& place, const toml::table& table, const 
     if (message.j1939)
         channel.frame = match_pgn(message.id >> 8 & 0x3FFFF, source ? source->value<int>() : sender_in(*dbc, message));
     else if (source)
-        refuse_key(place, *source, "source_address",
+        refuse_key(place, source, "source_address",
                    fmt::format("message {} is no J1939 message: {} gives it no VFrameFormat J1939PG. Mark it so, or "
                                "leave the key out: its identifier {:#x} is taken as it stands, that of one sender",
                                message.name, dbc->path, message.id));
@@ -188,19 +189,19 @@ drv_filter_t identifier_of(const config_place& place, const toml::table& table) 
     if (pgn) {
         for (const char* key : {"can_id", "extended"})
             if (const toml::node* node = table.get(key))
-                refuse_key(place, *node, key, "a channel has either can_id or pgn, not both");
+                refuse_key(place, node, key, "a channel has either can_id or pgn, not both");
         const auto number = static_cast<std::uint32_t>(*pgn->value<std::int64_t>());
         if (number != j1939_group(number))
-            refuse_key(place, *pgn, "pgn",
+            refuse_key(place, pgn, "pgn",
                        fmt::format("found {}, expected {}: below 0xF000 the low byte is an address, not part of it",
                                    number, j1939_group(number)));
         return match_pgn(number, table["source_address"].value<int>());
     }
-    if (source) refuse_key(place, *source, "source_address", "it needs pgn beside it, or a J1939 message of a dbc");
+    if (source) refuse_key(place, source, "source_address", "it needs pgn beside it, or a J1939 message of a dbc");
     const auto id = *can_id->value<std::int64_t>();
     const bool extended = table["extended"].value_or(id > 0x7FF);
     if (!extended && id > 0x7FF)
-        refuse_key(place, *can_id, "can_id", fmt::format("found {}, expected at most 2047 with extended = false", id));
+        refuse_key(place, can_id, "can_id", fmt::format("found {}, expected at most 2047 with extended = false", id));
     return {static_cast<std::uint32_t>(id), static_cast<std::uint8_t>(extended), 0};
 }
 
@@ -223,7 +224,7 @@ void resolve_by_bits(const config_place& place, const toml::table& table, channe
                                                 : DRV_VALUE_INTEGER;
     channel.layout.scale = 1;
     if (const char* wrong = drv_signal_prepare(&channel.layout))
-        refuse_key(place, *table.get("start_bit"), "start_bit", wrong);
+        refuse_key(place, table.get("start_bit"), "start_bit", wrong);
     resolve_sequence(place, table, nullptr, nullptr, channel);
 }
 
@@ -274,7 +275,7 @@ void resolve_channel(const config_place& place, const toml::table& table, const 
     if (bus.serial())
         resolve_field(place, table, bus, channel);
     else if (const toml::node* node = table.get("field"))
-        refuse_key(place, *node, "field",
+        refuse_key(place, node, "field",
                    fmt::format("bus \"{}\" is of type {}, only a serial bus has fields", bus.name, bus.type));
     else if (table.contains("message") || table.contains("signal"))
         resolve_by_name(place, table, bus, dbc, channel);
@@ -283,7 +284,7 @@ void resolve_channel(const config_place& place, const toml::table& table, const 
     check_length(place, table, bus, channel);
     if (const toml::node* node = table.get("scale")) { // by hand, or to correct what the dbc says
         channel.layout.scale = *node->value<double>();
-        if (channel.layout.scale == 0) refuse_key(place, *node, "scale", "found 0, expected another number");
+        if (channel.layout.scale == 0) refuse_key(place, node, "scale", "found 0, expected another number");
     }
     if (const toml::node* node = table.get("offset")) channel.layout.offset = *node->value<double>();
     channel.layout.offset -= table["zero_code"].value_or(0.0) * channel.layout.scale; // offset binary

@@ -17,10 +17,10 @@ void read_bus_clock(const config_place& place, const toml::table& table, double 
     bus.rate_hz = table["rate_hz"].value<double>();
     if (!bus.rate_hz) return;
     if (!bus.free_clock)
-        refuse_key(place, *table.get("rate_hz"), "rate_hz",
+        refuse_key(place, table.get("rate_hz"), "rate_hz",
                    "nodes that share one clock all have the rate of [acquisition]: rate_hz goes with clock = \"free\"");
     if (*bus.rate_hz > fastest_ratio * grid_hz || *bus.rate_hz < grid_hz / fastest_ratio)
-        refuse_key(place, *table.get("rate_hz"), "rate_hz",
+        refuse_key(place, table.get("rate_hz"), "rate_hz",
                    fmt::format("found {:g} Hz, expected {:g} to {:g} Hz beside a grid of {:g} Hz", *bus.rate_hz,
                                grid_hz / fastest_ratio, fastest_ratio * grid_hz, grid_hz));
 }
@@ -30,7 +30,7 @@ void check_reference(const config_place& place, const toml::table& table, double
     const std::size_t first = clock_domains(config).front().front();
     const bus_config& bus = config.buses[config.channels[first].bus];
     if (!bus.free_clock || !bus.rate_hz || std::abs(*bus.rate_hz / grid_hz - 1) < 1e-9) return;
-    refuse_key(place, *table.get("rate_hz"), "rate_hz",
+    refuse_key(place, table.get("rate_hz"), "rate_hz",
                fmt::format("found {:g} Hz, expected {:g} Hz: every node has a clock of its own, so the first channel's "
                            "(\"{}\") is the reference, and its rate is rate_hz x decimate of [acquisition]",
                            *bus.rate_hz, grid_hz, config.channels[first].name));

@@ -37,7 +37,7 @@ std::size_t check_list(const config_place& place, const toml::table& table, cons
     for (std::size_t k = 0; k < list->size(); ++k) {
         const toml::node& entry = *list->get(k);
         if (!entry.is_array() || !good(*entry.as_array()))
-            refuse_key(place, entry, key, fmt::format("entry {}: expected {}", k + 1, expected));
+            refuse_key(place, &entry, key, fmt::format("entry {}: expected {}", k + 1, expected));
     }
     return list->size();
 }
@@ -50,7 +50,7 @@ void check_geometry(const toml::table& file, const live_config& config) {
     const config_place place{config.path, "[geometry]"};
     for (const char* key : {"nodes", "dofs"})
         if (const toml::array* list = (*table)[key].as_array(); !list || list->empty())
-            refuse_key(place, *table, key, "it is missing or empty, expected at least one entry");
+            refuse_key(place, table, key, "it is missing or empty, expected at least one entry");
     const std::size_t nodes =
         check_list(place, *table, "nodes", "three numbers: [x, y, z]", [](const toml::array& node) {
             return node.size() == 3 && is_number(node.get(0)) && is_number(node.get(1)) && is_number(node.get(2));
@@ -65,7 +65,7 @@ void check_geometry(const toml::table& file, const live_config& config) {
     });
     for (const channel_config& channel : config.channels)
         if (static_cast<std::size_t>(std::abs(channel.dof)) > dofs)
-            refuse_key(place, *table, "dofs",
+            refuse_key(place, table, "dofs",
                        fmt::format("found {} entries, but channel \"{}\" measures degree of freedom {}", dofs,
                                    channel.name, channel.dof));
 }

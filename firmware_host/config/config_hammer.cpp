@@ -16,24 +16,24 @@ constexpr double most_bytes = 1e9;
 void check_company(const config_place& place, const toml::table& table, const toml::table& file,
                    const live_config& config) {
     if (config.trigger.source != trigger_source::immediate)
-        refuse_key({config.path, "[trigger]"}, *file["trigger"].as_table()->get("source"), "source",
+        refuse_key({config.path, "[trigger]"}, file["trigger"].as_table()->get("source"), "source",
                    "[hammer] waits for hits itself: leave [trigger] out");
     if (config.identification.window_s || config.identification.forgetting)
         refuse_key({config.path, "[identification]"},
-                   *file["identification"].as_table()->get(config.identification.window_s ? "window_s" : "forgetting"),
+                   file["identification"].as_table()->get(config.identification.window_s ? "window_s" : "forgetting"),
                    config.identification.window_s ? "window_s" : "forgetting",
                    "the hits of a [hammer] test are averaged: leave it out");
     if (config.channels[config.hammer.channel].role != channel_role::force)
-        refuse_key(place, *table.get("channel"), "channel",
+        refuse_key(place, table.get("channel"), "channel",
                    fmt::format("\"{}\" has not the role force", config.channels[config.hammer.channel].name));
     if (config.hammer.spectrum_hz > config.rate_hz / 2)
-        refuse_key(place, *table.get("spectrum_hz"), "spectrum_hz",
+        refuse_key(place, table.get("spectrum_hz"), "spectrum_hz",
                    fmt::format("found {:g} Hz, expected at most half of rate_hz, {:g} Hz", config.hammer.spectrum_hz,
                                config.rate_hz / 2));
     const double bytes = (config.hammer.length_s + config.hammer.pretrigger_s) * config.rate_hz * 8 *
                          static_cast<double>(config.channels.size());
     if (bytes > most_bytes)
-        refuse_key(place, *table.get("length_s"), "length_s",
+        refuse_key(place, table.get("length_s"), "length_s",
                    fmt::format("a hit of {:g} s would take {:.1f} GB, at most {:g} GB are kept", config.hammer.length_s,
                                bytes / 1e9, most_bytes / 1e9));
 }
@@ -45,17 +45,17 @@ void read_points(const config_place& place, const toml::table& t, const live_con
     for (const toml::node& one : *points) {
         out.points.push_back(static_cast<int>(one.value<std::int64_t>().value_or(0)));
         if (out.points.back() == 0 || std::abs(one.value<std::int64_t>().value_or(0)) > 10000)
-            refuse_key(place, *points, "points",
+            refuse_key(place, points, "points",
                        "expected the numbers of the places in the order in which they are struck, "
                        "from 1 (-3: at 3, direction reversed), such as [1, 2, 7]");
     }
-    if (points->empty()) refuse_key(place, *points, "points", "is empty, expected a place at least");
+    if (points->empty()) refuse_key(place, points, "points", "is empty, expected a place at least");
     if (config.identification.method != "auto")
         refuse_key(
-            place, *points, "points",
+            place, points, "points",
             fmt::format("belongs to method \"auto\", {} takes all hits as one place", config.identification.method));
     if (config.n_u != 1)
-        refuse_key(place, *points, "points",
+        refuse_key(place, points, "points",
                    fmt::format("{} force channels, expected one, that of the "
                                "hammer",
                                config.n_u));

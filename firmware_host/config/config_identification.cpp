@@ -63,17 +63,17 @@ void check_agreement(const config_place& place, const toml::table& t, const iden
     for (const char* key : {"p", "rows", "order", "hankel"})
         if (agreed && t.contains(key) && t[key].value<std::string>() != "auto" &&
             t[key].value<std::string>() != "system")
-            refuse_key(place, *t.get(key), key,
+            refuse_key(place, t.get(key), key,
                        "belongs to one method, \"auto\" agrees over many: leave one of them out");
     if (agreed && wanted.forgetting)
-        refuse_key(place, *t.get("forgetting"), "forgetting",
+        refuse_key(place, t.get("forgetting"), "forgetting",
                    "\"auto\" keeps the samples of a window, without forgetting: expected window_s, or one method");
     for (const char* key : {"band", "decimate"})
         if (!agreed && t.contains(key))
-            refuse_key(place, *t.get(key), key,
+            refuse_key(place, t.get(key), key,
                        fmt::format("belongs to method \"auto\", {} takes the stream as it is", wanted.method));
     if (!agreed && wanted.hold == "auto")
-        refuse_key(place, *t.get("hold"), "hold",
+        refuse_key(place, t.get("hold"), "hold",
                    fmt::format("\"auto\" belongs to method \"auto\"; of {} expected zoh, foh or band", wanted.method));
 }
 
@@ -83,7 +83,7 @@ void read_band(const config_place& place, const toml::table& t, identification_c
     const auto hertz = [&](std::size_t k) { return band->size() == 2 ? (*band)[k].value_or(-1.0) : -1.0; };
     const double low = hertz(0), high = hertz(1);
     if (!(low >= 0 && high > low && std::isfinite(high)))
-        refuse_key(place, *band, "band", "expected two frequencies in Hz, the lower one first, such as [0.3, 40.0]");
+        refuse_key(place, band, "band", "expected two frequencies in Hz, the lower one first, such as [0.3, 40.0]");
     out.band = {low, high};
 }
 
@@ -98,16 +98,16 @@ void read_identification(const toml::table& file, live_config& config) {
     const bool agreed = out.method == "auto";
     out.hankel = t["hankel"].value_or(out.hankel);
     if (const std::string fault = agreed ? "" : hankel_fault(out.hankel, out.method, config.n_u); !fault.empty())
-        refuse_key(place, *t.get("hankel"), "hankel", fault);
+        refuse_key(place, t.get("hankel"), "hankel", fault);
     out.hold = t["hold"].value_or(std::string(agreed ? "auto" : "zoh"));
     out.detrend = t["detrend"].value_or(out.detrend);
     if (out.detrend == "linear")
-        refuse_key(place, *t.get("detrend"), "detrend",
+        refuse_key(place, t.get("detrend"), "detrend",
                    "\"linear\" needs the whole record: none and mean are possible while a stream runs");
     out.refine = t["refine"].value_or(std::string(agreed ? "auto" : "no"));
     if (config.n_u == 0) {
         if (out.refine == "yes")
-            refuse_key(place, *t.get("refine"), "refine",
+            refuse_key(place, t.get("refine"), "refine",
                        "\"yes\" needs a [[channel]] with the role force: without one there is nothing to simulate");
         out.refine = "no";
     }
@@ -120,16 +120,16 @@ void read_identification(const toml::table& file, live_config& config) {
     out.sigma_blocks = static_cast<int>(t["sigma_blocks"].value_or(std::int64_t{out.sigma_blocks}));
     if (out.sigma_blocks > 0 && out.sigma_blocks < fewest_blocks)
         refuse_key(
-            place, *t.get("sigma_blocks"), "sigma_blocks",
+            place, t.get("sigma_blocks"), "sigma_blocks",
             fmt::format("found {}, expected 0 (no standard deviations) or {} to 100", out.sigma_blocks, fewest_blocks));
     const auto sigma = t["sigma"].value_or(std::string(t.contains("sigma_blocks") ? "jackknife" : "analytic"));
     out.analytic = sigma == "analytic";
     if (sigma == "none") out.sigma_blocks = 0;
     out.window = t["window"].value_or(out.window);
     if (const std::string fault = chosen_window_fault(out); !fault.empty())
-        refuse_key(place, *t.get("window"), "window", fault);
+        refuse_key(place, t.get("window"), "window", fault);
     if (out.window_s && out.forgetting)
-        refuse_key(place, *t.get("forgetting"), "forgetting",
+        refuse_key(place, t.get("forgetting"), "forgetting",
                    "window_s is given too; a window and forgetting together are not available, choose one");
     check_agreement(place, t, out);
     read_band(place, t, out);
@@ -143,10 +143,10 @@ void read_identification(const toml::table& file, live_config& config) {
                         "here",
                         out.method, rows_used(method, config.n_u, out.p, out.rows)));
     if (const std::string fault = window_fault(out, config.n_u, config.n_y, config.rate_hz); !fault.empty())
-        refuse_key(place, *t.get("window_s"), "window_s", fault);
-    if (out.update_s * config.rate_hz < 1)
+        refuse_key(place, t.get("window_s"), "window_s", fault);
+    if (t.contains("update_s") && out.update_s * config.rate_hz < 1)
         refuse_key(
-            place, *t.get("update_s"), "update_s",
+            place, t.get("update_s"), "update_s",
             fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
     out.restart_on_change = t["restart_on_change"].value_or(true);
     out.mkr = t["mkr"].value_or(false);
@@ -155,7 +155,7 @@ void read_identification(const toml::table& file, live_config& config) {
         config.warnings.emplace_back(
             "[identification] mkr: no [[channel]] has the role force, so there is no M, K and R");
     const std::string fault = out.mkr && config.n_u > 0 && config.n_y > 0 ? plan_fault(live_mass_plan(config)) : "";
-    if (!fault.empty()) refuse_key(place, *t.get("mkr"), "mkr", fault + ". The key \"dof\" of [[channel]] says where");
+    if (!fault.empty()) refuse_key(place, t.get("mkr"), "mkr", fault + ". The key \"dof\" of [[channel]] says where");
 }
 
 } // namespace okid_host

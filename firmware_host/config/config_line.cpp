@@ -39,13 +39,13 @@ void check_owners(const config_place& place, const toml::table& table, const bus
         if (const toml::node* node = table.get(each.key))
             if ((' ' + std::string(each.types) + ' ').find(' ' + bus.type + ' ') == std::string::npos)
                 refuse_key(
-                    place, *node, each.key,
+                    place, node, each.key,
                     fmt::format("found on a bus of type {}, expected only on one of type {}", bus.type, each.told));
 }
 
 void require(const config_place& place, const toml::table& table, const char* key, const std::string& why) {
     if (!table.contains(key))
-        refuse_key(place, table, key,
+        refuse_key(place, &table, key,
                    fmt::format("is missing: a bus of type {} needs {}", table["type"].value_or(std::string()), why));
 }
 
@@ -53,17 +53,17 @@ void read_counter(const config_place& place, const toml::table& table, bus_confi
     bus.counter_bits = table["counter_bits"].value_or(bus.counter_bits);
     const toml::node *field = table.get("counter_field"), *bits = table.get("counter_bits");
     if ((field || bits) && bus.framing != DRV_FRAMING_ASCII)
-        refuse_key(place, field ? *field : *bits, field ? "counter_field" : "counter_bits",
+        refuse_key(place, field ? field : bits, field ? "counter_field" : "counter_bits",
                    fmt::format("only framing = \"ascii\" has it; {} {}", framing_name(bus.framing),
                                bus.framing == DRV_FRAMING_COBS ? "counts samples by itself" : "counts none"));
     if (!field) {
-        if (bits) refuse_key(place, *bits, "counter_bits", "it needs counter_field beside it");
+        if (bits) refuse_key(place, bits, "counter_bits", "it needs counter_field beside it");
         return;
     }
     bus.counter_field = table["counter_field"].value<int>();
     const auto most = static_cast<int>(drv_framing_limit(bus.framing)) - 1;
     if (*bus.counter_field > most)
-        refuse_key(place, *field, "counter_field", fmt::format("found {}, expected 0 to {}", *bus.counter_field, most));
+        refuse_key(place, field, "counter_field", fmt::format("found {}, expected 0 to {}", *bus.counter_field, most));
 }
 
 void check_rates(const config_place& place, const toml::table& table, const bus_config& bus) {
@@ -72,7 +72,7 @@ void check_rates(const config_place& place, const toml::table& table, const bus_
     if (const toml::node* node = table.get("btr"))
         if (bus.btr.size() < 4 || bus.btr.size() > 16 ||
             !std::all_of(bus.btr.begin(), bus.btr.end(), [](unsigned char c) { return std::isxdigit(c); }))
-            refuse_key(place, *node, "btr",
+            refuse_key(place, node, "btr",
                        fmt::format("found {}, expected hexadecimal digits as the adapter's manual gives them, such as "
                                    "\"031C\"",
                                    found_value(*node)));
@@ -82,7 +82,7 @@ void check_rates(const config_place& place, const toml::table& table, const bus_
         if (node && (data || bus.btr.empty()) &&
             drv_slcan_opening(text, sizeof text, data ? 0 : whole(bus.bitrate), data ? whole(bus.dbitrate) : 0,
                               nullptr) < 0)
-            refuse_key(place, *node, key,
+            refuse_key(place, node, key,
                        fmt::format("found {}, slcan has {}", found_value(*node),
                                    data ? "2000000 and 5000000"
                                         : "10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000 and 1000000; "
@@ -110,7 +110,7 @@ void read_line(const config_place& place, const toml::table& table, bus_config& 
     bus.baud = table["baud"].value_or(usual_baud);
     bus.interface = name_in_logs(bus.name);
     if (bus.device.size() >= DRV_PATH_BYTES)
-        refuse_key(place, *table.get("device"), "device",
+        refuse_key(place, table.get("device"), "device",
                    fmt::format("a device has a path of at most {} characters", int{DRV_PATH_BYTES} - 1));
     if (bus.serial()) {
         require(place, table, "framing", "one of: cobs, ascii, witmotion, vectornav");
@@ -128,16 +128,16 @@ void resolve_field(const config_place& place, const toml::table& table, const bu
                    channel_config& channel) {
     const toml::node* field = table.get("field");
     if (!field)
-        refuse_key(place, table, "field",
+        refuse_key(place, &table, "field",
                    fmt::format("is missing: bus \"{}\" is serial, expected the number of the channel's place in a "
                                "sample, from 0",
                                bus.name));
     for (const char* key : {"message", "signal", "can_id", "pgn", "source_address", "extended", "start_bit", "length",
                             "byte_order", "signed", "value"})
         if (const toml::node* node = table.get(key))
-            refuse_key(place, *node, key, "a channel of a serial bus has a field instead");
+            refuse_key(place, node, key, "a channel of a serial bus has a field instead");
     if (const toml::node* node = table.get("sequence"))
-        refuse_key(place, *node, "sequence",
+        refuse_key(place, node, "sequence",
                    bus.framing == DRV_FRAMING_COBS
                        ? "framing \"cobs\" counts samples by itself"
                        : "a serial bus counts samples with counter_field = N in its [[bus]]");
@@ -145,7 +145,7 @@ void resolve_field(const config_place& place, const toml::table& table, const bu
     const auto most = static_cast<std::int64_t>(drv_framing_limit(bus.framing)) - 1;
     if (number > most)
         refuse_key(
-            place, *field, "field",
+            place, field, "field",
             fmt::format("found {}, expected 0 to {} with framing \"{}\"", number, most, framing_name(bus.framing)));
     channel.field = static_cast<unsigned>(number);
     channel.frame = {drv_line_frame_field(bus.framing, *channel.field, &channel.layout), 0, 0};

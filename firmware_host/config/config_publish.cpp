@@ -60,7 +60,7 @@ bool numeric(const std::string& host) {
     if (found.find("://") == std::string::npos) found.insert(0, "://"); // a name before the @ without a scheme
     found = without_password(found);
     if (found.rfind("://", 0) == 0) found.erase(0, 3);
-    refuse_key(place, node, key, fmt::format("found \"{}\", expected {}", printable(found), expected));
+    refuse_key(place, &node, key, fmt::format("found \"{}\", expected {}", printable(found), expected));
 }
 
 std::string socket_of(const config_place& place, const toml::node& node) {
@@ -68,7 +68,7 @@ std::string socket_of(const config_place& place, const toml::node& node) {
     const std::string path =
         given.is_absolute() ? given.string() : (std::filesystem::path(place.path).parent_path() / given).string();
     if (path.size() >= sizeof(sockaddr_un{}.sun_path))
-        refuse_key(place, node, "socket",
+        refuse_key(place, &node, "socket",
                    fmt::format("the path has {} characters, a socket's has at most {}", path.size(),
                                sizeof(sockaddr_un{}.sun_path) - 1));
     return path;
@@ -84,7 +84,7 @@ broker_address broker_of(const config_place& place, const toml::node& node) {
     broker_address out;
     const std::size_t slash = text.find('/'), last_at = text.rfind('@');
     if (slash != std::string::npos && last_at != std::string::npos && last_at > slash)
-        refuse_key(place, node, "mqtt",
+        refuse_key(place, &node, "mqtt",
                    "found an @ behind a /: a password with a / in it belongs into a password_file");
     if (slash != std::string::npos) {
         if (slash + 1 < text.size()) out.prefix = text.substr(slash + 1);
@@ -107,7 +107,7 @@ broker_address broker_of(const config_place& place, const toml::node& node) {
 void read_password_file(const config_place& place, const toml::node& node, publish_config& out) {
     const bool named = out.mqtt && !out.mqtt->user.empty();
     if (!named || !out.mqtt->password.empty())
-        refuse_key(place, node, "password_file",
+        refuse_key(place, &node, "password_file",
                    named ? "mqtt has a password too, expected one of the two"
                          : "it is the password of the user of mqtt, expected mqtt = \"mqtt://user@host\" beside it");
     out.mqtt->password_file = *node.value<std::string>();
@@ -128,7 +128,7 @@ influx_target influx_of(const config_place& place, const toml::node& node) {
     if (http) out.path = slash < text.size() ? text.substr(slash) : "/api/v2/write";
     for (const char* secret : {"?token=", "&token=", "?p=", "&p="})
         if (out.path.find(secret) != std::string::npos)
-            refuse_key(place, node, "influx", "found a password in the query; it belongs into influx_token_file");
+            refuse_key(place, &node, "influx", "found a password in the query; it belongs into influx_token_file");
     const std::optional<net_address> at =
         address_of(std::string_view(text).substr(host, slash - host), http ? 8086 : 0);
     const bool plain = std::all_of(out.path.begin(), out.path.end(), [](char c) { return c > ' ' && c < 127; });
@@ -147,7 +147,7 @@ bool everybody_reads(const std::string& path) {
 void require_built(const config_place& place, const toml::table& table, const char* key, bool built,
                    const char* package) {
     if (table.contains(key) && !built)
-        refuse_key(place, *table.get(key), key,
+        refuse_key(place, table.get(key), key,
                    fmt::format("this okid was built without it: install {} and build it again, or leave the key out",
                                package));
 }
@@ -181,7 +181,7 @@ void read_publish(const toml::table& file, live_config& config) {
     if (const toml::node* node = table->get("samples")) {
         out.samples = *node->value<bool>();
         if (out.samples && out.socket.empty())
-            refuse_key(place, *node, "samples",
+            refuse_key(place, node, "samples",
                        "found true, expected socket = \"okid.sock\" beside it: that is where they go");
     }
     if (const toml::node* node = table->get("udp")) {
@@ -201,13 +201,13 @@ void read_publish(const toml::table& file, live_config& config) {
     if (const toml::node* node = table->get("mqtt")) out.mqtt = broker_of(place, *node);
     if (const toml::node* node = table->get("password_file")) read_password_file(place, *node, out);
     if (const toml::node* node = table->get("discovery")) {
-        if (!out.mqtt) refuse_key(place, *node, "discovery", "it is sent over MQTT, expected mqtt beside it");
+        if (!out.mqtt) refuse_key(place, node, "discovery", "it is sent over MQTT, expected mqtt beside it");
         out.mqtt->discovery = *node->value<bool>();
     }
     if (const toml::node* node = table->get("influx")) out.influx = influx_of(place, *node);
     if (const toml::node* node = table->get("influx_token_file")) {
         if (!out.influx || out.influx->path.empty())
-            refuse_key(place, *node, "influx_token_file", "it is for HTTP, expected influx = \"http://…\" beside it");
+            refuse_key(place, node, "influx_token_file", "it is for HTTP, expected influx = \"http://…\" beside it");
         out.influx->token_file = *node->value<std::string>();
     }
     if (out.mqtt && !out.mqtt->password.empty() && everybody_reads(config.path))
@@ -233,7 +233,7 @@ void read_virtual(const toml::table& file, live_config& config) {
                                   "file of okid.VirtualSensors.save()",
                                   config.path, table->source().begin.line));
     if (!config.publish.samples)
-        refuse_key(place, *model, "model",
+        refuse_key(place, model, "model",
                    "virtual sensors go where the signals go, expected samples = true in [publish]");
     config.virtual_sensors.model =
         (std::filesystem::path(config.path).parent_path() / *model->value<std::string>()).string();
@@ -241,7 +241,7 @@ void read_virtual(const toml::table& file, live_config& config) {
     if (!channels) return;
     for (const toml::node& one : *channels) {
         if (!one.is_string())
-            refuse_key(place, one, "channels", fmt::format("found {}, expected names in quotes", found_value(one)));
+            refuse_key(place, &one, "channels", fmt::format("found {}, expected names in quotes", found_value(one)));
         config.virtual_sensors.channels.push_back(*one.value<std::string>());
     }
 }

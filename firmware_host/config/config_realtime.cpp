@@ -22,12 +22,12 @@ void read_realtime(const toml::table& file, live_config& config) {
         const auto cpu = node.value_exact<std::int64_t>();
         if (!cpu || *cpu < 0 || *cpu >= CPU_SETSIZE)
             refuse_key(
-                place, *cpus, "cpus",
+                place, cpus, "cpus",
                 fmt::format("found {}, expected numbers of processors, such as [1] or [2, 3]", found_value(node)));
         out.cpus.push_back(static_cast<int>(*cpu));
     }
     if (out.cpus.empty())
-        refuse_key(place, *cpus, "cpus", "found [], expected at least one processor; leave the key out for all");
+        refuse_key(place, cpus, "cpus", "found [], expected at least one processor; leave the key out for all");
 }
 
 } // namespace okid_host

@@ -37,10 +37,10 @@ void read_record(const toml::table& file, live_config& config) {
     out.segment_mb = t["segment_mb"].value_or(out.segment_mb);
     out.max_mb = t["max_mb"].value_or(std::max(out.max_mb, 2 * out.segment_mb));
     if (out.segment_mb < least_segment_mb)
-        refuse_key(place, *t.get("segment_mb"), "segment_mb",
+        refuse_key(place, t.get("segment_mb"), "segment_mb",
                    fmt::format("found {:g}, expected at least {:g}", out.segment_mb, least_segment_mb));
     if (out.max_mb < 2 * out.segment_mb)
-        refuse_key(place, *t.get("max_mb"), "max_mb",
+        refuse_key(place, t.get("max_mb"), "max_mb",
                    fmt::format("found {:g}, expected room for two segments, {:g}", out.max_mb, 2 * out.segment_mb));
     const bool waits = config.trigger.source != trigger_source::immediate;
     if (waits) out.pretrigger_s = std::max(out.pretrigger_s, config.trigger.pretrigger_s + 1);

@@ -4,6 +4,7 @@
 
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "number_keys.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -38,7 +39,7 @@ const section_rule gpio_rule = {
 const std::vector<section_rule> schema = {
     {"acquisition",
      false,
-     {{"rate_hz", kind::positive, 0, 1e6},
+     {{"rate_hz", kind::number, 1e-5, 1e6}, // a longer period does not fit the nanoseconds of the grid for ever
       {"decimate", kind::whole, 1, 64},
       {"title", kind::text},
       {"operator", kind::text},
@@ -180,13 +181,13 @@ void check_number(const config_place& place, const toml::node& node, const key_r
     else if (std::isfinite(rule.low))
         expected += fmt::format(" from {:.10g}", rule.low);
     if (std::isfinite(rule.high)) expected += fmt::format(" to {:.10g}", rule.high);
-    refuse_key(place, node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
+    refuse_key(place, &node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
 }
 
 void check_choice(const config_place& place, const toml::node& node, const key_rule& rule) {
     const auto text = node.value<std::string>();
     if (text && std::find(rule.choices.begin(), rule.choices.end(), *text) != rule.choices.end()) return;
-    refuse_key(place, node, rule.key,
+    refuse_key(place, &node, rule.key,
                fmt::format("found {}{}, expected one of: {}", found_value(node),
                            text ? did_you_mean(*text, rule.choices) : "", list_names(rule.choices)));
 }
@@ -196,7 +197,7 @@ void check_table(const config_place& place, const toml::table& table, const sect
 void check_value(const config_place& place, const toml::node& node, const key_rule& rule) {
     const auto expect = [&](bool holds, const char* expected) {
         if (!holds)
-            refuse_key(place, node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
+            refuse_key(place, &node, rule.key, fmt::format("found {}, expected {}", found_value(node), expected));
     };
     switch (rule.what) {
     case kind::text: expect(node.is_string() && !node.value<std::string>()->empty(), "text in quotes"); break;
@@ -248,7 +249,7 @@ void check_table(const config_place& place, const toml::table& table, const sect
         const auto found =
             std::find_if(rule.keys.begin(), rule.keys.end(), [&](const key_rule& k) { return name == k.key; });
         if (found == rule.keys.end())
-            refuse_key(place, *node, key,
+            refuse_key(place, node, key,
                        fmt::format("unknown key{}; known here: {}", did_you_mean(name, known), list_names(known)));
         check_value(place, *node, *found);
     }
@@ -261,19 +262,19 @@ void check_section(const std::string& path, std::string_view key, const toml::no
     if (rule == rules.end()) {
         std::vector<std::string> known;
         for (const section_rule& each : rules) known.emplace_back(each.name);
-        refuse_key(top, node, key,
+        refuse_key(top, &node, key,
                    fmt::format("unknown {}{}; known: {}", node.is_table() || node.is_array() ? "section" : "key",
                                did_you_mean(std::string(key), known), list_names(known)));
     }
     if (!rule->many) {
         if (!node.is_table())
-            refuse_key(top, node, key, fmt::format("found {}, expected a section [{}]", found_value(node), key));
+            refuse_key(top, &node, key, fmt::format("found {}, expected a section [{}]", found_value(node), key));
         check_table({path, fmt::format("[{}]", key)}, *node.as_table(), *rule);
         return;
     }
     const toml::array* entries = node.as_array();
     if (!entries || !entries->is_homogeneous(toml::node_type::table))
-        refuse_key(top, node, key,
+        refuse_key(top, &node, key,
                    fmt::format("found {}, expected sections [[{}]] with two brackets", found_value(node), key));
     for (std::size_t i = 0; i < entries->size(); ++i)
         check_table({path, entry_name(rule->name, *entries->get_as<toml::table>(i), i)},
@@ -282,11 +283,23 @@ void check_section(const std::string& path, std::string_view key, const toml::no
 
 } // namespace
 
-void refuse_key(const config_place& place, const toml::node& node, std::string_view key, const std::string& text) {
-    const auto line = node.source().begin.line; // keys taken over from a preset have none
-    throw failure(exit_usage, fmt::format("{}: {}, {}, key \"{}\": {}", place.path,
-                                          line ? fmt::format("line {}", line) : "from the preset", place.section,
+void refuse_key(const config_place& place, const toml::node* node, std::string_view key, const std::string& text) {
+    std::string at; // a key that is not in the file has no place there, one taken over from a preset no line
+    if (node)
+        at = node->source().begin.line ? fmt::format("line {}, ", node->source().begin.line) : "from the preset, ";
+    throw failure(exit_usage, fmt::format("{}: {}{}, key \"{}\": {}", place.path, at, place.section,
                                           printable(std::string(key)), text));
+}
+
+std::vector<number_key> number_keys() {
+    std::vector<number_key> out;
+    for (const section_rule& section : schema)
+        for (const key_rule& rule : section.keys)
+            if (std::isfinite(rule.high) && rule.high > rule.low)
+                out.push_back({section.name, rule.key, section.many, rule.low, rule.high});
+            else if (rule.what == kind::number)
+                out.push_back({section.name, rule.key, section.many, -1, 1});
+    return out;
 }
 
 std::string found_value(const toml::node& node) {

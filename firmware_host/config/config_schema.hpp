@@ -13,8 +13,9 @@ struct config_place {
     std::string section; ///< "[acquisition]", "[[channel]] \"force\""
 };
 
-/// "path: line 12, [[channel]] "a1", key "unit": <text>" with exit 2.
-[[noreturn]] void refuse_key(const config_place& place, const toml::node& node, std::string_view key,
+/// "path: line 12, [[channel]] "a1", key "unit": <text>" with exit 2. `node`: what the key holds, of which the line is
+/// told; nullptr: the key is not in the file, what is wrong follows from others.
+[[noreturn]] void refuse_key(const config_place& place, const toml::node* node, std::string_view key,
                              const std::string& text);
 
 /// Value of a node for a message: `"abc"`, `12`, `true`, `a table`.

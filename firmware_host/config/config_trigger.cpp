@@ -32,7 +32,7 @@ gpio_place read_place(const config_place& place, const toml::table& table) {
     out.active_low = table["active_low"].value_or(false);
     for (const char* key : {"chip", "line"})
         if (const std::string text = table[key].value_or(std::string()); text.size() >= DRV_GPIO_NAME_BYTES)
-            refuse_key(place, *table.get(key), key, "expected at most 63 characters");
+            refuse_key(place, table.get(key), key, "expected at most 63 characters");
     return out;
 }
 
@@ -41,7 +41,7 @@ void refuse_others(const config_place& place, const toml::table& table, const st
     const auto refuse = [&](std::initializer_list<const char*> keys, const char* owner) {
         for (const char* key : keys)
             if (table.contains(key))
-                refuse_key(place, *table.get(key), key,
+                refuse_key(place, table.get(key), key,
                            fmt::format("belongs to source = \"{}\", found source = \"{}\"", owner, source));
     };
     if (source != "gpio") refuse({"chip", "line", "active_low"}, "gpio");
@@ -61,7 +61,7 @@ void read_start(const toml::table& file, live_config& config) {
     out.pretrigger_s = (*table)["pretrigger_s"].value_or(0.0);
     if (const double bytes = out.pretrigger_s * config.rate_hz * 8 * static_cast<double>(config.channels.size() + 4);
         bytes > most_pretrigger_bytes)
-        refuse_key(place, *table->get("pretrigger_s"), "pretrigger_s",
+        refuse_key(place, table->get("pretrigger_s"), "pretrigger_s",
                    fmt::format("{:g} s of {} channels at {:g} Hz are {:.1f} GB, at most {:g} GB are kept",
                                out.pretrigger_s, config.channels.size(), config.rate_hz, bytes / 1e9,
                                most_pretrigger_bytes / 1e9));
@@ -91,7 +91,7 @@ void read_lamps(const toml::table& file, live_config& config) {
         if (!one) continue;
         *lamp = read_place({config.path, fmt::format("[lamps] {}", key)}, *one);
         if (std::find(taken.begin(), taken.end(), (*lamp)->text()) != taken.end())
-            refuse_key({config.path, "[lamps]"}, *one, key,
+            refuse_key({config.path, "[lamps]"}, one, key,
                        fmt::format("{} is used already, by another lamp or the trigger", (*lamp)->text()));
         taken.push_back((*lamp)->text());
     }
@@ -110,7 +110,7 @@ std::size_t triggering_channel(const config_place& place, const toml::table& tab
     const std::string name = *node->value<std::string>();
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-        refuse_key(place, *node, "channel",
+        refuse_key(place, node, "channel",
                    fmt::format("found \"{}\"{}, expected one of: {}", printable(name), did_you_mean(name, names),
                                list_names(names)));
     return static_cast<std::size_t>(found - names.begin());

@@ -55,7 +55,7 @@ void apply(const config_place& place, toml::table& entry, bool bus, std::map<std
     const toml::table keys = find_preset(name, bus, texts);
     if (keys.empty()) {
         const std::vector<std::string> known = names_for(bus);
-        refuse_key(place, *node, "preset",
+        refuse_key(place, node, "preset",
                    fmt::format("found {}{}, expected one of: {} (okid check --presets tells what they are)",
                                found_value(*node), did_you_mean(name, known), list_names(known)));
     }

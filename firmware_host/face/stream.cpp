@@ -289,7 +289,9 @@ int32_t okid_host_stream_add(okid_host_stream_t* self, int32_t kind, const void*
 
 int32_t okid_host_stream_gap(okid_host_stream_t* self, int64_t count) {
     return face::guard([&] {
-        if (count < 0) throw failure(exit_usage, fmt::format("count: found {}, expected 0 or more", count));
+        const std::int64_t most = OKID_MOST_SAMPLES - self->now();
+        if (count < 0 || count > most)
+            throw failure(exit_usage, fmt::format("count: found {}, expected 0 to {}", count, most));
         self->stream.sums().add_missing(count);
     });
 }

@@ -244,6 +244,7 @@ response_set read_table(const std::string& path) {
     if (table.columns.front() != "frequency_hz")
         fail(fmt::format("the first column is \"{}\"", printable(table.columns.front())));
     std::vector<response> all;
+    std::vector<int> parts; // of each: 1 real, 2 imaginary
     for (std::size_t c = 1; c < width; ++c) {
         response one;
         bool imaginary = false;
@@ -252,12 +253,18 @@ response_set read_table(const std::string& path) {
         auto at = std::find_if(all.begin(), all.end(),
                                [&](const response& x) { return x.output == one.output && x.input == one.input; });
         if (at == all.end()) at = all.insert(all.end(), std::move(one)), at->values.resize(table.count, complex(0, 0));
+        parts.resize(all.size());
+        parts[static_cast<std::size_t>(at - all.begin())] |= imaginary ? 2 : 1;
         for (std::size_t l = 0; l < table.count; ++l) {
             const double x = table.samples[l * width + c];
             at->values[l] += imaginary ? complex(0, x) : complex(x, 0);
         }
     }
     if (all.empty() || table.count == 0) fail("no response");
+    for (std::size_t k = 0; k < all.size(); ++k)
+        if (parts[k] != 3)
+            fail(fmt::format("the {} part of {}/{} is missing", parts[k] == 1 ? "imaginary" : "real",
+                             printable(all[k].output), printable(all[k].input)));
     for (response& one : all)
         for (std::size_t l = 0; l < table.count; ++l) one.frequency_hz.push_back(table.samples[l * width]);
     return set_of(path, all);

@@ -7,6 +7,7 @@
 #include "csv_rows.hpp"
 
 #include "error.hpp"
+#include "files/memory_bound.hpp"
 #include "files/nearest_name.hpp"
 #include "files/side_by_side.hpp"
 
@@ -246,6 +247,7 @@ std::size_t row_parser::cut(std::string_view text, std::size_t line) {
         text.remove_prefix(one.text.size());
         pieces_.push_back(one);
     }
+    require_samples(path_, first, width_);
     out_.samples.resize(first * width_);
     if (time_column_ >= 0) times_.resize(first);
     return line;
@@ -287,7 +289,8 @@ void row_parser::read(line_reader& reader, const csv_request& request) {
         if (out_.count == 0 && reader.size()) {
             const double all = static_cast<double>(reader.size()) / static_cast<double>(block.size());
             const auto lines = static_cast<double>(count_lines(block));
-            out_.samples.reserve(width_ * static_cast<std::size_t>(1.1 * all * lines + 16));
+            const auto expected = static_cast<std::size_t>(1.1 * all * lines + 16);
+            if (samples_fit(expected, width_)) out_.samples.reserve(width_ * expected);
         }
         line = cut(block, line);
         parse_pieces();

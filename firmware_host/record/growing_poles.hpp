@@ -6,7 +6,7 @@
 
 namespace okid_host {
 
-/// Reflect the poles of A (n_z x n_z) that grow by more than 1 / eps over so many samples: mu becomes 1 / conj(mu). The other
+/// Reflect the poles of A (n_z x n_z) that grow by more than eps^-1/4 over so many samples: mu becomes 1 / conj(mu). The other
 /// poles and their vectors stay. @return how many there were
 int reflect_growing(std::size_t samples, int n_z, std::vector<double>& A);
 

@@ -7,6 +7,7 @@
 
 #include "error.hpp"
 #include "files/input_file.hpp"
+#include "files/memory_bound.hpp"
 #include "files/nearest_name.hpp"
 
 #include <algorithm>
@@ -213,6 +214,7 @@ csv_record read_npy(const std::string& path, const csv_request& request) {
     out.fs_hz = request.fs_hz.value_or(0);
     out.count = file.rows();
     out.first_line = 1;
+    require_samples(path, out.count, wanted.size());
     out.samples.resize(out.count * wanted.size());
     file.read(wanted, out.samples.data());
     if (!request.whole) check_columns(path, out.columns, out.columns.size(), out.samples.data(), out.count);

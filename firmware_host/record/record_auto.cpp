@@ -218,6 +218,12 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
 }
 
 [[noreturn]] void throw_no_modes(const std::vector<listed_pair>& found, std::size_t runs) {
+    if (runs == 0)
+        throw failure(
+            exit_no_model,
+            "no model: no run of any method was possible: too few samples follow one another without a missing or "
+            "screened one between them. Record longer, fix the gaps, set the sensors to a range that they do not "
+            "leave, or look at one method with --method n4sid-cva");
     std::string seen;
     for (const auto& [mode, carried] : found)
         if (mode.agreement > worth_listing)
@@ -481,12 +487,14 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
 record_result identify_auto(record_set records, const record_options& given) {
     record_work work;
     work.set = std::move(records);
-    const long long asked_gaps = count_missing(work.set).gaps;
+    const missing_count asked = count_missing(work.set);
+    check_measured(asked, work.set, given);
+    const long long asked_gaps = asked.gaps;
     screened_outputs screened = screen_outputs(work.set, given.outputs);
     const bool all = std::all_of(screened.kept.begin(), screened.kept.end(), [](bool kept) { return kept; });
     if (!all) work.set = without_outputs(work.set, screened.kept);
     const record_options options = all ? given : without_outputs(given, screened.kept);
-    check_moving(work.set, options);
+    check_moving(work.set, options, !screened.said.empty());
     check_different_inputs(moments_of(work.set), options);
     const missing_count missing = count_missing(work.set);
     work.context = describe_records(work.set, options, missing);

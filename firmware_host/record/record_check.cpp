@@ -28,6 +28,12 @@ channel_movement movement_of(const record_set& set, std::size_t channel) {
     return out;
 }
 
+bool has_missing(const record_set& set, std::size_t channel) {
+    for (std::size_t i = channel; i < set.samples.size(); i += set.channels())
+        if (std::isnan(set.samples[i])) return true;
+    return false;
+}
+
 const std::string& name_of(std::size_t channel, const record_options& options) {
     const std::size_t n_u = options.inputs.size();
     return channel < n_u ? options.inputs[channel] : options.outputs[channel - n_u];
@@ -124,7 +130,7 @@ void check_measured(const missing_count& missing, const record_set& set, const r
                               no_measured_value));
 }
 
-void check_moving(const record_set& set, const record_options& options) {
+void check_moving(const record_set& set, const record_options& options, bool screened) {
     for (std::size_t k = 0; k < set.channels(); ++k) {
         const channel_movement found = movement_of(set, k);
         if (found.moves) continue;
@@ -132,6 +138,15 @@ void check_moving(const record_set& set, const record_options& options) {
         if (std::isnan(found.first))
             throw failure(exit_no_model, fmt::format("no model: {} \"{}\" has no sample in the range used",
                                                      input ? "input" : "output", name_of(k, options)));
+        const bool left = screened && has_missing(set, k);
+        if (left)
+            throw failure(
+                exit_no_model,
+                fmt::format("no model: {} \"{}\" is constant ({:g}) where it was not screened: the rest of it is "
+                            "clipped, frozen, dropped to zero or spikes. Check the sensor, its range and its "
+                            "wiring; a record of a single impulse shows no vibration",
+                            input ? "input" : "output", name_of(k, options), found.first),
+                input ? OKID_ERR_INPUT : OKID_ERR_OUTPUT);
         throw failure(
             exit_no_model,
             fmt::format("no model: {} \"{}\" is constant ({:g}): it {}. Leave it out of --{}, or check the {} "

@@ -21,8 +21,8 @@ std::vector<input_moments> moments_of(const record_set& set);
 /// Refuses a number that no sensor gives.
 void check_measured(const missing_count& missing, const record_set& set, const record_options& options);
 
-/// A channel that never moves makes any model a guess.
-void check_moving(const record_set& set, const record_options& options);
+/// A channel that never moves makes any model a guess. `screened`: some samples were left out for their looks.
+void check_moving(const record_set& set, const record_options& options, bool screened = false);
 
 /// Inputs that repeat each other share their effect in any proportion; `about`: moments_of() the records.
 void check_different_inputs(const std::vector<input_moments>& about, const record_options& options);

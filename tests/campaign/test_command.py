@@ -9,7 +9,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ import pytest
 from okid.campaign.command import main
 from okid.campaign.spec import load_spec
 from okid.campaign.state_folder import StateFolder
+from waiting import until
 
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -28,7 +28,7 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
         [Path(sys.executable).parent / "okid-campaign", *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=600,
         check=False,
     )
 
@@ -144,11 +144,9 @@ def test_interrupt_ends_with_130_and_is_resumed(
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True, text=True,
     )  # fmt: skip
     state = spec.folder / "state" / spec.sums_key
-    limit = time.monotonic() + 60.0
-    while not list(state.glob("*.sums")) and time.monotonic() < limit:
-        time.sleep(0.02)
+    until(lambda: list(state.glob("*.sums")))
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
-    _, said = process.communicate(timeout=60)
+    _, said = process.communicate(timeout=600)
     assert process.returncode == 130 and "run again to go on" in said and "Traceback" not in said, said
     kept = sum(len(files) for files in StateFolder(spec.folder, spec.sums_key).load().values())
     assert 0 < kept < 60

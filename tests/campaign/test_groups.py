@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from okid.campaign.grouping import group_records
 from okid.campaign.record_list import list_records
+from okid.campaign.record_read import read_one
 from okid.campaign.spec import load_spec
 
 NAMES = ("north_20250131T2330", "north_20250201T0030", "south_20250131T1200", "south_20250203T1200")
@@ -103,13 +104,24 @@ def test_names_that_do_not_fit_are_told(folder: Path) -> None:
     assert any("east_20251399T0000.npy: its time '20251399T0000' is not" in line for line in bad)
 
 
-def test_records_of_a_url(tmp_path: Path) -> None:
-    """Any file system of fsspec: here one in memory, which only this process sees."""
+def test_records_of_a_url(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A remote file system: here one in memory in the place of S3."""
     import fsspec
+    from fsspec.implementations.memory import MemoryFileSystem
 
-    memory = fsspec.filesystem("memory")
+    class Bucket(MemoryFileSystem):  # type: ignore[misc]
+        protocol = "s3"
+
+        @classmethod
+        def _strip_protocol(cls, path: str) -> str:
+            return str(super()._strip_protocol(path.removeprefix("s3:/")))
+
+    fsspec.register_implementation("s3", Bucket, clobber=True)
     for k in range(3):
-        with memory.open(f"/bridge/{k}.npy", "wb") as file:
+        with Bucket().open(f"/bridge/{k}.npy", "wb") as file:
             np.save(file, np.zeros((4, 1), np.int16))
-    found, bad = groups_of(tmp_path, '[records]\nfiles = ["memory://bridge/*.npy"]\n[group]\nby = []\n')
+    found, bad = groups_of(tmp_path, '[records]\nfiles = ["s3://bridge/*.npy"]\n[group]\nby = []\n')
     assert found == {"all records": ["0", "1", "2"]} and not bad
+    ref = list_records(load_spec(tmp_path / "SPEC.toml"))[0][0]
+    assert ref.url.startswith("s3://") and ref.url.endswith("/bridge/0.npy")
+    assert read_one(load_spec(tmp_path / "SPEC.toml"), ref.name, ref.url).samples.shape == (4, 1)

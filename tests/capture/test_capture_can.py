@@ -10,7 +10,6 @@ import os
 import signal
 import subprocess
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from captured import assert_same_result, assert_truth, edited, frames
 from okid import capture
 from okid.capture import command_can
 from okid.capture.recording import Recorder
+from waiting import until
 
 _numbers = itertools.count()
 
@@ -38,10 +38,7 @@ def when_heard(bus: can.BusABC, messages: list[can.Message], after: int = 2) -> 
     from can.interfaces.virtual import channels
 
     def send() -> None:
-        for _ in range(2000):
-            if len(channels[bus.channel_id]) >= after:
-                break
-            time.sleep(0.01)
+        until(lambda: len(channels[bus.channel_id]) >= after)
         for message in messages:
             bus.send(message)
 
@@ -162,11 +159,7 @@ def test_signals_end_a_run_with_its_result(
 
 
 def wait_for_lines(path: Path, count: int) -> None:
-    for _ in range(3000):
-        if path.exists() and path.read_bytes().count(b"\n") >= count:
-            return
-        time.sleep(0.01)
-    raise AssertionError(f"{path}: never had {count} lines")
+    until(lambda: path.exists() and path.read_bytes().count(b"\n") >= count)
 
 
 @pytest.mark.parametrize(

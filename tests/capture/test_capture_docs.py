@@ -7,13 +7,13 @@ import re
 import runpy
 import sys
 import threading
-import time
 from pathlib import Path
 
 import can
 import pytest
 from captured import frames
 from okid import capture
+from waiting import until
 
 PAGE = (Path(__file__).parents[2] / "docs" / "howto" / "acquisition-scripts.md").read_text()
 
@@ -28,8 +28,7 @@ def test_the_script_of_the_page(
     with can.Bus(interface="virtual", channel="okid-page", preserve_timestamps=True) as sender:
 
         def send() -> None:
-            while len(channels["okid-page"]) < 2:
-                time.sleep(0.01)
+            until(lambda: len(channels["okid-page"]) >= 2)
             for message in frames(rig / "a.log"):
                 sender.send(message)
 

@@ -11,7 +11,6 @@ import socket
 import struct
 import subprocess
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +19,7 @@ import pytest
 from captured import COMMAND, assert_same_result, assert_truth, frames
 from okid import capture
 from okid._errors import InputError
+from waiting import until
 
 _numbers = itertools.count()
 GROUP = "239.74.163.77"
@@ -222,12 +222,9 @@ def test_two_processes_over_multicast(rig: Path, tmp_path: Path, capsys: pytest.
     said: list[str] = []
 
     def emulate() -> None:
-        for _ in range(3000):
-            if (tmp_path / "r.log").exists():
-                break
-            time.sleep(0.01)
+        until((tmp_path / "r.log").exists)
         node = [*COMMAND, "emulate", str(rig / "rig.toml"), *where, "--speed", "4"]
-        done = subprocess.run(node, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(node, capture_output=True, text=True, timeout=600, check=False)
         said.append(done.stdout + done.stderr)
 
     thread = threading.Thread(target=emulate, daemon=True)

@@ -8,7 +8,6 @@ import json
 import socket
 import struct
 import threading
-import time
 import tomllib
 import zlib
 from pathlib import Path
@@ -24,6 +23,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from okid import capture
 from okid.capture import emulate
+from waiting import until
 
 
 @pytest.fixture(scope="session")
@@ -127,11 +127,7 @@ def test_a_line_that_is_unplugged_keeps_everything(
 
 
 def wait_for_file(path: Path, size: int = 0) -> None:
-    for _ in range(6000):
-        if path.exists() and path.stat().st_size >= size:
-            return
-        time.sleep(0.01)
-    raise AssertionError(f"{path}: never had {size} bytes")
+    until(lambda: path.exists() and path.stat().st_size >= size)
 
 
 def test_a_socket_and_a_duration(rig: Path, line: tuple[Path, bytes], tmp_path: Path) -> None:

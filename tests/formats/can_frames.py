@@ -12,7 +12,7 @@ def plain_frames(count: int = 60) -> list[Message]:
     """Classic data frames of two buses, 11 and 29 bits, 0 to 8 bytes."""
     return [
         Message(
-            timestamp=START + round(k * 0.00413, 6), arbitration_id=0x100 + k if k % 3 else 0x18F02D00 + k,
+            timestamp=START + round(k * 0.00413, 6), arbitration_id=(0x100 + k) % 0x800 if k % 3 else 0x18F02D00 + k,
             is_extended_id=k % 3 == 0, data=bytes((k + i) % 256 for i in range(k % 9)), channel=f"can{k % 2}",
         )
         for k in range(count)

@@ -138,6 +138,9 @@ def main() -> int:
         "dbc": [DBC.encode(), DBC.replace("\n", "\r\n").encode()],
         "csv": [text.encode() for text in CSV],
         "npy": arrays(),
+        "numbers": [
+            bytes([a, b, c, d]) for a, b, c, d in ((0, 0, 1, 0), (0, 20, 9, 20), (17, 5, 0, 0), (30, 16, 25, 13))
+        ],
         "face": [
             *(b"\x00" + text.encode() for text in (CONFIG, LINE_CONFIG)),
             *(b"\x01" + text.encode() for text in CSV),

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 from program import PROGRAM as OKID
 from two_masses import rig_text
+from waiting import until
 
 BUILD = Path(os.environ.get("OKID_BUILD", str(Path(__file__).parents[2] / "build")))
 
@@ -54,12 +55,8 @@ class Sim:
     def value(self, line: int) -> int:
         return int((self.lines / f"sim_gpio{line}" / "value").read_text())
 
-    def wait_for(self, line: int, value: int, seconds: float = 20) -> None:
-        for _ in range(int(seconds / 0.02)):
-            if self.value(line) == value:
-                return
-            time.sleep(0.02)
-        raise AssertionError(f"line {line} never became {value}")
+    def wait_for(self, line: int, value: int) -> None:
+        until(lambda: self.value(line) == value)
 
     def remove(self) -> None:
         (self.config / "live").write_text("0")
@@ -113,7 +110,8 @@ def test_run_begins_with_the_edge(rig: Path, sim: Sim) -> None:
     assert sim.value(4) == 1 and not events_of(rig, "trigger") and not events_of(rig, "modes")
     pressed = time.time()
     sim.pull(2, True)
-    sim.wait_for(4, 0, 2)
+    sim.wait_for(4, 0)
+    assert time.time() - pressed < 2
     sim.wait_for(5, 0)  # the table has come to rest
     sim.pull(2, False)
     time.sleep(0.1)
@@ -204,7 +202,7 @@ def test_lines_that_cannot_be_had(rig: Path, sim: Sim) -> None:
             [OKID, "run", str(rig / "b.toml"), "--duration", "1"],
             capture_output=True,
             text=True,
-            timeout=30,
+            timeout=600,
             check=False,
         )
         assert run.returncode == 4 and piece in run.stderr, run.stderr

@@ -55,7 +55,7 @@ def write_log(path: pathlib.Path, channels: int, samples: int) -> None:
 def test_a_config_that_asks_for_too_much_is_refused_at_once(tmp_path: pathlib.Path, command: str) -> None:
     """24 GB in release 0.1, and killed."""
     (tmp_path / "many.toml").write_text(many_channels(256, "p = 40\n"))
-    done = measured(command, tmp_path / "many.toml", seconds=20)
+    done = measured(command, tmp_path / "many.toml", within_s=20)
     assert done.returncode == 2 and done.stdout == "", done
     assert done.peak_mb < 200
     said = re.fullmatch(
@@ -69,11 +69,11 @@ def test_a_config_that_asks_for_too_much_is_refused_at_once(tmp_path: pathlib.Pa
     assert need > 20000 and 10 <= p < without and rows == 2 * p and 60 < channels < 256
     for wanted, count in ((f"p = {p}\n", 256), ("p = 40\n", channels), (f"p = {without}\nsigma_blocks = 0\n", 256)):
         (tmp_path / "fits.toml").write_text(many_channels(count, wanted))
-        done = measured("check", tmp_path / "fits.toml", seconds=20)
+        done = measured("check", tmp_path / "fits.toml", within_s=20)
         assert (done.returncode, done.stderr) == (0, "") and done.peak_mb < 200
     for wanted, count in ((f"p = {p + 1}\n", 256), ("p = 41\n", channels)):
         (tmp_path / "more.toml").write_text(many_channels(count, wanted))
-        assert measured("check", tmp_path / "more.toml", seconds=20).returncode == 2
+        assert measured("check", tmp_path / "more.toml", within_s=20).returncode == 2
 
 
 def test_65536_channels_are_checked_in_a_moment(tmp_path: pathlib.Path) -> None:
@@ -88,7 +88,7 @@ def test_65536_channels_are_checked_in_a_moment(tmp_path: pathlib.Path) -> None:
         text = many_channels(0, "p = 10\n").replace("[identification]", channels + "[identification]")
         (tmp_path / "many.toml").write_text(text)
         before = os.times()
-        assert measured("check", tmp_path / "many.toml", seconds=60).returncode == 0
+        assert measured("check", tmp_path / "many.toml", within_s=60).returncode == 0
         after = os.times()
         spent.append(after.children_user + after.children_system - before.children_user - before.children_system)
     assert spent[1] < 20 * spent[0]  # eight times as many
@@ -101,7 +101,7 @@ def test_256_channels_are_usable(tmp_path: pathlib.Path) -> None:
     (tmp_path / "many.toml").write_text(many_channels(256, settings))
     write_log(tmp_path / "many.log", 256, 4000)
     done = measured(
-        "replay", tmp_path / "many.log", "-c", tmp_path / "many.toml", "--json", tmp_path / "r.json", seconds=300
+        "replay", tmp_path / "many.log", "-c", tmp_path / "many.toml", "--json", tmp_path / "r.json", within_s=300
     )
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "r.json").read_text())

@@ -57,14 +57,17 @@ def cpu_s(run: subprocess.Popen[str]) -> float:
 
 
 def connected(port: int) -> socket.socket:
-    for _ in range(200):
+    def attempt() -> socket.socket | None:
         with contextlib.suppress(OSError):
-            return socket.create_connection(("127.0.0.1", port), timeout=5)
-        time.sleep(0.05)
-    raise AssertionError("nobody listens")
+            return socket.create_connection(("127.0.0.1", port), timeout=600)
+        return None
+
+    one: socket.socket = until(attempt)
+    return one
 
 
-def test_no_descriptors_left(rig: pathlib.Path) -> None:
+@pytest.mark.parametrize("judged", [False, pytest.param(True, marks=pytest.mark.realtime)], ids=["", "processor"])
+def test_no_descriptors_left(rig: pathlib.Path, judged: bool) -> None:
     """Release 0.1 went round accept() with a whole processor, and had no descriptor left for its result: exit 2."""
     assert okid("replay", rig / "a.log", "-c", rig / "a.toml", "--json", rig / "calm.json").returncode == 0
     port = free_port()
@@ -81,16 +84,16 @@ def test_no_descriptors_left(rig: pathlib.Path) -> None:
         for _ in range(45):
             one = crowd.enter_context(socket.socket(socket.AF_UNIX))
             one.setblocking(False)
-            until(lambda one=one: one.connect_ex(str(rig / "s")) == 0, 5)  # nobody is left standing at the door
+            until(lambda one=one: one.connect_ex(str(rig / "s")) == 0)  # nobody is left standing at the door
         before, at = cpu_s(run), time.monotonic()
         time.sleep(2)
-        assert (cpu_s(run) - before) / (time.monotonic() - at) < 0.5
+        assert not judged or (cpu_s(run) - before) / (time.monotonic() - at) < 0.5
         with connected(port) as wire:
             wire.sendall(b"GET /metrics HTTP/1.0\r\n\r\n")
             with contextlib.suppress(ConnectionResetError):
                 assert wire.recv(15) in (b"", b"HTTP/1.1 200 OK")
         assert run.poll() is None
-        _, told = run.communicate(timeout=60)
+        _, told = run.communicate(timeout=600)
         assert run.returncode == 0, told
     assert (rig / "r.json").read_bytes() == (rig / "calm.json").read_bytes()
 
@@ -99,11 +102,11 @@ def test_no_descriptors_left(rig: pathlib.Path) -> None:
 def test_a_broker_that_announces_256_mb(rig: pathlib.Path, piecewise: bool) -> None:
     """Release 0.1 took the room for it: 540 MB."""
     with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(20)
+        server.settimeout(600)
         with publishing(rig, f'mqtt = "mqtt://127.0.0.1:{server.getsockname()[1]}"') as run:
             wire, _ = server.accept()
             with wire:
-                wire.settimeout(10)
+                wire.settimeout(600)
                 assert wire.recv(1000)[0] == 0x10  # CONNECT
                 wire.sendall(b"\x20\x02\x00\x00")
                 announced = b"\x30\xff\xff\xff\x7f" + struct.pack(">H", 1) + b"t"
@@ -118,7 +121,7 @@ def test_a_broker_that_announces_256_mb(rig: pathlib.Path, piecewise: bool) -> N
             assert status(run, "VmPeak") < 1_500_000 and status(run, "VmHWM") < 150_000
             assert run.poll() is None
             run.terminate()
-            assert "announced a packet" in run.communicate(timeout=60)[1]
+            assert "announced a packet" in run.communicate(timeout=600)[1]
 
 
 def test_slow_visitors_do_not_pile_up() -> None:
@@ -133,12 +136,12 @@ def test_slow_visitors_do_not_pile_up() -> None:
     before, crowd = threading.active_count(), []
     try:
         for _ in range(300):
-            one = socket.create_connection(("127.0.0.1", server.server_port), timeout=5)
+            one = socket.create_connection(("127.0.0.1", server.server_port), timeout=600)
             one.sendall(b"GET / HT")
             crowd.append(one)
         time.sleep(0.5)
         assert threading.active_count() - before <= MOST_VISITORS
-        with socket.create_connection(("127.0.0.1", server.server_port), timeout=10) as wire:
+        with socket.create_connection(("127.0.0.1", server.server_port), timeout=600) as wire:
             wire.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
             assert wire.recv(15).startswith(b"HTTP/1.0 200")
     finally:
@@ -148,6 +151,7 @@ def test_slow_visitors_do_not_pile_up() -> None:
         server.server_close()
 
 
+@pytest.mark.realtime
 def test_the_page_without_descriptors_does_not_spin() -> None:
     """Release 0.1 asked for the visitor it could not take without a pause."""
 
@@ -168,7 +172,7 @@ def test_the_page_without_descriptors_does_not_spin() -> None:
         assert time.process_time() - before < 0.3
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
-    visitor.settimeout(10)
+    visitor.settimeout(600)
     visitor.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
     assert visitor.recv(15).startswith(b"HTTP/1.0 200")
     visitor.close()

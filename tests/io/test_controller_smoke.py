@@ -11,6 +11,7 @@ import pytest
 from program import ROOT
 
 
+@pytest.mark.programs
 def test_a_thousand_frames_through_two_controllers() -> None:
     if platform.machine() != "x86_64":
         pytest.skip("x86-64 only: the emulated machine runs this machine's own programs")

@@ -10,6 +10,7 @@ from pathlib import Path
 import program
 import pytest
 from lines import Line, node_config, packet
+from waiting import until
 
 RECORD = '[record]\ndirectory = "runs"\n'
 
@@ -39,16 +40,13 @@ def live(folder: Path, section: str, *before: str) -> tuple[list[tuple[int, int,
         stderr=subprocess.PIPE,
         text=True,
     )
-    for _ in range(1000):
-        if list((folder / "runs").glob("*.okj")):
-            break
-        assert process.poll() is None, process.communicate()[1]
-        time.sleep(0.01)
+    until(lambda: list((folder / "runs").glob("*.okj")) or process.poll() is not None)
+    assert process.poll() is None, process.communicate()[1]
     tty.write(packet(0, [[1, 2]] * 20))
     time.sleep(0.3)
     seen = threads(process.pid), status(process.pid)
     process.terminate()
-    said = process.communicate(timeout=60)[1]
+    said = process.communicate(timeout=600)[1]
     tty.unplug()
     return *seen, said
 

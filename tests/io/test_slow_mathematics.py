@@ -26,6 +26,7 @@ from lines import Line, Run, line, node_config, of_type, packet
 from live_feed import w2_codes, watching
 from test_torn_away import busy_processors
 
+pytestmark = pytest.mark.realtime
 RATE, FAST = 1000, 8000
 SECONDS = 60 if os.environ.get("OKID_SLOW") else 6
 ROLES = ("force",) * 2 + ("acceleration",) * 6

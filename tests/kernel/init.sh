@@ -18,7 +18,9 @@ mount -t tmpfs shm /dev/shm
 mount -t tmpfs run /run
 mount -t configfs config /sys/kernel/config 2>/dev/null
 ln -sf /proc/self/fd /dev/fd
-ip link set lo up
+ip link set lo up multicast on
+ip route add 224.0.0.0/4 dev lo
+ip route add 192.0.2.0/24 dev lo # addresses beyond this computer, for datagrams that nobody hears
 # One slow processor for senders and receivers: what vcan hands on must not be dropped before a socket sees it.
 echo 100000 >/proc/sys/net/core/netdev_max_backlog
 

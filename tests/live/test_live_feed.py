@@ -310,7 +310,7 @@ def test_many_threads_at_once(tmp_path: Path) -> None:
         for k in range(300):
             feed.send(modes(float(k), [10.0, 20.0]), samples(50 * k, np.zeros((3, 50))))
         for thread in threads:
-            thread.join(30)
+            thread.join()
         feed.close()
         assert len(seen) == 80 and len(one.hub) == 0
 

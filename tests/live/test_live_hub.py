@@ -60,10 +60,10 @@ def test_take_waits_and_ends() -> None:
     outbox = Outbox(lambda: news(0))
     assert outbox.take(0.01) == []
     waiter: list[list[bytes]] = []
-    thread = threading.Thread(target=lambda: waiter.append(outbox.take(20)))
+    thread = threading.Thread(target=lambda: waiter.append(outbox.take(600)))
     thread.start()
     outbox.put(news(1))
-    thread.join(10)
+    thread.join()
     assert waiter == [[news(1).data]]
     outbox.close()
     assert outbox.closed and outbox.take(20) == []

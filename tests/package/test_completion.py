@@ -122,7 +122,7 @@ def zsh_typed(line: str, folder: pathlib.Path) -> str:
 SHELLS = {"bash": bash_asked, "fish": fish_asked}
 
 
-@pytest.fixture(params=SHELLS)
+@pytest.fixture(params=["bash", pytest.param("fish", marks=pytest.mark.programs)])
 def ask(request: pytest.FixtureRequest, folder: pathlib.Path) -> Ask:
     return lambda line: SHELLS[request.param](line, folder)
 
@@ -182,6 +182,7 @@ def test_bash_knows_how_many_files_there_are(folder: pathlib.Path) -> None:
     assert bash_asked("okid identify first\\ b", folder) == ["first blow.csv"]
 
 
+@pytest.mark.programs
 def test_zsh(folder: pathlib.Path) -> None:
     """What tab makes of a line at a terminal."""
     assert zsh_typed("okid ident", folder) == "identify"
@@ -194,6 +195,7 @@ def test_zsh(folder: pathlib.Path) -> None:
     assert zsh_typed("okid record --directory ru", folder) == "record|--directory|runs"
 
 
+@pytest.mark.programs
 def test_zsh_sourced(folder: pathlib.Path) -> None:
     """`source <(okid completion zsh)` registers it."""
     script = folder / "okid.zsh"

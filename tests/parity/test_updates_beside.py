@@ -15,6 +15,7 @@ import pytest
 from okid.capture.stream import Capture
 from program import PROGRAM
 from program import okid as run_okid
+from waiting import until
 
 RIG = """rate_hz = 200.0
 duration_s = 40.0
@@ -135,6 +136,7 @@ def test_a_replay_that_nobody_looks_at(made: Path) -> None:
     assert said.stdout.count("\nt ") + said.stdout.startswith("t ") >= len(of_type(before, "modes")) > 70
 
 
+@pytest.mark.realtime
 def test_the_stream_does_not_wait(made: Path) -> None:
     """What replay needs for its updates, a live session does not: samples, gaps and counts are there long before."""
     path = config(made, "fast", 'method = "okid-era"\np = 30\nupdate_s = 2.0\n')
@@ -161,11 +163,12 @@ def test_left_alone_nothing_is_left_out(made: Path) -> None:
     with Capture(path, live=True) as live:
         live.open(made / "a.log")
         while live.play(800) == 800:  # two frames a sample: 2 s
-            for _ in range(500):
+
+            def caught_up() -> bool:
                 live.serve()
-                if live.stats()["updates"]["made"] >= live.stats()["t"] // 2:
-                    break
-                time.sleep(0.01)
+                return live.stats()["updates"]["made"] >= live.stats()["t"] // 2
+
+            until(caught_up)
         live.finish()
         told = of_type(live.events(), "stats")[-1]["updates"]
     assert told == of_type(before, "stats")[-1]["updates"]

@@ -9,13 +9,13 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import can
 import pytest
 from okid import capture
+from waiting import until
 
 DBC = """VERSION ""
 NS_ :
@@ -136,14 +136,11 @@ def test_decoding_beside_the_log(buses: tuple[str, can.BusABC, can.BusABC], tmp_
     assert len(lines) == 3
 
 
-def repeat(sender: can.BusABC, messages: list[can.Message], tries: int = 200) -> None:
+def repeat(sender: can.BusABC, messages: list[can.Message]) -> None:
     """Send once the other end has been opened (a virtual bus drops what nobody hears)."""
     from can.interfaces.virtual import channels
 
-    for _ in range(tries):
-        if any(len(queues) >= 3 for queues in channels.values()):
-            break
-        time.sleep(0.02)
+    until(lambda: any(len(queues) >= 3 for queues in channels.values()))
     for message in messages:
         sender.send(message)
 
@@ -175,12 +172,9 @@ def test_signals_end_a_recording_in_order(tmp_path: Path, number: signal.Signals
     )
     log = tmp_path / "a.log"
     child = subprocess.Popen([sys.executable, "-c", program, str(log)], stdout=subprocess.PIPE, text=True)
-    for _ in range(600):
-        if log.exists() and log.stat().st_size > 0:
-            break
-        time.sleep(0.05)
+    until(lambda: log.exists() and log.stat().st_size > 0, child)
     child.send_signal(number)
-    shown, _ = child.communicate(timeout=30)
+    shown, _ = child.communicate(timeout=600)
     assert child.returncode == 0
     lines = log.read_text().splitlines()
     assert f"{len(lines)} frames" in shown

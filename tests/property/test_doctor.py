@@ -89,3 +89,20 @@ def test_support_bundle(rig: Path) -> None:
     told = okid("support-bundle", rig / "c.toml").stdout
     assert "c.toml" in told and "rate_hz" in told.split("## okid doctor")[0] and "rate_hz = -5" in told
     assert okid("support-bundle", "--events", rig / "none").returncode == 2
+
+
+def test_kernels_of_openblas(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those in use have their name; kernels without AVX2 on a processor that has it are called a fallback."""
+    flags = Path("/proc/cpuinfo").read_text().split()
+    monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
+    text = okid("doctor").stdout
+    line = next(line for line in text.splitlines() if "linear algebra" in line)
+    assert "OpenBLAS 0." in line and "kernels for " in line, text
+    if "avx2" not in flags:
+        return
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    assert "ok       linear algebra" in okid("doctor").stdout
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Prescott")
+    text = okid("doctor").stdout
+    assert "note     linear algebra" in text and "kernels for Prescott: a fallback" in text, text
+    assert "-> unset OPENBLAS_CORETYPE" in text, text

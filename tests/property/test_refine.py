@@ -403,9 +403,10 @@ def test_refinement_needs_a_force(tmp_path: Path) -> None:
         ("slicot_ib01_example/slicot_ib01_example.csv", 1, {}),
         ("daisy_cd_player_arm/daisy_cd_player_arm.csv", 2, {"method": "n4sid-moesp", "rows": 15, "order": 8}),
         ("daisy_cd_player_arm/daisy_cd_player_arm.csv", 2, {}),
-        ("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"order": 40}),
+        ("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"order": 24, "outputs": 6}),
         *(
             [
+                ("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"order": 40}),
                 ("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"method": "n4sid-moesp", "order": 40}),
                 ("daisy_flexible_structure/daisy_flexible_structure.csv", 2, {"order": 80}),
             ]
@@ -419,6 +420,8 @@ def test_measured_records_are_not_simulated_worse(path: str, n_u: int, settings:
     samples = okid.read_csv(data_file(path)).samples
     u, y = samples[:, :n_u], samples[:, n_u:]
     settings = {"method": "okid-era", **settings}
+    if outputs := settings.pop("outputs", 0):  # some, across the structure: all 28 take a minute
+        y = y[:, :: y.shape[1] // outputs][:, :outputs]
     before, after = okid.identify(u, y, fs=100.0, **settings), okid.identify(u, y, fs=100.0, refine=True, **settings)
     codes = [w.code for w in after.warnings]
     was, now = (

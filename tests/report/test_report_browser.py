@@ -130,7 +130,7 @@ def picture(page: Any) -> str:
 
 
 def until_changed(page: Any, before: str) -> None:
-    page.wait_for_function("(old) => document.querySelector('canvas').toDataURL() !== old", arg=before, timeout=20000)
+    page.wait_for_function("(old) => document.querySelector('canvas').toDataURL() !== old", arg=before, timeout=120_000)
 
 
 def test_shapes_move_and_stop(browser: Any, pages: dict[str, Path]) -> None:

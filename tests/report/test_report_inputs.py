@@ -145,7 +145,7 @@ def test_refusals_are_one_line(
 
 def test_results_with_odd_names_and_numbers(small: tuple[Path, Any, Any], tmp_path: Path) -> None:
     data = json.loads(small[0].read_text(encoding="utf-8"))
-    data["outputs"] = ["a\u0001\n\u2028", "b\ud800", "\u4e2d\u6587 \u202e$\\frac$" + "x" * 300]
+    data["outputs"] = ["a\u0001\n\u2028", "b\ufffd", "\u4e2d\u6587 \u202e$\\frac$" + "x" * 300]
     data["warnings"] = [{"code": "<b>", "text": "</section>\u0000"}, "no object"]
     (tmp_path / "odd.json").write_text(json.dumps(data), encoding="utf-8")
     assert report.main([str(tmp_path / "odd.json"), "--out", str(tmp_path / "odd.html")]) == 0

@@ -12,9 +12,10 @@ from pathlib import Path
 
 from program import PROGRAM as OKID
 from two_masses import rig_text, simulate_rig
+from waiting import until
 
 
-def sh(*args: str, check: bool = True, seconds: float = 60) -> subprocess.CompletedProcess[str]:
+def sh(*args: str, check: bool = True, seconds: float = 600) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(args, capture_output=True, text=True, timeout=seconds, check=False)
     if check:
         assert done.returncode == 0, f"{args}: {done.returncode}\n{done.stdout}\n{done.stderr}"
@@ -55,12 +56,8 @@ class Run:
             stdout=subprocess.DEVNULL,
             stderr=self.stderr,
         )
-        for _ in range(400):
-            if self.listening(interface):
-                return
-            assert self.process.poll() is None, self.messages()
-            time.sleep(0.02)
-        raise AssertionError("okid run never listened")
+        until(lambda: self.listening(interface) or self.process.poll() is not None)
+        assert self.process.poll() is None, self.messages()
 
     @staticmethod
     def listening(interface: str = "vcan0") -> bool:
@@ -79,7 +76,7 @@ class Run:
     def stop(self, how: signal.Signals = signal.SIGINT, status: int = 0) -> list[dict]:
         time.sleep(0.3)  # what was sent is already in the socket: the end of the run empties it
         self.process.send_signal(how)
-        assert self.process.wait(30) == status, self.messages()
+        assert self.process.wait(600) == status, self.messages()
         return self.events()
 
     def events(self) -> list[dict]:

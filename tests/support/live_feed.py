@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from systems import record, w2
+from waiting import until
 
 UPDATE_S = 0.5
 
@@ -55,18 +56,15 @@ class Watch:
 
     def end(self) -> list[tuple[float, float]]:
         """After the run has ended."""
-        self._thread.join(10)
+        self._thread.join()
         self._socket.close()
         return self.came
 
 
 @contextlib.contextmanager
-def watching(path: Path, seconds: float = 20) -> Iterator[Watch]:
+def watching(path: Path) -> Iterator[Watch]:
     """Connects as soon as there is a socket."""
-    until = time.monotonic() + seconds
-    while not path.exists():
-        assert time.monotonic() < until, f"{path}: no socket"
-        time.sleep(0.01)
+    until(path.exists)
     one = Watch(path)
     yield one
     one.end()

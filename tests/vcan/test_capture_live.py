@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import pytest
 from okid import capture
 from test_vcan import OKID, interface, sh  # noqa: F401  (interface is a fixture)
 from two_masses import rig_text, simulate_rig
+from waiting import until
 
 WHERE = ["--interface", "socketcan", "--channel", "vcan0"]
 
@@ -35,8 +35,7 @@ def captured(rig: Path, folder: Path, meanwhile: Callable[[], None], *options: s
     """Exit code of `okid-capture can` on vcan0; `meanwhile` runs once it listens."""
 
     def wait_then_act() -> None:
-        while lines_of(folder / "r.log") < 0:
-            time.sleep(0.02)
+        until(lambda: lines_of(folder / "r.log") >= 0)
         meanwhile()
 
     thread = threading.Thread(target=wait_then_act, daemon=True)
@@ -52,7 +51,7 @@ def test_emulated_node_to_modes_without_a_loss(rig: Path, tmp_path: Path, capsys
 
     def emulate() -> None:
         command = [sys.executable, "-m", "okid.capture", "emulate", str(rig / "rig.toml"), *WHERE]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
         said.append(done.stdout + done.stderr)
 
     assert captured(rig, tmp_path, emulate, "--frames", "1800") == 0
@@ -73,10 +72,7 @@ def test_emulated_node_to_modes_without_a_loss(rig: Path, tmp_path: Path, capsys
 def test_link_down_keeps_everything(rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def play_then_down() -> None:
         sh(OKID, "replay", str(rig / "a.log"), "--to", "vcan0", "--speed", "4")
-        for _ in range(1000):
-            if lines_of(tmp_path / "r.log") == 1800:
-                break
-            time.sleep(0.02)
+        until(lambda: lines_of(tmp_path / "r.log") == 1800)
         sh("ip", "link", "set", "vcan0", "down")
 
     assert captured(rig, tmp_path, play_then_down) == 4

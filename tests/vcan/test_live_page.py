@@ -82,6 +82,7 @@ def test_what_a_page_sees_is_what_was_on_the_bus(folder: Path) -> None:
     page = Listener(live.port)
     assert page.event()[1]["state"]["text"] == "waiting for okid"
     run = Run(folder)
+    next(event for kind, event in page.events() if kind == "state" and event["link"] == "live")
     play(folder / "holes.log")
     events = run.stop()
     seen = Watched(page, 10 * RATE // COLUMN)

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import pytest
 from test_vcan import OKID, Run, interface, make_record, play, sh  # noqa: F401  (interface is a fixture)
+from waiting import until
 
 TOOLS = Path(OKID).parent / "tests"
 SLOW = bool(os.environ.get("OKID_SLOW"))
@@ -49,13 +50,7 @@ class Receiver:
             "python-can": [sys.executable, "-c", PYTHON_CAN, str(count)],
         }[kind]
         self.process = subprocess.Popen(command, stdout=self.log.open("w"), stderr=subprocess.STDOUT)
-        for _ in range(1000):
-            ready = Run.listening() if kind == "candump" else "listening" in self.log.read_text()
-            if ready:
-                return
-            assert self.process.poll() is None, self.log.read_text()
-            time.sleep(0.02)
-        raise AssertionError(f"{kind} never listened")
+        until(lambda: Run.listening() if kind == "candump" else "listening" in self.log.read_text(), self.process)
 
     def received(self) -> int:
         if self.kind == "candump":
@@ -64,7 +59,7 @@ class Receiver:
                 size = self.log.stat().st_size
                 time.sleep(1.0)
             self.process.send_signal(signal.SIGINT)
-        assert self.process.wait(90) in (0, -2, 130)
+        assert self.process.wait(600) in (0, -2, 130)
         lines = self.log.read_text().splitlines()
         if self.kind == "candump":
             return sum(" 123#" in line for line in lines)
@@ -78,6 +73,7 @@ LOADS = [
 ]
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize(("kind", "rate", "count"), LOADS)
 def test_load(kind: str, rate: int, count: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     row = {}
@@ -115,14 +111,12 @@ def number_frame(number: int) -> bytes:
     return struct.pack("=IB3xI4x", 0x123, 8, number)
 
 
-def wait_for_line(path: Path, text: str, count: int, seconds: float = 10) -> str:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        lines = [line for line in path.read_text().splitlines() if line.startswith(text)]
-        if len(lines) >= count:
-            return lines[count - 1]
-        time.sleep(0.01)
-    raise AssertionError(f"{count} lines {text!r} in {path.read_text()}")
+def wait_for_line(path: Path, text: str, count: int) -> str:
+    def found() -> list[str]:
+        return [line for line in path.read_text().splitlines() if line.startswith(text)]
+
+    until(lambda: len(found()) >= count)
+    return found()[count - 1]
 
 
 def test_samples_again_after_the_link_is_back(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -136,25 +130,23 @@ def test_samples_again_after_the_link_is_back(tmp_path: Path, capfd: pytest.Capt
         else:
             sh("ip", "link", "set", "vcan0", "down")
         sh("ip", "link", "set", "vcan0", "up")
-        up, late_ms = time.clock_gettime_ns(time.CLOCK_MONOTONIC), 0.0
+        up = time.clock_gettime_ns(time.CLOCK_MONOTONIC)
         with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as sender:
             sender.bind(("vcan0",))
             for number in range(2000):
                 sender.send(number_frame(number))
                 if receiver.log.read_text().count("back ") > turn:
                     break
-                asleep = time.monotonic()
                 time.sleep(0.005)
-                late_ms += 1e3 * (time.monotonic() - asleep) - 5  # the machine's own lateness
         back = int(wait_for_line(receiver.log, "back ", turn + 1).split()[1])
-        waits.append((back - up) / 1e6 - (late_ms if late_ms > 100 else 0))
+        waits.append((back - up) / 1e6)
     with capfd.disabled():
         median = sorted(waits)[rounds // 2]
         print(f"\n{rounds} links back: samples again after {max(waits):.0f} ms at most, {median:.0f} ms median")
     assert max(waits) <= 500
     assert receiver.process.poll() is None
     receiver.process.kill()
-    receiver.process.wait(10)
+    receiver.process.wait()
 
 
 @pytest.fixture(scope="module")
@@ -175,19 +167,13 @@ def test_start_frame_and_sync(
         watch = subprocess.Popen(["candump", "-L", "-r", "4000000", "vcan0"], stdout=out)
         time.sleep(0.5)
         live = Run(record, config="s.toml")
-        for _ in range(500):  # candump listens already: only the first SYNC says that okid does
-            if frame in seen.read_text():
-                break
-            time.sleep(0.02)
+        until(lambda: frame in seen.read_text())  # candump listens already: only the first SYNC says that okid does
         play(record / "a.log")
         events = live.stop()
         sync = [e for e in events if e["type"] == "stats"][-1]["bus"]["can0"]["sync"]
-        for _ in range(500):  # candump may be behind: what it has not yet read is lost when it is stopped
-            if seen.read_text().count(frame) >= sync["sent"]:
-                break
-            time.sleep(0.02)
+        until(lambda: seen.read_text().count(frame) >= sync["sent"])  # what candump has not read is lost when it ends
         watch.send_signal(signal.SIGINT)
-        watch.wait(10)
+        watch.wait()
     lines = [line.split() for line in seen.read_text().splitlines()]
     assert lines[0][2] == "000#0100"
     stamps = [float(line[0].strip("()")) for line in lines if line[2] == frame]

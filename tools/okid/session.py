@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
-from okid.abi.arguments import frame_names, names, unmasked, whole
+from okid.abi.arguments import MOST_SAMPLES, frame_names, names, state_bytes, unmasked, whole
 from okid.abi.sums import Stats
 from okid.identification.stream import HostStream
 from okid.result.parts import Mode
@@ -22,8 +22,11 @@ if TYPE_CHECKING:
     from okid.notebook import LiveView
 
 
+_MOST_CHANNELS = 65536
+
+
 def _named(what: str, given: Sequence[str] | int, letter: str, least: int) -> list[str]:
-    count = whole(what, given, least) if isinstance(given, int) else len(given)
+    count = whole(what, given, least, _MOST_CHANNELS) if isinstance(given, int) else len(given)
     if count < least:
         raise InputError(f"{what} is {given!r}, expected at least {least}")
     return names(None if isinstance(given, int) else given, letter, count)
@@ -215,7 +218,7 @@ class Session:
 
     def gap(self, count: int = 0) -> None:
         """`count` samples are missing here; 0 = another record begins."""
-        self._stream.gap(whole("count", count, 0))
+        self._stream.gap(whole("count", count, 0, MOST_SAMPLES))
 
     def reset(self) -> None:
         """Forget all samples."""
@@ -245,10 +248,10 @@ class Session:
         """Go on where to_bytes() of a session of the same channels, lags and memory stood, else InputError. For ± what
         was before is one block; a fading memory has none until it is forgotten. With `refine` how far the correlation
         sums look back and the filter of the noise are those of the state, and stay so at reset()."""
-        self._stream.restore(state)
+        self._stream.restore(state_bytes(state))
 
     def merge(self, state: bytes) -> None:
         """Add all samples of another session's to_bytes() as further records, and as one block for ±. InputError with a
         window or forgetting. With `refine` both must have begun with restore() of one state and reset(), or one of them
         with that state itself: `first.to_bytes()` for `second.restore()`, `second.reset()`, then `first.merge()`."""
-        self._stream.merge(state)
+        self._stream.merge(state_bytes(state))

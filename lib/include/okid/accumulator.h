@@ -138,7 +138,11 @@ OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i16(okid_accumulator_
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i32(okid_accumulator_t* self, const int32_t* codes,
                                                                size_t count);
 
-/// Mark `count` missing samples: the run ends here. A gap of 0 samples separates two records.
+/// Samples that an accumulator counts at most, missing ones included: 292 years at 0.5 GHz.
+#define OKID_MOST_SAMPLES (INT64_C(1) << 62)
+
+/// Mark `count` missing samples: the run ends here. A gap of 0 samples separates two records; a negative one is none, and
+/// one beyond OKID_MOST_SAMPLES in all ends there.
 OKID_API void okid_accumulator_gap(okid_accumulator_t* self, int64_t count);
 
 /// Add all of `other` to `self` as further records (exact for codes). Both need edges = 1, slots = 0, the same n_u, n_y,

@@ -31,6 +31,10 @@
 /// **Errors.** okid_status_t: 0 is ok, below 0 an error after which nothing has changed, above 0 a valid result with a
 /// warning. okid_status_text() gives a line for each. A missing sample is NaN, is counted, and harms nothing after it.
 ///
+/// **NULL** where a pointer is expected is an error and never a fault: a status function gives OKID_ERR_NULL (or the error
+/// that it finds first), every other one does nothing and gives 0 or NULL; a struct that such a function fills is then all zeros.
+/// Where NULL means something, the function says so. A pointer that is not NULL must point to what it says.
+///
 /// **Versions.** A program links only with a library of its own interface and number type (okid/abi.h).
 #ifndef OKID_H
 #define OKID_H

@@ -115,6 +115,7 @@ okid_status_t okid_accumulator_copy(okid_accumulator_t* self, const okid_accumul
 }
 
 void okid_accumulator_reset(okid_accumulator_t* self) {
+    if (!self) return;
     const size_t size = (size_t)lay_out(self) * 8, from = 8 * (size_t)self->x_at;
     memset((char*)self + from, 0, size - from);
     memset(&self->stats, 0, sizeof self->stats);
@@ -125,15 +126,24 @@ void okid_accumulator_reset(okid_accumulator_t* self) {
 }
 
 void okid_accumulator_set_units(okid_accumulator_t* self, const double* scale, const double* offset) {
+    if (!self || !scale) return;
     for (int32_t r = 0; r < self->m; ++r) {
         acc_scale(self)[r] = scale[r];
         acc_scale(self)[self->m + r] = offset ? offset[r] : 0;
     }
 }
 
-void okid_accumulator_stats(const okid_accumulator_t* self, okid_accumulator_stats_t* out) { *out = self->stats; }
-void okid_accumulator_config(const okid_accumulator_t* self, okid_accumulator_config_t* out) { *out = self->config; }
-int64_t okid_accumulator_rows(const okid_accumulator_t* self) { return self->stats.rows; }
+void okid_accumulator_stats(const okid_accumulator_t* self, okid_accumulator_stats_t* out) {
+    static const okid_accumulator_stats_t none = {0};
+    if (out) *out = self ? self->stats : none;
+}
+
+void okid_accumulator_config(const okid_accumulator_t* self, okid_accumulator_config_t* out) {
+    static const okid_accumulator_config_t none = {0};
+    if (out) *out = self ? self->config : none;
+}
+
+int64_t okid_accumulator_rows(const okid_accumulator_t* self) { return self ? self->stats.rows : 0; }
 
 double okid_accumulator_weight(const okid_accumulator_t* a) {
     double rows = a->base_weight;

@@ -78,12 +78,14 @@ okid_status_t okid_correlation_create(okid_correlation_t** self, const okid_corr
 }
 
 void okid_correlation_reset(okid_correlation_t* self) {
+    if (!self) return;
     const okid_correlation_config_t config = self->config;
     const size_t size = (size_t)lay_out(self, &config) * 8, from = 8 * (size_t)self->now_at;
     memset((char*)self + from, 0, size - from);
 }
 
 void okid_correlation_set_units(okid_correlation_t* self, const double* scale) {
+    if (!self || !scale) return;
     memcpy(cor_scale(self), scale, (size_t)self->m * sizeof *scale);
 }
 
@@ -196,6 +198,8 @@ static void close_slot(okid_correlation_t* s) {
 }
 
 void okid_correlation_gap(okid_correlation_t* self, int64_t count) {
+    if (!self || count < 0) return;
+    if (count > OKID_MOST_SAMPLES - self->clock) count = OKID_MOST_SAMPLES - self->clock;
     if (self->have > 0 || !self->in_gap) {
         close_slot(self);
         self->have = 0;
@@ -341,6 +345,12 @@ okid_status_t okid_correlation_merge(okid_correlation_t* self, okid_correlation_
     return OKID_OK;
 }
 
-void okid_correlation_stats(const okid_correlation_t* self, okid_accumulator_stats_t* out) { *out = self->stats; }
+void okid_correlation_stats(const okid_correlation_t* self, okid_accumulator_stats_t* out) {
+    static const okid_accumulator_stats_t none = {0};
+    if (out) *out = self ? self->stats : none;
+}
 
-void okid_correlation_config(const okid_correlation_t* self, okid_correlation_config_t* out) { *out = self->config; }
+void okid_correlation_config(const okid_correlation_t* self, okid_correlation_config_t* out) {
+    static const okid_correlation_config_t none = {0};
+    if (out) *out = self ? self->config : none;
+}

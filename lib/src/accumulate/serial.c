@@ -99,6 +99,71 @@ okid_status_t okid_accumulator_peek(const void* in, size_t bytes, okid_accumulat
     return OKID_OK;
 }
 
+/// The next real number of what is read: is it finite? `least` 0: and not below 0. By its bits, for processors without doubles.
+static int sane_number(walk_t* w, int least) {
+    const uint64_t bits = (uint64_t)walk_bits(w, 0, 8);
+    return (bits >> 52 & 0x7FF) != 0x7FF && (least != 0 || bits >> 63 == 0 || bits << 1 == 0);
+}
+
+/// A count of samples.
+static int sane_count(walk_t* w) { return (uint64_t)walk_bits(w, 0, 8) <= (uint64_t)OKID_MOST_SAMPLES; }
+
+/// Lagged products and sums: finite, and some square above 0 where one is below (rounding leaves the like of a constant).
+static int sane_sums(walk_t* w, const okid_accumulator_t* a, int exact) {
+    const size_t products = acc_sum_count(a), width = (size_t)a->width, newest = acc_lag_count(a);
+    if (exact) { // two planes of whole numbers, then whole sums: any bits are numbers
+        w->at += 8 * (2 * products + (size_t)a->m);
+        return 1;
+    }
+    int sane = 1, above = 0, below = 0;
+    for (size_t i = 0; i < products; ++i) {
+        const walk_t here = *w;
+        sane &= sane_number(w, 1);
+        if (i % width != newest + i / width) continue;
+        walk_t again = here;
+        if (sane_number(&again, 0))
+            above |= walk_bits(&(walk_t){NULL, w->from, here.at}, 0, 8) != 0;
+        else
+            below = 1;
+    }
+    for (int32_t i = 0; i < a->m; ++i) sane &= sane_number(w, 1);
+    return sane && (above || !below);
+}
+
+static int sane_samples(walk_t* w, const okid_accumulator_t* a, size_t count) {
+    int sane = 1;
+    for (size_t i = 0; i < count; ++i)
+        if (acc_has_codes(a))
+            w->at += 4;
+        else
+            sane &= sane_number(w, 1);
+    return sane;
+}
+
+/// What walk_state() is about to read: a checksum that is right says nothing of the numbers. Nothing is changed.
+static int sane_state(const okid_accumulator_t* a, const void* in, size_t header, int32_t have, int32_t closed) {
+    walk_t w = {NULL, (const uint8_t*)in, header};
+    int sane = 1;
+    for (size_t i = 0; i < sizeof a->stats / 8 + 1; ++i) sane &= sane_count(&w); // and the clock
+    sane &= sane_number(&w, 0);                                                  // weight of the base
+    for (int i = 0; i < 4; ++i) {
+        const uint32_t word = (uint32_t)walk_bits(&w, 0, 4);
+        if (i == 1 || i == 2) sane &= word <= 1; // in a gap, centred
+    }
+    for (int32_t i = 0; i < 2 * a->m; ++i) sane &= sane_number(&w, 1);
+    sane &= sane_samples(&w, a, (size_t)have * (size_t)a->m);
+    for (int32_t k = 0; k <= closed; ++k) {
+        for (int i = 0; i < 3; ++i) sane &= sane_count(&w); // rows, start, joined
+        sane &= sane_sums(&w, a, acc_has_codes(a));
+        sane &= sane_samples(&w, a, acc_lag_count(a) * (a->config.slots > 0 ? 2 : 1));
+    }
+    if (a->config.slots > 0 || !a->config.edges) return sane;
+    sane &= sane_sums(&w, a, acc_base_is_exact(a));
+    if (!acc_base_is_exact(a))
+        for (size_t i = 0; i < acc_lag_count(a) + acc_edge_count(a); ++i) sane &= sane_number(&w, 1);
+    return sane;
+}
+
 okid_status_t okid_accumulator_deserialise(okid_accumulator_t* self, const void* in, size_t bytes) {
     if (!self) return OKID_ERR_NULL;
     okid_accumulator_config_t c;
@@ -127,7 +192,7 @@ okid_status_t okid_accumulator_deserialise(okid_accumulator_t* self, const void*
     self->have = kept[0];
     self->open = kept[1];
     self->closed = kept[2];
-    if (count.at + 4 != bytes) return OKID_ERR_FORMAT;
+    if (count.at + 4 != bytes || !sane_state(self, in, header, have, closed)) return OKID_ERR_FORMAT;
     okid_accumulator_reset(self);
     walk_t w = {NULL, (const uint8_t*)in, header};
     walk_state(&w, self);

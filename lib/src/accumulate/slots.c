@@ -212,10 +212,10 @@ okid_status_t okid_accumulator_remove(okid_accumulator_t* self, okid_accumulator
     return OKID_OK;
 }
 
-int32_t okid_accumulator_slots(const okid_accumulator_t* self) { return self->closed + 1; }
+int32_t okid_accumulator_slots(const okid_accumulator_t* self) { return self ? self->closed + 1 : 0; }
 
 int64_t okid_accumulator_slot_rows(const okid_accumulator_t* self, int32_t k) {
-    if (k < 0 || k > self->closed) return 0;
+    if (!self || k < 0 || k > self->closed) return 0;
     return acc_slot(self, acc_ring(self, k))->rows + (k == self->closed ? self->pending : 0);
 }
 

@@ -293,12 +293,14 @@ okid_status_t okid_square_root_create(okid_square_root_t** self, const okid_squa
 }
 
 void okid_square_root_reset(okid_square_root_t* self) {
+    if (self == nullptr) return;
     *self = plan(self->config);
     const size_t size = lay_out(*self);
     std::memset(self->reference(), 0, size - self->reference_at);
 }
 
 void okid_square_root_set_units(okid_square_root_t* self, const double* scale, const double* offset) {
+    if (self == nullptr || scale == nullptr) return;
     for (int32_t c = 0; c < self->m; ++c) {
         self->scale()[c] = scale[c];
         self->scale()[self->m + c] = offset != nullptr ? offset[c] : 0;
@@ -322,6 +324,8 @@ okid_status_t okid_square_root_add_i32(okid_square_root_t* self, const int32_t* 
 }
 
 void okid_square_root_gap(okid_square_root_t* self, int64_t count) {
+    if (self == nullptr || count < 0) return;
+    if (count > OKID_MOST_SAMPLES - self->clock) count = OKID_MOST_SAMPLES - self->clock;
     if (self->have > 0 || self->in_gap == 0) {
         close_slot(*self);
         self->have = 0;
@@ -358,6 +362,12 @@ okid_status_t okid_square_root_merge(okid_square_root_t* self, okid_square_root_
     return OKID_OK;
 }
 
-void okid_square_root_stats(const okid_square_root_t* self, okid_accumulator_stats_t* out) { *out = self->stats; }
-void okid_square_root_config(const okid_square_root_t* self, okid_square_root_config_t* out) { *out = self->config; }
-int64_t okid_square_root_rows(const okid_square_root_t* self) { return self->stats.rows; }
+void okid_square_root_stats(const okid_square_root_t* self, okid_accumulator_stats_t* out) {
+    if (out != nullptr) *out = self != nullptr ? self->stats : okid_accumulator_stats_t{};
+}
+
+void okid_square_root_config(const okid_square_root_t* self, okid_square_root_config_t* out) {
+    if (out != nullptr) *out = self != nullptr ? self->config : okid_square_root_config_t{};
+}
+
+int64_t okid_square_root_rows(const okid_square_root_t* self) { return self != nullptr ? self->stats.rows : 0; }

@@ -263,6 +263,7 @@ okid_status_t okid_change_test(okid_change_t* self, okid_change_verdict_t* out) 
 }
 
 void okid_change_clear(okid_change_t* self) {
+    if (self == nullptr) return;
     self->added = 0;
     self->rows = 0;
 }

@@ -142,8 +142,8 @@ okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov) {
 }
 
 const okid_real_t* okid_era_singular_values(const okid_era_t* self, int32_t* count) {
-    if (count != nullptr) *count = self->rank;
-    return self->values;
+    if (count != nullptr) *count = self != nullptr ? self->rank : 0;
+    return self != nullptr ? self->values : nullptr;
 }
 
 okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, okid_real_t* B, okid_real_t* C,

@@ -49,6 +49,8 @@ struct linear_era {
     void through(const okid_real_t* T, const okid_real_t* x, int count, okid_real_t* out) const;
     void back(const okid_real_t* T, const okid_real_t* x, int count, okid_real_t keep, okid_real_t* out) const;
     void begin_test();
+    void leave_left(okid_real_t* columns, int count) const;
+    void leave_right(okid_real_t* rows_of_F, int count, okid_real_t* scratch) const;
     void outside(const okid_real_t* T);
     bool begin_inputs(const okid_real_t* T);
     void change_theta(const double* diagonal);
@@ -80,6 +82,7 @@ struct linear_subspace {
   private:
     bool weigh(bool cva);
     bool ask_for();
+    void leave_gamma();
     void to_sums(double* from, int count, double* to, bool transposed);
 };
 

@@ -100,6 +100,25 @@ void linear_era::back(const real* T, const real* x, int count, real keep, real* 
                  out + area(b * own, count), count);
 }
 
+/// Take out of `count` columns of the height, or rows of F, what a first time left of U, or V: of sizes near the largest
+/// singular value the rounding alone is as large as the squares of the small ones.
+void linear_era::leave_left(real* columns, int count) const {
+    for (int k = 0; k < count; ++k) {
+        real* column = columns + area(k, height);
+        for (int i = 0; i < order; ++i) {
+            sum[i] = 0;
+            for (int y = 0; y < height; ++y)
+                if (const int times = stands(y / n_y); times > 0)
+                    sum[i] += left[area(i, height) + size_t(y)] * column[y] / static_cast<real>(times);
+        }
+        multiply(false, false, height, 1, order, -1, left, height, sum, order, 1, column, height);
+    }
+}
+void linear_era::leave_right(real* rows_of_F, int count, real* scratch) const {
+    multiply(false, true, count, order, seen, 1, rows_of_F, count, right, order, 0, scratch, count);
+    multiply(false, false, count, seen, order, -1, scratch, count, right, order, 1, rows_of_F, count);
+}
+
 /// late, early, first: what of H(1) V, U^T H(1) and C is outside U and V; their next terms. `change` holds T F V, `room`
 /// U^T H(1) before F.
 void linear_era::outside(const real* T) {
@@ -108,23 +127,29 @@ void linear_era::outside(const real* T) {
     };
     back(T, room, order, 0, early);
     multiply(false, false, order, seen, order, -1, known, order, right, order, 1, early, order);
+    leave_right(early, order, sum);
     for (int k = 0; k < order; ++k) {
         const real* later = change + area(k, tall) + n_y;
         std::copy(later, later + height, late + area(k, height));
         weigh(late + area(k, height));
     }
     multiply(false, false, height, order, order, -1, left, height, known, order, 1, late, height);
+    leave_left(late, order);
     multiply(true, false, order, breadth, height, 1, late, height, T, tall, 0, room, order);
     back(T, room, order, 0, late_next);
+    leave_right(late_next, order, sum);
     through(T, early, order, room);
     multiply(false, false, height, order, breadth, 1, T, tall, room, breadth, 0, early_next, height);
     for (int k = 0; k < order; ++k) weigh(early_next + area(k, height));
+    leave_left(early_next, order);
     for (int j = 0; j < breadth; ++j) std::copy(T + area(j, tall), T + area(j, tall) + n_y, room + area(j, n_y));
     back(T, room, n_y, 0, first);
     multiply(false, false, n_y, seen, order, -1, C, n_y, right, order, 1, first, n_y);
+    leave_right(first, n_y, out_C);
     through(T, first, n_y, room);
     multiply(false, false, height, n_y, breadth, 1, T, tall, room, breadth, 0, first_next, height);
     for (int o = 0; o < n_y; ++o) weigh(first_next + area(o, height));
+    leave_left(first_next, n_y);
 }
 
 /// rows = G_r, normal = factor of G_r^T G_r, inputs = B, input = T E_u - G_r B; beside = input^T T F, lean = G_r^T (T F - G V^T).

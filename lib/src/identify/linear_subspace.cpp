@@ -64,6 +64,16 @@ bool linear_subspace::weigh(bool cva) {
     return true;
 }
 
+/// turned <- (1 - dual J^-1 Gamma^T) turned: twice, for a first time leaves the rounding of the large singular values.
+void linear_subspace::leave_gamma() {
+    const int n = order, nf = 3 * n + n_y;
+    for (int pass = 0; pass < 2; ++pass) {
+        multiply(true, false, n, nf, h, 1, view.gamma, h, turned, h, 0, found, n);
+        linalg::cholesky_solve(n, cross, n, found, n, nf);
+        multiply(false, false, h, nf, n, -1, dual, h, found, n, 1, turned, h);
+    }
+}
+
 /// ask = F (1 - Gamma J^-1 dual^T): rows of Gamma_, of Gamma_ one block later, of what A leaves of Gamma-bar, of C.
 bool linear_subspace::ask_for() {
     const int n = order, nf = 3 * n + n_y, short_h = h - n_y;
@@ -80,9 +90,7 @@ bool linear_subspace::ask_for() {
     }
     multiply(false, false, short_h, n, n, -1, gamma, h, pencil, n, 1, turned + at(0, 2 * n, h), h);
     for (int o = 0; o < n_y; ++o) turned[at(o, 3 * n + o, h)] = 1;
-    multiply(true, false, n, nf, h, 1, gamma, h, turned, h, 0, found, n); // Gamma^T F^T
-    linalg::cholesky_solve(n, cross, n, found, n, nf);
-    multiply(false, false, h, nf, n, -1, dual, h, found, n, 1, turned, h);
+    leave_gamma();
     for (int r = 0; r < h; ++r)
         for (int k = 0; k < nf; ++k) ask[at(k, r, nf)] = turned[at(r, k, h)];
     return true;
@@ -125,6 +133,11 @@ okid_status_t linear_subspace::begin(okid_identify& identifier, const okid_ident
             for (int k = 0; k < nf; ++k) next[at(k, r, nf)] = turned[at(r, k, h)];
         solve_lower_right(h, view.weight, h, next, nf, nf, solve);
     }
+    for (int r = 0; r < h; ++r) // next Gamma = ask Gamma M = 0
+        for (int k = 0; k < nf; ++k) turned[at(r, k, h)] = next[at(k, r, nf)];
+    leave_gamma();
+    for (int r = 0; r < h; ++r)
+        for (int k = 0; k < nf; ++k) next[at(k, r, nf)] = turned[at(r, k, h)];
     multiply(false, false, nf, z.w, h, 1, next, nf, L32, size, 0, past + nf, all);
     multiply(false, false, nf, h, h, 1, ask, nf, L33, size, 0, future, all);
     multiply(false, false, nf, h, h, 1, next, nf, L33, size, 0, future + nf, all);

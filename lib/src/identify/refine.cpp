@@ -109,6 +109,60 @@ bool invert_basis(okid_refine& s) {
     return largest < 1e-3;
 }
 
+/// Poles and vectors of the start, in an order that the poles alone tell: real ones first, then by frequency.
+/// @return false: not all are numbers
+bool sort_modes(okid_refine& s) {
+    okid::refine_layout& l = s.layout;
+    const int n = l.n_z;
+    for (int to = 0; to < n; to += l.size(to)) {
+        int next = -1;
+        for (int k = 0; k < n; k += s.im[k] > 0 ? 2 : 1) {
+            if (std::isnan(s.re[k])) continue; // taken
+            if (next < 0 || s.im[k] < s.im[next] || (s.im[k] == s.im[next] && s.re[k] < s.re[next])) next = k;
+        }
+        if (next < 0) return false;
+        l.pair[to] = s.im[next] > 0;
+        s.best.pole[to] = double(s.re[next]);
+        if (l.pair[to]) s.best.pole[to + 1] = double(s.im[next]);
+        for (int part = 0; part < l.size(to); ++part)
+            for (int r = 0; r < n; ++r)
+                s.basis[at(r, to + part, n)] = (part == 0 ? 1 : -1) * double(s.vectors[at(r, next + part, n)]);
+        s.re[next] = NAN;
+    }
+    return true;
+}
+
+/// Choose the gain that is held in each mode, and turn the mode so that this gain is positive. A mode's phase is then that
+/// of the transfer function, whatever states the start has; of gains as large as each other the first one is taken.
+void turn_modes(okid_refine& s) {
+    constexpr double as_large = 1 + 1e-6;
+    okid::refine_layout& l = s.layout;
+    const int n = l.n_z;
+    for (int k = 0; k < n; k += l.size(k)) {
+        double largest = -1;
+        for (int c = 0; c < l.n_u; ++c) {
+            const double* b = s.best.input + at(k, c, n);
+            const double power = (b[0] * b[0] + (l.pair[k] ? b[1] * b[1] : 0)) * s.drive[c];
+            if (power > as_large * largest) l.fixed[k] = c, largest = power;
+        }
+        const double* b = s.best.input + at(k, l.fixed[k], n);
+        const std::complex<double> gain(b[0], l.pair[k] ? b[1] : 0.0);
+        const std::complex<double> turn = gain == 0.0 ? 1.0 : std::conj(gain) / std::abs(gain);
+        const auto rotate = [&](double* part, int step) {
+            const double x = part[0];
+            part[0] *= turn.real();
+            if (!l.pair[k]) return;
+            part[0] -= turn.imag() * part[step];
+            part[step] = turn.real() * part[step] + turn.imag() * x;
+        };
+        for (int i = 0; i < n; ++i) { // columns of the basis, whose second part has the other sign; rows of its inverse
+            rotate(s.basis + at(i, k, n), n);
+            rotate(s.inverse + at(k, i, n), 1);
+        }
+        for (int c = 0; c < l.n_u; ++c) rotate(s.best.input + at(k, c, n), 1);
+    }
+}
+
 /// The start in modal coordinates; its initial states zero.
 okid_status_t decompose(okid_refine& s, const okid_model_t& start) {
     okid::refine_layout& l = s.layout;
@@ -116,32 +170,18 @@ okid_status_t decompose(okid_refine& s, const okid_model_t& start) {
     std::copy(start.A, start.A + area(n, n), s.a);
     if (!std::all_of(s.a, s.a + area(n, n), [](okid_real_t x) { return std::isfinite(x); })) return OKID_ERR_NUMERIC;
     if (okid::linalg::eigen(n, s.a, s.re, s.im, s.vectors, s.eigen) != 0) return OKID_ERR_NUMERIC;
-    for (int k = 0; k < n; k += l.size(k)) {
-        l.pair[k] = s.im[k] > 0;
-        s.best.pole[k] = double(s.re[k]);
-        if (l.pair[k]) s.best.pole[k + 1] = double(s.im[k]);
-        for (int part = 0; part < l.size(k); ++part)
-            for (int r = 0; r < n; ++r)
-                s.basis[at(r, k + part, n)] = (part == 0 ? 1 : -1) * double(s.vectors[at(r, k + part, n)]);
-    }
+    if (!sort_modes(s)) return OKID_ERR_NUMERIC;
     std::fill(l.held, l.held + n, false);
     for (int k = 0; k < n; k += l.size(k))
         if (!s.best.inside(l, k)) return OKID_ERR_UNSTABLE;
     if (!invert_basis(s)) return OKID_ERR_NUMERIC;
     std::copy(start.B, start.B + area(n, n_u), s.spare);
     multiply(false, false, n, n_u, n, 1, s.inverse, n, s.spare, n, 0, s.best.input, n);
+    turn_modes(s);
     std::copy(start.C, start.C + area(n_y, n), s.spare);
     multiply(false, false, n_y, n, n, 1, s.spare, n_y, s.basis, n, 0, s.best.shows + area(n_y, n_u), n_y);
     std::copy(start.D, start.D + area(n_y, n_u), s.best.shows);
     std::fill(s.best.start, s.best.start + area(n, l.runs), 0.0);
-    for (int k = 0; k < n; k += l.size(k)) {
-        double largest = -1;
-        for (int c = 0; c < n_u; ++c) {
-            const double* b = s.best.input + at(k, c, n);
-            const double power = (b[0] * b[0] + (l.pair[k] ? b[1] * b[1] : 0)) * s.drive[c];
-            if (power > largest) l.fixed[k] = c, largest = power;
-        }
-    }
     return OKID_OK;
 }
 

@@ -169,8 +169,8 @@ okid_status_t okid_subspace_decompose_factor(okid_subspace_t* self, const okid_r
 }
 
 const okid_real_t* okid_subspace_singular_values(const okid_subspace_t* self, int32_t* count) {
-    if (count != nullptr) *count = self->sizes.h;
-    return self->cut.values;
+    if (count != nullptr) *count = self != nullptr ? self->sizes.h : 0;
+    return self != nullptr ? self->cut.values : nullptr;
 }
 
 okid_status_t okid_subspace_realize(okid_subspace_t* self, int32_t order, okid_real_t* A, okid_real_t* B,

@@ -2,7 +2,8 @@
 // PURPOSE    replicate models, each without one block of the record, from sums alone
 // METHOD     sums of the whole less those of the block, identified at the order of the full model by what okid_identify_run()
 //            does, less the scans and checks that no deviation needs; ERA starts from the full model (followed_era). Or the
-//            full model plus its derivative along the sums of the block (linear.hpp)
+//            full model plus its derivative along the sums of the block (linear.hpp), poles and vectors to first order
+//            (first_order.hpp)
 // REFERENCE  docs/numerics.md, uncertainty
 // NUMERICS   codes: the sums without the block are exact; doubles: a rounding of the whole. Linear: the sums of a block are
 //            taken about the means of the whole, which is the derivative of the centred sums
@@ -10,6 +11,7 @@
 #include <okid/uncertainty.h>
 
 #include "accumulate/lag_means.h"
+#include "identify/first_order.hpp"
 #include "identify/identify.hpp"
 #include "identify/linear.hpp"
 
@@ -37,6 +39,8 @@ struct okid_jackknife {
     okid::linear_era era;
     okid::linear_subspace subspace;
     okid::linear_ssarx ssarx;
+    okid::first_order beside; ///< of linear models
+    bool begun;               ///< it has the model
 };
 
 namespace {
@@ -63,6 +67,7 @@ void lay_out_linear(okid_jackknife& s, okid::arena& memory) {
         s.subspace.lay_out(shape, shape.max_order, memory);
     else
         s.era.lay_out(shape, shape.max_order, memory);
+    s.beside.lay_out(shape.n_u, shape.n_y, shape.max_order, memory);
 }
 
 size_t lay_out(okid_jackknife& s, okid::arena& memory) {
@@ -168,6 +173,13 @@ double share_of(const okid_jackknife& s, double weight) {
     return std::clamp(share / s.channels, least, 1 - least);
 }
 
+/// The model plus step times its derivative along the part.
+okid_model_t along(okid_jackknife& s, double step) {
+    return s.ssarx.size > 0      ? s.ssarx.along(step)
+           : s.subspace.size > 0 ? s.subspace.along(step)
+                                 : s.era.along(s.diagonal, step);
+}
+
 } // namespace
 
 size_t okid_jackknife_memsize(const okid_jackknife_config_t* config) {
@@ -235,6 +247,7 @@ okid_status_t okid_jackknife_begin_linear(okid_jackknife_t* self, okid_identify_
              : s.subspace.size > 0 ? s.subspace.begin(*by, *full)
                                    : s.era.begin(*by, *full);
     if (status == OKID_OK) s.whole = whole;
+    s.begun = false;
     return status;
 }
 
@@ -254,10 +267,9 @@ okid_status_t okid_jackknife_delete(okid_jackknife_t* self, okid_accumulator_t* 
                                                          : s.era.asks());
         if (status != OKID_OK) return status;
         *share = share_of(s, weight);
-        const double step = -weight / (1 - *share);
-        *model = s.ssarx.size > 0      ? s.ssarx.along(step)
-                 : s.subspace.size > 0 ? s.subspace.along(step)
-                                       : s.era.along(s.diagonal, step);
+        if (!s.begun) s.beside.begin(along(s, 0));
+        s.begun = true;
+        *model = s.beside.of(along(s, -weight / (1 - *share)));
         return OKID_OK;
     }
     if (status == OKID_OK) status = okid_accumulator_copy(s.rest, s.whole);

@@ -237,6 +237,7 @@ okid_status_t okid_watch_set_model(okid_watch_t* self, const okid_identified_t* 
 }
 
 int32_t okid_watch_add(okid_watch_t* self, const okid_real_t* sample) {
+    if (self == nullptr || sample == nullptr) return 0;
     okid_watch& s = *self;
     if (!std::all_of(sample, sample + s.config.n_u + s.config.n_y, [](okid_real_t x) { return std::isfinite(x); })) {
         okid_watch_gap(self);
@@ -251,15 +252,19 @@ int32_t okid_watch_add(okid_watch_t* self, const okid_real_t* sample) {
 }
 
 void okid_watch_gap(okid_watch_t* self) {
+    if (self == nullptr) return;
     for (predictor* each : {&self->at_work, &self->next}) rest(self->config, *each);
     self->high = 0;
 }
 
 void okid_watch_reset(okid_watch_t* self) {
+    if (self == nullptr) return;
     self->at_work.order = self->next.order = 0;
     self->high = 0;
 }
 
 void okid_watch_state(const okid_watch_t* self, okid_watch_state_t* out) {
-    *out = {self->at_work.order > 0, self->next.order > 0, self->high, self->ratio};
+    if (out == nullptr) return;
+    *out = {};
+    if (self != nullptr) *out = {self->at_work.order > 0, self->next.order > 0, self->high, self->ratio};
 }

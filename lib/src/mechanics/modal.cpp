@@ -136,6 +136,7 @@ okid_status_t okid_modal_analyse(const okid_model_t* model, double dt, okid_mode
 
 double okid_modal_mac(int32_t n, const okid_real_t* a_re, const okid_real_t* a_im, const okid_real_t* b_re,
                       const okid_real_t* b_im) {
+    if (a_re == nullptr || a_im == nullptr || b_re == nullptr || b_im == nullptr) return 0;
     okid_real_t aa = 0, bb = 0, re = 0, im = 0;
     for (int32_t i = 0; i < n; ++i) {
         aa += a_re[i] * a_re[i] + a_im[i] * a_im[i];

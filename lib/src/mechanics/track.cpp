@@ -301,6 +301,7 @@ okid_status_t okid_track_update(okid_tracks_t* self, int32_t count, const okid_r
 }
 
 void okid_track_jump(okid_tracks_t* self) {
+    if (self == nullptr) return;
     for (int k = self->count - 1; k >= 0; --k)
         if (self->track[k].number == 0) remove(*self, k);
     self->jumping = 1;

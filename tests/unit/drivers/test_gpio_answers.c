@@ -222,10 +222,8 @@ static void test_requests_that_are_refused(void) {
 
 static void test_edges_carry_host_time_and_losses(void) {
     drv_gpio_event_t events[4];
-    struct timespec now;
+    const int64_t at = INT64_C(5000000000); // since the computer began to run
     TEST_ASSERT_EQUAL_INT(0, drv_gpio_open_input(&line, &config));
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    const int64_t at = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
     world.edges[0] = (gpio_edge_t){at, DRV_GPIO_RISING, 0};
     world.edges[1] = (gpio_edge_t){at + 5000, DRV_GPIO_RISING, 2};
     world.edges[2] = (gpio_edge_t){at + 9000, DRV_GPIO_FALLING, 1};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Serial sources on a pseudo terminal: samples in, frames out; unplugged and plugged in again.
+#include <drv/host_clock.h>
 #include <drv/line_frame.h>
 #include <drv/serial_port.h>
 #include <drv/slcan.h>
@@ -13,7 +14,6 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <termios.h>
-#include <time.h>
 #include <unistd.h>
 #include <unity.h>
 
@@ -68,6 +68,8 @@ static void start(const drv_source_ops_t* ops, const drv_source_config_t* config
 
 static void say(const void* bytes, size_t count) { TEST_ASSERT_EQUAL_INT(count, write(far, bytes, count)); }
 
+enum { patience_ms = 600000 }; // only ends what would never end
+
 static void say_samples(uint32_t sequence, unsigned channels, unsigned samples, uint32_t time_us) {
     const drv_stream_header_t header = {DRV_STREAM_INT16, (uint8_t)channels, (uint8_t)samples, sequence, time_us};
     uint8_t wire[DRV_STREAM_ENCODED];
@@ -76,15 +78,15 @@ static void say_samples(uint32_t sequence, unsigned channels, unsigned samples, 
     say(wire, drv_stream_encode_codes(&header, codes, wire, sizeof wire));
 }
 
-/// Wait (2 s at most) until `count` frames have come.
+/// Wait until `count` frames have come.
 static void expect_frames(int count) {
     int got = 0;
-    for (int i = 0; i < 2000 && got < count; ++i) {
-        struct pollfd wait = {source.ops->fd(&source), POLLIN, 0};
-        poll(&wait, 1, 1);
+    while (got < count) {
         const int more = source.ops->read(&source, frames + got, 256 - got);
         TEST_ASSERT_TRUE(more >= 0);
         got += more;
+        struct pollfd wait = {source.ops->fd(&source), POLLIN, 0};
+        if (more == 0) TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, patience_ms));
     }
     TEST_ASSERT_EQUAL_INT(count, got);
 }
@@ -108,8 +110,10 @@ static int64_t counter(int frame) {
 static void test_packets_become_frames(void) {
     const drv_source_config_t config = settings(DRV_FRAMING_COBS);
     start(&drv_source_serial, &config);
+    const int64_t before = drv_host_time_ns();
     say_samples(100, 9, 4, 0xFFFFFF00);
     expect_frames(8);
+    const int64_t after = drv_host_time_ns();
     for (int i = 0; i < 8; ++i) {
         TEST_ASSERT_EQUAL_INT(i % 2, frames[i].id);
         TEST_ASSERT_EQUAL_INT64(100 + i / 2, counter(i));
@@ -118,10 +122,7 @@ static void test_packets_become_frames(void) {
         for (unsigned k = 0; k < (i % 2 ? 2 : 7); ++k)
             TEST_ASSERT_TRUE(field(i, (unsigned)i % 2 * 7 + k) == 1000 + i / 2 * 9 + i % 2 * 7 + (int)k);
     }
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    const int64_t age = (int64_t)now.tv_sec * 1000000000 + now.tv_nsec - frames[7].time_ns;
-    TEST_ASSERT_TRUE(age >= 0 && age < INT64_C(2000000000));
+    TEST_ASSERT_TRUE(frames[7].time_ns >= before - INT64_C(100000000) && frames[7].time_ns <= after);
     say_samples(104, 9, 1, 0x00000EA0); // the device's clock has wrapped
     expect_frames(2);
     TEST_ASSERT_EQUAL_INT64((INT64_C(0x100000000) + 0xEA0) * 1000, frames[0].hw_time_ns);
@@ -158,10 +159,7 @@ static void test_unplugged_and_back(void) {
         TEST_ASSERT_TRUE(stats.link_is_down);
         TEST_ASSERT_EQUAL_UINT64(round + 1, stats.link_down);
         plug_in();
-        for (int i = 0; i < 500 && source.ops->fd(&source) < 0; ++i) {
-            poll(NULL, 0, 5);
-            TEST_ASSERT_EQUAL_INT(0, source.ops->read(&source, frames, 256));
-        }
+        while (source.ops->fd(&source) < 0) TEST_ASSERT_EQUAL_INT(0, source.ops->read(&source, frames, 256));
         source.ops->stats(&source, &stats);
         TEST_ASSERT_EQUAL_UINT64(round + 1, stats.reopened);
         TEST_ASSERT_EQUAL_UINT64(0, stats.damaged);
@@ -260,7 +258,7 @@ static void test_the_line_is_raw_and_any_baud_is_taken(void) {
     size_t got = 0;
     while (got < 256) {
         struct pollfd wait = {port.fd, POLLIN, 0};
-        TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, 2000));
+        TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, patience_ms));
         got += (size_t)drv_serial_read(&port, back + got, sizeof back - got);
     }
     TEST_ASSERT_EQUAL_MEMORY(every, back, 256);
@@ -280,7 +278,7 @@ static void expect_said(const char* want) {
     size_t got = 0;
     while (got < strlen(want)) {
         struct pollfd wait = {far, POLLIN, 0};
-        TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, 2000));
+        TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, patience_ms));
         got += (size_t)read(far, text + got, sizeof text - 1 - got);
     }
     text[got] = '\0';
@@ -322,10 +320,7 @@ static void test_slcan_adapter(void) {
     unplug();
     while (source.ops->fd(&source) >= 0) source.ops->read(&source, frames, 256);
     plug_in();
-    for (int i = 0; i < 500 && source.ops->fd(&source) < 0; ++i) {
-        poll(NULL, 0, 5);
-        source.ops->read(&source, frames, 256);
-    }
+    while (source.ops->fd(&source) < 0) source.ops->read(&source, frames, 256);
     expect_said("\rC\rS6\rY2\rO\r"); // an adapter that was off must be told again
     say("t0010\r", 6);
     expect_frames(1);

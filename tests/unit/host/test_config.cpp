@@ -132,7 +132,7 @@ static void test_unknown_keys() {
 }
 
 static void test_wrong_types_and_ranges() {
-    refuse_change("rate_hz = 1000", "rate_hz = \"1000\"", {"line 2", "found \"1000\", expected a number above 0"});
+    refuse_change("rate_hz = 1000", "rate_hz = \"1000\"", {"line 2", "found \"1000\", expected a number from 1e-05"});
     refuse_change("rate_hz = 1000", "rate_hz = 0", {"found 0"});
     refuse_change("rate_hz = 1000", "rate_hz = nan", {"line 2", "rate_hz"});
     refuse_change("rate_hz = 1000", "", {"\"rate_hz\" is missing"});

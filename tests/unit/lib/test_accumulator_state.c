@@ -319,8 +319,67 @@ static void one_run_is_exported(void) {
     }
 }
 
+static uint32_t crc32_of(const uint8_t* at, size_t count) {
+    uint32_t crc = 0xFFFFFFFF;
+    for (size_t i = 0; i < count; ++i) {
+        crc ^= at[i];
+        for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (crc & 1 ? 0xEDB88320 : 0);
+    }
+    return ~crc;
+}
+
+/// 8 bytes at a place replaced, with the checksum that belongs to them.
+static okid_status_t with_bits(okid_accumulator_t* a, const uint8_t* good, size_t bytes, size_t at, uint64_t bits) {
+    uint8_t* changed = malloc(bytes);
+    memcpy(changed, good, bytes);
+    for (int i = 0; i < 8; ++i) changed[at + (size_t)i] = (uint8_t)(bits >> 8 * i);
+    const uint32_t crc = crc32_of(changed, bytes - 4);
+    for (int i = 0; i < 4; ++i) changed[bytes - 4 + (size_t)i] = (uint8_t)(crc >> 8 * i);
+    const okid_status_t status = okid_accumulator_deserialise(a, changed, bytes);
+    free(changed);
+    return status;
+}
+
+/// A checksum that is right says nothing of the numbers: not finite, negative counts, no square above 0.
+static void absurd_content_is_refused(void) {
+    const uint64_t infinite = 0x7FF0000000000000, nan = 0x7FF8000000000001, negative = 0xBFF0000000000000;
+    okid_accumulator_config_t config = okid_accumulator_defaults(1, 1, 2);
+    config.edges = 1;
+    const size_t size = okid_accumulator_memsize(&config);
+    void* block = malloc(size);
+    okid_accumulator_t* a = NULL;
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &config, block, size));
+    const double values[] = {1, 2, 3, 5, -1, 2, 4, 1, 0, 3, 2, 2, 7, 1, 1, 1};
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(a, values, 8));
+    const size_t bytes = okid_accumulator_serialised_size(a);
+    uint8_t* good = malloc(bytes);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(a, good, bytes));
+    const size_t header = 8 + 4 * 10 + 8, stats = sizeof(okid_accumulator_stats_t), scale = header + stats + 16 + 16;
+    const size_t x = scale + 8 * 4, slot = x + 8 * 4, sums = slot + 24;
+    TEST_ASSERT_EQUAL(OKID_OK, with_bits(a, good, bytes, slot + 8, 0));
+    for (size_t at = header; at < header + stats + 8; at += 8) // counts and clock
+        TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, with_bits(a, good, bytes, at, negative));
+    for (size_t at = scale; at + 8 < bytes; at += 8)
+        if (at < slot || at >= sums) {
+            TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, with_bits(a, good, bytes, at, infinite));
+            TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, with_bits(a, good, bytes, at, nan));
+        }
+    TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, with_bits(a, good, bytes, slot, negative)); // rows
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_deserialise(a, good, bytes));
+    TEST_ASSERT_EQUAL_INT64(6, okid_accumulator_rows(a)); // nothing was changed by what was refused
+    uint8_t* none = malloc(bytes);
+    memcpy(none, good, bytes);
+    for (int i = 0; i < 8; ++i)
+        none[sums + 8 * 4 + (size_t)i] = (uint8_t)(negative >> 8 * i); // the square of channel 0
+    TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, with_bits(a, none, bytes, sums + 8 * (6 + 5), negative)); // and of channel 1
+    free(none);
+    free(good);
+    free(block);
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(absurd_content_is_refused);
     RUN_TEST(bytes_go_on_bit_for_bit);
     RUN_TEST(damaged_bytes_change_nothing);
     RUN_TEST(constants_bound_the_memory);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Refinement from correlation sums beside that from the record: the same maximum, gaps, offsets, the deviations, wrong use.
+// Refinement from correlation sums beside that from the record: the same maximum, gaps, offsets, the deviations in any
+// states, wrong use.
 #include "modal_rig.h"
 #include "tolerance.h"
 
@@ -130,6 +131,60 @@ static void errors_scatter_as_the_draws_say(void) {
     TEST_ASSERT_TRUE(share > 0.6 && share < 1.6); // 72 squares: 1.0 +- 0.17
 }
 
+/// start in other states: the sign of one turned, or x' = T x of a random orthogonal T (plane rotations, then signs).
+static void turn_states(int states, uint64_t* seed) {
+    const int first = states < RIG_NZ ? states : 0;
+    for (int turn = 0; turn < (states < RIG_NZ ? 0 : 3 * RIG_NZ); ++turn) {
+        const int i = turn % RIG_NZ, j = (turn + 1 + turn / RIG_NZ) % RIG_NZ;
+        const double angle = 3 * rig_normal(seed), c = cos(angle), s = sin(angle);
+        for (int k = 0; k < RIG_NZ; ++k) {
+            const double x = (double)A[k + i * RIG_NZ], y = (double)A[k + j * RIG_NZ];
+            A[k + i * RIG_NZ] = (okid_real_t)(c * x - s * y);
+            A[k + j * RIG_NZ] = (okid_real_t)(s * x + c * y);
+        }
+        for (int k = 0; k < RIG_NZ; ++k) {
+            const double x = (double)A[i + k * RIG_NZ], y = (double)A[j + k * RIG_NZ];
+            A[i + k * RIG_NZ] = (okid_real_t)(c * x - s * y);
+            A[j + k * RIG_NZ] = (okid_real_t)(s * x + c * y);
+        }
+        const double x = (double)B[i], y = (double)B[j];
+        B[i] = (okid_real_t)(c * x - s * y);
+        B[j] = (okid_real_t)(s * x + c * y);
+        for (int o = 0; o < RIG_NY; ++o) {
+            const double p = (double)C[o + i * RIG_NY], q = (double)C[o + j * RIG_NY];
+            C[o + i * RIG_NY] = (okid_real_t)(c * p - s * q);
+            C[o + j * RIG_NY] = (okid_real_t)(s * p + c * q);
+        }
+    }
+    for (int k = 0; k < RIG_NZ; ++k) {
+        A[first + k * RIG_NZ] = -A[first + k * RIG_NZ];
+        A[k + first * RIG_NZ] = -A[k + first * RIG_NZ];
+    }
+    B[first] = -B[first];
+    for (int o = 0; o < RIG_NY; ++o) C[o + first * RIG_NY] = -C[o + first * RIG_NY];
+}
+
+/// Modes, gain and deviations do not know in which states the start was written.
+static void deviations_do_not_depend_on_the_states(void) {
+    double* v = rig_record(&rig, N, 0.05, NULL, 3);
+    double full[2 * RIG_MODES], deviation[2 * RIG_MODES], same[2 * RIG_MODES], other[2 * RIG_MODES];
+    const okid_correlation_sums_t sums = sums_of(v, 0, N, 0, L, OKID_DETREND_NONE);
+    uint64_t seed = 9;
+    make_refine(0, DRAWS);
+    for (int states = -1; states < RIG_NZ + 10; ++states) {
+        setUp();
+        if (states >= 0) turn_states(states, &seed);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_refine_from_correlation(self, &start, &sums, &found));
+        modes_of(found.A, found.C, states < 0 ? full : same);
+        deviations_of(states < 0 ? full : same, states < 0 ? deviation : other);
+        for (int k = 0; k < 2 * RIG_MODES && states >= 0; ++k) {
+            TEST_ASSERT_TRUE(fabs(same[k] - full[k]) < TOLERANCE(1e-5, 0.05) * deviation[k]);
+            TEST_ASSERT_TRUE(fabs(other[k] / deviation[k] - 1) < TOLERANCE(1e-7, 1e-2));
+        }
+    }
+    free(v);
+}
+
 static void a_moving_start_and_offsets_do_no_harm(void) {
     double x0[RIG_NZ] = {30, -20, 10, 10, -5, 8}, plain[2 * RIG_MODES], moved[2 * RIG_MODES];
     double* v = rig_record(&rig, N, 0.01, x0, 4);
@@ -175,6 +230,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(sums_and_record_find_the_same);
     RUN_TEST(errors_scatter_as_the_draws_say);
+    RUN_TEST(deviations_do_not_depend_on_the_states);
     RUN_TEST(a_moving_start_and_offsets_do_no_harm);
     RUN_TEST(wrong_use_is_refused);
     return UNITY_END();

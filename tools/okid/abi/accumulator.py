@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
+from okid.abi.arguments import state_bytes, whole
 from okid.abi.sums import Sums
+from okid.abi.turns import in_turn
 
 _SAMPLE = {0: abi.SAMPLE_DOUBLE, 16: abi.SAMPLE_INT16, 24: abi.SAMPLE_INT24, 32: abi.SAMPLE_INT32}
 
@@ -66,6 +68,8 @@ class Accumulator(Sums):
             )
         if saturated not in ("keep", "missing"):
             raise InputError(f"saturated is {saturated!r}, expected 'keep' or 'missing'")
+        for name, value in (("n_u", n_u), ("n_y", n_y), ("lags", lags)):
+            whole(name, value, 0, 65536)
         config = abi.AccumulatorConfig(
             n_u, n_y, lags, _SAMPLE[codes], block, slots, forgetting, int(edges), spare_slots,
             int(bulk and codes == 16 and block == 0), int(saturated == "missing"), buffer,
@@ -103,20 +107,20 @@ class Accumulator(Sums):
         A part of an unbroken record was fed with its own samples and the `lags` samples before them.
         Raises InputError when the two do not fit each other.
         """
-        abi.check(self._call("remove", self.handle, part.handle, weight), "remove")
+        abi.check(self._use_both("remove", part, weight), "remove")
 
     @property
     def slots(self) -> int:
         """Slots of the window that hold rows, the open one included; 1 without a window."""
-        return int(self._call("slots", self.handle))
+        return int(self._use("slots"))
 
     def slot_rows(self, k: int) -> int:
         """Regression rows in slot k, 0 = the oldest."""
-        return int(self._call("slot_rows", self.handle, k))
+        return int(self._use("slot_rows", k))
 
     def take_slots(self, window: Accumulator, first: int, count: int) -> None:
         """Add slots first .. first + count - 1 of a window to this accumulator, which has none itself."""
-        abi.check(self._call("take_slots", self.handle, window.handle, first, count), "take_slots")
+        abi.check(self._use_both("take_slots", window, first, count), "take_slots")
 
     def centre(self) -> None:
         """Take the offsets out of a finished record before it is merged with others: each channel less its own mean.
@@ -124,7 +128,7 @@ class Accumulator(Sums):
         Takes no samples any more afterwards, only merges with accumulators that are centred too.
         Raises InputError with a window, forgetting or without edges.
         """
-        abi.check(self._call("centre", self.handle), "centre")
+        abi.check(self._use("centre"), "centre")
 
     def run_sums(self, detrend: str = "mean") -> tuple[NDArray[np.float64], ...]:
         """S (p+1, m, m), head (p, m), tail (p, m), sum (m) of one unbroken run: see okid_accumulator_run().
@@ -134,19 +138,21 @@ class Accumulator(Sums):
         m, p = self.channels, self.lags
         sums, head, tail, total = np.empty((p + 1, m, m)), np.empty((p, m)), np.empty((p, m)), np.empty(m)
         out = abi.RunSums(*map(abi.pointer, (sums, head, tail, total)))
-        abi.check(self._call("run", self.handle, self._detrend(detrend), out), "run_sums")
+        abi.check(self._use("run", self._detrend(detrend), out), "run_sums")
         return sums.transpose(0, 2, 1), head, tail, total
 
+    @in_turn
     def to_bytes(self) -> bytes:
         """The whole state for a file or another machine: checked by a CRC, the same for every processor."""
-        out = np.empty(int(self._call("serialised_size", self.handle)), np.uint8)
-        abi.check(self._call("serialise", self.handle, out.ctypes.data, out.size), "to_bytes")
+        out = np.empty(int(self._use("serialised_size")), np.uint8)
+        abi.check(self._use("serialise", out.ctypes.data, out.size), "to_bytes")
         return out.tobytes()
 
     @staticmethod
     def from_bytes(data: bytes) -> Accumulator:
         """An accumulator that goes on where to_bytes() stood, bit for bit. InputError when the bytes are damaged."""
         config = abi.AccumulatorConfig()
+        data = state_bytes(data)
         abi.check(abi.library().okid_accumulator_peek(data, len(data), ctypes.byref(config)), "from_bytes")
         made = Accumulator(
             config.n_u, config.n_y, config.lags, codes=next(k for k, v in _SAMPLE.items() if v == config.sample),
@@ -158,7 +164,8 @@ class Accumulator(Sums):
 
     def restore(self, data: bytes) -> None:
         """Go back to a state of to_bytes() of an accumulator of the same configuration, else InputError."""
-        abi.check(self._call("deserialise", self.handle, data, len(data)), "restore")
+        data = state_bytes(data)
+        abi.check(self._use("deserialise", data, len(data)), "restore")
 
     @property
     def arguments(self) -> dict[str, Any]:

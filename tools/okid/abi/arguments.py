@@ -20,8 +20,20 @@ def choice(name: str, value: str, allowed: Sequence[str]) -> str:
     return value
 
 
-def whole(name: str, value: object, smallest: int) -> int:
-    """A whole number >= `smallest`."""
+MOST_SAMPLES = 1 << 62  # OKID_MOST_SAMPLES
+
+
+def state_bytes(value: object) -> bytes:
+    """What to_bytes() or snapshot() gave."""
+    if not isinstance(value, bytes | bytearray | memoryview):
+        raise InputError(f"the state is {type(value).__name__}, expected bytes, as to_bytes() gives them")
+    return bytes(value)
+
+
+def whole(name: str, value: object, smallest: int, largest: int | None = None) -> int:
+    """A whole number >= `smallest`, at most `largest`."""
+    if largest is not None and isinstance(value, int | np.integer) and int(value) > largest:
+        raise InputError(f"{name} is {str(value)[:40]}, expected a whole number from {smallest} to {largest}")
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or int(value) < smallest:
         raise InputError(f"{name} is {value!r}, expected a whole number >= {smallest}")
     return int(value)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from okid._errors import Error, IdentificationError, InputError
 from okid.abi.shared_object import load
+from okid.abi.turns import Inside
 
 _text, _handle, _status, _size = ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int32, ctypes.c_size_t
 _out, _sizes = ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(ctypes.c_size_t)
@@ -136,7 +137,8 @@ def error(code: int) -> Error:
 
 def call(name: str, *arguments: Any) -> int:
     """`okid_host_NAME(...)`. Raises error()."""
-    code: int = getattr(library(), f"okid_host_{name}")(*arguments)
+    with Inside():
+        code: int = getattr(library(), f"okid_host_{name}")(*arguments)
     if code != 0:
         raise error(code)
     return code

@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
+from okid.abi.arguments import state_bytes, whole
 from okid.abi.sums import Sums
+from okid.abi.turns import in_turn
 
 
 class Observer(NamedTuple):
@@ -54,6 +56,8 @@ class SquareRoot(Sums):
         spare_slots: int = 0,
         forgetting: float = 1.0,
     ) -> None:
+        for name, value in (("n_u", n_u), ("n_y", n_y), ("lags", lags)):
+            whole(name, value, 0, 65536)
         super().__init__(abi.SquareRootConfig(n_u, n_y, lags, batch, block, slots, spare_slots, forgetting))
 
     def add(self, samples: ArrayLike) -> int:
@@ -77,6 +81,7 @@ class SquareRoot(Sums):
         lower, mean = self._matrix("factor", detrend)
         return lower.T, mean
 
+    @in_turn
     def observer(self, detrend: str = "mean", *, ridge_min: float = 0.0, stabilise: bool = True) -> Observer:
         """Observer Markov parameters from the factor; `stabilise` False leaves an unstable ARX model as it is.
 
@@ -95,13 +100,15 @@ class SquareRoot(Sums):
         abi.check(status, "observer")
         return Observer(theta.T, innovation, *(float(getattr(info, name)) for name in Observer._fields[2:]))
 
+    @in_turn
     def snapshot(self) -> bytes:
         """The whole state as bytes: what memcpy would copy."""
         return self._memory().tobytes()
 
+    @in_turn
     def restore(self, snapshot: bytes) -> None:
         """Go back to a snapshot() of the same configuration. InputError when the size differs."""
-        memory = self._memory()
+        memory, snapshot = self._memory(), state_bytes(snapshot)
         if len(snapshot) != memory.size:
             raise InputError(f"the snapshot has {len(snapshot)} bytes, this accumulator {memory.size}")
         memory[:] = np.frombuffer(snapshot, dtype=np.uint8)

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import Error, InputError
-from okid.abi.arguments import unmasked, whole
+from okid.abi.arguments import MOST_SAMPLES, unmasked, whole
+from okid.abi.turns import Turn, both, in_turn
 from okid.shown.notebook_html import own_fields
 
 _ADD: dict[np.dtype[Any], str] = {  # what a C-contiguous array of samples goes to as it stands
@@ -39,12 +40,12 @@ class Stats(NamedTuple):
 
 
 class Sums:
-    """A kernel of the library in a block of memory; `kernel` is what its C functions begin with."""
+    """A kernel of the library in a block of memory; `kernel` is what its C functions begin with. Threads take turns."""
 
     kernel: ClassVar[str]
 
     def __init__(self, config: Any) -> None:
-        self._config = config
+        self._config, self._turn = config, Turn()
         size = int(self._call("memsize", ctypes.byref(config)))
         if size == 0:
             given = ", ".join(f"{name}={getattr(config, name)}" for name, *_ in config._fields_)
@@ -63,14 +64,25 @@ class Sums:
     def _call(self, verb: str, *arguments: Any) -> Any:
         return getattr(abi.library(), f"{self.kernel}_{verb}")(*arguments)
 
+    @in_turn
+    def _use(self, verb: str, *arguments: Any) -> Any:
+        """A call on the object itself. Error when it is closed."""
+        return self._call(verb, self.handle, *arguments)
+
+    def _use_both(self, verb: str, other: Sums, *arguments: Any) -> Any:
+        """A call on two objects."""
+        with both(self._turn, other._turn):
+            return self._call(verb, self.handle, other.handle, *arguments)
+
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    @in_turn
     def close(self) -> None:
-        """Give the memory back; any later use raises Error."""
+        """Give the memory back, behind a call that another thread is in; any later use raises Error."""
         self._block = None
 
     def _memory(self) -> NDArray[np.uint8]:
@@ -80,7 +92,7 @@ class Sums:
 
     @property
     def handle(self) -> ctypes.c_void_p:
-        """The object for calls into the C library; valid until close()."""
+        """The object for calls into the C library; valid until close(). Calls of your own on it take no turns."""
         self._memory()
         return self._handle
 
@@ -115,13 +127,15 @@ class Sums:
         if type(samples) is not np.ndarray or samples.ndim != 2 or samples.shape[1] != self._width:
             return None
         call = self._direct.get(samples.dtype)
-        if call is None or self._block is None:
+        if call is None:
             return None
         try:
             place = _Place.from_buffer(samples)  # type: ignore[arg-type]  # ndarray says so from Python 3.12 on
         except (TypeError, ValueError, BufferError):  # read-only, or not C-contiguous
             return None
-        status: int = call(self._handle, place, samples.shape[0])
+        with self._turn:
+            self._memory()
+            status: int = call(self._handle, place, samples.shape[0])
         return status if status >= 0 else abi.check(status, "add")
 
     def _samples(self, samples: ArrayLike) -> NDArray[Any]:
@@ -138,34 +152,34 @@ class Sums:
             raise InputError(f"samples are {given.dtype}, expected real numbers")
         if given.dtype == np.float32:
             single = np.ascontiguousarray(given)
-            return int(self._call("add_f32", self.handle, single.ctypes.data_as(abi.floats), len(single)))
+            return int(self._use("add_f32", single.ctypes.data_as(abi.floats), len(single)))
         real = np.ascontiguousarray(given, dtype=np.float64)
-        return int(self._call("add", self.handle, abi.pointer(real), len(real)))
+        return int(self._use("add", abi.pointer(real), len(real)))
 
     def _add_codes(self, given: NDArray[Any]) -> int:
         exact = np.ascontiguousarray(given)
         if given.dtype == np.int16:
-            return int(self._call("add_i16", self.handle, exact.ctypes.data_as(abi.int16s), len(exact)))
-        return int(self._call("add_i32", self.handle, exact.ctypes.data_as(abi.int32s), len(exact)))
+            return int(self._use("add_i16", exact.ctypes.data_as(abi.int16s), len(exact)))
+        return int(self._use("add_i32", exact.ctypes.data_as(abi.int32s), len(exact)))
 
     def gap(self, count: int = 0) -> None:
         """Mark `count` missing samples; 0 separates two records."""
-        self._call("gap", self.handle, whole("count", count, 0))
+        self._use("gap", whole("count", count, 0, MOST_SAMPLES))
 
     def merge(self, other: Self) -> None:
         """Add all of `other` as further records. InputError when the two do not fit each other."""
-        abi.check(self._call("merge", self.handle, other.handle), "merge")
+        abi.check(self._use_both("merge", other), "merge")
 
     def reset(self) -> None:
         """Forget everything but the units."""
-        self._call("reset", self.handle)
+        self._use("reset")
 
     def set_units(self, scale: ArrayLike, offset: ArrayLike | None = None) -> None:
         """value = scale * code + offset for each of the m channels, applied when a result is made."""
         factors, shift = self._each("scale", scale), None if offset is None else self._each("offset", offset)
         if np.any(factors == 0.0):
             raise InputError(f"scale is {scale!r}: a channel times 0 measures nothing")
-        self._call("set_units", self.handle, abi.pointer(factors), abi.pointer(shift))
+        self._use("set_units", abi.pointer(factors), abi.pointer(shift))
 
     def _each(self, name: str, given: ArrayLike) -> NDArray[np.float64]:
         """One finite number for all channels, or one for each."""
@@ -181,13 +195,13 @@ class Sums:
     def stats(self) -> Stats:
         """Counts since the start or the last reset."""
         raw = abi.AccumulatorStats()
-        self._call("stats", self.handle, ctypes.byref(raw))
+        self._use("stats", ctypes.byref(raw))
         return Stats(*(int(getattr(raw, name)) for name in Stats._fields))
 
     @property
     def rows(self) -> int:
         """Regression rows now in the sums."""
-        return int(self._call("rows", self.handle))
+        return int(self._use("rows"))
 
     def _detrend(self, name: str) -> int:
         if name not in _DETREND:
@@ -198,7 +212,7 @@ class Sums:
         size = self.channels * (self.lags + 1)
         out, mean = np.empty((size, size)), np.empty(self.channels)
         mode = self._detrend(detrend)
-        abi.check(self._call(verb, self.handle, mode, abi.pointer(out), abi.pointer(mean)), verb)
+        abi.check(self._use(verb, mode, abi.pointer(out), abi.pointer(mean)), verb)
         return out, mean
 
     def gram(self, detrend: str = "mean") -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -42,7 +42,8 @@ def _whole(spec: CampaignSpec, data: bytes) -> Accumulator:
 
 def shift_rows(spec: CampaignSpec, out: Outcome, groups: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """A row a group and mode; `groups`: rows of the table of groups, in the order of `out.groups`."""
-    on_disk = StateFolder(spec.folder, spec.sums_key).load()
+    state = StateFolder(spec.folder, spec.sums_key)
+    on_disk = state.load()
     by_series: dict[str, list[int]] = {}
     for k, (group, row) in enumerate(zip(out.groups, groups, strict=True)):
         if group.ident in out.done and row["time"] is not None and len(on_disk.get(group.ident, [])) == 1:
@@ -60,9 +61,9 @@ def shift_rows(spec: CampaignSpec, out: Outcome, groups: list[dict[str, Any]]) -
             ).tolist()
             blocks = []
             for low, high in pairwise(cuts):
-                block = _whole(spec, paths[training[low]].read_bytes())
+                block = _whole(spec, state.read(paths[training[low]]))
                 for k in training[low + 1 : high]:
-                    block.merge(_whole(spec, paths[k].read_bytes()))
+                    block.merge(_whole(spec, state.read(paths[k])))
                 blocks.append(block)
             test.learn(blocks)
         except Error as fault:
@@ -70,7 +71,7 @@ def shift_rows(spec: CampaignSpec, out: Outcome, groups: list[dict[str, Any]]) -
             continue
         for k, path in zip(order, paths, strict=True):
             try:
-                modes = test.test([_whole(spec, path.read_bytes())]).modes
+                modes = test.test([_whole(spec, state.read(path))]).modes
             except Error as fault:
                 out.remarks.append(f"{groups[k]['group']}: no change test: {fault}")
                 continue

@@ -45,7 +45,8 @@ def _parser() -> argparse.ArgumentParser:
                            epilog="example: okid-campaign run SPEC.toml --workers 8")  # fmt: skip
     run.add_argument("spec", metavar="SPEC.toml")
     run.add_argument("--workers", type=_positive, metavar="N", help="processes of the embedded cluster")
-    run.add_argument("--cluster", metavar="tcp://HOST:PORT", help="address of a running Dask scheduler")
+    run.add_argument("--cluster", nargs="?", const="", metavar="tcp://HOST:PORT",
+                     help="address of a running Dask scheduler of yours (default: that of the spec)")  # fmt: skip
     run.add_argument("--out", metavar="FOLDER", help="in place of [output] folder")
     run.add_argument("--quiet", action="store_true", help="faults only")
     check = kinds.add_parser("check", help="check the spec and list what it finds; no record is read",
@@ -109,7 +110,7 @@ def _load_about(folder: Path) -> tuple[dict[str, Any], Trend]:
         return about, Trend(**given)
     except InputError as fault:
         raise InputError(f"{fault}; expected the output folder of okid-campaign run") from None
-    except (ValueError, KeyError, TypeError) as fault:
+    except (ValueError, KeyError, TypeError, ArithmeticError) as fault:
         raise InputError(f"{path}: damaged: {fault}") from None
 
 
@@ -134,13 +135,25 @@ def _check(args: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
+def _scheduler(args: argparse.Namespace, spec: CampaignSpec) -> str | None:
+    """The Dask scheduler to use, None = the embedded cluster. It runs code here: a file alone does not choose it."""
+    if args.cluster is None and spec.address is not None and not args.workers:
+        raise InputError(
+            f'{spec.path}: [cluster], key "address": {spec.address!r} runs code on this computer: give --cluster if it '
+            "is a scheduler of yours, --workers N for the embedded cluster"
+        )
+    if args.cluster == "" and spec.address is None:
+        raise InputError(f'{spec.path}: --cluster without an address, and [cluster] has no "address"')
+    return None if args.cluster is None else args.cluster or spec.address
+
+
 def _run(args: argparse.Namespace, written: str) -> int:
     from okid.campaign.run import run_campaign
     from okid.campaign.tables import make_tables, write_tables
 
     spec = load_spec(args.spec)
     spec = replace(
-        spec, workers=args.workers or spec.workers, address=args.cluster or (None if args.workers else spec.address),
+        spec, workers=args.workers or spec.workers, address=_scheduler(args, spec),
         folder=Path(args.out) if args.out else spec.folder,
     )  # fmt: skip
     if spec.identification.method != "auto":

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import zlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +14,7 @@ from okid._errors import Error, IdentificationError
 from okid.abi.accumulator import Accumulator
 from okid.campaign.record_read import ReadRecord
 from okid.campaign.spec import FEWEST, CampaignSpec
+from okid.data.memory import decompressed
 from okid.identification.host_result import HostResult, identify
 from okid.identification.stream import HostStream, behind_refinement
 from okid.result.stabilization import of_identifiers
@@ -46,7 +46,7 @@ def _merged(spec: CampaignSpec, parts: Sequence[Accumulator], refinement: bytes)
     for part in parts:
         whole.merge(part.to_bytes())
     if refinement:
-        whole.merge(zlib.decompress(refinement))
+        whole.merge(decompressed(refinement))
     return whole
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The records of a campaign: patterns and URLs expanded by fsspec, with time, temperature and keys of each one."""
+"""The records of a campaign: patterns and URLs expanded, with time, temperature and keys of each one."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from okid._errors import InputError
+from okid.campaign.file_systems import is_remote, opened
 from okid.campaign.spec import CampaignSpec
 from okid.campaign.spec_keys import Place, nearest
 
 EXTENSIONS = (".npy", ".okj", ".log", ".csv", ".uff", ".unv", ".mf4", ".h5", ".hdf5", ".mat", ".parquet")
+_FIRST_S, _LAST_S = -62135596800, 253402300799  # years 1 to 9999
 _STAMPS = ("ETag", "etag", "mtime", "LastModified", "last_modified", "updated", "created")
 
 
@@ -50,22 +52,18 @@ def _stamp(info: dict[str, Any]) -> str:
 
 def _expanded(spec: CampaignSpec, pattern: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Name, URL and what the file system says of every file of a pattern."""
-    from fsspec.core import url_to_fs
-    from fsspec.implementations.local import LocalFileSystem
-
-    remote = "://" in pattern
-    place = pattern if remote else str((spec.base / pattern).absolute())
+    remote = is_remote(pattern)
     try:
-        fs, path = url_to_fs(place, **(spec.records.storage if remote else {}))
-        found = fs.glob(path, detail=True)
+        fs = opened(pattern, spec.records.storage)
+        found = fs.glob(pattern if remote else str((spec.base / pattern).absolute()), detail=True)
     except (OSError, ValueError, ImportError) as fault:
-        raise InputError(f'{spec.path}: [records], key "files": {pattern!r}: {fault}') from None
-    local = isinstance(fs, LocalFileSystem)
+        text = " ".join(str(fault).split())[:200]
+        raise InputError(f'{spec.path}: [records], key "files": {pattern!r}: {text}') from None
     base = spec.base.absolute()
     for path, info in found.items():
         if info.get("type") == "directory":
             continue
-        if local:
+        if not remote:
             here = Path(path)
             name = here.relative_to(base).as_posix() if here.is_relative_to(base) else here.as_posix()
             yield name, path, info
@@ -96,6 +94,8 @@ def _seconds(value: Any) -> float | None:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return None
     if isinstance(value, int | float):
+        if not _FIRST_S <= value <= _LAST_S:
+            raise ValueError(f"{value!r} s since 1970")
         return float(value)
     if isinstance(value, str):
         value = datetime.fromisoformat(value)
@@ -136,7 +136,7 @@ def _of_index(
     if spec.records.time == "index":
         try:
             time_s = _seconds(row[spec.records.index_time])
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             raise InputError(
                 f"its time in the index is {row[spec.records.index_time]!r}, expected a date and time"
             ) from None
@@ -182,11 +182,11 @@ def _modified(ref: RecordRef) -> float | None:
     """When the file was written, as the file system says."""
     for part in ref.stamp.split("|")[1:]:
         try:
-            return float(part)
+            return _seconds(float(part))
         except ValueError:
             try:
                 return _seconds(part)
-            except ValueError:
+            except (ValueError, OverflowError):
                 continue
     return None
 

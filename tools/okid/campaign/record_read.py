@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.campaign.file_systems import is_remote, opened
 from okid.campaign.spec import CampaignSpec
 from okid.data.input_file import read_input
+from okid.data.memory import load_npy, most_bytes, require_memory
 
 Real = NDArray[np.float64]
-_LARGEST = 4 << 30  # bytes of one record
 _WHOLE = 0.02  # of a code: how far a decoded number may lie from one
 _RANGE = {16: (-(2**15), 2**15 - 1), 24: (-(2**23), 2**23 - 1), 32: (-(2**31), 2**31 - 1)}
 
@@ -40,14 +41,11 @@ class ReadRecord:
 
 
 def _fetch(url: str, storage: dict[str, Any]) -> bytes:
-    if "://" not in url:
-        return read_input(url, _LARGEST)
-    import fsspec
-
-    with fsspec.open(url, "rb", **storage) as file:
-        data: bytes = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise InputError(f"larger than {_LARGEST} bytes")
+    if not is_remote(url):
+        return read_input(url, most_bytes())
+    with opened(url, storage).open(url, "rb") as file:
+        data: bytes = file.read(most_bytes() + 1)
+    require_memory(len(data), "its bytes")
     return data
 
 
@@ -59,7 +57,7 @@ def content_hash(url: str, storage: dict[str, Any]) -> str:
 @contextmanager
 def _as_file(url: str, data: bytes) -> Iterator[Path]:
     """A local file with these bytes: the record's own when it is local."""
-    if "://" not in url:
+    if not is_remote(url):
         yield Path(url)
         return
     with tempfile.TemporaryDirectory(prefix="okid-campaign-") as folder:
@@ -85,7 +83,7 @@ def read_one(spec: CampaignSpec, name: str, url: str) -> ReadRecord:
         raise InputError(_about(name, url, str(fault))) from None
     except OSError as fault:
         raise Unreachable(f"{name}: {fault.strerror or fault}") from None
-    except (ValueError, EOFError, KeyError, ImportError) as fault:
+    except (ValueError, EOFError, KeyError, ImportError, ArithmeticError) as fault:
         raise InputError(f"{name}: not a record, or damaged: {' '.join(str(fault).split())[:160]}") from None
     if len(samples) == 0:
         raise InputError(f"{name}: holds no samples")
@@ -105,7 +103,7 @@ def _mean(values: NDArray[Any], scale: float, offset: float) -> float | None:
 
 
 def _of_array(spec: CampaignSpec, data: bytes) -> tuple[NDArray[Any], float | None]:
-    array = np.load(io.BytesIO(data), allow_pickle=False)
+    array = load_npy(io.BytesIO(data), len(data))
     columns = spec.channels.columns
     if array.ndim != 2 or array.shape[1] != len(columns):
         raise InputError(f"holds an array {array.shape}, expected (samples, {len(columns)}): {', '.join(columns)}")

@@ -19,6 +19,7 @@ from okid.campaign.pieces import part_of
 from okid.campaign.record_list import RecordRef
 from okid.campaign.record_read import ReadRecord, read_one
 from okid.campaign.spec import CampaignSpec
+from okid.data.memory import decompressed
 from okid.identification.stream import HostStream, behind_refinement
 
 _TRIED = 8  # records
@@ -64,7 +65,7 @@ class Refining:
         self._spec, self._one, self._all = spec, None, None
         if spec.plan:
             self._one, self._all = _stream(spec), _stream(spec, states_only=True)
-            self._one.restore(zlib.decompress(spec.plan))
+            self._one.restore(decompressed(spec.plan))
 
     def add(self, record: ReadRecord) -> None:
         """All of a record."""
@@ -72,13 +73,13 @@ class Refining:
             return
         self._one.reset()
         _feed(self._spec, record, self._one)
-        self._all.merge(zlib.decompress(_alone(self._one.state())))
+        self._all.merge(decompressed(_alone(self._one.state())))
 
     def merge(self, packed: Iterable[bytes]) -> Refining:
         """What packed() gave."""
         for one in packed:
             if self._all is not None and one:
-                self._all.merge(zlib.decompress(one))
+                self._all.merge(decompressed(one))
         return self
 
     def packed(self) -> bytes:

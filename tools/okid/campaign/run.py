@@ -162,7 +162,7 @@ class _Run:
         for ident, files in on_disk.items():
             if ident not in known:
                 for path, _ in files:
-                    path.unlink()
+                    self.state.remove(path)
                 self.out.remarks.append(
                     f"a group of an earlier run has no record any more: its sums were removed ({ident})"
                 )
@@ -174,7 +174,7 @@ class _Run:
                 if still_valid(header, records, changed):
                     plan.files.append((path, header))
                 else:
-                    path.unlink()
+                    self.state.remove(path)
                     self.out.remarks.append(
                         f"{group.label}: records were changed, removed or added to finished sums: read again"
                     )
@@ -277,7 +277,7 @@ class _Run:
         if what[0] != "batch":
             ident, files = what[1], what[-1]
             for path in files:
-                path.unlink(missing_ok=True)
+                self.state.remove(path)
             self.out.faults[ident] = f"its sums could not be merged and were removed, run again to read it: {reason}"
             return
         slices: list[Slice] = what[1]
@@ -317,7 +317,7 @@ class _Run:
         if len(split.files) > 1:
             files = sorted(split.files)
             self.submit(
-                ("merge", ident, 0, leaf, files), merge_batch, [path.read_bytes() for path in files], priority=10
+                ("merge", ident, 0, leaf, files), merge_batch, [self.state.read(path) for path in files], priority=10
             )
             return
         self.trees[ident].nodes[0, leaf] = split.files[0] if split.files else None
@@ -337,10 +337,10 @@ class _Run:
         elif top and self.reusable(tree, files):
             self.out.done[ident] = tree.plan.files[0][1]
         elif top:
-            self.submit(("finish", ident, files), finish_group, [path.read_bytes() for path in files], priority=20)
+            self.submit(("finish", ident, files), finish_group, [self.state.read(path) for path in files], priority=20)
         elif len(files) > 1:
             what = ("merge", ident, level + 1, parent, files)
-            self.submit(what, merge_batch, [path.read_bytes() for path in files], priority=10)
+            self.submit(what, merge_batch, [self.state.read(path) for path in files], priority=10)
         else:
             tree.nodes[level + 1, parent] = files[0] if files else None
             self.climb(ident, level + 1, parent)

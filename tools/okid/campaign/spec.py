@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from okid._errors import InputError
+from okid.campaign.file_systems import is_remote, protocol_of, storage_fault
 from okid.campaign.spec_keys import Place, check_keys, nearest
 from okid.data.input_file import parse_toml, read_input
 
@@ -231,8 +232,20 @@ class _Reader:
         for key in ("index", "config"):
             if key in table and not (self.path.parent / table[key]).is_file():
                 place.refuse(key, f"found {table[key]!r}, expected a file: {self.path.parent / table[key]} is none")
+        self.check_places(table, place)
         table["files"] = tuple(table["files"])
         return Sources(**table)
+
+    @staticmethod
+    def check_places(table: dict[str, Any], place: Place) -> None:
+        """Only file systems that run no code of a file, with options that do not either."""
+        for pattern in filter(is_remote, table["files"]):
+            try:
+                protocol = protocol_of(pattern)
+            except InputError as fault:
+                place.refuse("files", f"found {pattern!r}: {fault}")
+            if wrong := storage_fault(protocol, table.get("storage", {})):
+                place.refuse("storage", wrong)
 
     @staticmethod
     def name_groups(table: dict[str, Any]) -> tuple[str, ...]:

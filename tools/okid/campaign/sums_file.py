@@ -12,7 +12,6 @@ import struct
 import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from okid._errors import InputError
@@ -20,7 +19,8 @@ from okid.abi.accumulator import Accumulator
 from okid.campaign.pieces import empty_sums, fold, folds
 from okid.campaign.refinement import Refining
 from okid.campaign.spec import CampaignSpec
-from okid.data.whole_file import safe_part
+from okid.data.input_file import parse_json
+from okid.data.memory import decompressed
 
 _MAGIC, HEAD = b"OKIDSUM1", struct.Struct("<8sII")
 _LIVE = 64 << 20  # bytes of accumulators that stay unpacked while parts are collected
@@ -68,7 +68,7 @@ class GroupSums:
             header = data[HEAD.size : HEAD.size + length]
             if magic != _MAGIC or zlib.crc32(header) != crc:
                 raise ValueError("wrong magic or checksum")
-            given, at, parts = json.loads(header), HEAD.size + length, {}
+            given, at, parts = _checked(parse_json(header.decode("utf-8"))), HEAD.size + length, {}
             for part, size in given["parts"]:
                 if parts_bytes is None:
                     parts[int(part)] = data[at : at + size]
@@ -82,8 +82,21 @@ class GroupSums:
                 given["group"], int(given["lags"]), given["records"], parts, given["result"], given["left_out"],
                 refinement, given["merged"],
             )  # fmt: skip
-        except (ValueError, KeyError, TypeError, struct.error) as fault:
+        except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, struct.error) as fault:
             raise InputError(f"{source}: sums of a campaign are damaged: {fault}") from None
+
+
+def _checked(given: dict[str, Any]) -> dict[str, Any]:
+    """A header whose checksum is right may still hold anything. ValueError, or what a wrong type raises."""
+    facts = [one["name"] for one in [*given["records"], *given["left_out"]]]
+    sizes = [size for _, size in given["parts"]] + [given.get("refinement", 0)]
+    if not all(isinstance(one, str) for one in [given["group"], *facts]):
+        raise ValueError("a name is no text")
+    if not all(type(size) is int and size >= 0 for size in sizes):
+        raise ValueError("a size is no size")
+    if given["result"] is not None and not isinstance(given["result"]["model_key"], str):
+        raise ValueError("the result is of no settings")
+    return given
 
 
 def pack(sums: Accumulator) -> bytes:
@@ -94,7 +107,7 @@ def pack(sums: Accumulator) -> bytes:
 def unpack(data: bytes) -> Accumulator:
     """InputError when the bytes are damaged."""
     try:
-        return Accumulator.from_bytes(zlib.decompress(data))
+        return Accumulator.from_bytes(decompressed(data, what="sums of a campaign"))
     except zlib.error as fault:
         raise InputError(f"sums of a campaign are damaged: {fault}") from None
 
@@ -167,9 +180,3 @@ def whole_of(spec: CampaignSpec, lags: int, parts: Iterable[Accumulator]) -> Acc
     for part in parts:
         whole.merge(part)
     return whole
-
-
-def write_sums(path: Path, sums: GroupSums) -> None:
-    """Whole or not at all: temporary file, then rename."""
-    with safe_part(path) as part:
-        part.write_bytes(sums.to_bytes())

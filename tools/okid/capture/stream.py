@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from okid._errors import InputError
 from okid.abi import host
+from okid.abi.turns import Turn, in_turn
 from okid.capture.config import BusConfig, CaptureConfig, load_config
 
 if TYPE_CHECKING:
@@ -134,6 +135,7 @@ class Capture:
         options.duration_s = duration or 0.0
         options.trigger_ns = 0 if trigger_at is None else round(trigger_at * 1e6) * 1000
         self._handle: ctypes.c_void_p | None = None
+        self._turn = Turn()
         self._told: list[dict[str, Any]] = []
         read, made = ctypes.c_void_p(), ctypes.c_void_p()
         host.call("config_load", os.fsencode(self.config.path), None, ctypes.byref(read))
@@ -146,6 +148,7 @@ class Capture:
         self._only = next(iter(self._of_interface.values())) if len(self._of_interface) == 1 else None
         self._serial = next((n for n, bus in enumerate(self.config.buses) if bus.serial or bus.type == "slcan"), 0)
 
+    @in_turn
     def close(self) -> None:
         """Give the memory back; without finish() there is no result."""
         if self._handle is not None:
@@ -164,8 +167,8 @@ class Capture:
         self.close()
 
     def __del__(self) -> None:
-        if getattr(self, "_handle", None) is not None:
-            self.close()
+        if getattr(self, "_handle", None) is not None:  # without its turn: nobody else knows of it any more
+            host.library().okid_host_capture_delete(self._handle)
 
     def use_bus(self, bus: BusConfig) -> None:
         """All that comes is of this one; else a message tells by its `channel` whose it is."""
@@ -182,37 +185,45 @@ class Capture:
         ]
         return self.push_frames(np.concatenate(parts)) if parts else None
 
+    @in_turn
     def push_frames(self, frames: NDArray[Any]) -> None:
         """An array of FRAME, in the order in which they came; `bus` is the place of the [[bus]] in the config."""
         given = np.ascontiguousarray(frames, FRAME)
         host.call("capture_frames", self._open(), given.ctypes.data, given.size)
 
+    @in_turn
     def push_bytes(self, data: bytes, time_s: float | None = None) -> None:
         """Bytes of a serial line, in any pieces, and when they came; None = out of a file: by the node's clock, else
         one sample after the other."""
         stamp = 0 if time_s is None else round(time_s * 1e6) * 1000
         host.call("capture_bytes", self._open(), self._serial, data, len(data), stamp)
 
+    @in_turn
     def link(self, up: bool, bus: int = 0) -> None:
         """The bus went away, or is back: what is lost between has the cause link_down."""
         host.call("capture_link", self._open(), bus, up)
 
+    @in_turn
     def lost(self, socket_overflow: int = 0, driver: int = 0, bus: int = 0) -> None:
         """Frames that the source itself counted as lost, since the beginning."""
         host.call("capture_lost", self._open(), bus, socket_overflow, driver)
 
+    @in_turn
     def trigger(self, time_s: float) -> None:
         """The edge of a trigger line, s since 1970."""
         host.call("capture_edge", self._open(), round(time_s * 1e9))
 
+    @in_turn
     def serve(self) -> None:
         """While nothing comes: trigger lines, lamps and journals are looked after. Ten times a second."""
-        host.call("capture_serve", self._handle)
+        host.call("capture_serve", self._open())
 
+    @in_turn
     def open(self, log: str | Path) -> None:
         """A `candump -L` log or a journal, for play()."""
         host.call("capture_open", self._open(), os.fsencode(log))
 
+    @in_turn
     def play(self, frames: int) -> int:
         """The next frames of the log; fewer than asked for = its end, or done. Returns how many."""
         played = ctypes.c_size_t()
@@ -220,10 +231,12 @@ class Capture:
         return played.value
 
     @property
+    @in_turn
     def done(self) -> bool:
         """As many samples or hits as were asked for have come."""
         return bool(host.library().okid_host_capture_done(self._open()))
 
+    @in_turn
     def take(self, *, raw: bool = False, every: bool = False) -> list[Real]:
         """Blocks of samples that wait, in order. raw: numbers as they stand in the frames; every: channels of role aux
         too. A long silence is one block of NaN that takes no memory."""
@@ -241,12 +254,14 @@ class Capture:
                 block = np.ctypeslib.as_array(rows.rows, (rows.count, width))
                 out.append(block[:, :shown].copy())
 
+    @in_turn
     def events(self) -> list[dict[str, Any]]:
         """Events since the last call, as `okid run --events` writes them."""
         lines = host.library().okid_host_capture_events(self._open()).decode()
         told, self._told = self._told, []
         return told + [text_of_json.loads(line) for line in lines.splitlines()]
 
+    @in_turn
     def stats(self) -> dict[str, Any]:
         """The counts by now, as a stats event."""
         text = host.library().okid_host_capture_stats(self._open())
@@ -263,11 +278,12 @@ class Capture:
         """Channels of which nothing came."""
         return [name for name, one in self.stats()["channel"].items() if one["received"] == 0]
 
+    @in_turn
     def finish(self) -> dict[str, Any] | None:
         """The stream ends: the last samples can be taken. Returns okid.result/1, None without identification.
 
         Raises IdentificationError when no model can be had.
         """
-        host.call("capture_finish", self._handle)
+        host.call("capture_finish", self._open())
         self._told = self.events()
         return next((event["result"] for event in self._told[-1:] if event["type"] == "result"), None)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import stat
@@ -75,12 +76,39 @@ def _too_deep(value: Any) -> bool:
     return True
 
 
-def parse_json(text: str, **options: Any) -> Any:
-    """json.loads() with bounded nesting. json.JSONDecodeError also where the nesting is deeper than DEEPEST."""
+_LONG = re.compile(r"\d{300}|[eE]\+?0*[1-9]\d\d")  # a number that may be beyond what is finite
+_HALF = re.compile(r"\\u[dD][89a-fA-F]")  # of a letter
+
+
+def _no_number(text: str) -> float:
+    raise ValueError(f"found {text}, expected a number or null")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    return value if math.isfinite(value) else _no_number(text[:20])
+
+
+def _whole_number(text: str) -> int:
+    return int(text) if len(text) < 300 else int(_no_number(f"a number of {len(text)} digits"))
+
+
+def parse_json(text: str) -> Any:
+    """json.loads() of what may stand in a file of somebody else. json.JSONDecodeError also where the nesting is deeper
+    than DEEPEST, where a number is not finite or has hundreds of digits, and where a text has half of a letter."""
+    exact: dict[str, Any] = {"parse_float": _finite, "parse_int": _whole_number} if _LONG.search(text) else {}
     try:
-        value = json.loads(text, **options)
+        value = json.loads(text, parse_constant=_no_number, **exact)
+        if _HALF.search(text):
+            json.dumps(value, ensure_ascii=False).encode("utf-8")
+    except json.JSONDecodeError:
+        raise
     except RecursionError:
         value, deep = None, True
+    except UnicodeEncodeError:
+        raise json.JSONDecodeError("half of a letter (a lone surrogate)", text, 0) from None
+    except ValueError as fault:
+        raise json.JSONDecodeError(str(fault), text, 0) from None
     else:
         deep = isinstance(value, dict | list) and _too_deep(value)
     if deep:
@@ -111,7 +139,13 @@ def _toml_too_deep(text: str) -> bool:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """tomllib.loads() with bounded nesting. tomllib.TOMLDecodeError also where the nesting is deeper than DEEPEST."""
+    """tomllib.loads() with bounded nesting. tomllib.TOMLDecodeError also where the nesting is deeper than DEEPEST, and
+    where a number has thousands of digits."""
     if _toml_too_deep(text):
         raise tomllib.TOMLDecodeError(f"nested deeper than {DEEPEST} levels")
-    return tomllib.loads(text)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError as fault:  # of int(), which has a limit
+        raise tomllib.TOMLDecodeError(str(fault)) from None

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from okid._errors import InputError
 from okid.abi import host
 from okid.abi.arguments import unmasked
+from okid.data.input_file import parse_json
 from okid.shown.notebook_html import own_fields
 
 Real = NDArray[np.float64]
@@ -104,7 +105,7 @@ def _name_fault(names: Sequence[str]) -> str | None:
     for name in names:
         if not name or name != name.strip() or not name.isprintable():
             return f"{name!r} is no channel name: expected printable characters without blanks at the ends"
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
     return f"the channel name {twice[0]!r} stands twice" if twice else None
 
 
@@ -186,7 +187,8 @@ class Record:
     def labels(self) -> tuple[list[str], list[str]]:
         """Names without the unit they carry ("force" of "force [N]", where that stays unique), and the units."""
         base = [_base(name) if unit and unit_of_name(name) == unit else name for name, unit in self._pairs()]
-        sure = [b if b and base.count(b) == 1 else name for b, name in zip(base, self.names, strict=True)]
+        count = Counter(base)
+        sure = [b if b and count[b] == 1 else name for b, name in zip(base, self.names, strict=True)]
         return sure, list(self.units)
 
     def about(self) -> dict[str, Any]:
@@ -212,7 +214,7 @@ class Record:
                 list(about.get("dofs") or []), {str(k): str(v) for k, v in (about.get("notes") or {}).items()},
                 list(remarks),
             )  # fmt: skip
-        except (KeyError, TypeError, ValueError, AttributeError) as fault:
+        except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as fault:
             if isinstance(fault, InputError):
                 raise
             raise InputError(f"description of the record is damaged: {type(fault).__name__}: {fault}") from None
@@ -281,7 +283,7 @@ def _stated(comments: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
     if line is None:
         return {}
     try:
-        about = json.loads(line.split(":", 1)[1])
+        about = parse_json(line.split(":", 1)[1])
     except ValueError:
         return {}
     known = about.get("names")

@@ -15,11 +15,14 @@ from typing import Any
 import can
 
 from okid._errors import InputError
+from okid.formats.blf_containers import check_blf
 from okid.formats.bus_mdf4 import bus_number, write_bus_mdf4
 from okid.formats.candump_text import log_line
 from okid.formats.foreign_library import Complaints, library, listening, reading, writing
 from okid.formats.log_names import FRAME_CSV_HEAD, LOG_EXTENSIONS, is_frame_csv
 from okid.formats.mdf4 import quiet_asammdf
+from okid.formats.mdf4_blocks import check_mdf4
+from okid.formats.sqlite_log import sqlite_frames
 
 _LINE = re.compile(
     r"\((?P<time>\d+(?:\.\d+)?)\)[ \t]+(?P<bus>[!-~]+)[ \t]+(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#"
@@ -34,6 +37,9 @@ _SHOWN = re.compile(
     r"(?P<data>(?:[ \t]+[0-9A-Fa-f]{2})*)(?P<remote>[ \t]+remote request)?(?:[ \t]+ERRORFRAME)?(?:[ \t]+'.*')?"
 )
 _FORMS = "(seconds) interface ID#data, ID##flags data or ID#R, as candump -L writes it, or what candump -t a shows"
+
+
+_LAST_S = 9e9  # 2255: what the nanoseconds of a journal hold
 
 
 def _cannot_hold(extension: str, frame: can.Message) -> str | None:
@@ -146,7 +152,14 @@ def _bus_name(extension: str, channel: Any) -> str:
 
 
 def _whole(frame: can.Message, number: int) -> can.Message:
-    """The frame if it holds as many bytes as it says."""
+    """The frame if it is one: a time, an identifier of its kind, as many bytes as it says."""
+    if not (isinstance(frame.timestamp, int | float) and 0 <= frame.timestamp < _LAST_S):
+        raise InputError(f"frame {number} has the time {frame.timestamp!r}, expected seconds from 0 to {_LAST_S:g}")
+    most = 0x1FFFFFFF if frame.is_extended_id else 0x7FF
+    if not 0 <= frame.arbitration_id <= most:
+        raise InputError(f"frame {number} has the identifier {frame.arbitration_id:X}, expected 0 to {most:X}")
+    if not 0 <= frame.dlc <= 64 or len(frame.data or b"") > 64:
+        raise InputError(f"frame {number} has {frame.dlc} bytes, expected at most 64")
     if not frame.is_remote_frame and not frame.is_error_frame:
         if len(frame.data) < frame.dlc:
             raise InputError(
@@ -189,6 +202,13 @@ def read_log(path: str | Path, remarks: list[str] | None = None) -> Iterator[can
 
 def _library_frames(path: str | Path, extension: str) -> Iterator[can.Message]:
     options: dict[str, Any] = {"relative_timestamp": False} if extension == ".asc" else {}
+    if extension == ".db":
+        yield from sqlite_frames(path)
+        return
+    if extension == ".blf":
+        check_blf(path)
+    if extension == ".mf4":
+        check_mdf4(path)
     with can.LogReader(path, **options) as reader:
         stated = getattr(reader, "file_size", None)
         if extension == ".blf" and isinstance(stated, int) and stated > Path(path).stat().st_size:

@@ -17,6 +17,7 @@ from okid._errors import InputError
 from okid.abi import host
 from okid.data.whole_file import whole_file
 from okid.formats.foreign_library import library, reading, writing
+from okid.formats.hdf5_file import hdf5_file
 from okid.formats.uff_function import FRF, ROLE_CODES, UffFunction, function_bytes
 from okid.frf import Frf
 
@@ -51,8 +52,7 @@ def _read_tables(paths: Sequence[str | Path]) -> Frf:
 
 
 def _read_hdf5(path: str | Path) -> Frf:
-    h5py = library("h5py", "HDF5")
-    with reading(path, "an HDF5 file"), h5py.File(path, "r") as file:
+    with reading(path, "an HDF5 file"), hdf5_file(path) as (_, file):
         missing = [name for name in ("frequency_hz", "response") if name not in file]
         if missing:
             raise InputError(f"no dataset {missing[0]!r}, expected frequency_hz (lines,) and response (lines, outputs, "

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.data.input_file import parse_json
 from okid.data.records import Record
 from okid.formats.channel_arrays import record_of_arrays, stated_rate
 from okid.formats.foreign_library import library, reading, writing
+from okid.formats.hdf5_file import hdf5_file
 from okid.formats.result_tree import result_dict, result_tree
 from okid.result.result import Result
 
@@ -135,8 +136,7 @@ def read_hdf5(path: str | Path, group: int | str | None = None) -> Record:
     (Hz) or dt (s), else a dataset t, time .. (s), give the rate; attributes unit(s) the units. InputError when h5py
     is missing, the file is damaged, or lengths or rates differ.
     """
-    h5py = library("h5py", "HDF5")
-    with reading(path, "an HDF5 file"), h5py.File(path, "r") as file:
+    with reading(path, "an HDF5 file"), hdf5_file(path) as (h5py, file):
         schema = file.attrs.get("schema")
         if schema == "okid.record/1" and group is None:
             return _own(file)
@@ -156,8 +156,7 @@ def read_hdf5(path: str | Path, group: int | str | None = None) -> Record:
 
 def read_hdf5_result(path: str | Path) -> dict[str, Any]:
     """The okid.result/1 dictionary that write_hdf5() stored. InputError when the file holds none."""
-    h5py = library("h5py", "HDF5")
-    with reading(path, "an HDF5 file"), h5py.File(path, "r") as file:
+    with reading(path, "an HDF5 file"), hdf5_file(path) as (_, file):
         if file.attrs.get("schema") != "okid.result/1" or "json" not in file:
             raise InputError("holds no okid.result/1")
-        return result_dict(json.loads(_text(file["json"][()])))
+        return result_dict(parse_json(_text(file["json"][()])))

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import os
+import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,15 +15,19 @@ from numpy.typing import NDArray
 from scipy.io import loadmat, savemat
 
 from okid._errors import InputError
+from okid.data.input_file import LARGEST, parse_json
+from okid.data.memory import decompressed, most_bytes
 from okid.data.records import Record
 from okid.formats.channel_arrays import record_of_arrays, stated_rate
-from okid.formats.foreign_library import library, reading, writing
+from okid.formats.foreign_library import reading, writing
+from okid.formats.hdf5_file import hdf5_file
 from okid.formats.mat_exports import exported, texts
 from okid.formats.result_tree import result_dict, result_tree
 from okid.result.result import Result
 
 _SIGNATURE_73 = b"\x89HDF\r\n\x1a\n"
 _MOST_BYTES = 2**31 - 1  # of one variable in version 5
+_HEAD_5, _COMPRESSED = 128, 15  # bytes above the variables; kind of a compressed one
 _MOST_LEVELS = 8  # of structs and cells within each other
 
 
@@ -81,7 +87,22 @@ def _value_5(value: Any, level: int = 0) -> Any:
     return made[0] if len(made) == 1 else made
 
 
+def _check_5(path: str | Path) -> None:
+    """The compressed variables of version 5 are counted before scipy decompresses them whole."""
+    with open(path, "rb") as file:
+        head = file.read(_HEAD_5)
+        order = {b"IM": "<", b"MI": ">"}.get(head[126:128])
+        whole = 0
+        while order and len(tag := file.read(8)) == 8:
+            kind, size = struct.unpack(f"{order}II", tag)
+            if kind != _COMPRESSED:
+                file.seek(size, os.SEEK_CUR)
+                continue
+            whole += len(decompressed(file.read(min(size, LARGEST)), most_bytes() - whole, "its compressed variables"))
+
+
 def _variables_5(path: str | Path) -> dict[str, Any]:
+    _check_5(path)
     return {key: _value_5(value) for key, value in loadmat(path, appendmat=False).items() if not key.startswith("__")}
 
 
@@ -112,8 +133,7 @@ def _value_73(file: Any, item: Any, level: int = 0) -> Any:
 
 
 def _variables_73(path: str | Path) -> dict[str, Any]:
-    h5py = library("h5py", "MATLAB 7.3")
-    with h5py.File(path, "r") as file:
+    with hdf5_file(path, "MATLAB 7.3") as (_, file):
         return {key: _value_73(file, file[key]) for key in file if not key.startswith("#")}
 
 
@@ -141,7 +161,7 @@ def read_mat(path: str | Path, group: int | str | None = None) -> Record:
         variables = _variables_73(path) if _is_73(path) else _variables_5(path)
         own = texts(variables["okid_record"]) if "okid_record" in variables else None
         if own and group is None:
-            return Record.described(variables["samples"], json.loads("".join(own)))
+            return Record.described(variables["samples"], parse_json("".join(own)))
         if "okid_result" in variables and group is None:
             raise InputError("holds an identified model, expected measured samples")
         foreign = exported(variables, group)
@@ -166,4 +186,4 @@ def read_mat_result(path: str | Path) -> dict[str, Any]:
         found = texts(variables["okid_result"]) if "okid_result" in variables else None
         if not found:
             raise InputError("holds no okid.result/1")
-        return result_dict(json.loads("".join(found)))
+        return result_dict(parse_json("".join(found)))

@@ -7,6 +7,7 @@ Structs come as dictionaries, arrays of structs as lists of them, texts and cell
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -66,8 +67,10 @@ def _labels(value: Any, count: int, *path: str) -> list[str]:
 
 def _unique(names: list[str], instead: Callable[[int], str]) -> list[str]:
     """The names, those that stand twice with what tells them apart."""
-    told = [name if names.count(name) == 1 else instead(k) for k, name in enumerate(names)]
-    return [name if told.count(name) == 1 else f"{name} {k + 1}" for k, name in enumerate(told)]
+    count = Counter(names)
+    told = [name if count[name] == 1 else instead(k) for k, name in enumerate(names)]
+    count = Counter(told)
+    return [name if count[name] == 1 else f"{name} {k + 1}" for k, name in enumerate(told)]
 
 
 # Testlab

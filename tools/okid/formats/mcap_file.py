@@ -12,7 +12,7 @@ import json
 import os
 import re
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
@@ -20,11 +20,14 @@ from typing import IO, Any
 import numpy as np
 
 from okid._errors import InputError
+from okid.data.input_file import parse_json
+from okid.data.memory import require_memory, require_samples
 from okid.data.records import Record
 from okid.formats.foreign_library import library, reading, writing
 
 SIGNALS = "/signals"
 _ABOUT = "okid.record/1"
+_ROW, _NUMBER = 200, 40  # bytes that a message and a number of it take while a file is read
 _TIME = {
     "type": "object",
     "title": "time",
@@ -168,6 +171,32 @@ def nanoseconds(when: datetime) -> int:
     return (since.days * 86400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
 
 
+def _records(stream: Any, kinds: Any, source: IO[bytes], size: int) -> Iterator[Any]:
+    """The records of a file of `size` bytes; a chunk is decompressed by count, not by what it states."""
+    for one in stream.StreamReader(source, emit_chunks=True, record_size_limit=size).records:
+        if not isinstance(one, kinds.Chunk):
+            yield one
+            continue
+        require_memory(one.uncompressed_size, "a chunk")
+        if one.compression:
+            one.data, one.compression = _chunk_data(one), ""
+        yield from stream.breakup_chunk(one)
+
+
+def _chunk_data(chunk: Any) -> bytes:
+    if chunk.compression == "zstd":
+        machine = library("zstandard", "MCAP").ZstdDecompressor().stream_reader(chunk.data)
+        data = bytes(machine.read(chunk.uncompressed_size + 1))
+    elif chunk.compression == "lz4":
+        frame = library("lz4.frame", "MCAP").LZ4FrameDecompressor()
+        data = bytes(frame.decompress(chunk.data, max_length=chunk.uncompressed_size + 1))
+    else:
+        raise InputError(f"a chunk is compressed by {str(chunk.compression)[:20]!r}, expected zstd or lz4")
+    if len(data) != chunk.uncompressed_size:
+        raise InputError(f"a chunk states {chunk.uncompressed_size} bytes and holds another number of them")
+    return data
+
+
 def read_mcap(path: str | Path) -> Record:
     """Read the topic /signals of an MCAP file that okid wrote; samples that are not there are NaN.
 
@@ -178,16 +207,18 @@ def read_mcap(path: str | Path) -> Record:
     rows: dict[int, list[float | None]] = {}
     wanted: int | None = None
     with reading(path, "an MCAP file"), open(path, "rb") as source:
-        for one in stream.StreamReader(source).records:
+        for one in _records(stream, kinds, source, Path(path).stat().st_size):
             if isinstance(one, kinds.Metadata) and one.name == _ABOUT:
-                about = json.loads(one.metadata["json"])
+                about = parse_json(one.metadata["json"])
             elif isinstance(one, kinds.Channel) and one.topic == SIGNALS:
                 wanted = one.id
             elif about is not None and isinstance(one, kinds.Message) and one.channel_id == wanted:
-                values = json.loads(one.data)
+                values = parse_json(one.data.decode("utf-8"))
                 rows[int(values["sample"])] = [values[name] for name in about["names"]]
+                require_memory(_ROW + len(rows) * (_ROW + _NUMBER * len(about["names"])), f"{len(rows)} messages")
         if about is None or not rows:
             raise InputError(f"has no topic {SIGNALS} with samples as okid writes it")
+        require_samples(max(rows) + 1 - min(rows), len(about["names"]))
         samples = np.full((max(rows) + 1 - min(rows), len(about["names"])), np.nan)
         for number, row in rows.items():
             samples[number - min(rows)] = [np.nan if value is None else value for value in row]
@@ -254,7 +285,7 @@ def _about(start: dict[str, Any]) -> dict[str, Any]:
 
 def _event(line: bytes | str, path: str | Path, number: int) -> dict[str, Any]:
     try:
-        event = json.loads(line)
+        event = parse_json(line if isinstance(line, str) else line.decode("utf-8"))
         if isinstance(event, dict) and isinstance(event.get("type"), str):
             return event
     except ValueError:

@@ -19,8 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.data.input_file import parse_json
+from okid.data.memory import require_samples
 from okid.data.records import Record, even_rate
 from okid.formats.foreign_library import library, reading, writing
+from okid.formats.mdf4_blocks import check_mdf4
 from okid.formats.rasters import Raster, choose_raster, sort_in
 
 Real = NDArray[np.float64]
@@ -66,6 +69,7 @@ def _samples(signal: Any) -> Real | None:
 
 def _rasters(file: Any, remarks: list[str]) -> list[Raster]:
     found: list[Raster] = []
+    require_samples(sum(int(g.channel_group.cycles_nr) * max(1, len(g.channels)) for g in file.groups), 1)
     for number, group in enumerate(file.groups):
         master = file.masters_db.get(number)
         for place, channel in enumerate(group.channels):
@@ -90,7 +94,7 @@ def _own_words(comment: str) -> dict[str, Any] | None:
     if found is None:
         return None
     try:
-        about = json.loads(found.group(1))
+        about = parse_json(found.group(1))
     except ValueError:
         return None
     return about if isinstance(about, dict) else None
@@ -128,6 +132,7 @@ def quiet_asammdf() -> Iterator[None]:
 
 
 def _open(asammdf: Any, path: str | Path) -> Any:
+    check_mdf4(path)
     text = None
     try:
         return asammdf.MDF(path)

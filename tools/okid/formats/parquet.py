@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.data.input_file import parse_json
+from okid.data.memory import require_memory, require_samples
 from okid.data.records import Record
 from okid.formats.channel_arrays import record_of_arrays, stated_rate
 from okid.formats.foreign_library import library, reading, writing
@@ -56,6 +58,10 @@ def read_parquet(path: str | Path) -> Record:
     """
     arrow, parquet = library("pyarrow", "Parquet"), library("pyarrow.parquet", "Parquet")
     with reading(path, "a Parquet file"):
+        about = parquet.read_metadata(path)
+        require_samples(about.num_rows, about.num_columns)
+        groups = [about.row_group(k) for k in range(about.num_row_groups)]
+        require_memory(sum(group.total_byte_size for group in groups), "its columns")
         table = parquet.read_table(path)
         metadata = {
             k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (table.schema.metadata or {}).items()
@@ -65,7 +71,7 @@ def read_parquet(path: str | Path) -> Record:
             raise InputError(f"holds {table.num_rows} rows of {len(arrays)} columns, expected samples")
         if "okid" in metadata:
             found = [array for array in arrays.values() if array is not None]
-            return Record.described(np.column_stack(found), json.loads(metadata["okid"]))
+            return Record.described(np.column_stack(found), parse_json(metadata["okid"]))
         units = {f.name: (f.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") for f in table.schema}
         rates = {key: rate for key, value in metadata.items() if (rate := _rate(key, value)) is not None}
         usable = {name: array for name, array in arrays.items() if array is not None and not name.startswith("__")}

@@ -84,6 +84,6 @@ def result_tree(raw: Mapping[str, Any]) -> dict[str, Any]:
             **{key: _matrices(raw[key]) for key in ("mkr", "pdc") if raw.get(key)},
             "json": json.dumps(raw, allow_nan=False),
         }  # fmt: skip
-    except (KeyError, TypeError, ValueError, AttributeError) as fault:
+    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as fault:
         raise InputError(f"not a complete okid.result/1: {type(fault).__name__}: {fault}") from None
     return tree

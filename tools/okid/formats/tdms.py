@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from datetime import UTC
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from okid._errors import InputError
+from okid.data.memory import require_samples
 from okid.data.records import Record, even_rate
 from okid.formats.foreign_library import library, listening, reading
 from okid.formats.rasters import Raster, choose_raster, sort_in
@@ -36,11 +38,12 @@ def read_tdms(path: str | Path, group: int | str | None = None) -> Record:
         channels = [one for each in file.groups() for one in each.channels() if len(one)]
         remarks = [f"{one.path} is left out: it holds no numbers" for one in channels if one.dtype.kind not in "fiub"]
         channels = [one for one in channels if one.dtype.kind in "fiub"]
-        names = [one.name for one in channels]
+        require_samples(sum(len(one) for one in channels), 1)
+        names = Counter(one.name for one in channels)
         stated = any("wf_increment" in one.properties for one in channels)
         rasters: list[Raster] = []
         for one in channels:
-            name = one.name if names.count(one.name) == 1 else f"{one.group_name} {one.name}"
+            name = one.name if names[one.name] == 1 else f"{one.group_name} {one.name}"
             times = _times(one, len(one)) if stated else np.arange(float(len(one)))
             unit = str(one.properties.get("unit_string") or "")
             sort_in(rasters, name, unit, times, np.asarray(one[:], dtype=np.float64))

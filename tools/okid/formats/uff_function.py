@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
+from okid.data.input_file import parse_json
 from okid.formats.uff_blocks import CLOSING, Block, opening, short_number, text_line
 
 Real = NDArray[np.float64]
@@ -93,7 +94,7 @@ def _known(lines: list[str]) -> dict[str, Any]:
     for line in lines[3:5]:
         if line.startswith(_MARK + "{"):
             try:
-                found.update(json.loads(line[len(_MARK) :]))
+                found.update(parse_json(line[len(_MARK) :]))
             except ValueError:
                 return {}
     return found

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from okid import abi
 from okid._errors import Error
 from okid.abi import host
+from okid.abi.turns import Turn, in_turn
 from okid.identification.identifier import Identifier
 
 Real = NDArray[np.float64]
@@ -50,12 +51,14 @@ def options_text(options: Mapping[str, Any]) -> bytes:
 class HostResult:
     """An okid_host_result_t, deleted with this object; `owner`: whose memory its decomposition is."""
 
-    def __init__(self, handle: ctypes.c_void_p, owner: object = None) -> None:
+    def __init__(self, handle: ctypes.c_void_p, owner: Any = None) -> None:
+        self._turn: Turn = Turn() if owner is None else owner._turn  # its decomposition is the stream's own
         self.handle, self._owner, self._delete = handle, owner, host.library().okid_host_result_delete
 
     def __del__(self) -> None:
         self._delete(self.handle)
 
+    @in_turn
     def _text(self, what: str) -> str:
         text: bytes | None = getattr(host.library(), f"okid_host_result_{what}")(self.handle)
         if text is None:
@@ -76,6 +79,7 @@ class HostResult:
         """What `okid identify` prints, options named as arguments."""
         return self._text("table")
 
+    @in_turn
     def array(self, name: str) -> Real | None:
         """A copy of an array by its place in okid.result/1 ("model.A", "markov.Y" ..); None: there is none."""
         view = host.Array()
@@ -88,6 +92,7 @@ class HostResult:
         memory = (ctypes.c_char * (8 * count)).from_address(view.data)
         return np.array(np.ndarray(shape, np.float64, memory, 0, [8 * step for step in strides]), order="C")
 
+    @in_turn
     def identifier(self) -> Identifier | None:
         """The decomposition, for models of other orders; it keeps this object alive. None: there is none."""
         raw = host.Decomposition()

@@ -14,6 +14,7 @@ from okid._errors import IdentificationError, InputError
 from okid.abi.accumulator import Accumulator
 from okid.abi.arguments import choice, positive, whole
 from okid.abi.square_root import SquareRoot
+from okid.abi.turns import Turn, both, in_turn
 from okid.result.model import Model
 from okid.result.parts import Observer
 from okid.shown.notebook_html import own_fields
@@ -171,14 +172,14 @@ class Identifier:
             ctypes.byref(self._handle), ctypes.byref(self.config), self._block.ctypes.data, self._block.size
         )
         abi.check(status, "identifier")
-        self._raw = abi.Identified()
+        self._raw, self._turn = abi.Identified(), Turn()
 
     @classmethod
-    def of_handle(cls, handle: int, config: Any, last: Any, owner: object) -> Identifier:
+    def of_handle(cls, handle: int, config: Any, last: Any, owner: Any) -> Identifier:
         """The identifier behind an okid_identify_t that `owner` keeps alive; `last` the model of its last run()."""
         out = cls.__new__(cls)
         out.config, out._block, out._handle = config, owner, ctypes.c_void_p(handle)
-        out._raw = abi.Identified.from_buffer_copy(last)
+        out._raw, out._turn = abi.Identified.from_buffer_copy(last), owner._turn
         return out
 
     def run(self, accumulator: Accumulator | SquareRoot) -> Identified:
@@ -190,7 +191,8 @@ class Identifier:
         library = abi.library()
         of_factor = isinstance(accumulator, SquareRoot)
         run = library.okid_identify_run_factor if of_factor else library.okid_identify_run
-        status = int(run(self._handle, accumulator.handle, ctypes.byref(self._raw)))
+        with both(self._turn, accumulator._turn):
+            status = int(run(self._handle, accumulator.handle, ctypes.byref(self._raw)))
         if status == abi.ERR_MISMATCH:
             raise InputError(
                 "this accumulator does not fit: n_u, n_y and lags must be the identifier's, its solver 'dense' for a "
@@ -220,12 +222,14 @@ class Identifier:
         """Lags an accumulator must have for run()."""
         return int(abi.library().okid_identify_lags(ctypes.byref(self.config)))
 
+    @in_turn
     def realise(self, order: int) -> Identified:
         """Another order from the decomposition of the last run(), for stabilization diagrams."""
         status = int(abi.library().okid_identify_order(self._handle, order, ctypes.byref(self._raw)))
         abi.check(status, f"order {order}")
         return _copy(self._raw)
 
+    @in_turn
     def poles(self, order: int) -> Identified:
         """The modes of another order only, much cheaper: A and C are that order's, B, D, K, innovation are zeros."""
         status = int(abi.library().okid_identify_poles(self._handle, order, ctypes.byref(self._raw)))
@@ -244,6 +248,7 @@ class Identifier:
         """Block rows of the Hankel matrices of the last run()."""
         return int(self._raw.rows)
 
+    @in_turn
     def set_inputs(self, B: Real, D: Real) -> Identified:
         """The n4sid model of the last run() with other B (n_z, n_u) and D (n_y, n_u); the Markov parameters follow."""
         given = [np.asfortranarray(one, dtype=np.float64) for one in (B, D)]

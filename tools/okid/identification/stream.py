@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from okid._errors import Error, InputError
 from okid.abi import host
 from okid.abi.arguments import unmasked
+from okid.abi.turns import Turn, in_turn
 from okid.identification.host_result import HostResult, options_text
 
 _KINDS = {np.dtype(np.float64): 0, np.dtype(np.float32): 1, np.dtype(np.int16): 2, np.dtype(np.int32): 3}
@@ -40,8 +41,8 @@ class _Owner:
     """Keeps an okid_host_stream_t as long as anyone looks into it."""
 
     def __init__(self, handle: ctypes.c_void_p) -> None:
-        self.handle = handle
-        weakref.finalize(self, host.library().okid_host_stream_delete, handle)
+        self.handle, self._turn = handle, Turn()
+        weakref.finalize(self, host.library().okid_host_stream_delete, handle).atexit = False
 
 
 def _load_config(path: str | Path) -> ctypes.c_void_p:
@@ -51,7 +52,8 @@ def _load_config(path: str | Path) -> ctypes.c_void_p:
 
 
 class HostStream:
-    """An okid_host_stream_t. `options`: those of okid_host_stream_create(); `config`: a CONFIG.toml they change."""
+    """An okid_host_stream_t, which threads take in turns. `options`: those of okid_host_stream_create(); `config`: a
+    CONFIG.toml they change."""
 
     def __init__(self, options: Mapping[str, Any], config: str | Path | None = None) -> None:
         handle, base = ctypes.c_void_p(), None if config is None else _load_config(config)
@@ -61,6 +63,7 @@ class HostStream:
             if base is not None:
                 host.library().okid_host_config_delete(base)
         self._owner: _Owner | None = _Owner(handle)
+        self._turn = self._owner._turn
         self._add = host.library().okid_host_stream_add
         self._at = handle.value
         self.options: dict[str, Any] = json.loads(host.library().okid_host_stream_json(handle))
@@ -69,25 +72,32 @@ class HostStream:
     @property
     def handle(self) -> ctypes.c_void_p:
         """For calls into the library. Error when it is closed."""
+        return self._check_open().handle
+
+    def _check_open(self) -> _Owner:
         if self._owner is None:
             raise Error("this session is closed")
-        return self._owner.handle
+        return self._owner
 
+    @in_turn
     def close(self) -> None:
-        """Give the memory back, as soon as no result looks into it; any later use raises Error."""
+        """Give the memory back, behind a call that another thread is in, as soon as no result looks into it; any later
+        use raises Error."""
         self._owner = self._at = None
 
     def add(self, samples: ArrayLike) -> int:
         """Rows (N, m), inputs first. The status of the library: 0, or a warning > 0."""
         if type(samples) is np.ndarray and samples.ndim == 2 and samples.shape[1] == self.channels:
             kind = _KINDS.get(samples.dtype)
-            if kind is not None and self._at is not None:
+            if kind is not None:
                 try:  # as it stands, some 1.5 us a call beside the work
                     place = _Place.from_buffer(samples)  # type: ignore[arg-type]  # ndarray says so from 3.12 on
                 except (TypeError, ValueError, BufferError):  # read-only, or not C-contiguous
                     pass
                 else:
-                    status: int = self._add(self._at, kind, place, samples.shape[0])
+                    with self._turn:
+                        self._check_open()
+                        status: int = self._add(self._at, kind, place, samples.shape[0])
                     return status if status >= 0 else self._refused(status)
         return self._add_copy(unmasked(samples))
 
@@ -101,26 +111,31 @@ class HostStream:
                 raise InputError(f"samples are {given.dtype}, expected real numbers")
             given = given.astype(np.float64)
         rows = np.ascontiguousarray(given)
-        status = int(self._add(self.handle, _KINDS[rows.dtype], rows.ctypes.data, len(rows)))
+        with self._turn:
+            status = int(self._add(self.handle, _KINDS[rows.dtype], rows.ctypes.data, len(rows)))
         return status if status >= 0 else self._refused(status)
 
     def _refused(self, status: int) -> int:
         raise host.error(-status)
 
+    @in_turn
     def gap(self, count: int) -> None:
         """`count` samples are missing."""
         host.call("stream_gap", self.handle, count)
 
+    @in_turn
     def reset(self) -> None:
         """Forget all samples."""
         host.library().okid_host_stream_reset(self.handle)
 
+    @in_turn
     def counts(self) -> Counts:
         """By now."""
         out = Counts()
         host.call("stream_stats", self.handle, ctypes.byref(out))
         return out
 
+    @in_turn
     def _result(self, verb: str) -> HostResult | None:
         made = ctypes.c_void_p()
         host.call(f"stream_{verb}", self.handle, ctypes.byref(made))
@@ -136,16 +151,19 @@ class HostStream:
         assert found is not None
         return found
 
+    @in_turn
     def state(self) -> bytes:
         """The sums, for restore() and merge(): what okid.Accumulator.to_bytes() gives, behind those of a refinement."""
         at, size = ctypes.c_void_p(), ctypes.c_size_t()
         host.call("stream_state", self.handle, ctypes.byref(at), ctypes.byref(size))
         return ctypes.string_at(at, size.value)
 
+    @in_turn
     def restore(self, state: bytes) -> None:
         """Go on where a state stood. InputError when it does not fit, or is damaged."""
         host.call("stream_restore", self.handle, state, len(state))
 
+    @in_turn
     def merge(self, state: bytes) -> None:
         """Add the samples of a state as further records, and one block for ±."""
         host.call("stream_merge", self.handle, state, len(state))

@@ -25,6 +25,11 @@ def segment_length(rate_hz: float, window_s: float | None = None) -> int:
     return length
 
 
+def cross_bytes(n_u: int, n_y: int, length: int) -> int:
+    """What the sums for response functions take."""
+    return 16 * (length // 2 + 1) * n_y * n_u * (n_u + 1)
+
+
 class Response(NamedTuple):
     """H1 of one output to one input: response (F,), coherence (F,) with all inputs (NaN while there are not more
     averages than inputs), averages."""
@@ -134,7 +139,10 @@ class Averages:
         return density
 
     def response(self, output: int, given: int) -> Response | None:
-        """H1 of an output (from 0) to an input (from 0); None before there is a segment with both."""
+        """H1 of an output (from 0) to an input (from 0); None before there is a segment with both, or where no
+        responses are kept."""
+        if output >= self.n_y or given >= self.n_u:
+            return None
         count = int(self._paired[output])
         if count == 0:
             return None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import InputError
-from okid.live.averages import SHORTEST, Averages, segment_length
+from okid.live.averages import SHORTEST, Averages, cross_bytes, segment_length
 from okid.live.config import PageConfig
 from okid.live.diagram import Material
 from okid.live.envelope import Envelope
@@ -21,17 +21,21 @@ Real = NDArray[np.float64]
 KEPT_S, KEPT_BYTES = 60.0, 64 << 20
 MOST_HIT_SAMPLES, MOST_HITS = 16384, 40
 TRIES = 8  # segments of which one at least must be whole
+MOST_CHANNELS, CROSS_BYTES = 4096, 256 << 20  # what a `start` event may ask for; sums for response functions
 
 
 class Measured:
     """Channels in the order of the samples: n_u forces, n_y responses, then aux channels.
 
-    Memory: 8 bytes a sample of the last 60 s (of the window where that is longer), at most 64 MB, and the averages.
+    Memory: 8 bytes a sample of the last 60 s (of the window where that is longer), at most 64 MB, and the averages, of
+    which response functions take at most 256 MB: shorter segments, or spectra alone. InputError above 4096 channels.
     """
 
     def __init__(self, channels: list[Channel], rate_hz: float, config: PageConfig) -> None:
-        self.channels, self.rate_hz = channels, rate_hz
         m = len(channels)
+        if m > MOST_CHANNELS:
+            raise InputError(f"{m} channels, a page shows at most {MOST_CHANNELS}")
+        self.channels, self.rate_hz = channels, rate_hz
         self.n_u = sum(each.role == "force" for each in channels)
         self.n_y = sum(each.role not in ("force", "aux") for each in channels)
         window = config.identification.window_s
@@ -43,14 +47,22 @@ class Measured:
         self._before = round(config.hit_before_s * rate_hz)
         if config.hammer:
             length = min(MOST_HIT_SAMPLES, self._before + max(16, round(config.hit_s * rate_hz)))
-            self.averages = Averages(self.n_u, self.n_y, m, rate_hz, length, hits=True)
+            self.averages = self._averages(length, hits=True)
         else:
             length = segment_length(rate_hz, window)
             most = None if window is None else max(10, round(2 * window * rate_hz / length) - 1)
-            self.averages = Averages(self.n_u, self.n_y, m, rate_hz, length, most=most)
+            self.averages = self._averages(length, most=most)
         self._blows: deque[int] = deque()
         self._hits: deque[Real] = deque(maxlen=MOST_HITS)
         self._basis = 0  # samples before it belong to another state of the structure
+
+    def _averages(self, length: int, *, hits: bool = False, most: int | None = None) -> Averages:
+        """With segments of that length, or as long as fit."""
+        while not hits and length > SHORTEST and cross_bytes(self.n_u, self.n_y, length) > CROSS_BYTES:
+            length //= 2
+        fits = cross_bytes(self.n_u, self.n_y, length) <= CROSS_BYTES
+        n_u, n_y = (self.n_u, self.n_y) if fits else (0, 0)
+        return Averages(n_u, n_y, len(self.channels), self.rate_hz, length, hits=hits, most=most)
 
     def add(self, first: int, values: Real) -> None:
         """Samples first .. as (m, count). Raises InputError when they are not of m channels."""
@@ -76,7 +88,7 @@ class Measured:
         if old.tried < TRIES or old.useful * TRIES > old.tried or old.length <= SHORTEST:
             return
         most = None if old.most is None else 2 * old.most
-        self.averages = Averages(self.n_u, self.n_y, len(self.channels), self.rate_hz, old.length // 2, most=most)
+        self.averages = self._averages(old.length // 2, most=most)
         self.restart(self._basis)
 
     def hit(self, sample: int) -> None:

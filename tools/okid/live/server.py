@@ -147,9 +147,13 @@ class _Handler(BaseHTTPRequestHandler):
         """Requests are not logged."""
 
     def _refuse(self) -> None:
-        self._answer(HTTPStatus.METHOD_NOT_ALLOWED, b"only GET\n", "text/plain", {"Allow": "GET"})
+        self._answer(HTTPStatus.METHOD_NOT_ALLOWED, b"only GET and HEAD\n", "text/plain", {"Allow": "GET, HEAD"})
 
-    do_HEAD = do_POST = do_PUT = do_DELETE = do_PATCH = do_OPTIONS = do_TRACE = do_CONNECT = _refuse
+    do_POST = do_PUT = do_DELETE = do_PATCH = do_OPTIONS = do_TRACE = do_CONNECT = _refuse
+
+    def do_HEAD(self) -> None:
+        """What do_GET() would send, without its body; a stream of events has none."""
+        self.do_GET()
 
     def do_GET(self) -> None:
         """Files, /events, /spectra."""
@@ -157,7 +161,9 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(HTTPStatus.FORBIDDEN, b"this name does not belong to okid-live\n", "text/plain")
             return
         asked = urlsplit(self.path)
-        if asked.path == "/events":
+        if asked.path == "/events" and self.command == "HEAD":
+            self._answer(HTTPStatus.OK, b"", "text/event-stream")
+        elif asked.path == "/events":
             self._send_events()
         elif asked.path == "/spectra":
             self._send_spectra(asked.query)

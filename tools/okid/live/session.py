@@ -103,7 +103,7 @@ class Session:
                 self._take_samples(event)
             else:
                 self._take_event(event)
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError) as fault:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, ArithmeticError, MemoryError) as fault:
             self.faults += 1
             if self.faults <= 3:
                 self.run.note(f"a line of okid could not be read ({type(fault).__name__}: {str(fault)[:120]})")
@@ -138,7 +138,7 @@ class Session:
         self._asleep_bytes = 0
         self._samples_seen = False
         self.diagram, self._sent = None, {}
-        run = self.run
+        run, self.measured = self.run, None  # where the channels are refused there is no picture of them
         self.measured = Measured(run.channels, run.rate_hz, self.config) if run.channels and run.rate_hz else None
         if len(self.hub):
             self.hub.send(self._snapshot())

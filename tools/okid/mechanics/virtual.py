@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
 from okid.abi import host
+from okid.abi.turns import Turn, in_turn
 from okid.data.whole_file import whole_file
 from okid.result.model import Model
 from okid.shown.notebook_html import own_fields
@@ -76,7 +77,8 @@ class VirtualSensors:
 
     def _hold(self, handle: ctypes.c_void_p, n_u: int, n_y: int, estimates: bool) -> None:
         self._handle, self._inputs, self._n_y, self._estimates = handle, n_u, n_y, estimates
-        weakref.finalize(self, host.library().okid_host_virtual_delete, handle)
+        self._turn = Turn()
+        weakref.finalize(self, host.library().okid_host_virtual_delete, handle).atexit = False
 
     @property
     def _n_u(self) -> int:
@@ -93,6 +95,7 @@ class VirtualSensors:
         host.call("virtual_learn", out._handle, len(rows), rows.ctypes.data)
         return out
 
+    @in_turn
     def save(self, path: str | Path, *, inputs: Sequence[str] = (), outputs: Sequence[str] = ()) -> None:
         """Write the file that [virtual] of a CONFIG.toml names; channels: `inputs`, `outputs` (default u1, y1).
         Raises InputError."""
@@ -105,6 +108,7 @@ class VirtualSensors:
         with whole_file(Path(path)) as part:
             part.write_text(json.dumps(about) + "\n", encoding="utf-8")
 
+    @in_turn
     def reset(self) -> None:
         """Forget the state: what comes next begins at rest."""
         host.library().okid_host_virtual_reset(self._handle)
@@ -127,6 +131,7 @@ class VirtualSensors:
         found = self.run(answer.reshape(1, -1), None if drive is None else drive.reshape(1, -1))
         return Estimate(*(each[0] for each in found))
 
+    @in_turn
     def run(self, y: ArrayLike, u: ArrayLike | None = None) -> Estimate:
         """Many samples, y (N, n_y) and u (N, n_u), from where the filter stands."""
         rows = self._rows(y, u, self._n_u)
@@ -135,6 +140,7 @@ class VirtualSensors:
         host.call("virtual_run", self._handle, count, rows.ctypes.data, *(each.ctypes.data for each in out))
         return out
 
+    @in_turn
     def forecast(self, steps: int, u: ArrayLike | None = None) -> Estimate:
         """The next samples without any measurement, u (steps, n_u) where the model has measured inputs (default 0); the
         filter stays where it is."""

@@ -169,7 +169,7 @@ def read_events(path: str | Path) -> Events:
     for number, event in _lines(path):
         try:
             _add(out, event)
-        except (AttributeError, KeyError, TypeError, ValueError) as fault:
+        except (AttributeError, KeyError, TypeError, ValueError, ArithmeticError) as fault:
             text = f"not a complete {event['type']!r} event: {type(fault).__name__}: {fault}"
             raise InputError(f"{path}:{number}: {text}") from None
     if out.start is None and not out.updates and out.stats is None:

@@ -130,7 +130,7 @@ def _markov(raw: dict[str, Any], n_y: int, n_u: int, source: str) -> Real:
     given = ((raw.get("markov") or {}).get("Y") or []) if n_u else []
     try:
         markov = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, ArithmeticError):
         markov = np.zeros(0)
     if given and markov.shape[1:] != (n_y, n_u):
         raise InputError(f"{source}: markov.Y is {given!r:.60}, expected matrices of {n_y} rows of {n_u} numbers")

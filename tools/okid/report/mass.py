@@ -110,7 +110,7 @@ def mass_section(m: Material) -> list[page.Section]:
         else:
             parts.append(page.absent(f"More than {MOST_SHOWN} columns: the matrices are in the result file."))
         parts.append(_damping_picture(m, mkr, pdc))
-    except (KeyError, TypeError, ValueError) as fault:
+    except (KeyError, TypeError, ValueError, ArithmeticError) as fault:
         if isinstance(fault, InputError):
             raise
         raise InputError(f"not a complete okid.result/1: mkr, pdc: {type(fault).__name__}: {fault}") from None

@@ -111,11 +111,12 @@ class Result:
         if raw.get("schema") != "okid.result/1":
             raise InputError(f"schema is {raw.get('schema')!r}, expected 'okid.result/1'")
         try:
+            json.dumps(raw, allow_nan=False)  # a missing number is null
             out = cls.of_host(_Parsed(raw, text))
             for one in fields(cls):
                 getattr(out, one.name)
             return out
-        except (KeyError, TypeError, ValueError, AttributeError) as fault:
+        except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as fault:
             raise InputError(f"not a complete okid.result/1: {type(fault).__name__}: {fault}") from None
 
     def __getattr__(self, name: str) -> Any:
