@@ -30,8 +30,8 @@ def sensor() -> Iterator[None]:
 
 @contextlib.contextmanager
 def in_memory() -> Iterator[None]:
-    """Nothing of this process is thrown out of memory, where that is permitted. With the virtual clock nobody is late for
-    want of it, and all that a long session of tests has mapped would fill the kernel's memory."""
+    """Nothing of this process is thrown out of memory, where that is permitted. Not with the virtual clock: nobody is
+    late there, and all that a long session of tests has mapped would fill the kernel's memory."""
     if VIRTUAL:
         yield
         return
