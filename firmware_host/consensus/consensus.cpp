@@ -285,12 +285,19 @@ consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c,
                        const std::vector<bool>& turned) {
     consensus_mode mode;
     mode.frequency_hz = c.frequency_hz;
-    const std::vector<bool> votes = voters(runs, mode.frequency_hz, spacing_hz, c.members.front().found->shape.size());
+    const std::size_t n_y = c.members.front().found->shape.size();
+    const std::vector<bool> votes = voters(runs, mode.frequency_hz, spacing_hz, n_y);
     mode.could = static_cast<int>(std::count(votes.begin(), votes.end(), true));
     mode.spacing_hz = spacing_hz;
-    for (const consensus_run& run : runs)
-        mode.parted +=
-            can_see(run, mode.frequency_hz) && can_part(run, spacing_hz, c.members.front().found->shape.size());
+    std::vector<double> horizons;
+    for (const consensus_run& run : runs) {
+        if (!can_see(run, mode.frequency_hz)) continue;
+        mode.parted += can_part(run, spacing_hz, n_y);
+        horizons.push_back(run.horizon_s());
+    }
+    std::sort(horizons.rbegin(), horizons.rend());
+    const std::size_t third = fewest_runs - 1;
+    mode.resolved_hz = third < horizons.size() ? beats_seen / static_cast<double>(n_y) / horizons[third] : INFINITY;
     std::vector<member> seen;
     for (const member& m : c.members) {
         mode.members.emplace_back(m.run, m.track);
@@ -330,7 +337,7 @@ void mark_split(std::vector<consensus_mode>& modes) {
                     : std::max(within(mode.frequency_hz, mode.damping_ratio, other.frequency_hz, other.damping_ratio),
                                same_frequency * other.frequency_hz);
             // A shadow: no three runs can tell it from the stronger one, and it has its shape.
-            const bool shadow = mode.shape.size() >= 3 && mode.parted < fewest_runs && apart <= mode.spacing_hz;
+            const bool shadow = mode.shape.size() >= 3 && apart < mode.resolved_hz;
             if ((apart < one || shadow) && shape_mac(mode.shape, other.shape) > same_shape_run) {
                 split.push_back(i);
                 break;

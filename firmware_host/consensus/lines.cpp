@@ -11,7 +11,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace okid_host {
 namespace {
@@ -23,13 +22,10 @@ constexpr std::size_t fewest_blocks = 8; // to speak of a spread
 constexpr std::size_t line_blocks = 64;
 constexpr double loudest_silence =
     0.07; // half the amplitude of a line of 3 % of the spread in the tenth of a record after a hit
-constexpr double line_periods = 8;        // at least so many in a block
-constexpr std::size_t fewest_quarter = 4; // blocks, to compare quiet and loud ones
-constexpr double comes_and_goes = 8;      // loud over quiet quarter of the blocks, all of the signal
-constexpr double stays = 2;               // the same of an amplitude that something else makes
-constexpr double fewest_periods = 3;      // … where a fall is looked for
-constexpr double line_damping = 0.01;     // a pole damped more is no line
-constexpr double unresolved = 2;          // decay times in the record below which nobody can tell
+constexpr double line_periods = 8;    // at least so many in a block
+constexpr double fewest_periods = 3;  // … where a fall is looked for
+constexpr double line_damping = 0.01; // a pole damped more is no line
+constexpr double unresolved = 2;      // decay times in the record below which nobody can tell
 constexpr double mains_tolerance = 0.003;
 constexpr double multiple_tolerance = 0.015;
 constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / sqrt(blocks)
@@ -157,42 +153,6 @@ bool decays(const std::vector<complex>& a, double decay) {
     return -slope > falls * std::sqrt(left / (n - 2) / sxx) && -slope > decay / as_damped && -slope < decay * as_damped;
 }
 
-/// What moves the outputs comes and goes: does the amplitude at the mode's frequency stay, in quiet parts as in loud ones? Then
-/// something else makes it.
-/// @param a      blocks at the frequency
-/// @param whole  of all of the signal, root mean squares of the same blocks
-bool goes_on_alone(const std::vector<complex>& a, const std::vector<double>& whole) {
-    if (a.size() < 4 * fewest_quarter || whole.size() != a.size()) return false;
-    std::vector<std::size_t> order(a.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) { return whole[i] < whole[j]; });
-    const std::size_t quarter = order.size() / 4;
-    double quiet = 0, loud = 0, quiet_all = 0, loud_all = 0;
-    for (std::size_t i = 0; i < quarter; ++i) {
-        const std::size_t low = order[i], high = order[order.size() - 1 - i];
-        quiet += std::abs(a[low]), loud += std::abs(a[high]);
-        quiet_all += whole[low], loud_all += whole[high];
-    }
-    return loud_all > comes_and_goes * quiet_all && loud < stays * quiet;
-}
-
-/// Root mean squares, block by block, of the outputs along the weights.
-std::vector<double> levels_along(const record_level& level, std::size_t m, std::size_t first_channel,
-                                 const std::vector<complex>& weights, std::size_t block) {
-    std::vector<double> out;
-    for (const sample_rows& rows : level.records)
-        for (std::size_t first = 0; first + block <= rows.size() / m; first += block) {
-            double square = 0;
-            for (std::size_t i = first; i < first + block; ++i) {
-                complex along = 0;
-                for (std::size_t c = 0; c < weights.size(); ++c) along += weights[c] * rows[i * m + first_channel + c];
-                square += std::norm(along);
-            }
-            if (!std::isnan(square)) out.push_back(std::sqrt(square / static_cast<double>(block)));
-        }
-    return out;
-}
-
 bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
     std::size_t longest = 0;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
@@ -205,16 +165,13 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     const std::vector<complex> weights = weights_along(mode.shape),
                                a = amplitudes(level, m, n_u, weights, mode.frequency_hz, block);
     if (at_rest && strength(a) > loudest_silence) return false;
-    if (!endless)
-        return (a.size() >= fewest_blocks && spread_over_mean(a) < steady) ||
-               goes_on_alone(a, levels_along(level, m, n_u, weights, block));
+    if (!endless) return a.size() >= fewest_blocks && spread_over_mean(a) < steady;
     // Few periods: shorter blocks show whether it falls.
     const std::size_t shorter = std::max<std::size_t>(
         static_cast<std::size_t>(fewest_periods * level.fs_hz / mode.frequency_hz) + 1, longest / fewest_blocks);
     const auto fall = a.size() >= fewest_blocks ? a : amplitudes(level, m, n_u, weights, mode.frequency_hz, shorter);
     const std::size_t step = a.size() >= fewest_blocks ? block : shorter;
-    if (level.records.size() == 1 && decays(fall, rate * static_cast<double>(step) / level.fs_hz)) return false;
-    return a.size() < fewest_blocks || spread_over_mean(a) < steady;
+    return level.records.size() != 1 || at_rest || !decays(fall, rate * static_cast<double>(step) / level.fs_hz);
 }
 
 /// A line that the converter makes: at a simple part of the record's rate, in one output alone.

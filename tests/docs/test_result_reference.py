@@ -47,6 +47,7 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
         json.loads(agreed.stdout),
         identified(rig, *full),
         identified(rig, "--method", "n4sid-cva"),
+        identified(rig, "--sensing", "acceleration,velocity"),
         remarked,
         python.to_dict(),
         json.loads((rig / "live.json").read_text()),

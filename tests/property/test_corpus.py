@@ -20,10 +20,13 @@ TRUE = {
     "level_dependent": {"silverbox_multisine", "silverbox_arrow", "frame3_flex_sine10", "frame3_flex_quake",
                         "frame3_flex_sine15", "frame3_flex_sine20", "frame3_flex_decay", "ridgecrest_0704",
                         "ridgecrest_0706", "ridgecrest_0822", "ridgecrest_200604", "ridgecrest_200624"},
-    "nonlinear": {f"frame3_flex_{name}" for name in ("quake", "sine10", "sine15", "sine20", "decay")},  # so its owner
+    "nonlinear": {f"frame3_flex_{name}" for name in ("quake", "sine10", "sine15", "sine20", "decay")}  # so its owner
+    | {"silverbox_arrow"},  # a Duffing circuit
     "screened": {"tower_wn1"},
+    "unexplained": {"plane_lab1_1"},  # 17.5 Hz, a side band of the first mode: listed as doubtful
 }  # fmt: skip
-UNKNOWN = {("level_dependent", f"tower_wn{k}") for k in (1, 2, 3)}  # all three agree in sign
+# The towers agree in sign; on the aircraft it is 0.002 % at 105.2 Hz.
+UNKNOWN = {("level_dependent", name) for name in ("tower_wn1", "tower_wn2", "tower_wn3", "plane_lab1_1")}
 MUST = {("level_dependent", "silverbox_multisine"), ("level_dependent", "silverbox_arrow"), ("screened", "tower_wn1")}
 
 

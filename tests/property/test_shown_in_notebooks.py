@@ -24,7 +24,7 @@ MODULES = (
 # What works, instead of being found: it has a state, or says how to find something.
 TOOLS = {
     "Accumulator", "CampaignSpec", "ChangeTest", "Collector", "Error", "IdentificationError", "Identifier",
-    "InputError", "Session", "SquareRoot", "VirtualSensors",
+    "InputError", "Session", "SquareRoot", "Turn", "VirtualSensors",
 }  # fmt: skip
 
 

@@ -135,27 +135,6 @@ static void a_decay_is_no_line_however_short_the_record() {
     TEST_ASSERT_EQUAL_UINT64(1, listed(line, false, {pole(3, 5e-4, 1)})[0].why.size());
 }
 
-/// Noise that is 30 times louder in a part of the record, and a line that is not: the amplitude of the line wanders by the
-/// noise below it, but it is the same in quiet and in loud parts.
-static void what_goes_on_alone_is_a_line() {
-    std::mt19937 random(9);
-    std::normal_distribution<double> normal;
-    record_level level = one_record();
-    const std::complex<double> pole_at = pole_of(8, 0.02);
-    std::complex<double> state = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        const double gust = i > count / 3 && i < count / 2 ? 30 : 1;
-        state = pole_at * state + gust * normal(random);
-        const double wanders = 12 * (1 + 0.5 * std::sin(2e-3 * static_cast<double>(i)));
-        const double y = state.imag() + wanders * std::sin(2 * M_PI * 41.5 / fs * static_cast<double>(i));
-        level.records[0].insert(level.records[0].end(), {y, -0.5 * state.imag()});
-    }
-    const auto modes = listed(level, false, {pole(41.5, 2e-3, 0), pole(8, 0.02, -0.5)});
-    TEST_ASSERT_EQUAL_UINT64(1, modes[0].why.size());
-    TEST_ASSERT_EQUAL_STRING("tone", modes[0].why[0].c_str());
-    TEST_ASSERT_EQUAL_UINT64(0, modes[1].why.size());
-}
-
 /// A simple part of the rate in one output of two is the converter's; in both, or elsewhere, it is not.
 static void a_part_of_the_rate_in_one_output_is_pickup() {
     const record_level level = answered(24, 0.02, false, 7, 0, 8);
@@ -168,7 +147,6 @@ static void a_part_of_the_rate_in_one_output_is_pickup() {
 int main() {
     UNITY_BEGIN();
     RUN_TEST(a_decay_is_no_line_however_short_the_record);
-    RUN_TEST(what_goes_on_alone_is_a_line);
     RUN_TEST(a_part_of_the_rate_in_one_output_is_pickup);
     RUN_TEST(a_line_is_seen_along_its_shape);
     RUN_TEST(what_rings_after_silence_is_no_line);
