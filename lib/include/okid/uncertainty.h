@@ -129,8 +129,8 @@ OKID_NODISCARD OKID_API okid_status_t okid_jackknife_begin_linear(okid_jackknife
                                                                   okid_accumulator_t* whole,
                                                                   const okid_identified_t* full);
 
-/// The model of the whole without one part. With `linear` to first order, in its own states; of MOESP and CVA B and D
-/// are those of the full model.
+/// The model of the whole without one part. With `linear` poles and shapes to first order, in modal coordinates (as it comes,
+/// A + dA, where A has no independent eigenvectors); of MOESP and CVA B and D belong to the full model.
 /// @param part    in, the sums of the part; see okid_accumulator_remove(), also for `weight`. NULL, not with `linear`: nothing
 ///                is left out, for sums of another horizon than the full model's: at its order and ridge
 /// @param model   out, valid until the next call (K is NULL)

@@ -178,8 +178,9 @@ static void deviations_do_not_depend_on_the_states(void) {
         modes_of(found.A, found.C, states < 0 ? full : same);
         deviations_of(states < 0 ? full : same, states < 0 ? deviation : other);
         for (int k = 0; k < 2 * RIG_MODES && states >= 0; ++k) {
-            TEST_ASSERT_TRUE(fabs(same[k] - full[k]) < TOLERANCE(1e-5, 0.05) * deviation[k]);
-            TEST_ASSERT_TRUE(fabs(other[k] / deviation[k] - 1) < TOLERANCE(1e-7, 1e-2));
+            TEST_ASSERT_TRUE(fabs(same[k] / full[k] - 1) < TOLERANCE(1e-9, 2e-4));
+            if (sizeof(okid_real_t) < sizeof(double)) continue; // a deviation is smaller than the rounding of f
+            TEST_ASSERT_TRUE(fabs(other[k] / deviation[k] - 1) < 1e-7);
         }
     }
     free(v);
