@@ -281,7 +281,7 @@ def test_a_device_that_is_not_there(tmp_path: Path) -> None:
         busy = program.okid("run", config, "--events", tmp_path / "other.jsonl")
         assert busy.returncode == 4 and "another program has it open" in busy.stderr, busy.stderr
         other.stop()
-        other.process.communicate(timeout=600)
+        other.process.communicate(timeout=1800)
 
 
 def test_doctor_looks_at_the_line(tmp_path: Path) -> None:
