@@ -76,7 +76,9 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, int]:
     source = folder / "layout.c"
     source.write_text(head + "int main(void) {\n" + "\n".join(lines) + "\nreturn 0;\n}\n", encoding="utf-8")
     program = folder / "layout"
-    subprocess.run([compiler, "-std=c99", "-I", str(INCLUDE), str(source), "-o", str(program)], check=True, timeout=1800)
+    subprocess.run(
+        [compiler, "-std=c99", "-I", str(INCLUDE), str(source), "-o", str(program)], check=True, timeout=1800
+    )
     shown = subprocess.run([str(program)], check=True, capture_output=True, text=True, timeout=1800).stdout
     return {name: int(value) for name, value in (line.split() for line in shown.splitlines())}
 

@@ -133,7 +133,7 @@ def test_lines_of_text(tmp_path: Path) -> None:
     assert stats["lost_by"]["crc"] >= len(torn) and stats["lost_by"]["sequence"] <= len(lost)
 
 
-@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(seed=st.integers(0, 2**32 - 1))
 def test_marked_gaps_are_the_injected_losses(tmp_path: Path, seed: int) -> None:
     rig = Rig(tmp_path, seconds=12.0)
