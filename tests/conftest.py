@@ -29,6 +29,8 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 def pytest_configure(config: pytest.Config) -> None:
     for mark in MARKS:
         config.addinivalue_line("markers", mark)
+    # What distributed says of a slow disk is no warning of ours.
+    config.addinivalue_line("filterwarnings", "ignore:Creating scratch directories is taking:UserWarning")
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m chooses

@@ -99,7 +99,7 @@ def test_command(tmp_path: Path) -> None:
     default(tmp_path)
     for words, told in ((["check"], "method auto; series: frame"), (["run", "--workers", "1"], "6 of 6 groups with")):
         run = [sys.executable, "-m", "okid.campaign", words[0], str(tmp_path / "SPEC.toml"), *words[1:]]
-        done = subprocess.run(run, capture_output=True, text=True, timeout=300)
+        done = subprocess.run(run, capture_output=True, text=True, timeout=1800)
         assert done.returncode == 0, done.stderr
         assert told in done.stdout
     assert "frame: not watched: 2 training groups, 11 are needed" in done.stdout

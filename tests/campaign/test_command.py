@@ -28,7 +28,7 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
         [Path(sys.executable).parent / "okid-campaign", *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=600,
+        timeout=1800,
         check=False,
     )
 
@@ -146,7 +146,7 @@ def test_interrupt_ends_with_130_and_is_resumed(
     state = spec.folder / "state" / spec.sums_key
     until(lambda: list(state.glob("*.sums")))
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
-    _, said = process.communicate(timeout=600)
+    _, said = process.communicate(timeout=1800)
     assert process.returncode == 130 and "run again to go on" in said and "Traceback" not in said, said
     kept = sum(len(files) for files in StateFolder(spec.folder, spec.sums_key).load().values())
     assert 0 < kept < 60

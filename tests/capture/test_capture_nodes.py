@@ -195,7 +195,7 @@ def multicast() -> str | None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
             member = struct.pack("4s4s", socket.inet_aton(GROUP), socket.inet_aton("0.0.0.0"))
             one.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
-            one.settimeout(2)
+            one.settimeout(1800)
             one.bind(("", 0))
             one.sendto(b"x", (GROUP, one.getsockname()[1]))
             one.recv(1)
@@ -224,7 +224,7 @@ def test_two_processes_over_multicast(rig: Path, tmp_path: Path, capsys: pytest.
     def emulate() -> None:
         until((tmp_path / "r.log").exists)
         node = [*COMMAND, "emulate", str(rig / "rig.toml"), *where, "--speed", "4"]
-        done = subprocess.run(node, capture_output=True, text=True, timeout=600, check=False)
+        done = subprocess.run(node, capture_output=True, text=True, timeout=1800, check=False)
         said.append(done.stdout + done.stderr)
 
     thread = threading.Thread(target=emulate, daemon=True)

@@ -112,7 +112,7 @@ class Reader:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=120,
+            timeout=1800,
         )
         assert done.returncode == int(block.notes.get("exit", 0)), f"{block.place}: {done.returncode}\n{done.stdout}"
         return done.stdout
@@ -148,7 +148,7 @@ class Reader:
 @cache
 def help_of(*words: str) -> str:
     first = PROGRAM if words[0] == "okid" else str(Path(sys.executable).parent / words[0])
-    done = subprocess.run([first, *words[1:], "--help"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([first, *words[1:], "--help"], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0, (words, done.stderr)
     return done.stdout
 

@@ -74,7 +74,7 @@ samples = true
 
 def okid(folder: pathlib.Path, *arguments: str) -> None:
     """The program in `folder`; its exit code must be 0 or 3 (a replay that was ended before a model was there)."""
-    done = subprocess.run([OKID, *arguments], cwd=folder, capture_output=True, text=True, timeout=120)
+    done = subprocess.run([OKID, *arguments], cwd=folder, capture_output=True, text=True, timeout=1800)
     assert done.returncode in (0, 3), f"okid {' '.join(arguments)}: {done.returncode}\n{done.stderr}"
 
 
@@ -166,7 +166,7 @@ class Line:
 def listening(path: pathlib.Path) -> Iterator[list[Event]]:
     """What a subscriber of the socket gets, in a list that is complete once the other end has closed."""
     one = socket.socket(socket.AF_UNIX)
-    one.settimeout(60)
+    one.settimeout(1800)
     until(path.exists)
     one.connect(str(path))
     out: list[Event] = []
@@ -178,7 +178,7 @@ def listening(path: pathlib.Path) -> Iterator[list[Event]]:
     thread = threading.Thread(target=read, daemon=True)
     thread.start()
     yield out
-    thread.join(60)
+    thread.join(1800)
 
 
 @contextlib.contextmanager
@@ -211,7 +211,7 @@ def node_on_a_line(folder: pathlib.Path) -> list[Event]:
             line.send(700, 600)
             until(lambda: told('"cause":"link_down"'))
             run.send_signal(signal.SIGINT)
-            _, said = run.communicate(timeout=60)
+            _, said = run.communicate(timeout=1800)
         assert run.returncode in (0, 3), said  # white noise has no modes
     line.unplug()
     return events_of(events) + [event for event in heard if event["type"] == "samples"]

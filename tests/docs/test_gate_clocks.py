@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`make test` judges okid and never the machine: no test of it reads a real clock, sleeps, or gives up within a minute.
+"""`make test` judges okid and never the machine: no test of it reads a real clock, sleeps, or gives up early.
 
 Read are all tests, and the helpers that they import. Left out is what a clock of its own excuses: the files of
 tests/kernel/virtual, and what is marked `realtime` or `programs`.
@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TESTS = ROOT / "tests"
 ELSEWHERE = ("bench", "boards", "controller", "distribution", "embedded", "fuzz", "languages", "mutation", "wheel")
 MAY_READ_A_CLOCK = {
-    "support/waiting.py": "polls for a condition; its bound of ten minutes only ends what would never end",
+    "support/waiting.py": "polls for a condition; its bound of half an hour only ends what would never end",
     "hostile/test_campaign_cluster.py": "strangers knock for two seconds; that a machine is busy lets nobody in",
     "fault/journal_disk.c": "a disk that stands still for as long as a file exists; decides nothing",
 }
@@ -28,7 +28,7 @@ C_CLOCKS = re.compile(
     r"|\bpoll\([^;]*, [1-9]\d{0,4}\)"
     r"|\b(steady_clock|system_clock|high_resolution_clock|sleep_for|sleep_until|wait_for|wait_until)\b"
 )
-LEAST_S = 60
+LEAST_S = 1800  # on two processors beside thirty others that never rest, a step of 20 s took 500 s
 GIVES_UP = {"settimeout", "wait", "join", "result", "communicate", "get", "recv", "until", "timeout"}
 VIRTUAL = [line for line in (TESTS / "kernel" / "virtual").read_text().splitlines() if not line.startswith("#")]
 
@@ -129,7 +129,7 @@ def test_what_is_named_is_there() -> None:
     for name in VIRTUAL:
         file, _, test = name.partition("::")
         assert (ROOT / file).exists() and (not test or f"def {test}(" in (ROOT / file).read_text()), name
-    for text, bad in (("import time\ntime.monotonic()", 1), ("x.wait(30)", 1), ("x.wait(60)", 0), ("until(f)", 0)):
+    for text, bad in (("import time\ntime.monotonic()", 1), ("x.wait(60)", 1), ("x.wait(1800)", 0), ("until(f)", 0)):
         assert len(list(faults_of(ast.parse(text)))) == bad, text
     excused = "import time\n@pytest.mark.realtime\ndef test_a():\n    time.time()"
     assert not list(faults_of(ast.parse(excused)))

@@ -70,7 +70,7 @@ def built(source: str, folder: Path) -> Path:
 
 def run(command: list[str | Path], rig: Path, given: str | None = None) -> str:
     with (rig / given).open("rb") if given else contextlib.nullcontext() as stdin:
-        done = subprocess.run(command, cwd=rig, stdin=stdin, capture_output=True, text=True, timeout=600)
+        done = subprocess.run(command, cwd=rig, stdin=stdin, capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -16,7 +16,7 @@ from scipy.signal import cont2discrete, dlsim
 # The same examples every time; each one writes over the file of the one before.
 steady = settings(
     deadline=None, derandomize=True, database=None, max_examples=25, print_blob=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
 NAMES = ["shaker", "storey1", "storey2", "storey3"]
 

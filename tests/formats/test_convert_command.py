@@ -160,7 +160,7 @@ def test_help_and_usage(capsys: pytest.CaptureFixture[str]) -> None:
 def test_as_a_program(tmp_path: Path) -> None:
     write_csv(tmp_path / "a.csv", full_record(9))
     words = [sys.executable, "-m", "okid.formats.command", str(tmp_path / "a.csv"), str(tmp_path / "a.h5")]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(words, capture_output=True, text=True, timeout=1800, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == f"{tmp_path / 'a.h5'}: 9 samples x 4 channels, 1024 Hz\n"
 

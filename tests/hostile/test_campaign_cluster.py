@@ -13,8 +13,8 @@ def test_a_neighbour_runs_nothing(tmp_path: object) -> None:
     with connected(1, None, 500.0) as client:
         address = client.scheduler.address
         assert address.startswith("tls://127.0.0.1:")
-        assert client.submit(int, "41").result(600) == 41
+        assert client.submit(int, "41").result(1800) == 41
         for other in (address, address.replace("tls://", "tcp://")):
             with pytest.raises((OSError, TypeError, ValueError)):
                 Client(other, timeout=2, set_as_default=False)  # type: ignore[no-untyped-call]
-        assert client.submit(int, "42").result(600) == 42
+        assert client.submit(int, "42").result(1800) == 42

@@ -126,7 +126,7 @@ def test_an_open_pipe_is_read(tmp_path: pathlib.Path) -> None:
         input=CONFIG + CHANNEL,
         text=True,
         capture_output=True,
-        timeout=600,
+        timeout=1800,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -49,7 +49,7 @@ def everything_said(folder: pathlib.Path, config: pathlib.Path) -> dict[str, byt
         keep("to log", okid("convert", journal, folder / "r.log"))
     report = [sys.executable, "-m", "okid.report", str(folder / "r.json"), "--config", str(config), "--events",
               str(folder / "e.jsonl"), "--out", str(folder / "report.html")]  # fmt: skip
-    keep("report", subprocess.run(report, capture_output=True, text=True, timeout=120, check=False))
+    keep("report", subprocess.run(report, capture_output=True, text=True, timeout=1800, check=False))
     for path in folder.rglob("*"):
         if path.is_file() and path != config:
             out[str(path.relative_to(folder))] = path.read_bytes()
@@ -107,7 +107,7 @@ def test_password_file(rig: pathlib.Path, tmp_path: pathlib.Path) -> None:
     (tmp_path / "credentials" / "broker-password").write_text(PLAIN)
     (tmp_path / "credentials" / "broker-password").chmod(0o400)
     done = subprocess.run(
-        [PROGRAM, "run", str(config)], capture_output=True, text=True, timeout=120, check=False,
+        [PROGRAM, "run", str(config)], capture_output=True, text=True, timeout=1800, check=False,
         env={**os.environ, "CREDENTIALS_DIRECTORY": str(tmp_path / "credentials")},
     )  # fmt: skip
     assert done.returncode == 0 and "every user" not in done.stderr, done.stderr

@@ -59,7 +59,7 @@ def cpu_s(run: subprocess.Popen[str]) -> float:
 def connected(port: int) -> socket.socket:
     def attempt() -> socket.socket | None:
         with contextlib.suppress(OSError):
-            return socket.create_connection(("127.0.0.1", port), timeout=600)
+            return socket.create_connection(("127.0.0.1", port), timeout=1800)
         return None
 
     one: socket.socket = until(attempt)
@@ -93,7 +93,7 @@ def test_no_descriptors_left(rig: pathlib.Path, judged: bool) -> None:
             with contextlib.suppress(ConnectionResetError):
                 assert wire.recv(15) in (b"", b"HTTP/1.1 200 OK")
         assert run.poll() is None
-        _, told = run.communicate(timeout=600)
+        _, told = run.communicate(timeout=1800)
         assert run.returncode == 0, told
     assert (rig / "r.json").read_bytes() == (rig / "calm.json").read_bytes()
 
@@ -102,11 +102,11 @@ def test_no_descriptors_left(rig: pathlib.Path, judged: bool) -> None:
 def test_a_broker_that_announces_256_mb(rig: pathlib.Path, piecewise: bool) -> None:
     """Release 0.1 took the room for it: 540 MB."""
     with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(600)
+        server.settimeout(1800)
         with publishing(rig, f'mqtt = "mqtt://127.0.0.1:{server.getsockname()[1]}"') as run:
             wire, _ = server.accept()
             with wire:
-                wire.settimeout(600)
+                wire.settimeout(1800)
                 assert wire.recv(1000)[0] == 0x10  # CONNECT
                 wire.sendall(b"\x20\x02\x00\x00")
                 announced = b"\x30\xff\xff\xff\x7f" + struct.pack(">H", 1) + b"t"
@@ -121,7 +121,7 @@ def test_a_broker_that_announces_256_mb(rig: pathlib.Path, piecewise: bool) -> N
             assert status(run, "VmPeak") < 1_500_000 and status(run, "VmHWM") < 150_000
             assert run.poll() is None
             run.terminate()
-            assert "announced a packet" in run.communicate(timeout=600)[1]
+            assert "announced a packet" in run.communicate(timeout=1800)[1]
 
 
 def test_slow_visitors_do_not_pile_up() -> None:
@@ -136,12 +136,12 @@ def test_slow_visitors_do_not_pile_up() -> None:
     before, crowd = threading.active_count(), []
     try:
         for _ in range(300):
-            one = socket.create_connection(("127.0.0.1", server.server_port), timeout=600)
+            one = socket.create_connection(("127.0.0.1", server.server_port), timeout=1800)
             one.sendall(b"GET / HT")
             crowd.append(one)
         time.sleep(0.5)
         assert threading.active_count() - before <= MOST_VISITORS
-        with socket.create_connection(("127.0.0.1", server.server_port), timeout=600) as wire:
+        with socket.create_connection(("127.0.0.1", server.server_port), timeout=1800) as wire:
             wire.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
             assert wire.recv(15).startswith(b"HTTP/1.0 200")
     finally:
@@ -172,7 +172,7 @@ def test_the_page_without_descriptors_does_not_spin() -> None:
         assert time.process_time() - before < 0.3
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
-    visitor.settimeout(600)
+    visitor.settimeout(1800)
     visitor.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
     assert visitor.recv(15).startswith(b"HTTP/1.0 200")
     visitor.close()

@@ -16,7 +16,7 @@ def test_a_thousand_frames_through_two_controllers() -> None:
     if platform.machine() != "x86_64":
         pytest.skip("x86-64 only: the emulated machine runs this machine's own programs")
     done = subprocess.run(
-        [str(ROOT / "tests" / "controller" / "run"), "smoke"], capture_output=True, text=True, timeout=1200, check=False
+        [str(ROOT / "tests" / "controller" / "run"), "smoke"], capture_output=True, text=True, timeout=1800, check=False
     )
     if done.returncode == 90 and os.environ.get("CI") != "true":
         pytest.skip(done.stderr.strip().splitlines()[-1])

@@ -46,7 +46,7 @@ def live(folder: Path, section: str, *before: str) -> tuple[list[tuple[int, int,
     time.sleep(0.3)
     seen = threads(process.pid), status(process.pid)
     process.terminate()
-    said = process.communicate(timeout=600)[1]
+    said = process.communicate(timeout=1800)[1]
     tty.unplug()
     return *seen, said
 

@@ -114,7 +114,7 @@ def test_a_log_is_played_onto_an_adapter(tmp_path: Path) -> None:
         assert f"300 frames played onto {tmp_path / 'okid'}" in done.stdout
         got = []
         while len(got) < 300:
-            received = bus.recv(timeout=600)
+            received = bus.recv(timeout=1800)
             assert received is not None, len(got)
             got.append((received.arbitration_id, received.is_extended_id, bytes(received.data)))
     assert got == sent

@@ -61,7 +61,7 @@ def test_the_next_sample_is_the_next_sample(tmp_path: Path, burst: int) -> None:
             sent = handed_over(tty, 1000, burst, {1.0: 0.15, 1.9: 0.3, 2.7: 0.15})
         until(lambda: not tty.unread())
         run.send_signal(signal.SIGINT)
-        out, err = run.communicate(timeout=600)
+        out, err = run.communicate(timeout=1800)
     assert run.returncode == 0, err
     (journal,) = (tmp_path / "runs").glob("*.okj")
     done = program.okid("convert", journal, tmp_path / "a.csv", "-c", tmp_path / "a.toml")

@@ -68,7 +68,7 @@ class OkidFeed:
         self._listener = socket.socket(socket.AF_UNIX)
         self._listener.bind(str(path))
         self._listener.listen(1)
-        self._listener.settimeout(600)
+        self._listener.settimeout(1800)
         self._wire: socket.socket | None = None
 
     def accept(self) -> None:

@@ -95,7 +95,7 @@ class Replay:
         )
 
     def end(self) -> int:
-        return self.process.wait(60)
+        return self.process.wait(1800)
 
 
 @pytest.fixture(scope="module")

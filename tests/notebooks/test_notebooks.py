@@ -26,7 +26,7 @@ def test_runs(path: pathlib.Path, tmp_path: pathlib.Path) -> None:
     code = [cell for cell in book.cells if cell.cell_type == "code"]
     assert not any(cell.outputs or cell.execution_count for cell in code), "clear the outputs before a commit"
     assert sum("assert " in cell.source for cell in code) >= 3, "a notebook checks what it claims"
-    client = NotebookClient(book, timeout=300, resources={"metadata": {"path": str(tmp_path)}})
+    client = NotebookClient(book, timeout=1800, resources={"metadata": {"path": str(tmp_path)}})
     client.execute(env={**os.environ, "PYTHONPATH": str(ROOT / "tools")})
     outputs = [output for cell in code for output in cell.outputs]
     assert all(output.output_type != "stream" or output.name != "stderr" for output in outputs), outputs

@@ -41,7 +41,7 @@ Ask = Callable[[str], list[str]]
 
 
 def okid(*arguments: str, code: int = 0) -> str:
-    done = subprocess.run([OKID, *arguments], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([OKID, *arguments], capture_output=True, text=True, timeout=1800)
     assert done.returncode == code, done.stderr
     return done.stdout if code == 0 else done.stderr
 
@@ -68,7 +68,7 @@ def bash_asked(line: str, folder: pathlib.Path) -> list[str]:
         capture_output=True,
         text=True,
         cwd=folder,
-        timeout=60,
+        timeout=1800,
     )
     assert done.returncode == 0 and not done.stderr, done.stderr
     return sorted(done.stdout.split("\n")[:-1]) if done.stdout.strip() else []
@@ -83,7 +83,7 @@ def fish_asked(line: str, folder: pathlib.Path) -> list[str]:
         capture_output=True,
         text=True,
         cwd=folder,
-        timeout=60,
+        timeout=1800,
         env=environment,
     )
     assert done.returncode == 0 and not done.stderr, done.stderr
@@ -201,7 +201,7 @@ def test_zsh_sourced(folder: pathlib.Path) -> None:
     script = folder / "okid.zsh"
     script.write_text(okid("completion", "zsh"))
     program = f"autoload -Uz compinit; compinit -u -D; source {script}; print $_comps[okid]"
-    done = subprocess.run(["zsh", "-f", "-c", program], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(["zsh", "-f", "-c", program], capture_output=True, text=True, timeout=1800)
     assert done.stdout.strip() == "_okid" and not done.stderr
 
 

@@ -106,7 +106,7 @@ def test_load_counts_every_bit(tmp_path: Path) -> None:
             [PROGRAM, "replay", tmp_path / "l.log", "-c", tmp_path / "c.toml", "--events", events],
             capture_output=True,
             check=False,
-            timeout=60,
+            timeout=1800,
         )
         stats = [e for e in map(json.loads, events.read_text().splitlines()) if e["type"] == "stats"][-1]
         expected = 100 * seconds * RATE / samples

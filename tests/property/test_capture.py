@@ -174,7 +174,7 @@ def test_signals_end_a_recording_in_order(tmp_path: Path, number: signal.Signals
     child = subprocess.Popen([sys.executable, "-c", program, str(log)], stdout=subprocess.PIPE, text=True)
     until(lambda: log.exists() and log.stat().st_size > 0, child)
     child.send_signal(number)
-    shown, _ = child.communicate(timeout=600)
+    shown, _ = child.communicate(timeout=1800)
     assert child.returncode == 0
     lines = log.read_text().splitlines()
     assert f"{len(lines)} frames" in shown

@@ -53,7 +53,7 @@ def messages(draw: st.DrawFn) -> str:
     return text + '\nVAL_ 291 Outer 1 "SG_ one" 2 "two";\n' + tail
 
 
-@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(text=messages(), data=st.data())
 def test_nested_multiplexors_are_those_of_cantools(tmp_path: Path, text: str, data: st.DataObject) -> None:
     (tmp_path / "a.dbc").write_text(text)

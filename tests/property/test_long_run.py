@@ -91,7 +91,7 @@ def play(folder: Path, path: Path, seconds: list[list[str]]) -> tuple[dict, list
             if second % 60 == 59:
                 memory.append(resident_kib(run.pid))
         run.stdin.close()
-        assert run.wait(600) == 0, run.stderr.read().decode()
+        assert run.wait(1800) == 0, run.stderr.read().decode()
     return json.loads((folder / "r.json").read_text()), memory
 
 

@@ -48,7 +48,7 @@ def replay(folder: Path, config: str, log: str = "a.log") -> tuple[dict[str, Any
         until(lambda: run.poll() is not None or one.connect_ex(str(folder / "v.sock")) == 0)
         with one, one.makefile("r", encoding="utf-8") as file:
             lines = [json.loads(line) for line in file.read().splitlines()]
-        assert run.wait(600) == 0, run.stderr and run.stderr.read()
+        assert run.wait(1800) == 0, run.stderr and run.stderr.read()
     return lines[0], [line for line in lines if line["type"] == "samples"]
 
 

@@ -223,8 +223,8 @@ def test_broken_matrices_and_foreign_records(
 
 
 def test_help_as_a_module() -> None:
-    done = subprocess.run([sys.executable, "-m", "okid.report", "--help"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-m", "okid.report", "--help"], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0
     assert "example:" in done.stdout
-    done = subprocess.run([sys.executable, "-m", "okid.report"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-m", "okid.report"], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 2

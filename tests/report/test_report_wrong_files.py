@@ -249,4 +249,4 @@ def test_a_result_through_a_pipe_is_not_looked_at_twice(folder: Path) -> None:
     with subprocess.Popen(["cat", folder / "result.json"], stdout=subprocess.PIPE) as writer:
         assert writer.stdout is not None
         assert len(report.load_result(f"/dev/fd/{writer.stdout.fileno()}").shapes) > 0
-        assert writer.wait(timeout=60) == 0
+        assert writer.wait(timeout=1800) == 0

@@ -15,7 +15,7 @@ from two_masses import rig_text, simulate_rig
 from waiting import until
 
 
-def sh(*args: str, check: bool = True, seconds: float = 600) -> subprocess.CompletedProcess[str]:
+def sh(*args: str, check: bool = True, seconds: float = 1800) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(args, capture_output=True, text=True, timeout=seconds, check=False)
     if check:
         assert done.returncode == 0, f"{args}: {done.returncode}\n{done.stdout}\n{done.stderr}"
@@ -76,7 +76,7 @@ class Run:
     def stop(self, how: signal.Signals = signal.SIGINT, status: int = 0) -> list[dict]:
         time.sleep(0.3)  # what was sent is already in the socket: the end of the run empties it
         self.process.send_signal(how)
-        assert self.process.wait(600) == status, self.messages()
+        assert self.process.wait(1800) == status, self.messages()
         return self.events()
 
     def events(self) -> list[dict]:

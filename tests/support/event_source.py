@@ -10,7 +10,7 @@ from typing import Any
 
 
 def ask(port: int, path: str = "/", method: str = "GET", **headers: str) -> tuple[int, dict[str, str], bytes]:
-    link = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
+    link = http.client.HTTPConnection("127.0.0.1", port, timeout=1800)
     link.request(method, path, headers=headers)
     reply = link.getresponse()
     data = reply.read()
@@ -22,7 +22,7 @@ class Listener:
     """A browser's EventSource."""
 
     def __init__(self, port: int) -> None:
-        self.link = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
+        self.link = http.client.HTTPConnection("127.0.0.1", port, timeout=1800)
         self.link.request("GET", "/events", headers={"Accept": "text/event-stream"})
         self.reply = self.link.getresponse()
         assert self.reply.status == 200, self.reply.status

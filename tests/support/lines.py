@@ -123,7 +123,7 @@ class Run:
         self.process.send_signal(signal.SIGINT)
 
     def finish(self, status: int = 0) -> list[dict[str, Any]]:
-        out, self.stderr = self.process.communicate(timeout=600)
+        out, self.stderr = self.process.communicate(timeout=1800)
         assert self.process.returncode == status, f"{self.process.returncode}\n{out}\n{self.stderr}"
         return self.events()
 
@@ -152,7 +152,7 @@ class Reader:
                     self._data += data
                     self._more.notify_all()
 
-    def packets(self, count: int, timeout: float = 600) -> bytes:
+    def packets(self, count: int, timeout: float = 1800) -> bytes:
         """What has come once it holds so many packets."""
         with self._more:
             assert self._more.wait_for(lambda: self._data.count(0) >= count, timeout), bytes(self._data)

@@ -25,5 +25,5 @@ class Live:
     def end(self, how: signal.Signals = signal.SIGTERM) -> tuple[int, str]:
         """Exit code and what stood on stderr."""
         self.process.send_signal(how)
-        errors = self.process.communicate(timeout=600)[1]
+        errors = self.process.communicate(timeout=1800)[1]
         return self.process.returncode, errors

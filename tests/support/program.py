@@ -17,7 +17,7 @@ def okid(*arguments: object, status: int | None = None) -> subprocess.CompletedP
         [PROGRAM, *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=1800,
         stdin=subprocess.DEVNULL,
         check=False,
     )

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-PATIENCE_S = 600
+PATIENCE_S = 1800
 # In the test kernel (tests/kernel/virtual) nobody is ever late, so lateness is a fault.
 VIRTUAL = "time-travel" in Path("/proc/cmdline").read_text()
 

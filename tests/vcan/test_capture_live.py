@@ -51,7 +51,7 @@ def test_emulated_node_to_modes_without_a_loss(rig: Path, tmp_path: Path, capsys
 
     def emulate() -> None:
         command = [sys.executable, "-m", "okid.capture", "emulate", str(rig / "rig.toml"), *WHERE]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=1800, check=False)
         said.append(done.stdout + done.stderr)
 
     assert captured(rig, tmp_path, emulate, "--frames", "1800") == 0

@@ -16,7 +16,7 @@ FILES = "-dac_override,-dac_read_search"
 
 def without(capabilities: str, *command: object) -> subprocess.CompletedProcess[str]:
     words = ["setpriv", f"--bounding-set={capabilities}", "--inh-caps=-all", *map(str, command)]
-    return subprocess.run(words, capture_output=True, text=True, timeout=600, check=False)
+    return subprocess.run(words, capture_output=True, text=True, timeout=1800, check=False)
 
 
 def test_a_small_receive_buffer(tmp_path: Path) -> None:

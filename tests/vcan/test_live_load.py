@@ -78,7 +78,7 @@ def feed(line: Line, samples: int) -> None:
         bus.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, struct.pack("=II", 0x100, 0x7FF))
         bus.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, 1 << 24)
         bus.bind(("vcan0",))
-        bus.settimeout(600)
+        bus.settimeout(1800)
         done = 0
         while done < samples:
             seen = int.from_bytes(bus.recv(16)[8:10], "little")
@@ -127,7 +127,7 @@ def test_the_program_is_stopped(tmp_path: Path) -> None:
     live.process.send_signal(signal.SIGSTOP)
     time.sleep(2.0)
     live.process.send_signal(signal.SIGCONT)
-    assert sender.wait(600) == 0
+    assert sender.wait(1800) == 0
     time.sleep(1.0)
     events = live.stop()
     last = [event for event in events if event["type"] == "stats"][-1]

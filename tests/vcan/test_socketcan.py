@@ -59,7 +59,7 @@ class Receiver:
                 size = self.log.stat().st_size
                 time.sleep(1.0)
             self.process.send_signal(signal.SIGINT)
-        assert self.process.wait(600) in (0, -2, 130)
+        assert self.process.wait(1800) in (0, -2, 130)
         lines = self.log.read_text().splitlines()
         if self.kind == "candump":
             return sum(" 123#" in line for line in lines)

@@ -133,7 +133,7 @@ def no_memory(_: int, run: Run) -> Iterator[None]:
             ["dd", "if=/dev/zero", f"of={room}/all", "bs=1M", f"count={free_mb() - 24}"], stderr=subprocess.DEVNULL
         )
         yield
-        assert filler.wait(600) == 0 and free_mb() < 64, f"{free_mb()} MB were left: that is no pressure"
+        assert filler.wait(1800) == 0 and free_mb() < 64, f"{free_mb()} MB were left: that is no pressure"
     finally:
         sh("umount", str(room))
 

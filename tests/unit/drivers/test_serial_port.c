@@ -19,7 +19,7 @@
 #include <unistd.h>
 #include <unity.h>
 
-enum { patience_ms = 600000 }; // only ends what would never end
+enum { patience_ms = 1800000 }; // only ends what would never end
 
 static struct {
     int open_error, get_error, set_error, write_error; ///< errno

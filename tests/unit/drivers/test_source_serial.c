@@ -68,7 +68,7 @@ static void start(const drv_source_ops_t* ops, const drv_source_config_t* config
 
 static void say(const void* bytes, size_t count) { TEST_ASSERT_EQUAL_INT(count, write(far, bytes, count)); }
 
-enum { patience_ms = 600000 }; // only ends what would never end
+enum { patience_ms = 1800000 }; // only ends what would never end
 
 static void say_samples(uint32_t sequence, unsigned channels, unsigned samples, uint32_t time_us) {
     const drv_stream_header_t header = {DRV_STREAM_INT16, (uint8_t)channels, (uint8_t)samples, sequence, time_us};
