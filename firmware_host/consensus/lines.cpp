@@ -44,26 +44,35 @@ constexpr double resonant = 2;        // power of the responses over that of the
 constexpr std::size_t averaged = 4;   // segments of a spectrum, at least
 constexpr std::size_t shortest = 128; // samples of a segment
 
-/// Amplitudes at a frequency, block by block under a Hann window, of channels with these weights from the first on.
+/// Amplitudes at a frequency, block by block under a Hann window, of channels with these weights from the first on; one record.
+std::vector<complex> amplitudes(const sample_rows& rows, double fs_hz, std::size_t m, std::size_t first_channel,
+                                const std::vector<complex>& weights, double frequency_hz, std::size_t block) {
+    std::vector<complex> out;
+    const complex turn = std::polar(1.0, -2 * M_PI * frequency_hz / fs_hz);
+    const std::size_t count = rows.size() / m;
+    complex phase = 1;
+    for (std::size_t first = 0; first + block <= count; first += block) {
+        complex sum = 0;
+        for (std::size_t i = 0; i < block; ++i, phase *= turn) {
+            const double hann = 1 - std::cos(2 * M_PI * static_cast<double>(i) / static_cast<double>(block));
+            complex along = 0;
+            for (std::size_t c = 0; c < weights.size(); ++c)
+                along += weights[c] * rows[(first + i) * m + first_channel + c];
+            sum += hann * along * phase;
+        }
+        phase /= std::abs(phase);
+        if (!std::isnan(sum.real())) out.push_back(sum / static_cast<double>(block));
+    }
+    return out;
+}
+
+/// The same of all records, one behind the other.
 std::vector<complex> amplitudes(const record_level& level, std::size_t m, std::size_t first_channel,
                                 const std::vector<complex>& weights, double frequency_hz, std::size_t block) {
     std::vector<complex> out;
-    const complex turn = std::polar(1.0, -2 * M_PI * frequency_hz / level.fs_hz);
     for (const sample_rows& rows : level.records) {
-        const std::size_t count = rows.size() / m;
-        complex phase = 1;
-        for (std::size_t first = 0; first + block <= count; first += block) {
-            complex sum = 0;
-            for (std::size_t i = 0; i < block; ++i, phase *= turn) {
-                const double hann = 1 - std::cos(2 * M_PI * static_cast<double>(i) / static_cast<double>(block));
-                complex along = 0;
-                for (std::size_t c = 0; c < weights.size(); ++c)
-                    along += weights[c] * rows[(first + i) * m + first_channel + c];
-                sum += hann * along * phase;
-            }
-            phase /= std::abs(phase);
-            if (!std::isnan(sum.real())) out.push_back(sum / static_cast<double>(block));
-        }
+        const auto of_record = amplitudes(rows, level.fs_hz, m, first_channel, weights, frequency_hz, block);
+        out.insert(out.end(), of_record.begin(), of_record.end());
     }
     return out;
 }
@@ -133,24 +142,25 @@ std::vector<complex> weights_along(std::vector<complex> shape) {
 }
 
 /// Does the amplitude fall as a free vibration of this damping does? One of a line stays, whatever the record's length.
-/// @param a       blocks under a Hann window, of all records
-/// @param decay   of the amplitude from one block to the next, by the mode's damping (natural logarithm)
-bool decays(const std::vector<complex>& a, double decay) {
-    const auto n = static_cast<double>(a.size());
-    if (a.size() < 4) return false;
-    double mean = 0, sxx = 0, sxy = 0, left = 0;
-    for (const complex& x : a) mean += std::log(std::abs(x)) / n;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        const double at = static_cast<double>(i) - (n - 1) / 2;
-        sxx += at * at;
-        sxy += at * std::log(std::abs(a[i]));
+/// @param records  blocks under a Hann window, of each record; they have one slope, each its own height
+/// @param decay    of the amplitude from one block to the next, by the mode's damping (natural logarithm)
+bool decays(const std::vector<std::vector<complex>>& records, double decay) {
+    double sxx = 0, sxy = 0, syy = 0, free = -1; // degrees of freedom
+    for (const std::vector<complex>& a : records) {
+        const auto n = static_cast<double>(a.size());
+        double mean = 0;
+        for (const complex& x : a) mean += std::log(std::abs(x)) / n;
+        for (std::size_t i = 0; i < a.size(); ++i) {
+            const double at = static_cast<double>(i) - (n - 1) / 2, height = std::log(std::abs(a[i])) - mean;
+            sxx += at * at;
+            sxy += at * height;
+            syy += height * height;
+        }
+        if (!a.empty()) free += n - 1;
     }
-    const double slope = sxy / sxx;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        const double at = static_cast<double>(i) - (n - 1) / 2;
-        left += std::pow(std::log(std::abs(a[i])) - mean - slope * at, 2);
-    }
-    return -slope > falls * std::sqrt(left / (n - 2) / sxx) && -slope > decay / as_damped && -slope < decay * as_damped;
+    if (free < 2) return false;
+    const double slope = sxy / sxx, sigma = std::sqrt(std::max(0.0, syy - slope * sxy) / free / sxx);
+    return -slope > falls * sigma && -slope > decay / as_damped && -slope < decay * as_damped;
 }
 
 bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
@@ -166,12 +176,17 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
                                a = amplitudes(level, m, n_u, weights, mode.frequency_hz, block);
     if (at_rest && strength(a) > loudest_silence) return false;
     if (!endless) return a.size() >= fewest_blocks && spread_over_mean(a) < steady;
+    if (at_rest) return true;
     // Few periods: shorter blocks show whether it falls.
-    const std::size_t shorter = std::max<std::size_t>(
-        static_cast<std::size_t>(fewest_periods * level.fs_hz / mode.frequency_hz) + 1, longest / fewest_blocks);
-    const auto fall = a.size() >= fewest_blocks ? a : amplitudes(level, m, n_u, weights, mode.frequency_hz, shorter);
-    const std::size_t step = a.size() >= fewest_blocks ? block : shorter;
-    return level.records.size() != 1 || at_rest || !decays(fall, rate * static_cast<double>(step) / level.fs_hz);
+    const std::size_t step =
+        a.size() >= fewest_blocks * level.records.size()
+            ? block
+            : std::max<std::size_t>(static_cast<std::size_t>(fewest_periods * level.fs_hz / mode.frequency_hz) + 1,
+                                    longest / fewest_blocks);
+    std::vector<std::vector<complex>> falling;
+    for (const sample_rows& rows : level.records)
+        falling.push_back(amplitudes(rows, level.fs_hz, m, n_u, weights, mode.frequency_hz, step));
+    return !decays(falling, rate * static_cast<double>(step) / level.fs_hz);
 }
 
 /// A line that the converter makes: at a simple part of the record's rate, in one output alone.
