@@ -9,7 +9,7 @@ import numpy as np
 import okid
 import pytest
 import pyuff
-from hypothesis import given
+from hypothesis import assume, given
 from okid.data.records import Record
 from okid.formats import Geometry, read_geometry, read_record, read_uff, write_record, write_result, write_uff
 from okid.formats.uff import uff_losses
@@ -54,6 +54,7 @@ def test_time_histories_as_pyuff_sees_them(tmp_path: Path, binary: bool) -> None
 @steady
 @given(records())
 def test_any_record_comes_back(tmp_path: Path, record: Record) -> None:
+    assume(record.title.strip().upper() != "NONE")  # the format's own word for no title
     write_record(tmp_path / "a.unv", record)
     assert_same(read_record(tmp_path / "a.unv"), record, notes=False)
 

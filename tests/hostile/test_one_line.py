@@ -213,7 +213,7 @@ def test_a_limit_of_the_size_of_files(tmp_path: Path) -> None:
         ("replay", "x.log", "-c", "c.toml", "--events", "e.jsonl"), ("convert", "x.log", "x.csv", "-c", "c.toml"),
     ):  # fmt: skip
         done = subprocess.run(
-            [PROGRAM, *command], capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False,
+            [PROGRAM, *command], capture_output=True, text=True, cwd=tmp_path, timeout=1800, check=False,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)),
         )  # fmt: skip
         assert done.returncode in (

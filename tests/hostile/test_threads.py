@@ -144,7 +144,7 @@ def test_python_ends_while_a_thread_is_inside(what: str) -> None:
     """
     for _ in range(3):
         done = subprocess.run(
-            [sys.executable, "-c", textwrap.dedent(text)], capture_output=True, text=True, timeout=300, check=False,
+            [sys.executable, "-c", textwrap.dedent(text)], capture_output=True, text=True, timeout=1800, check=False,
             env={**os.environ, "PYTHONPATH": str(TOOLS), "OPENBLAS_NUM_THREADS": "1"},
         )  # fmt: skip
         assert (done.returncode, done.stderr) == (0, ""), done

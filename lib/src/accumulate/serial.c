@@ -120,9 +120,9 @@ static int sane_sums(walk_t* w, const okid_accumulator_t* a, int exact) {
         const walk_t here = *w;
         sane &= sane_number(w, 1);
         if (i % width != newest + i / width) continue;
-        walk_t again = here;
+        walk_t again = here, bits = here;
         if (sane_number(&again, 0))
-            above |= walk_bits(&(walk_t){NULL, w->from, here.at}, 0, 8) != 0;
+            above |= walk_bits(&bits, 0, 8) != 0;
         else
             below = 1;
     }

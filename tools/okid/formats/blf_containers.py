@@ -10,7 +10,7 @@ from okid._errors import InputError
 from okid.data.input_file import LARGEST
 from okid.data.memory import decompressed, most_bytes
 
-_FILE = struct.Struct("<4sL")  # signature, size of the head
+_FILE = struct.Struct("<4sL8xQ")  # signature, size of the head, of the file
 _OBJECT = struct.Struct("<4sHHLL")  # signature, size of the head, version, size, type
 _CONTAINER, _ZLIB = 10, 2
 _METHOD = struct.Struct("<H6xL4x")
@@ -24,7 +24,10 @@ def check_blf(path: str | Path) -> None:
         head = file.read(_FILE.size)
         if len(head) < _FILE.size or head[:4] != b"LOGG":
             raise InputError(f"it begins with {head[:4]!r}, expected LOGG")
-        file.seek(_FILE.unpack(head)[1])
+        _, first, stated = _FILE.unpack(head)
+        if stated > size:
+            raise InputError(f"has {size} bytes, its header says {stated}: the file is cut off")
+        file.seek(first)
         while len(head := file.read(_OBJECT.size)) == _OBJECT.size:
             signature, _, _, length, kind = _OBJECT.unpack(head)
             if signature != b"LOBJ" or not _OBJECT.size <= length <= size:
