@@ -58,7 +58,9 @@ def test_packets_of_every_format(rig: Path, number_format: int) -> None:
         emulate._packet(2, np.zeros((1, 253)), 0, config)
 
 
-@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@settings(
+    deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(st.lists(st.binary(max_size=300), max_size=6), st.integers(1, 50))
 def test_any_bytes_in_any_pieces(tmp_path: Path, pieces: list[bytes], cut: int) -> None:
     """Nothing raises, and the cut into reads changes nothing."""

@@ -88,7 +88,9 @@ def config_text(layout: dict) -> str:
     return text
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(layout=layouts(), data=st.data())
 def test_decodes_as_cantools(tmp_path: Path, layout: dict, data: st.DataObject) -> None:
     text = dbc_text(layout)
