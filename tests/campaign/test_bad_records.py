@@ -24,7 +24,10 @@ BAD: dict[str, tuple[Callable[[Path], Any], str]] = {
     "empty": (lambda path: path.write_bytes(b""), "is empty"),
     "text": (lambda path: path.write_text("hello"), "not a record, or damaged"),
     "cut": (lambda path: path.write_bytes(path.read_bytes()[:2000]), "its head says (1500, 4) of int16"),
-    "pickle": (lambda path: np.save(path, np.array([{}], dtype=object), allow_pickle=True), "its head says (1,) of object"),
+    "pickle": (
+        lambda path: np.save(path, np.array([{}], dtype=object), allow_pickle=True),
+        "its head says (1,) of object",
+    ),
     "columns": (
         lambda path: np.save(path, CODES[:, :3]),
         "holds an array (1500, 3), expected (samples, 4): force, acc1",
