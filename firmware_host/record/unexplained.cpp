@@ -12,6 +12,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <utility>
 
 namespace okid_host {
 namespace {
@@ -50,10 +51,11 @@ bool is_peak(const std::vector<double>& power, std::size_t k) {
 std::vector<std::vector<double>> outputs_of(const record_set& set) {
     std::vector<std::vector<double>> out;
     for (const record_data& record : set.records) {
-        std::vector<double>& rows = out.emplace_back();
+        std::vector<double> rows;
         for (std::size_t i = 0; i < record.count; ++i)
             rows.insert(rows.end(), set.rows(record) + i * set.channels() + set.n_u,
                         set.rows(record) + (i + 1) * set.channels());
+        out.push_back(std::move(rows));
     }
     return out;
 }
