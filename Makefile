@@ -83,13 +83,13 @@ bench: build ## speed of the kernels and of whole identifications as ratios with
 	@$(PYTHON) tests/bench/whole_answers.py build/bench.json
 	@cmake --build build --target bench_latency -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_latency build/bench.json
 
-bench-quick: build ## what takes two minutes of it, judged with wide margins
+bench-quick: build ## what takes two minutes of it: sizes are judged, speeds told
 	@tools/setup.sh bench
 	@tools/setup.sh test
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --only kernels --save build/bench-quick.json >/dev/null
 	@for part in python_call identify_beside files whole_answers; do \
 	  OKID_PROGRAM=build/okid $(PYTHON) tests/bench/$$part.py build/bench-quick.json || exit 1; done
-	@$(PYTHON) tools/bench_check.py build/bench-quick.json --wide
+	@$(PYTHON) tools/bench_check.py build/bench-quick.json --sizes
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
 	@$(PYTHON) tools/bench_check.py build/bench.json
