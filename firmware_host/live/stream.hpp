@@ -55,8 +55,10 @@ class stream {
     bool settled() const { return settled_; }                                ///< at the last update
     bool at_rest(std::size_t mode) const { return settling_.at_rest(mode); } ///< of the last update
     void reset();
-    /// As identifier::restore().
+    /// identifier::state() behind rate and channels of the stream, restore() and merge() compare them.
+    std::vector<std::byte> state();
     void restore(const void* state, std::size_t bytes);
+    void merge(const void* state, std::size_t bytes);
 
     /// Identify for a result. Throws `failure` (exit 3) when no model can be had.
     void identify();
@@ -69,9 +71,7 @@ class stream {
     /// @param said  what to say first
     result_context context(remarks said = {});
     /// Of the modes of the last identify() or update().
-    std::vector<mode_verdict> verdicts() const {
-        return mode_verdicts(model(), identifier_.agreed() ? identifier_.agreed()->found().context : result_context{});
-    }
+    std::vector<mode_verdict> verdicts();
     /// Found by auto, but not signed: in the events, not in the table; no track, no alarm.
     bool doubtful(std::size_t mode) const {
         return identifier_.agreed() && !identifier_.agreed()->found().context.verdicts[mode].confident;
