@@ -188,15 +188,6 @@ result_context stream::context(remarks said) {
     return out;
 }
 
-std::vector<mode_verdict> stream::verdicts() {
-    if (identifier_.agreed()) return mode_verdicts(model(), identifier_.agreed()->found().context);
-    result_context about;
-    about.inputs = config_.inputs;
-    about.fs_hz = config_.rate_hz;
-    about.samples = identifier_.basis();
-    return mode_verdicts(model(), about);
-}
-
 void stream::remark_fit(result_context& about) {
     if (!identifier_.agreed()) remark_low_fit(identifier_.predicted_percent(), false, about);
 }

@@ -71,7 +71,9 @@ class stream {
     /// @param said  what to say first
     result_context context(remarks said = {});
     /// Of the modes of the last identify() or update().
-    std::vector<mode_verdict> verdicts();
+    std::vector<mode_verdict> verdicts() const {
+        return mode_verdicts(model(), identifier_.agreed() ? identifier_.agreed()->found().context : result_context{});
+    }
     /// Found by auto, but not signed: in the events, not in the table; no track, no alarm.
     bool doubtful(std::size_t mode) const {
         return identifier_.agreed() && !identifier_.agreed()->found().context.verdicts[mode].confident;
