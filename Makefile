@@ -119,7 +119,7 @@ sbom: build ## bill of materials: build/sbom.cdx.json and docs/reference/depende
 audit: sbom ## known holes in what okid stands on: PyPI's advisories, updates that wait in Debian's archive
 	@.venv/bin/python tools/audit.py
 
-fuzz: ## fuzzers of every decoder and file reader, SECONDS=60 for all of them together
+fuzz: build ## fuzzers of every decoder and file reader, SECONDS=60 for all of them together
 	@tools/setup.sh fuzz
 	@tests/fuzz/run $(or $(SECONDS),60)
 

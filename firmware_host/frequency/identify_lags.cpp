@@ -303,6 +303,7 @@ result_context prepare(lag_work& work) {
         const missing_count here = count_missing(one.set);
         check_measured(here, one.set, own);
         check_moving(one.set, own);
+        check_different_outputs(one.set, own);
         check_different_inputs(moments_of(one.set), own);
         missing.samples += here.samples;
         missing.gaps += here.gaps;
@@ -310,9 +311,11 @@ result_context prepare(lag_work& work) {
         samples += static_cast<long long>(one.set.count());
         if (own.detrend == "linear") detrend_linear(one.set, own);
         remove_means(one.set);
-        if (one.set.count() < least_lags * static_cast<std::size_t>(rows_per_lag))
-            throw failure(exit_no_model, fmt::format("no model: {} has {} samples, method plscf takes {}",
-                                                     one.set.records.front().path, one.set.count(),
+        const std::size_t whole = one.set.count() - static_cast<std::size_t>(here.samples);
+        if (whole < least_lags * static_cast<std::size_t>(rows_per_lag))
+            throw failure(exit_no_model, fmt::format("no model: {} has {} samples{}, method plscf takes {}",
+                                                     one.set.records.front().path, whole,
+                                                     here.samples > 0 ? " of which no channel is missing" : "",
                                                      least_lags * static_cast<std::size_t>(rows_per_lag)));
     }
     out = describe_records(work.set_ups.front().set, work.options, missing);

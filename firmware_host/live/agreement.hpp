@@ -7,6 +7,7 @@
 #include "error.hpp"
 #include "record/record.hpp"
 #include "stream_config.hpp"
+#include "stream_state.hpp"
 
 #include <okid/accumulator.h>
 
@@ -54,12 +55,8 @@ class agreement {
     void merge(const void* state, std::size_t bytes); ///< as further records
 
   private:
-    struct saved {
-        std::vector<std::int64_t> ends; ///< of its records
-        std::vector<double> rows;
-    };
-    saved read(const void* state, std::size_t bytes) const;
-    void take(const saved& from);
+    saved_samples read(const void* state, std::size_t bytes) const;
+    void take(const saved_samples& from);
     void push(const double* row);
     const double* at(std::int64_t sample) const { return rows_.data() + static_cast<std::size_t>(sample - base_) * m_; }
     record_set records() const;

@@ -55,8 +55,10 @@ class stream {
     bool settled() const { return settled_; }                                ///< at the last update
     bool at_rest(std::size_t mode) const { return settling_.at_rest(mode); } ///< of the last update
     void reset();
-    /// As identifier::restore().
+    /// identifier::state() behind rate and channels of the stream, restore() and merge() compare them.
+    std::vector<std::byte> state();
     void restore(const void* state, std::size_t bytes);
+    void merge(const void* state, std::size_t bytes);
 
     /// Identify for a result. Throws `failure` (exit 3) when no model can be had.
     void identify();

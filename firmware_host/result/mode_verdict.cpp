@@ -28,6 +28,10 @@ constexpr std::array<std::pair<const char*, const char*>, 10> words{{
 
 } // namespace
 
+bool judged_by_agreement(const result_context& context) {
+    return context.method == "auto" || context.method == "plscf" || !context.verdicts.empty();
+}
+
 std::string why_text(const std::string& code) {
     const auto* at = std::find_if(words.begin(), words.end(), [&](const auto& one) { return code == one.first; });
     return at == words.end() ? code : at->second;

@@ -179,16 +179,16 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
         for (int i = 0; shapes && i < model.n_y; ++i)
             out += fmt::format("  {:>{}.3f}", model.shape_re[i + static_cast<std::ptrdiff_t>(k) * model.n_y],
                                width[static_cast<std::size_t>(i)]);
-        if (agreed && !verdict.confident) out += fmt::format("  {}", fmt::join(verdict.why, ", "));
+        if (!verdict.confident) out += fmt::format("  {}", fmt::join(verdict.why, ", "));
         out += "\n";
     }
-    if (!agreed && std::any_of(verdicts.begin(), verdicts.end(), [](const mode_verdict& v) { return !v.confident; }))
-        out += fmt::format("   ? EMAC below {:g}: probably noise, not a mode of the structure\n", doubtful_emac);
     if (!left_out.empty())
         out +=
             fmt::format("   {}, listed with --all-modes: {}\n",
                         counted(static_cast<long long>(left_out.size()), "doubtful mode"), fmt::join(left_out, ", "));
-    if (agreed) out += why_legend(verdicts);
+    out += why_legend(verdicts);
+    if (!judged_by_agreement(context) && model.mode_count > 0)
+        out += "   not judged by a named method: EMAC from 0.5 on, which noise reaches too; method auto judges\n";
     return out;
 }
 
@@ -259,6 +259,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
             agreed ? ordered_json(nullptr) : vector_json(model.singular_values, model.singular_count);
     out["singular_noise"] = number_json(model.noise_level);
     if (arrays) put_arrays_json(model, context, out);
+    out["judged_by"] = judged_by_agreement(context) ? "agreement" : "emac";
     out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
     if (!context.shape_quantity.empty()) out["shape_quantity"] = context.shape_quantity;
     if (agreed) {
