@@ -34,6 +34,11 @@ record_options options_of(const stream_config& config) {
     return out;
 }
 
+/// Samples of the window, 0: there is none.
+std::int64_t window_of(const stream_config& config) {
+    return config.wanted.window_s ? kept_samples(config) : std::int64_t{0};
+}
+
 } // namespace
 
 std::int64_t kept_samples(const stream_config& config) {
@@ -46,13 +51,14 @@ std::int64_t kept_samples(const stream_config& config) {
 }
 
 double agreement_bytes(const stream_config& config) {
-    return 8 * numbers_a_number * static_cast<double>(kept_samples(config)) * static_cast<double>(config.channels());
+    return 8 * numbers_a_number * static_cast<double>(kept_samples(config)) * static_cast<double>(config.channels()) +
+           followed_modes::bytes(config, window_of(config));
 }
 
 agreement::agreement(const stream_config& config)
     : where_(config.where), m_(config.channels()), options_(options_of(config)),
       window_(config.wanted.window_s.has_value()), most_(kept_samples(config)), starts_{0}, hits_(config.hits),
-      missing_(m_, NAN) {
+      missing_(m_, NAN), followed_(config, window_of(config)) {
     if (window_) rows_.reserve(static_cast<std::size_t>(most_ + most_ / 4 + 1) * m_);
 }
 
@@ -80,9 +86,11 @@ void agreement::add(const double* row) {
         in_gap_ = true;
     }
     push(row);
+    followed_.add(row);
 }
 
 void agreement::add_missing(std::int64_t count) {
+    followed_.add_missing(count);
     if (count == 0) {
         if (starts_.back() < came_) starts_.push_back(came_);
         in_gap_ = false;
@@ -100,6 +108,7 @@ void agreement::forget() {
     starts_ = {came_};
     run_at_ = came_;
     in_gap_ = false;
+    followed_.reset();
 }
 
 void agreement::reset() {
@@ -146,7 +155,7 @@ okid_status_t agreement::run(const mass_plan& mass) {
     const std::pair<std::int64_t, bool> now{came_, mass.wanted()};
     if (run_of_ == now) return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
     run_of_ = now;
-    run_at_ = came_;
+    pass();
     fault_.reset();
     try {
         record_set set = records();
@@ -158,7 +167,25 @@ okid_status_t agreement::run(const mass_plan& mass) {
         fault_ = why;
         found_ = {};
     }
+    decided_on_ = basis();
+    followed_.begin(found_);
+    model_ = kept_model(found_.model.view());
+    sigma_ = found_.context.sigma;
     return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
+}
+
+/// Deviations shrink with the root of what they rest on.
+bool agreement::follow() {
+    if (!followed_.any()) return false;
+    model_ = kept_model(found_.model.view());
+    followed_.follow(model_);
+    sigma_ = found_.context.sigma;
+    if (!sigma_) return true;
+    const double narrower =
+        std::sqrt(static_cast<double>(decided_on_) / static_cast<double>(std::max(decided_on_, basis())));
+    for (auto* each : {&sigma_->frequency_hz, &sigma_->damping_ratio, &sigma_->shape_re, &sigma_->shape_im})
+        for (double& one : *each) one *= narrower;
+    return true;
 }
 
 std::vector<std::byte> agreement::state() const {

@@ -108,7 +108,9 @@ stream_update stream::update(std::int64_t now) {
         return out;
     }
     const bool baseline = obliged();
-    out.status = identifier_.run();
+    if (identifier_.decides()) since_ = now;
+    out.since = since_;
+    out.status = identifier_.update();
     if (out.status < 0) {
         settling_.reset();
     } else {

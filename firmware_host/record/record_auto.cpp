@@ -144,6 +144,7 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
         modes.push_back(
             {mode.frequency_hz, mode.damping_ratio, mode.mpc, mode.emac, std::move(shape), mode.confident()});
         context.verdicts.push_back({mode.confident(), mode.found_in, mode.why});
+        work.carriers.push_back(carried ? carried->by : mode_carrier());
         auto& shifts = work.shifts.emplace_back(carried ? carried->shifts : std::vector<mode_shift>());
         for (mode_shift& shift : shifts)
             for (std::size_t i = 0; i < n_y; ++i) shift.shape[i] *= scale[n_u + i] / largest;
@@ -272,6 +273,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     for (const record_level& level : levels) work.context.rates_hz.push_back(level.fs_hz);
     std::vector<listed_mode> listed;
     describe_modes(found, scale, set.n_u, options.sigma_blocks > 0, listed, work);
+    work.scale = std::move(scale);
     return listed;
 }
 
@@ -459,6 +461,8 @@ record_result identify_auto(record_set records, const record_options& given) {
     record_result result;
     result.model = kept_model(work.model);
     result.context = std::move(work.context);
+    result.carriers = std::move(work.carriers);
+    result.scale = std::move(work.scale);
     shapes_in_one_quantity(given.sensing, result.model, result.context);
     return result;
 }
