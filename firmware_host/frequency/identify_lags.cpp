@@ -253,8 +253,8 @@ void make_model(lag_work& work, const response_modes& found, record_work& to) {
     std::vector<listed_mode> listed;
     for (std::size_t k = 0; k < found.modes.size(); ++k) {
         const consensus_mode& mode = found.modes[k];
-        listed.push_back({mode.frequency_hz, mode.damping_ratio, shape_mpc(found.shapes[k].shape), NAN,
-                          found.shapes[k].shape, mode.confident()});
+        listed.push_back(
+            {mode.frequency_hz, mode.damping_ratio, mode.mpc, NAN, found.shapes[k].shape, mode.confident()});
         to.context.verdicts.push_back({mode.confident(), mode.found_in, mode.why});
     }
     if (work.options.sigma_blocks > 0 && !found.sigma.shape_re.empty()) to.context.sigma = found.sigma;

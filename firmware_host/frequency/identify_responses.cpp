@@ -54,6 +54,13 @@ response_set choose(const response_set& from, const record_request& wanted) {
     return set;
 }
 
+/// One over the length of the blocks, where lines were left out as well.
+double finest_spacing(const std::vector<double>& f) {
+    double out = f.back();
+    for (std::size_t l = 1; l < f.size(); ++l) out = std::min(out, f[l] - f[l - 1]);
+    return out;
+}
+
 void check_options(const record_request& given) {
     for (const auto& [option, there] :
          {std::pair{"--fs", !given.fs.empty()}, std::pair{"--method", !given.method.empty()},
@@ -221,7 +228,7 @@ record_result identify_responses(const response_set& measured, const response_re
         work.context.warnings.emplace_back(
             "reciprocity", "more inputs than outputs: by reciprocity the outputs of this result are the places that "
                            "were struck, its inputs the sensors");
-    const joint_responses all{{set}, set.outputs, set.outputs};
+    const joint_responses all{{set}, set.outputs, set.outputs, 1 / finest_spacing(measured.frequency_hz)};
     make_result(set, constant_s, find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization),
                 work);
     find_matrices(options, work);

@@ -9,6 +9,8 @@
 // NUMERICS outputs and inputs at unit rms; poles from a companion matrix without an inverse in both normalisations
 #include "matrix_fraction.hpp"
 
+#include "consensus/quantity.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -175,7 +177,7 @@ void add_poles(const fraction_sums& sums, Index n, bool lowest, const reduced_eq
             const Eigen::RowVectorXcd row = powers.transpose() * B[static_cast<std::size_t>(o)];
             pole.shape.push_back((row * v.col(k)).value() * sums.scale_y[o]);
         }
-        pole.mpc = shape_mpc(pole.shape);
+        pole.mpc = shape_collinearity(pole.shape, {});
         run.poles.push_back(std::move(pole));
     }
 }
@@ -241,12 +243,6 @@ std::vector<consensus_run> fit_matrix_fractions(const response_set& set) {
             }
         }
     return runs;
-}
-
-double shape_mpc(const std::vector<complex>& shape) {
-    double xx = 0, yy = 0, xy = 0;
-    for (const complex& x : shape) xx += x.real() * x.real(), yy += x.imag() * x.imag(), xy += x.real() * x.imag();
-    return xx + yy > 0 ? ((xx - yy) * (xx - yy) + 4 * xy * xy) / ((xx + yy) * (xx + yy)) : 0;
 }
 
 } // namespace okid_host

@@ -10,7 +10,4 @@ namespace okid_host {
 /// halves and quarters (each half over the next) with one. The poles of each of these runs are linked over the degrees.
 std::vector<consensus_run> fit_matrix_fractions(const response_set& set);
 
-/// Modal phase collinearity: 1 where all entries lie on one line through the origin.
-double shape_mpc(const std::vector<std::complex<double>>& shape);
-
 } // namespace okid_host

@@ -2,7 +2,7 @@
 // PURPOSE  residues of modes in measured frequency responses, and the likeliest poles under the noise that is left
 // METHOD   H(s) = sum_k r_k / (s - l_k) + conjugate + five powers of s for what lies below and above the band, of motions of any
 //          kind (LSFD), one QR for all responses; the poles by Gauss-Newton with the residues eliminated (variable projection,
-//          Kaufman's form). Responses are weighted by what the fit leaves of them, lines by what it leaves around them
+//          Kaufman's form). A Hann window widens what it averages: its part is known and fitted along. Responses are weighted by what the fit leaves of them, lines by what it leaves around them
 //          Covariance of a pole, two of which the wider counts: of the noise, from what is left near the resonance along its
 //          residues, so that what all outputs have in common counts; and of the places, from how far the responses of each
 //          would move the pole, so that a structure that was not the same for each of them counts
@@ -44,6 +44,7 @@ MatrixXd parts(const MatrixXcd& from) {
 struct problem {
     Eigen::VectorXcd s; // j w over the highest w
     double w_high = 0;
+    double window = 0; // length of a Hann window, in 1 / w_high; 0: none
     MatrixXcd H;
     VectorXd root; // one over the noise of each line, rms 1
     // Weighted, parts below each other:
@@ -52,9 +53,10 @@ struct problem {
     MatrixXd slopes, gram;  // along the poles, the residues eliminated
 };
 
-problem make_problem(const response_set& set) {
+problem make_problem(const response_set& set, double window_s) {
     problem out;
     out.w_high = 2 * M_PI * set.frequency_hz.back();
+    out.window = window_s * out.w_high;
     out.s.resize(set.lines());
     for (Index l = 0; l < set.lines(); ++l)
         out.s[l] = complex(0, set.frequency_hz[static_cast<std::size_t>(l)] / set.frequency_hz.back());
@@ -64,11 +66,29 @@ problem make_problem(const response_set& set) {
     return out;
 }
 
+/// Integral of t^k exp(-a t), 0 .. T. @param e  exp(-a T)
+complex moment(complex a, int k, double T, complex e) {
+    const complex x = a * T;
+    if (k == 0) return (1.0 - e) / a;
+    if (k == 1) return (1.0 - (1.0 + x) * e) / (a * a);
+    return (2.0 - (2.0 + 2.0 * x + x * x) * e) / (a * a * a);
+}
+
+/// 1 / z^power; under a window what averages of random vibration make of it: the transform of t^(power-1) exp(-z t) times the
+/// correlation of the Hann window with itself, (1 - t/T) (2 + cos(2 pi t/T)) / 3 + sin(2 pi t/T) / (2 pi).
+complex through_window(complex z, int power, double T) {
+    if (T == 0) return power == 1 ? 1.0 / z : 1.0 / (z * z);
+    const complex turn(0, 2 * M_PI / T), e = std::exp(-z * T); // the same a whole turn farther
+    const auto fading = [&](complex a) { return moment(a, power - 1, T, e) - moment(a, power, T, e) / T; };
+    return 2.0 / 3.0 * fading(z) + (fading(z + turn) + fading(z - turn)) / 6.0 +
+           (moment(z - turn, power - 1, T, e) - moment(z + turn, power - 1, T, e)) / complex(0, 4 * M_PI);
+}
+
 /// 1 / (s - l)^power and its partner, the columns of Re and Im of a coefficient.
-void put_pole(const Eigen::VectorXcd& s, complex pole, int power, MatrixXcd& to, Index column) {
-    for (Index l = 0; l < s.size(); ++l) {
-        complex a = 1.0 / (s[l] - pole), b = 1.0 / (s[l] - std::conj(pole));
-        if (power == 2) a *= a, b *= b;
+void put_pole(const problem& all, complex pole, int power, MatrixXcd& to, Index column) {
+    for (Index l = 0; l < all.s.size(); ++l) {
+        const complex a = through_window(all.s[l] - pole, power, all.window),
+                      b = through_window(all.s[l] - std::conj(pole), power, all.window);
         to(l, column) = a + b;
         to(l, column + 1) = complex(0, 1) * (a - b);
     }
@@ -78,7 +98,7 @@ void put_pole(const Eigen::VectorXcd& s, complex pole, int power, MatrixXcd& to,
 double fit_linear(const std::vector<complex>& poles, const VectorXd& weight, problem& all) {
     const auto n = static_cast<Index>(poles.size());
     MatrixXcd basis(all.s.size(), 2 * n + residual_powers);
-    for (Index k = 0; k < n; ++k) put_pole(all.s, poles[static_cast<std::size_t>(k)], 1, basis, 2 * k);
+    for (Index k = 0; k < n; ++k) put_pole(all, poles[static_cast<std::size_t>(k)], 1, basis, 2 * k);
     for (Index p = 0; p < residual_powers; ++p)
         for (Index l = 0; l < all.s.size(); ++l)
             basis(l, 2 * n + p) = std::pow(all.s[l], static_cast<int>(lowest_power + p));
@@ -136,7 +156,7 @@ Eigen::Matrix2d turn_of(const problem& all, Index k, Index c) {
 MatrixXd normal_equations(const std::vector<complex>& poles, const VectorXd& weight, problem& all, MatrixXd& N) {
     const auto n = static_cast<Index>(poles.size());
     MatrixXcd slopes(all.s.size(), 2 * n);
-    for (Index k = 0; k < n; ++k) put_pole(all.s, poles[static_cast<std::size_t>(k)], 2, slopes, 2 * k);
+    for (Index k = 0; k < n; ++k) put_pole(all, poles[static_cast<std::size_t>(k)], 2, slopes, 2 * k);
     all.slopes = parts(all.root.asDiagonal() * slopes);
     all.slopes -= all.Q * (all.Q.transpose() * all.slopes);
     all.gram = all.slopes.transpose() * all.slopes;
@@ -205,14 +225,14 @@ double local_noise(const problem& all, complex pole, const VectorXd& weight, Ind
     const MatrixXd own = all.slopes.middleCols(2 * k, 2);
     const MatrixXd inverse = all.gram.block<2, 2>(2 * k, 2 * k).inverse();
     const VectorXd self = (own * inverse).cwiseProduct(own).rowwise().sum(), bound = taken(all.Q);
-    double seen = 0, expected = 0;
+    double found = 0, expected = 0;
     for (Index l = 0; l < lines; ++l) {
         const double near = std::norm(all.root[l] / (all.s[l] - pole));
-        seen += near * (re[l] * re[l] + im[l] * im[l]);
+        found += near * (re[l] * re[l] + im[l] * im[l]);
         expected += near * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
     }
     const double power = 2 * along.cwiseAbs2().cwiseQuotient(weight).sum();
-    return std::max(1.0, seen / std::max(expected * power, 1e-300));
+    return std::max(1.0, found / std::max(expected * power, 1e-300));
 }
 
 /// Covariances of the poles, N being their information. @param b  what moves them, a column a response
@@ -228,7 +248,7 @@ void find_covariances(const std::vector<complex>& poles, const problem& all, con
         out.by_noise.emplace_back(unit * repeated * local_noise(all, poles[m], weight, k) *
                                   inverse.block<2, 2>(2 * k, 2 * k));
         const MatrixXd rows = inverse.middleRows(2 * k, 2), moves = rows * b;
-        MatrixXd moved = MatrixXd::Zero(2, count);
+        MatrixXd of_place = MatrixXd::Zero(2, count);
         VectorXd share = VectorXd::Zero(count);
         for (Index c = 0; c < b.cols(); ++c) {
             MatrixXd own = all.gram.middleCols(2 * k, 2) * turn_of(all, k, c);
@@ -237,18 +257,19 @@ void find_covariances(const std::vector<complex>& poles, const problem& all, con
                 own.middleRows(at, 2) = (turn_of(all, at / 2, c).transpose() * own.middleRows(at, 2)).eval();
             }
             const Index place = places[static_cast<std::size_t>(c)];
-            moved.col(place) += moves.col(c);
+            of_place.col(place) += moves.col(c);
             share[place] += weight[c] * (rows * own).trace() / 2;
         }
         const VectorXd others = (1 - share.array()).max(1 - most_of_a_place).inverse();
-        out.by_place.emplace_back(unit * moved * others.asDiagonal() * moved.transpose());
+        out.by_place.emplace_back(unit * of_place * others.asDiagonal() * of_place.transpose());
     }
 }
 
 } // namespace
 
-modal_fit fit_modes(const response_set& set, const std::vector<Index>& places, std::vector<complex> poles, int steps) {
-    problem all = make_problem(set);
+modal_fit fit_modes(const response_set& set, const std::vector<Index>& places, std::vector<complex> poles, int steps,
+                    double window_s) {
+    problem all = make_problem(set, window_s);
     for (complex& pole : poles) pole /= all.w_high;
     const std::vector<complex> start = poles;
     VectorXd weight = VectorXd::Ones(set.H.cols());
@@ -281,6 +302,7 @@ modal_fit fit_modes(const response_set& set, const std::vector<Index>& places, s
         out.residues.row(k).imag() = all.w_high * all.coefficients.row(2 * k + 1);
     }
     out.variance = weight.cwiseInverse();
+    out.unlikeliness = out.variance.array().log().mean() - 2 * all.root.array().log().mean();
     out.unit_variance =
         all.w_high * all.w_high * Eigen::Map<const VectorXd, 0, Eigen::InnerStride<2>>(all.unit_variance.data(), n);
     find_covariances(poles, all, weight, places, N, b, out);

@@ -13,13 +13,14 @@ struct modal_fit {
     Eigen::MatrixXcd residues;                       ///< a row a pole, columns as those of response_set::H
     Eigen::VectorXd variance;                        ///< of the noise of each response, of its real and imaginary part
     Eigen::VectorXd unit_variance;                   ///< of the real part of a pole's residues for a noise of 1
+    double unlikeliness = 0;                         ///< mean logarithm of the variance of what is left
     std::vector<Eigen::Matrix2d> by_noise, by_place; ///< covariances of Re, Im of each pole; empty: not known
 };
 
-/// @param places  of each column, which place it was measured at, from 0; @param poles  the start, at least one. Fitted with
+/// @param window_s  length of the Hann window that the responses were averaged under, 0: none; @param places  of each column, which place it was measured at, from 0; @param poles  the start, at least one. Fitted with
 /// the residuals of modes below and above the band; poles that would run away stay where they were. @param steps  of the
 /// poles, at most
 modal_fit fit_modes(const response_set& set, const std::vector<Eigen::Index>& places,
-                    std::vector<std::complex<double>> poles, int steps);
+                    std::vector<std::complex<double>> poles, int steps, double window_s);
 
 } // namespace okid_host

@@ -7,6 +7,7 @@
 // REFERENCE Mevel, Basseville, Benveniste, Goursat (2002), several set-ups with references
 #include "response_modes.hpp"
 
+#include "consensus/quantity.hpp"
 #include "error.hpp"
 #include "matrix_fraction.hpp"
 #include "record/request.hpp"
@@ -29,9 +30,9 @@ using Eigen::MatrixXd;
 
 constexpr double widest_damping = 0.5; // sigma of damping over damping
 constexpr double widest_frequency = 0.05;
-constexpr double least_strength = 2;                    // of a residue matrix over its noise
-constexpr int first_steps = 2, last_steps = 12;         // of the poles
-constexpr double neighbours = 0.02;                     // in frequency: poles that compete for one resonance
+constexpr double least_strength = 2;                              // of a residue matrix over its noise
+constexpr int first_steps = 2, window_steps = 5, last_steps = 12; // of the poles
+constexpr double neighbours = 0.02;                               // in frequency: poles that compete for one resonance
 constexpr double one_mode = 2.5, one_mode_share = 0.01; // sum of widths, or share of the frequency: as of records
 constexpr double same_residues = 0.9;                   // MAC of the residues of two poles that are one mode
 constexpr double narrowest = 0.25;                      // half a resonance's width in lines: below it no damping shows
@@ -164,7 +165,7 @@ std::pair<double, double> spread_of(const modal_fit& fit, std::size_t k) {
 std::pair<modal_fit, refined_modes> fit_all(const joint_responses& from, const std::vector<complex>& poles, int steps) {
     std::vector<Index> places;
     const response_set columns = side_by_side_columns(from, places);
-    std::pair<modal_fit, refined_modes> out{fit_modes(columns, places, poles, steps), {}};
+    std::pair<modal_fit, refined_modes> out{fit_modes(columns, places, poles, steps, from.window_s), {}};
     out.second.poles = out.first.poles;
     for (std::size_t k = 0; k < poles.size(); ++k) {
         out.second.shapes.push_back(shape_of(from, out.first, static_cast<Index>(k)));
@@ -267,12 +268,24 @@ std::vector<fitted_mode> fit_candidates(const joint_responses& from, std::vector
     return all;
 }
 
+/// No file says whether there was a window: the likelier of both.
+void choose_window(const std::vector<fitted_mode>& candidates, joint_responses& from) {
+    std::vector<complex> poles;
+    for (const fitted_mode& one : candidates) poles.push_back(one.pole);
+    joint_responses plain = from;
+    plain.window_s = 0;
+    if (from.window_s == 0 || poles.empty() ||
+        fit_all(plain, poles, window_steps).first.unlikeliness <= fit_all(from, poles, window_steps).first.unlikeliness)
+        from.window_s = 0;
+}
+
 /// The candidates at their refined values, with shapes and deviations; what turns out to be none is said.
-void refine_modes(const joint_responses& from, response_modes& found) {
+void refine_modes(joint_responses from, const std::vector<bool>& turned, response_modes& found) {
     auto& [modes, shapes, sigma, stable] = found;
     std::vector<fitted_mode> candidates;
     for (std::size_t k = 0; k < modes.size(); ++k)
         if (is_candidate(modes[k], modes)) candidates.push_back({k, modes[k].found_in, pole_of(modes[k]), {}, {}, ""});
+    choose_window(candidates, from);
     do { // few steps while there is noise among them
         do candidates = fit_candidates(from, std::move(candidates), first_steps);
         while (leave_worst_out(candidates, modes));
@@ -282,7 +295,7 @@ void refine_modes(const joint_responses& from, response_modes& found) {
         consensus_mode& mode = modes[one.at];
         mode.frequency_hz = std::abs(one.pole) / (2 * M_PI);
         mode.damping_ratio = -one.pole.real() / std::abs(one.pole);
-        mode.mpc = shape_mpc(one.shape.shape);
+        mode.mpc = shape_collinearity(one.shape.shape, turned);
         judge_agreement(mode);
         std::tie(sigma.frequency_hz[one.at], sigma.damping_ratio[one.at]) = one.sigma;
         shapes[one.at] = std::move(one.shape);
@@ -452,14 +465,16 @@ response_modes find_response_modes(const joint_responses& from, bool all, const 
     const auto runs = runs_of(from);
     response_modes out;
     if (diagram) out.stable = diagram_of(from, runs);
-    out.modes = find_agreement(runs);
+    std::vector<bool>
+        turned; // sensors of another quantity: their entries in the references are not those of all outputs
+    out.modes = find_agreement(runs, from.references == from.outputs ? &turned : nullptr);
     mark_doubtful(from.sets.front(), out.modes);
     const auto chance = [](const consensus_mode& mode) { return mode.found_in < worth_listing; };
     out.modes.erase(std::remove_if(out.modes.begin(), out.modes.end(), chance), out.modes.end());
     out.shapes.resize(out.modes.size());
     out.sigma.frequency_hz.assign(out.modes.size(), NAN);
     out.sigma.damping_ratio.assign(out.modes.size(), NAN);
-    refine_modes(from, out);
+    refine_modes(from, turned, out);
     leave_out(from.sets.front().frequency_hz, all, numbers, out);
     if (std::none_of(out.modes.begin(), out.modes.end(), [](const consensus_mode& mode) { return mode.confident(); }))
         throw_no_modes(out.modes, runs.size());

@@ -107,9 +107,11 @@ response_set cut_band(const response_set& from, double low_hz, double high_hz) {
     if (static_cast<Index>(kept.size()) < fewest_lines)
         throw failure(
             exit_usage,
-            fmt::format("{} lines between {:g} and {:g} Hz, {} more with a response that is no number or has no "
-                        "coherence; expected at least {}. Choose a wider --band, or measure with finer lines",
-                        kept.size(), low_hz, high_hz, unmeasured, fewest_lines));
+            fmt::format("{} lines between {:g} and {:g} Hz, expected at least {}{}. Choose a wider --band, or measure "
+                        "with finer lines",
+                        kept.size(), low_hz, high_hz, fewest_lines,
+                        unmeasured > 0 ? fmt::format("; {} more hold no number or have no coherence", unmeasured)
+                                       : ""));
     return chosen_lines(from, kept);
 }
 

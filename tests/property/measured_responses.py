@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Files of frequency responses as a laboratory measures them, with the modes that are in them.
 
-Structures are closed forms (beam, plate) or springs between masses. Forces and motions are signals: modal equations are
-integrated sample by sample at eight times the rate of the recorder, filtered, taken down, given noise, and averaged to H1
-under a window. So no response is computed from a pole, and leakage, noise and a bad low end are those of a measurement.
+Structures are closed forms (beam, plate) or springs between masses. Forces and motions are signals: modal equations
+are integrated sample by sample at eight times the rate of the recorder, filtered, taken down, given noise, and averaged
+to H1 under a window. So no response is computed from a pole, and leakage, noise and a bad low end are those of a
+measurement.
 
     python measured_responses.py FOLDER [SEED ...]    writes the files and truth.json
 """
@@ -211,7 +212,9 @@ def make(kind: str, name: str, seed: int, repeat: int = 0, drift: float = 3e-4) 
     f, h, coherence = f[keep], h[keep], coherence[keep]
     effective = t.averages * (1.0 if t.hammer else 0.75)
     scatter = np.abs(h) * np.sqrt(np.maximum(1 - coherence, 1e-12) / np.maximum(2 * effective * coherence, 1e-12))
-    file = File(f"{kind}_{name}_{seed}", f, h, coherence, inputs, outputs, of, t.low_hz, kind, 8 if t.displacement else 12)
+    file = File(
+        f"{kind}_{name}_{seed}", f, h, coherence, inputs, outputs, of, t.low_hz, kind, 8 if t.displacement else 12
+    )
     file.seen = _stand_out(file, scatter)
     if kind not in ("roving_hammer", "accelerance_g") or seed % 2:
         file.coherence = None
@@ -269,8 +272,8 @@ def mac(a: Complex, b: Real) -> float:
 
 
 def score(file: File, modes: list[dict]) -> tuple[list[tuple[int, dict]], list[dict]]:
-    """Modes of the result with the true modes that they are (frequency within 1 %, shape with MAC above 0.8), and those
-    that are none. A mode of the truth that does not stand out may be found: it counts for neither."""
+    """The true modes with the modes of the result that they are (frequency within 1 %, MAC above 0.8), and the modes of
+    the result that are none. A true mode that does not stand out counts for neither."""
     places = file.inputs if len(file.inputs) > len(file.outputs) else file.outputs
     left, found = list(modes), []
     for k, f in enumerate(file.truth.f):
