@@ -3,11 +3,11 @@
 // METHOD   H(s) = sum_k r_k / (s - l_k) + conjugate + five powers of s for what lies below and above the band, of motions of any
 //          kind (LSFD), one QR for all responses; the poles by Gauss-Newton with the residues eliminated (variable projection,
 //          Kaufman's form). A Hann window widens what it averages: its part is known and fitted along. Responses are weighted by what the fit leaves of them, lines by what it leaves around them
-//          Covariance of a pole, two of which the wider counts: of the noise, from what is left near the resonance along its
-//          residues, so that what all outputs have in common counts; and of the places, from how far the responses of each
-//          would move the pole, so that a structure that was not the same for each of them counts
-// REFERENCE Golub, Pereyra (1973); Kaufman (1975); Heylen, Lammens, Sas, Modal Analysis Theory and Testing; MacKinnon, White
-//          (1985), variances under noise of unknown form (HC2)
+//          Places of a roving hammer or sensor meet a structure that is not quite the same: each moves the pole, and where they do
+//          by more than their noise the pole is the mean over places of that scatter, with its variance (random effects). The noise
+//          is what is left near the resonance along its residues, so that errors common to all outputs count
+// REFERENCE Golub, Pereyra (1973); Kaufman (1975); Heylen, Lammens, Sas, Modal Analysis Theory and Testing; Paule, Mandel (1982),
+//          means of measurements that differ
 // NUMERICS frequencies over the highest line, columns at unit length; the covariance is widened by the correlation of what is
 //          left from line to line, as windows with overlap make it
 #include "modal_fit.hpp"
@@ -32,7 +32,8 @@ constexpr Index correlated_lines = 6;
 constexpr Index residual_powers = 5, lowest_power = -2; // of s
 constexpr Index noise_reach = 10;                       // lines to either side over which their noise is taken
 constexpr double quietest_line = 1e-3;                  // of the mean noise
-constexpr double most_of_a_place = 0.95; // of what is known of a pole: beyond, the others say nothing of it
+constexpr double least_of_a_place = 0.2; // of an even share of what is known of a pole: below lies a node of its shape
+constexpr int rounds_of_places = 8;      // of weights and scatter between places, from noise alone
 
 /// Real and imaginary parts below each other.
 MatrixXd parts(const MatrixXcd& from) {
@@ -235,33 +236,60 @@ double local_noise(const problem& all, complex pole, const VectorXd& weight, Ind
     return std::max(1.0, found / std::max(expected * power, 1e-300));
 }
 
-/// Covariances of the poles, N being their information. @param b  what moves them, a column a response
-void find_covariances(const std::vector<complex>& poles, const problem& all, const VectorXd& weight,
-                      const std::vector<Index>& places, const MatrixXd& N, const MatrixXd& b, modal_fit& out) {
+/// One part of a pole as the mean over places that may differ by more than their noise. @param moves  by which each moves the mean
+/// weighted by `share`, which add up to 0; @param variance  by noise alone; out: of the mean over the places. @return what that
+/// mean adds
+double meet(const VectorXd& moves, const VectorXd& share, double& variance) {
+    std::vector<Index> known;
+    for (Index g = 0; g < share.size(); ++g)
+        if (share[g] * static_cast<double>(share.size()) > least_of_a_place) known.push_back(g);
+    if (known.size() < 2) return 0;
+    double between = 0, mean = 0, weight = 0;
+    for (int round = 0; round < rounds_of_places; ++round) {
+        double squares = 0, noise = 0, spread = 0;
+        mean = weight = 0;
+        const auto own = [&](Index g) { return 1 / (between + variance / share[g]); };
+        for (const Index g : known) weight += own(g), mean += own(g) * moves[g] / share[g];
+        mean /= weight;
+        for (const Index g : known) {
+            squares += own(g) * own(g) / weight;
+            noise += own(g) * (1 - own(g) / weight) * variance / share[g];
+            spread += own(g) * std::pow(moves[g] / share[g] - mean, 2);
+        }
+        between = std::max(0.0, (spread - noise) / std::max(weight - squares, 1e-3 * weight));
+    }
+    variance = std::max(variance, 1 / weight);
+    return mean;
+}
+
+/// The poles as the mean over the places, and their covariances; N: their information. @param b  what moves them, a column a
+/// response
+void meet_places(const std::vector<complex>& poles, const problem& all, const VectorXd& weight,
+                 const std::vector<Index>& places, const MatrixXd& N, const MatrixXd& b, modal_fit& out) {
     const Eigen::LDLT<MatrixXd> factor(N);
     if (factor.info() != Eigen::Success || !factor.isPositive()) return;
     const MatrixXd inverse = factor.solve(MatrixXd::Identity(N.rows(), N.cols()));
-    const double unit = all.w_high * all.w_high, repeated = repetition(all);
+    const double repeated = repetition(all);
     const Index count = *std::max_element(places.begin(), places.end()) + 1;
     for (std::size_t m = 0; m < poles.size(); ++m) {
         const auto k = static_cast<Index>(m);
-        out.by_noise.emplace_back(unit * repeated * local_noise(all, poles[m], weight, k) *
-                                  inverse.block<2, 2>(2 * k, 2 * k));
         const MatrixXd rows = inverse.middleRows(2 * k, 2), moves = rows * b;
         MatrixXd of_place = MatrixXd::Zero(2, count);
         VectorXd share = VectorXd::Zero(count);
         for (Index c = 0; c < b.cols(); ++c) {
             MatrixXd own = all.gram.middleCols(2 * k, 2) * turn_of(all, k, c);
-            for (std::size_t j = 0; j < poles.size(); ++j) {
-                const auto at = static_cast<Index>(2 * j);
-                own.middleRows(at, 2) = (turn_of(all, at / 2, c).transpose() * own.middleRows(at, 2)).eval();
-            }
+            for (Index j = 0; 2 * j < own.rows(); ++j)
+                own.middleRows(2 * j, 2) = (turn_of(all, j, c).transpose() * own.middleRows(2 * j, 2)).eval();
             const Index place = places[static_cast<std::size_t>(c)];
             of_place.col(place) += moves.col(c);
             share[place] += weight[c] * (rows * own).trace() / 2;
         }
-        const VectorXd others = (1 - share.array()).max(1 - most_of_a_place).inverse();
-        out.by_place.emplace_back(unit * of_place * others.asDiagonal() * of_place.transpose());
+        Eigen::Matrix2d covariance =
+            repeated * local_noise(all, poles[m], weight, k) * inverse.block<2, 2>(2 * k, 2 * k);
+        const double re = meet(of_place.row(0), share, covariance(0, 0)),
+                     im = meet(of_place.row(1), share, covariance(1, 1));
+        out.poles[m] += all.w_high * complex(re, im);
+        out.covariance.emplace_back(all.w_high * all.w_high * covariance);
     }
 }
 
@@ -305,7 +333,7 @@ modal_fit fit_modes(const response_set& set, const std::vector<Index>& places, s
     out.unlikeliness = out.variance.array().log().mean() - 2 * all.root.array().log().mean();
     out.unit_variance =
         all.w_high * all.w_high * Eigen::Map<const VectorXd, 0, Eigen::InnerStride<2>>(all.unit_variance.data(), n);
-    find_covariances(poles, all, weight, places, N, b, out);
+    meet_places(poles, all, weight, places, N, b, out);
     return out;
 }
 

@@ -9,12 +9,12 @@
 namespace okid_host {
 
 struct modal_fit {
-    std::vector<std::complex<double>> poles;         ///< rad/s, upper half
-    Eigen::MatrixXcd residues;                       ///< a row a pole, columns as those of response_set::H
-    Eigen::VectorXd variance;                        ///< of the noise of each response, of its real and imaginary part
-    Eigen::VectorXd unit_variance;                   ///< of the real part of a pole's residues for a noise of 1
-    double unlikeliness = 0;                         ///< mean logarithm of the variance of what is left
-    std::vector<Eigen::Matrix2d> by_noise, by_place; ///< covariances of Re, Im of each pole; empty: not known
+    std::vector<std::complex<double>> poles; ///< rad/s, upper half
+    Eigen::MatrixXcd residues;               ///< a row a pole, columns as those of response_set::H
+    Eigen::VectorXd variance;                ///< of the noise of each response, of its real and imaginary part
+    Eigen::VectorXd unit_variance;           ///< of the real part of a pole's residues for a noise of 1
+    double unlikeliness = 0;                 ///< mean logarithm of the variance of what is left
+    std::vector<Eigen::Matrix2d> covariance; ///< of Re, Im of each pole; empty: not known
 };
 
 /// @param window_s  length of the Hann window that the responses were averaged under, 0: none; @param places  of each column, which place it was measured at, from 0; @param poles  the start, at least one. Fitted with

@@ -150,15 +150,13 @@ residue_shape shape_of(const joint_responses& from, const modal_fit& fit, Index 
 
 /// Standard deviations of frequency and damping from that of the pole's parts.
 std::pair<double, double> spread_of(const modal_fit& fit, std::size_t k) {
-    if (fit.by_noise.empty()) return {NAN, NAN};
+    if (fit.covariance.empty()) return {NAN, NAN};
     const complex pole = fit.poles[k];
     const double size = std::abs(pole), re = pole.real(), im = pole.imag();
     const Eigen::Vector2d f(re / size / (2 * M_PI), im / size / (2 * M_PI)),
         zeta(-im * im / (size * size * size), re * im / (size * size * size));
-    const auto wider = [&](const Eigen::Vector2d& v) {
-        return std::sqrt(std::max(v.dot(fit.by_noise[k] * v), v.dot(fit.by_place[k] * v)));
-    };
-    return {wider(f), wider(zeta)};
+    const auto along = [&](const Eigen::Vector2d& v) { return std::sqrt(v.dot(fit.covariance[k] * v)); };
+    return {along(f), along(zeta)};
 }
 
 /// Residues, shapes and deviations of all set-ups together.
@@ -174,17 +172,23 @@ std::pair<modal_fit, refined_modes> fit_all(const joint_responses& from, const s
     return out;
 }
 
-/// Fitted: what the runs agree on, and what few of them found, lest it stand in the others' residues; but not where a mode
-/// that they agree on has its resonance: two poles share one shape between them there.
-bool is_candidate(const consensus_mode& mode, const std::vector<consensus_mode>& all) {
-    if (mode.confident()) return true;
-    const double width = mode.frequency_hz * mode.damping_ratio;
+/// Fitted: what the runs agree on, and what few of them found, lest it stand in the others' residues.
+bool is_candidate(const consensus_mode& mode) {
     return std::all_of(mode.why.begin(), mode.why.end(),
-                       [](const std::string& why) { return why == "few_runs" || why == "noise_shape"; }) &&
-           std::none_of(all.begin(), all.end(), [&](const consensus_mode& other) {
-               return other.confident() && std::abs(other.frequency_hz - mode.frequency_hz) <
-                                               width + other.frequency_hz * other.damping_ratio;
-           });
+                       [](const std::string& why) { return why == "few_runs" || why == "noise_shape"; });
+}
+
+/// Chance, or a second pole within the resonance of a mode that the runs agree on: fitted, both would share one shape.
+bool is_none(const consensus_mode& mode, const std::vector<consensus_mode>& all) {
+    const double width = mode.frequency_hz * mode.damping_ratio;
+    return mode.found_in < worth_listing ||
+           (!mode.confident() && std::any_of(
+                                     all.begin(), all.end(),
+                                     [&](const consensus_mode& other) {
+                                         return other.confident() &&
+                                                std::abs(other.frequency_hz - mode.frequency_hz) <
+                                                    width + other.frequency_hz * other.damping_ratio;
+                                     }));
 }
 
 /// A candidate with what the fit says of it.
@@ -284,7 +288,7 @@ void refine_modes(joint_responses from, const std::vector<bool>& turned, respons
     auto& [modes, shapes, sigma, stable] = found;
     std::vector<fitted_mode> candidates;
     for (std::size_t k = 0; k < modes.size(); ++k)
-        if (is_candidate(modes[k], modes)) candidates.push_back({k, modes[k].found_in, pole_of(modes[k]), {}, {}, ""});
+        if (is_candidate(modes[k])) candidates.push_back({k, modes[k].found_in, pole_of(modes[k]), {}, {}, ""});
     choose_window(candidates, from);
     do { // few steps while there is noise among them
         do candidates = fit_candidates(from, std::move(candidates), first_steps);
@@ -469,8 +473,9 @@ response_modes find_response_modes(const joint_responses& from, bool all, const 
         turned; // sensors of another quantity: their entries in the references are not those of all outputs
     out.modes = find_agreement(runs, from.references == from.outputs ? &turned : nullptr);
     mark_doubtful(from.sets.front(), out.modes);
-    const auto chance = [](const consensus_mode& mode) { return mode.found_in < worth_listing; };
-    out.modes.erase(std::remove_if(out.modes.begin(), out.modes.end(), chance), out.modes.end());
+    const std::vector<consensus_mode> gathered = out.modes;
+    const auto none = [&](const consensus_mode& mode) { return is_none(mode, gathered); };
+    out.modes.erase(std::remove_if(out.modes.begin(), out.modes.end(), none), out.modes.end());
     out.shapes.resize(out.modes.size());
     out.sigma.frequency_hz.assign(out.modes.size(), NAN);
     out.sigma.damping_ratio.assign(out.modes.size(), NAN);
