@@ -258,7 +258,8 @@ double meet(const VectorXd& moves, const VectorXd& share, double& variance) {
         }
         between = std::max(0.0, (spread - noise) / std::max(weight - squares, 1e-3 * weight));
     }
-    variance = std::max(variance, 1 / weight);
+    const double free = static_cast<double>(known.size()) - 1; // few places know little of their own scatter (Student)
+    variance += std::max(0.0, 1 / weight - variance) * free / std::max(free - 2, 0.5);
     return mean;
 }
 
