@@ -25,10 +25,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int most_halvings = 5;
-constexpr double farthest_step = 0.5; // of the decay rate
-constexpr double least_gain = 1e-7;   // of the cost
-constexpr double farthest = 0.02;     // in frequency, from the start
-constexpr Index correlated_lines = 6;
+constexpr double farthest_step = 0.5;                   // of the decay rate
+constexpr double least_gain = 1e-7;                     // of the cost
+constexpr double farthest = 0.02;                       // in frequency, from the start
+constexpr Index correlated_lines = 6, local_lags = 2;   // lines
 constexpr Index residual_powers = 5, lowest_power = -2; // of s
 constexpr Index noise_reach = 10;                       // lines to either side over which their noise is taken
 constexpr double quietest_line = 1e-3;                  // of the mean noise
@@ -215,8 +215,9 @@ double repetition(const problem& all) {
     return out;
 }
 
-/// How much more than white noise of its mean level moves a pole: what is left near it, along its residues.
-double local_noise(const problem& all, complex pole, const VectorXd& weight, Index k) {
+/// How much more than white noise of its mean level moves a pole: what is left near it, along its residues, and how much its lines
+/// repeat each other. @param repeated  of all lines
+double local_noise(const problem& all, complex pole, const VectorXd& weight, Index k, double repeated) {
     const Index lines = all.s.size();
     Eigen::VectorXcd along(weight.size());
     for (Index c = 0; c < weight.size(); ++c)
@@ -227,13 +228,17 @@ double local_noise(const problem& all, complex pole, const VectorXd& weight, Ind
     const MatrixXd inverse = all.gram.block<2, 2>(2 * k, 2 * k).inverse();
     const VectorXd self = (own * inverse).cwiseProduct(own).rowwise().sum(), bound = taken(all.Q);
     double found = 0, expected = 0;
+    Eigen::Array<double, local_lags + 1, 1> products = Eigen::Array<double, local_lags + 1, 1>::Zero();
     for (Index l = 0; l < lines; ++l) {
         const double near = std::norm(all.root[l] / (all.s[l] - pole));
         found += near * (re[l] * re[l] + im[l] * im[l]);
+        for (Index lag = 0; lag <= std::min(local_lags, lines - 1 - l); ++lag)
+            products[lag] += near * (re[l] * re[l + lag] + im[l] * im[l + lag]);
         expected += near * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
     }
     const double power = 2 * along.cwiseAbs2().cwiseQuotient(weight).sum();
-    return std::max(1.0, found / std::max(expected * power, 1e-300));
+    const double alike = 2 * (products / std::max(products[0], 1e-300)).max(0).sum() - 1;
+    return std::max(repeated, alike) * std::max(1.0, found / std::max(expected * power, 1e-300));
 }
 
 /// One part of a pole as the mean over places that may differ by more than their noise. @param moves  by which each moves the mean
@@ -286,7 +291,7 @@ void meet_places(const std::vector<complex>& poles, const problem& all, const Ve
             share[place] += weight[c] * (rows * own).trace() / 2;
         }
         Eigen::Matrix2d covariance =
-            repeated * local_noise(all, poles[m], weight, k) * inverse.block<2, 2>(2 * k, 2 * k);
+            local_noise(all, poles[m], weight, k, repeated) * inverse.block<2, 2>(2 * k, 2 * k);
         const double re = meet(of_place.row(0), share, covariance(0, 0)),
                      im = meet(of_place.row(1), share, covariance(1, 1));
         out.poles[m] += all.w_high * complex(re, im);

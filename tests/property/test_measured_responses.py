@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from program import okid as program
 
-HELD_LEAST, HELD_MOST = 0.90, 0.98
+HELD_LEAST = 0.88  # of 0.95, less what 100 modes leave to chance
+NARROW_ENOUGH = 0.15  # median of error over deviation; of normal errors 0.67
 
 
 def identify(path: Path, *options: str) -> dict[str, Any]:
@@ -60,14 +61,15 @@ def _errors(kind: str, name: str, seed: int, repeats: int, folder: Path) -> np.n
     return np.array(out)
 
 
-@pytest.mark.parametrize(("kind", "name"), [("roving_hammer", "masses"), ("accelerance_g", "masses")])
-def test_deviations_hold_the_truth_of_repeated_tests(kind: str, name: str, tmp_path: Path) -> None:
-    """Each place of the roving hammer has its own frequencies, which scatter far more than the noise moves them."""
-    errors = np.abs(_errors(kind, name, 1, 10, tmp_path))
-    assert len(errors) >= 60
+@pytest.mark.parametrize("kind", ["roving_hammer", "accelerance_g"])
+def test_deviations_hold_the_truth_of_repeated_tests(kind: str, tmp_path: Path) -> None:
+    """Each place of the roving hammer has its own frequencies, which scatter far more than the noise moves them; the
+    averages of the other are under a Hann window, which would put most of its damping beyond two deviations."""
+    errors = np.abs(np.concatenate([_errors(kind, name, 1, 4, tmp_path) for name in lab.STRUCTURES]))
+    assert len(errors) >= 90
     held = np.mean(errors < 2, axis=0)
     assert np.all(held >= HELD_LEAST), held
-    assert np.all(held <= HELD_MOST + 0.02), held
+    assert np.all(np.median(errors, axis=0) > NARROW_ENOUGH), "deviations far wider than the errors"
 
 
 @pytest.fixture(scope="module")
@@ -95,9 +97,7 @@ def test_decibels_and_magnitudes_are_real_and_imaginary_parts(masses: lab.File, 
         columns = np.stack([of[part] for part in parts], axis=2).reshape(len(h), -1)
         text = ",".join(["frequency_hz", *names]) + "\n"
         rows = np.column_stack([masses.f, columns]).tolist()
-        tables[parts].write_text(
-            text + "\n".join(",".join(map(repr, r)) for r in rows.tolist()) + "\n", encoding="ascii"
-        )
+        tables[parts].write_text(text + "\n".join(",".join(map(repr, r)) for r in rows) + "\n", encoding="ascii")
     first, *others = [_frequencies(path) for path in tables.values()]
     assert len(first) >= 7
     for other in others:
@@ -124,7 +124,7 @@ def test_lines_of_noise_are_in_no_fit_where_nothing_says_so(masses: lab.File, tm
     h[bad] = 30 * np.mean(np.abs(h)) * (r.normal(size=h[bad].shape) + 1j * r.normal(size=h[bad].shape))
     path = lab.write(replace(masses, h=h, coherence=None, name="low"), tmp_path)
     result = identify(path)
-    assert 15.0 < result["band_hz"][0] < 20.0
+    assert 16.0 < result["band_hz"][0] < 21.0
     assert "lines_left_out" in [one["code"] for one in result["warnings"]]
     assert len(confident(result)) >= 7
     asked = identify(path, "--band", "5:190")
