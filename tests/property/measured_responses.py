@@ -15,6 +15,7 @@ import json
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +114,8 @@ def _drift(r: np.random.Generator, shape: tuple[int, ...], fs: float, corner: fl
 
 def _h1(u: Real, y: Real, length: int, step: int, window: Real) -> tuple[Complex, Real]:
     """One force, outputs x samples. lines x outputs: H1 and coherence."""
-    uu, yu, yy = 0.0, 0.0, 0.0
+    lines = length // 2 + 1
+    uu, yu, yy = np.zeros(lines), np.zeros((len(y), lines), complex), np.zeros((len(y), lines))
     for k in range(0, len(u) - length + 1, step):
         U, Y = np.fft.rfft(window * u[k : k + length]), np.fft.rfft(window * y[:, k : k + length], axis=1)
         uu, yu, yy = uu + np.abs(U) ** 2, yu + Y * np.conj(U), yy + np.abs(Y) ** 2
@@ -271,7 +273,7 @@ def mac(a: Complex, b: Real) -> float:
     return float(np.abs(np.vdot(a, b)) ** 2 / (np.vdot(a, a).real * np.vdot(b, b).real))
 
 
-def score(file: File, modes: list[dict]) -> tuple[list[tuple[int, dict]], list[dict]]:
+def score(file: File, modes: list[dict[str, Any]]) -> tuple[list[tuple[int, dict[str, Any]]], list[dict[str, Any]]]:
     """The true modes with the modes of the result that they are (frequency within 1 %, MAC above 0.8), and the modes of
     the result that are none. A true mode that does not stand out counts for neither."""
     places = file.inputs if len(file.inputs) > len(file.outputs) else file.outputs
@@ -286,7 +288,7 @@ def score(file: File, modes: list[dict]) -> tuple[list[tuple[int, dict]], list[d
     return found, left
 
 
-def _shape(mode: dict) -> Complex:
+def _shape(mode: dict[str, Any]) -> Complex:
     return np.array(mode["shape_re"]) + 1j * np.array(mode["shape_im"])
 
 
