@@ -45,7 +45,8 @@ std::int64_t kept_samples(const stream_config& config) {
     if (config.wanted.window_s)
         return std::max<std::int64_t>(1, std::llround(*config.wanted.window_s * config.rate_hz));
     const okid_watch_config_t watch = watch_config_of(config);
-    const double left = config.wanted.max_memory_mb * 1e6 - static_cast<double>(okid_watch_memsize(&watch));
+    const double left = config.wanted.max_memory_mb * 1e6 - static_cast<double>(okid_watch_memsize(&watch)) -
+                        followed_modes::bytes(config, 0);
     const double numbers = std::min(most_numbers, std::max(0.0, left) / 8 / numbers_a_number);
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(numbers / static_cast<double>(config.channels())));
 }

@@ -49,8 +49,13 @@ class agreement {
     /// An eighth of what is kept came since the last run(): so all updates together cost a few times one result.
     bool due() const { return asked_ || due_after(came_ - run_at_); }
     bool due_after(std::int64_t samples) const { return 8 * samples >= basis(); }
-    void ask() { asked_ = true; }                    ///< the next run() is due now
-    void pass() { run_at_ = came_, asked_ = false; } ///< this update is not made: the next one is due as if it had been
+    void ask() { asked_ = true; } ///< the next run() is due now
+    /// This decision is not made: the next one is due as if it had been, and nothing is followed until then.
+    void pass() {
+        run_at_ = came_;
+        asked_ = false;
+        followed_.stop();
+    }
 
     std::int64_t basis() const { return came_ - begin_; }
     std::int64_t rows() const; ///< complete ones

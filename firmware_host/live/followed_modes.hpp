@@ -29,6 +29,7 @@ class followed_modes {
 
     /// These are the modes; their carriers say now where they stand.
     void begin(const record_result& found);
+    void stop() { groups_.clear(); } ///< until the next begin()
     bool any() const { return !groups_.empty(); }
     /// Frequencies and damping of the modes that begin() was given, moved as far as their carriers moved since.
     void follow(kept_model& to);

@@ -26,15 +26,8 @@ TRUE = {
     "unexplained": {"plane_lab1_1"},  # 17.5 Hz, a side band of the first mode: listed as doubtful
 }  # fmt: skip
 # The towers agree in sign; on the aircraft it is 0.002 % at 105.2 Hz.
-UNKNOWN = {
-    ("level_dependent", name)
-    for name in ("tower_wn1", "tower_wn2", "tower_wn3", "plane_lab1_1")
-}
-MUST = {
-    ("level_dependent", "silverbox_multisine"),
-    ("level_dependent", "silverbox_arrow"),
-    ("screened", "tower_wn1"),
-}
+UNKNOWN = {("level_dependent", name) for name in ("tower_wn1", "tower_wn2", "tower_wn3", "plane_lab1_1")}
+MUST = {("level_dependent", "silverbox_multisine"), ("level_dependent", "silverbox_arrow"), ("screened", "tower_wn1")}
 
 
 class Found:
@@ -44,32 +37,20 @@ class Found:
         self.record = record
         self.modes = result.to_dict()["modes"]
         codes = {warning.code: warning.text for warning in result.warnings}
-        self.unsure = codes.pop("no_deviation", "")
-        self.wide = codes.pop("wide_sigma", "")
+        self.unsure, self.wide = codes.pop("no_deviation", ""), codes.pop("wide_sigma", "")
         self.said = {(code, str(record["id"])) for code in codes}
 
 
 @pytest.fixture(scope="module")
 def corpus() -> list[Found]:
-    reference = json.loads(
-        data_file("measured", "reference.json").read_text(encoding="utf-8")
-    )
+    reference = json.loads(data_file("measured", "reference.json").read_text(encoding="utf-8"))
     found = []
     for record in reference["records"]:
-        read = okid.read_csv(data_file("measured", record["file"])).select(
-            record["inputs"] + record["outputs"], "r"
-        )
+        read = okid.read_csv(data_file("measured", record["file"])).select(record["inputs"] + record["outputs"], "r")
         n_u = len(record["inputs"])
         u, y = read.samples[:, :n_u] if n_u else None, read.samples[:, n_u:]
         names = {"input_names": record["inputs"]} if n_u else {}
-        found.append(
-            Found(
-                record,
-                okid.identify(
-                    u, y, fs=read.fs_hz, output_names=record["outputs"], **names
-                ),
-            )
-        )
+        found.append(Found(record, okid.identify(u, y, fs=read.fs_hz, output_names=record["outputs"], **names)))
     return found
 
 
@@ -88,9 +69,7 @@ def test_score(corpus: list[Found]) -> None:
 
 def test_each_remark_is_true_or_absent(corpus: list[Found]) -> None:
     said = set().union(*(one.said for one in corpus))
-    false = {
-        (code, name) for code, name in said if name not in TRUE.get(code, ())
-    } - UNKNOWN
+    false = {(code, name) for code, name in said if name not in TRUE.get(code, ())} - UNKNOWN
     assert not false
     assert said >= MUST
 
@@ -98,12 +77,7 @@ def test_each_remark_is_true_or_absent(corpus: list[Found]) -> None:
 def test_a_mode_without_deviations_says_why(corpus: list[Found]) -> None:
     named = 0
     for one in corpus:
-        without = [
-            m
-            for m in one.modes
-            if m["confident"]
-            and None in (m["frequency_std_hz"], m["damping_ratio_std"])
-        ]
+        without = [m for m in one.modes if m["confident"] and None in (m["frequency_std_hz"], m["damping_ratio_std"])]
         assert bool(without) == bool(one.unsure), one.record["id"]
         assert all(f"{mode['frequency_hz']:.4g} Hz" in one.unsure for mode in without)
         wide = [
@@ -111,10 +85,7 @@ def test_a_mode_without_deviations_says_why(corpus: list[Found]) -> None:
             for m in one.modes
             if m["confident"]
             and m not in without
-            and (
-                m["damping_ratio_std"] > m["damping_ratio"]
-                or m["frequency_std_hz"] > 0.05 * m["frequency_hz"]
-            )
+            and (m["damping_ratio_std"] > m["damping_ratio"] or m["frequency_std_hz"] > 0.05 * m["frequency_hz"])
         ]
         assert bool(wide) == bool(one.wide), one.record["id"]
         assert all(f"{mode['frequency_hz']:.4g} Hz" in one.wide for mode in wide)
