@@ -37,6 +37,7 @@ constexpr double doubtful_share = 0.5;    // of the runs: fewer is not even doub
 constexpr double worth_listing = 0.25;    // agreement, or share of the runs, below which a cluster is not even doubtful
 constexpr double widest_damping = 1;      // sigma of damping over damping: beyond, damping is not known
 constexpr double widest_frequency = 0.05; // of the frequency: beyond, nobody knows where the mode is
+constexpr double widest_lonely = 0.5;     // sigma of damping over damping of one output without force
 constexpr double fewest_periods = 8;      // of a mode in the record: fewer are a trend
 constexpr double periods_of_horizon = 0.025; // 0.75 of a period in 30 samples
 
@@ -112,6 +113,10 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
             mode.damping_ratio = carried->damping_ratio;
         }
         mode.shape = carried->shape;
+        // of one output no shape and no force vouch for a mode: noise agrees by chance, but not from block to block
+        if (options.outputs.size() == 1 && options.inputs.empty() &&
+            carried->damping_std > widest_lonely * mode.damping_ratio)
+            mode.why.emplace_back("wide_sigma");
         if (carried->exact) continue;
         // what a model leaves out moves each method elsewhere, and no block of the record shows it
         carried->frequency_std_hz = std::hypot(carried->frequency_std_hz, mode.frequency_scatter_hz);
