@@ -145,8 +145,8 @@ OKID_NODISCARD OKID_API okid_status_t okid_accumulator_add_i32(okid_accumulator_
 /// one beyond OKID_MOST_SAMPLES in all ends there.
 OKID_API void okid_accumulator_gap(okid_accumulator_t* self, int64_t count);
 
-/// Add all of `other` to `self` as further records (exact for codes). Both need edges = 1, slots = 0, the same n_u, n_y,
-/// lags and sample type. The open run of `self` ends; `other` keeps its content. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH (also: one of them
+/// Add all of `other` to `self` as further records (exact for codes). Both need edges = 1, slots = 0, the same n_u, n_y
+/// and sample type; of an `other` with more lags the first ones are taken. The open run of `self` ends; `other` keeps its content. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH (also: one of them
 /// centred, the other not), OKID_ERR_RANGE
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_t* other);
 
@@ -168,10 +168,18 @@ OKID_API int64_t okid_accumulator_slot_rows(const okid_accumulator_t* self, int3
 
 /// Add slots first .. first + count - 1 of a window to `self`: a part of the window, or all of it as a record that parts can
 /// be removed from. `from` keeps its content; the open run of `self` ends. `self` needs edges = 1, slots = 0, forgetting = 1 and
-/// the n_u, n_y, lags and sample type of `from`; neither may be centred. Cost O((m p)^2) an unbroken run of slots.
+/// the n_u, n_y and sample type of `from`, and no more lags; neither may be centred. Cost O((m p)^2) an unbroken run of slots.
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_DIM (slots that do not exist)
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_take_slots(okid_accumulator_t* self, okid_accumulator_t* from,
                                                                   int32_t first, int32_t count);
+
+/// Forget the oldest closed slots of a window. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM (slots that do not exist)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_drop_slots(okid_accumulator_t* self, int32_t count);
+
+/// Make one closed slot of each two that follow each other without a gap, and the block twice as long: a window of as many slots
+/// then spans twice the time. No row is lost. Cost O(m^2 p) a slot.
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH (no window), OKID_ERR_RANGE (the block is 2^30 rows long)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_pair_slots(okid_accumulator_t* self);
 
 /// Take the offsets out of a finished record before it is merged: every channel less its mean over the record, so that
 /// offsets that moved between records do no harm. Codes: less the mean rounded to 2^-8 code, exactly, so that any order of

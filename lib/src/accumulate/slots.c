@@ -18,22 +18,36 @@ void okid_accumulator_clear_slot(okid_accumulator_t* self, int32_t index, int jo
     slot->start = self->clock - self->pending;
 }
 
+/// Samples of the lag window that are older than ours, of sums `from` that have as many lags or more.
+static size_t older_lags(const okid_accumulator_t* a, const okid_accumulator_t* from) {
+    return (size_t)(from->config.lags - a->config.lags);
+}
+
+/// Where row r of our sums begins in those of `from`: lags stand in time order, ours are the newest.
+static size_t row_in(const okid_accumulator_t* a, const okid_accumulator_t* from, size_t r) {
+    return r * (size_t)from->width + older_lags(a, from) * (size_t)a->m;
+}
+
 /// base = keep * base + gain * (sums of one slot of `from`). Codes without forgetting: exact, keep 1, gain 1 or -1.
-static void add_sums(okid_accumulator_t* a, const double* data, double keep, double gain) {
-    const size_t m = (size_t)a->m, sums = acc_sum_count(a), at = acc_slot_sum(a);
+static void add_sums(okid_accumulator_t* a, const okid_accumulator_t* from, const double* data, double keep,
+                     double gain) {
+    const size_t m = (size_t)a->m, n = (size_t)a->width, sums = acc_sum_count(a), its = acc_sum_count(from),
+                 at = acc_slot_sum(from);
     const int64_t* codes = (const int64_t*)data;
     if (acc_base_is_exact(a)) {
         int64_t* base = (int64_t*)acc_base(a);
         const int64_t sign = gain < 0 ? -1 : 1;
-        for (size_t i = 0; i < sums; ++i)
-            wide_add_wide(base + sums + i, base + i, sign * codes[sums + i], sign * codes[i]);
+        for (size_t r = 0; r < m; ++r)
+            for (size_t i = r * n, k = row_in(a, from, r); i < (r + 1) * n; ++i, ++k)
+                wide_add_wide(base + sums + i, base + i, sign * codes[its + k], sign * codes[k]);
         for (size_t r = 0; r < m; ++r) base[acc_base_sum(a) + r] += sign * codes[at + r];
         return;
     }
     const int exact = acc_has_codes(a);
     double *base = acc_base(a), *sum = base + acc_base_sum(a);
-    for (size_t i = 0; i < sums; ++i)
-        base[i] = keep * base[i] + gain * (exact ? wide_double(codes[sums + i], codes[i]) : data[i]);
+    for (size_t r = 0; r < m; ++r)
+        for (size_t i = r * n, k = row_in(a, from, r); i < (r + 1) * n; ++i, ++k)
+            base[i] = keep * base[i] + gain * (exact ? wide_double(codes[its + k], codes[k]) : data[k]);
     for (size_t r = 0; r < m; ++r) sum[r] = keep * sum[r] + gain * (exact ? (double)codes[at + r] : data[at + r]);
 }
 
@@ -73,12 +87,14 @@ static void add_end_double(okid_accumulator_t* a, const double* end, double keep
         }
 }
 
-/// A slot into the base: base = keep * base + gain * slot. An end that meets a neighbour's is NULL: there both cancel.
-static void fold_slot(okid_accumulator_t* a, const acc_piece_t* piece, int64_t rows, double keep, double gain) {
-    add_sums(a, piece->data, keep, gain);
+/// A slot of `from` into the base: base = keep * base + gain * slot. An end that meets a neighbour's is NULL: there both cancel.
+static void fold_slot(okid_accumulator_t* a, const okid_accumulator_t* from, const acc_piece_t* piece, int64_t rows,
+                      double keep, double gain) {
+    add_sums(a, from, piece->data, keep, gain);
     for (int end = 0; end < 2; ++end) {
         const double* at = end == 0 ? piece->head : piece->tail;
         const double sign = end == 0 ? gain : -gain;
+        if (at) at += older_lags(a, from) * (size_t)a->m;
         if (at && acc_base_is_exact(a))
             add_end_exact(a, at, sign < 0 ? -1 : 1);
         else if (at)
@@ -109,7 +125,7 @@ void okid_accumulator_close_slot(okid_accumulator_t* self, int joined) {
     if (c->slots == 0 && !c->edges) return; // stays until another run needs the place
     if (c->slots == 0) {
         const acc_piece_t piece = open_piece(self);
-        fold_slot(self, &piece, slot->rows, c->forgetting < 1 ? pow(c->forgetting, (double)slot->rows) : 1, 1);
+        fold_slot(self, self, &piece, slot->rows, c->forgetting < 1 ? pow(c->forgetting, (double)slot->rows) : 1, 1);
         okid_accumulator_clear_slot(self, self->open, joined);
         return;
     }
@@ -123,23 +139,31 @@ void okid_accumulator_close_slot(okid_accumulator_t* self, int joined) {
     okid_accumulator_clear_slot(self, self->open, joined);
 }
 
-/// self.base += gain * other.base, exact (gain 1 or -1) or double as both are.
+/// self.base += gain * other.base, exact (gain 1 or -1) or double as both are. The ends of runs stand by lag: ours come first.
 static void add_base(okid_accumulator_t* self, const okid_accumulator_t* other, double gain) {
-    const size_t sums = acc_sum_count(self), packed = acc_edge_count(self), edge = acc_base_edge(self);
+    const size_t m = (size_t)self->m, n = (size_t)self->width, sums = acc_sum_count(self), its = acc_sum_count(other),
+                 packed = acc_edge_count(self), its_packed = acc_edge_count(other);
     self->base_weight += gain * other->base_weight;
     if (!acc_base_is_exact(self)) {
-        double* to = acc_base(self);
-        const double* from = acc_base(other);
-        for (size_t i = 0; i < edge + packed; ++i) to[i] += gain * from[i];
+        double *to = acc_base(self), *edge = to + acc_base_edge(self);
+        const double *from = acc_base(other), *its_edge = from + acc_base_edge(other);
+        for (size_t r = 0; r < m; ++r)
+            for (size_t i = r * n, k = row_in(self, other, r); i < (r + 1) * n; ++i, ++k) to[i] += gain * from[k];
+        for (size_t i = 0; i < m + acc_lag_count(self); ++i)
+            to[acc_base_sum(self) + i] += gain * from[acc_base_sum(other) + i];
+        for (size_t i = 0; i < packed; ++i) edge[i] += gain * its_edge[i];
         return;
     }
     const int64_t sign = gain < 0 ? -1 : 1;
-    int64_t* to = (int64_t*)acc_base(self);
-    const int64_t* from = (const int64_t*)acc_base(other);
-    for (size_t i = 0; i < sums; ++i) wide_add_wide(to + sums + i, to + i, sign * from[sums + i], sign * from[i]);
-    for (size_t i = acc_base_sum(self); i < edge; ++i) to[i] += sign * from[i];
-    for (size_t i = edge; i < edge + packed; ++i)
-        wide_add_wide(to + packed + i, to + i, sign * from[packed + i], sign * from[i]);
+    int64_t *to = (int64_t*)acc_base(self), *edge = to + acc_base_edge(self);
+    const int64_t *from = (const int64_t*)acc_base(other), *its_edge = from + acc_base_edge(other);
+    for (size_t r = 0; r < m; ++r)
+        for (size_t i = r * n, k = row_in(self, other, r); i < (r + 1) * n; ++i, ++k)
+            wide_add_wide(to + sums + i, to + i, sign * from[its + k], sign * from[k]);
+    for (size_t i = 0; i < m + acc_lag_count(self); ++i)
+        to[acc_base_sum(self) + i] += sign * from[acc_base_sum(other) + i];
+    for (size_t i = 0; i < packed; ++i)
+        wide_add_wide(edge + packed + i, edge + i, sign * its_edge[its_packed + i], sign * its_edge[i]);
 }
 
 /// Everything of `other` into the base, its open slot as a closed record.
@@ -148,7 +172,7 @@ static void add_all(okid_accumulator_t* self, okid_accumulator_t* other, double 
     add_base(self, other, gain);
     const int64_t rows = acc_slot(other, other->open)->rows;
     const acc_piece_t piece = open_piece(other);
-    if (rows > 0) fold_slot(self, &piece, rows, 1, gain);
+    if (rows > 0) fold_slot(self, other, &piece, rows, 1, gain);
 }
 
 static void add_counts(okid_accumulator_t* self, const okid_accumulator_t* other, int64_t sign) {
@@ -167,16 +191,16 @@ static void end_run(okid_accumulator_t* self) {
     okid_accumulator_settle(self);
     const int64_t rows = acc_slot(self, self->open)->rows;
     const acc_piece_t piece = open_piece(self);
-    if (rows > 0) fold_slot(self, &piece, rows, 1, 1);
+    if (rows > 0) fold_slot(self, self, &piece, rows, 1, 1);
     okid_accumulator_clear_slot(self, self->open, 0);
     self->have = 0;
     self->in_gap = 1;
 }
 
-/// Same channels, lags and samples, and room for the ends of runs in both bases?
+/// Same channels and samples, and no lag fewer in the other?
 static int alike(const okid_accumulator_t* self, const okid_accumulator_t* other) {
     const okid_accumulator_config_t *a = &self->config, *b = &other->config;
-    return a->n_u == b->n_u && a->n_y == b->n_y && a->lags == b->lags && a->sample == b->sample && self != other;
+    return a->n_u == b->n_u && a->n_y == b->n_y && a->lags <= b->lags && a->sample == b->sample && self != other;
 }
 
 okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_t* other) {
@@ -198,8 +222,9 @@ okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_
 okid_status_t okid_accumulator_remove(okid_accumulator_t* self, okid_accumulator_t* part, double weight) {
     if (!self || !part) return OKID_ERR_NULL;
     const okid_accumulator_config_t *a = &self->config, *b = &part->config;
-    if (!alike(self, part) || !a->edges || !b->edges || a->slots || b->slots || a->forgetting != b->forgetting ||
-        self->stats.rows < part->stats.rows || (part->stats.rows > 0 && self->centred != part->centred))
+    if (!alike(self, part) || a->lags != b->lags || !a->edges || !b->edges || a->slots || b->slots ||
+        a->forgetting != b->forgetting || self->stats.rows < part->stats.rows ||
+        (part->stats.rows > 0 && self->centred != part->centred))
         return OKID_ERR_MISMATCH;
     if (!(weight > 0 && weight <= 1) || (weight < 1 && a->forgetting == 1)) return OKID_ERR_RANGE;
     end_run(self);
@@ -234,11 +259,53 @@ okid_status_t okid_accumulator_take_slots(okid_accumulator_t* self, okid_accumul
         const slot_info_t* slot = acc_slot(from, acc_ring(from, k));
         if (k == first) piece.head = piece.data + acc_slot_head(from);
         if (k == first + count - 1) piece.tail = acc_tail(from, acc_ring(from, k));
-        fold_slot(self, &piece, slot->rows, 1, 1);
+        fold_slot(self, from, &piece, slot->rows, 1, 1);
         self->stats.rows += slot->rows;
         self->stats.samples += slot->rows;
         self->clock += slot->rows;
     }
     acc_slot(self, self->open)->start = self->clock;
+    return OKID_OK;
+}
+
+okid_status_t okid_accumulator_drop_slots(okid_accumulator_t* self, int32_t count) {
+    if (!self) return OKID_ERR_NULL;
+    if (count < 0 || count > self->closed) return OKID_ERR_DIM;
+    for (int32_t k = 0; k < count; ++k) drop_oldest(self);
+    return OKID_OK;
+}
+
+/// A slot takes in the one that continues it.
+static void join_slots(okid_accumulator_t* a, int32_t first, int32_t second) {
+    const size_t sums = acc_sum_count(a), at = acc_slot_sum(a), m = (size_t)a->m;
+    double* to = acc_slot_data(a, first);
+    const double* from = acc_slot_data(a, second);
+    if (acc_has_codes(a)) {
+        int64_t* low = (int64_t*)to;
+        const int64_t* its = (const int64_t*)from;
+        for (size_t i = 0; i < sums; ++i) wide_add_wide(low + sums + i, low + i, its[sums + i], its[i]);
+        for (size_t r = 0; r < m; ++r) low[at + r] += its[at + r];
+    } else {
+        for (size_t i = 0; i < at + m; ++i) to[i] += from[i];
+    }
+    memcpy(to + acc_slot_tail(a), from + acc_slot_tail(a), acc_lag_count(a) * sizeof(double));
+    acc_slot(a, first)->rows += acc_slot(a, second)->rows;
+}
+
+okid_status_t okid_accumulator_pair_slots(okid_accumulator_t* self) {
+    if (!self) return OKID_ERR_NULL;
+    if (self->config.slots == 0) return OKID_ERR_MISMATCH;
+    if (self->config.block > INT32_MAX / 2) return OKID_ERR_RANGE;
+    okid_accumulator_settle(self);
+    const int32_t oldest = acc_oldest(self), all = self->slot_count;
+    int32_t kept = 0; // slots that stand in their new places
+    for (int32_t k = 0; k <= self->closed; ++kept) {
+        const int32_t to = (oldest + kept) % all, from = (oldest + k++) % all, next = (oldest + k) % all;
+        if (to != from) memcpy(acc_slot(self, to), acc_slot(self, from), (size_t)self->slot_numbers * sizeof(double));
+        if (k < self->closed && acc_slot(self, next)->joined) join_slots(self, to, (oldest + k++) % all);
+    }
+    self->closed = kept - 1;
+    self->open = (oldest + self->closed) % all;
+    self->config.block *= 2;
     return OKID_OK;
 }

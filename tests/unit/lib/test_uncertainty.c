@@ -199,6 +199,91 @@ static void slots_of_a_window_are_its_parts(void) {
     free(whole), free(part), free(rest), free(window);
 }
 
+/// A window whose slots are paired up when they are all full holds the whole record, gaps or not, in slots of any length.
+static void paired_slots_hold_what_they_were(void) {
+    for (okid_sample_t sample = OKID_SAMPLE_DOUBLE; sample <= OKID_SAMPLE_INT16; ++sample) {
+        okid_accumulator_config_t config = shape_of(sample);
+        okid_accumulator_t *whole = make(&config), *taken = make(&config), *part = make(&config);
+        feed(whole, 0, 1500);
+        okid_accumulator_gap(whole, 0);
+        feed(whole, 1600, N);
+        config.block = 50;
+        config.slots = 24;
+        okid_accumulator_t* window = make(&config);
+        int paired = 0;
+        const int cuts[][2] = {{0, 700}, {700, 1500}, {1600, 2600}, {2600, 3500}, {3500, N}};
+        for (int k = 0; k < 5; ++k) {
+            if (k == 2) okid_accumulator_gap(window, 0);
+            for (int n = cuts[k][0]; n < cuts[k][1]; ++n) {
+                const int from =
+                    k == 2 && n == cuts[k][0] ? n - P : n; // feed() begins a run behind the samples before it
+                TEST_ASSERT_EQUAL(
+                    OKID_OK, sample == OKID_SAMPLE_INT16
+                                 ? okid_accumulator_add_i16(window, codes + from * RIG_M, (size_t)(n + 1 - from))
+                                 : okid_accumulator_add(window, record + (size_t)from * RIG_M, (size_t)(n + 1 - from)));
+                if (okid_accumulator_slots(window) <= 16) continue;
+                TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_pair_slots(window));
+                TEST_ASSERT_TRUE(okid_accumulator_slots(window) <= 10);
+                ++paired;
+            }
+        }
+        TEST_ASSERT_TRUE(paired >= 2);
+        TEST_ASSERT_EQUAL(okid_accumulator_rows(whole), okid_accumulator_rows(window));
+        gram_of(whole, gram);
+        gram_of(window, other);
+        TEST_ASSERT_TRUE(sample == OKID_SAMPLE_INT16 ? memcmp(gram, other, sizeof gram) == 0
+                                                     : worst_difference(other[0]) < 1e-12);
+        const int32_t slots = okid_accumulator_slots(window);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_take_slots(taken, window, 0, slots));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_take_slots(part, window, 0, 3));
+        TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_accumulator_drop_slots(window, slots));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_drop_slots(window, 3));
+        TEST_ASSERT_EQUAL(slots - 3, okid_accumulator_slots(window));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_remove(taken, part, 1));
+        gram_of(taken, gram);
+        gram_of(window, other);
+        TEST_ASSERT_TRUE(sample == OKID_SAMPLE_INT16 ? memcmp(gram, other, sizeof gram) == 0
+                                                     : worst_difference(other[0]) < 1e-12);
+        TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_accumulator_pair_slots(whole));
+        free(whole), free(taken), free(part), free(window);
+    }
+}
+
+/// Sums to more lags give those to fewer: the same rows, their first lags.
+static void longer_sums_hold_shorter_ones(void) {
+    for (okid_sample_t sample = OKID_SAMPLE_DOUBLE; sample <= OKID_SAMPLE_INT16; ++sample) {
+        okid_accumulator_config_t config = shape_of(sample);
+        okid_accumulator_t *merged = make(&config), *taken = make(&config), *direct = make(&config);
+        config.lags = P + 5;
+        okid_accumulator_t* longer = make(&config);
+        feed(longer, P, 900);
+        okid_accumulator_gap(longer, 2);
+        feed(longer, 1200 + P, 2000);
+        config.edges = 0;
+        config.block = 100;
+        config.slots = 20;
+        okid_accumulator_t* window = make(&config);
+        feed(window, P, 900);
+        okid_accumulator_gap(window, 2);
+        feed(window, 1200 + P, 2000);
+        feed(direct, P + 5, 900); // its first row stands behind as many samples
+        okid_accumulator_gap(direct, 0);
+        feed(direct, 1200 + P + 5, 2000);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_merge(merged, longer));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_take_slots(taken, window, 0, okid_accumulator_slots(window)));
+        TEST_ASSERT_EQUAL(okid_accumulator_rows(direct), okid_accumulator_rows(merged));
+        gram_of(direct, gram);
+        for (int k = 0; k < 2; ++k) {
+            gram_of(k == 0 ? merged : taken, other);
+            TEST_ASSERT_TRUE(sample == OKID_SAMPLE_INT16 ? memcmp(gram, other, sizeof gram) == 0
+                                                         : worst_difference(other[0]) < 1e-13);
+        }
+        TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_accumulator_merge(longer, merged));
+        TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_accumulator_remove(merged, longer, 1));
+        free(merged), free(taken), free(direct), free(longer), free(window);
+    }
+}
+
 static void energy_is_the_diagonal(void) {
     for (okid_sample_t sample = OKID_SAMPLE_DOUBLE; sample <= OKID_SAMPLE_INT16; ++sample) {
         const okid_accumulator_config_t config = shape_of(sample);
@@ -464,6 +549,8 @@ int main(void) {
     RUN_TEST(removal_refuses_what_does_not_fit);
     RUN_TEST(faded_parts_are_removed_with_their_weight);
     RUN_TEST(slots_of_a_window_are_its_parts);
+    RUN_TEST(paired_slots_hold_what_they_were);
+    RUN_TEST(longer_sums_hold_shorter_ones);
     RUN_TEST(energy_is_the_diagonal);
     RUN_TEST(deviations_are_those_of_the_formula);
     RUN_TEST(missing_modes_are_counted);
