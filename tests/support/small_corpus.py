@@ -110,7 +110,12 @@ def rod(seed: int) -> Record:
     """Axial modes of a free rod of steel, struck at its end, the force not measured; hardly any damping."""
     rng = np.random.default_rng([3, seed])
     fs, times, order = 20000.0, 4, np.arange(1, 7)
-    truth = Truth(1280.0 * order, np.linspace(1e-4, 4e-4, 6), np.ones((6, 1)), np.cos(np.pi * order * 0.03)[None])
+    truth = Truth(
+        np.asarray(1280.0 * order, np.float64),
+        np.linspace(1e-4, 4e-4, 6),
+        np.ones((6, 1)),
+        np.cos(np.pi * order * 0.03)[None],
+    )
     force = hits(int(2.0 * fs * times), fs * times, [0.05], 0.00012, rng)
     y = sampled(modal(truth, force, 1 / fs / times), fs, times)[int(0.06 * fs) :]
     return Record(None, measured(rng, y, 0.002), fs, truth.hz, truth.damping, truth.shapes)
