@@ -83,13 +83,13 @@ bench: build ## speed of the kernels and of whole identifications as ratios with
 	@$(PYTHON) tests/bench/whole_answers.py build/bench.json
 	@cmake --build build --target bench_latency -- --quiet && OPENBLAS_NUM_THREADS=1 build/tests/bench_latency build/bench.json
 
-bench-quick: build ## what takes two minutes of it, judged with wide margins
+bench-quick: build ## what takes two minutes of it: sizes are judged, speeds told
 	@tools/setup.sh bench
 	@tools/setup.sh test
 	@OPENBLAS_NUM_THREADS=1 build/okid bench --only kernels --save build/bench-quick.json >/dev/null
 	@for part in python_call identify_beside files whole_answers; do \
 	  OKID_PROGRAM=build/okid $(PYTHON) tests/bench/$$part.py build/bench-quick.json || exit 1; done
-	@$(PYTHON) tools/bench_check.py build/bench-quick.json --wide
+	@$(PYTHON) tools/bench_check.py build/bench-quick.json --sizes
 
 bench-check: bench ## exit 1 when a ratio falls short of what the kernel promises
 	@$(PYTHON) tools/bench_check.py build/bench.json
@@ -119,7 +119,7 @@ sbom: build ## bill of materials: build/sbom.cdx.json and docs/reference/depende
 audit: sbom ## known holes in what okid stands on: PyPI's advisories, updates that wait in Debian's archive
 	@.venv/bin/python tools/audit.py
 
-fuzz: ## fuzzers of every decoder and file reader, SECONDS=60 for all of them together
+fuzz: build ## fuzzers of every decoder and file reader, SECONDS=60 for all of them together
 	@tools/setup.sh fuzz
 	@tests/fuzz/run $(or $(SECONDS),60)
 

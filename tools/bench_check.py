@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Judges the ratios of a bench run (okid.bench/1) against what the kernel promises.
-usage: bench_check.py FILE.json [--wide]
+usage: bench_check.py FILE.json [--sizes]
 
-Ratios within one run, never times: machines differ and are shared. --wide: twice as far off is good, and what
-`make bench-quick` leaves out may be missing.
+Ratios within one run, never times: machines differ and are shared. --sizes: of a short run beside other work. What
+depends on memory alone is judged, a speed that falls short is told, what `make bench-quick` leaves out may be missing.
 """
 
 from __future__ import annotations
@@ -66,23 +66,23 @@ SIZES = {"W1": (1, 3), "W2": (2, 6), "W3": (3, 10)}
 
 
 LONG = ("campaign_", "handed_over_", "slicot_moesp_over_n4sid")  # not of `make bench-quick`
+SIZE = ("state_", "read_csv_memory_")  # the same on every machine, however busy
 
 
 def main() -> int:
-    wide = sys.argv[2:] == ["--wide"]
-    if len(sys.argv) != 2 + wide:
+    quick = sys.argv[2:] == ["--sizes"]
+    if len(sys.argv) != 2 + quick:
         print(__doc__, file=sys.stderr)
         return 2
     bench = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     short = unmeasured = 0
-    apart = 2.0 if wide else 1.0
-    promises = {name: bound for name, bound in PROMISES.items() if not (wide and name.startswith(LONG))}
-    limits = {name: bound for name, bound in LIMITS.items() if not (wide and name.startswith(LONG))}
-    slicot = {name: least for name, least in SLICOT.items() if not (wide and name.startswith(LONG))}
+    promises = {name: bound for name, bound in PROMISES.items() if not (quick and name.startswith(LONG))}
+    limits = {name: bound for name, bound in LIMITS.items() if not (quick and name.startswith(LONG))}
+    slicot = {name: least for name, least in SLICOT.items() if not (quick and name.startswith(LONG))}
 
     def judge(name: str, value: float, good: bool, bound: str, meaning: str) -> None:
         nonlocal short
-        short += not good
+        short += not good and (not quick or name.startswith(SIZE))
         print(f"{'ok   ' if good else 'SHORT'} {name:44} {value:8.2f}  {bound:10} {meaning}")
 
     for name in (name for name in promises | limits if name not in bench["ratios"]):
@@ -92,20 +92,20 @@ def main() -> int:
         if name not in bench["ratios"]:
             continue
         value = float(bench["ratios"][name])
-        judge(name, value, value >= least / apart, f">= {least / apart:g}", meaning)
+        judge(name, value, value >= least, f">= {least:g}", meaning)
     for name, (most, meaning) in limits.items():
         if name not in bench["ratios"]:
             continue
         value = float(bench["ratios"][name])
-        judge(name, value, value <= most * apart, f"<= {most * apart:g}", meaning)
+        judge(name, value, value <= most, f"<= {most:g}", meaning)
     for name, least in slicot.items():
         if name in bench["ratios"]:
             value = float(bench["ratios"][name])
             judge(
                 name,
                 value,
-                value >= least / apart,
-                f">= {least / apart:g}",
+                value >= least,
+                f">= {least:g}",
                 "whole identification: times as fast as SLICOT",
             )
         else:
@@ -127,7 +127,7 @@ def main() -> int:
     if short or unmeasured:
         print(f"{short} short, {unmeasured} not measured")
     else:
-        print("all promises kept")
+        print("sizes as promised; speeds are judged by make bench-check" if quick else "all promises kept")
     return 1 if short or unmeasured else 0
 
 

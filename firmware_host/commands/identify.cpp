@@ -288,7 +288,8 @@ void add_identify(CLI::App& app) {
     command->add_flag(
         "--frf", given->frf,
         "the files hold frequency responses: universal files (data sets 58, 58b) or CSV (frequency_hz, then "
-        "OUT/IN:re and OUT/IN:im). Several files are set-ups of one structure. Takes --inputs, --outputs "
+        "OUT/IN:re and OUT/IN:im, or :db or :mag and :deg; :coh). Several files are set-ups of one structure. Takes "
+        "--inputs, --outputs "
         "(default: all), --band, --modes, --sensing, --input-dofs, --output-dofs");
     command
         ->add_option("--exponential", given->exponential,

@@ -314,11 +314,8 @@ consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c,
     mode.emac = med([](const member& m) { return m.found->emac; });
     const double zeta = mode.damping_ratio;
     mode.damping_spread = 1.4826 * med([&](const member& m) { return std::abs(m.found->damping_ratio / zeta - 1); });
-    const double scatter = mode.damping_spread / scatter_scale;
-    mode.agreement = mode.found_in * mode.emac * (1 + mode.mpc) / 2 / (1 + scatter * scatter);
     set_values(runs, seen, mode);
-    if (mode.hits < fewest_runs || mode.found_in < one_half) mode.why.emplace_back("few_runs");
-    if (mode.agreement < one_half) mode.why.emplace_back("noise_shape");
+    judge_agreement(mode);
     return mode;
 }
 
@@ -347,6 +344,15 @@ void mark_split(std::vector<consensus_mode>& modes) {
 }
 
 } // namespace
+
+void judge_agreement(consensus_mode& mode) {
+    const double scatter = mode.damping_spread / scatter_scale;
+    mode.agreement = mode.found_in * mode.emac * (1 + mode.mpc) / 2 / (1 + scatter * scatter);
+    const auto ours = [](const std::string& code) { return code == "few_runs" || code == "noise_shape"; };
+    mode.why.erase(std::remove_if(mode.why.begin(), mode.why.end(), ours), mode.why.end());
+    if (mode.hits < fewest_runs || mode.found_in < one_half) mode.why.emplace_back("few_runs");
+    if (mode.agreement < one_half) mode.why.emplace_back("noise_shape");
+}
 
 double shape_mac(const std::vector<std::complex<double>>& a, const std::vector<std::complex<double>>& b) {
     std::complex<double> dot = 0;

@@ -80,6 +80,10 @@ bool can_see(const consensus_run& run, double frequency_hz);
 ///                out: those that do. nullptr: shapes are taken as they are
 std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs, std::vector<bool>* turned = nullptr);
 
+/// The rule that makes a mode confident, of records, set-ups and responses alike: half of the runs that could see it, three at
+/// least, and an agreement of one half. Sets .agreement and the codes few_runs and noise_shape.
+void judge_agreement(consensus_mode& mode);
+
 /// |a^H b|^2 / (a^H a)(b^H b).
 double shape_mac(const std::vector<std::complex<double>>& a, const std::vector<std::complex<double>>& b);
 

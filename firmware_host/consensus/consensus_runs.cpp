@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <new>
 
 namespace okid_host {
@@ -107,6 +108,12 @@ okid_identify_config_t run_config(const consensus_run& run, int n_u, int n_y) {
     config.fs_hz = run.fs_hz;
     config.detrend = OKID_DETREND_NONE; // levels are centred
     return config;
+}
+
+okid_identify_config_t longest_run(int n_u, int n_y, double fs_hz) {
+    consensus_run run = run_of(OKID_METHOD_N4SID_CVA, rows_of(n_u, n_y, std::numeric_limits<int>::max()));
+    run.fs_hz = fs_hz;
+    return run_config(run, n_u, n_y);
 }
 
 level_sums::level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest) {

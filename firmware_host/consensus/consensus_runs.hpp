@@ -17,6 +17,9 @@ std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_
 /// What the library is asked for by a run.
 okid_identify_config_t run_config(const consensus_run& run, int n_u, int n_y);
 
+/// What carries the modes of a level with all samples that its longest horizon asks for; without order.
+okid_identify_config_t longest_run(int n_u, int n_y, double fs_hz);
+
 /// Sums of a level for runs with so many lags.
 class level_sums {
   public:

@@ -15,11 +15,10 @@ namespace okid_host {
 namespace {
 
 constexpr long long fewest_samples = 700; // numerics.md section 5
-constexpr std::size_t most_levels = 7;
-constexpr double top_decimated = 0.42; // inside the pass band of the filter
-constexpr double top_full = 0.48;      // where the record has no filter of its own
-constexpr double edge_power = 0.1;     // of the usual power, above top_decimated: less means an anti-alias filter
-constexpr double no_power = 1e-3;      // of the usual power, below: nothing is excited there
+constexpr double top_decimated = 0.42;    // inside the pass band of the filter
+constexpr double top_full = 0.48;         // where the record has no filter of its own
+constexpr double edge_power = 0.1;        // of the usual power, above top_decimated: less means an anti-alias filter
+constexpr double no_power = 1e-3;         // of the usual power, below: nothing is excited there
 constexpr double band_step = 0.02;
 constexpr double most_cut_off =
     0.1; // of the energy, at the beginning: a decay that is over by then has no narrow bands
@@ -115,6 +114,11 @@ double share_before(const std::vector<sample_rows>& records, std::size_t m, std:
 }
 
 } // namespace
+
+std::vector<double> decimation_weights(int factor) {
+    const Eigen::VectorXd weights = weights_of(fir_kernel(factor, 1));
+    return {weights.begin(), weights.end()};
+}
 
 std::vector<record_level> make_levels(std::vector<sample_rows> records, std::size_t n_u, std::size_t n_y, double fs_hz,
                                       bool at_rest, int decimate, std::vector<double>& scale) {

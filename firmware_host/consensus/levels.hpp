@@ -22,6 +22,11 @@ struct record_level {
     long long samples = 0; ///< complete ones
 };
 
+constexpr std::size_t most_levels = 7; ///< the record's own rate and six halves
+
+/// The weights of the linear-phase filter before a rate that is so many times lower.
+std::vector<double> decimation_weights(int factor);
+
 /// The records and their halves, while enough samples stay; each record centred, each channel scaled to unit spread.
 /// @param decimate  the first rate is so many times lower than fs_hz
 /// @param at_rest  the records begin in silence, which the filters are given too

@@ -334,7 +334,7 @@ int32_t okid_host_stream_identify(okid_host_stream_t* self, okid_host_result_t**
 
 int32_t okid_host_stream_state(okid_host_stream_t* self, const void** state, size_t* bytes) {
     return face::guard([&] {
-        self->state = self->stream.sums().state();
+        self->state = self->stream.state();
         *state = self->state.data();
         *bytes = self->state.size();
     });
@@ -345,7 +345,7 @@ int32_t okid_host_stream_restore(okid_host_stream_t* self, const void* state, si
 }
 
 int32_t okid_host_stream_merge(okid_host_stream_t* self, const void* state, size_t bytes) {
-    return face::guard([&] { self->stream.sums().merge(state, bytes); });
+    return face::guard([&] { self->stream.merge(state, bytes); });
 }
 
 void okid_host_stream_delete(okid_host_stream_t* self) { delete self; }

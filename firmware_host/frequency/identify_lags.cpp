@@ -23,7 +23,6 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <okid/mkr.h>
 
 namespace okid_host {
 namespace {
@@ -92,9 +91,6 @@ joint_responses join(const lag_work& work, std::vector<response_set> sets) {
         sets = {join_set_ups(sets, names)};
         out.references = sets.front().outputs;
     }
-    out.sensing.assign(out.outputs.size(), // half-spectra fall as velocities do
-                       struck(work) ? static_cast<int>(OKID_SENSE_ACCELERATION)
-                                    : static_cast<int>(OKID_SENSE_VELOCITY));
     out.sets = std::move(sets);
     return out;
 }
@@ -119,7 +115,7 @@ std::size_t wanted_lags(const lag_work& work, const response_modes& found, std::
 }
 
 void take_window_out(double constant_s, response_modes& found) {
-    for (consensus_mode& mode : found.modes) take_window_out(constant_s, mode);
+    for (consensus_mode& mode : found.modes) take_window_out(constant_s, "tone", mode);
 }
 
 std::vector<lag_sums> sums_of(const lag_work& work, std::size_t lags) {
@@ -181,7 +177,7 @@ replicate refit(const lag_work& work, const joint_responses& from, const respons
         const std::complex<double> pole = found.poles[k];
         out.modes[k].frequency_hz = std::abs(pole) / (2 * M_PI);
         out.modes[k].damping_ratio = -pole.real() / std::abs(pole);
-        take_window_out(work.constant_s, out.modes[k]);
+        take_window_out(work.constant_s, "tone", out.modes[k]);
     }
     return out;
 }
@@ -257,8 +253,8 @@ void make_model(lag_work& work, const response_modes& found, record_work& to) {
     std::vector<listed_mode> listed;
     for (std::size_t k = 0; k < found.modes.size(); ++k) {
         const consensus_mode& mode = found.modes[k];
-        listed.push_back({mode.frequency_hz, mode.damping_ratio, shape_mpc(found.shapes[k].shape), NAN,
-                          found.shapes[k].shape, mode.confident()});
+        listed.push_back(
+            {mode.frequency_hz, mode.damping_ratio, mode.mpc, NAN, found.shapes[k].shape, mode.confident()});
         to.context.verdicts.push_back({mode.confident(), mode.found_in, mode.why});
     }
     if (work.options.sigma_blocks > 0 && !found.sigma.shape_re.empty()) to.context.sigma = found.sigma;
@@ -303,6 +299,7 @@ result_context prepare(lag_work& work) {
         const missing_count here = count_missing(one.set);
         check_measured(here, one.set, own);
         check_moving(one.set, own);
+        check_different_outputs(one.set, own);
         check_different_inputs(moments_of(one.set), own);
         missing.samples += here.samples;
         missing.gaps += here.gaps;
@@ -310,9 +307,11 @@ result_context prepare(lag_work& work) {
         samples += static_cast<long long>(one.set.count());
         if (own.detrend == "linear") detrend_linear(one.set, own);
         remove_means(one.set);
-        if (one.set.count() < least_lags * static_cast<std::size_t>(rows_per_lag))
-            throw failure(exit_no_model, fmt::format("no model: {} has {} samples, method plscf takes {}",
-                                                     one.set.records.front().path, one.set.count(),
+        const std::size_t whole = one.set.count() - static_cast<std::size_t>(here.samples);
+        if (whole < least_lags * static_cast<std::size_t>(rows_per_lag))
+            throw failure(exit_no_model, fmt::format("no model: {} has {} samples{}, method plscf takes {}",
+                                                     one.set.records.front().path, whole,
+                                                     here.samples > 0 ? " of which no channel is missing" : "",
                                                      least_lags * static_cast<std::size_t>(rows_per_lag)));
     }
     out = describe_records(work.set_ups.front().set, work.options, missing);

@@ -54,6 +54,13 @@ response_set choose(const response_set& from, const record_request& wanted) {
     return set;
 }
 
+/// One over the length of the blocks, where lines were left out as well.
+double finest_spacing(const std::vector<double>& f) {
+    double out = f.back();
+    for (std::size_t l = 1; l < f.size(); ++l) out = std::min(out, f[l] - f[l - 1]);
+    return out;
+}
+
 void check_options(const record_request& given) {
     for (const auto& [option, there] :
          {std::pair{"--fs", !given.fs.empty()}, std::pair{"--method", !given.method.empty()},
@@ -186,7 +193,7 @@ void make_result(const response_set& set, double constant_s, response_modes&& fo
     make_modal_model(listed, work.context.fs_hz, work);
     fit_responses(set, work);
     for (std::size_t k = 0; k < modes.size(); ++k) {
-        take_window_out(constant_s, modes[k]);
+        take_window_out(constant_s, "narrow", modes[k]);
         listed[k].frequency_hz = modes[k].frequency_hz;
         listed[k].damping_ratio = modes[k].damping_ratio;
         work.context.verdicts.push_back({modes[k].confident(), modes[k].found_in, modes[k].why});
@@ -205,15 +212,23 @@ record_result identify_responses(const response_set& measured, const response_re
     if (turned) set = exchanged(set);
     const record_options options = options_of(set, asked.wanted, turned);
     const double constant_s = time_constant(asked.exponential);
-    set = cut_band(set, options.band ? options.band->first : 0, options.band ? options.band->second : INFINITY);
+    set = options.band ? cut_band(set, options.band->first, options.band->second)
+                       : without_noise_lines(cut_band(set, 0, INFINITY));
     record_work work;
     work.context = describe(set);
+    const auto left_out = measured.lines() - set.lines();
+    if (!options.band && left_out > measured.lines() / 20)
+        work.context.warnings.emplace_back(
+            "lines_left_out",
+            fmt::format("{} of {} lines are no more than noise or have no coherence: lines of {:g} to {:g} Hz "
+                        "are used. --band LO:HI takes lines as they are",
+                        left_out, measured.lines(), set.frequency_hz.front(), set.frequency_hz.back()));
     work.context.all_modes = asked.all_modes;
     if (turned)
         work.context.warnings.emplace_back(
             "reciprocity", "more inputs than outputs: by reciprocity the outputs of this result are the places that "
                            "were struck, its inputs the sensors");
-    const joint_responses all{{set}, set.outputs, set.outputs, check_sensing(asked.wanted.sensing, set.outputs.size())};
+    const joint_responses all{{set}, set.outputs, set.outputs, 1 / finest_spacing(measured.frequency_hz)};
     make_result(set, constant_s, find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization),
                 work);
     find_matrices(options, work);

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  poles of measured frequency responses over many orders
+// PURPOSE  poles of measured frequency responses over many orders, in the whole band and in narrower ones
 // METHOD   H(f) A(z) = B(z) + error, z = exp(j theta), theta over the band 0 .. pi: linear least squares in the real
 //          matrices of B and A, B eliminated output by output (Toeplitz sums, Cholesky). A_0 = I keeps noise poles
-//          unstable and errs in damping, A_n = I errs less and has poles of noise: both are looked at
+//          unstable and errs in damping, A_n = I errs less and has poles of noise: both are looked at. Narrower bands, each
+//          half over the next, have fewer modes: weak ones show there, and noise has other poles in each
 // REFERENCE Guillaume, Verboven, Vanlanduit, Van der Auweraer, Peeters (2003); Cauberghe, Guillaume, Verboven,
 //          Vanlanduit, Parloo (2004)
 // NUMERICS outputs and inputs at unit rms; poles from a companion matrix without an inverse in both normalisations
 #include "matrix_fraction.hpp"
+
+#include "consensus/quantity.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,6 +27,9 @@ constexpr Index most_states = 100;   // of the companion matrix: its poles cost 
 constexpr Index most_references = 8; // inputs whose poles are sought together
 constexpr Index largest_degree = 64, least_degree = 12;
 constexpr int degrees_looked_at = 12;
+constexpr Index narrowest_band = 160;     // lines
+constexpr Index narrowings = 2;           // halvings of the band
+constexpr double edge_of_band = 0.08;     // of a narrower one: its poles answer for what lies outside
 constexpr double ridge = 1e-10;           // of the mean power: without noise more coefficients fit than are needed
 constexpr double smallest_weighed = 1e-3; // of the largest response: below it the weight rises no more
 
@@ -59,7 +65,7 @@ std::vector<Index> references(Index n_u) {
 fraction_sums sum_up(const MatrixXcd& H, const VectorXd& weight, Index n_y, const std::vector<double>& f,
                      Index degree) {
     fraction_sums out{n_y, H.cols() / n_y, degree, 0, 0, {}, {}, {}, {}, {}, {}};
-    const double step = f[1] - f[0];
+    const double step = (f.back() - f.front()) / static_cast<double>(f.size() - 1);
     out.low_hz = f.front() < 3 * step ? 0 : f.front(); // a band that begins at 0 keeps the symmetry of real systems
     out.width_hz = f.back() - out.low_hz;
     const Index lines = H.rows();
@@ -171,19 +177,14 @@ void add_poles(const fraction_sums& sums, Index n, bool lowest, const reduced_eq
             const Eigen::RowVectorXcd row = powers.transpose() * B[static_cast<std::size_t>(o)];
             pole.shape.push_back((row * v.col(k)).value() * sums.scale_y[o]);
         }
-        pole.mpc = shape_mpc(pole.shape);
+        pole.mpc = shape_collinearity(pole.shape, {});
         run.poles.push_back(std::move(pole));
     }
 }
 
-} // namespace
-
-std::vector<consensus_run> fit_matrix_fractions(const response_set& set) {
-    const std::vector<Index> chosen = references(set.n_u());
-    const auto n_u = static_cast<Index>(chosen.size()), n_y = set.n_y();
-    MatrixXcd H(set.lines(), n_y * n_u);
-    for (Index i = 0; i < n_u; ++i)
-        H.middleCols(n_y * i, n_y) = set.H.middleCols(n_y * chosen[static_cast<std::size_t>(i)], n_y);
+/// Runs over the lines of one band: weights of the lines (of the whole band three, else one), both normalisations.
+std::vector<consensus_run> fit_band(MatrixXcd H, Index n_y, const std::vector<double>& f, bool whole) {
+    const Index n_u = H.cols() / n_y, lines = H.rows();
     const auto unit = [](double norm) { return norm > 0 ? norm : 1.0; };
     for (Index i = 0; i < n_u; ++i) H.middleCols(n_y * i, n_y) /= unit(H.middleCols(n_y * i, n_y).norm());
     VectorXd scale_y(n_y);
@@ -193,17 +194,15 @@ std::vector<consensus_run> fit_matrix_fractions(const response_set& set) {
         scale_y[o] = unit(std::sqrt(power));
         for (Index i = 0; i < n_u; ++i) H.col(o + n_y * i) /= scale_y[o];
     }
-    const Index degree = std::clamp(std::min(most_states / n_u, set.lines() / 4), least_degree, largest_degree);
+    const Index most = whole ? largest_degree : largest_degree / 2;
+    const Index degree = std::clamp(std::min(most_states / n_u, lines / 4), least_degree, most);
     const Index step = std::clamp<Index>((degree - least_degree / 2) / degrees_looked_at, 1, 4);
     const VectorXd level = level_of(H).cwiseMax(smallest_weighed);
     std::vector<consensus_run> runs;
-    for (const double power : {0.0, 0.5, 1.0}) {
-        fraction_sums sums = sum_up(H, level.array().pow(-power), n_y, set.frequency_hz, degree);
+    for (const double power : whole ? std::vector<double>{0.0, 0.5, 1.0} : std::vector<double>{0.5}) {
+        fraction_sums sums = sum_up(H, level.array().pow(-power), n_y, f, degree);
         sums.scale_y = scale_y;
         consensus_run run;
-        run.fs_hz = set.frequency_hz.back();
-        run.top = 1;
-        run.rows = static_cast<int>(set.lines());
         for (Index n = degree - (degrees_looked_at - 1) * step; n <= degree; n += step)
             if (n >= 3) run.orders.push_back(static_cast<int>(n));
         consensus_run other = run; // A_n = I
@@ -215,14 +214,35 @@ std::vector<consensus_run> fit_matrix_fractions(const response_set& set) {
         runs.push_back(std::move(run));
         runs.push_back(std::move(other));
     }
-    for (consensus_run& run : runs) link_tracks(run);
     return runs;
 }
 
-double shape_mpc(const std::vector<complex>& shape) {
-    double xx = 0, yy = 0, xy = 0;
-    for (const complex& x : shape) xx += x.real() * x.real(), yy += x.imag() * x.imag(), xy += x.real() * x.imag();
-    return xx + yy > 0 ? ((xx - yy) * (xx - yy) + 4 * xy * xy) / ((xx + yy) * (xx + yy)) : 0;
+} // namespace
+
+std::vector<consensus_run> fit_matrix_fractions(const response_set& set) {
+    const std::vector<Index> chosen = references(set.n_u());
+    const auto n_u = static_cast<Index>(chosen.size()), n_y = set.n_y(), lines = set.lines();
+    MatrixXcd H(lines, n_y * n_u);
+    for (Index i = 0; i < n_u; ++i)
+        H.middleCols(n_y * i, n_y) = set.H.middleCols(n_y * chosen[static_cast<std::size_t>(i)], n_y);
+    std::vector<consensus_run> runs;
+    for (Index part = 0; part <= narrowings && (part == 0 || (lines >> part) >= narrowest_band); ++part)
+        for (Index width = lines >> part, first = 0; first + width <= lines; first += std::max<Index>(1, width / 2)) {
+            const auto f = set.frequency_hz.begin() + first;
+            const std::vector<double> band(f, f + width);
+            const double edge = edge_of_band * (band.back() - band.front());
+            const double bottom = first == 0 ? 0 : band.front() + edge,
+                         top = first + width + width / 2 > lines ? set.frequency_hz.back() : band.back() - edge;
+            for (consensus_run& run : fit_band(H.middleRows(first, width), n_y, band, part == 0)) {
+                run.fs_hz = set.frequency_hz.back();
+                run.bottom = bottom / run.fs_hz;
+                run.top = top / run.fs_hz;
+                run.rows = static_cast<int>(lines);
+                link_tracks(run);
+                runs.push_back(std::move(run));
+            }
+        }
+    return runs;
 }
 
 } // namespace okid_host

@@ -6,11 +6,8 @@
 
 namespace okid_host {
 
-/// Right matrix fractions of several degrees, with three weights of the lines and two normalisations each; the poles of
-/// each of these runs are linked over the degrees.
+/// Right matrix fractions of several degrees in two normalisations: of the whole band with three weights of the lines, of its
+/// halves and quarters (each half over the next) with one. The poles of each of these runs are linked over the degrees.
 std::vector<consensus_run> fit_matrix_fractions(const response_set& set);
-
-/// Modal phase collinearity: 1 where all entries lie on one line through the origin.
-double shape_mpc(const std::vector<std::complex<double>>& shape);
 
 } // namespace okid_host

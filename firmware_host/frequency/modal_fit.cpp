@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  residues of modes in measured frequency responses, and the likeliest poles under white noise
-// METHOD   H(s) = sum_k r_k / (s - l_k) + conjugate + three powers of s for what lies below and above the band (LSFD), one
-//          QR for all responses of one kind of sensor; the poles by Gauss-Newton with the residues eliminated (variable
-//          projection, Kaufman's form), responses weighted by what the fit leaves of them
-// REFERENCE Golub, Pereyra (1973); Kaufman (1975); Heylen, Lammens, Sas, Modal Analysis Theory and Testing
-// NUMERICS frequencies over the highest line, columns at unit length; the covariance of the poles is widened by the
-//          correlation of what is left from line to line, as windows with overlap make it
+// PURPOSE  residues of modes in measured frequency responses, and the likeliest poles under the noise that is left
+// METHOD   H(s) = sum_k r_k / (s - l_k) + conjugate + five powers of s for what lies below and above the band, of motions of any
+//          kind (LSFD), one QR for all responses; the poles by Gauss-Newton with the residues eliminated (variable projection,
+//          Kaufman's form). A Hann window widens what it averages: its part is known and fitted along. Responses are weighted by what the fit leaves of them, lines by what it leaves around them
+//          Places of a roving hammer or sensor meet a structure that is not quite the same: each moves the pole, and where they do
+//          by more than their noise the pole is the mean over places of that scatter, with its variance (random effects). The noise
+//          is what is left near the resonance along its residues, so that errors common to all outputs count
+// REFERENCE Golub, Pereyra (1973); Kaufman (1975); Heylen, Lammens, Sas, Modal Analysis Theory and Testing; Paule, Mandel (1982),
+//          means of measurements that differ
+// NUMERICS frequencies over the highest line, columns at unit length; the covariance is widened by the correlation of what is
+//          left from line to line, as windows with overlap make it
 #include "modal_fit.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <okid/mkr.h>
 
 namespace okid_host {
 namespace {
@@ -22,10 +25,15 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int most_halvings = 5;
-constexpr double farthest_step = 0.5; // of the decay rate
-constexpr double least_gain = 1e-7;   // of the cost
-constexpr double farthest = 0.02;     // in frequency, from the start
-constexpr Index correlated_lines = 6;
+constexpr double farthest_step = 0.5;                   // of the decay rate
+constexpr double least_gain = 1e-7;                     // of the cost
+constexpr double farthest = 0.02;                       // in frequency, from the start
+constexpr Index correlated_lines = 6, local_lags = 2;   // lines
+constexpr Index residual_powers = 5, lowest_power = -2; // of s
+constexpr Index noise_reach = 10;                       // lines to either side over which their noise is taken
+constexpr double quietest_line = 1e-3;                  // of the mean noise
+constexpr double least_of_a_place = 0.2; // of an even share of what is known of a pole: below lies a node of its shape
+constexpr int rounds_of_places = 8;      // of weights and scatter between places, from noise alone
 
 /// Real and imaginary parts below each other.
 MatrixXd parts(const MatrixXcd& from) {
@@ -34,48 +42,54 @@ MatrixXd parts(const MatrixXcd& from) {
     return out;
 }
 
-/// Responses of one kind of sensor: they share their basis.
-struct kind {
-    std::vector<Index> columns;
-    int lowest = 0; // power of s
-    MatrixXd y;     // parts of the responses
-    MatrixXd Q, left, coefficients;
-    VectorXd unit_variance; // of each coefficient
-};
-
 struct problem {
     Eigen::VectorXcd s; // j w over the highest w
     double w_high = 0;
-    std::vector<kind> kinds;
+    double window = 0; // length of a Hann window, in 1 / w_high; 0: none
+    MatrixXcd H;
+    VectorXd root; // one over the noise of each line, rms 1
+    // Weighted, parts below each other:
+    MatrixXd y, Q, left, coefficients;
+    VectorXd unit_variance; // of each coefficient
+    MatrixXd slopes, gram;  // along the poles, the residues eliminated
 };
 
-problem make_problem(const response_set& set, const std::vector<int>& sensing) {
+problem make_problem(const response_set& set, double window_s) {
     problem out;
     out.w_high = 2 * M_PI * set.frequency_hz.back();
+    out.window = window_s * out.w_high;
     out.s.resize(set.lines());
     for (Index l = 0; l < set.lines(); ++l)
         out.s[l] = complex(0, set.frequency_hz[static_cast<std::size_t>(l)] / set.frequency_hz.back());
-    for (const auto& [what, lowest] : {std::pair{static_cast<int>(OKID_SENSE_DISPLACEMENT), -2},
-                                       std::pair{static_cast<int>(OKID_SENSE_VELOCITY), -1},
-                                       std::pair{static_cast<int>(OKID_SENSE_ACCELERATION), 0}}) {
-        kind one;
-        one.lowest = lowest;
-        for (Index c = 0; c < set.H.cols(); ++c)
-            if (sensing[static_cast<std::size_t>(c % set.n_y())] == what) one.columns.push_back(c);
-        if (one.columns.empty()) continue;
-        MatrixXcd own(set.lines(), static_cast<Index>(one.columns.size()));
-        for (std::size_t k = 0; k < one.columns.size(); ++k) own.col(static_cast<Index>(k)) = set.H.col(one.columns[k]);
-        one.y = parts(own);
-        out.kinds.push_back(std::move(one));
-    }
+    out.H = set.H;
+    out.root = VectorXd::Ones(set.lines());
+    out.y = parts(out.H);
     return out;
 }
 
+/// Integral of t^k exp(-a t), 0 .. T. @param e  exp(-a T)
+complex moment(complex a, int k, double T, complex e) {
+    const complex x = a * T;
+    if (k == 0) return (1.0 - e) / a;
+    if (k == 1) return (1.0 - (1.0 + x) * e) / (a * a);
+    return (2.0 - (2.0 + 2.0 * x + x * x) * e) / (a * a * a);
+}
+
+/// 1 / z^power; under a window what averages of random vibration make of it: the transform of t^(power-1) exp(-z t) times the
+/// correlation of the Hann window with itself, (1 - t/T) (2 + cos(2 pi t/T)) / 3 + sin(2 pi t/T) / (2 pi).
+complex through_window(complex z, int power, double T) {
+    if (T == 0) return power == 1 ? 1.0 / z : 1.0 / (z * z);
+    const complex turn(0, 2 * M_PI / T), e = std::exp(-z * T); // the same a whole turn farther
+    const auto fading = [&](complex a) { return moment(a, power - 1, T, e) - moment(a, power, T, e) / T; };
+    return 2.0 / 3.0 * fading(z) + (fading(z + turn) + fading(z - turn)) / 6.0 +
+           (moment(z - turn, power - 1, T, e) - moment(z + turn, power - 1, T, e)) / complex(0, 4 * M_PI);
+}
+
 /// 1 / (s - l)^power and its partner, the columns of Re and Im of a coefficient.
-void put_pole(const Eigen::VectorXcd& s, complex pole, int power, MatrixXcd& to, Index column) {
-    for (Index l = 0; l < s.size(); ++l) {
-        complex a = 1.0 / (s[l] - pole), b = 1.0 / (s[l] - std::conj(pole));
-        if (power == 2) a *= a, b *= b;
+void put_pole(const problem& all, complex pole, int power, MatrixXcd& to, Index column) {
+    for (Index l = 0; l < all.s.size(); ++l) {
+        const complex a = through_window(all.s[l] - pole, power, all.window),
+                      b = through_window(all.s[l] - std::conj(pole), power, all.window);
         to(l, column) = a + b;
         to(l, column + 1) = complex(0, 1) * (a - b);
     }
@@ -84,68 +98,80 @@ void put_pole(const Eigen::VectorXcd& s, complex pole, int power, MatrixXcd& to,
 /// Least squares of all responses for these poles. @return the weighted sum of squares
 double fit_linear(const std::vector<complex>& poles, const VectorXd& weight, problem& all) {
     const auto n = static_cast<Index>(poles.size());
-    double cost = 0;
-    for (kind& one : all.kinds) {
-        MatrixXcd basis(all.s.size(), 2 * n + 3);
-        for (Index k = 0; k < n; ++k) put_pole(all.s, poles[static_cast<std::size_t>(k)], 1, basis, 2 * k);
-        for (int p = 0; p < 3; ++p)
-            for (Index l = 0; l < all.s.size(); ++l) basis(l, 2 * n + p) = std::pow(all.s[l], one.lowest + p);
-        MatrixXd A = parts(basis);
-        const VectorXd size = A.colwise().norm();
-        A.array().rowwise() /= size.transpose().array();
-        const Eigen::HouseholderQR<MatrixXd> qr(A);
-        one.Q = qr.householderQ() * MatrixXd::Identity(A.rows(), A.cols());
-        const MatrixXd along = one.Q.transpose() * one.y;
-        one.left = one.y - one.Q * along;
-        const auto R = qr.matrixQR().topRows(A.cols()).triangularView<Eigen::Upper>();
-        one.coefficients = size.cwiseInverse().asDiagonal() * MatrixXd(R.solve(along));
-        const MatrixXd inverse = R.solve(MatrixXd::Identity(A.cols(), A.cols()));
-        one.unit_variance = inverse.rowwise().squaredNorm().cwiseQuotient(size.cwiseAbs2());
-        for (std::size_t k = 0; k < one.columns.size(); ++k)
-            cost += weight[one.columns[k]] * one.left.col(static_cast<Index>(k)).squaredNorm();
-    }
-    return cost;
+    MatrixXcd basis(all.s.size(), 2 * n + residual_powers);
+    for (Index k = 0; k < n; ++k) put_pole(all, poles[static_cast<std::size_t>(k)], 1, basis, 2 * k);
+    for (Index p = 0; p < residual_powers; ++p)
+        for (Index l = 0; l < all.s.size(); ++l)
+            basis(l, 2 * n + p) = std::pow(all.s[l], static_cast<int>(lowest_power + p));
+    MatrixXd A = parts(all.root.asDiagonal() * basis);
+    const VectorXd size = A.colwise().norm();
+    A.array().rowwise() /= size.transpose().array();
+    const Eigen::HouseholderQR<MatrixXd> qr(A);
+    all.Q = qr.householderQ() * MatrixXd::Identity(A.rows(), A.cols());
+    const MatrixXd along = all.Q.transpose() * all.y;
+    all.left = all.y - all.Q * along;
+    const auto R = qr.matrixQR().topRows(A.cols()).triangularView<Eigen::Upper>();
+    all.coefficients = size.cwiseInverse().asDiagonal() * MatrixXd(R.solve(along));
+    const MatrixXd inverse = R.solve(MatrixXd::Identity(A.cols(), A.cols()));
+    all.unit_variance = inverse.rowwise().squaredNorm().cwiseQuotient(size.cwiseAbs2());
+    return all.left.colwise().squaredNorm().dot(weight);
 }
 
 /// One over the variance of what is left of each response; those that are nearly exact do not rule the others.
-VectorXd weights(const problem& all, Index responses) {
-    VectorXd variance(responses);
-    double level = 0;
-    for (const kind& one : all.kinds)
-        for (std::size_t k = 0; k < one.columns.size(); ++k) {
-            const auto at = static_cast<Index>(k);
-            const double degrees = std::max<double>(1, static_cast<double>(one.y.rows() - one.Q.cols()));
-            variance[one.columns[k]] = one.left.col(at).squaredNorm() / degrees;
-            level += one.y.col(at).squaredNorm() / static_cast<double>(one.y.rows() * responses);
-        }
+VectorXd weights(const problem& all) {
+    const double degrees = std::max<double>(1, static_cast<double>(all.y.rows() - all.Q.cols()));
+    const double level = all.y.squaredNorm() / static_cast<double>(all.y.size());
+    const VectorXd variance = all.left.colwise().squaredNorm().transpose() / degrees;
     return variance.cwiseMax(1e-20 * level + 1e-300).cwiseInverse();
 }
 
-/// Normal equations of the poles' real and imaginary parts, the residues eliminated.
-void normal_equations(const std::vector<complex>& poles, const VectorXd& weight, const problem& all, MatrixXd& N,
-                      VectorXd& b) {
-    const auto n = static_cast<Index>(poles.size());
-    N.setZero(2 * n, 2 * n);
-    b.setZero(2 * n);
-    for (const kind& one : all.kinds) {
-        MatrixXcd slopes(all.s.size(), 2 * n);
-        for (Index k = 0; k < n; ++k) put_pole(all.s, poles[static_cast<std::size_t>(k)], 2, slopes, 2 * k);
-        MatrixXd G = parts(slopes);
-        G -= one.Q * (one.Q.transpose() * G);
-        const MatrixXd gram = G.transpose() * G, along = G.transpose() * one.left;
-        for (std::size_t c = 0; c < one.columns.size(); ++c) {
-            const double w = weight[one.columns[c]];
-            MatrixXd J(2 * n, 2 * n); // of this response, in the basis of the slopes
-            J.setZero();
-            for (Index k = 0; k < n; ++k) {
-                const double re = one.coefficients(2 * k, static_cast<Index>(c)),
-                             im = one.coefficients(2 * k + 1, static_cast<Index>(c));
-                J.block<2, 2>(2 * k, 2 * k) << re, -im, im, re;
-            }
-            N += w * J.transpose() * gram * J;
-            b += w * J.transpose() * along.col(static_cast<Index>(c));
-        }
+/// Share of each line that the fit cannot leave.
+VectorXd taken(const MatrixXd& Q) {
+    const Index lines = Q.rows() / 2;
+    return (Q.topRows(lines).rowwise().squaredNorm() + Q.bottomRows(lines).rowwise().squaredNorm()) / 2;
+}
+
+/// Lines by what the fit leaves around them: a sensor below its range, or a force without power, is noise of these lines.
+void weigh_lines(const VectorXd& weight, problem& all) {
+    const Index lines = all.s.size(), reach = std::max(noise_reach, lines / 50);
+    const VectorXd left = (all.left.topRows(lines).cwiseAbs2() + all.left.bottomRows(lines).cwiseAbs2()) * weight;
+    const VectorXd power = left.cwiseQuotient(all.root.cwiseAbs2()), free = (1 - taken(all.Q).array()).matrix();
+    VectorXd noise(lines);
+    for (Index l = 0; l < lines; ++l) {
+        const Index first = std::max<Index>(0, l - reach), count = std::min(lines, l + reach + 1) - first;
+        noise[l] = power.segment(first, count).sum() / std::max(free.segment(first, count).sum(), 1e-3);
     }
+    all.root = (noise / noise.mean()).cwiseMax(quietest_line).cwiseSqrt().cwiseInverse();
+    all.root /= std::sqrt(all.root.squaredNorm() / static_cast<double>(lines));
+    all.y = parts(all.root.asDiagonal() * all.H);
+}
+
+/// Of a response: how its residue of a pole turns that pole's slopes.
+Eigen::Matrix2d turn_of(const problem& all, Index k, Index c) {
+    const double re = all.coefficients(2 * k, c), im = all.coefficients(2 * k + 1, c);
+    return (Eigen::Matrix2d() << re, -im, im, re).finished();
+}
+
+/// Normal equations of the poles' real and imaginary parts, the residues eliminated. @return their right-hand side, a
+/// column a response
+MatrixXd normal_equations(const std::vector<complex>& poles, const VectorXd& weight, problem& all, MatrixXd& N) {
+    const auto n = static_cast<Index>(poles.size());
+    MatrixXcd slopes(all.s.size(), 2 * n);
+    for (Index k = 0; k < n; ++k) put_pole(all, poles[static_cast<std::size_t>(k)], 2, slopes, 2 * k);
+    all.slopes = parts(all.root.asDiagonal() * slopes);
+    all.slopes -= all.Q * (all.Q.transpose() * all.slopes);
+    all.gram = all.slopes.transpose() * all.slopes;
+    MatrixXd b = all.slopes.transpose() * all.left * weight.asDiagonal();
+    N.setZero(2 * n, 2 * n);
+    for (Index c = 0; c < weight.size(); ++c) {
+        MatrixXd J = MatrixXd::Zero(2 * n, 2 * n);
+        for (Index k = 0; k < n; ++k) {
+            J.block<2, 2>(2 * k, 2 * k) = turn_of(all, k, c);
+            b.block<2, 1>(2 * k, c) = (turn_of(all, k, c).transpose() * b.block<2, 1>(2 * k, c)).eval();
+        }
+        N += weight[c] * J.transpose() * all.gram * J;
+    }
+    return b;
 }
 
 /// A step of the poles, no farther than half their decay rates; one that would run away from its start stays.
@@ -167,59 +193,127 @@ std::vector<complex> moved(const std::vector<complex>& start, const std::vector<
 
 /// How much neighbouring lines repeat each other: 1 for white noise.
 double repetition(const problem& all) {
-    VectorXd sums = VectorXd::Zero(correlated_lines + 1);
     const Index lines = all.s.size();
-    for (const kind& one : all.kinds)
-        for (Index c = 0; c < one.left.cols(); ++c) {
-            const double power = one.left.col(c).squaredNorm();
-            for (Index lag = 0; lag <= correlated_lines && power > 0; ++lag)
-                for (const Index half : {Index{0}, lines})
-                    sums[lag] += one.left.col(c)
-                                     .segment(half, lines - lag)
-                                     .dot(one.left.col(c).segment(half + lag, lines - lag)) /
-                                 power;
-        }
+    const VectorXd power = all.left.colwise().squaredNorm().cwiseMax(1e-300).cwiseInverse();
+    const auto sum = [&](Index lag) {
+        double out = 0;
+        for (const Index half : {Index{0}, lines})
+            out += all.left.middleRows(half, lines - lag)
+                       .cwiseProduct(all.left.middleRows(half + lag, lines - lag))
+                       .colwise()
+                       .sum()
+                       .dot(power);
+        return out;
+    };
+    const double whole = sum(0);
     double out = 1;
-    for (Index lag = 1; lag <= correlated_lines && sums[lag] > 0; ++lag) out += 2 * sums[lag] / sums[0];
+    for (Index lag = 1; lag <= std::min(correlated_lines, lines - 1); ++lag) {
+        const double here = sum(lag);
+        if (!(here > 0)) break;
+        out += 2 * here / whole;
+    }
     return out;
 }
 
-modal_fit result_of(const std::vector<complex>& poles, const problem& all, const response_set& set,
-                    const VectorXd& weight) {
-    modal_fit out;
-    const auto n = static_cast<Index>(poles.size());
-    for (const complex& pole : poles) out.poles.push_back(pole * all.w_high);
-    out.residues.resize(n, set.H.cols());
-    out.unit_variance.resize(n, set.H.cols());
-    out.left.resize(set.lines(), set.H.cols());
-    out.variance = weight.cwiseInverse();
-    for (const kind& one : all.kinds)
-        for (std::size_t c = 0; c < one.columns.size(); ++c) {
-            const auto at = static_cast<Index>(c);
-            out.left.col(one.columns[c]).real() = one.left.col(at).head(set.lines());
-            out.left.col(one.columns[c]).imag() = one.left.col(at).tail(set.lines());
-            for (Index k = 0; k < n; ++k) {
-                out.residues(k, one.columns[c]) =
-                    all.w_high * complex(one.coefficients(2 * k, at), one.coefficients(2 * k + 1, at));
-                out.unit_variance(k, one.columns[c]) = all.w_high * all.w_high * one.unit_variance[2 * k];
-            }
+/// How much more than white noise of its mean level moves a pole: what is left near it, along its residues, and how much its lines
+/// repeat each other. @param repeated  of all lines
+double local_noise(const problem& all, complex pole, const VectorXd& weight, Index k, double repeated) {
+    const Index lines = all.s.size();
+    Eigen::VectorXcd along(weight.size());
+    for (Index c = 0; c < weight.size(); ++c)
+        along[c] = weight[c] * complex(all.coefficients(2 * k, c), -all.coefficients(2 * k + 1, c));
+    const VectorXd re = all.left.topRows(lines) * along.real() - all.left.bottomRows(lines) * along.imag(),
+                   im = all.left.topRows(lines) * along.imag() + all.left.bottomRows(lines) * along.real();
+    const MatrixXd own = all.slopes.middleCols(2 * k, 2);
+    const MatrixXd inverse = all.gram.block<2, 2>(2 * k, 2 * k).inverse();
+    const VectorXd self = (own * inverse).cwiseProduct(own).rowwise().sum(), bound = taken(all.Q);
+    double found = 0, expected = 0;
+    Eigen::Array<double, local_lags + 1, 1> products = Eigen::Array<double, local_lags + 1, 1>::Zero();
+    for (Index l = 0; l < lines; ++l) {
+        const double near = std::norm(all.root[l] / (all.s[l] - pole));
+        found += near * (re[l] * re[l] + im[l] * im[l]);
+        for (Index lag = 0; lag <= std::min(local_lags, lines - 1 - l); ++lag)
+            products[lag] += near * (re[l] * re[l + lag] + im[l] * im[l + lag]);
+        expected += near * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
+    }
+    const double power = 2 * along.cwiseAbs2().cwiseQuotient(weight).sum();
+    const double alike = 2 * (products / std::max(products[0], 1e-300)).max(0).sum() - 1;
+    return std::max(repeated, alike) * std::max(1.0, found / std::max(expected * power, 1e-300));
+}
+
+/// One part of a pole as the mean over places that may differ by more than their noise. @param moves  by which each moves the mean
+/// weighted by `share`, which add up to 0; @param variance  by noise alone; out: of the mean over the places. @return what that
+/// mean adds
+double meet(const VectorXd& moves, const VectorXd& share, double& variance) {
+    std::vector<Index> known;
+    for (Index g = 0; g < share.size(); ++g)
+        if (share[g] * static_cast<double>(share.size()) > least_of_a_place) known.push_back(g);
+    if (known.size() < 2) return 0;
+    double between = 0, mean = 0, weight = 0;
+    for (int round = 0; round < rounds_of_places; ++round) {
+        double squares = 0, noise = 0, spread = 0;
+        mean = weight = 0;
+        const auto own = [&](Index g) { return 1 / (between + variance / share[g]); };
+        for (const Index g : known) weight += own(g), mean += own(g) * moves[g] / share[g];
+        mean /= weight;
+        for (const Index g : known) {
+            squares += own(g) * own(g) / weight;
+            noise += own(g) * (1 - own(g) / weight) * variance / share[g];
+            spread += own(g) * std::pow(moves[g] / share[g] - mean, 2);
         }
-    return out;
+        between = std::max(0.0, (spread - noise) / std::max(weight - squares, 1e-3 * weight));
+    }
+    const double free = static_cast<double>(known.size()) - 1; // few places know little of their own scatter (Student)
+    variance += std::max(0.0, 1 / weight - variance) * free / std::max(free - 2, 0.5);
+    return mean;
+}
+
+/// The poles as the mean over the places, and their covariances; N: their information. @param b  what moves them, a column a
+/// response
+void meet_places(const std::vector<complex>& poles, const problem& all, const VectorXd& weight,
+                 const std::vector<Index>& places, const MatrixXd& N, const MatrixXd& b, modal_fit& out) {
+    const Eigen::LDLT<MatrixXd> factor(N);
+    if (factor.info() != Eigen::Success || !factor.isPositive()) return;
+    const MatrixXd inverse = factor.solve(MatrixXd::Identity(N.rows(), N.cols()));
+    const double repeated = repetition(all);
+    const Index count = *std::max_element(places.begin(), places.end()) + 1;
+    for (std::size_t m = 0; m < poles.size(); ++m) {
+        const auto k = static_cast<Index>(m);
+        const MatrixXd rows = inverse.middleRows(2 * k, 2), moves = rows * b;
+        MatrixXd of_place = MatrixXd::Zero(2, count);
+        VectorXd share = VectorXd::Zero(count);
+        for (Index c = 0; c < b.cols(); ++c) {
+            MatrixXd own = all.gram.middleCols(2 * k, 2) * turn_of(all, k, c);
+            for (Index j = 0; 2 * j < own.rows(); ++j)
+                own.middleRows(2 * j, 2) = (turn_of(all, j, c).transpose() * own.middleRows(2 * j, 2)).eval();
+            const Index place = places[static_cast<std::size_t>(c)];
+            of_place.col(place) += moves.col(c);
+            share[place] += weight[c] * (rows * own).trace() / 2;
+        }
+        Eigen::Matrix2d covariance =
+            local_noise(all, poles[m], weight, k, repeated) * inverse.block<2, 2>(2 * k, 2 * k);
+        const double re = meet(of_place.row(0), share, covariance(0, 0)),
+                     im = meet(of_place.row(1), share, covariance(1, 1));
+        out.poles[m] += all.w_high * complex(re, im);
+        out.covariance.emplace_back(all.w_high * all.w_high * covariance);
+    }
 }
 
 } // namespace
 
-modal_fit fit_modes(const response_set& set, const std::vector<int>& sensing, std::vector<complex> poles, int steps) {
-    problem all = make_problem(set, sensing);
+modal_fit fit_modes(const response_set& set, const std::vector<Index>& places, std::vector<complex> poles, int steps,
+                    double window_s) {
+    problem all = make_problem(set, window_s);
     for (complex& pole : poles) pole /= all.w_high;
     const std::vector<complex> start = poles;
-    VectorXd weight = VectorXd::Ones(set.H.cols()), b;
+    VectorXd weight = VectorXd::Ones(set.H.cols());
     MatrixXd N;
     (void)fit_linear(poles, weight, all);
     for (int step = 0; step < steps; ++step) {
-        weight = weights(all, set.H.cols());
+        weight = weights(all);
+        weigh_lines(weight, all);
         const double cost = fit_linear(poles, weight, all);
-        normal_equations(poles, weight, all, N, b);
+        const VectorXd b = normal_equations(poles, weight, all, N).rowwise().sum();
         const VectorXd along = N.ldlt().solve(b);
         double gained = 0, share = 1;
         for (int k = 0; k < most_halvings && !(gained > 0); ++k, share /= 2) {
@@ -231,13 +325,21 @@ modal_fit fit_modes(const response_set& set, const std::vector<int>& sensing, st
         if (!(gained > least_gain * cost)) break;
     }
     (void)fit_linear(poles, weight, all);
-    weight = weights(all, set.H.cols());
-    normal_equations(poles, weight, all, N, b);
-    modal_fit out = result_of(poles, all, set, weight);
-    const Eigen::LDLT<MatrixXd> factor(N);
-    if (factor.info() == Eigen::Success && factor.isPositive())
-        out.covariance =
-            all.w_high * all.w_high * repetition(all) * MatrixXd(factor.solve(MatrixXd::Identity(N.rows(), N.cols())));
+    weight = weights(all);
+    const MatrixXd b = normal_equations(poles, weight, all, N);
+    modal_fit out;
+    const auto n = static_cast<Index>(poles.size());
+    out.residues.resize(n, weight.size());
+    for (Index k = 0; k < n; ++k) {
+        out.poles.push_back(poles[static_cast<std::size_t>(k)] * all.w_high);
+        out.residues.row(k).real() = all.w_high * all.coefficients.row(2 * k);
+        out.residues.row(k).imag() = all.w_high * all.coefficients.row(2 * k + 1);
+    }
+    out.variance = weight.cwiseInverse();
+    out.unlikeliness = out.variance.array().log().mean() - 2 * all.root.array().log().mean();
+    out.unit_variance =
+        all.w_high * all.w_high * Eigen::Map<const VectorXd, 0, Eigen::InnerStride<2>>(all.unit_variance.data(), n);
+    meet_places(poles, all, weight, places, N, b, out);
     return out;
 }
 

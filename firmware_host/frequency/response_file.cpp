@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  reads frequency responses
-// METHOD   universal file: fixed columns of the 11 header lines of each data set 58 whose function is a frequency response;
-//          channels are named by node and direction ("12z", "-3x"; node 0: by the place in the file)
+// METHOD   universal file: fixed columns of the 11 header lines of each data set 58 whose function is a frequency response or
+//          a coherence; channels are named by node and direction ("12z", "-3x"; node 0: by the place in the file). Lines without
+//          coherence are no measurement: NaN
 // REFERENCE University of Cincinnati, universal file formats 58 and 58b
 #include "response_file.hpp"
 
@@ -23,7 +24,9 @@ namespace {
 
 using complex = std::complex<double>;
 constexpr std::size_t largest_file = std::size_t{1} << 30;
-constexpr int response_function = 4; // frequency response
+constexpr int response_function = 4, coherence_function = 6;
+constexpr double least_coherence = 0.4; // of the better quarter of the responses: of noise alone, one over the averages
+constexpr std::size_t coherent_around = 4; // lines to either side that are judged together
 constexpr std::size_t header_lines = 11;
 
 /// One response of a file.
@@ -31,7 +34,31 @@ struct response {
     std::string output, input;
     std::vector<double> frequency_hz;
     std::vector<complex> values;
+    std::vector<double> coherence; ///< empty: the file has none
 };
+
+/// The value a quarter of the numbers is above.
+double upper_quarter(std::vector<double> values) {
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(3 * (values.size() - 1) / 4);
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+}
+
+/// Lines at which even the better responses have no coherence become NaN.
+void strike_incoherent(const std::vector<response>& all, Eigen::MatrixXcd& H) {
+    const auto lines = static_cast<std::size_t>(H.rows());
+    for (std::size_t l = 0; l < lines; ++l) {
+        std::vector<double> seen;
+        for (const response& one : all) {
+            if (one.coherence.size() != lines) continue;
+            const std::size_t first = l - std::min(l, coherent_around), last = std::min(lines, l + coherent_around + 1);
+            seen.push_back(upper_quarter({one.coherence.begin() + static_cast<std::ptrdiff_t>(first),
+                                          one.coherence.begin() + static_cast<std::ptrdiff_t>(last)}));
+        }
+        if (!seen.empty() && !(upper_quarter(std::move(seen)) >= least_coherence))
+            H.row(static_cast<Eigen::Index>(l)).setConstant(complex(NAN, NAN));
+    }
+}
 
 response_set set_of(const std::string& path, const std::vector<response>& all) {
     response_set out;
@@ -60,6 +87,7 @@ response_set set_of(const std::string& path, const std::vector<response>& all) {
         if (!(out.frequency_hz[l] > out.frequency_hz[l - 1]))
             throw failure(exit_usage, fmt::format("{}: line {}: {:g} Hz behind {:g} Hz, expected ascending frequencies",
                                                   path, l + 1, out.frequency_hz[l], out.frequency_hz[l - 1]));
+    strike_incoherent(all, out.H);
     return out;
 }
 
@@ -156,8 +184,9 @@ std::vector<double> read_binary(lines_of& from, bool wide, bool big, std::size_t
     return out;
 }
 
-/// A data set 58 behind its first line; nothing for other functions than responses.
-void read_function(lines_of& from, std::string_view head, std::vector<response>& to) {
+/// A data set 58 behind its first line; nothing for other functions than responses and coherences.
+void read_function(lines_of& from, std::string_view head, std::vector<response>& to,
+                   std::vector<response>& coherences) {
     std::array<std::string, header_lines> lines;
     for (std::string& line : lines) {
         std::string_view text;
@@ -178,25 +207,30 @@ void read_function(lines_of& from, std::string_view head, std::vector<response>&
     if (binary && number_at(from, head, 13, 6) > 2) from.fail("binary numbers in VMS or IBM form, expected IEEE 754");
     const std::vector<double> all = binary ? read_binary(from, wide, number_at(from, head, 7, 6) == 2, row * points)
                                            : read_text(from, widths, row * points);
-    if (function != response_function) return;
-    if (type != 5 && type != 6)
+    if (function != response_function && function != coherence_function) return;
+    const bool complex_ones = type == 5 || type == 6;
+    if (function == response_function && !complex_ones)
         from.fail(fmt::format("a response of ordinate type {}, expected 5 or 6 (complex)", type));
     response one{channel_name(at(5, 41, 10), at(5, 51, 4), "output"),
                  channel_name(at(5, 66, 10), at(5, 76, 4), "input"),
+                 {},
                  {},
                  {}};
     const double start = at(6, 30, 13), step = at(6, 43, 13);
     for (std::size_t k = 0; k < points; ++k) {
         const double* x = all.data() + k * row;
         one.frequency_hz.push_back(even ? start + step * static_cast<double>(k) : x[0]);
-        one.values.emplace_back(x[row - 2], x[row - 1]);
+        if (function == coherence_function)
+            one.coherence.push_back(x[complex_ones ? row - 2 : row - 1]);
+        else
+            one.values.emplace_back(x[row - 2], x[row - 1]);
     }
-    to.push_back(std::move(one));
+    (function == coherence_function ? coherences : to).push_back(std::move(one));
 }
 
 response_set read_universal(const std::string& path) {
     lines_of from(path, read_input(path, "a universal file", largest_file));
-    std::vector<response> found;
+    std::vector<response> found, coherences;
     std::string_view line;
     bool any = false;
     while (from.next(line)) {
@@ -208,7 +242,7 @@ response_set read_universal(const std::string& path) {
         any = true;
         const std::string first(head);
         if (static_cast<int>(number_at(from, head, 0, 6)) == 58)
-            read_function(from, first, found);
+            read_function(from, first, found, coherences);
         else
             while (from.next(line) && !is_mark(line)) {
             }
@@ -216,18 +250,23 @@ response_set read_universal(const std::string& path) {
     if (!any) throw failure(exit_usage, fmt::format("{}: no data set, expected a universal file", path));
     if (found.empty() || found.front().values.empty())
         throw failure(exit_usage, fmt::format("{}: no data set 58 with a frequency response (function type 4)", path));
+    for (response& one : found)
+        for (const response& other : coherences)
+            if (other.output == one.output && other.input == one.input) one.coherence = other.coherence;
     return set_of(path, found);
 }
 
-/// "OUT/IN:re" taken apart. @return false: it is none
-bool split_column(const std::string& name, response& to, bool& imaginary) {
+constexpr std::array<const char*, 6> part_names{"re", "im", "db", "mag", "deg", "coh"};
+enum part_bits : unsigned { part_re = 1, part_im = 2, part_db = 4, part_mag = 8, part_deg = 16, part_coh = 32 };
+
+/// "OUT/IN:re" taken apart. @return the bit of its part; 0: it is none
+unsigned split_column(const std::string& name, response& to) {
     const std::size_t colon = name.rfind(':'), slash = name.find('/');
-    if (colon == name.npos || slash == name.npos || slash > colon) return false;
-    const std::string part = name.substr(colon + 1);
+    if (colon == name.npos || slash == name.npos || slash > colon) return 0;
     to.output = name.substr(0, slash);
     to.input = name.substr(slash + 1, colon - slash - 1);
-    imaginary = part == "im";
-    return part == "re" || imaginary;
+    const auto at = std::find(part_names.begin(), part_names.end(), name.substr(colon + 1));
+    return at == part_names.end() ? 0 : 1U << (at - part_names.begin());
 }
 
 response_set read_table(const std::string& path) {
@@ -238,33 +277,39 @@ response_set read_table(const std::string& path) {
     const auto fail = [&](const std::string& what) {
         throw failure(
             exit_usage,
-            fmt::format("{}: {}; expected a column frequency_hz, then OUT/IN:re and OUT/IN:im of each response", path,
-                        what));
+            fmt::format("{}: {}; expected a column frequency_hz, then of each response OUT/IN:re and OUT/IN:im, or "
+                        "OUT/IN:db (20 log10) or OUT/IN:mag and OUT/IN:deg; OUT/IN:coh where there is a coherence",
+                        path, what));
     };
     if (table.columns.front() != "frequency_hz")
         fail(fmt::format("the first column is \"{}\"", printable(table.columns.front())));
     std::vector<response> all;
-    std::vector<int> parts; // of each: 1 real, 2 imaginary
+    std::vector<unsigned> given; // of each
     for (std::size_t c = 1; c < width; ++c) {
         response one;
-        bool imaginary = false;
-        if (!split_column(table.columns[c], one, imaginary))
-            fail(fmt::format("found the column \"{}\"", printable(table.columns[c])));
+        const unsigned part = split_column(table.columns[c], one);
+        if (part == 0) fail(fmt::format("found the column \"{}\"", printable(table.columns[c])));
         auto at = std::find_if(all.begin(), all.end(),
                                [&](const response& x) { return x.output == one.output && x.input == one.input; });
         if (at == all.end()) at = all.insert(all.end(), std::move(one)), at->values.resize(table.count, complex(0, 0));
-        parts.resize(all.size());
-        parts[static_cast<std::size_t>(at - all.begin())] |= imaginary ? 2 : 1;
+        given.resize(all.size());
+        given[static_cast<std::size_t>(at - all.begin())] |= part;
         for (std::size_t l = 0; l < table.count; ++l) {
             const double x = table.samples[l * width + c];
-            at->values[l] += imaginary ? complex(0, x) : complex(x, 0);
+            if (part == part_coh)
+                at->coherence.push_back(x);
+            else if (part == part_im || part == part_deg)
+                at->values[l] += complex(0, x);
+            else
+                at->values[l] += part == part_db ? std::pow(10, x / 20) : x;
         }
     }
     if (all.empty() || table.count == 0) fail("no response");
     for (std::size_t k = 0; k < all.size(); ++k)
-        if (parts[k] != 3)
-            fail(fmt::format("the {} part of {}/{} is missing", parts[k] == 1 ? "imaginary" : "real",
-                             printable(all[k].output), printable(all[k].input)));
+        if (const unsigned own = given[k] & ~part_coh; own == (part_db | part_deg) || own == (part_mag | part_deg))
+            for (complex& x : all[k].values) x = x.real() * std::polar(1.0, x.imag() * M_PI / 180);
+        else if (own != (part_re | part_im))
+            fail(fmt::format("{}/{} has not both of its two parts", printable(all[k].output), printable(all[k].input)));
     for (response& one : all)
         for (std::size_t l = 0; l < table.count; ++l) one.frequency_hz.push_back(table.samples[l * width]);
     return set_of(path, all);

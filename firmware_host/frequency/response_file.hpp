@@ -5,7 +5,7 @@
 
 namespace okid_host {
 
-/// By the extension .uff or .unv, else CSV: a column frequency_hz, then "OUT/IN:re" and "OUT/IN:im" of each response.
+/// By the extension .uff or .unv, else CSV: a column frequency_hz, then "OUT/IN:re" and "OUT/IN:im" (or :db, :mag with :deg; :coh) of each response.
 /// A response that is not in the file is NaN throughout. Throws `failure` (exit 2).
 response_set read_responses(const std::string& path);
 

@@ -2,11 +2,12 @@
 // PURPOSE  the modes that are in frequency responses
 // METHOD   poles of matrix fractions over degrees, weights of the lines and normalisations, of every set-up, are gathered by the
 //          agreement that method auto uses for records; those of the candidates are refined with the residues of all set-ups
-//          (modal_fit) and judged. Shapes: the first singular vector of the residues at the references, the other entries
+//          (modal_fit), and judged by the rule of records with the refined shape; the fit may strike out, never in. Shapes: the first singular vector of the residues at the references, the other entries
 //          by least squares on what each set-up has there
 // REFERENCE Mevel, Basseville, Benveniste, Goursat (2002), several set-ups with references
 #include "response_modes.hpp"
 
+#include "consensus/quantity.hpp"
 #include "error.hpp"
 #include "matrix_fraction.hpp"
 #include "record/request.hpp"
@@ -29,20 +30,19 @@ using Eigen::MatrixXd;
 
 constexpr double widest_damping = 0.5; // sigma of damping over damping
 constexpr double widest_frequency = 0.05;
-constexpr double least_strength = 4;            // of a residue matrix over its noise
-constexpr int fewest_hits = 2;                  // of the runs: candidates, which the fit judges
-constexpr int first_steps = 2, last_steps = 12; // of the poles
-constexpr double neighbours = 0.02;             // in frequency: poles that compete for one resonance
-constexpr double one_mode = 2.5;                // widths between two resonances of one shape: one mode
-constexpr double same_residues = 0.95;          // MAC of the residues of two poles that are one mode
-constexpr double narrowest = 0.25;              // half a resonance's width in lines: below it is a line
-constexpr double edge_lines = 2;                // from the ends of the band
-constexpr double broadest = 0.2;                // damping of a vibration
-constexpr double worth_listing = 0.25;          // share of the runs below which a cluster is chance
-constexpr double doubtful_share = 0.5;          // of the runs: a doubtful mode that fewer found is not listed by itself
+constexpr double least_strength = 2;                              // of a residue matrix over its noise
+constexpr int first_steps = 2, window_steps = 5, last_steps = 12; // of the poles
+constexpr double neighbours = 0.02;                               // in frequency: poles that compete for one resonance
+constexpr double one_mode = 2.5, one_mode_share = 0.01; // sum of widths, or share of the frequency: as of records
+constexpr double same_residues = 0.9;                   // MAC of the residues of two poles that are one mode
+constexpr double narrowest = 0.25;                      // half a resonance's width in lines: below it no damping shows
+constexpr double edge_lines = 2;                        // from the ends of the band
+constexpr double broadest = 0.2;                        // damping of a vibration
+constexpr double worth_listing = 0.25;                  // share of the runs below which a cluster is chance
+constexpr double doubtful_share = 0.5; // of the runs: a doubtful mode that fewer found is not listed by itself
 
 /// The columns of all set-ups side by side, each an output of its own.
-response_set side_by_side_columns(const joint_responses& from, std::vector<int>& sensing) {
+response_set side_by_side_columns(const joint_responses& from, std::vector<Index>& places) {
     response_set out;
     out.frequency_hz = from.sets.front().frequency_hz;
     out.inputs = {"all"};
@@ -56,7 +56,7 @@ response_set side_by_side_columns(const joint_responses& from, std::vector<int>&
         for (Index c = 0; c < set.H.cols(); ++c) {
             const std::string& name = set.outputs[static_cast<std::size_t>(c % set.n_y())];
             out.outputs.push_back(name);
-            sensing.push_back(from.sensing[static_cast<std::size_t>(place_in(from.outputs, name))]);
+            places.push_back(place_in(from.outputs, name));
         }
     }
     return out;
@@ -67,7 +67,7 @@ void mark_doubtful(const response_set& set, std::vector<consensus_mode>& modes) 
     const std::vector<double>& f = set.frequency_hz;
     const double line = (f.back() - f.front()) / static_cast<double>(set.lines() - 1);
     for (consensus_mode& mode : modes) {
-        if (mode.frequency_hz * mode.damping_ratio < narrowest * line) mode.why.emplace_back("tone");
+        if (mode.frequency_hz * mode.damping_ratio < narrowest * line) mode.why.emplace_back("narrow");
         if (mode.damping_ratio > broadest) mode.why.emplace_back("overdamped");
         if (mode.frequency_hz < f.front() + edge_lines * line || mode.frequency_hz > f.back() - edge_lines * line)
             mode.why.emplace_back("band_edge");
@@ -88,7 +88,7 @@ std::vector<residue_matrix> residues_of(const joint_responses& from, const modal
         residue_matrix one{MatrixXcd(set.n_y(), set.n_u()), MatrixXd(set.n_y(), set.n_u()), {}};
         for (Index c = 0; c < set.H.cols(); ++c) {
             one.R(c % set.n_y(), c / set.n_y()) = fit.residues(k, first + c);
-            one.variance(c % set.n_y(), c / set.n_y()) = fit.variance[first + c] * fit.unit_variance(k, first + c);
+            one.variance(c % set.n_y(), c / set.n_y()) = fit.variance[first + c] * fit.unit_variance[k];
         }
         first += set.H.cols();
         out.push_back(std::move(one));
@@ -149,34 +149,46 @@ residue_shape shape_of(const joint_responses& from, const modal_fit& fit, Index 
 }
 
 /// Standard deviations of frequency and damping from that of the pole's parts.
-std::pair<double, double> spread_of(complex pole, const MatrixXd& covariance, Index k) {
-    if (covariance.size() == 0) return {NAN, NAN};
-    const Eigen::Matrix2d part = covariance.block<2, 2>(2 * k, 2 * k);
+std::pair<double, double> spread_of(const modal_fit& fit, std::size_t k) {
+    if (fit.covariance.empty()) return {NAN, NAN};
+    const complex pole = fit.poles[k];
     const double size = std::abs(pole), re = pole.real(), im = pole.imag();
     const Eigen::Vector2d f(re / size / (2 * M_PI), im / size / (2 * M_PI)),
         zeta(-im * im / (size * size * size), re * im / (size * size * size));
-    return {std::sqrt(f.dot(part * f)), std::sqrt(zeta.dot(part * zeta))};
+    const auto along = [&](const Eigen::Vector2d& v) { return std::sqrt(v.dot(fit.covariance[k] * v)); };
+    return {along(f), along(zeta)};
 }
 
 /// Residues, shapes and deviations of all set-ups together.
 std::pair<modal_fit, refined_modes> fit_all(const joint_responses& from, const std::vector<complex>& poles, int steps) {
-    std::vector<int> sensing;
-    const response_set columns = side_by_side_columns(from, sensing);
-    std::pair<modal_fit, refined_modes> out{fit_modes(columns, sensing, poles, steps), {}};
+    std::vector<Index> places;
+    const response_set columns = side_by_side_columns(from, places);
+    std::pair<modal_fit, refined_modes> out{fit_modes(columns, places, poles, steps, from.window_s), {}};
     out.second.poles = out.first.poles;
     for (std::size_t k = 0; k < poles.size(); ++k) {
         out.second.shapes.push_back(shape_of(from, out.first, static_cast<Index>(k)));
-        out.second.sigma.push_back(spread_of(out.first.poles[k], out.first.covariance, static_cast<Index>(k)));
+        out.second.sigma.push_back(spread_of(out.first, k));
     }
     return out;
 }
 
-/// What many runs agree on and what few found: the fit of the residues tells which of it is in the responses.
+/// Fitted: what the runs agree on, and what few of them found, lest it stand in the others' residues.
 bool is_candidate(const consensus_mode& mode) {
-    return mode.confident() ||
-           (mode.hits >= fewest_hits && std::all_of(mode.why.begin(), mode.why.end(), [](const std::string& why) {
-                return why == "few_runs" || why == "noise_shape";
-            }));
+    return std::all_of(mode.why.begin(), mode.why.end(),
+                       [](const std::string& why) { return why == "few_runs" || why == "noise_shape"; });
+}
+
+/// Chance, or a second pole within the resonance of a mode that the runs agree on: fitted, both would share one shape.
+bool is_none(const consensus_mode& mode, const std::vector<consensus_mode>& all) {
+    const double width = mode.frequency_hz * mode.damping_ratio;
+    return mode.found_in < worth_listing ||
+           (!mode.confident() && std::any_of(
+                                     all.begin(), all.end(),
+                                     [&](const consensus_mode& other) {
+                                         return other.confident() &&
+                                                std::abs(other.frequency_hz - mode.frequency_hz) <
+                                                    width + other.frequency_hz * other.damping_ratio;
+                                     }));
 }
 
 /// A candidate with what the fit says of it.
@@ -195,7 +207,7 @@ bool better(const fitted_mode& a, const fitted_mode& b) {
 }
 
 bool close(const fitted_mode& a, const fitted_mode& b, double share) {
-    const double widths = one_mode * std::max(-a.pole.real(), -b.pole.real());
+    const double widths = -one_mode * (a.pole.real() + b.pole.real());
     return std::abs(a.pole.imag() - b.pole.imag()) < std::max(widths, share * a.pole.imag());
 }
 
@@ -203,7 +215,7 @@ bool close(const fitted_mode& a, const fitted_mode& b, double share) {
 bool repeats(const modal_fit& fit, const std::vector<fitted_mode>& all, std::size_t k) {
     if (fit.residues.cols() < 3) return false;
     for (std::size_t j = 0; j < all.size(); ++j) {
-        if (j == k || !better(all[j], all[k]) || !close(all[j], all[k], 0)) continue;
+        if (j == k || !better(all[j], all[k]) || !close(all[j], all[k], one_mode_share)) continue;
         const Eigen::RowVectorXcd x = fit.residues.row(static_cast<Index>(k)),
                                   y = fit.residues.row(static_cast<Index>(j));
         if (std::norm(x.dot(y)) > same_residues * x.squaredNorm() * y.squaredNorm()) return true;
@@ -233,6 +245,7 @@ bool leave_worst_out(std::vector<fitted_mode>& candidates, std::vector<consensus
 
 /// One round: candidates at their refined poles, each judged.
 std::vector<fitted_mode> fit_candidates(const joint_responses& from, std::vector<fitted_mode> all, int steps) {
+    const std::vector<double>& line = from.sets.front().frequency_hz;
     std::vector<complex> poles;
     for (const fitted_mode& one : all) poles.push_back(one.pole);
     if (poles.empty()) return all;
@@ -251,18 +264,32 @@ std::vector<fitted_mode> fit_candidates(const joint_responses& from, std::vector
             all[k].why = "wide_sigma";
         else if (zeta > broadest)
             all[k].why = "overdamped";
+        else if (f < line.front() || f > line.back())
+            all[k].why = "band_edge";
         else if (repeats(fit, all, k))
             all[k].why = "split";
     }
     return all;
 }
 
+/// No file says whether there was a window: the likelier of both.
+void choose_window(const std::vector<fitted_mode>& candidates, joint_responses& from) {
+    std::vector<complex> poles;
+    for (const fitted_mode& one : candidates) poles.push_back(one.pole);
+    joint_responses plain = from;
+    plain.window_s = 0;
+    if (from.window_s == 0 || poles.empty() ||
+        fit_all(plain, poles, window_steps).first.unlikeliness <= fit_all(from, poles, window_steps).first.unlikeliness)
+        from.window_s = 0;
+}
+
 /// The candidates at their refined values, with shapes and deviations; what turns out to be none is said.
-void refine_modes(const joint_responses& from, response_modes& found) {
+void refine_modes(joint_responses from, const std::vector<bool>& turned, response_modes& found) {
     auto& [modes, shapes, sigma, stable] = found;
     std::vector<fitted_mode> candidates;
     for (std::size_t k = 0; k < modes.size(); ++k)
         if (is_candidate(modes[k])) candidates.push_back({k, modes[k].found_in, pole_of(modes[k]), {}, {}, ""});
+    choose_window(candidates, from);
     do { // few steps while there is noise among them
         do candidates = fit_candidates(from, std::move(candidates), first_steps);
         while (leave_worst_out(candidates, modes));
@@ -270,21 +297,23 @@ void refine_modes(const joint_responses& from, response_modes& found) {
     } while (leave_worst_out(candidates, modes));
     for (fitted_mode& one : candidates) {
         consensus_mode& mode = modes[one.at];
-        mode.why.clear();
         mode.frequency_hz = std::abs(one.pole) / (2 * M_PI);
         mode.damping_ratio = -one.pole.real() / std::abs(one.pole);
-        mode.mpc = shape_mpc(one.shape.shape);
+        mode.mpc = shape_collinearity(one.shape.shape, turned);
+        judge_agreement(mode);
         std::tie(sigma.frequency_hz[one.at], sigma.damping_ratio[one.at]) = one.sigma;
         shapes[one.at] = std::move(one.shape);
     }
 }
 
-/// Ascending; without what few runs found, or only the modes picked by their numbers, which then count as confident.
-void leave_out(bool all, const std::vector<int>& numbers, response_modes& found) {
+/// Ascending; without what few runs found or lies beyond the lines, or only the modes picked by their numbers, which then count as confident.
+void leave_out(const std::vector<double>& line, bool all, const std::vector<int>& numbers, response_modes& found) {
     auto& [modes, shapes, sigma, stable] = found;
     std::vector<std::size_t> order;
     for (std::size_t k = 0; k < modes.size(); ++k)
-        if (modes[k].confident() || all || modes[k].found_in >= doubtful_share) order.push_back(k);
+        if (modes[k].frequency_hz >= line.front() && modes[k].frequency_hz <= line.back() &&
+            (modes[k].confident() || all || modes[k].found_in >= doubtful_share))
+            order.push_back(k);
     std::sort(order.begin(), order.end(),
               [&own = modes](std::size_t a, std::size_t b) { return own[a].frequency_hz < own[b].frequency_hz; });
     if (!numbers.empty()) {
@@ -420,14 +449,14 @@ complex pole_of(const consensus_mode& mode) {
     return {-zeta * w, w * std::sqrt(1 - zeta * zeta)};
 }
 
-void take_window_out(double constant_s, consensus_mode& mode) {
+void take_window_out(double constant_s, const char* nothing_left, consensus_mode& mode) {
     if (!(constant_s > 0)) return;
     const complex pole = pole_of(mode) + 1 / constant_s;
     mode.frequency_hz = std::abs(pole) / (2 * M_PI);
     mode.damping_ratio = -pole.real() / std::abs(pole);
     if (!(mode.damping_ratio > 0)) {
         mode.damping_ratio = 1e-9;
-        mode.why.emplace_back("tone");
+        mode.why = {nothing_left};
     }
 }
 
@@ -440,15 +469,18 @@ response_modes find_response_modes(const joint_responses& from, bool all, const 
     const auto runs = runs_of(from);
     response_modes out;
     if (diagram) out.stable = diagram_of(from, runs);
-    out.modes = find_agreement(runs);
+    std::vector<bool>
+        turned; // sensors of another quantity: their entries in the references are not those of all outputs
+    out.modes = find_agreement(runs, from.references == from.outputs ? &turned : nullptr);
     mark_doubtful(from.sets.front(), out.modes);
-    const auto chance = [](const consensus_mode& mode) { return !is_candidate(mode) && mode.found_in < worth_listing; };
-    out.modes.erase(std::remove_if(out.modes.begin(), out.modes.end(), chance), out.modes.end());
+    const std::vector<consensus_mode> gathered = out.modes;
+    const auto none = [&](const consensus_mode& mode) { return is_none(mode, gathered); };
+    out.modes.erase(std::remove_if(out.modes.begin(), out.modes.end(), none), out.modes.end());
     out.shapes.resize(out.modes.size());
     out.sigma.frequency_hz.assign(out.modes.size(), NAN);
     out.sigma.damping_ratio.assign(out.modes.size(), NAN);
-    refine_modes(from, out);
-    leave_out(all, numbers, out);
+    refine_modes(from, turned, out);
+    leave_out(from.sets.front().frequency_hz, all, numbers, out);
     if (std::none_of(out.modes.begin(), out.modes.end(), [](const consensus_mode& mode) { return mode.confident(); }))
         throw_no_modes(out.modes, runs.size());
     fill_shapes(from, out);

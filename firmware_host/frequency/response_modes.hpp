@@ -17,7 +17,7 @@ struct joint_responses {
     std::vector<response_set> sets;      ///< at the same lines
     std::vector<std::string> outputs;    ///< of all set-ups
     std::vector<std::string> references; ///< outputs that stand in every set-up
-    std::vector<int> sensing;            ///< okid_sensing_t of each of `outputs`
+    double window_s = 0;                 ///< that averages of random vibration may have had; 0: none
 };
 
 /// Outputs that every set-up has.
@@ -33,7 +33,7 @@ struct residue_shape {
 struct response_modes {
     std::vector<consensus_mode> modes; ///< ascending
     std::vector<residue_shape> shapes;
-    deviations sigma;                    ///< of frequency and damping, by what the fit leaves
+    deviations sigma;                    ///< of frequency and damping, by what the fit leaves and between places
     std::optional<stabilization> stable; ///< poles over the degrees of one fit of each set-up, where asked for
 };
 
@@ -54,7 +54,7 @@ refined_modes fit_response_modes(const joint_responses& from, const std::vector<
 
 std::complex<double> pole_of(const consensus_mode& mode);
 
-/// What an exponential window added to the decay rate is taken away.
-void take_window_out(double constant_s, consensus_mode& mode);
+/// What an exponential window added to the decay rate is taken away; `nothing_left`: the code of a mode without any other.
+void take_window_out(double constant_s, const char* nothing_left, consensus_mode& mode);
 
 } // namespace okid_host

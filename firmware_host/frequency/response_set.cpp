@@ -11,9 +11,31 @@
 namespace okid_host {
 namespace {
 
-constexpr Eigen::Index fewest_lines = 32;
-
 using Eigen::Index;
+
+constexpr Index fewest_lines = 32;
+constexpr Index lines_apart = 2;       // lines: windows make neighbours alike, and their noise too
+constexpr Index judging_reach = 8;     // lines to either side that judge one
+constexpr double least_over_noise = 3; // power of a line over that of its noise: of noise alone 1, under windows 1.2
+
+/// The value that this share of the numbers is below.
+double share_of(const Eigen::VectorXd& from, double share) {
+    std::vector<double> values(from.data(), from.data() + from.size());
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+}
+
+response_set chosen_lines(const response_set& from, const std::vector<Index>& kept) {
+    response_set out = from;
+    out.frequency_hz.clear();
+    out.H.resize(static_cast<Index>(kept.size()), from.H.cols());
+    for (const Index l : kept) {
+        out.H.row(static_cast<Index>(out.frequency_hz.size())) = from.H.row(l);
+        out.frequency_hz.push_back(from.frequency_hz[static_cast<std::size_t>(l)]);
+    }
+    return out;
+}
 
 void check_lines(const response_set& first, const response_set& other, const std::string& a, const std::string& b) {
     const bool same = first.frequency_hz.size() == other.frequency_hz.size() &&
@@ -73,25 +95,55 @@ response_set join_set_ups(const std::vector<response_set>& sets, const std::vect
 
 response_set cut_band(const response_set& from, double low_hz, double high_hz) {
     std::vector<Index> kept;
-    for (Index l = 0; l < from.lines(); ++l)
-        if (const double f = from.frequency_hz[static_cast<std::size_t>(l)]; f > 0 && f >= low_hz && f <= high_hz)
+    Index unmeasured = 0;
+    for (Index l = 0; l < from.lines(); ++l) {
+        const double f = from.frequency_hz[static_cast<std::size_t>(l)];
+        if (!(f > 0 && f >= low_hz && f <= high_hz)) continue;
+        if (from.H.row(l).allFinite())
             kept.push_back(l);
-    const auto count = static_cast<Index>(kept.size());
-    if (count < fewest_lines)
-        throw failure(exit_usage, fmt::format("{} lines between {:g} and {:g} Hz, expected at least {}", count, low_hz,
-                                              high_hz, fewest_lines));
-    response_set out = from;
-    out.frequency_hz.clear();
-    out.H.resize(count, from.H.cols());
-    for (Index k = 0; k < count; ++k) {
-        const Index l = kept[static_cast<std::size_t>(k)];
-        out.frequency_hz.push_back(from.frequency_hz[static_cast<std::size_t>(l)]);
-        out.H.row(k) = from.H.row(l);
-        if (!out.H.row(k).allFinite())
-            throw failure(exit_usage, fmt::format("a response is no number at {:g} Hz; --band leaves lines out",
-                                                  out.frequency_hz.back()));
+        else
+            ++unmeasured;
     }
-    return out;
+    if (static_cast<Index>(kept.size()) < fewest_lines)
+        throw failure(
+            exit_usage,
+            fmt::format("{} lines between {:g} and {:g} Hz, expected at least {}{}. Choose a wider --band, or measure "
+                        "with finer lines",
+                        kept.size(), low_hz, high_hz, fewest_lines,
+                        unmeasured > 0 ? fmt::format("; {} more hold no number or have no coherence", unmeasured)
+                                       : ""));
+    return chosen_lines(from, kept);
+}
+
+response_set without_noise_lines(const response_set& from) {
+    const Index lines = from.lines(), reach = std::max(judging_reach, lines / 50);
+    Eigen::MatrixXd signal(lines, from.H.cols()), noise = signal;
+    signal = from.H.cwiseAbs2();
+    for (Index l = 0; l < lines; ++l) {
+        const Index at = std::clamp(l, lines_apart, lines - 1 - lines_apart);
+        const auto f = [&](Index line) { return from.frequency_hz[static_cast<std::size_t>(line)]; };
+        const double share = (f(at) - f(at - lines_apart)) / (f(at + lines_apart) - f(at - lines_apart));
+        noise.row(l) =
+            (from.H.row(at) - (1 - share) * from.H.row(at - lines_apart) - share * from.H.row(at + lines_apart))
+                .cwiseAbs2() /
+            (1 + (1 - share) * (1 - share) + share * share);
+    }
+    std::vector<Index> kept;
+    for (Index l = 0; l < lines; ++l) {
+        const Index first = std::max<Index>(0, l - reach), count = std::min(lines, l + reach + 1) - first;
+        std::vector<double> over;
+        for (Index c = 0; c < from.H.cols(); ++c)
+            over.push_back(share_of(signal.col(c).segment(first, count), 0.5) /
+                           std::max(share_of(noise.col(c).segment(first, count), 0.5), 1e-300));
+        if (share_of(Eigen::VectorXd::Map(over.data(), from.H.cols()), 0.75) >= least_over_noise) kept.push_back(l);
+    }
+    if (static_cast<Index>(kept.size()) < fewest_lines)
+        throw failure(
+            exit_no_model,
+            fmt::format("no model: at {} of {} lines from {:g} to {:g} Hz the responses are more than noise, "
+                        "expected at least {}. Average more, or say with --band which lines to take as they are",
+                        kept.size(), lines, from.frequency_hz.front(), from.frequency_hz.back(), fewest_lines));
+    return chosen_lines(from, kept);
 }
 
 response_set exchanged(const response_set& from) {

@@ -28,8 +28,13 @@ Eigen::Index place_of(std::vector<std::string>& names, const std::string& name);
 /// `failure` (exit 2) where the lines differ or an output was not measured for an input. `names`: of the set-ups.
 response_set join_set_ups(const std::vector<response_set>& sets, const std::vector<std::string>& names);
 
-/// The lines from low to high, those at 0 Hz left out. Throws (exit 2) where fewer than 32 stay or one is no number.
+/// The lines from low to high, without those at 0 Hz or with a response that is no number. Throws (exit 2) where fewer than
+/// 32 stay.
 response_set cut_band(const response_set& from, double low_hz, double high_hz);
+
+/// Lines at which the responses are more than noise: those of neighbouring lines do not follow from each other where a force
+/// has no power or a sensor is below its range. Throws (exit 3) where fewer than 32 stay.
+response_set without_noise_lines(const response_set& from);
 
 /// Outputs and inputs exchanged (Maxwell's reciprocity): what a roving hammer measures, as roving sensors would.
 response_set exchanged(const response_set& from);

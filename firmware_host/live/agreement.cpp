@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <fmt/format.h>
 
 namespace okid_host {
@@ -15,12 +14,6 @@ namespace {
 
 constexpr double most_numbers = 1e7;   // of a growing memory: 80 MB
 constexpr double numbers_a_number = 8; // an identification holds the record, its lower rates and copies of both
-
-struct state_head {
-    char mark[8];
-    std::int64_t n_u, n_y, records, samples;
-};
-constexpr char state_mark[9] = "okid.rec";
 
 record_options options_of(const stream_config& config) {
     record_options out;
@@ -41,25 +34,32 @@ record_options options_of(const stream_config& config) {
     return out;
 }
 
+/// Samples of the window, 0: there is none.
+std::int64_t window_of(const stream_config& config) {
+    return config.wanted.window_s ? kept_samples(config) : std::int64_t{0};
+}
+
 } // namespace
 
 std::int64_t kept_samples(const stream_config& config) {
     if (config.wanted.window_s)
         return std::max<std::int64_t>(1, std::llround(*config.wanted.window_s * config.rate_hz));
     const okid_watch_config_t watch = watch_config_of(config);
-    const double left = config.wanted.max_memory_mb * 1e6 - static_cast<double>(okid_watch_memsize(&watch));
+    const double left = config.wanted.max_memory_mb * 1e6 - static_cast<double>(okid_watch_memsize(&watch)) -
+                        followed_modes::bytes(config, 0);
     const double numbers = std::min(most_numbers, std::max(0.0, left) / 8 / numbers_a_number);
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(numbers / static_cast<double>(config.channels())));
 }
 
 double agreement_bytes(const stream_config& config) {
-    return 8 * numbers_a_number * static_cast<double>(kept_samples(config)) * static_cast<double>(config.channels());
+    return 8 * numbers_a_number * static_cast<double>(kept_samples(config)) * static_cast<double>(config.channels()) +
+           followed_modes::bytes(config, window_of(config));
 }
 
 agreement::agreement(const stream_config& config)
     : where_(config.where), m_(config.channels()), options_(options_of(config)),
       window_(config.wanted.window_s.has_value()), most_(kept_samples(config)), starts_{0}, hits_(config.hits),
-      missing_(m_, NAN) {
+      missing_(m_, NAN), followed_(config, window_of(config)) {
     if (window_) rows_.reserve(static_cast<std::size_t>(most_ + most_ / 4 + 1) * m_);
 }
 
@@ -87,9 +87,11 @@ void agreement::add(const double* row) {
         in_gap_ = true;
     }
     push(row);
+    followed_.add(row);
 }
 
 void agreement::add_missing(std::int64_t count) {
+    followed_.add_missing(count);
     if (count == 0) {
         if (starts_.back() < came_) starts_.push_back(came_);
         in_gap_ = false;
@@ -107,6 +109,7 @@ void agreement::forget() {
     starts_ = {came_};
     run_at_ = came_;
     in_gap_ = false;
+    followed_.reset();
 }
 
 void agreement::reset() {
@@ -153,7 +156,7 @@ okid_status_t agreement::run(const mass_plan& mass) {
     const std::pair<std::int64_t, bool> now{came_, mass.wanted()};
     if (run_of_ == now) return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
     run_of_ = now;
-    run_at_ = came_;
+    pass();
     fault_.reset();
     try {
         record_set set = records();
@@ -165,59 +168,37 @@ okid_status_t agreement::run(const mass_plan& mass) {
         fault_ = why;
         found_ = {};
     }
+    decided_on_ = basis();
+    followed_.begin(found_);
+    model_ = kept_model(found_.model.view());
+    sigma_ = found_.context.sigma;
     return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
 }
 
+/// Deviations shrink with the root of what they rest on.
+bool agreement::follow() {
+    if (!followed_.any()) return false;
+    model_ = kept_model(found_.model.view());
+    followed_.follow(model_);
+    sigma_ = found_.context.sigma;
+    if (!sigma_) return true;
+    const double narrower =
+        std::sqrt(static_cast<double>(decided_on_) / static_cast<double>(std::max(decided_on_, basis())));
+    for (auto* each : {&sigma_->frequency_hz, &sigma_->damping_ratio, &sigma_->shape_re, &sigma_->shape_im})
+        for (double& one : *each) one *= narrower;
+    return true;
+}
+
 std::vector<std::byte> agreement::state() const {
-    const record_set set = records();
-    state_head head{};
-    std::copy_n(state_mark, sizeof head.mark, head.mark);
-    head.n_u = static_cast<std::int64_t>(set.n_u);
-    head.n_y = static_cast<std::int64_t>(set.n_y);
-    head.records = static_cast<std::int64_t>(set.records.size());
-    head.samples = static_cast<std::int64_t>(set.count());
-    std::vector<std::byte> out;
-    const auto put = [&](const void* from, std::size_t bytes) {
-        const auto* first = static_cast<const std::byte*>(from);
-        out.insert(out.end(), first, first + bytes);
-    };
-    put(&head, sizeof head);
-    for (const record_data& record : set.records) {
-        const auto end = static_cast<std::int64_t>(record.first + record.count);
-        put(&end, sizeof end);
-    }
-    put(set.samples.data(), set.samples.size() * sizeof(double));
-    return out;
+    record_set set = records();
+    saved_samples out;
+    for (const record_data& record : set.records)
+        out.ends.push_back(static_cast<std::int64_t>(record.first + record.count));
+    out.rows = std::move(set.samples);
+    return samples_body(set.n_u, set.n_y, out);
 }
 
-agreement::saved agreement::read(const void* state, std::size_t bytes) const {
-    const auto refuse_state = [&](const std::string& why) { throw failure(exit_usage, where_ + "the state " + why); };
-    state_head head{};
-    if (bytes < sizeof head) refuse_state("is damaged: it ends early");
-    std::memcpy(&head, state, sizeof head);
-    if (std::memcmp(head.mark, state_mark, sizeof head.mark) != 0)
-        refuse_state("is none of method auto (which keeps samples), or is damaged");
-    if (head.n_u != static_cast<std::int64_t>(options_.inputs.size()) ||
-        head.n_y != static_cast<std::int64_t>(options_.outputs.size()))
-        refuse_state(fmt::format("is of {} inputs and {} outputs; expected {}, {}", head.n_u, head.n_y,
-                                 options_.inputs.size(), options_.outputs.size()));
-    const std::size_t rest = (bytes - sizeof head) / 8;
-    const auto records = static_cast<std::size_t>(head.records), samples = static_cast<std::size_t>(head.samples);
-    if (records > rest || samples > rest / m_ || bytes != sizeof head + 8 * (records + samples * m_))
-        refuse_state("is damaged: its size differs from its header");
-    saved out;
-    out.ends.resize(records);
-    out.rows.resize(samples * m_);
-    const auto* from = static_cast<const std::byte*>(state) + sizeof head;
-    if (records > 0) std::memcpy(out.ends.data(), from, 8 * records);
-    if (samples > 0) std::memcpy(out.rows.data(), from + 8 * records, 8 * samples * m_);
-    if (!std::is_sorted(out.ends.begin(), out.ends.end()) || (records > 0 ? out.ends.back() : 0) != head.samples ||
-        (records > 0 && out.ends.front() < 1))
-        refuse_state("is damaged: its records are not in order");
-    return out;
-}
-
-void agreement::take(const saved& from) {
+void agreement::take(const saved_samples& from) {
     std::size_t first = 0;
     for (const std::int64_t end : from.ends) {
         add_missing(0);
@@ -225,8 +206,12 @@ void agreement::take(const saved& from) {
     }
 }
 
+saved_samples agreement::read(const void* state, std::size_t bytes) const {
+    return read_samples(where_, options_.inputs.size(), options_.outputs.size(), state, bytes);
+}
+
 void agreement::restore(const void* state, std::size_t bytes) {
-    const saved from = read(state, bytes);
+    const saved_samples from = read(state, bytes);
     reset();
     take(from);
 }

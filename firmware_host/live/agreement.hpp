@@ -2,11 +2,14 @@
 // Method auto of a stream: the samples of its memory, and what identify_records() finds in them.
 //
 // What makes lines, clipping and rest known is not in any sum: so the samples themselves are kept, those of the window, or of
-// a growing memory at most `most_numbers`. A result is then that of the same samples in a file.
+// a growing memory at most `most_numbers`. A result is then that of the same samples in a file. Between two such decisions the modes
+// are followed in sums (followed_modes.hpp).
 #pragma once
 #include "error.hpp"
+#include "followed_modes.hpp"
 #include "record/record.hpp"
 #include "stream_config.hpp"
+#include "stream_state.hpp"
 
 #include <okid/accumulator.h>
 
@@ -37,11 +40,22 @@ class agreement {
     /// Identify what is kept, once for the same samples and plan. @return OKID_OK, or a status < 0 and refuse() says why
     okid_status_t run(const mass_plan& mass);
     const record_result& found() const { return found_; }
+    /// The modes of the last run() where they are now; false: there are none to follow.
+    bool follow();
+    bool follows() const { return followed_.any(); }
+    const okid_identified_t& model() const { return model_.view(); } ///< of the last run() or follow()
+    const std::optional<deviations>& sigma() const { return sigma_; }
     [[noreturn]] void refuse() const { throw failure(*fault_); } ///< of the last run()
     /// An eighth of what is kept came since the last run(): so all updates together cost a few times one result.
-    bool due() const { return due_after(came_ - run_at_); }
+    bool due() const { return asked_ || due_after(came_ - run_at_); }
     bool due_after(std::int64_t samples) const { return 8 * samples >= basis(); }
-    void pass() { run_at_ = came_; } ///< this update is not made: the next one is due as if it had been
+    void ask() { asked_ = true; } ///< the next run() is due now
+    /// This decision is not made: the next one is due as if it had been, and nothing is followed until then.
+    void pass() {
+        run_at_ = came_;
+        asked_ = false;
+        followed_.stop();
+    }
 
     std::int64_t basis() const { return came_ - begin_; }
     std::int64_t rows() const; ///< complete ones
@@ -54,12 +68,8 @@ class agreement {
     void merge(const void* state, std::size_t bytes); ///< as further records
 
   private:
-    struct saved {
-        std::vector<std::int64_t> ends; ///< of its records
-        std::vector<double> rows;
-    };
-    saved read(const void* state, std::size_t bytes) const;
-    void take(const saved& from);
+    saved_samples read(const void* state, std::size_t bytes) const;
+    void take(const saved_samples& from);
     void push(const double* row);
     const double* at(std::int64_t sample) const { return rows_.data() + static_cast<std::size_t>(sample - base_) * m_; }
     record_set records() const;
@@ -77,7 +87,11 @@ class agreement {
     std::size_t gone_ = 0;                                         ///< records that are forgotten
     std::vector<double> missing_;                                  ///< one row
     okid_accumulator_stats_t counts_{};
-    std::int64_t run_at_ = 0;
+    std::int64_t run_at_ = 0, decided_on_ = 0; ///< samples that had come, that were kept, at the last run()
+    bool asked_ = false;
+    followed_modes followed_;
+    kept_model model_;
+    std::optional<deviations> sigma_;
     std::optional<std::pair<std::int64_t, bool>> run_of_; ///< samples and whether M, K, R were wanted
     record_result found_;
     std::optional<failure> fault_;

@@ -153,6 +153,7 @@ template <class Number> std::size_t identifier::rows_until_change(const Number* 
 
 std::optional<std::int64_t> identifier::take_change() {
     if (!change_at_) return std::nullopt;
+    if (agreed_) agreed_->ask();
     return samples_ - *std::exchange(change_at_, std::nullopt);
 }
 
@@ -420,7 +421,7 @@ void identifier::merge(const void* state, std::size_t bytes) {
 okid_status_t identifier::run(const mass_plan& mass) {
     if (agreed_) {
         const okid_status_t status = agreed_->run(mass);
-        model_ = agreed_->found().model.view();
+        model_ = agreed_->model();
         return status;
     }
     flush();
@@ -429,6 +430,12 @@ okid_status_t identifier::run(const mass_plan& mass) {
     model_ = realised_;
     if (status >= 0 && refiner_) refiner_->refine(model_);
     return status;
+}
+
+okid_status_t identifier::update() {
+    if (decides() || !agreed_->follow()) return run();
+    model_ = agreed_->model();
+    return OKID_OK;
 }
 
 std::int64_t identifier::rows() {

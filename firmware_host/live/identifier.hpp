@@ -43,15 +43,21 @@ class identifier {
     /// Identify from what is there, auto with M, K, R of the plan. @return status of okid_identify_run(); the model stays
     /// valid until the next call
     okid_status_t run(const mass_plan& mass = {});
+    /// The same for an update: auto decides which modes there are when that is due, else it follows them.
+    okid_status_t update();
+    /// Would update() decide which modes there are? A named method does so each time.
+    bool decides() const { return !agreed_ || change_at_ || agreed_->due(); }
     /// Method auto of a stream, else none.
     const agreement* agreed() const { return agreed_.get(); }
     /// Is an update worth its work? Of a named method always.
-    bool due() const { return !agreed_ || change_at_ || agreed_->due(); }
+    bool due() const { return decides() || agreed_->follows(); }
     /// Is the next one due when so many samples more are there?
-    bool due_after(std::int64_t samples) const { return agreed_ ? agreed_->due_after(samples) : samples > 0; }
+    bool due_after(std::int64_t samples) const {
+        return agreed_ && decides() ? agreed_->due_after(samples) : samples > 0;
+    }
     /// Leave an update out that was due.
     void pass() {
-        if (agreed_) agreed_->pass();
+        if (agreed_ && decides()) agreed_->pass();
     }
     const okid_identified_t& model() const { return model_; }
     const okid_identified_t& realised() const { return realised_; } ///< the model before it was refined
@@ -61,7 +67,7 @@ class identifier {
     /// Standard deviations for the model of the last run(), of its modes and what the plan wants; none when sigma_blocks is
     /// 0 or there is too little to cut into blocks.
     std::optional<deviations> sigma(const mass_plan& plan) {
-        if (agreed_) return agreed_->found().context.sigma;
+        if (agreed_) return agreed_->sigma();
         if (refiner_ && refiner_->refined()) return refiner_->sigma(model_, plan);
         return blocks_ && samples_ >= blind_until_
                    ? blocks_->sigma(accumulator_, identify_, model_, plan, chooser_ ? chooser_->chosen().first : 0)

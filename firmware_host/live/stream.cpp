@@ -8,6 +8,7 @@
 #include "error.hpp"
 #include "record/record_check.hpp"
 #include "result/method.hpp"
+#include "stream_state.hpp"
 
 #include <fmt/format.h>
 #include <utility>
@@ -36,9 +37,17 @@ void stream::reset() {
     forget_updates();
 }
 
+std::vector<std::byte> stream::state() { return with_head(config_, identifier_.state()); }
+
 void stream::restore(const void* state, std::size_t bytes) {
-    identifier_.restore(state, bytes);
+    const state_body body = behind_head(config_, state, bytes);
+    identifier_.restore(body.from, body.bytes);
     forget_updates();
+}
+
+void stream::merge(const void* state, std::size_t bytes) {
+    const state_body body = behind_head(config_, state, bytes);
+    identifier_.merge(body.from, body.bytes);
 }
 
 void stream::forget_updates() {
@@ -99,7 +108,9 @@ stream_update stream::update(std::int64_t now) {
         return out;
     }
     const bool baseline = obliged();
-    out.status = identifier_.run();
+    if (identifier_.decides()) since_ = now;
+    out.since = since_;
+    out.status = identifier_.update();
     if (out.status < 0) {
         settling_.reset();
     } else {

@@ -24,6 +24,7 @@ struct stream_update {
     std::optional<deviations> sigma;          ///< of the modes
     const std::vector<int>* tracks = nullptr; ///< of each mode, 0 = none; only with a model
     bool settled = false;                     ///< the modal table has come to rest
+    std::int64_t since = 0;                   ///< sample at which it was decided which modes there are
 };
 
 class stream {
@@ -39,7 +40,9 @@ class stream {
 
     /// Must an update be made now, however late it is? The samples that come are compared with its model, when it is at
     /// rest, and the result depends on that. Three updates in a row, then none until half of the memory is new.
-    bool obliged() const { return identifier_.wants_model() && identifier_.samples() >= look_at_; }
+    bool obliged() const {
+        return identifier_.decides() && identifier_.wants_model() && identifier_.samples() >= look_at_;
+    }
     /// May it be left out? Yes when it is not obliged, and the next one is due already.
     /// @param ahead  samples that came behind it, up to the newest update; hurry: whatever came behind it
     bool may_skip(std::int64_t ahead, bool hurry) {
@@ -55,15 +58,17 @@ class stream {
     bool settled() const { return settled_; }                                ///< at the last update
     bool at_rest(std::size_t mode) const { return settling_.at_rest(mode); } ///< of the last update
     void reset();
-    /// As identifier::restore().
+    /// identifier::state() behind rate and channels of the stream, restore() and merge() compare them.
+    std::vector<std::byte> state();
     void restore(const void* state, std::size_t bytes);
+    void merge(const void* state, std::size_t bytes);
 
     /// Identify for a result. Throws `failure` (exit 3) when no model can be had.
     void identify();
     /// Throws `failure` (exit 3): why the last identification gave no model.
     [[noreturn]] void refuse(okid_status_t status, const result_context& about) const;
-    /// Is an update worth its work? A named method makes one whenever it is asked, auto when an eighth of what it keeps is
-    /// new (agreement::due()).
+    /// Is there anything to update? Auto decides which modes there are when an eighth of what it keeps is new
+    /// (agreement::due()), and follows those it has in between.
     bool due() const { return identifier_.due(); }
     /// What is known of the result of the last identify() or update(), without standard deviations.
     /// @param said  what to say first
@@ -96,6 +101,7 @@ class stream {
     settling baseline_settling_;     ///< of the obliged updates alone
     mode_tracks baseline_tracks_;
     std::vector<int> baseline_signed_;
+    std::int64_t since_ = 0;   ///< stream_update::since
     int looks_ = 0;            ///< obliged updates in a row
     std::int64_t look_at_ = 0; ///< the next one, in samples that ever came
     bool settled_ = false;

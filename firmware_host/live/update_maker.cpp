@@ -99,13 +99,13 @@ void update_maker::follow(const stream_update& found, update_report& out) {
         row.frequency_std_hz = sigma->frequency_hz[k];
         row.damping_ratio_std = sigma->damping_ratio[k];
     }
-    tell_modes(sigma, out);
+    tell_modes(sigma, found.since, out);
     for (std::size_t k = tracks.size(); k-- > 0;)
         if (stream_.doubtful(k)) state.modes.erase(state.modes.begin() + static_cast<std::ptrdiff_t>(k));
     if (turned) tell_alarm(out);
 }
 
-void update_maker::tell_modes(const deviations* sigma, update_report& out) {
+void update_maker::tell_modes(const deviations* sigma, std::int64_t since, update_report& out) {
     const table_state& state = *out.table;
     ordered_json modes = modes_json(stream_.model(), sigma);
     const std::vector<mode_verdict> verdicts = stream_.verdicts();
@@ -120,6 +120,7 @@ void update_maker::tell_modes(const deviations* sigma, update_report& out) {
                           {"modes", std::move(modes)},
                           {"window_s", seconds(basis)},
                           {"samples", basis},
+                          {"modes_since", seconds(since)},
                           {"settled", state.settled}});
     if (const window_choice* chosen = stream_.sums().window())
         out.events.back()["window_reason"] =

@@ -50,7 +50,7 @@ class update_maker {
   private:
     void make(std::int64_t samples, update_report& out);
     void follow(const stream_update& found, update_report& out);
-    void tell_modes(const deviations* sigma, update_report& out);
+    void tell_modes(const deviations* sigma, std::int64_t since, update_report& out);
     void tell_alarm(update_report& out) const;
     double seconds(std::int64_t samples) const { return static_cast<double>(samples) / rate_hz_; }
 

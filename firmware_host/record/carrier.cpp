@@ -222,6 +222,7 @@ std::vector<std::optional<carried_mode>> carry_at(const carrier_task& task, int 
         if (!one) continue;
         one->exact = exact;
         unfold(zoom, *one);
+        if (!task.level.zoomed) one->by = {task.run.level, config, one->frequency_hz, one->damping_ratio, one->shape};
     }
     return out;
 }
@@ -229,14 +230,15 @@ std::vector<std::optional<carried_mode>> carry_at(const carrier_task& task, int 
 /// Is there a deviation, and one to be believed at once?
 bool surely(const carried_mode& one) { return one.damping_std < doubted * one.damping_ratio; }
 
-/// Of what several orders say of a mode, the one whose deviation of damping is the middle one.
+/// Of what several orders say of a mode, the one whose deviation of damping is the middle one of those known.
 std::optional<carried_mode> middle(std::vector<carried_mode> all) {
     if (all.empty()) return std::nullopt;
-    std::stable_sort(all.begin(), all.end(), [](const carried_mode& a, const carried_mode& b) {
-        return (std::isnan(a.damping_std) ? INFINITY : a.damping_std) <
-               (std::isnan(b.damping_std) ? INFINITY : b.damping_std);
-    });
-    return all[(all.size() - 1) / 2];
+    const auto known = std::stable_partition(all.begin(), all.end(),
+                                             [](const carried_mode& one) { return std::isfinite(one.damping_std); });
+    std::stable_sort(all.begin(), known,
+                     [](const carried_mode& a, const carried_mode& b) { return a.damping_std < b.damping_std; });
+    const auto count = static_cast<std::size_t>(known - all.begin());
+    return all[count > 0 ? (count - 1) / 2 : 0];
 }
 
 } // namespace

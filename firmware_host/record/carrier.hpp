@@ -18,6 +18,7 @@ struct carried_mode {
     std::vector<double> shape_re_std, shape_im_std; ///< empty: not known
     std::vector<mode_shift> shifts;                 ///< a block each, empty: not known
     bool exact = false;                             ///< from the QR factor of nearly noise-free records
+    mode_carrier by;
 };
 
 /// What a model and its replicates say of the modes wanted; none where the model lacks them.

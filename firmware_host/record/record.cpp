@@ -339,6 +339,7 @@ record_result identify_records(record_set records, const record_options& options
     work.set.complete = missing.samples == 0;
     work.context = describe_records(work.set, options, missing);
     check_moving(work.set, options);
+    check_different_outputs(work.set, options);
     std::vector<input_moments> about = moments_of(work.set);
     check_different_inputs(about, options);
     if (options.detrend == "linear") detrend_linear(work.set, options);

@@ -5,6 +5,7 @@
 #include "result/kept_model.hpp"
 #include "result/result.hpp"
 
+#include <complex>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -42,6 +43,14 @@ struct record_options {
     std::function<void(const char* stage)> stage; ///< told what begins; may be empty
 };
 
+/// Of auto: the model that carries a mode, as its rate sees it; what it says when the record has grown is where the mode is then.
+struct mode_carrier {
+    int level = -1;                  ///< of record_level; -1: none, or a zoomed band
+    okid_identify_config_t config{}; ///< with its order
+    double frequency_hz = 0, damping_ratio = 0;
+    std::vector<std::complex<double>> shape; ///< of channels in units of `scale`
+};
+
 /// A model with what is known about it, and the decomposition it was realised from.
 struct record_result {
     kept_model model;
@@ -50,6 +59,8 @@ struct record_result {
     std::unique_ptr<std::byte[]> memory;   ///< of `identifier`
     okid_identify_t* identifier = nullptr; ///< for the poles of other orders; `model` does not look into it
     okid_identified_t realised{};          ///< what it gave, in its own memory
+    std::vector<mode_carrier> carriers;    ///< of auto, of each mode
+    std::vector<double> scale;             ///< of auto, of each channel: its spread
 
     /// Fits that nobody has asked for yet.
     struct fits_to_come {

@@ -33,11 +33,12 @@
 namespace okid_host {
 namespace {
 
-constexpr double doubtful_share = 0.5; // of the runs: fewer is not even doubtful
-constexpr double worth_listing = 0.25; // agreement, or share of the runs, below which a cluster is not even doubtful
-constexpr double widest_damping = 1;   // sigma of damping over damping
-constexpr double widest_frequency = 0.05;
-constexpr double fewest_periods = 8;         // of a mode in the record: fewer are a trend
+constexpr double doubtful_share = 0.5;    // of the runs: fewer is not even doubtful
+constexpr double worth_listing = 0.25;    // agreement, or share of the runs, below which a cluster is not even doubtful
+constexpr double widest_damping = 1;      // sigma of damping over damping: beyond, damping is not known
+constexpr double widest_frequency = 0.05; // of the frequency: beyond, nobody knows where the mode is
+constexpr double widest_lonely = 0.5;     // sigma of damping over damping of one output without force
+constexpr double fewest_periods = 8;      // of a mode in the record: fewer are a trend
 constexpr double periods_of_horizon = 0.025; // 0.75 of a period in 30 samples
 
 using listed_pair = std::pair<consensus_mode, std::optional<carried_mode>>;
@@ -112,8 +113,9 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
             mode.damping_ratio = carried->damping_ratio;
         }
         mode.shape = carried->shape;
-        if (carried->frequency_std_hz > widest_frequency * mode.frequency_hz ||
-            carried->damping_std > widest_damping * mode.damping_ratio)
+        // of one output no shape and no force vouch for a mode: noise agrees by chance, but not from block to block
+        if (options.outputs.size() == 1 && options.inputs.empty() &&
+            carried->damping_std > widest_lonely * mode.damping_ratio)
             mode.why.emplace_back("wide_sigma");
         if (carried->exact) continue;
         // what a model leaves out moves each method elsewhere, and no block of the record shows it
@@ -147,6 +149,7 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
         modes.push_back(
             {mode.frequency_hz, mode.damping_ratio, mode.mpc, mode.emac, std::move(shape), mode.confident()});
         context.verdicts.push_back({mode.confident(), mode.found_in, mode.why});
+        work.carriers.push_back(carried ? carried->by : mode_carrier());
         auto& shifts = work.shifts.emplace_back(carried ? carried->shifts : std::vector<mode_shift>());
         for (mode_shift& shift : shifts)
             for (std::size_t i = 0; i < n_y; ++i) shift.shape[i] *= scale[n_u + i] / largest;
@@ -275,6 +278,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     for (const record_level& level : levels) work.context.rates_hz.push_back(level.fs_hz);
     std::vector<listed_mode> listed;
     describe_modes(found, scale, set.n_u, options.sigma_blocks > 0, listed, work);
+    work.scale = std::move(scale);
     return listed;
 }
 
@@ -462,6 +466,8 @@ record_result identify_auto(record_set records, const record_options& given) {
     record_result result;
     result.model = kept_model(work.model);
     result.context = std::move(work.context);
+    result.carriers = std::move(work.carriers);
+    result.scale = std::move(work.scale);
     shapes_in_one_quantity(given.sensing, result.model, result.context);
     return result;
 }

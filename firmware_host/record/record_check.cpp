@@ -197,6 +197,23 @@ void check_different_inputs(const std::vector<input_moments>& about, const recor
     }
 }
 
+void check_different_outputs(const record_set& set, const record_options& options) {
+    const auto same = [&](std::size_t a, std::size_t b) {
+        for (std::size_t i = 0; i < set.samples.size(); i += set.channels())
+            if (set.samples[i + a] < set.samples[i + b] || set.samples[i + a] > set.samples[i + b]) return false;
+        return true;
+    };
+    for (std::size_t b = set.n_u + 1; b < set.channels(); ++b)
+        for (std::size_t a = set.n_u; a < b; ++a)
+            if (same(a, b))
+                throw failure(
+                    exit_no_model,
+                    fmt::format("no model: outputs \"{}\" and \"{}\" hold the same numbers: leave one of them "
+                                "out of --outputs",
+                                name_of(a, options), name_of(b, options)),
+                    OKID_ERR_OUTPUT);
+}
+
 void check_explains(const result_context& context) {
     constexpr double least_percent = 5;
     double best = -HUGE_VAL;

@@ -27,6 +27,9 @@ void check_moving(const record_set& set, const record_options& options, bool scr
 /// Inputs that repeat each other share their effect in any proportion; `about`: moments_of() the records.
 void check_different_inputs(const std::vector<input_moments>& about, const record_options& options);
 
+/// Outputs that hold the same numbers leave a model directions that nothing was measured of.
+void check_different_outputs(const record_set& set, const record_options& options);
+
 /// Largest magnitude in each channel of a record.
 std::vector<double> largest_of(const record_set& set, const record_data& record);
 

@@ -13,7 +13,7 @@
 namespace okid_host {
 namespace {
 
-constexpr std::array<std::pair<const char*, const char*>, 10> words{{
+constexpr std::array<std::pair<const char*, const char*>, 11> words{{
     {"few_runs", "fewer than half of the runs that could see it found it"},
     {"noise_shape", "short-lived, complex or scattering: probably noise"},
     {"split", "beside a stronger one of the same shape: one mode whose frequency changes with amplitude"},
@@ -24,9 +24,14 @@ constexpr std::array<std::pair<const char*, const char*>, 10> words{{
     {"wide_sigma", "its standard deviation is too wide"},
     {"band_edge", "too slow for the record, or at the edge of the band"},
     {"overdamped", "damped too much to vibrate"},
+    {"narrow", "narrower than the lines of the responses show: its damping is not known"},
 }};
 
 } // namespace
+
+bool judged_by_agreement(const result_context& context) {
+    return context.method == "auto" || context.method == "plscf" || !context.verdicts.empty();
+}
 
 std::string why_text(const std::string& code) {
     const auto* at = std::find_if(words.begin(), words.end(), [&](const auto& one) { return code == one.first; });

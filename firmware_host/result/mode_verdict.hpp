@@ -26,6 +26,9 @@ std::string why_text(const std::string& code);
 /// A line for each code among these modes.
 std::string why_legend(const std::vector<mode_verdict>& verdicts);
 
+/// Did several runs have to agree? Else each mode stands by itself.
+bool judged_by_agreement(const result_context& context);
+
 /// Of every mode: those of the context, or by EMAC for a named method.
 std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const result_context& context);
 

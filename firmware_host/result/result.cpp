@@ -9,6 +9,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <functional>
 
 namespace okid_host {
 namespace {
@@ -143,7 +144,8 @@ bool is_agreed(const result_context& context) { return context.method == "auto" 
 /// "n/a" in the width of an indicator.
 std::string indicator(double value) { return std::isfinite(value) ? fmt::format("{:.4f}", value) : "-"; }
 
-constexpr int most_shape_columns = 6; // more would not stand side by side on a screen
+constexpr double widest_damping = 1, widest_frequency = 0.05; // sigma over value, beyond which it is told
+constexpr int most_shape_columns = 6;                         // more would not stand side by side on a screen
 
 std::string mode_rows(const okid_identified_t& model, const result_context& context) {
     const bool agreed = !context.verdicts.empty();
@@ -177,27 +179,29 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
         for (int i = 0; shapes && i < model.n_y; ++i)
             out += fmt::format("  {:>{}.3f}", model.shape_re[i + static_cast<std::ptrdiff_t>(k) * model.n_y],
                                width[static_cast<std::size_t>(i)]);
-        if (agreed && !verdict.confident) out += fmt::format("  {}", fmt::join(verdict.why, ", "));
+        if (!verdict.confident) out += fmt::format("  {}", fmt::join(verdict.why, ", "));
         out += "\n";
     }
-    if (!agreed && std::any_of(verdicts.begin(), verdicts.end(), [](const mode_verdict& v) { return !v.confident; }))
-        out += fmt::format("   ? EMAC below {:g}: probably noise, not a mode of the structure\n", doubtful_emac);
     if (!left_out.empty())
         out +=
             fmt::format("   {}, listed with --all-modes: {}\n",
                         counted(static_cast<long long>(left_out.size()), "doubtful mode"), fmt::join(left_out, ", "));
-    if (agreed) out += why_legend(verdicts);
+    out += why_legend(verdicts);
+    if (!judged_by_agreement(context) && model.mode_count > 0)
+        out += "   not judged by a named method: EMAC from 0.5 on, which noise reaches too; method auto judges\n";
     return out;
 }
 
-/// "12.3 Hz, 45.6 Hz": confident modes whose standard deviations were wanted and cannot be given.
-std::string modes_without_deviation(const okid_identified_t& model, const result_context& context) {
+/// "12.3 Hz, 45.6 Hz": confident modes of whose values and standard deviations something holds.
+std::string confident_modes(
+    const okid_identified_t& model, const result_context& context,
+    const std::function<bool(double frequency, double frequency_std, double damping, double damping_std)>& of) {
     std::string out;
     if (!context.sigma) return out;
     const std::vector<mode_verdict> verdicts = mode_verdicts(model, context);
     for (std::size_t k = 0; k < verdicts.size(); ++k)
-        if (verdicts[k].confident &&
-            !(std::isfinite(context.sigma->frequency_hz[k]) && std::isfinite(context.sigma->damping_ratio[k])))
+        if (verdicts[k].confident && of(model.frequency_hz[k], context.sigma->frequency_hz[k], model.damping_ratio[k],
+                                        context.sigma->damping_ratio[k]))
             out += fmt::format("{}{:.4g} Hz", out.empty() ? "" : ", ", model.frequency_hz[k]);
     return out;
 }
@@ -255,6 +259,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
             agreed ? ordered_json(nullptr) : vector_json(model.singular_values, model.singular_count);
     out["singular_noise"] = number_json(model.noise_level);
     if (arrays) put_arrays_json(model, context, out);
+    out["judged_by"] = judged_by_agreement(context) ? "agreement" : "emac";
     out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
     if (!context.shape_quantity.empty()) out["shape_quantity"] = context.shape_quantity;
     if (agreed) {
@@ -323,11 +328,21 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
         if (code) out.emplace_back(code, note_text(model, bit));
     }
     out.insert(out.end(), context.warnings.begin(), context.warnings.end());
-    const std::string without = modes_without_deviation(model, context);
+    const std::string without = confident_modes(model, context, [](double, double f_std, double, double zeta_std) {
+        return !std::isfinite(f_std) || !std::isfinite(zeta_std);
+    });
     if (!without.empty())
         out.emplace_back(
             "no_deviation",
             fmt::format("no ± for {}: with some block of the record left out, the model does not hold it", without));
+    const std::string wide = confident_modes(model, context, [](double f, double f_std, double zeta, double zeta_std) {
+        return f_std > widest_frequency * f || zeta_std > widest_damping * zeta;
+    });
+    if (!wide.empty() && is_agreed(context))
+        out.emplace_back("wide_sigma", fmt::format("one standard deviation is as large as the damping, or {:.0f} % of "
+                                                   "the frequency, at {}: with some block of the record left out, the "
+                                                   "model has it elsewhere",
+                                                   100 * widest_frequency, wide));
     return out;
 }
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import random
 import struct
 import sys
@@ -129,6 +131,31 @@ def arrays() -> list[bytes]:
     return out
 
 
+# Of okid_accumulator_serialise() (growing, codes, a window) and okid_correlation_serialise(), small, packed.
+SUMS = [
+    "c-r&#_H=P{cIIMaU|>MT$N-(s!0^GIl>t9sLF2O$G!tSjDvb^l93Zrk0}EbrLZIp*p>!OCZb*dk!=ZF6s(3>RRNMqgTR32MAN_#<yTEGzBZv?4",
+    "c-r&#_H=P{cIIMaU|>MUFo4X4fDiVp4EO;H8XsLfBUW7>>``e1-~eJyBy-XA2SDi*C|v=id!Td-lrBLNU&25gAOfW&2>NkogJZA#CISH5Tnr`",
+    "c-r&#_H=P{cIIMaU|>MTAixC0Fg^l&uxDk!4_MIn=<1QpWI{3*l|}~&4iH+&feDK_nCf((v<Z~9g3>Bb+6YbD5lTxqpqhj3J^`q>2;3daSltr"
+    "@QP&U(RUZlE$3W>2C>?<+?vQ}yegg+|d(p!KJ)9XC1_u1txt#|9TlW~j",
+]
+CORRELATIONS = [
+    "c-r&#_H=Rf58`5EU|@h@CMXR9Obp22gFQO~e!z;xXUA#|#4J=A4jdp9hXX5iE8z0@#Z92J9+b92qxI0#nUJYZ1x~-aJBJYf&9e}J",
+    "c-r&#_H=Rf58`5EU|@h@CMeASWiv4#gAexX4EO;n8lN4>ECv+wKG>tuaNq!;I2@R;TLG7c&;kx<=Ah}rlt<N%a1SF2A5$K`J79bbC~b)5J_Q`=7|`qyAfQhKhdD5JD"
+    "52RegQiXbjgRhLT>3cB?3cjdZY4Bv2{iXg;BYS?eH;$H3)$}g0DEd3x&",
+]
+
+
+def states() -> list[bytes]:
+    """Kind of the state, then its bytes (fuzz_state.cpp)."""
+    samples = b"okid.rec" + struct.pack("<qqqqqq", 1, 2, 2, 3, 1, 3) + struct.pack("<9d", *range(9))
+    about = {"keeps": "samples", "rate_hz": 100.0, "inputs": ["f"], "outputs": ["a", "b"]}
+    texts = [json.dumps(one).encode() for one in (about, {**about, "rate_hz": 50.0}, {**about, "outputs": ["a", 1]})]
+    heads = [b"OKIDSTR\n" + struct.pack("<QI", 20 + len(text), 0) + text for text in texts]
+    sums = [b"\x02" + zlib.decompress(base64.b85decode(one)) for one in SUMS]
+    correlations = [b"\x03" + zlib.decompress(base64.b85decode(one)) for one in CORRELATIONS]
+    return [*(b"\0" + head + samples for head in heads), b"\x01" + samples, *sums, *correlations]
+
+
 def main() -> int:
     top = Path(sys.argv[1])
     seeds: dict[str, list[bytes]] = {
@@ -141,6 +168,7 @@ def main() -> int:
         "numbers": [
             bytes([a, b, c, d]) for a, b, c, d in ((0, 0, 1, 0), (0, 20, 9, 20), (17, 5, 0, 0), (30, 16, 25, 13))
         ],
+        "state": states(),
         "face": [
             *(b"\x00" + text.encode() for text in (CONFIG, LINE_CONFIG)),
             *(b"\x01" + text.encode() for text in CSV),

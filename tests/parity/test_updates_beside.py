@@ -103,7 +103,11 @@ def test_the_result_is_that_of_replay(made: Path, keys: str) -> None:
     assert json.loads(truth)["modes"] and of_type(before, "change") == of_type(events, "change") != []
     assert of_type(before, "gap") == of_type(events, "gap") != []
     told, all_made = of_type(events, "stats")[-1]["updates"], of_type(before, "stats")[-1]["updates"]
-    assert all_made["skipped"] == 0 and told["made"] + told["skipped"] == all_made["made"]
+    assert all_made["skipped"] == 0
+    if auto:  # follows nothing where it was too late to decide
+        assert 0 < told["made"] <= told["made"] + told["skipped"] <= all_made["made"]
+    else:
+        assert told["made"] + told["skipped"] == all_made["made"]
     modes = {event["t"]: event["modes"] for event in of_type(before, "modes")}
     for event in of_type(events, "modes"):  # what is made is made from the same samples
         assert [m["frequency_hz"] for m in event["modes"]] == [m["frequency_hz"] for m in modes[event["t"]]]

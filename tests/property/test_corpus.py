@@ -37,7 +37,7 @@ class Found:
         self.record = record
         self.modes = result.to_dict()["modes"]
         codes = {warning.code: warning.text for warning in result.warnings}
-        self.unsure = codes.pop("no_deviation", "")
+        self.unsure, self.wide = codes.pop("no_deviation", ""), codes.pop("wide_sigma", "")
         self.said = {(code, str(record["id"])) for code in codes}
 
 
@@ -80,5 +80,14 @@ def test_a_mode_without_deviations_says_why(corpus: list[Found]) -> None:
         without = [m for m in one.modes if m["confident"] and None in (m["frequency_std_hz"], m["damping_ratio_std"])]
         assert bool(without) == bool(one.unsure), one.record["id"]
         assert all(f"{mode['frequency_hz']:.4g} Hz" in one.unsure for mode in without)
+        wide = [
+            m
+            for m in one.modes
+            if m["confident"]
+            and m not in without
+            and (m["damping_ratio_std"] > m["damping_ratio"] or m["frequency_std_hz"] > 0.05 * m["frequency_hz"])
+        ]
+        assert bool(wide) == bool(one.wide), one.record["id"]
+        assert all(f"{mode['frequency_hz']:.4g} Hz" in one.wide for mode in wide)
         named += len(without)
     assert named <= 8

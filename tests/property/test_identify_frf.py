@@ -137,7 +137,7 @@ def test_exponential_window_is_taken_out() -> None:
 def test_noise_has_no_modes() -> None:
     r = np.random.default_rng(0)
     h = r.normal(size=(800, 4, 1)) + 1j * r.normal(size=(800, 4, 1))
-    with pytest.raises(okid.IdentificationError, match="no model: none of 6 runs"):
+    with pytest.raises(okid.IdentificationError, match="no model: at [0-9]+ of 800 lines .* more than noise"):
         okid.identify_frf(Frf.of(np.arange(1, 801) * 0.25, h))
 
 

@@ -85,6 +85,8 @@ def test_what_was_not_looked_at_is_said(raw: dict[str, Any], tmp_path: Path) -> 
     assert "No quality warning in what was checked: warnings of the identification, consistency" in bare
     assert "rate by the time stamps (no events given)" in bare
     assert "Not checked: completeness, units, modes that the order cut off, whiteness of the residual (no rec" in bare
+    assert "that several methods agree on the modes (one was named)" in bare
+    raw = raw | {"judged_by": "agreement"}
     silent = shown(raw, events=written(tmp_path / "e.jsonl", CHANNELS, None))
     assert "rate by the time stamps (not in the events)" in silent
     u, y = demo_record(4000)

@@ -7,6 +7,7 @@ import re
 
 # C0 and C1 controls without tab and new line, what turns or hides text, halves of letters.
 _HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff]")
+_LONGEST = 2000  # letters of a message
 
 
 def shown(text: str) -> str:
@@ -18,9 +19,12 @@ def shown(text: str) -> str:
 class Error(ValueError):
     """Base of every error of this package. `status` is the code of the C library, 0 when Python found the fault.
 
-    Control characters in the message are escaped: it is shown on terminals."""
+    Control characters in the message are escaped: it is shown on terminals. What a file says may stand in it: it is cut
+    beyond 2000 letters."""
 
     def __init__(self, message: str, status: int = 0) -> None:
+        if len(message) > _LONGEST:
+            message = f"{message[: _LONGEST // 2]} … {message[-_LONGEST // 2 :]}"
         super().__init__(shown(message))
         self.status = status
 

@@ -240,14 +240,15 @@ class Session:
         return Result.of_host(self._stream.identify())
 
     def to_bytes(self) -> bytes:
-        """The sums, for a file or another machine: what okid.Accumulator.to_bytes() gives; without the blocks for ±.
+        """The sums, for a file or another machine: what okid.Accumulator.to_bytes() gives, behind rate and channels and
+        with a check sum over all; of method auto the samples. Without the blocks for ±.
         With `refine` the correlation sums too; InputError while no model has told how far these look back."""
         return self._stream.state()
 
     def restore(self, state: bytes) -> None:
-        """Go on where to_bytes() of a session of the same channels, lags and memory stood, else InputError. For ± what
-        was before is one block; a fading memory has none until it is forgotten. With `refine` how far the correlation
-        sums look back and the filter of the noise are those of the state, and stay so at reset()."""
+        """Go on where to_bytes() of a session of the same rate, channels, lags and memory stood, else InputError. For ±
+        what was before is one block; a fading memory has none until it is forgotten. With `refine` how far the
+        correlation sums look back and the filter of the noise are those of the state, and stay so at reset()."""
         self._stream.restore(state_bytes(state))
 
     def merge(self, state: bytes) -> None:

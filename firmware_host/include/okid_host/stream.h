@@ -87,11 +87,13 @@ OKID_HOST_API int32_t okid_host_stream_update(okid_host_stream_t* self, struct o
  * result of the stream. @return 0; 3: no model; 4 */
 OKID_HOST_API int32_t okid_host_stream_identify(okid_host_stream_t* self, struct okid_host_result** result);
 
-/** The sums as bytes, for a file or another machine (format: okid/accumulator.h; of method auto the samples; with refine the correlation sums before
- * them, as bytes of their own: "OKIDREF\n", uint64 their number); the bytes are the stream's until its next call. Every release reads those of earlier ones. @return 0 or 4 */
+/** The sums as bytes, for a file or another machine: a head ("OKIDSTR\n", uint64 bytes of the head, uint32 CRC-32 of all other bytes, JSON with rate_hz,
+ * inputs, outputs), then the sums (format: okid/accumulator.h; of method auto the samples; with refine the correlation sums before
+ * them, as bytes of their own: "OKIDREF\n", uint64 their number); the bytes are the stream's until its next call. Sums without a head, of 0.1 or of an
+ * accumulator, are read too. @return 0 or 4 */
 OKID_HOST_API int32_t okid_host_stream_state(okid_host_stream_t* self, const void** state, size_t* bytes);
 
-/** Go on where a state of the same channels, lags and memory stood. With refine its correlation sums bring their lags and
+/** Go on where a state of the same rate, channels, lags and memory stood. With refine its correlation sums bring their lags and
  * the filter of the noise along, which stay with a reset: what comes after that can be merged with the state. What was before is one block for standard deviations, in
  * a fading memory none. @return 0 or 2; on an error nothing is changed */
 OKID_HOST_API int32_t okid_host_stream_restore(okid_host_stream_t* self, const void* state, size_t bytes);

@@ -78,6 +78,42 @@ okid_status_t okid_correlation_peek(const void* in, size_t bytes, okid_correlati
     return OKID_OK;
 }
 
+static int sane_samples(walk_t* w, const okid_correlation_t* s, size_t count) {
+    if (cor_codes(s)) return sane_whole(w, count, UINT64_C(1) << 31);
+    int sane = 1;
+    for (size_t i = 0; i < count; ++i) sane &= sane_number(w, 1);
+    return sane;
+}
+
+/// What walk_state() is about to read. Nothing is changed.
+static int sane_state(const okid_correlation_t* s, const void* in, int32_t closed) {
+    walk_t w = {NULL, (const uint8_t*)in, HEADER}, counts = w;
+    counts.at += offsetof(okid_accumulator_stats_t, rows);
+    uint64_t left = walk_bits(&counts, 0, 8); // rows that are in no slot yet looked at
+    int sane = 1;
+    for (size_t i = 0; i < sizeof s->stats / 8 + 1; ++i) sane &= sane_count(&w); // and the clock
+    w.at += 4;                                                                   // samples at hand
+    sane &= walk_bits(&w, 0, 4) <= 1;                                            // in a gap
+    w.at += 4;                                                                   // closed slots
+    for (int32_t i = 0; i < s->m; ++i) sane &= sane_number(&w, 1);
+    sane &= sane_samples(&w, s, cor_u_window(s) + cor_y_window(s));
+    const int32_t slots = closed < s->ring ? closed + 1 : s->ring, block = s->config.block;
+    for (int32_t k = 0; k < slots; ++k) {
+        const uint64_t rows = walk_bits(&w, 0, 8);
+        sane &= rows <= left && (block == 0 || rows < (uint64_t)block + (k < closed));
+        left -= rows <= left ? rows : left;
+        sane &= sane_samples(&w, s, s->slot_numbers - sizeof(cor_slot_t) / 8);
+    }
+    for (int32_t k = 0; k < (block > 0 ? slots : 1); ++k) {
+        const size_t products = cor_sum_count(s);
+        if (cor_codes(s))
+            sane &= sane_wide(&w, products) & sane_whole(&w, s->sums_numbers - 2 * products, UINT64_C(1) << 62);
+        else
+            sane &= sane_samples(&w, s, s->sums_numbers);
+    }
+    return sane;
+}
+
 okid_status_t okid_correlation_deserialise(okid_correlation_t* self, const void* in, size_t bytes) {
     if (!self) return OKID_ERR_NULL;
     okid_correlation_config_t c;
@@ -100,7 +136,7 @@ okid_status_t okid_correlation_deserialise(okid_correlation_t* self, const void*
     walk_t count = {NULL, NULL, HEADER};
     walk_state(&count, self);
     self->closed = kept;
-    if (count.at + 4 != bytes) return OKID_ERR_FORMAT;
+    if (count.at + 4 != bytes || !sane_state(self, in, closed)) return OKID_ERR_FORMAT;
     okid_correlation_reset(self);
     walk_t w = {NULL, (const uint8_t*)in, HEADER};
     walk_state(&w, self);

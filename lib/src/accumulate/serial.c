@@ -99,22 +99,13 @@ okid_status_t okid_accumulator_peek(const void* in, size_t bytes, okid_accumulat
     return OKID_OK;
 }
 
-/// The next real number of what is read: is it finite? `least` 0: and not below 0. By its bits, for processors without doubles.
-static int sane_number(walk_t* w, int least) {
-    const uint64_t bits = (uint64_t)walk_bits(w, 0, 8);
-    return (bits >> 52 & 0x7FF) != 0x7FF && (least != 0 || bits >> 63 == 0 || bits << 1 == 0);
-}
-
-/// A count of samples.
-static int sane_count(walk_t* w) { return (uint64_t)walk_bits(w, 0, 8) <= (uint64_t)OKID_MOST_SAMPLES; }
+/// What so many codes of 32 bits can sum to, as far as that can be multiplied by their mean.
+static uint64_t most_sum(uint64_t rows) { return rows < 1u << 27 ? rows << 31 : UINT64_C(1) << 58; }
 
 /// Lagged products and sums: finite, and some square above 0 where one is below (rounding leaves the like of a constant).
-static int sane_sums(walk_t* w, const okid_accumulator_t* a, int exact) {
+static int sane_sums(walk_t* w, const okid_accumulator_t* a, int exact, uint64_t rows) {
     const size_t products = acc_sum_count(a), width = (size_t)a->width, newest = acc_lag_count(a);
-    if (exact) { // two planes of whole numbers, then whole sums: any bits are numbers
-        w->at += 8 * (2 * products + (size_t)a->m);
-        return 1;
-    }
+    if (exact) return sane_wide(w, products) & sane_whole(w, (size_t)a->m, most_sum(rows));
     int sane = 1, above = 0, below = 0;
     for (size_t i = 0; i < products; ++i) {
         const walk_t here = *w;
@@ -142,24 +133,34 @@ static int sane_samples(walk_t* w, const okid_accumulator_t* a, size_t count) {
 
 /// What walk_state() is about to read: a checksum that is right says nothing of the numbers. Nothing is changed.
 static int sane_state(const okid_accumulator_t* a, const void* in, size_t header, int32_t have, int32_t closed) {
-    walk_t w = {NULL, (const uint8_t*)in, header};
+    walk_t w = {NULL, (const uint8_t*)in, header}, counts = w;
+    counts.at += offsetof(okid_accumulator_stats_t, rows);
+    uint64_t left = (uint64_t)walk_bits(&counts, 0, 8);       // rows that are in no slot yet looked at
+    const int base = a->config.edges && a->config.slots == 0; // else there is no room for one
     int sane = 1;
     for (size_t i = 0; i < sizeof a->stats / 8 + 1; ++i) sane &= sane_count(&w); // and the clock
-    sane &= sane_number(&w, 0);                                                  // weight of the base
+    counts.at = w.at;
+    sane &= sane_number(&w, 0) & (base || walk_bits(&counts, 0, 8) == 0); // weight of the base
     for (int i = 0; i < 4; ++i) {
         const uint32_t word = (uint32_t)walk_bits(&w, 0, 4);
-        if (i == 1 || i == 2) sane &= word <= 1; // in a gap, centred
+        if (i == 1 || i == 2) sane &= word <= (i == 1 || base); // in a gap, centred
     }
     for (int32_t i = 0; i < 2 * a->m; ++i) sane &= sane_number(&w, 1);
     sane &= sane_samples(&w, a, (size_t)have * (size_t)a->m);
     for (int32_t k = 0; k <= closed; ++k) {
+        counts.at = w.at;
+        const uint64_t rows = (uint64_t)walk_bits(&counts, 0, 8);
         for (int i = 0; i < 3; ++i) sane &= sane_count(&w); // rows, start, joined
-        sane &= sane_sums(&w, a, acc_has_codes(a));
+        sane &= sane_sums(&w, a, acc_has_codes(a), rows) & (rows <= left);
+        if (a->config.block > 0) sane &= rows < (uint64_t)a->config.block + (k < closed);
+        left -= rows <= left ? rows : left;
         sane &= sane_samples(&w, a, acc_lag_count(a) * (a->config.slots > 0 ? 2 : 1));
     }
-    if (a->config.slots > 0 || !a->config.edges) return sane;
-    sane &= sane_sums(&w, a, acc_base_is_exact(a));
-    if (!acc_base_is_exact(a))
+    if (!base) return sane;
+    sane &= sane_sums(&w, a, acc_base_is_exact(a), left);
+    if (acc_base_is_exact(a))
+        sane &= sane_whole(&w, acc_lag_count(a), UINT64_C(1) << 50) & sane_wide(&w, acc_edge_count(a));
+    else
         for (size_t i = 0; i < acc_lag_count(a) + acc_edge_count(a); ++i) sane &= sane_number(&w, 1);
     return sane;
 }

@@ -3,6 +3,9 @@
 #ifndef OKID_WALK_H
 #define OKID_WALK_H
 
+#include "wide.h"
+
+#include <okid/accumulator.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -49,6 +52,31 @@ static inline void walk_numbers(walk_t* w, void* numbers, size_t count) {
         bits = walk_bits(w, bits, 8);
         memcpy(at, &bits, 8);
     }
+}
+
+// What is read, before anything is changed: a checksum that is right says nothing of the numbers.
+
+/// The next real number of what is read: is it finite? `least` 0: and not below 0. By its bits, for processors without doubles.
+static inline int sane_number(walk_t* w, int least) {
+    const uint64_t bits = (uint64_t)walk_bits(w, 0, 8);
+    return (bits >> 52 & 0x7FF) != 0x7FF && (least != 0 || bits >> 63 == 0 || bits << 1 == 0);
+}
+
+/// A count of samples.
+static inline int sane_count(walk_t* w) { return (uint64_t)walk_bits(w, 0, 8) <= (uint64_t)OKID_MOST_SAMPLES; }
+
+/// Whole numbers of a magnitude up to `most`.
+static inline int sane_whole(walk_t* w, size_t count, uint64_t most) {
+    int sane = 1;
+    for (size_t i = 0; i < count; ++i) sane &= (uint64_t)walk_bits(w, 0, 8) + most <= 2 * most;
+    return sane;
+}
+
+/// Two planes of words as they are left by additions, far enough from their ends to be added to one another.
+static inline int sane_wide(walk_t* w, size_t count) {
+    int sane = 1;
+    for (size_t i = 0; i < count; ++i) sane &= (uint64_t)walk_bits(w, 0, 8) >> WIDE_BITS == 0;
+    return sane & sane_whole(w, count, UINT64_C(1) << 54);
 }
 
 #endif

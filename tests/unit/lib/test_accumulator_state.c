@@ -377,8 +377,42 @@ static void absurd_content_is_refused(void) {
     free(block);
 }
 
+/// Found by tests/fuzz/fuzz_state.cpp: sums of codes that no codes have, and a base where there is no room for one.
+static void sums_that_overflow_and_a_base_of_a_window(void) {
+    okid_accumulator_config_t config = okid_accumulator_defaults(1, 1, 1);
+    config.sample = OKID_SAMPLE_INT16;
+    config.edges = 1;
+    const int16_t codes[] = {1, 2, 3, 4, -5, 6, 7, -8, 9, 10};
+    const double values[] = {1, 2, 3, 4, -5, 6, 7, -8, 9, 10};
+    const size_t header = 8 + 4 * 10 + 8, weight = header + sizeof(okid_accumulator_stats_t) + 8;
+    const size_t sums = weight + 8 + 16 + 8 * 4 + 4 * 2 + 24, products = 8; // of a plane
+    for (int window = 0; window < 2; ++window) {
+        if (window) config = okid_accumulator_defaults(1, 1, 1), config.block = 2, config.slots = 2;
+        const size_t size = okid_accumulator_memsize(&config);
+        void* block = malloc(size);
+        okid_accumulator_t* a = NULL;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &config, block, size));
+        TEST_ASSERT_EQUAL(OKID_OK, window ? okid_accumulator_add(a, values, 5) : okid_accumulator_add_i16(a, codes, 5));
+        const size_t bytes = okid_accumulator_serialised_size(a);
+        uint8_t* good = malloc(bytes);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(a, good, bytes));
+        if (window) {
+            TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, with_bits(a, good, bytes, weight, 0x3FF0000000000000));
+        } else {
+            TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, with_bits(a, good, bytes, sums, UINT64_C(1) << 48));        // low word
+            TEST_ASSERT_EQUAL(OKID_ERR_FORMAT, with_bits(a, good, bytes, sums + 8 * products, INT64_MAX)); // high word
+            TEST_ASSERT_EQUAL(OKID_ERR_FORMAT,
+                              with_bits(a, good, bytes, sums + 16 * products, UINT64_C(1) << 60)); // sum
+        }
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_deserialise(a, good, bytes));
+        free(good);
+        free(block);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(sums_that_overflow_and_a_base_of_a_window);
     RUN_TEST(absurd_content_is_refused);
     RUN_TEST(bytes_go_on_bit_for_bit);
     RUN_TEST(damaged_bytes_change_nothing);

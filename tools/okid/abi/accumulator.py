@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid import abi
 from okid._errors import InputError
-from okid.abi.arguments import state_bytes, whole
+from okid.abi.arguments import behind_head, state_bytes, whole
 from okid.abi.sums import Sums
 from okid.abi.turns import in_turn
 
@@ -152,7 +152,7 @@ class Accumulator(Sums):
     def from_bytes(data: bytes) -> Accumulator:
         """An accumulator that goes on where to_bytes() stood, bit for bit. InputError when the bytes are damaged."""
         config = abi.AccumulatorConfig()
-        data = state_bytes(data)
+        data = behind_head(state_bytes(data))
         abi.check(abi.library().okid_accumulator_peek(data, len(data), ctypes.byref(config)), "from_bytes")
         made = Accumulator(
             config.n_u, config.n_y, config.lags, codes=next(k for k, v in _SAMPLE.items() if v == config.sample),
@@ -164,7 +164,7 @@ class Accumulator(Sums):
 
     def restore(self, data: bytes) -> None:
         """Go back to a state of to_bytes() of an accumulator of the same configuration, else InputError."""
-        data = state_bytes(data)
+        data = behind_head(state_bytes(data))
         abi.check(self._use("deserialise", data, len(data)), "restore")
 
     @property

@@ -30,6 +30,11 @@ def state_bytes(value: object) -> bytes:
     return bytes(value)
 
 
+def behind_head(state: bytes) -> bytes:
+    """A state of a stream without the head that tells its rate and channels (okid_host/stream.h)."""
+    return state[int.from_bytes(state[8:16], "little") :] if state.startswith(b"OKIDSTR\n") else state
+
+
 def whole(name: str, value: object, smallest: int, largest: int | None = None) -> int:
     """A whole number >= `smallest`, at most `largest`."""
     if largest is not None and isinstance(value, int | np.integer) and int(value) > largest:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from okid._errors import Error
+from okid.abi.arguments import behind_head
 from okid.campaign.group_model import in_units, stream_of
 from okid.campaign.pieces import part_of
 from okid.campaign.record_list import RecordRef
@@ -40,6 +41,7 @@ def _feed(spec: CampaignSpec, record: ReadRecord, to: HostStream) -> None:
 
 
 def _alone(state: bytes) -> bytes:
+    state = behind_head(state)
     return zlib.compress(state[: len(state) - len(behind_refinement(state))], 1)
 
 

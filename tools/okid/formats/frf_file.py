@@ -69,7 +69,8 @@ def read_frf(path: str | Path, *more: str | Path) -> Frf:
     """Frequency responses of .uff, .unv, .csv or .h5; several .uff or .csv files are set-ups of one structure, joined.
 
     UFF: every data set 58 or 58b of a frequency response; channels are named by node and direction ("12z"). CSV: a
-    column frequency_hz, then "OUT/IN:re" and "OUT/IN:im". HDF5: frequency_hz (F,), response (F, n_y, n_u) complex,
+    column frequency_hz, then "OUT/IN:re" and "OUT/IN:im" (or ":db" or ":mag" and ":deg"; ":coh"). Lines without
+    coherence are NaN. HDF5: frequency_hz (F,), response (F, n_y, n_u) complex,
     attributes inputs and outputs. InputError names the file and what is wrong with it.
     """
     kinds = {_ending(one) in _HDF5 for one in (path, *more)}

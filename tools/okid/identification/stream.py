@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import Error, InputError
 from okid.abi import host
-from okid.abi.arguments import unmasked
+from okid.abi.arguments import behind_head, unmasked
 from okid.abi.turns import Turn, in_turn
 from okid.identification.host_result import HostResult, options_text
 
@@ -25,7 +25,8 @@ _Place = ctypes.c_char * 0  # the address of a writable, C-contiguous buffer, fa
 
 
 def behind_refinement(state: bytes) -> bytes:
-    """A state without the sums of its refinement: what okid.Accumulator.to_bytes() gives."""
+    """A state without head and without the sums of its refinement: what okid.Accumulator.to_bytes() gives."""
+    state = behind_head(state)
     return state[int.from_bytes(state[8:16], "little") :] if state.startswith(b"OKIDREF\n") else state
 
 
@@ -153,7 +154,8 @@ class HostStream:
 
     @in_turn
     def state(self) -> bytes:
-        """The sums, for restore() and merge(): what okid.Accumulator.to_bytes() gives, behind those of a refinement."""
+        """The sums, for restore() and merge(): what okid.Accumulator.to_bytes() gives, behind a head with rate and
+        channels and the sums of a refinement."""
         at, size = ctypes.c_void_p(), ctypes.c_size_t()
         host.call("stream_state", self.handle, ctypes.byref(at), ctypes.byref(size))
         return ctypes.string_at(at, size.value)

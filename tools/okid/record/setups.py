@@ -135,7 +135,7 @@ def identify_setups(
     >>> _, y = okid.demo_record()
     >>> found = okid.identify_setups(None, [y[:, [0, 1]], y[:, [0, 2]]], fs=1000.0, output_names=["ab", "ac"])
     >>> found.outputs, [f"{mode.frequency_hz:.0f}" for mode in found.confident_modes]
-    (['a', 'b', 'c'], ['32', '46'])
+    (['a', 'b', 'c'], ['11', '32', '46'])
     """
     if len(y) < 2 or len(output_names) != len(y) or (u is not None and len(u) != len(y)):
         told = "" if u is None else f", {len(u)} in u"

@@ -140,6 +140,8 @@ def _looked_at(m: Material) -> tuple[list[str], dict[str, list[str]]]:
     file("whiteness of the residual", "" if white else no_record or "no stable predictor, or a short record")
     seen += ["checks of M, K, R"] if m.result.raw.get("mkr") else []
     file("rate by the time stamps", rate_unseen(m))
+    if m.result.raw.get("judged_by") == "emac":
+        file("that several methods agree on the modes", "one was named")
     return seen, unseen
 
 

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// The modes that auto found in a stream, followed from one of its decisions to the next: the stream at its own rate, half of it,
+// a quarter … into sums of fixed size, and out of them the models that carry the modes. An update costs the same however long
+// the stream has run.
+#pragma once
+#include "record/record.hpp"
+#include "stream_config.hpp"
+
+#include <okid/accumulator.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace okid_host {
+
+class followed_modes {
+  public:
+    /// @param window  samples that count, 0: all. Throws `failure` (exit 3) when memory does not suffice
+    followed_modes(const stream_config& config, std::int64_t window);
+    static double bytes(const stream_config& config, std::int64_t window);
+
+    void add(const double* row);          ///< in engineering units; NaN: missing
+    void add_missing(std::int64_t count); ///< 0: another record begins
+    void reset();
+
+    /// These are the modes; their carriers say now where they stand.
+    void begin(const record_result& found);
+    void stop() { groups_.clear(); } ///< until the next begin()
+    bool any() const { return !groups_.empty(); }
+    /// Frequencies and damping of the modes that begin() was given, moved as far as their carriers moved since.
+    void follow(kept_model& to);
+
+  private:
+    /// The stream at one rate.
+    struct rate {
+        double fs_hz = 0;
+        std::size_t factor = 1;      ///< of the rate before it
+        std::vector<double> weights; ///< of the filter before it; empty: none
+        std::vector<double> waiting; ///< the newest rows that the filter looks at
+        std::size_t came = 0;        ///< rows of the rate before, of this record
+        std::vector<double> row;
+        std::unique_ptr<std::byte[]> block;
+        okid_accumulator_t* sums = nullptr;
+    };
+    /// Modes that one model carries.
+    struct group {
+        std::size_t rate;
+        okid_identify_config_t config;
+        std::vector<std::size_t> modes;
+        std::vector<mode_shift> wanted;
+        std::vector<std::optional<std::pair<double, double>>> then; ///< frequency and damping at begin()
+    };
+    static okid_accumulator_config_t sums_config(const stream_config& config, double fs_hz, std::int64_t window);
+    void push(std::size_t k, const double* row);
+    void into_filter(std::size_t k, const double* row);
+    std::vector<std::optional<std::pair<double, double>>> now(const group& of);
+
+    int n_u_, n_y_;
+    std::size_t m_;
+    std::vector<rate> rates_;
+    std::vector<double> missing_;
+    std::vector<group> groups_;
+};
+
+} // namespace okid_host
