@@ -237,7 +237,7 @@ double local_noise(const problem& all, complex pole, const VectorXd& weight, Ind
         expected += near * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
     }
     const double power = 2 * along.cwiseAbs2().cwiseQuotient(weight).sum();
-    const double alike = 2 * (products / std::max(products[0], 1e-300)).max(0).sum() - 1;
+    const double alike = 2 * (products / std::max(products[0], 1e-300)).max(0.0).sum() - 1;
     return std::max(repeated, alike) * std::max(1.0, found / std::max(expected * power, 1e-300));
 }
 

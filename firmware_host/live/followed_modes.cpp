@@ -92,9 +92,10 @@ void followed_modes::into_filter(std::size_t k, const double* row) {
 void followed_modes::add(const double* row) { into_filter(0, row); }
 
 void followed_modes::add_missing(std::int64_t count) {
-    const auto longest = static_cast<std::int64_t>(most_levels << most_levels) *
-                         static_cast<std::int64_t>(std::max<std::size_t>(1, rates_[1].weights.size()));
-    if (count > 0 && count < longest) { // so that the lower rates keep their step
+    // Missing rows go through the filters, so that the lower rates keep their step; after a gap that is longer than all
+    // filters together look back each rate begins again.
+    const auto longest = static_cast<std::int64_t>((most_levels * rates_[1].weights.size()) << most_levels);
+    if (count > 0 && count < longest) {
         for (; count > 0; --count) into_filter(0, missing_.data());
         return;
     }

@@ -33,12 +33,10 @@
 namespace okid_host {
 namespace {
 
-constexpr double doubtful_share = 0.5;    // of the runs: fewer is not even doubtful
-constexpr double worth_listing = 0.25;    // agreement, or share of the runs, below which a cluster is not even doubtful
-constexpr double widest_damping = 1;      // sigma of damping over damping: beyond, damping is not known
-constexpr double widest_frequency = 0.05; // of the frequency: beyond, nobody knows where the mode is
-constexpr double widest_lonely = 0.5;     // sigma of damping over damping of one output without force
-constexpr double fewest_periods = 8;      // of a mode in the record: fewer are a trend
+constexpr double doubtful_share = 0.5; // of the runs: fewer is not even doubtful
+constexpr double worth_listing = 0.25; // agreement, or share of the runs, below which a cluster is not even doubtful
+constexpr double widest_lonely = 0.5;  // sigma of damping over damping of one output without force
+constexpr double fewest_periods = 8;   // of a mode in the record: fewer are a trend
 constexpr double periods_of_horizon = 0.025; // 0.75 of a period in 30 samples
 
 using listed_pair = std::pair<consensus_mode, std::optional<carried_mode>>;

@@ -138,13 +138,10 @@ std::string fit_text(const result_context& context) {
     return out;
 }
 
-/// Of many runs, without a Hankel matrix of its own.
-bool is_agreed(const result_context& context) { return context.method == "auto" || context.method == "plscf"; }
-
 /// "n/a" in the width of an indicator.
 std::string indicator(double value) { return std::isfinite(value) ? fmt::format("{:.4f}", value) : "-"; }
 
-constexpr double widest_damping = 1, widest_frequency = 0.05; // sigma over value, beyond which it is told
+constexpr double widest_damping = 1, widest_frequency = 0.05; // sigma over value, beyond which it is reported
 constexpr int most_shape_columns = 6;                         // more would not stand side by side on a screen
 
 std::string mode_rows(const okid_identified_t& model, const result_context& context) {
@@ -246,7 +243,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["gaps"] = context.gaps;
     out["inputs"] = context.inputs;
     out["outputs"] = context.outputs;
-    const bool agreed = is_agreed(context); // of many horizons
+    const bool agreed = judged_by_agreement(context); // of many horizons, without a Hankel matrix of its own
     out["p"] = agreed ? ordered_json(nullptr) : ordered_json(model.p);
     out["rows"] = agreed ? ordered_json(nullptr) : ordered_json(model.rows);
     out["hankel"] = context.hankel ? ordered_json(*context.hankel) : ordered_json(nullptr);
@@ -301,10 +298,10 @@ std::string result_table(const okid_identified_t& model, const result_context& c
         fmt::format("{}: {} to {}, {}, {}", context.method, counted(model.n_u, "input"), counted(model.n_y, "output"),
                     what, counted(context.records, fractions && context.records > 1 ? "set-up" : "record"));
     if (context.gaps) out += ", " + counted(context.gaps, "gap");
-    const std::string horizon = fractions            ? "agreement of several degrees, weights and normalisations"
-                                : is_agreed(context) ? "agreement of several methods, horizons and rates"
-                                : model.observer     ? fmt::format("p {}, {} block rows", model.p, model.rows)
-                                                     : fmt::format("{} block rows", model.rows);
+    const std::string horizon = fractions ? "agreement of several degrees, weights and normalisations"
+                                : judged_by_agreement(context) ? "agreement of several methods, horizons and rates"
+                                : model.observer               ? fmt::format("p {}, {} block rows", model.p, model.rows)
+                                                               : fmt::format("{} block rows", model.rows);
     if (context.band_hz)
         out +=
             fmt::format("\nmodes sought between {:.3g} and {:.4g} Hz", context.band_hz->first, context.band_hz->second);
@@ -338,7 +335,7 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
     const std::string wide = confident_modes(model, context, [](double f, double f_std, double zeta, double zeta_std) {
         return f_std > widest_frequency * f || zeta_std > widest_damping * zeta;
     });
-    if (!wide.empty() && is_agreed(context))
+    if (!wide.empty() && judged_by_agreement(context))
         out.emplace_back("wide_sigma", fmt::format("one standard deviation is as large as the damping, or {:.0f} % of "
                                                    "the frequency, at {}: with some block of the record left out, the "
                                                    "model has it elsewhere",
