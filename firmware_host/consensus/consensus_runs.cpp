@@ -46,14 +46,14 @@ int rows_of(int n_u, int n_y, long long samples) {
     return static_cast<int>(std::min<long long>({wanted, borne, std::max(6, most_unknowns / (n_u + n_y))}));
 }
 
-bool find_poles(const okid_identify_config_t& config, const level_sums& sums, consensus_run& run) {
+bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, consensus_run& run) {
     const std::size_t bytes = okid_identify_memsize(&config);
     const auto block = memory(bytes);
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
-    if (!block || !sums.handle() || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK)
+    if (!block || !sums.sums || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK)
         return false;
-    const okid_status_t status = okid_identify_run(identifier, sums.handle(), &model);
+    const okid_status_t status = okid_identify_run(identifier, sums.sums, &model);
     if (status < 0 && status != OKID_ERR_NO_MODES) return false; // of the lowest order: higher ones may have modes
     collect_poles(identifier, model, run);
     link_tracks(run);
@@ -116,30 +116,43 @@ okid_identify_config_t longest_run(int n_u, int n_y, double fs_hz) {
     return run_config(run, n_u, n_y);
 }
 
-level_sums::level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest) {
-    okid_accumulator_config_t shape{};
-    shape.n_u = n_u;
-    shape.n_y = n_y;
-    shape.lags = lags;
-    shape.sample = OKID_SAMPLE_DOUBLE;
-    shape.forgetting = 1;
-    shape.edges = 1;
-    const std::size_t bytes = okid_accumulator_memsize(&shape);
-    block_ = memory(bytes);
-    if (!block_ || okid_accumulator_create(&accumulator_, &shape, block_.get(), bytes) != OKID_OK) {
-        accumulator_ = nullptr;
-        return;
+int longest_lags(int n_u, int n_y) {
+    record_level endless;
+    endless.fs_hz = 1;
+    endless.samples = std::numeric_limits<int>::max();
+    int out = 1;
+    for (const consensus_run& run : plan_runs(n_u, n_y, 0, endless)) {
+        const okid_identify_config_t config = run_config(run, n_u, n_y);
+        out = std::max(out, okid_identify_lags(&config));
     }
+    return out;
+}
+
+owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest) {
+    okid_accumulator_config_t shape = okid_accumulator_defaults(n_u, n_y, lags);
+    shape.edges = 1;
+    owned_sums out(shape);
     const auto m = static_cast<std::size_t>(n_u + n_y);
     const std::vector<double> silence(at_rest ? static_cast<std::size_t>(lags) * m : 0);
+    const bool alone = level.older == nullptr;
+    sample_rows in_units;
+    std::vector<double> units(m, 1.0);
+    for (std::size_t c = 0; c < m && !alone; ++c) units[c] = 1 / level.scale[c];
     for (const auto& rows : level.records) {
-        okid_accumulator_gap(accumulator_, 0);
+        if (!out.sums) break;
+        in_units = alone ? sample_rows() : rows;
+        for (std::size_t i = 0; i < in_units.size(); ++i) in_units[i] *= level.scale[i % m];
+        okid_accumulator_gap(out.sums, 0);
         okid_status_t status = OKID_OK;
-        if (at_rest) status = okid_accumulator_add(accumulator_, silence.data(), static_cast<std::size_t>(lags));
-        if (status >= 0) status = okid_accumulator_add(accumulator_, rows.data(), rows.size() / m);
-        if (status < 0) accumulator_ = nullptr;
-        if (status < 0) return;
+        if (at_rest) status = okid_accumulator_add(out.sums, silence.data(), static_cast<std::size_t>(lags));
+        if (status >= 0)
+            status = okid_accumulator_add(out.sums, alone ? rows.data() : in_units.data(), rows.size() / m);
+        if (status < 0) out.sums = nullptr;
     }
+    if (alone || !out.sums) return out;
+    okid_accumulator_set_units(out.sums, units.data(), nullptr);
+    if (!level.older->take(out.sums)) out.sums = nullptr;
+    return out;
 }
 
 std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std::size_t first, int n_u, int n_y,
@@ -164,7 +177,7 @@ std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std:
     }
     side_by_side(pieces.size(), threads, [&](std::size_t i) {
         piece& mine = pieces[i];
-        const level_sums sums(*mine.level, n_u, n_y, mine.lags, at_rest);
+        const owned_sums sums = level_sums(*mine.level, n_u, n_y, mine.lags, at_rest);
         for (consensus_run& run : mine.runs)
             if (!find_poles(run_config(run, n_u, n_y), sums, run)) run.orders.clear();
     });

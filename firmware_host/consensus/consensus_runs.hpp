@@ -3,11 +3,11 @@
 #pragma once
 #include "consensus.hpp"
 #include "levels.hpp"
+#include "owned_sums.hpp"
 
 #include <okid/accumulator.h>
 
 #include <cstddef>
-#include <memory>
 
 namespace okid_host {
 
@@ -20,16 +20,11 @@ okid_identify_config_t run_config(const consensus_run& run, int n_u, int n_y);
 /// What carries the modes of a level with all samples that its longest horizon asks for; without order.
 okid_identify_config_t longest_run(int n_u, int n_y, double fs_hz);
 
-/// Sums of a level for runs with so many lags.
-class level_sums {
-  public:
-    level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest);
-    okid_accumulator_t* handle() const { return accumulator_; }
+/// The most lags that any run of so many channels asks for, however many samples there are.
+int longest_lags(int n_u, int n_y);
 
-  private:
-    std::unique_ptr<std::byte[]> block_;
-    okid_accumulator_t* accumulator_ = nullptr;
-};
+/// Sums of a level for runs with so many lags; none without memory.
+owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest);
 
 /// All runs of the levels from `first` on with their poles linked. Runs that find no model are left out.
 /// @param threads  at a time, 0: all processors; the result is the same for any number

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The same records at their own rate, half of it, a quarter …: no single rate suits all modes of a structure.
 #pragma once
+#include "level_memory.hpp"
 #include "zoom.hpp"
 
 #include <cstddef>
@@ -19,7 +20,9 @@ struct record_level {
     bool zoomed = false;
     zoom_band zoom() const { return {fs_hz, band}; }
     std::vector<sample_rows> records;
-    long long samples = 0; ///< complete ones
+    long long samples = 0;               ///< complete ones, older ones with them
+    const level_memory* older = nullptr; ///< sums of the samples before the records, in units of the channels
+    std::vector<double> scale;           ///< of each channel, where there are older ones: what one unit of the records is
 };
 
 constexpr std::size_t most_levels = 7; ///< the record's own rate and six halves

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  method auto of a stream
-// METHOD   rows in one vector, the oldest dropped at its front; identify_records() over what is there
+// METHOD   rows in one vector, the oldest dropped at its front: of a growing memory into sums (record/older_samples.hpp);
+//          identify_records() over what is there
 #include "agreement.hpp"
 
 #include "record/roving.hpp"
@@ -12,7 +13,7 @@
 namespace okid_host {
 namespace {
 
-constexpr double most_numbers = 1e7;   // of a growing memory: 80 MB
+constexpr double most_numbers = 1e7;   // of hits at several places: 80 MB
 constexpr double numbers_a_number = 8; // an identification holds the record, its lower rates and copies of both
 
 record_options options_of(const stream_config& config) {
@@ -39,11 +40,15 @@ std::int64_t window_of(const stream_config& config) {
     return config.wanted.window_s ? kept_samples(config) : std::int64_t{0};
 }
 
+/// A window ends; and where hits are at several places the samples after each are needed.
+bool keeps_sums(const stream_config& config) { return !config.wanted.window_s && config.hits.empty(); }
+
 } // namespace
 
 std::int64_t kept_samples(const stream_config& config) {
     if (config.wanted.window_s)
         return std::max<std::int64_t>(1, std::llround(*config.wanted.window_s * config.rate_hz));
+    if (config.hits.empty()) return static_cast<std::int64_t>(newest_samples(config.channels()));
     const okid_watch_config_t watch = watch_config_of(config);
     const double left = config.wanted.max_memory_mb * 1e6 - static_cast<double>(okid_watch_memsize(&watch)) -
                         followed_modes::bytes(config, 0);
@@ -53,21 +58,23 @@ std::int64_t kept_samples(const stream_config& config) {
 
 double agreement_bytes(const stream_config& config) {
     return 8 * numbers_a_number * static_cast<double>(kept_samples(config)) * static_cast<double>(config.channels()) +
-           followed_modes::bytes(config, window_of(config));
+           followed_modes::bytes(config, window_of(config)) +
+           (keeps_sums(config) ? older_samples::bytes(config.inputs.size(), config.outputs.size()) : 0);
 }
 
 agreement::agreement(const stream_config& config)
     : where_(config.where), m_(config.channels()), options_(options_of(config)),
       window_(config.wanted.window_s.has_value()), most_(kept_samples(config)), starts_{0}, hits_(config.hits),
       missing_(m_, NAN), followed_(config, window_of(config)) {
-    if (window_) rows_.reserve(static_cast<std::size_t>(most_ + most_ / 4 + 1) * m_);
+    if (keeps_sums(config)) older_ = std::make_unique<older_samples>(options_);
+    rows_.reserve(static_cast<std::size_t>(window_ ? most_ + most_ / 4 + 1 : older_ ? most_ : 0) * m_);
 }
 
 void agreement::push(const double* row) {
     if (came_ - begin_ == most_) {
-        ++begin_;
+        begin_ += older_ ? static_cast<std::int64_t>(older_->take(records())) : 1;
         while (starts_.size() > 1 && starts_[1] <= begin_) starts_.erase(starts_.begin()), ++gone_;
-        if (begin_ - base_ > most_ / 4) {
+        if (older_ || begin_ - base_ > most_ / 4) {
             rows_.erase(rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>((begin_ - base_)) *
                                                            static_cast<std::ptrdiff_t>(m_));
             base_ = begin_;
@@ -110,6 +117,7 @@ void agreement::forget() {
     run_at_ = came_;
     in_gap_ = false;
     followed_.reset();
+    if (older_) older_ = std::make_unique<older_samples>(options_);
 }
 
 void agreement::reset() {
@@ -119,10 +127,14 @@ void agreement::reset() {
 }
 
 std::int64_t agreement::rows() const {
-    std::int64_t out = 0;
+    std::int64_t out = older_ ? older_->samples() - older_->missing() : 0;
     for (std::int64_t k = begin_; k < came_; ++k)
         out += std::all_of(at(k), at(k) + m_, [](double x) { return std::isfinite(x); });
     return out;
+}
+
+std::int64_t agreement::basis() const {
+    return came_ - begin_ + (older_ ? static_cast<std::int64_t>(older_->samples()) : 0);
 }
 
 record_set agreement::records() const {
@@ -161,7 +173,7 @@ okid_status_t agreement::run(const mass_plan& mass) {
     try {
         record_set set = records();
         place_hits(set, mass);
-        found_ = identify_records(std::move(set), options_);
+        found_ = identify_records(std::move(set), options_, older_.get());
         found_.context.x0.reset(); // of the samples of a stream nothing else is told than of its sums
         found_.context.simulation_percent.reset();
     } catch (const failure& why) {
@@ -195,10 +207,27 @@ std::vector<std::byte> agreement::state() const {
     for (const record_data& record : set.records)
         out.ends.push_back(static_cast<std::int64_t>(record.first + record.count));
     out.rows = std::move(set.samples);
+    if (older_ && older_->samples() > 0) out.older = older_->state();
     return samples_body(set.n_u, set.n_y, out);
 }
 
-void agreement::take(const saved_samples& from) {
+/// @param first  they begin the stream, which goes on where they ended
+void agreement::take(const saved_samples& from, bool begins) {
+    if (!from.older.empty()) {
+        if (!older_)
+            throw failure(exit_usage, where_ + "the state keeps sums of older samples, expected one of a window or of "
+                                               "hits at several places, which keep samples alone");
+        older_samples other(options_);
+        other.put_back(where_, from.older.data(), from.older.size());
+        counts_.samples += other.samples() - other.missing();
+        counts_.missing += other.missing();
+        counts_.gaps += other.gaps();
+        if (begins)
+            *older_ = std::move(other);
+        else
+            older_->merge(other);
+    }
+    asked_ = true;
     std::size_t first = 0;
     for (const std::int64_t end : from.ends) {
         add_missing(0);
@@ -213,12 +242,12 @@ saved_samples agreement::read(const void* state, std::size_t bytes) const {
 void agreement::restore(const void* state, std::size_t bytes) {
     const saved_samples from = read(state, bytes);
     reset();
-    take(from);
+    take(from, true);
 }
 
 void agreement::merge(const void* state, std::size_t bytes) {
     if (window_) throw failure(exit_usage, where_ + "a window takes no further records, only a growing memory");
-    take(read(state, bytes));
+    take(read(state, bytes), false);
 }
 
 } // namespace okid_host

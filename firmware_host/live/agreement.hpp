@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Method auto of a stream: the samples of its memory, and what identify_records() finds in them.
 //
-// What makes lines, clipping and rest known is not in any sum: so the samples themselves are kept, those of the window, or of
-// a growing memory at most `most_numbers`. A result is then that of the same samples in a file. Between two such decisions the modes
-// are followed in sums (followed_modes.hpp).
+// What makes lines, clipping and rest known is not in any sum: so the newest samples themselves are kept, those of the window, or of
+// a growing memory a fixed number, and of what came before them the sums. A result is then that of the same samples in a file.
+// Between two such decisions the modes are followed in sums (followed_modes.hpp).
 #pragma once
 #include "error.hpp"
 #include "followed_modes.hpp"
+#include "record/older_samples.hpp"
 #include "record/record.hpp"
 #include "stream_config.hpp"
 #include "stream_state.hpp"
@@ -15,6 +16,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -57,10 +59,10 @@ class agreement {
         followed_.stop();
     }
 
-    std::int64_t basis() const { return came_ - begin_; }
+    std::int64_t basis() const; ///< samples that the result rests on
     std::int64_t rows() const; ///< complete ones
     okid_accumulator_stats_t stats() const { return counts_; }
-    bool overflowed() const { return !window_ && begin_ > forgotten_; } ///< a growing memory has reached its bound
+    bool overflowed() const { return !window_ && !older_ && begin_ > forgotten_; } ///< hits were dropped
     std::size_t bytes() const { return rows_.capacity() * sizeof(double); }
 
     std::vector<std::byte> state() const;
@@ -69,7 +71,7 @@ class agreement {
 
   private:
     saved_samples read(const void* state, std::size_t bytes) const;
-    void take(const saved_samples& from);
+    void take(const saved_samples& from, bool begins);
     void push(const double* row);
     const double* at(std::int64_t sample) const { return rows_.data() + static_cast<std::size_t>(sample - base_) * m_; }
     record_set records() const;
@@ -80,6 +82,7 @@ class agreement {
     record_options options_;
     bool window_, in_gap_ = false;
     std::int64_t most_;
+    std::unique_ptr<older_samples> older_;                         ///< of a growing memory
     std::vector<double> rows_;                                     ///< samples base_ … came_ - 1
     std::int64_t base_ = 0, begin_ = 0, came_ = 0, forgotten_ = 0; ///< kept: begin_ … came_ - 1
     std::vector<std::int64_t> starts_;                             ///< of records

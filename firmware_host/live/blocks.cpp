@@ -28,12 +28,6 @@ std::unique_ptr<std::byte[]> allocate(std::size_t bytes, int blocks) {
 
 } // namespace
 
-owned_sums::owned_sums(const okid_accumulator_config_t& config) {
-    const std::size_t bytes = okid_accumulator_memsize(&config);
-    block.reset(new (std::nothrow) std::byte[bytes]);
-    if (block && okid_accumulator_create(&sums, &config, block.get(), bytes) != OKID_OK) sums = nullptr;
-}
-
 live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_identify_config_t& identify, int blocks,
                          bool analytic, bool states_only)
     : whole_(whole), sums_(block_sums(whole)), m_(static_cast<std::size_t>(whole.n_u + whole.n_y)),

@@ -2,6 +2,7 @@
 // The blocks of a running stream that are left out in turn for standard deviations. A window has them in its slots; for a
 // growing or fading memory each block has an accumulator of its own beside the whole. All memory at the start.
 #pragma once
+#include "consensus/owned_sums.hpp"
 #include "result/deviations.hpp"
 
 #include <okid/accumulator.h>
@@ -26,16 +27,6 @@ inline okid_status_t add_samples(okid_accumulator_t* to, const float* samples, s
 inline okid_status_t add_samples(okid_accumulator_t* to, const double* samples, std::size_t count) {
     return okid_accumulator_add(to, samples, count);
 }
-
-/// An accumulator in memory of its own.
-struct owned_sums {
-    std::unique_ptr<std::byte[]> block;
-    okid_accumulator_t* sums = nullptr;
-
-    owned_sums() = default;
-    explicit owned_sums(
-        const okid_accumulator_config_t& config); ///< `sums` stays NULL when the memory does not suffice
-};
 
 class live_blocks {
   public:

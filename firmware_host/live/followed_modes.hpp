@@ -3,6 +3,8 @@
 // a quarter … into sums of fixed size, and out of them the models that carry the modes. An update costs the same however long
 // the stream has run.
 #pragma once
+#include "consensus/owned_sums.hpp"
+#include "consensus/rate_chain.hpp"
 #include "record/record.hpp"
 #include "stream_config.hpp"
 
@@ -10,7 +12,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -35,17 +36,6 @@ class followed_modes {
     void follow(kept_model& to);
 
   private:
-    /// The stream at one rate.
-    struct rate {
-        double fs_hz = 0;
-        std::size_t factor = 1;      ///< of the rate before it
-        std::vector<double> weights; ///< of the filter before it; empty: none
-        std::vector<double> waiting; ///< the newest rows that the filter looks at
-        std::size_t came = 0;        ///< rows of the rate before, of this record
-        std::vector<double> row;
-        std::unique_ptr<std::byte[]> block;
-        okid_accumulator_t* sums = nullptr;
-    };
     /// Modes that one model carries.
     struct group {
         std::size_t rate;
@@ -55,13 +45,12 @@ class followed_modes {
         std::vector<std::optional<std::pair<double, double>>> then; ///< frequency and damping at begin()
     };
     static okid_accumulator_config_t sums_config(const stream_config& config, double fs_hz, std::int64_t window);
-    void push(std::size_t k, const double* row);
-    void into_filter(std::size_t k, const double* row);
     std::vector<std::optional<std::pair<double, double>>> now(const group& of);
 
     int n_u_, n_y_;
     std::size_t m_;
-    std::vector<rate> rates_;
+    rate_chain chain_;
+    std::vector<owned_sums> sums_; ///< of each rate
     std::vector<double> missing_;
     std::vector<group> groups_;
 };

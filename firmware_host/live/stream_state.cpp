@@ -125,6 +125,7 @@ std::vector<std::byte> samples_body(std::size_t n_u, std::size_t n_y, const save
     put_all(&head, sizeof head);
     put_all(from.ends.data(), from.ends.size() * sizeof(std::int64_t));
     put_all(from.rows.data(), from.rows.size() * sizeof(double));
+    out.insert(out.end(), from.older.begin(), from.older.end());
     return out;
 }
 
@@ -140,7 +141,8 @@ saved_samples read_samples(const std::string& where, std::size_t n_u, std::size_
         refuse(fmt::format("is of {} inputs and {} outputs; expected {}, {}", head.n_u, head.n_y, n_u, n_y));
     const std::size_t rest = (bytes - sizeof head) / 8, width = n_u + n_y;
     const auto records = static_cast<std::size_t>(head.records), samples = static_cast<std::size_t>(head.samples);
-    if (records > rest || samples > rest / width || bytes != sizeof head + 8 * (records + samples * width))
+    if (head.records < 0 || head.samples < 0 || records > rest || samples > rest / width ||
+        records > rest - samples * width)
         refuse("is damaged: its size differs from its header");
     saved_samples out;
     out.ends.resize(records);
@@ -148,6 +150,8 @@ saved_samples read_samples(const std::string& where, std::size_t n_u, std::size_
     const auto* from = static_cast<const std::byte*>(body) + sizeof head;
     if (records > 0) std::memcpy(out.ends.data(), from, 8 * records);
     if (samples > 0) std::memcpy(out.rows.data(), from + 8 * records, 8 * samples * width);
+    const std::byte* const older = from + 8 * (records + samples * width);
+    out.older.assign(older, static_cast<const std::byte*>(body) + bytes);
     if (!std::is_sorted(out.ends.begin(), out.ends.end()) || (records > 0 ? out.ends.back() : 0) != head.samples ||
         (records > 0 && out.ends.front() < 1))
         refuse("is damaged: its records are not in order");

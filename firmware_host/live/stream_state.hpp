@@ -25,6 +25,7 @@ state_body behind_head(const stream_config& config, const void* state, std::size
 struct saved_samples {
     std::vector<std::int64_t> ends; ///< of its records
     std::vector<double> rows;
+    std::vector<std::byte> older; ///< sums of the samples before them; empty: there are none
 };
 std::vector<std::byte> samples_body(std::size_t n_u, std::size_t n_y, const saved_samples& from);
 /// Throws `failure` (exit 2) for bytes of another number of channels, and for what is damaged.

@@ -57,11 +57,14 @@ std::vector<int> carrying_orders(const consensus_run& run, const std::vector<mod
     return out;
 }
 
+/// The records of a level, in units of the channels where the sums of older samples are.
 record_set set_of(const record_level& level, std::size_t n_u, std::size_t n_y) {
     record_set out;
     out.n_u = n_u;
     out.n_y = n_y;
     for (const sample_rows& rows : level.records) out.add({}, rows.data(), rows.size() / out.channels());
+    for (std::size_t i = 0; level.older && i < out.samples.size(); ++i)
+        out.samples[i] *= level.scale[i % out.channels()];
     return out;
 }
 
@@ -166,7 +169,7 @@ namespace {
 struct carrier_task {
     const record_level& level;
     const consensus_run& run;
-    const level_sums& sums;
+    const owned_sums& sums;
     int n_u, n_y, blocks;
     bool at_rest, analytic;
 };
@@ -197,11 +200,11 @@ std::vector<std::optional<carried_mode>> carry_at(const carrier_task& task, int 
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
     if (!block || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK ||
-        okid_identify_run(identifier, task.sums.handle(), &model) < 0)
+        okid_identify_run(identifier, task.sums.sums, &model) < 0)
         return out;
     const bool nearly_singular = (model.warnings & OKID_NOTE_ILL_CONDITIONED) && model.observer_info.ridge <= 1e-10;
     const bool exact = nearly_singular && run_factor(task.level, config, task.at_rest, identifier, model);
-    if (nearly_singular && !exact && okid_identify_run(identifier, task.sums.handle(), &model) < 0) return out;
+    if (nearly_singular && !exact && okid_identify_run(identifier, task.sums.sums, &model) < 0) return out;
     std::vector<replicate_model> replicates;
     if (task.blocks > 0) {
         record_work work;
@@ -211,7 +214,8 @@ std::vector<std::optional<carried_mode>> carry_at(const carrier_task& task, int 
         work.model = model;
         work.identifier = identifier;
         work.analytic = task.analytic;
-        replicates = leave_out_blocks(work, task.sums.handle(), task.blocks);
+        work.older = task.level.older;
+        replicates = leave_out_blocks(work, task.sums.sums, task.blocks);
     }
     for (mode_shift& mode : wanted) {
         zoom.fold(mode.frequency_hz, mode.damping_ratio);
@@ -254,8 +258,8 @@ std::vector<std::optional<carried_mode>> carry(const record_level& level, int nu
     const consensus_run* run = long_run(runs, number);
     if (!run || left.empty()) return out;
     const okid_identify_config_t config = run_config(*run, n_u, n_y);
-    const level_sums sums(level, n_u, n_y, okid_identify_lags(&config), at_rest);
-    if (!sums.handle()) return out;
+    const owned_sums sums = level_sums(level, n_u, n_y, okid_identify_lags(&config), at_rest);
+    if (!sums.sums) return out;
     const carrier_task task{level, *run, sums, n_u, n_y, blocks, at_rest, analytic};
     std::vector<std::vector<carried_mode>> said(modes.size());
     std::vector<int> used;

@@ -56,7 +56,13 @@ bool is_held(const record_options& options, const record_set& set) {
 
 bool refine_agreed(const record_options& options, std::vector<listed_mode>& listed, record_work& work) {
     if (options.refine == "no" || work.set.n_u == 0 || work.model.n_z == 0) return false;
-    if (options.refine == "auto" && !is_held(options, work.set)) return false;
+    if (options.refine == "auto" && (work.before || !is_held(options, work.set))) return false;
+    if (work.before) {
+        work.context.warnings.emplace_back(
+            "refine_failed", fmt::format("the modes are those of the agreement, which rest on all samples: a refinement "
+                                         "could use the newest {} alone", work.set.count()));
+        return false;
+    }
     if (options.stage) options.stage("refining the modes");
     const bool constants = options.detrend != "none";
     if (options.refine == "auto" && whiteness_nearby(constants, work) > 2 * nearly_white) return false;

@@ -323,9 +323,9 @@ result_context describe_records(const record_set& set, const record_options& opt
     return context;
 }
 
-record_result identify_records(record_set records, const record_options& options) {
+record_result identify_records(record_set records, const record_options& options, const older_samples* before) {
     check_hits(records, options.hits);
-    if (options.method == "auto") return identify_auto(std::move(records), options);
+    if (options.method == "auto") return identify_auto(std::move(records), options, before);
     if (!options.hits.empty()) {
         record_options other = options;
         other.inputs = place_names(options.inputs.front(), options.hits);

@@ -51,6 +51,8 @@ struct mode_carrier {
     std::vector<std::complex<double>> shape; ///< of channels in units of `scale`
 };
 
+class older_samples;
+
 /// A model with what is known about it, and the decomposition it was realised from.
 struct record_result {
     kept_model model;
@@ -73,7 +75,9 @@ struct record_result {
 
 /// Identify from all records together. Throws `failure`: exit 3 when no honest model can be had.
 /// Fits of an n4sid model that surely explains its record may be left for finish_fits().
-record_result identify_records(record_set records, const record_options& options);
+/// @param before  of auto: what is known of samples before these
+record_result identify_records(record_set records, const record_options& options,
+                               const older_samples* before = nullptr);
 
 /// The fits and what is to be said of them, if they were left for later.
 void finish_fits(record_result& result);

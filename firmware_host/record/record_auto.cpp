@@ -14,6 +14,7 @@
 #include "modal_gain.hpp"
 #include "modal_model.hpp"
 #include "modal_refine.hpp"
+#include "older_samples.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_hold.hpp"
@@ -215,10 +216,14 @@ void keep_picked(const std::vector<int>& numbers, std::vector<listed_pair>& foun
 }
 
 /// Slow trends: a vibration that the record holds only a few times.
-void mark_slow(const record_set& set, double fs_hz, std::vector<consensus_mode>& modes) {
-    std::size_t longest = 0;
-    for (const record_data& record : set.records) longest = std::max(longest, record.count);
-    const double seconds = static_cast<double>(longest) / fs_hz;
+void mark_slow(const record_work& work, double fs_hz, std::vector<consensus_mode>& modes) {
+    auto longest = static_cast<double>(work.before ? work.before->longest() : 0);
+    double begun = static_cast<double>(work.before ? work.before->begun() : 0);
+    for (const record_data& record : work.set.records) {
+        longest = std::max(longest, begun + static_cast<double>(record.count));
+        begun = 0;
+    }
+    const double seconds = longest / fs_hz;
     for (consensus_mode& mode : modes)
         if (mode.frequency_hz * seconds < fewest_periods || mode.could == 0) mode.why.emplace_back("band_edge");
 }
@@ -234,6 +239,15 @@ void remark_mixed(const std::vector<bool>& turned, const record_options& options
                     fmt::join(groups[0], ", "), fmt::join(groups[1], ", ")));
 }
 
+/// The sums of older samples to the levels of the newest ones.
+void remember(const older_samples& before, const std::vector<double>& scale, std::vector<record_level>& levels) {
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        levels[k].older = &before.level(k);
+        levels[k].scale = scale;
+        levels[k].samples += before.level(k).samples();
+    }
+}
+
 /// Everything up to the modes, their standard deviations and the shapes.
 std::vector<listed_mode> find_modes_agreed(const record_options& options, record_work& work) {
     const auto tell = [&](const char* stage) {
@@ -247,6 +261,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     tell("making streams of lower rates");
     std::vector<double> scale;
     auto levels = make_levels(std::move(rows), set.n_u, set.n_y, options.fs_hz, work.at_rest, options.decimate, scale);
+    if (work.before) remember(*work.before, scale, levels);
     const double lowest_hz = periods_of_horizon * levels.back().fs_hz;
     tell("looking with several methods, horizons and rates");
     auto runs = look_at(levels, 0, n_u, n_y, work.at_rest, options.threads);
@@ -263,7 +278,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     }
     if (!known && !turned.empty()) remark_mixed(turned, options, work.context);
     mark_lines(levels, set.n_u, set.n_y, work.at_rest, modes);
-    mark_slow(set, options.fs_hz, modes);
+    mark_slow(work, options.fs_hz, modes);
     keep_wanted(options, modes);
     modes = worth_telling(std::move(modes), options.all_modes);
     tell("leaving out one block after the other");
@@ -429,11 +444,25 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
     return listed;
 }
 
+/// What is known of samples that are no longer kept.
+void add_before(const missing_count& newest, record_work& work) {
+    result_context& context = work.context;
+    context.samples += work.before->samples();
+    context.records += work.before->records();
+    context.gaps += work.before->gaps();
+    context.judged_samples = static_cast<long long>(work.set.count());
+    if (newest.samples == 0 && work.before->missing() > 0)
+        context.warnings.push_back(missing_samples({work.before->missing(), work.before->gaps()}, context.samples));
+}
+
 } // namespace
 
-record_result identify_auto(record_set records, const record_options& given) {
+record_result identify_auto(record_set records, const record_options& given, const older_samples* before) {
     record_work work;
     work.set = std::move(records);
+    std::unique_ptr<older_samples> split;
+    if (!before && given.hits.empty()) split = split_older(work.set, given);
+    work.before = before && before->samples() > 0 ? before : split.get();
     const missing_count asked = count_missing(work.set);
     check_measured(asked, work.set, given);
     const long long asked_gaps = asked.gaps;
@@ -446,6 +475,14 @@ record_result identify_auto(record_set records, const record_options& given) {
     const missing_count missing = count_missing(work.set);
     work.context = describe_records(work.set, options, missing);
     if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened
+    if (work.before && !all) {
+        work.context.warnings.emplace_back(
+            "newest_only", fmt::format("the newest {} samples alone are used: of the {} before them only sums are kept, "
+                                       "with the output that is left out in them",
+                                       work.set.count(), work.before->samples()));
+        work.before = nullptr;
+    }
+    if (work.before) add_before(asked, work);
     work.context.warnings.insert(work.context.warnings.end(), screened.said.begin(), screened.said.end());
     work.at_rest = begin_at_rest(work.set, options);
     if (work.at_rest) work.context.start = "rest";
@@ -453,7 +490,9 @@ record_result identify_auto(record_set records, const record_options& given) {
     const bool roving = !options.hits.empty();
     const std::vector<listed_mode> listed = roving ? find_struck(options, work) : find_modes_agreed(options, work);
     if (work.set.n_u == 0 && work.context.sigma)
-        keep_to_ambient_bound(work.set, options.fs_hz, listed, *work.context.sigma);
+        keep_to_ambient_bound(work.set, options.fs_hz * static_cast<double>(work.set.count()) /
+                                            static_cast<double>(work.context.samples),
+                              listed, *work.context.sigma);
     if (options.stage) options.stage("simulating the model");
     const bool placed = work.model.n_u > 0; // by find_struck
     if (!placed) make_models(listed, options, work);

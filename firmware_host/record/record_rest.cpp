@@ -47,7 +47,8 @@ std::size_t onset(const record_set& set, const record_data& record) {
     return first;
 }
 
-/// A record that is silent before its force sets in begins at rest.
+} // namespace
+
 bool begins_at_rest(const record_set& set, const record_data& record) {
     const std::size_t hit = onset(set, record);
     if (hit < fewest_silent || hit >= record.count) return false;
@@ -57,8 +58,6 @@ bool begins_at_rest(const record_set& set, const record_data& record) {
             return false;
     return true;
 }
-
-} // namespace
 
 bool begin_at_rest(const record_set& set, const record_options& options) {
     return options.start == "rest" ||

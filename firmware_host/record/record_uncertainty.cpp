@@ -4,6 +4,7 @@
 //          (okid/uncertainty.h)
 #include "record_uncertainty.hpp"
 
+#include "consensus/owned_sums.hpp"
 #include "record_work.hpp"
 
 #include "error.hpp"
@@ -16,17 +17,6 @@
 
 namespace okid_host {
 namespace {
-
-struct sums {
-    std::unique_ptr<std::byte[]> block;
-    okid_accumulator_t* handle = nullptr;
-
-    explicit sums(const okid_accumulator_config_t& shape) {
-        const std::size_t bytes = okid_accumulator_memsize(&shape);
-        block.reset(new (std::nothrow) std::byte[bytes]);
-        if (block && okid_accumulator_create(&handle, &shape, block.get(), bytes) != OKID_OK) handle = nullptr;
-    }
-};
 
 /// Equal parts of all regression rows together; what stands before a record's first row is history only.
 std::vector<std::vector<record_piece>> cut(const std::vector<record_data>& records, std::size_t history,
@@ -139,28 +129,36 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
     shape.identify.order = shape.identify.max_order = work.model.n_z;
     okid_accumulator_config(whole, &shape.sums);
     const auto lags = static_cast<std::size_t>(shape.sums.lags);
-    const std::size_t parts =
+    const std::size_t older = work.older ? work.older->blocks() : 0;
+    std::size_t parts =
         std::min(static_cast<std::size_t>(blocks), static_cast<std::size_t>(okid_accumulator_rows(whole)) / lags);
+    if (older > 0) // about as long as theirs
+        parts = static_cast<std::size_t>(std::clamp(
+            static_cast<double>(work.set.count()) / work.older->rows_of_block(), 1.0, static_cast<double>(parts)));
     std::vector<replicate_model> out;
-    const sums part(shape.sums);
-    if (parts < std::size_t{fewest_blocks} || !part.handle) return out;
+    const owned_sums part(shape.sums);
+    if (parts + older < std::size_t{fewest_blocks} || !part.sums) return out;
     std::unique_ptr<std::byte[]> block;
     const auto all_pieces = cut(work.set.records, work.at_rest ? 0 : lags, parts);
-    const bool linear =
-        work.analytic && !one_block_rules(work.set, work.config.detrend == OKID_DETREND_MEAN, all_pieces);
+    const bool linear = work.analytic && (older > 0 || !one_block_rules(work.set, work.config.detrend == OKID_DETREND_MEAN,
+                                                                        all_pieces));
     okid_jackknife_t* jackknife = linear ? begin_jackknife(shape, 1, work, whole, block) : nullptr;
     if (!jackknife) jackknife = begin_jackknife(shape, 0, work, whole, block);
     if (!jackknife) return out;
-    for (const auto& pieces : all_pieces) {
-        if (feed_pieces(part.handle, work.set, pieces, lags) < 0) return {};
-        if (okid_accumulator_rows(part.handle) == 0) continue;
+    if (okid_accumulator_copy(part.sums, whole) < 0) return out; // its units
+    for (std::size_t k = 0; k < older + parts; ++k) {
+        okid_accumulator_reset(part.sums);
+        if (k < older ? !work.older->take_block(k, part.sums)
+                      : feed_pieces(part.sums, work.set, all_pieces[k - older], lags) < 0)
+            return {};
+        if (okid_accumulator_rows(part.sums) == 0) continue;
         okid_model_t found{};
         double share = 0;
-        const okid_status_t status = okid_jackknife_delete(jackknife, part.handle, 1, &found, &share);
+        const okid_status_t status = okid_jackknife_delete(jackknife, part.sums, 1, &found, &share);
         if (!(share > 0)) return {};
         out.push_back(status < 0 ? replicate_model{} : keep(found));
         out.back().share = share;
-        out.back().pieces = pieces;
+        if (k >= older) out.back().pieces = all_pieces[k - older];
     }
     return out;
 }
@@ -188,13 +186,13 @@ void remark_finite_p(const record_work& work, long long rows, const deviations& 
     const std::int32_t lags = okid_identify_lags(&shape.identify);
     shape.sums = okid_accumulator_defaults(config.n_u, config.n_y, lags);
     shape.sums.edges = shape.sums.bulk = shape.sums.buffer = 1;
-    const sums longer(shape.sums);
+    const owned_sums longer(shape.sums);
     const std::size_t history = work.at_rest ? 0 : static_cast<std::size_t>(lags);
     std::unique_ptr<std::byte[]> block;
-    if (!longer.handle ||
-        feed_pieces(longer.handle, work.set, cut(work.set.records, history, 1)[0], static_cast<std::size_t>(lags)) < 0)
+    if (!longer.sums ||
+        feed_pieces(longer.sums, work.set, cut(work.set.records, history, 1)[0], static_cast<std::size_t>(lags)) < 0)
         return;
-    okid_jackknife_t* jackknife = begin_jackknife(shape, 0, work, longer.handle, block);
+    okid_jackknife_t* jackknife = begin_jackknife(shape, 0, work, longer.sums, block);
     okid_model_t found{};
     double share = 0;
     if (!jackknife || okid_jackknife_delete(jackknife, nullptr, 1, &found, &share) < 0) return;

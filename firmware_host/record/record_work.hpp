@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  what the steps of a record identification hand on to each other
 #pragma once
+#include "consensus/level_memory.hpp"
 #include "record.hpp"
 #include "record_uncertainty.hpp"
 
@@ -28,6 +29,8 @@ struct refined_arrays {
     }
 };
 
+class older_samples;
+
 /// Records, configuration and model. The model looks into `memory` (of `identifier`) or, refined, into `refined`.
 struct record_work {
     record_set set;
@@ -35,8 +38,10 @@ struct record_work {
     okid_identify_config_t config{};
     okid_identified_t model{};
     result_context context;
+    const older_samples* before = nullptr; ///< auto: what is known of the samples before those of `set`
     std::unique_ptr<std::byte[]> memory;
     okid_identify_t* identifier = nullptr;
+    const level_memory* older = nullptr; ///< sums of samples before those of `set`
     bool analytic = false;        ///< deviations out of what it holds, see leave_out_blocks()
     okid_identified_t realised{}; ///< what it gave, before any refinement
     std::unique_ptr<refined_arrays> refined;

@@ -239,6 +239,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["method"] = context.method;
     out["fs_hz"] = number_json(context.fs_hz);
     out["samples"] = context.samples;
+    if (context.judged_samples > 0) out["judged_samples"] = context.judged_samples;
     out["records"] = context.records;
     out["gaps"] = context.gaps;
     out["inputs"] = context.inputs;

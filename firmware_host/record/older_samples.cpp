@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  what a stream or a long file leaves behind of samples that are no longer kept
+// METHOD   an eighth of the samples kept goes at a time, screened by all of them, each channel less its mean over them, through
+//          the filters of all rates into sums
+#include "older_samples.hpp"
+
+#include "consensus/consensus_runs.hpp"
+#include "error.hpp"
+#include "record.hpp"
+#include "record_rest.hpp"
+#include "screening.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace okid_host {
+namespace {
+
+constexpr std::size_t kept_numbers = std::size_t{1} << 20, fewest_kept = std::size_t{1} << 15;
+constexpr std::size_t eighths = 8; ///< of the samples kept, of which one goes
+
+/// Rows first .. last-1, with the records they are of.
+record_set rows_of(const record_set& set, std::size_t first, std::size_t last) {
+    record_set out;
+    out.n_u = set.n_u;
+    out.n_y = set.n_y;
+    for (const record_data& record : set.records) {
+        const std::size_t from = std::max(first, record.first), to = std::min(last, record.first + record.count);
+        if (from < to) out.add(record.path, set.samples.data() + from * set.channels(), to - from);
+    }
+    return out;
+}
+
+std::size_t leaving(const record_set& newest) {
+    const std::size_t usual = std::max<std::size_t>(1, newest.count() / eighths);
+    for (const record_data& record : newest.records) {
+        const std::size_t end = record.first + record.count;
+        if (record.first < usual && end > usual && end <= newest.count() / 2) return end;
+    }
+    return usual;
+}
+
+template <class Number> void put(std::vector<std::byte>& to, const Number& number) {
+    const auto* const from = reinterpret_cast<const std::byte*>(&number);
+    to.insert(to.end(), from, from + sizeof number);
+}
+
+void put_all(std::vector<std::byte>& to, const std::vector<double>& numbers) {
+    put(to, static_cast<std::uint64_t>(numbers.size()));
+    for (const double x : numbers) put(to, x);
+}
+
+/// What put() and put_all() wrote, one after the other; throws where the bytes end early.
+struct byte_reader {
+    const std::byte* from;
+    std::size_t left;
+    const std::string& where;
+
+    template <class Number> Number next() {
+        Number out{};
+        if (left < sizeof out) damaged();
+        std::memcpy(&out, from, sizeof out);
+        from += sizeof out, left -= sizeof out;
+        return out;
+    }
+    std::vector<double> numbers() {
+        const auto count = next<std::uint64_t>();
+        if (count > left / sizeof(double)) damaged();
+        std::vector<double> out(count);
+        for (double& x : out) x = next<double>();
+        return out;
+    }
+    [[noreturn]] void damaged() const {
+        throw failure(exit_usage, where + "the state is damaged: its sums of older samples cannot be read");
+    }
+};
+
+} // namespace
+
+std::size_t newest_samples(std::size_t channels) { return std::max(fewest_kept, kept_numbers / channels); }
+
+double older_samples::bytes(std::size_t n_u, std::size_t n_y) {
+    const auto inputs = static_cast<int>(n_u), outputs = static_cast<int>(n_y);
+    return most_levels * level_memory::bytes(inputs, outputs, longest_lags(inputs, outputs));
+}
+
+older_samples::older_samples(const record_options& options)
+    : n_u_(options.inputs.size()), n_y_(options.outputs.size()), outputs_(options.outputs),
+      begins_at_rest_(options.start == "rest"), lines_(options.detrend == "linear"),
+      chain_(n_u_ + n_y_, options.fs_hz, options.decimate) {
+    const auto inputs = static_cast<int>(n_u_), outputs = static_cast<int>(n_y_);
+    const int lags = longest_lags(inputs, outputs);
+    const double rows = static_cast<double>(newest_samples(n_u_ + n_y_) / eighths);
+    for (std::size_t k = 0; k < chain_.count(); ++k)
+        levels_.emplace_back(inputs, outputs, lags, std::llround(rows * chain_.fs_hz(k) / options.fs_hz));
+}
+
+void older_samples::begin_record(bool at_rest) {
+    longest_ = std::max(longest_, length_);
+    length_ = 0;
+    in_gap_ = false;
+    ++records_;
+    chain_.begin_record(at_rest);
+    for (level_memory& level : levels_) {
+        level.gap();
+        if (at_rest) level.silence();
+    }
+}
+
+void older_samples::add(const double* row) {
+    const bool there = std::all_of(row, row + n_u_ + n_y_, [](double x) { return !std::isnan(x); });
+    missing_ += !there;
+    gaps_ += !there && !in_gap_;
+    in_gap_ = !there;
+    ++samples_;
+    ++length_;
+    chain_.add(row, [this](std::size_t k, const double* of_rate) { levels_[k].add(of_rate); });
+}
+
+std::size_t older_samples::take(const record_set& newest) {
+    const std::size_t count = leaving(newest), m = n_u_ + n_y_;
+    record_set clean = newest;
+    const screened_outputs screened = screen_outputs(clean, outputs_);
+    for (std::size_t c = 0; c < n_y_; ++c) // one that is left out as a whole is as it came: it may serve later
+        for (std::size_t i = n_u_ + c; !screened.kept[c] && i < clean.samples.size(); i += m)
+            clean.samples[i] = newest.samples[i];
+    if (lines_)
+        for (const record_data& record : clean.records) remove_lines(clean.rows(record), m, record.count);
+    remove_means(clean);
+    for (std::size_t r = 0; r < clean.records.size() && clean.records[r].first < count; ++r) {
+        const record_data& record = clean.records[r];
+        if (!within_) begin_record(begins_at_rest_ || begins_at_rest(clean, record));
+        const std::size_t last = std::min(record.first + record.count, count);
+        for (std::size_t n = record.first; n < last; ++n) add(clean.samples.data() + n * m);
+        within_ = last < record.first + record.count;
+    }
+    return count;
+}
+
+void older_samples::merge(const older_samples& other) {
+    if (other.samples_ == 0) return;
+    for (std::size_t k = 0; k < levels_.size(); ++k) levels_[k].merge(other.levels_[k]);
+    samples_ += other.samples_;
+    missing_ += other.missing_;
+    gaps_ += other.gaps_;
+    records_ += other.records_;
+    longest_ = std::max({longest_, other.longest_, other.length_});
+}
+
+std::vector<std::byte> older_samples::state() const {
+    std::vector<std::byte> out;
+    for (const long long number : {samples_, missing_, gaps_, length_, longest_}) put(out, std::int64_t{number});
+    put(out, std::int32_t{records_});
+    put(out, std::int32_t{within_ ? 1 : 0});
+    put_all(out, chain_.state());
+    for (const level_memory& level : levels_) {
+        const std::vector<std::byte> sums = level.state();
+        out.insert(out.end(), sums.begin(), sums.end());
+    }
+    return out;
+}
+
+void older_samples::put_back(const std::string& where, const std::byte* from, std::size_t bytes) {
+    byte_reader in{from, bytes, where};
+    long long counts[5];
+    for (long long& count : counts)
+        if (count = in.next<std::int64_t>(); count < 0) in.damaged();
+    const auto records = in.next<std::int32_t>(), within = in.next<std::int32_t>();
+    if (records < 0 || within < 0 || within > 1 || !chain_.put_back(in.numbers())) in.damaged();
+    for (level_memory& level : levels_) {
+        const std::size_t read = level.put_back(in.from, in.left);
+        if (read == 0) in.damaged();
+        in.from += read, in.left -= read;
+    }
+    if (in.left != 0) in.damaged();
+    samples_ = counts[0], missing_ = counts[1], gaps_ = counts[2], length_ = counts[3], longest_ = counts[4];
+    records_ = records;
+    within_ = within == 1;
+}
+
+std::unique_ptr<older_samples> split_older(record_set& set, const record_options& options) {
+    const std::size_t most = newest_samples(set.channels()), all = set.count();
+    if (all <= most) return nullptr;
+    auto out = std::make_unique<older_samples>(options);
+    std::size_t begin = 0;
+    while (all - begin > most) begin += out->take(rows_of(set, begin, begin + most));
+    set = rows_of(set, begin, all);
+    return out;
+}
+
+} // namespace okid_host

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Method auto keeps the newest samples, which judge the modes, and of those before them the sums, which they are estimated
+// from: the memory of a stream is fixed, and so is the work of an identification. A file is a stream that ends.
+#pragma once
+#include "consensus/level_memory.hpp"
+#include "consensus/rate_chain.hpp"
+#include "record_set.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+struct record_options;
+
+/// Samples that are kept of so many channels: a million numbers, but not below 32,768 samples.
+std::size_t newest_samples(std::size_t channels);
+
+class older_samples {
+  public:
+    /// Of the options the channels, their rate, decimate, detrend and start. Throws `failure` (exit 1) without memory
+    explicit older_samples(const record_options& options);
+    static double bytes(std::size_t n_u, std::size_t n_y);
+
+    /// The first of the samples kept are kept no longer: they are screened by all of them, then summed.
+    /// @param newest  all that are kept. @return how many went: an eighth, or up to the end of the record that ends next
+    std::size_t take(const record_set& newest);
+    void merge(const older_samples& other); ///< as further records
+
+    std::size_t levels() const { return levels_.size(); }
+    const level_memory& level(std::size_t k) const { return levels_[k]; }
+    long long samples() const { return samples_; }              ///< those missing with them
+    long long missing() const { return missing_; }
+    long long gaps() const { return gaps_; }
+    int records() const { return records_ - (within_ ? 1 : 0); } ///< that are older as a whole
+    /// Samples of the longest record, and of the one that goes on among the newest (0: none does).
+    long long longest() const { return longest_; }
+    long long begun() const { return within_ ? length_ : 0; }
+
+    std::vector<std::byte> state() const;
+    /// Throws `failure` (exit 2), where `where` begins the message, for bytes that are none; then nothing has changed.
+    void put_back(const std::string& where, const std::byte* from, std::size_t bytes);
+
+  private:
+    void begin_record(bool at_rest);
+    void add(const double* row);
+
+    std::size_t n_u_, n_y_;
+    std::vector<std::string> outputs_;
+    bool begins_at_rest_, lines_;
+    rate_chain chain_;
+    std::vector<level_memory> levels_;
+    long long samples_ = 0, missing_ = 0, gaps_ = 0, length_ = 0, longest_ = 0;
+    int records_ = 0;
+    bool within_ = false, in_gap_ = false; ///< the newest samples go on with the last record taken
+};
+
+/// Of more samples than are kept the older ones go, as in a stream. @return them; none went: nullptr
+std::unique_ptr<older_samples> split_older(record_set& set, const record_options& options);
+
+} // namespace okid_host
