@@ -156,6 +156,17 @@ def test_nan_in_a_result(good: dict[str, Any], key: str) -> None:
     assert okid.Result.from_dict(good).fs_hz == good["fs_hz"]
 
 
+@pytest.mark.parametrize("key", ["frequency_hz", "frequency_std_hz", "damping_ratio_std", "found_in", "mpc", "why"])
+def test_a_mode_of_something_else(good: dict[str, Any], key: str) -> None:
+    for value in ("x", [1], {"a": 1}, *([3.0] if key == "why" else [])):
+        modes = [{**good["modes"][0], key: value}, *good["modes"][1:]]
+        if key == "why" and not isinstance(value, float):
+            assert okid.Result.from_dict({**good, "modes": modes}).modes[0].why == tuple(map(str, value))
+            continue
+        with pytest.raises(InputError, match="not a complete okid.result/1"):
+            str(okid.Result.from_dict({**good, "modes": modes}).table())
+
+
 ABSURD: list[tuple[str, Callable[[], Any]]] = [
     ("outputs", lambda: okid.Session(1, 10**9, fs=100.0)),
     ("inputs", lambda: okid.Session(2**70, 1, fs=100.0)),

@@ -81,10 +81,21 @@ class Mode(NamedTuple):
         """Of an entry of "modes"."""
         f, zeta, mpc, emac = numbers([one[key] for key in ("frequency_hz", "damping_ratio", "mpc", "emac")]).tolist()
         shape = numbers(one["shape_re"]) + 1j * numbers(one["shape_im"])
-        return cls(f, zeta, shape, mpc, emac, one.get("frequency_std_hz"), one.get("damping_ratio_std"),
-                   _optional(one.get("shape_re_std")), _optional(one.get("shape_im_std")),
-                   one.get("confident"), one.get("found_in"), tuple(one.get("why") or ()),
-                   tuple(one.get("why_text") or one.get("why") or ()))  # fmt: skip
+        why = [tuple(map(str, one.get(key) or one.get("why") or ())) for key in ("why", "why_text")]
+        return cls(
+            f,
+            zeta,
+            shape,
+            mpc,
+            emac,
+            known(one.get("frequency_std_hz")),
+            known(one.get("damping_ratio_std")),
+            _optional(one.get("shape_re_std")),
+            _optional(one.get("shape_im_std")),
+            one.get("confident"),
+            known(one.get("found_in")),
+            *why,
+        )
 
     def _repr_html_(self) -> str:
         return own_fields(self)
