@@ -51,8 +51,7 @@ bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, co
     const auto block = memory(bytes);
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
-    if (!block || !sums.sums || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK)
-        return false;
+    if (!block || !sums.sums || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK) return false;
     const okid_status_t status = okid_identify_run(identifier, sums.sums, &model);
     if (status < 0 && status != OKID_ERR_NO_MODES) return false; // of the lowest order: higher ones may have modes
     collect_poles(identifier, model, run);

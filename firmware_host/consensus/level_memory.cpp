@@ -13,7 +13,8 @@
 namespace okid_host {
 namespace {
 
-constexpr int room = level_memory::most_blocks / 2; // slots beside: a block ends early at a gap, which the window counts as time
+constexpr int room =
+    level_memory::most_blocks / 2; // slots beside: a block ends early at a gap, which the window counts as time
 
 okid_accumulator_config_t base_config(int n_u, int n_y, int lags) {
     okid_accumulator_config_t out = okid_accumulator_defaults(n_u, n_y, lags);
@@ -67,7 +68,8 @@ owned_sums sums_in(const std::byte*& from, std::size_t& left, const okid_accumul
 
 double level_memory::bytes(int n_u, int n_y, int lags) {
     const okid_accumulator_config_t window = window_config(n_u, n_y, lags, 1), base = base_config(n_u, n_y, lags);
-    return static_cast<double>(okid_accumulator_memsize(&window)) + static_cast<double>(okid_accumulator_memsize(&base));
+    return static_cast<double>(okid_accumulator_memsize(&window)) +
+           static_cast<double>(okid_accumulator_memsize(&base));
 }
 
 level_memory::level_memory(int n_u, int n_y, int lags, std::int64_t block)

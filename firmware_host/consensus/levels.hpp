@@ -22,7 +22,7 @@ struct record_level {
     std::vector<sample_rows> records;
     long long samples = 0;               ///< complete ones, older ones with them
     const level_memory* older = nullptr; ///< sums of the samples before the records, in units of the channels
-    std::vector<double> scale;           ///< of each channel, where there are older ones: what one unit of the records is
+    std::vector<double> scale; ///< of each channel, where there are older ones: what one unit of the records is
 };
 
 constexpr std::size_t most_levels = 7; ///< the record's own rate and six halves

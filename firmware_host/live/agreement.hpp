@@ -60,7 +60,7 @@ class agreement {
     }
 
     std::int64_t basis() const; ///< samples that the result rests on
-    std::int64_t rows() const; ///< complete ones
+    std::int64_t rows() const;  ///< complete ones
     okid_accumulator_stats_t stats() const { return counts_; }
     bool overflowed() const { return !window_ && !older_ && begin_ > forgotten_; } ///< hits were dropped
     std::size_t bytes() const { return rows_.capacity() * sizeof(double); }

@@ -71,8 +71,8 @@ void followed_modes::add_missing(std::int64_t count) {
     }
     chain_.begin_record(false);
     for (std::size_t k = 0; k < sums_.size(); ++k)
-        okid_accumulator_gap(sums_[k].sums, static_cast<std::int64_t>(static_cast<double>(count) * chain_.fs_hz(k) /
-                                                                      chain_.fs_hz(0)));
+        okid_accumulator_gap(sums_[k].sums,
+                             static_cast<std::int64_t>(static_cast<double>(count) * chain_.fs_hz(k) / chain_.fs_hz(0)));
 }
 
 void followed_modes::reset() {

@@ -59,8 +59,10 @@ bool refine_agreed(const record_options& options, std::vector<listed_mode>& list
     if (options.refine == "auto" && (work.before || !is_held(options, work.set))) return false;
     if (work.before) {
         work.context.warnings.emplace_back(
-            "refine_failed", fmt::format("the modes are those of the agreement, which rest on all samples: a refinement "
-                                         "could use the newest {} alone", work.set.count()));
+            "refine_failed",
+            fmt::format("the modes are those of the agreement, which rest on all samples: a refinement "
+                        "could use the newest {} alone",
+                        work.set.count()));
         return false;
     }
     if (options.stage) options.stage("refining the modes");

@@ -32,7 +32,7 @@ class older_samples {
 
     std::size_t levels() const { return levels_.size(); }
     const level_memory& level(std::size_t k) const { return levels_[k]; }
-    long long samples() const { return samples_; }              ///< those missing with them
+    long long samples() const { return samples_; } ///< those missing with them
     long long missing() const { return missing_; }
     long long gaps() const { return gaps_; }
     int records() const { return records_ - (within_ ? 1 : 0); } ///< that are older as a whole

@@ -477,9 +477,10 @@ record_result identify_auto(record_set records, const record_options& given, con
     if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened
     if (work.before && !all) {
         work.context.warnings.emplace_back(
-            "newest_only", fmt::format("the newest {} samples alone are used: of the {} before them only sums are kept, "
-                                       "with the output that is left out in them",
-                                       work.set.count(), work.before->samples()));
+            "newest_only",
+            fmt::format("the newest {} samples alone are used: of the {} before them only sums are kept, "
+                        "with the output that is left out in them",
+                        work.set.count(), work.before->samples()));
         work.before = nullptr;
     }
     if (work.before) add_before(asked, work);
@@ -490,9 +491,9 @@ record_result identify_auto(record_set records, const record_options& given, con
     const bool roving = !options.hits.empty();
     const std::vector<listed_mode> listed = roving ? find_struck(options, work) : find_modes_agreed(options, work);
     if (work.set.n_u == 0 && work.context.sigma)
-        keep_to_ambient_bound(work.set, options.fs_hz * static_cast<double>(work.set.count()) /
-                                            static_cast<double>(work.context.samples),
-                              listed, *work.context.sigma);
+        keep_to_ambient_bound(
+            work.set, options.fs_hz * static_cast<double>(work.set.count()) / static_cast<double>(work.context.samples),
+            listed, *work.context.sigma);
     if (options.stage) options.stage("simulating the model");
     const bool placed = work.model.n_u > 0; // by find_struck
     if (!placed) make_models(listed, options, work);

@@ -133,15 +133,15 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
     std::size_t parts =
         std::min(static_cast<std::size_t>(blocks), static_cast<std::size_t>(okid_accumulator_rows(whole)) / lags);
     if (older > 0) // about as long as theirs
-        parts = static_cast<std::size_t>(std::clamp(
-            static_cast<double>(work.set.count()) / work.older->rows_of_block(), 1.0, static_cast<double>(parts)));
+        parts = static_cast<std::size_t>(std::clamp(static_cast<double>(work.set.count()) / work.older->rows_of_block(),
+                                                    1.0, static_cast<double>(parts)));
     std::vector<replicate_model> out;
     const owned_sums part(shape.sums);
     if (parts + older < std::size_t{fewest_blocks} || !part.sums) return out;
     std::unique_ptr<std::byte[]> block;
     const auto all_pieces = cut(work.set.records, work.at_rest ? 0 : lags, parts);
-    const bool linear = work.analytic && (older > 0 || !one_block_rules(work.set, work.config.detrend == OKID_DETREND_MEAN,
-                                                                        all_pieces));
+    const bool linear = work.analytic &&
+                        (older > 0 || !one_block_rules(work.set, work.config.detrend == OKID_DETREND_MEAN, all_pieces));
     okid_jackknife_t* jackknife = linear ? begin_jackknife(shape, 1, work, whole, block) : nullptr;
     if (!jackknife) jackknife = begin_jackknife(shape, 0, work, whole, block);
     if (!jackknife) return out;

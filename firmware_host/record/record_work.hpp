@@ -42,8 +42,8 @@ struct record_work {
     std::unique_ptr<std::byte[]> memory;
     okid_identify_t* identifier = nullptr;
     const level_memory* older = nullptr; ///< sums of samples before those of `set`
-    bool analytic = false;        ///< deviations out of what it holds, see leave_out_blocks()
-    okid_identified_t realised{}; ///< what it gave, before any refinement
+    bool analytic = false;               ///< deviations out of what it holds, see leave_out_blocks()
+    okid_identified_t realised{};        ///< what it gave, before any refinement
     std::unique_ptr<refined_arrays> refined;
     std::vector<double> states;                  ///< initial ones of fits that are left for later; else empty
     std::vector<mode_carrier> carriers;          ///< auto: of each listed mode

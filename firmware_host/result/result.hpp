@@ -23,7 +23,7 @@ struct result_context {
     double fs_hz = 0;
     long long samples = 0;
     int records = 1;
-    bool responses = false; ///< the samples are lines of frequency responses, the records set-ups
+    bool responses = false;       ///< the samples are lines of frequency responses, the records set-ups
     long long judged_samples = 0; ///< auto: the newest, that the modes are judged from; 0: all of them
     long long gaps = 0;
     std::vector<std::string> inputs, outputs;
