@@ -11,6 +11,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <tuple>
 
 namespace okid_host {
 namespace {
@@ -205,11 +207,26 @@ struct band_powers {
     double at = 0, below = 0, above = 0;
 };
 
-band_powers powers_around(const record_level& level, std::size_t m, std::size_t first, std::size_t last,
+/// The spectra of levels that were asked for: modes of one level ask for the same ones.
+class level_spectra {
+  public:
+    explicit level_spectra(std::size_t m) : m_(m) {}
+    const std::vector<double>& of(const record_level& level, std::size_t channel, std::size_t size) {
+        const auto [at, made] = known_.try_emplace({&level, channel, size});
+        if (made) at->second = power_spectrum(level.records, m_, channel, size);
+        return at->second;
+    }
+
+  private:
+    std::size_t m_;
+    std::map<std::tuple<const record_level*, std::size_t, std::size_t>, std::vector<double>> known_;
+};
+
+band_powers powers_around(level_spectra& spectra, const record_level& level, std::size_t first, std::size_t last,
                           std::size_t size, double f, double width) {
     band_powers out;
     for (std::size_t k = first; k < last; ++k) {
-        const std::vector<double> power = power_spectrum(level.records, m, k, size);
+        const std::vector<double>& power = spectra.of(level, k, size);
         if (power.empty()) continue;
         out.at += mean_power(power, f - width, f + width);
         out.below += mean_power(power, f - 4 * width, f - 2 * width);
@@ -219,16 +236,17 @@ band_powers powers_around(const record_level& level, std::size_t m, std::size_t 
 }
 
 /// Is it the force that has a narrow peak there, and not the structure?
-bool is_line_of_force(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode) {
+bool is_line_of_force(level_spectra& spectra, const record_level& level, std::size_t m, std::size_t n_u,
+                      const consensus_mode& mode) {
     std::size_t longest = 0, size = shortest;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
     const double f = mode.frequency_hz / level.fs_hz;
     while (2 * averaged * size <= longest && mode.damping_ratio * f * static_cast<double>(size) < 2) size *= 2;
     const double width = std::max(mode.damping_ratio * f, 2 / static_cast<double>(size));
     if (n_u == 0 || longest < averaged * size || f < 4 * width) return false;
-    const band_powers force = powers_around(level, m, 0, n_u, size, f, width);
+    const band_powers force = powers_around(spectra, level, 0, n_u, size, f, width);
     if (force.at < forced * std::max(force.below, force.above)) return false;
-    const band_powers response = powers_around(level, m, n_u, m, size, f, width);
+    const band_powers response = powers_around(spectra, level, n_u, m, size, f, width);
     const double beside = std::max(response.below / force.below, response.above / force.above);
     return response.at / force.at < resonant * beside;
 }
@@ -238,6 +256,7 @@ bool is_line_of_force(const record_level& level, std::size_t m, std::size_t n_u,
 void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::size_t n_y, bool at_rest,
                 std::vector<consensus_mode>& modes) {
     const std::size_t m = n_u + n_y;
+    level_spectra spectra(m);
     for (consensus_mode& mode : modes) {
         const std::size_t channel = n_u + largest(mode.shape);
         const record_level& level = seen_by(levels, mode.frequency_hz);
@@ -251,7 +270,7 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
             mode.why.emplace_back(mains ? "pickup" : "tone");
             continue;
         }
-        if (is_line_of_force(level, m, n_u, mode)) {
+        if (is_line_of_force(spectra, level, m, n_u, mode)) {
             mode.why.emplace_back("harmonic");
             continue;
         }

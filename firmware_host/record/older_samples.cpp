@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  what a stream or a long file leaves behind of samples that are no longer kept
-// METHOD   an eighth of the samples kept goes at a time, screened by all of them, each channel less its mean over them, through
-//          the filters of all rates into sums
+// METHOD   a quarter of the samples kept goes at a time, screened beside the next quarter, each channel less its mean over both,
+//          through the filters of all rates into sums
 #include "older_samples.hpp"
 
 #include "consensus/consensus_runs.hpp"
@@ -17,8 +17,8 @@
 namespace okid_host {
 namespace {
 
-constexpr std::size_t kept_numbers = std::size_t{1} << 20, fewest_kept = std::size_t{1} << 15;
-constexpr std::size_t eighths = 8; ///< of the samples kept, of which one goes
+constexpr std::size_t kept_numbers = std::size_t{1} << 19, fewest_kept = std::size_t{1} << 15;
+constexpr std::size_t quarters = 4; ///< of the samples kept, of which one goes
 
 /// Rows first .. last-1, with the records they are of.
 record_set rows_of(const record_set& set, std::size_t first, std::size_t last) {
@@ -33,7 +33,7 @@ record_set rows_of(const record_set& set, std::size_t first, std::size_t last) {
 }
 
 std::size_t leaving(const record_set& newest) {
-    const std::size_t usual = std::max<std::size_t>(1, newest.count() / eighths);
+    const std::size_t usual = std::max<std::size_t>(1, newest.count() / quarters);
     for (const record_data& record : newest.records) {
         const std::size_t end = record.first + record.count;
         if (record.first < usual && end > usual && end <= newest.count() / 2) return end;
@@ -91,7 +91,7 @@ older_samples::older_samples(const record_options& options)
       chain_(n_u_ + n_y_, options.fs_hz, options.decimate) {
     const auto inputs = static_cast<int>(n_u_), outputs = static_cast<int>(n_y_);
     const int lags = longest_lags(inputs, outputs);
-    const double rows = static_cast<double>(newest_samples(n_u_ + n_y_) / eighths);
+    const double rows = static_cast<double>(newest_samples(n_u_ + n_y_) / quarters);
     for (std::size_t k = 0; k < chain_.count(); ++k)
         levels_.emplace_back(inputs, outputs, lags, std::llround(rows * chain_.fs_hz(k) / options.fs_hz));
 }
@@ -120,11 +120,12 @@ void older_samples::add(const double* row) {
 
 std::size_t older_samples::take(const record_set& newest) {
     const std::size_t count = leaving(newest), m = n_u_ + n_y_;
-    record_set clean = newest;
+    const record_set raw = rows_of(newest, 0, newest.count() / 2);
+    record_set clean = raw;
     const screened_outputs screened = screen_outputs(clean, outputs_);
     for (std::size_t c = 0; c < n_y_; ++c) // one that is left out as a whole is as it came: it may serve later
         for (std::size_t i = n_u_ + c; !screened.kept[c] && i < clean.samples.size(); i += m)
-            clean.samples[i] = newest.samples[i];
+            clean.samples[i] = raw.samples[i];
     if (lines_)
         for (const record_data& record : clean.records) remove_lines(clean.rows(record), m, record.count);
     remove_means(clean);
@@ -133,7 +134,7 @@ std::size_t older_samples::take(const record_set& newest) {
         if (!within_) begin_record(begins_at_rest_ || begins_at_rest(clean, record));
         const std::size_t last = std::min(record.first + record.count, count);
         for (std::size_t n = record.first; n < last; ++n) add(clean.samples.data() + n * m);
-        within_ = last < record.first + record.count;
+        within_ = last < newest.records[r].first + newest.records[r].count;
     }
     return count;
 }

@@ -16,7 +16,7 @@ namespace okid_host {
 
 struct record_options;
 
-/// Samples that are kept of so many channels: a million numbers, but not below 32,768 samples.
+/// Samples that are kept of so many channels: half a million numbers, but not below 32,768 samples.
 std::size_t newest_samples(std::size_t channels);
 
 class older_samples {
@@ -25,8 +25,8 @@ class older_samples {
     explicit older_samples(const record_options& options);
     static double bytes(std::size_t n_u, std::size_t n_y);
 
-    /// The first of the samples kept are kept no longer: they are screened by all of them, then summed.
-    /// @param newest  all that are kept. @return how many went: an eighth, or up to the end of the record that ends next
+    /// The first of the samples kept are kept no longer: they are screened, then summed.
+    /// @param newest  all that are kept. @return how many went: a quarter, or up to the end of the record that ends next
     std::size_t take(const record_set& newest);
     void merge(const older_samples& other); ///< as further records
 
