@@ -234,7 +234,7 @@ def test_snapshot_copy_and_pickle(whole: bool) -> None:
 
 
 def test_errors_leave_the_state_unchanged() -> None:
-    with Accumulator(1, 2, 3) as sums, Accumulator(1, 2, 4) as longer, Accumulator(1, 2, 3, codes=16) as exact:
+    with Accumulator(1, 2, 3) as sums, Accumulator(1, 2, 2) as shorter, Accumulator(1, 2, 3, codes=16) as exact:
         with pytest.raises(IdentificationError):
             sums.gram()
         sums.add(draw(1, 30, 3))
@@ -242,7 +242,7 @@ def test_errors_leave_the_state_unchanged() -> None:
         for wrong in (np.zeros((4, 2)), np.zeros(3), np.zeros((2, 3), complex), np.array([["a", "b", "c"]])):
             with pytest.raises(InputError):
                 sums.add(wrong)
-        for other in (longer, exact):
+        for other in (shorter, exact):
             with pytest.raises(InputError):
                 sums.merge(other)
         with pytest.raises(InputError):
