@@ -133,6 +133,11 @@ std::int64_t agreement::rows() const {
     return out;
 }
 
+std::size_t agreement::bytes() const {
+    const double sums = older_ ? older_samples::bytes(options_.inputs.size(), options_.outputs.size()) : 0;
+    return rows_.capacity() * sizeof(double) + static_cast<std::size_t>(sums);
+}
+
 std::int64_t agreement::basis() const {
     return came_ - begin_ + (older_ ? static_cast<std::int64_t>(older_->samples()) : 0);
 }

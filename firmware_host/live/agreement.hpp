@@ -63,7 +63,7 @@ class agreement {
     std::int64_t rows() const;  ///< complete ones
     okid_accumulator_stats_t stats() const { return counts_; }
     bool overflowed() const { return !window_ && !older_ && begin_ > forgotten_; } ///< hits were dropped
-    std::size_t bytes() const { return rows_.capacity() * sizeof(double); }
+    std::size_t bytes() const;                                                     ///< of samples and sums
 
     std::vector<std::byte> state() const;
     void restore(const void* state, std::size_t bytes);

@@ -142,10 +142,10 @@ result_context stream::context(remarks said) {
         out = agreed->found().context;
         out.warnings.insert(out.warnings.begin(), said.begin(), said.end());
         if (agreed->overflowed())
-            out.warnings.emplace_back("memory_full",
-                                      fmt::format("the result rests on the newest {} samples: as many as method auto "
-                                                  "keeps of a growing memory. Set window_s",
-                                                  identifier_.basis()));
+            out.warnings.emplace_back(
+                "memory_full", fmt::format("the result rests on the newest {} samples: max_memory_mb holds no more "
+                                           "of the hits at several places",
+                                           identifier_.basis()));
     } else {
         out.warnings = std::move(said);
         out.warnings.insert(out.warnings.end(), config_.said.begin(), config_.said.end());

@@ -242,6 +242,7 @@ void remark_mixed(const std::vector<bool>& turned, const record_options& options
 /// The sums of older samples to the levels of the newest ones.
 void remember(const older_samples& before, const std::vector<double>& scale, std::vector<record_level>& levels) {
     for (std::size_t k = 0; k < levels.size(); ++k) {
+        before.level(k).settle();
         levels[k].older = &before.level(k);
         levels[k].scale = scale;
         levels[k].samples += before.level(k).samples();

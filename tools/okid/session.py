@@ -37,7 +37,7 @@ class Session:
 
     `method` as in okid.identify(): "auto" by default, "okid-era" when an option of one method is given (p, rows, order,
     hankel, forgetting). Named methods keep sums of lagged products; "auto" keeps the samples of the window, without one
-    the newest 10 million numbers, and finds in them what okid.identify() finds in the same samples.
+    the newest 500,000 numbers and sums of those before, and finds what okid.identify() finds in the same samples.
     `inputs`, `outputs`: names of the channels, or how many; no inputs = ambient. `fs` Hz. `window_s` forgets what is
     older (in blocks of about a twentieth of it); with `window="auto"` each modes() or identify() chooses how much of
     it, as far as the structure stands still. `forgetting` fades by that factor a sample, neither keeps everything.

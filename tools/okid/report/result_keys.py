@@ -14,7 +14,7 @@ NEEDED = (
 # Key -> kind; "?" behind a kind: null and absent are fine too.
 _TOP = {
     "fs_hz": "rate", "samples": "count", "records": "count?", "gaps": "count?", "inputs": "names", "outputs": "names",
-    "p": "count?", "rows": "count?", "order": "count", "method": "text?", "hold": "text?", "detrend": "text?",
+    "judged_samples": "count?", "p": "count?", "rows": "count?", "order": "count", "method": "text?", "hold": "text?", "detrend": "text?",
     "start": "text?", "version": "text?", "singular_values": "numbers?", "model": "object", "markov": "object?",
     "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
 }  # fmt: skip

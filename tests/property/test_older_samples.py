@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+"""Method auto of more samples than it keeps: estimated from all of them, judged from the newest, in fixed memory; the
+same of a file, of a stream cut anywhere, and of a stream that was saved and goes on."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import okid
+import systems
+from numpy.typing import NDArray
+
+W2 = systems.w2()
+KEPT = 65536  # of 8 channels
+COUNT = 150_000
+
+
+@functools.cache
+def rows() -> NDArray[np.float64]:
+    """Two forces and six accelerations, 2 % noise, an offset."""
+    u, y = systems.record(W2, COUNT, 2.0, 3)
+    return np.hstack([u, y + 0.3])
+
+
+def split(samples: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return samples[:, :2], samples[:, 2:]
+
+
+@functools.cache
+def whole() -> okid.Result:
+    return okid.identify(*split(rows()), fs=W2.fs, input_dofs=[1, 4], output_dofs=[1, 2, 3, 4, 5, 6])
+
+
+def confident(result: okid.Result) -> list[okid.Mode]:
+    return [mode for mode in result.modes if mode.confident]
+
+
+def session() -> okid.Session:
+    return okid.Session(2, 6, fs=W2.fs)
+
+
+def test_all_samples_count() -> None:
+    found, newest = whole(), okid.identify(*split(rows()[-KEPT:]), fs=W2.fs, refine=False)
+    raw = found.to_dict()
+    assert raw["samples"] == COUNT and KEPT / 2 < raw["judged_samples"] <= KEPT
+    assert "judged_samples" not in newest.to_dict()
+    f, zeta = W2.modes()
+    assert len(confident(found)) == 6
+    for mode, true_f, true_zeta, alone in zip(confident(found), f, zeta, confident(newest), strict=True):
+        assert abs(mode.frequency_hz / true_f - 1) < 2e-5 and abs(mode.damping_ratio / true_zeta - 1) < 3e-3
+        assert abs(mode.frequency_hz - true_f) < 5 * mode.frequency_std_hz
+        assert mode.frequency_std_hz < alone.frequency_std_hz
+    assert found.mass is not None
+    np.testing.assert_allclose(found.mass.M, W2.M, atol=0.005)
+
+
+def test_a_stream_is_the_file() -> None:
+    live = session()
+    for block in np.array_split(rows(), [7, 70000, 70001, 131072]):
+        live.feed(block)
+    found = live.identify()
+    file = okid.identify(*split(rows()), fs=W2.fs)
+    for name in ("frequency_hz", "damping_ratio", "frequency_std_hz", "damping_ratio_std", "mpc", "why"):
+        assert [getattr(m, name) for m in found.modes] == [getattr(m, name) for m in file.modes]
+    assert found.to_dict()["judged_samples"] == file.to_dict()["judged_samples"]
+
+
+def test_a_saved_stream_goes_on() -> None:
+    straight, first, second = session(), session(), session()
+    straight.feed(rows()[:110_000])
+    first.feed(rows()[:90_000])
+    state = first.to_bytes()
+    second.restore(state)
+    second.feed(rows()[90_000:110_000])
+    assert second.samples == straight.samples == 110_000 and second.stats == straight.stats
+    assert second.to_bytes() == straight.to_bytes()
+    for damage in (state[:-100], state + b"x"):
+        try:
+            session().restore(damage)
+            raise AssertionError("a damaged state was taken")
+        except okid.InputError:
+            pass
+
+
+def test_halves_merged_are_the_whole() -> None:
+    a, b = session(), session()
+    a.feed(rows()[: COUNT // 2])
+    b.feed(rows()[COUNT // 2 :])
+    a.merge(b.to_bytes())
+    assert a.samples == COUNT
+    for ours, other in zip(confident(a.identify()), confident(okid.identify(*split(rows()), fs=W2.fs)), strict=True):
+        assert abs(ours.frequency_hz / other.frequency_hz - 1) < 1e-5
+        assert abs(ours.damping_ratio / other.damping_ratio - 1) < 1e-3
+
+
+def test_memory_does_not_grow() -> None:
+    live = session()
+    before, sizes = live.nbytes, []
+    for _ in range(2):
+        live.feed(rows())
+        sizes.append(len(live.to_bytes()))
+    assert live.nbytes == before and live.samples == live.basis == 2 * COUNT
+    assert max(sizes) < 25e6 < 2 * COUNT * 8 * 8 * 2
+
+
+def test_gaps_and_many_records() -> None:
+    """Samples are missing throughout, and the stream is cut into records."""
+    holed = rows().copy()
+    holed[5000::5000, 3] = np.nan
+    live = session()
+    for piece in np.array_split(holed, 6):
+        live.feed(piece)
+        live.gap()
+    found = live.identify()
+    assert live.stats.missing == 29 and live.samples == COUNT
+    f, _ = W2.modes()
+    np.testing.assert_allclose([mode.frequency_hz for mode in confident(found)], f, rtol=1e-4)
+    assert found.to_dict()["records"] == 6
+
+
+def test_an_output_that_is_left_out() -> None:
+    """Only in the newest samples it fails: sums with it are no use then, and that is said."""
+    broken = rows().copy()
+    broken[80_000:, 7] = 0.3
+    found = okid.identify(*split(broken), fs=W2.fs)
+    codes = [warning.code for warning in found.warnings]
+    assert "newest_only" in codes and "screened" in codes and found.to_dict()["samples"] <= KEPT
+    np.testing.assert_allclose([mode.frequency_hz for mode in confident(found)], W2.modes()[0], rtol=1e-3)

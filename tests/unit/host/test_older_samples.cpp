@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+// What is left of samples that are no longer kept: the rates sample by sample are those of the whole record, and sums in blocks
+// of time hold every row of them, gaps or not, in memory that does not grow.
+#include "consensus/consensus_runs.hpp"
+#include "consensus/rate_chain.hpp"
+#include "record/older_samples.hpp"
+#include "record/record.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <unity.h>
+
+using namespace okid_host;
+
+namespace {
+
+constexpr int n_u = 1, n_y = 2, lags = 12;
+constexpr std::size_t m = n_u + n_y, width = m * (lags + 1);
+
+/// A white force and two responses that ring a little, by a recursion of their own.
+std::vector<double> rows_of(std::size_t count, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<double> out(count * m);
+    double a = 0, b = 0, before = 0;
+    for (std::size_t n = 0; n < count; ++n) {
+        const double force = normal(random), next = 1.6 * a - 0.9 * before + force;
+        before = std::exchange(a, next);
+        b = 0.8 * b + 0.3 * a;
+        out[n * m] = force;
+        out[n * m + 1] = a + 0.1 * normal(random);
+        out[n * m + 2] = b + 0.1 * normal(random);
+    }
+    return out;
+}
+
+std::vector<double> gram_of(okid_accumulator_t* sums) {
+    std::vector<double> out(width * width);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(sums, OKID_DETREND_NONE, out.data(), nullptr));
+    return out;
+}
+
+bool is_missing(double x) { return x != x; } // unity.h hides std::isnan
+
+owned_sums sums_like(int of_lags) {
+    okid_accumulator_config_t config = okid_accumulator_defaults(n_u, n_y, of_lags);
+    config.edges = 1;
+    owned_sums out(config);
+    TEST_ASSERT_NOT_NULL(out.sums);
+    return out;
+}
+
+void assert_same(const std::vector<double>& expected, const std::vector<double>& found, double tolerance) {
+    const double most = *std::max_element(expected.begin(), expected.end());
+    for (std::size_t i = 0; i < expected.size(); ++i)
+        TEST_ASSERT_DOUBLE_WITHIN(tolerance * most, expected[i], found[i]);
+}
+
+record_options options() {
+    record_options out;
+    out.inputs = {"u"};
+    out.outputs = {"a", "b"};
+    out.fs_hz = 100;
+    return out;
+}
+
+record_set set_of(const std::vector<std::vector<double>>& records) {
+    record_set out;
+    out.n_u = n_u;
+    out.n_y = n_y;
+    for (const auto& rows : records) out.add("r", rows.data(), rows.size() / m);
+    return out;
+}
+
+} // namespace
+
+void setUp() {}
+void tearDown() {}
+
+static void rates_row_by_row_are_those_of_the_record() {
+    for (const int decimate : {1, 3})
+        for (const bool silent : {false, true}) {
+            std::vector<double> rows = rows_of(40000, 5), scale;
+            for (std::size_t c = 0; c < m; ++c) rows[7000 * m + c] = NAN;
+            rate_chain chain(m, 100, decimate);
+            std::vector<std::vector<double>> found(chain.count());
+            chain.begin_record(silent);
+            for (std::size_t n = 0; n < rows.size(); n += m) {
+                if (n == 9000 * m) { // goes on elsewhere
+                    rate_chain other(m, 100, decimate);
+                    TEST_ASSERT_FALSE(other.put_back({1, 2, 3}));
+                    TEST_ASSERT_TRUE(other.put_back(chain.state()));
+                    chain = other;
+                }
+                chain.add(rows.data() + n,
+                          [&](std::size_t k, const double* row) { found[k].insert(found[k].end(), row, row + m); });
+            }
+            const auto levels = make_levels({rows}, n_u, n_y, 100, silent, decimate, scale);
+            TEST_ASSERT_TRUE(levels.size() >= 4);
+            for (std::size_t k = 0; k < levels.size(); ++k) { // those are centred, in units of their spread
+                const sample_rows& whole = levels[k].records[0];
+                TEST_ASSERT_EQUAL_UINT64(whole.size(), found[k].size());
+                for (std::size_t c = 0; c < m; ++c) {
+                    double shift = 0, there = 0;
+                    for (std::size_t i = c; i < whole.size(); i += m)
+                        if (!is_missing(whole[i])) shift += found[k][i] - whole[i] * scale[c], ++there;
+                    for (std::size_t i = c; i < whole.size(); i += m) {
+                        TEST_ASSERT_EQUAL(is_missing(whole[i]), is_missing(found[k][i]));
+                        if (!is_missing(whole[i]) && !silent)
+                            TEST_ASSERT_DOUBLE_WITHIN(1e-9, whole[i] * scale[c] + shift / there, found[k][i]);
+                    }
+                }
+            }
+        }
+}
+
+/// Every row, whether nothing is missing, a sample now and then, or every 30th: then blocks are folded.
+static void blocks_hold_every_row() {
+    for (const std::size_t gap_each : {std::size_t{0}, std::size_t{997}, std::size_t{30}}) {
+        std::vector<double> rows = rows_of(30000, 6);
+        for (std::size_t n = gap_each; gap_each > 0 && n * m < rows.size(); n += gap_each) rows[n * m + 1] = NAN;
+        level_memory memory(n_u, n_y, lags + 4, 100);
+        const owned_sums whole = sums_like(lags + 4), taken = sums_like(lags), direct = sums_like(lags);
+        for (std::size_t n = 0; n < rows.size(); n += m) memory.add(rows.data() + n);
+        TEST_ASSERT_TRUE(okid_accumulator_add(whole.sums, rows.data(), rows.size() / m) >= 0);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_merge(direct.sums, whole.sums));
+        TEST_ASSERT_TRUE(memory.take(taken.sums));
+        TEST_ASSERT_EQUAL_INT64(okid_accumulator_rows(whole.sums), okid_accumulator_rows(taken.sums));
+        const std::vector<double> all = gram_of(direct.sums);
+        assert_same(all, gram_of(taken.sums), 1e-12);
+        const std::size_t blocks = memory.blocks();
+        TEST_ASSERT_TRUE(blocks >= 8 && blocks <= level_memory::most_blocks + 2);
+        for (std::size_t k = 0; k < blocks; ++k) { // each can be taken out, and all together leave nothing
+            const owned_sums part = sums_like(lags);
+            TEST_ASSERT_TRUE(memory.take_block(k, part.sums));
+            TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_remove(taken.sums, part.sums, 1));
+        }
+        TEST_ASSERT_EQUAL_INT64(0, okid_accumulator_rows(taken.sums));
+        const std::vector<std::byte> state = memory.state();
+        level_memory again(n_u, n_y, lags + 4, 100), other(n_u, n_y, lags, 100);
+        TEST_ASSERT_EQUAL_UINT64(0, other.put_back(state.data(), state.size()));
+        for (std::size_t cut = 0; cut < state.size(); cut += 501)
+            TEST_ASSERT_EQUAL_UINT64(0, again.put_back(state.data(), cut));
+        TEST_ASSERT_EQUAL_UINT64(state.size(), again.put_back(state.data(), state.size()));
+        const owned_sums twice = sums_like(lags);
+        again.merge(memory);
+        TEST_ASSERT_TRUE(again.take(twice.sums));
+        std::vector<double> doubled = all;
+        for (double& x : doubled) x *= 2;
+        assert_same(doubled, gram_of(twice.sums), 1e-12);
+    }
+}
+
+/// Older and newest samples together have all rows but those at the seams, the filters' and the lags'.
+static void nothing_is_lost_between_older_and_newest() {
+    const std::size_t kept = newest_samples(m), count = 3 * kept;
+    std::vector<double> rows = rows_of(count, 8);
+    for (std::size_t n = 0; n < count; ++n) rows[n * m + 2] += 5; // an offset
+    record_set set = set_of({rows});
+    const auto older = split_older(set, options());
+    TEST_ASSERT_NOT_NULL(older.get());
+    TEST_ASSERT_EQUAL_INT64(static_cast<long long>(count), older->samples() + static_cast<long long>(set.count()));
+    TEST_ASSERT_TRUE(set.count() <= kept && set.count() > kept / 2);
+    TEST_ASSERT_EQUAL_MEMORY(rows.data() + (count - set.count()) * m, set.samples.data(), set.samples.size() * 8);
+    TEST_ASSERT_EQUAL_INT64(older->samples(), older->level(0).samples());
+    TEST_ASSERT_EQUAL_INT64(older->samples(), older->begun());
+    TEST_ASSERT_EQUAL(0, older->records());
+    const owned_sums sums = sums_like(lags), direct = sums_like(lags);
+    TEST_ASSERT_TRUE(older->level(0).take(sums.sums));
+    for (std::size_t n = 0; n < count; ++n) rows[n * m + 2] -= 5;
+    TEST_ASSERT_TRUE(okid_accumulator_add(direct.sums, rows.data(), static_cast<std::size_t>(older->samples())) >= 0);
+    std::vector<double> expected = gram_of(direct.sums), found = gram_of(sums.sums);
+    for (double& x : expected) x /= static_cast<double>(okid_accumulator_rows(direct.sums));
+    for (double& x : found) x /= static_cast<double>(okid_accumulator_rows(sums.sums));
+    assert_same(expected, found, 1e-3); // the mean is that of the samples kept then
+    record_set few = set_of({rows_of(kept, 9)});
+    TEST_ASSERT_NULL(split_older(few, options()).get());
+}
+
+/// A record that ends before the middle of the samples kept goes as a whole; its faults are no part of the sums.
+static void records_go_as_a_whole_and_screened() {
+    const std::size_t kept = newest_samples(m), each = kept / 10;
+    std::vector<std::vector<double>> records;
+    for (unsigned k = 0; k < 24; ++k) records.push_back(rows_of(each, 20 + k));
+    records[3][(each / 2) * m + 1] = 1e4; // a spike
+    record_set set = set_of(records);
+    const auto older = split_older(set, options());
+    TEST_ASSERT_NOT_NULL(older.get());
+    TEST_ASSERT_EQUAL_INT64(0, older->begun());
+    TEST_ASSERT_EQUAL(24, older->records() + static_cast<int>(set.records.size()));
+    for (const record_data& record : set.records) TEST_ASSERT_EQUAL_UINT64(each, record.count);
+    TEST_ASSERT_EQUAL_INT64(1, older->missing());
+    TEST_ASSERT_EQUAL_INT64(static_cast<long long>(each), older->longest());
+    double energy[m];
+    const owned_sums sums = sums_like(lags);
+    TEST_ASSERT_TRUE(older->level(0).take(sums.sums));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_energy(sums.sums, OKID_DETREND_NONE, energy));
+    TEST_ASSERT_TRUE(energy[1] < 1e7);
+    const std::vector<std::byte> state = older->state();
+    older_samples again(options());
+    again.put_back("", state.data(), state.size());
+    TEST_ASSERT_TRUE(again.state() == state);
+    TEST_ASSERT_TRUE(static_cast<double>(state.size()) < older_samples::bytes(n_u, n_y));
+    again.merge(*older);
+    TEST_ASSERT_EQUAL_INT64(2 * older->samples(), again.samples());
+}
+
+int main() {
+    UNITY_BEGIN();
+    RUN_TEST(rates_row_by_row_are_those_of_the_record);
+    RUN_TEST(blocks_hold_every_row);
+    RUN_TEST(nothing_is_lost_between_older_and_newest);
+    RUN_TEST(records_go_as_a_whole_and_screened);
+    return UNITY_END();
+}
