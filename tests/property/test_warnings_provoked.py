@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,22 +47,3 @@ def test_matrices_of_two_of_six_modes() -> None:
         dofs = {"input_dofs": [1, 2], "output_dofs": list(range(1, len(sensors) + 1))}
         found = okid.identify(u, y[:, sensors], fs=W2.fs, method="n4sid-cva", order=12, sigma="none", **dofs)
         assert ("mkr_choice_unclear" in codes(found)) == warned
-
-
-def test_hits_at_places_whose_memory_is_full(tmp_path: Path) -> None:
-    """Hits at several places are kept as samples; max_memory_mb bounds them."""
-    u, y = systems.record(W1, 40000, 2.0, 5)
-    channels = "".join(
-        f'[[channel]]\nname = "c{k}"\nrole = "{role}"\nbus = "b"\ncan_id = {k}\nstart_bit = 0\nlength = 16\n'
-        for k, role in enumerate(["force"] + 3 * ["acceleration"])
-    )
-    for limit, warned in ((15, True), (200, False)):
-        path = tmp_path / f"{limit}.toml"
-        path.write_text(
-            f'[acquisition]\nrate_hz = {W1.fs}\n[[bus]]\nname = "b"\ntype = "socketcan"\ninterface = "can0"\n{channels}'
-            f'[identification]\nmax_memory_mb = {limit}\nsigma = "none"\n'
-            "[hammer]\nlevel = 1.0\nhits = 1\npoints = [1, 2]\n"
-        )
-        session = okid.Session.from_config(path)
-        session.feed(np.hstack([u, y]))
-        assert ("memory_full" in codes(session.identify())) == warned

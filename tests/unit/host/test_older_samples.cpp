@@ -3,6 +3,7 @@
 // of time hold every row of them, gaps or not, in memory that does not grow.
 #include "consensus/consensus_runs.hpp"
 #include "consensus/rate_chain.hpp"
+#include "live/agreement.hpp"
 #include "record/older_samples.hpp"
 #include "record/record.hpp"
 
@@ -206,11 +207,34 @@ static void records_go_as_a_whole_and_screened() {
     TEST_ASSERT_EQUAL_INT64(2 * older->samples(), again.samples());
 }
 
+/// Hits at several places are all kept as samples, as far as max_memory_mb holds them; then `memory_full` says so.
+static void hits_at_places_are_kept_as_samples() {
+    stream_config config;
+    config.inputs = {"u"};
+    config.outputs = {"a", "b"};
+    config.rate_hz = 100;
+    config.wanted.method = "auto";
+    config.scale.assign(m, 1);
+    config.offset.assign(m, 0);
+    const std::vector<double> rows = rows_of(2000, 11);
+    for (const bool places : {true, false}) {
+        config.hits = places ? std::vector<int>{1, 2} : std::vector<int>();
+        config.wanted.max_memory_mb = followed_modes::bytes(config, 0) / 1e6 + 3;
+        agreement kept(config);
+        for (int k = 0; k < 100; ++k)
+            for (std::size_t n = 0; n < rows.size(); n += m) kept.add(rows.data() + n);
+        TEST_ASSERT_EQUAL(places, kept.overflowed());
+        TEST_ASSERT_EQUAL(!places, kept.basis() == 200000);
+        TEST_ASSERT_EQUAL_INT64(200000, kept.stats().samples);
+    }
+}
+
 int main() {
     UNITY_BEGIN();
     RUN_TEST(rates_row_by_row_are_those_of_the_record);
     RUN_TEST(blocks_hold_every_row);
     RUN_TEST(nothing_is_lost_between_older_and_newest);
     RUN_TEST(records_go_as_a_whole_and_screened);
+    RUN_TEST(hits_at_places_are_kept_as_samples);
     return UNITY_END();
 }
