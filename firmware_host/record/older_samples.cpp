@@ -18,7 +18,8 @@ namespace okid_host {
 namespace {
 
 constexpr std::size_t kept_numbers = std::size_t{1} << 19, fewest_kept = std::size_t{1} << 15;
-constexpr std::size_t quarters = 4; ///< of the samples kept, of which one goes
+constexpr std::size_t quarters = 4;      ///< of the samples kept, of which one goes
+constexpr std::size_t first_blocks = 20; ///< of the samples kept, which one block of sums is at first
 
 /// Rows first .. last-1, with the records they are of.
 record_set rows_of(const record_set& set, std::size_t first, std::size_t last) {
@@ -91,7 +92,7 @@ older_samples::older_samples(const record_options& options)
       chain_(n_u_ + n_y_, options.fs_hz, options.decimate) {
     const auto inputs = static_cast<int>(n_u_), outputs = static_cast<int>(n_y_);
     const int lags = longest_lags(inputs, outputs);
-    const double rows = static_cast<double>(newest_samples(n_u_ + n_y_) / quarters);
+    const double rows = static_cast<double>(newest_samples(n_u_ + n_y_) / first_blocks);
     for (std::size_t k = 0; k < chain_.count(); ++k)
         levels_.emplace_back(inputs, outputs, lags, std::llround(rows * chain_.fs_hz(k) / options.fs_hz));
 }

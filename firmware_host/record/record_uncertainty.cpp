@@ -18,6 +18,8 @@
 namespace okid_host {
 namespace {
 
+constexpr std::size_t usual_blocks = 10; // of older and newest samples together, at least
+
 /// Equal parts of all regression rows together; what stands before a record's first row is history only.
 std::vector<std::vector<record_piece>> cut(const std::vector<record_data>& records, std::size_t history,
                                            std::size_t parts) {
@@ -132,9 +134,11 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
     const std::size_t older = work.older ? work.older->blocks() : 0;
     std::size_t parts =
         std::min(static_cast<std::size_t>(blocks), static_cast<std::size_t>(okid_accumulator_rows(whole)) / lags);
-    if (older > 0) // about as long as theirs
-        parts = static_cast<std::size_t>(std::clamp(static_cast<double>(work.set.count()) / work.older->rows_of_block(),
-                                                    1.0, static_cast<double>(parts)));
+    if (older > 0) { // about as long as theirs, and not too few together
+        const double alike = static_cast<double>(work.set.count()) / work.older->rows_of_block();
+        const double fewest = older < usual_blocks ? static_cast<double>(usual_blocks - older) : 1;
+        parts = std::min(parts, static_cast<std::size_t>(std::max(alike, fewest)));
+    }
     std::vector<replicate_model> out;
     const owned_sums part(shape.sums);
     if (parts + older < std::size_t{fewest_blocks} || !part.sums) return out;

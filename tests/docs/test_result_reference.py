@@ -10,6 +10,7 @@ from typing import Any
 
 import okid as package
 import pytest
+import systems
 from command_help import ROOT
 from program import okid
 from reference_tables import REFERENCE, codes, documented, keys_of, rows, sections
@@ -41,6 +42,8 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
     python = package.identify(u, y, fs=250.0, p=12, input_dofs=[1], output_dofs=[1, 2], refine=True)
     # a remark, for its keys: p is too long for a record so short
     remarked = identified(rig, "--inputs", "force1", "--range", "0:300")
+    structure = systems.w2()  # more samples than auto keeps of 8 channels
+    long = package.identify(*systems.record(structure, 66_000, 2.0, 1), fs=structure.fs, sigma="none")
     agreed = okid("identify", rig / "a.csv", "--inputs", "force1", "--outputs", "acc1,acc2", "--json", "-")
     assert agreed.returncode == 0, agreed.stderr
     return [
@@ -50,6 +53,7 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
         identified(rig, "--sensing", "acceleration,velocity"),
         remarked,
         python.to_dict(),
+        long.to_dict(),
         json.loads((rig / "live.json").read_text()),
     ]
 

@@ -8,6 +8,7 @@ import functools
 
 import numpy as np
 import okid
+import pytest
 import systems
 from numpy.typing import NDArray
 
@@ -103,6 +104,15 @@ def test_memory_does_not_grow() -> None:
         sizes.append(len(live.to_bytes()))
     assert live.nbytes == before and live.samples == live.identify().to_dict()["samples"] == 2 * COUNT
     assert max(sizes) < 25e6 < 2 * COUNT * 8 * 8 * 2
+
+
+@pytest.mark.parametrize("count", [KEPT + 1, KEPT + 20_000])
+def test_deviations_from_the_first_sums_on(count: int) -> None:
+    """Few blocks are sums as yet; with forces and without."""
+    u, y = split(rows()[:count])
+    for found in (okid.identify(u, y, fs=W2.fs), okid.identify(None, np.hstack([y, y[:, :2] + u]), fs=W2.fs)):
+        assert found.to_dict()["judged_samples"] < KEPT and len(confident(found)) >= 5
+        assert all(mode.frequency_std_hz and mode.damping_ratio_std for mode in confident(found))
 
 
 def test_gaps_and_many_records() -> None:
