@@ -14,7 +14,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 
 using std::size_t;
 
@@ -82,14 +81,8 @@ void fill(okid_era& e, const okid_real_t* markov, int shift) {
 
 /// All triplets of H, or the leading ones where no order needs the others.
 bool decompose(okid_era& e) {
-    const auto leading = [&](auto* hankel, auto* left, auto* values, auto* right) {
-        if constexpr (std::is_same_v<decltype(hankel), double*>)
-            return !correlated(e) && e.expected > 0 &&
-                   okid::has_leading(e.height, e.breadth, e.expected, e.work_bytes) &&
-                   okid::leading_triplets(e.height, e.breadth, e.expected, hankel, left, values, right, e.rank, e.work);
-        return false;
-    };
-    if (leading(e.hankel, e.left, e.values, e.right)) {
+    if (!correlated(e) && e.expected > 0 && okid::has_leading(e.height, e.breadth, e.expected, e.work_bytes) &&
+        okid::leading_triplets(e.height, e.breadth, e.expected, e.hankel, e.left, e.values, e.right, e.rank, e.work)) {
         e.carried = e.expected;
         return true;
     }

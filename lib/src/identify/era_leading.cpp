@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 using std::size_t;
 
@@ -36,41 +37,51 @@ struct rooms {
         within = later.take<double>(area(count, breadth));
         within_left = later.take<double>(area(count, count));
         within_right = later.take<double>(area(count, breadth));
-        svd = later.take<double>(linalg::svd_work<double>(count, breadth));
+        svd = later.take<double>(linalg::svd_work<okid_real_t>(count, breadth));
         bytes = std::max(memory.bytes(), later.bytes());
     }
     size_t bytes;
 };
 
+/// Of double precision: in single precision the squares leave no digit.
+template <class Real>
+bool find(int height, int breadth, int count, const Real* hankel, Real* left, Real* values, Real* right, int ld_right,
+          void* work) {
+    if constexpr (!std::is_same_v<Real, double>) {
+        return false;
+    } else {
+        const rooms at_hand(height, breadth, count, arena(work));
+        lower_product(height, [breadth](int) { return breadth; }, hankel, height, 0, at_hand.square, height);
+        Real greatest = 0;
+        for (int k = 0; k < height; ++k) greatest = std::max(greatest, at_hand.square[at(k, k, height)]);
+        if (!(greatest > 0) || linalg::symmetric(height, at_hand.square, count, values, left, at_hand.symmetric) != 0 ||
+            !(values[count - 1] > least_square * values[0]))
+            return false;
+        for (int k = count; k < height; ++k) values[k] = std::sqrt(std::max(Real{0}, values[k]));
+        Real *basis = at_hand.basis, *within = at_hand.within, *turn = at_hand.within_left;
+        linalg::multiply(true, false, count, breadth, height, 1, left, height, hankel, height, 0, within, count);
+        linalg::multiply(false, true, height, count, breadth, 1, hankel, height, within, count, 0, basis, height);
+        if (orthonormalise(height, count, basis, at_hand.core, count) != count) return false;
+        linalg::multiply(true, false, count, breadth, height, 1, basis, height, hankel, height, 0, within, count);
+        if (linalg::svd(count, breadth, within, turn, values, at_hand.within_right, at_hand.svd) != 0) return false;
+        linalg::multiply(false, false, height, count, count, 1, basis, height, turn, count, 0, left, height);
+        for (int c = 0; c < breadth; ++c)
+            std::copy(at_hand.within_right + at(0, c, count), at_hand.within_right + at(0, c + 1, count),
+                      right + at(0, c, ld_right));
+        return true;
+    }
+}
+
 } // namespace
 
 bool has_leading(int height, int breadth, int count, size_t work_bytes) {
-    return height >= fewest_rows && height <= breadth && 3 * count <= height &&
+    return std::is_same_v<okid_real_t, double> && height >= fewest_rows && height <= breadth && 3 * count <= height &&
            rooms(height, breadth, count, arena()).bytes <= work_bytes;
 }
 
-bool leading_triplets(int height, int breadth, int count, const double* hankel, double* left, double* values,
-                      double* right, int ld_right, void* work) {
-    const rooms at_hand(height, breadth, count, arena(work));
-    lower_product(height, [breadth](int) { return breadth; }, hankel, height, 0, at_hand.square, height);
-    double greatest = 0;
-    for (int k = 0; k < height; ++k) greatest = std::max(greatest, at_hand.square[at(k, k, height)]);
-    if (!(greatest > 0) || linalg::symmetric(height, at_hand.square, count, values, left, at_hand.symmetric) != 0 ||
-        !(values[count - 1] > least_square * values[0]))
-        return false;
-    for (int k = count; k < height; ++k) values[k] = std::sqrt(std::max(0.0, values[k]));
-    double *basis = at_hand.basis, *within = at_hand.within;
-    linalg::multiply(true, false, count, breadth, height, 1, left, height, hankel, height, 0, within, count);
-    linalg::multiply(false, true, height, count, breadth, 1, hankel, height, within, count, 0, basis, height);
-    if (orthonormalise(height, count, basis, at_hand.core, count) != count) return false;
-    linalg::multiply(true, false, count, breadth, height, 1, basis, height, hankel, height, 0, within, count);
-    if (linalg::svd(count, breadth, within, at_hand.within_left, values, at_hand.within_right, at_hand.svd) != 0)
-        return false;
-    linalg::multiply(false, false, height, count, count, 1, basis, height, at_hand.within_left, count, 0, left, height);
-    for (int c = 0; c < breadth; ++c)
-        std::copy(at_hand.within_right + at(0, c, count), at_hand.within_right + at(0, c + 1, count),
-                  right + at(0, c, ld_right));
-    return true;
+bool leading_triplets(int height, int breadth, int count, const okid_real_t* hankel, okid_real_t* left,
+                      okid_real_t* values, okid_real_t* right, int ld_right, void* work) {
+    return find(height, breadth, count, hankel, left, values, right, ld_right, work);
 }
 
 } // namespace okid
