@@ -18,8 +18,8 @@ namespace okid_host {
 namespace {
 
 constexpr std::size_t kept_numbers = std::size_t{1} << 19, fewest_kept = std::size_t{1} << 15;
-constexpr std::size_t quarters = 4;      ///< of the samples kept, of which one goes
-constexpr std::size_t first_blocks = 20; ///< of the samples kept, which one block of sums is at first
+constexpr std::size_t quarters = 4; ///< of the samples kept, of which one goes
+constexpr double first_blocks = 20; ///< of the samples kept, which one block of sums is at first
 
 /// Rows first .. last-1, with the records they are of.
 record_set rows_of(const record_set& set, std::size_t first, std::size_t last) {
@@ -92,7 +92,7 @@ older_samples::older_samples(const record_options& options)
       chain_(n_u_ + n_y_, options.fs_hz, options.decimate) {
     const auto inputs = static_cast<int>(n_u_), outputs = static_cast<int>(n_y_);
     const int lags = longest_lags(inputs, outputs);
-    const double rows = static_cast<double>(newest_samples(n_u_ + n_y_) / first_blocks);
+    const double rows = static_cast<double>(newest_samples(n_u_ + n_y_)) / first_blocks;
     for (std::size_t k = 0; k < chain_.count(); ++k)
         levels_.emplace_back(inputs, outputs, lags, std::llround(rows * chain_.fs_hz(k) / options.fs_hz));
 }
@@ -148,6 +148,23 @@ void older_samples::merge(const older_samples& other) {
     gaps_ += other.gaps_;
     records_ += other.records_;
     longest_ = std::max({longest_, other.longest_, other.length_});
+}
+
+void older_samples::lend_sums(const std::vector<double>& scale, std::vector<record_level>& levels) const {
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        levels_[k].settle();
+        levels[k].older = &levels_[k];
+        levels[k].scale = scale;
+        levels[k].samples += levels_[k].samples();
+    }
+}
+
+void older_samples::add_counts(const missing_count& newest, std::size_t judged, result_context& to) const {
+    to.samples += samples_;
+    to.records += records();
+    to.gaps += gaps_;
+    to.judged_samples = static_cast<long long>(judged);
+    if (newest.samples == 0 && missing_ > 0) to.warnings.push_back(missing_samples({missing_, gaps_}, to.samples));
 }
 
 std::vector<std::byte> older_samples::state() const {

@@ -5,6 +5,7 @@
 #include "consensus/level_memory.hpp"
 #include "consensus/rate_chain.hpp"
 #include "record_set.hpp"
+#include "result/result.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -30,7 +31,6 @@ class older_samples {
     std::size_t take(const record_set& newest);
     void merge(const older_samples& other); ///< as further records
 
-    std::size_t levels() const { return levels_.size(); }
     const level_memory& level(std::size_t k) const { return levels_[k]; }
     long long samples() const { return samples_; } ///< those missing with them
     long long missing() const { return missing_; }
@@ -39,6 +39,11 @@ class older_samples {
     /// Samples of the longest record, and of the one that goes on among the newest (0: none does).
     long long longest() const { return longest_; }
     long long begun() const { return within_ ? length_ : 0; }
+
+    /// Sums for the levels of the newest samples; scale: what one unit of a level is in each channel.
+    void lend_sums(const std::vector<double>& scale, std::vector<record_level>& levels) const;
+    /// Counts and gaps with those of the newest samples.
+    void add_counts(const missing_count& newest, std::size_t judged, result_context& to) const;
 
     std::vector<std::byte> state() const;
     /// Throws `failure` (exit 2), where `where` begins the message, for bytes that are none; then nothing has changed.

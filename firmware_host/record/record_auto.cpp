@@ -239,16 +239,6 @@ void remark_mixed(const std::vector<bool>& turned, const record_options& options
                     fmt::join(groups[0], ", "), fmt::join(groups[1], ", ")));
 }
 
-/// The sums of older samples to the levels of the newest ones.
-void remember(const older_samples& before, const std::vector<double>& scale, std::vector<record_level>& levels) {
-    for (std::size_t k = 0; k < levels.size(); ++k) {
-        before.level(k).settle();
-        levels[k].older = &before.level(k);
-        levels[k].scale = scale;
-        levels[k].samples += before.level(k).samples();
-    }
-}
-
 /// Everything up to the modes, their standard deviations and the shapes.
 std::vector<listed_mode> find_modes_agreed(const record_options& options, record_work& work) {
     const auto tell = [&](const char* stage) {
@@ -262,7 +252,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     tell("making streams of lower rates");
     std::vector<double> scale;
     auto levels = make_levels(std::move(rows), set.n_u, set.n_y, options.fs_hz, work.at_rest, options.decimate, scale);
-    if (work.before) remember(*work.before, scale, levels);
+    if (work.before) work.before->lend_sums(scale, levels);
     const double lowest_hz = periods_of_horizon * levels.back().fs_hz;
     tell("looking with several methods, horizons and rates");
     auto runs = look_at(levels, 0, n_u, n_y, work.at_rest, options.threads);
@@ -445,17 +435,6 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
     return listed;
 }
 
-/// What is known of samples that are no longer kept.
-void add_before(const missing_count& newest, record_work& work) {
-    result_context& context = work.context;
-    context.samples += work.before->samples();
-    context.records += work.before->records();
-    context.gaps += work.before->gaps();
-    context.judged_samples = static_cast<long long>(work.set.count());
-    if (newest.samples == 0 && work.before->missing() > 0)
-        context.warnings.push_back(missing_samples({work.before->missing(), work.before->gaps()}, context.samples));
-}
-
 } // namespace
 
 record_result identify_auto(record_set records, const record_options& given, const older_samples* before) {
@@ -484,7 +463,7 @@ record_result identify_auto(record_set records, const record_options& given, con
                         work.set.count(), work.before->samples()));
         work.before = nullptr;
     }
-    if (work.before) add_before(asked, work);
+    if (work.before) work.before->add_counts(asked, work.set.count(), work.context);
     work.context.warnings.insert(work.context.warnings.end(), screened.said.begin(), screened.said.end());
     work.at_rest = begin_at_rest(work.set, options);
     if (work.at_rest) work.context.start = "rest";

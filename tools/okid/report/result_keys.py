@@ -15,8 +15,8 @@ NEEDED = (
 _TOP = {
     "fs_hz": "rate", "samples": "count", "records": "count?", "gaps": "count?", "inputs": "names", "outputs": "names",
     "judged_samples": "count?", "p": "count?", "rows": "count?", "order": "count", "method": "text?", "hold": "text?",
-    "detrend": "text?", "start": "text?", "version": "text?", "singular_values": "numbers?", "model": "object", "markov": "object?",
-    "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
+    "detrend": "text?", "start": "text?", "version": "text?", "singular_values": "numbers?", "model": "object",
+    "markov": "object?", "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
 }  # fmt: skip
 _MODEL = {"dt": "rate", "A": "matrix", "B": "matrix", "C": "loose matrix", "D": "loose matrix", "K": "loose matrix?"}
 _MODE = {
