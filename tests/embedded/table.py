@@ -36,7 +36,7 @@ KERNELS = {
     "observer, structured": ("structured",),
     "stability of the observer": ("companion",),
     "Markov parameters": ("markov",),
-    "ERA and ERA/DC": ("era", "era_correlation", "era_leading", "triangular"),
+    "ERA and ERA/DC": ("era", "era_correlation", "triangular"),
     "modes": ("modal",),
     "linear algebra (Eigen)": ("linalg_eigen", "linalg_eigen_symmetric"),
 }

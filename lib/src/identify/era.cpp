@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    eigensystem realization from system Markov parameters, or from their data correlations
-// METHOD     SVD of H(0), of its leading triplets where no order needs more (era_leading.cpp); R^T H(1) S once for every order that will be asked for; observer gain by least squares through
+// METHOD     SVD of H(0); R^T H(1) S once for every order that will be asked for; observer gain by least squares through
 //            the identified observability matrix. ERA/DC: see era_correlation.cpp for the matrix that is decomposed
 // REFERENCE  paper eq. (43)-(54); Juang and Pappa (1985); ERA/DC: Juang, Cooper, Wright (1988); EMAC: Pappa, Elliott,
 //            Schenk (1993)
@@ -9,7 +9,6 @@
 #include <okid/steps/era.h>
 
 #include "identify/era_correlation.hpp"
-#include "identify/era_leading.hpp"
 #include "linalg/linalg.hpp"
 
 #include <algorithm>
@@ -20,8 +19,6 @@ using std::size_t;
 struct okid_era {
     okid_era_config_t config;
     int height, breadth, rank; // of what is decomposed
-    int expected, carried;     // largest order that will be asked for, 0: any; triplets that are known
-    size_t work_bytes;
     okid_real_t *hankel, *left, *values, *right, *work, *product, *core, *rotated;
     okid::correlation correlation;
 };
@@ -38,10 +35,8 @@ size_t lay_out(okid_era& e, okid::arena& memory) {
     e.values = memory.take<okid_real_t>(rank);
     e.right = memory.take<okid_real_t>(rank * breadth);
     // The products begin when the SVD is done: one memory for both.
-    const size_t work = std::max(okid::linalg::svd_work(e.height, e.breadth),
-                                 height * std::max(rank, static_cast<size_t>(e.config.n_y)));
-    e.work = e.product = memory.take<okid_real_t>(work);
-    e.work_bytes = work * sizeof(okid_real_t);
+    e.work = e.product = memory.take<okid_real_t>(std::max(okid::linalg::svd_work(e.height, e.breadth),
+                                                           height * std::max(rank, static_cast<size_t>(e.config.n_y))));
     e.core = memory.take<okid_real_t>(rank * rank);
     e.rotated = memory.take<okid_real_t>(rank * static_cast<size_t>(std::max(e.config.n_y, e.config.n_u)));
     if (correlated(e)) e.correlation.lay_out(e.rank, memory);
@@ -79,17 +74,6 @@ void fill(okid_era& e, const okid_real_t* markov, int shift) {
         okid::fill_hankel(c.n_u, c.n_y, c.rows, c.cols, markov + (1 + shift) * c.n_u * c.n_y, e.hankel);
 }
 
-/// All triplets of H, or the leading ones where no order needs the others.
-bool decompose(okid_era& e) {
-    if (!correlated(e) && e.expected > 0 && okid::has_leading(e.height, e.breadth, e.expected, e.work_bytes) &&
-        okid::leading_triplets(e.height, e.breadth, e.expected, e.hankel, e.left, e.values, e.right, e.rank, e.work)) {
-        e.carried = e.expected;
-        return true;
-    }
-    e.carried = e.rank;
-    return okid::linalg::svd(e.height, e.breadth, e.hankel, e.left, e.values, e.right, e.work) == 0;
-}
-
 /// rotated (rank x count) <- P^+ rhs without Sigma: least squares on the first r block rows of the observability matrix.
 /// @param rhs  r n_y x count, leading dimension height
 bool project(okid_era& e, int order, const okid_real_t* rhs, int count) {
@@ -109,8 +93,6 @@ okid::era_view okid::view_of(const okid_era_t* self) {
             self->right,
             correlated(*self) ? self->correlation.right : nullptr};
 }
-
-void okid::era_expect(okid_era_t* self, int order) { self->expected = order; }
 
 size_t okid_era_memsize(const okid_era_config_t* config) {
     if (config == nullptr || !valid(*config)) return 0;
@@ -148,12 +130,13 @@ okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov) {
     okid_era& e = *self;
     if (correlated(e) && !e.correlation.prepare(markov)) return OKID_ERR_NUMERIC;
     fill(e, markov, 0);
-    if (!decompose(e)) return OKID_ERR_NUMERIC;
+    if (okid::linalg::svd(e.height, e.breadth, e.hankel, e.left, e.values, e.right, e.work) != 0)
+        return OKID_ERR_NUMERIC;
     fill(e, markov, 1);
-    okid::linalg::multiply(false, true, e.height, e.carried, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0,
+    okid::linalg::multiply(false, true, e.height, e.rank, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0,
                            e.product, e.height);
-    okid::linalg::multiply(true, false, e.carried, e.carried, e.height, 1, e.left, e.height, e.product, e.height, 0,
-                           e.core, e.rank);
+    okid::linalg::multiply(true, false, e.rank, e.rank, e.height, 1, e.left, e.height, e.product, e.height, 0, e.core,
+                           e.rank);
     if (correlated(e)) e.correlation.observability(e.rank, e.left);
     return OKID_OK;
 }
@@ -167,7 +150,7 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, 
                                const okid_real_t* gain_markov, okid_real_t* K) {
     if (self == nullptr || A == nullptr || B == nullptr || C == nullptr) return OKID_ERR_NULL;
     okid_era& e = *self;
-    if (order < 1 || order > std::min(largest_order(e), e.carried) || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
+    if (order < 1 || order > largest_order(e) || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
     const int ny = e.config.n_y, nu = e.config.n_u;
     for (int j = 0; j < order; ++j)
         for (int i = 0; i < order; ++i)
@@ -201,7 +184,7 @@ okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_mo
         modes->psi_re == nullptr || modes->psi_im == nullptr || emac == nullptr)
         return OKID_ERR_NULL;
     const okid_era& e = *self;
-    if (order < 1 || order > e.carried) return OKID_ERR_DIM;
+    if (order < 1 || order > e.rank) return OKID_ERR_DIM;
     const int ny = e.config.n_y, last = e.height - ny;
     constexpr okid_real_t quarter_pi = static_cast<okid_real_t>(0.78539816339744831);
     for (int k = 0; k < modes->count; ++k) {

@@ -18,9 +18,6 @@ struct era_view {
 };
 era_view view_of(const okid_era_t* self);
 
-/// No order above this one will be asked for. 0: any may be.
-void era_expect(okid_era_t* self, int order);
-
 struct correlation {
     okid_era_config_t config;
     int rows, cols, rank;                       ///< block rows and columns of the tall Hankel matrix; columns of basis

@@ -6,7 +6,6 @@
 // NUMERICS   see the modules
 // WORKSPACE  (m(lags+1))^2 for the Gram matrix, the modules' own, all in the caller's block; no heap
 #include "identify/identify.hpp"
-#include "identify/era_correlation.hpp"
 
 #include <okid/modal.h>
 #include <okid/steps/era.h>
@@ -263,13 +262,9 @@ okid_status_t okid_identify_create(okid_identify_t** self, const okid_identify_c
     *s = plan(*config);
     lay_out(*s, memory);
     *self = s;
-    if (s->by_subspace)
-        return okid_subspace_create(&s->subspace, &s->subspace_config, s->storey_block,
-                                    okid_subspace_memsize(&s->subspace_config));
-    const okid_status_t status =
-        okid_era_create(&s->era, &s->era_config, s->storey_block, okid_era_memsize(&s->era_config));
-    if (status == OKID_OK) okid::era_expect(s->era, s->max_order);
-    return status;
+    return s->by_subspace ? okid_subspace_create(&s->subspace, &s->subspace_config, s->storey_block,
+                                                 okid_subspace_memsize(&s->subspace_config))
+                          : okid_era_create(&s->era, &s->era_config, s->storey_block, okid_era_memsize(&s->era_config));
 }
 
 okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator, okid_identified_t* out) {
