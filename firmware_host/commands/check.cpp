@@ -73,7 +73,7 @@ std::string summary(const live_config& config, const stream_config& stream, cons
     const okid_method_t method = method_of(id.method);
     const std::string horizon =
         id.method == "auto"
-            ? "several methods, horizons and rates, an update when an eighth of the memory is new, not before"
+            ? "several methods, horizons and rates, which modes there are when an eighth is new, an update each"
             : fmt::format("{}{} block rows, an update each",
                           looks_back_rows(method, config.n_u) ? "" : fmt::format("p {}, ", id.p),
                           rows_used(method, config.n_u, id.p, id.rows));

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace okid_host {
 namespace {
@@ -34,33 +33,26 @@ void check(okid_status_t status) {
     if (status < 0) throw failure(exit_device, std::string("sums of older samples: ") + okid_status_text(status));
 }
 
-template <class Number> void put(std::vector<std::byte>& to, const Number& number) {
-    const auto* const from = reinterpret_cast<const std::byte*>(&number);
-    to.insert(to.end(), from, from + sizeof number);
-}
-
 void put_sums(std::vector<std::byte>& to, okid_accumulator_t* sums) {
-    const std::size_t bytes = okid_accumulator_serialised_size(sums), at = to.size() + sizeof(std::uint64_t);
-    put(to, static_cast<std::uint64_t>(bytes));
+    const std::size_t bytes = okid_accumulator_serialised_size(sums), at = to.size() + word_bytes;
+    put_word(to, bytes);
     to.resize(at + bytes);
     check(okid_accumulator_serialise(sums, to.data() + at, bytes));
 }
 
-/// Sums of the same channels and lags out of what put_sums() wrote; else none.
-owned_sums sums_in(const std::byte*& from, std::size_t& left, const okid_accumulator_config_t& like) {
-    std::uint64_t bytes = 0;
-    if (left < sizeof bytes) return {};
-    std::memcpy(&bytes, from, sizeof bytes);
-    from += sizeof bytes, left -= sizeof bytes;
-    okid_accumulator_config_t found{};
-    if (bytes > left || okid_accumulator_peek(from, bytes, &found) != OKID_OK || found.n_u != like.n_u ||
+/// Sums of the same channels and lags as `other` out of what put_sums() wrote; else none.
+owned_sums sums_in(byte_reader& from, okid_accumulator_t* other) {
+    okid_accumulator_config_t found{}, like{};
+    okid_accumulator_config(other, &like);
+    const std::uint64_t bytes = from.word();
+    const std::byte* const sums = from.bytes(bytes);
+    if (!sums || okid_accumulator_peek(sums, bytes, &found) != OKID_OK || found.n_u != like.n_u ||
         found.n_y != like.n_y || found.lags != like.lags || found.sample != like.sample || found.slots != like.slots ||
         found.spare_slots != like.spare_slots || found.edges != like.edges || found.forgetting != like.forgetting)
         return {};
     found.buffer = like.buffer;
     owned_sums out(found);
-    if (out.sums && okid_accumulator_deserialise(out.sums, from, bytes) != OKID_OK) out.sums = nullptr;
-    from += bytes, left -= bytes;
+    if (out.sums && okid_accumulator_deserialise(out.sums, sums, bytes) != OKID_OK) out.sums = nullptr;
     return out;
 }
 
@@ -133,28 +125,20 @@ bool level_memory::take(okid_accumulator_t* to) const {
 
 std::vector<std::byte> level_memory::state() const {
     std::vector<std::byte> out;
-    put(out, static_cast<std::int64_t>(samples_));
+    put_word(out, static_cast<std::uint64_t>(samples_));
     put_sums(out, newest_.sums);
     put_sums(out, base_.sums);
     return out;
 }
 
-std::size_t level_memory::put_back(const std::byte* from, std::size_t bytes) {
-    const std::byte* const first = from;
-    std::int64_t samples = 0;
-    if (bytes < sizeof samples) return 0;
-    std::memcpy(&samples, from, sizeof samples);
-    from += sizeof samples, bytes -= sizeof samples;
-    okid_accumulator_config_t like{};
-    okid_accumulator_config(newest_.sums, &like);
-    owned_sums newest = sums_in(from, bytes, like);
-    okid_accumulator_config(base_.sums, &like);
-    owned_sums base = newest.sums ? sums_in(from, bytes, like) : owned_sums();
-    if (!base.sums || samples < 0) return 0;
+bool level_memory::put_back(byte_reader& from) {
+    const auto samples = static_cast<long long>(from.word());
+    owned_sums newest = sums_in(from, newest_.sums), base = sums_in(from, base_.sums);
+    if (!newest.sums || !base.sums || samples < 0) return false;
     samples_ = samples;
     newest_ = std::move(newest);
     base_ = std::move(base);
-    return static_cast<std::size_t>(from - first);
+    return true;
 }
 
 } // namespace okid_host

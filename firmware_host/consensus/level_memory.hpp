@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The samples of one rate that are no longer kept: their sums, in blocks of time, in memory of fixed size.
 #pragma once
+#include "files/byte_state.hpp"
 #include "owned_sums.hpp"
 
 #include <okid/accumulator.h>
@@ -35,8 +36,8 @@ class level_memory {
     void settle() const { okid_accumulator_serialised_size(newest_.sums); }
 
     std::vector<std::byte> state() const;
-    /// @return bytes that were read of the beginning; 0: they are no state of such sums, nothing has changed
-    std::size_t put_back(const std::byte* from, std::size_t bytes);
+    /// @return false: that is no state of such sums; nothing has changed
+    bool put_back(byte_reader& from);
 
   private:
     bool has_base() const { return okid_accumulator_rows(base_.sums) > 0; }

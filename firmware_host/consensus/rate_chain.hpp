@@ -16,6 +16,10 @@ class rate_chain {
 
     std::size_t count() const { return rates_.size(); }
     double fs_hz(std::size_t k) const { return rates_[k].fs_hz; }
+    /// Samples after which no filter remembers what came before.
+    std::int64_t look_back() const {
+        return static_cast<std::int64_t>((rates_.size() * rates_[1].weights.size()) << rates_.size());
+    }
 
     /// A row of m numbers, NaN = missing. Calls use(k, row) for every rate k that has a row with it.
     template <class Use> void add(const double* row, Use&& use) {

@@ -216,21 +216,21 @@ std::vector<std::byte> agreement::state() const {
     return samples_body(set.n_u, set.n_y, out);
 }
 
-/// @param first  they begin the stream, which goes on where they ended
-void agreement::take(const saved_samples& from, bool begins) {
-    if (!from.older.empty()) {
-        if (!older_)
-            throw failure(exit_usage, where_ + "the state keeps sums of older samples, expected one of a window or of "
-                                               "hits at several places, which keep samples alone");
-        older_samples other(options_);
-        other.put_back(where_, from.older.data(), from.older.size());
-        counts_.samples += other.samples() - other.missing();
-        counts_.missing += other.missing();
-        counts_.gaps += other.gaps();
-        if (begins)
-            *older_ = std::move(other);
-        else
-            older_->merge(other);
+/// The sums in a state; none: nullptr.
+std::unique_ptr<older_samples> agreement::older_in(const saved_samples& from) const {
+    if (from.older.empty()) return nullptr;
+    if (!older_)
+        throw failure(exit_usage, where_ + "the state keeps sums of older samples, expected one of a window or of "
+                                           "hits at several places, which keep samples alone");
+    return std::make_unique<older_samples>(options_, where_, from.older);
+}
+
+/// @param older  those before them, merged or put back by now
+void agreement::take(const saved_samples& from, const older_samples* older) {
+    if (older) {
+        counts_.samples += older->samples() - older->missing();
+        counts_.missing += older->missing();
+        counts_.gaps += older->gaps();
     }
     asked_ = true;
     std::size_t first = 0;
@@ -246,13 +246,18 @@ saved_samples agreement::read(const void* state, std::size_t bytes) const {
 
 void agreement::restore(const void* state, std::size_t bytes) {
     const saved_samples from = read(state, bytes);
+    std::unique_ptr<older_samples> older = older_in(from);
     reset();
-    take(from, true);
+    if (older) older_ = std::move(older);
+    take(from, from.older.empty() ? nullptr : older_.get());
 }
 
 void agreement::merge(const void* state, std::size_t bytes) {
     if (window_) throw failure(exit_usage, where_ + "a window takes no further records, only a growing memory");
-    take(read(state, bytes), false);
+    const saved_samples from = read(state, bytes);
+    const std::unique_ptr<older_samples> older = older_in(from);
+    if (older) older_->merge(*older);
+    take(from, older.get());
 }
 
 } // namespace okid_host

@@ -48,7 +48,7 @@ class agreement {
     const okid_identified_t& model() const { return model_.view(); } ///< of the last run() or follow()
     const std::optional<deviations>& sigma() const { return sigma_; }
     [[noreturn]] void refuse() const { throw failure(*fault_); } ///< of the last run()
-    /// An eighth of what is kept came since the last run(): so all updates together cost a few times one result.
+    /// An eighth of all came since the last run(): the runs of a long stream grow with the logarithm of its length.
     bool due() const { return asked_ || due_after(came_ - run_at_); }
     bool due_after(std::int64_t samples) const { return 8 * samples >= basis(); }
     void ask() { asked_ = true; } ///< the next run() is due now
@@ -71,7 +71,8 @@ class agreement {
 
   private:
     saved_samples read(const void* state, std::size_t bytes) const;
-    void take(const saved_samples& from, bool begins);
+    std::unique_ptr<older_samples> older_in(const saved_samples& from) const;
+    void take(const saved_samples& from, const older_samples* older);
     void push(const double* row);
     const double* at(std::int64_t sample) const { return rows_.data() + static_cast<std::size_t>(sample - base_) * m_; }
     record_set records() const;

@@ -64,8 +64,7 @@ void followed_modes::add(const double* row) {
 void followed_modes::add_missing(std::int64_t count) {
     // Missing rows go through the filters, so that the lower rates keep their step; after a gap that is longer than all
     // filters together look back each rate begins again.
-    const auto longest = static_cast<std::int64_t>((most_levels * decimation_weights(2).size()) << most_levels);
-    if (count > 0 && count < longest) {
+    if (count > 0 && count < chain_.look_back()) {
         for (; count > 0; --count) add(missing_.data());
         return;
     }

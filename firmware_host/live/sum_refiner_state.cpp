@@ -5,6 +5,7 @@
 #include "sum_refiner.hpp"
 
 #include "error.hpp"
+#include "files/byte_state.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -14,32 +15,9 @@ namespace okid_host {
 namespace {
 
 constexpr char sums_magic[] = "OKIDREF\n";
-constexpr std::size_t word = 8, fixed_words = 4; // magic, bytes, whiteness, length of the filter
+constexpr std::size_t word = word_bytes, fixed_words = 4; // magic, bytes, whiteness, length of the filter
 constexpr std::size_t most_taps = 41;
 constexpr std::int32_t most_pieces = 4096; // of the library
-
-void put(std::vector<std::byte>& to, std::uint64_t value) {
-    for (std::size_t k = 0; k < word; ++k) to.push_back(static_cast<std::byte>(value >> (8 * k)));
-}
-
-void put(std::vector<std::byte>& to, double value) {
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, &value, word);
-    put(to, bits);
-}
-
-std::uint64_t integer_at(const std::byte* from) {
-    std::uint64_t value = 0;
-    for (std::size_t k = 0; k < word; ++k) value |= std::to_integer<std::uint64_t>(from[k]) << (8 * k);
-    return value;
-}
-
-double number_at(const std::byte* from) {
-    const std::uint64_t bits = integer_at(from);
-    double value = 0;
-    std::memcpy(&value, &bits, word);
-    return value;
-}
 
 [[noreturn]] void damaged() { throw failure(exit_usage, "the state is damaged: its sums of a refinement are cut off"); }
 
@@ -49,10 +27,10 @@ std::vector<std::byte> sum_refiner::state() {
     const std::size_t bytes = okid_correlation_serialised_size(sums_.sums);
     std::vector<std::byte> out;
     for (std::size_t k = 0; k < word; ++k) out.push_back(static_cast<std::byte>(sums_magic[k]));
-    put(out, std::uint64_t{word * (fixed_words + filter_.size()) + bytes});
-    put(out, whiteness_);
-    put(out, std::uint64_t{filter_.size()});
-    for (const double x : filter_) put(out, x);
+    put_word(out, word * (fixed_words + filter_.size()) + bytes);
+    put_number(out, whiteness_);
+    put_word(out, filter_.size());
+    for (const double x : filter_) put_number(out, x);
     const std::size_t at = out.size();
     out.resize(at + bytes);
     check_statistics(okid_correlation_serialise(sums_.sums, out.data() + at, bytes));
@@ -61,21 +39,22 @@ std::vector<std::byte> sum_refiner::state() {
 
 std::size_t sum_refiner::bytes_in(const void* state, std::size_t bytes) {
     if (bytes < word * fixed_words || std::memcmp(state, sums_magic, word) != 0) return 0;
-    const std::uint64_t own = integer_at(static_cast<const std::byte*>(state) + word);
+    const std::uint64_t own = byte_reader(static_cast<const std::byte*>(state) + word, word).word();
     if (own > bytes) damaged();
     return static_cast<std::size_t>(own);
 }
 
 sum_refiner::carried sum_refiner::read(const void* state, std::size_t bytes) const {
-    const auto* const from = static_cast<const std::byte*>(state);
-    if (bytes < word * fixed_words) damaged();
+    byte_reader in(state, bytes);
+    in.bytes(2 * word); // magic, bytes of all
     carried out;
-    out.whiteness = number_at(from + 2 * word);
-    const std::uint64_t taps = integer_at(from + 3 * word);
-    if (taps < 1 || taps > most_taps || bytes < word * (fixed_words + taps)) damaged();
-    for (std::size_t k = 0; k < taps; ++k) out.filter.push_back(number_at(from + word * (fixed_words + k)));
-    const std::byte* const sums = from + word * (fixed_words + taps);
-    const std::size_t size = bytes - static_cast<std::size_t>(sums - from);
+    out.whiteness = in.number();
+    const std::uint64_t taps = in.word();
+    if (taps < 1 || taps > most_taps) damaged();
+    for (std::size_t k = 0; k < taps; ++k) out.filter.push_back(in.number());
+    if (in.failed()) damaged();
+    const std::size_t size = in.left();
+    const std::byte* const sums = in.bytes(size);
     okid_correlation_config_t found{};
     if (const okid_status_t status = okid_correlation_peek(sums, size, &found); status != OKID_OK)
         throw failure(exit_usage, fmt::format("the state is damaged: {}", okid_status_text(status)));

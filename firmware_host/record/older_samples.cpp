@@ -12,7 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <fmt/format.h>
 
 namespace okid_host {
 namespace {
@@ -42,40 +42,15 @@ std::size_t leaving(const record_set& newest) {
     return usual;
 }
 
-template <class Number> void put(std::vector<std::byte>& to, const Number& number) {
-    const auto* const from = reinterpret_cast<const std::byte*>(&number);
-    to.insert(to.end(), from, from + sizeof number);
+/// Samples that are complete.
+long long complete(const record_set& set, std::size_t first, std::size_t last) {
+    const auto* const from = set.samples.data();
+    long long out = 0;
+    for (std::size_t n = first; n < last; ++n)
+        out += std::none_of(from + n * set.channels(), from + (n + 1) * set.channels(),
+                            [](double x) { return std::isnan(x); });
+    return out;
 }
-
-void put_all(std::vector<std::byte>& to, const std::vector<double>& numbers) {
-    put(to, static_cast<std::uint64_t>(numbers.size()));
-    for (const double x : numbers) put(to, x);
-}
-
-/// What put() and put_all() wrote, one after the other; throws where the bytes end early.
-struct byte_reader {
-    const std::byte* from;
-    std::size_t left;
-    const std::string& where;
-
-    template <class Number> Number next() {
-        Number out{};
-        if (left < sizeof out) damaged();
-        std::memcpy(&out, from, sizeof out);
-        from += sizeof out, left -= sizeof out;
-        return out;
-    }
-    std::vector<double> numbers() {
-        const auto count = next<std::uint64_t>();
-        if (count > left / sizeof(double)) damaged();
-        std::vector<double> out(count);
-        for (double& x : out) x = next<double>();
-        return out;
-    }
-    [[noreturn]] void damaged() const {
-        throw failure(exit_usage, where + "the state is damaged: its sums of older samples cannot be read");
-    }
-};
 
 } // namespace
 
@@ -130,6 +105,7 @@ std::size_t older_samples::take(const record_set& newest) {
     if (lines_)
         for (const record_data& record : clean.records) remove_lines(clean.rows(record), m, record.count);
     remove_means(clean);
+    screened_ += complete(raw, 0, count) - complete(clean, 0, count);
     for (std::size_t r = 0; r < clean.records.size() && clean.records[r].first < count; ++r) {
         const record_data& record = clean.records[r];
         if (!within_) begin_record(begins_at_rest_ || begins_at_rest(clean, record));
@@ -146,6 +122,7 @@ void older_samples::merge(const older_samples& other) {
     samples_ += other.samples_;
     missing_ += other.missing_;
     gaps_ += other.gaps_;
+    screened_ += other.screened_;
     records_ += other.records_;
     longest_ = std::max({longest_, other.longest_, other.length_});
 }
@@ -161,18 +138,31 @@ void older_samples::lend_sums(const std::vector<double>& scale, std::vector<reco
 
 void older_samples::add_counts(const missing_count& newest, std::size_t judged, result_context& to) const {
     to.samples += samples_;
-    to.records += records();
+    to.records += static_cast<int>(records());
     to.gaps += gaps_;
     to.judged_samples = static_cast<long long>(judged);
-    if (newest.samples == 0 && missing_ > 0) to.warnings.push_back(missing_samples({missing_, gaps_}, to.samples));
+    remarks& said = to.warnings;
+    said.erase(std::remove_if(said.begin(), said.end(), [](const auto& one) { return one.first == "missing_samples"; }),
+               said.end());
+    missing_count all = newest;
+    all.samples += missing_ - screened_;
+    all.gaps = to.gaps;
+    if (all.samples > 0) said.push_back(missing_samples(all, to.samples));
+    if (screened_ > 0)
+        said.emplace_back(
+            "screened", fmt::format("{} of the {} samples before the newest {} had an output that was clipped, frozen, "
+                                    "dropped to zero or a spike: left out as gaps, nothing is interpolated",
+                                    screened_, samples_, judged));
 }
 
 std::vector<std::byte> older_samples::state() const {
     std::vector<std::byte> out;
-    for (const long long number : {samples_, missing_, gaps_, length_, longest_}) put(out, std::int64_t{number});
-    put(out, std::int32_t{records_});
-    put(out, std::int32_t{within_ ? 1 : 0});
-    put_all(out, chain_.state());
+    for (const long long number : {samples_, missing_, gaps_, screened_, length_, longest_, records_,
+                                   static_cast<long long>(within_), static_cast<long long>(in_gap_)})
+        put_word(out, static_cast<std::uint64_t>(number));
+    const std::vector<double> filters = chain_.state();
+    put_word(out, filters.size());
+    for (const double x : filters) put_number(out, x);
     for (const level_memory& level : levels_) {
         const std::vector<std::byte> sums = level.state();
         out.insert(out.end(), sums.begin(), sums.end());
@@ -180,22 +170,27 @@ std::vector<std::byte> older_samples::state() const {
     return out;
 }
 
-void older_samples::put_back(const std::string& where, const std::byte* from, std::size_t bytes) {
-    byte_reader in{from, bytes, where};
-    long long counts[5];
-    for (long long& count : counts)
-        if (count = in.next<std::int64_t>(); count < 0) in.damaged();
-    const auto records = in.next<std::int32_t>(), within = in.next<std::int32_t>();
-    if (records < 0 || within < 0 || within > 1 || !chain_.put_back(in.numbers())) in.damaged();
-    for (level_memory& level : levels_) {
-        const std::size_t read = level.put_back(in.from, in.left);
-        if (read == 0) in.damaged();
-        in.from += read, in.left -= read;
+older_samples::older_samples(const record_options& options, const std::string& where,
+                             const std::vector<std::byte>& state)
+    : older_samples(options) {
+    byte_reader in(state.data(), state.size());
+    long long within = 0, in_gap = 0;
+    bool good = true;
+    for (long long* const to :
+         {&samples_, &missing_, &gaps_, &screened_, &length_, &longest_, &records_, &within, &in_gap}) {
+        *to = static_cast<long long>(in.word());
+        good = good && *to >= 0;
     }
-    if (in.left != 0) in.damaged();
-    samples_ = counts[0], missing_ = counts[1], gaps_ = counts[2], length_ = counts[3], longest_ = counts[4];
-    records_ = records;
     within_ = within == 1;
+    in_gap_ = in_gap == 1;
+    const std::uint64_t count = in.word();
+    good = good && within <= 1 && in_gap <= 1 && count <= in.left() / word_bytes;
+    std::vector<double> filters(good ? static_cast<std::size_t>(count) : 0);
+    for (double& x : filters) x = in.number();
+    good = good && chain_.put_back(filters);
+    for (level_memory& level : levels_) good = good && level.put_back(in);
+    if (!good || in.failed() || in.left() != 0)
+        throw failure(exit_usage, where + "the state is damaged: its sums of older samples cannot be read");
 }
 
 std::unique_ptr<older_samples> split_older(record_set& set, const record_options& options) {

@@ -24,6 +24,8 @@ class older_samples {
   public:
     /// Of the options the channels, their rate, decimate, detrend and start. Throws `failure` (exit 1) without memory
     explicit older_samples(const record_options& options);
+    /// Those of state(). Throws `failure` (exit 2), where `where` begins the message, for bytes that are none
+    older_samples(const record_options& options, const std::string& where, const std::vector<std::byte>& state);
     static double bytes(std::size_t n_u, std::size_t n_y);
 
     /// The first of the samples kept are kept no longer: they are screened, then summed.
@@ -35,19 +37,17 @@ class older_samples {
     long long samples() const { return samples_; } ///< those missing with them
     long long missing() const { return missing_; }
     long long gaps() const { return gaps_; }
-    int records() const { return records_ - (within_ ? 1 : 0); } ///< that are older as a whole
+    long long records() const { return records_ - (within_ ? 1 : 0); } ///< that are older as a whole
     /// Samples of the longest record, and of the one that goes on among the newest (0: none does).
     long long longest() const { return longest_; }
     long long begun() const { return within_ ? length_ : 0; }
 
     /// Sums for the levels of the newest samples; scale: what one unit of a level is in each channel.
     void lend_sums(const std::vector<double>& scale, std::vector<record_level>& levels) const;
-    /// Counts and gaps with those of the newest samples.
+    /// Counts, and what is to be said of missing and faulty samples, with those of the newest. newest: missing as they came
     void add_counts(const missing_count& newest, std::size_t judged, result_context& to) const;
 
     std::vector<std::byte> state() const;
-    /// Throws `failure` (exit 2), where `where` begins the message, for bytes that are none; then nothing has changed.
-    void put_back(const std::string& where, const std::byte* from, std::size_t bytes);
 
   private:
     void begin_record(bool at_rest);
@@ -58,8 +58,8 @@ class older_samples {
     bool begins_at_rest_, lines_;
     rate_chain chain_;
     std::vector<level_memory> levels_;
-    long long samples_ = 0, missing_ = 0, gaps_ = 0, length_ = 0, longest_ = 0;
-    int records_ = 0;
+    long long samples_ = 0, missing_ = 0, gaps_ = 0, length_ = 0, longest_ = 0, records_ = 0;
+    long long screened_ = 0;               ///< of those missing
     bool within_ = false, in_gap_ = false; ///< the newest samples go on with the last record taken
 };
 

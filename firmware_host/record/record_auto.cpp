@@ -463,7 +463,8 @@ record_result identify_auto(record_set records, const record_options& given, con
                         work.set.count(), work.before->samples()));
         work.before = nullptr;
     }
-    if (work.before) work.before->add_counts(asked, work.set.count(), work.context);
+    if (work.before)
+        work.before->add_counts(asked_gaps > 0 ? missing : missing_count(), work.set.count(), work.context);
     work.context.warnings.insert(work.context.warnings.end(), screened.said.begin(), screened.said.end());
     work.at_rest = begin_at_rest(work.set, options);
     if (work.at_rest) work.context.start = "rest";

@@ -71,6 +71,16 @@ def measured(rng: np.random.Generator, clean: Real, noise: float) -> Real:
     return np.asarray(clean + spread * (noise * rng.standard_normal(clean.shape) + rng.uniform(-1, 1, clean.shape[1])))
 
 
+def response(truth: Truth, force: Real, fs: float, times: int, kinds: str = "") -> Real:
+    """To a force at `times` the rate, sampled."""
+    return sampled(modal(truth, force, 1 / fs / times, kinds), fs, times)
+
+
+def shown(truth: Truth, fs: float, u: Real | None, y: Real, options: Mapping[str, Any] | None = None) -> Record:
+    """All modes of the structure are in the band."""
+    return Record(u, y, fs, truth.hz, truth.damping, truth.shapes, options or {})
+
+
 def hits(count: int, fine_hz: float, at_s: list[float], width_s: float, rng: np.random.Generator) -> Real:
     """Smooth pulses (1 - cos), a little different in strength and width."""
     t = np.arange(count)[:, None] / fine_hz
@@ -102,8 +112,8 @@ def plate(fs: float, seconds: float, at_s: list[float], seed: int) -> Record:
     truth = Truth(hz[first], rng.uniform(0.002, 0.006, 23), deflection(strike)[:, None], deflection(sensor)[None])
     times = 4
     force = hits(int(seconds * fs * times), fs * times, at_s, 0.0006, rng)
-    u, y = sampled(force, fs, times), sampled(modal(truth, force, 1 / fs / times), fs, times)
-    return Record(measured(rng, u, 0.002), measured(rng, y, 0.002), fs, truth.hz, truth.damping, truth.shapes)
+    u, y = sampled(force, fs, times), response(truth, force, fs, times)
+    return shown(truth, fs, measured(rng, u, 0.002), measured(rng, y, 0.002))
 
 
 def rod(seed: int) -> Record:
@@ -117,8 +127,8 @@ def rod(seed: int) -> Record:
         np.cos(np.pi * order * 0.03)[None],
     )
     force = hits(int(2.0 * fs * times), fs * times, [0.05], 0.00012, rng)
-    y = sampled(modal(truth, force, 1 / fs / times), fs, times)[int(0.06 * fs) :]
-    return Record(None, measured(rng, y, 0.002), fs, truth.hz, truth.damping, truth.shapes)
+    y = response(truth, force, fs, times)[int(0.06 * fs) :]
+    return shown(truth, fs, None, measured(rng, y, 0.002))
 
 
 def bridge(seed: int) -> Record:
@@ -133,8 +143,8 @@ def bridge(seed: int) -> Record:
         np.array([[1.0, 0.8, -0.9, 0.7, 0.8]]),
     )
     force = coloured(rng, int(600 * fs * times), fs * times, 0.5, 15.0, 4)
-    y = sampled(modal(truth, force, 1 / fs / times), fs, times)
-    return Record(None, measured(rng, y, 0.03), fs, truth.hz, truth.damping, truth.shapes)
+    y = response(truth, force, fs, times)
+    return shown(truth, fs, None, measured(rng, y, 0.03))
 
 
 def building(seed: int) -> Record:
@@ -158,14 +168,7 @@ def building(seed: int) -> Record:
     ground = coloured(rng, count, fs * times, 0.7, 8.0, 3) * (t / 5) * np.exp(1 - t / 5)
     carried = np.repeat(np.eye(3)[[0, 1]], 4, axis=0)  # absolute acceleration: the ground's and the structure's
     y = sampled(modal(truth, ground, 1 / fs / times) + ground @ carried.T, fs, times)
-    return Record(
-        measured(rng, sampled(ground, fs, times), 0.005),
-        measured(rng, y, 0.005),
-        fs,
-        truth.hz,
-        truth.damping,
-        truth.shapes,
-    )
+    return shown(truth, fs, measured(rng, sampled(ground, fs, times), 0.005), measured(rng, y, 0.005))
 
 
 def mixed(told: bool, seed: int) -> Record:
@@ -177,11 +180,10 @@ def mixed(told: bool, seed: int) -> Record:
     shapes = np.array([np.sin(k * np.pi * at) for k in (1, 2, 3)]).T
     truth = Truth(hz, np.array([0.008, 0.006, 0.009]), shapes[:1].T, shapes)
     force = coloured(rng, int(20 * fs * times), fs * times, 4.0, 150.0)
-    fine = modal(truth, force, 1 / fs / times, "avav")
-    y = measured(rng, sampled(fine, fs, times), 0.01)
+    y = measured(rng, response(truth, force, fs, times, "avav"), 0.01)
     kinds = ["acceleration", "velocity", "acceleration", "velocity"]
     options = {"sensing": kinds} if told else {}
-    return Record(measured(rng, sampled(force, fs, times), 0.01), y, fs, truth.hz, truth.damping, shapes, options)
+    return shown(truth, fs, measured(rng, sampled(force, fs, times), 0.01), y, options)
 
 
 def close_pair(seed: int) -> Record:
@@ -193,8 +195,8 @@ def close_pair(seed: int) -> Record:
     shapes = np.array([[1.0, 0.9, 0.5, 0.6], [1.0, -0.9, 0.6, -0.5], [0.7, 0.6, -1.0, -0.9]]).T
     truth = Truth(hz, np.full(3, zeta), rng.standard_normal((3, 6)), shapes)
     force = coloured(rng, int(240 * fs * times), fs * times, 2.0, 30.0, 6)
-    y = sampled(modal(truth, force, 1 / fs / times), fs, times)
-    return Record(None, measured(rng, y, 0.02), fs, truth.hz, truth.damping, truth.shapes)
+    y = response(truth, force, fs, times)
+    return shown(truth, fs, None, measured(rng, y, 0.02))
 
 
 def short_decay(seed: int) -> Record:
@@ -205,8 +207,8 @@ def short_decay(seed: int) -> Record:
     shapes = rng.uniform(0.3, 1, (3, 4)) * rng.choice([-1.0, 1.0], (3, 4))
     truth = Truth(hz, np.array([0.0035, 0.003, 0.005, 0.004]), rng.uniform(0.5, 1, (4, 1)), shapes)
     force = hits(int(2.55 * fs * times), fs * times, [0.03], 0.003, rng)
-    y = sampled(modal(truth, force, 1 / fs / times), fs, times)[50:]
-    return Record(None, measured(rng, y, 0.005), fs, truth.hz, truth.damping, truth.shapes)
+    y = response(truth, force, fs, times)[50:]
+    return shown(truth, fs, None, measured(rng, y, 0.005))
 
 
 def short_hit(seed: int) -> Record:
@@ -221,8 +223,8 @@ def short_hit(seed: int) -> Record:
         rng.uniform(0.4, 1, (2, 4)) * rng.choice([-1.0, 1.0], (2, 4)),
     )
     force = hits(int(0.3 * fs * times), fs * times, [0.01], 0.0004, rng)
-    u, y = sampled(force, fs, times), sampled(modal(truth, force, 1 / fs / times), fs, times)
-    return Record(measured(rng, u, 0.002), measured(rng, y, 0.005), fs, truth.hz, truth.damping, truth.shapes)
+    u, y = sampled(force, fs, times), response(truth, force, fs, times)
+    return shown(truth, fs, measured(rng, u, 0.002), measured(rng, y, 0.005))
 
 
 HUM_HZ, PICKUP_HZ = 50.0, 80.0  # of disturbed(): the mains, and a fifth of the rate
@@ -240,19 +242,12 @@ def disturbed(seed: int) -> Record:
         rng.uniform(0.4, 1, (3, 3)) * rng.choice([-1.0, 1.0], (3, 3)),
     )
     force = coloured(rng, int(25 * fs * times), fs * times, 5.0, 140.0)
-    y = sampled(modal(truth, force, 1 / fs / times), fs, times)
+    y = response(truth, force, fs, times)
     t = np.arange(len(y)) / fs
     spread = y.std(0)
     y += 0.3 * spread * np.sin(2 * np.pi * HUM_HZ * t)[:, None] * [1.0, 0.7, 0.8]
     y[:, 1] += 0.3 * spread[1] * np.sin(2 * np.pi * PICKUP_HZ * t + 1)
-    return Record(
-        measured(rng, sampled(force, fs, times), 0.01),
-        measured(rng, y, 0.01),
-        fs,
-        truth.hz,
-        truth.damping,
-        truth.shapes,
-    )
+    return shown(truth, fs, measured(rng, sampled(force, fs, times), 0.01), measured(rng, y, 0.01))
 
 
 def noise(with_input: bool, seed: int) -> Record:
@@ -275,8 +270,8 @@ def weak_modes(seed: int) -> Record:
         hz, np.array([0.01, 0.012, 0.008, 0.01, 0.012, 0.009]), size[:, None] * rng.uniform(0.7, 1.3, (6, 5)), shapes
     )
     force = coloured(rng, int(120 * fs * times), fs * times, 1.0, 70.0, 5)
-    y = sampled(modal(truth, force, 1 / fs / times), fs, times)
-    return Record(None, measured(rng, y, 0.03), fs, truth.hz, truth.damping, truth.shapes)
+    y = response(truth, force, fs, times)
+    return shown(truth, fs, None, measured(rng, y, 0.03))
 
 
 KINDS: dict[str, Callable[[int], Record]] = {

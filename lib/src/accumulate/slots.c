@@ -28,11 +28,12 @@ static size_t row_in(const okid_accumulator_t* a, const okid_accumulator_t* from
     return r * (size_t)from->width + older_lags(a, from) * (size_t)a->m;
 }
 
-/// base = keep * base + gain * (sums of one slot of `from`). Codes without forgetting: exact, keep 1, gain 1 or -1.
-static void add_sums(okid_accumulator_t* a, const okid_accumulator_t* from, const double* data, double keep,
+/// base = keep * base + gain * (sums at `data` of `from`, S and then the sums of the channels, in a slot or in its base).
+/// Codes without forgetting: exact, keep 1, gain 1 or -1. @param exact  they are pairs of words
+static void add_sums(okid_accumulator_t* a, const okid_accumulator_t* from, const double* data, int exact, double keep,
                      double gain) {
     const size_t m = (size_t)a->m, n = (size_t)a->width, sums = acc_sum_count(a), its = acc_sum_count(from),
-                 at = acc_slot_sum(from);
+                 at = exact ? 2 * its : its;
     const int64_t* codes = (const int64_t*)data;
     if (acc_base_is_exact(a)) {
         int64_t* base = (int64_t*)acc_base(a);
@@ -43,7 +44,6 @@ static void add_sums(okid_accumulator_t* a, const okid_accumulator_t* from, cons
         for (size_t r = 0; r < m; ++r) base[acc_base_sum(a) + r] += sign * codes[at + r];
         return;
     }
-    const int exact = acc_has_codes(a);
     double *base = acc_base(a), *sum = base + acc_base_sum(a);
     for (size_t r = 0; r < m; ++r)
         for (size_t i = r * n, k = row_in(a, from, r); i < (r + 1) * n; ++i, ++k)
@@ -90,7 +90,7 @@ static void add_end_double(okid_accumulator_t* a, const double* end, double keep
 /// A slot of `from` into the base: base = keep * base + gain * slot. An end that meets a neighbour's is NULL: there both cancel.
 static void fold_slot(okid_accumulator_t* a, const okid_accumulator_t* from, const acc_piece_t* piece, int64_t rows,
                       double keep, double gain) {
-    add_sums(a, from, piece->data, keep, gain);
+    add_sums(a, from, piece->data, acc_has_codes(from), keep, gain);
     for (int end = 0; end < 2; ++end) {
         const double* at = end == 0 ? piece->head : piece->tail;
         const double sign = end == 0 ? gain : -gain;
@@ -141,27 +141,24 @@ void okid_accumulator_close_slot(okid_accumulator_t* self, int joined) {
 
 /// self.base += gain * other.base, exact (gain 1 or -1) or double as both are. The ends of runs stand by lag: ours come first.
 static void add_base(okid_accumulator_t* self, const okid_accumulator_t* other, double gain) {
-    const size_t m = (size_t)self->m, n = (size_t)self->width, sums = acc_sum_count(self), its = acc_sum_count(other),
-                 packed = acc_edge_count(self), its_packed = acc_edge_count(other);
+    const size_t ends = acc_lag_count(self), packed = acc_edge_count(self), its_packed = acc_edge_count(other);
+    const int exact = acc_base_is_exact(self);
     self->base_weight += gain * other->base_weight;
-    if (!acc_base_is_exact(self)) {
-        double *to = acc_base(self), *edge = to + acc_base_edge(self);
-        const double *from = acc_base(other), *its_edge = from + acc_base_edge(other);
-        for (size_t r = 0; r < m; ++r)
-            for (size_t i = r * n, k = row_in(self, other, r); i < (r + 1) * n; ++i, ++k) to[i] += gain * from[k];
-        for (size_t i = 0; i < m + acc_lag_count(self); ++i)
-            to[acc_base_sum(self) + i] += gain * from[acc_base_sum(other) + i];
+    add_sums(self, other, acc_base(other), exact, 1, gain);
+    if (!exact) {
+        double *sum = acc_base(self) + acc_base_edge_sum(self), *edge = acc_base(self) + acc_base_edge(self);
+        const double *its_sum = acc_base(other) + acc_base_edge_sum(other),
+                     *its_edge = acc_base(other) + acc_base_edge(other);
+        for (size_t i = 0; i < ends; ++i) sum[i] += gain * its_sum[i];
         for (size_t i = 0; i < packed; ++i) edge[i] += gain * its_edge[i];
         return;
     }
     const int64_t sign = gain < 0 ? -1 : 1;
-    int64_t *to = (int64_t*)acc_base(self), *edge = to + acc_base_edge(self);
-    const int64_t *from = (const int64_t*)acc_base(other), *its_edge = from + acc_base_edge(other);
-    for (size_t r = 0; r < m; ++r)
-        for (size_t i = r * n, k = row_in(self, other, r); i < (r + 1) * n; ++i, ++k)
-            wide_add_wide(to + sums + i, to + i, sign * from[its + k], sign * from[k]);
-    for (size_t i = 0; i < m + acc_lag_count(self); ++i)
-        to[acc_base_sum(self) + i] += sign * from[acc_base_sum(other) + i];
+    int64_t *sum = (int64_t*)acc_base(self) + acc_base_edge_sum(self),
+            *edge = (int64_t*)acc_base(self) + acc_base_edge(self);
+    const int64_t *its_sum = (const int64_t*)acc_base(other) + acc_base_edge_sum(other),
+                  *its_edge = (const int64_t*)acc_base(other) + acc_base_edge(other);
+    for (size_t i = 0; i < ends; ++i) sum[i] += sign * its_sum[i];
     for (size_t i = 0; i < packed; ++i)
         wide_add_wide(edge + packed + i, edge + i, sign * its_edge[its_packed + i], sign * its_edge[i]);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which tracks of which runs make a mode, on tracks written by hand: each bound of the decision from both sides.
-#include "consensus/consensus.hpp"
 #include "consensus/quantity.hpp"
+#include "hand_made_tracks.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,44 +11,9 @@ using namespace okid_host;
 
 namespace {
 
-using shape = std::vector<std::complex<double>>;
-const shape bending = {1.0, 0.5, -0.4}, torsion = {1.0, -0.8, 0.6};
-
-/// A pole that a run holds at all orders.
-run_track track(double frequency_hz, double damping_ratio, const shape& of, double emac = 1) {
-    run_track out;
-    out.frequency_hz = frequency_hz;
-    out.damping_ratio = damping_ratio;
-    out.mpc = shape_collinearity(of, {});
-    out.emac = emac;
-    out.length = 10;
-    out.shape = of;
-    return out;
-}
-
-/// As many runs as a rate has, without tracks.
-std::vector<consensus_run> rate(int level, double fs_hz, int rows, int outputs, std::size_t count = 6) {
-    consensus_run run;
-    run.method = OKID_METHOD_N4SID_CVA;
-    run.level = level;
-    run.fs_hz = fs_hz;
-    run.rows = rows;
-    run.outputs = outputs;
-    run.top = 0.42;
-    return std::vector<consensus_run>(count, run);
-}
-
-void give(std::vector<consensus_run>& runs, std::size_t first, std::size_t last, const run_track& found) {
-    for (std::size_t r = first; r < last; ++r) runs[r].tracks.push_back(found);
-}
-
-bool has(const consensus_mode& mode, const char* code) {
-    return std::find(mode.why.begin(), mode.why.end(), code) != mode.why.end();
-}
-
 /// One mode at 10 Hz in so many of six runs.
 consensus_mode found_by(std::size_t runs_with, double emac = 1, double damping_scatter = 0) {
-    auto runs = rate(0, 100, 30, 3);
+    auto runs = rate(6, 30, 3);
     for (std::size_t r = 0; r < runs_with; ++r)
         runs[r].tracks.push_back(track(10, 0.01 * (1 + (r % 2 ? damping_scatter : -damping_scatter)), bending, emac));
     const auto modes = find_agreement(runs);
@@ -77,13 +42,13 @@ static void a_short_lived_or_scattering_pole_is_noise() {
 
 /// Two modes of one output, 0.8 Hz apart: a horizon of 0.3 s sees one pole between them, one of 2.4 s sees both.
 static void only_runs_that_can_part_two_modes_vote_on_them() {
-    auto runs = rate(0, 100, 30, 1);
+    auto runs = rate(6, 30, 1);
     give(runs, 0, 6, track(10.4, 0.06, {1.0}));
-    const auto lower = rate(3, 12.5, 30, 1);
+    const auto lower = rate(6, 30, 1, 3, 12.5);
     runs.insert(runs.end(), lower.begin(), lower.end());
     give(runs, 6, 12, track(4.0, 0.004, {1.0}));
     give(runs, 6, 12, track(4.8, 0.004, {1.0}));
-    const auto middle = rate(1, 50, 30, 1); // 0.6 s
+    const auto middle = rate(6, 30, 1, 1, 50); // 0.6 s
     runs.insert(runs.end(), middle.begin(), middle.end());
     for (const consensus_mode& mode : find_agreement(runs))
         if (mode.frequency_hz < 5) {
@@ -93,7 +58,7 @@ static void only_runs_that_can_part_two_modes_vote_on_them() {
 }
 
 static void the_longest_horizons_vote_where_none_can_part() {
-    auto runs = rate(0, 100, 30, 1);
+    auto runs = rate(6, 30, 1);
     give(runs, 0, 6, track(10, 0.001, {1.0}));
     give(runs, 0, 2, track(10.3, 0.001, {1.0})); // of six runs, none of which can
     const auto modes = find_agreement(runs);
@@ -105,7 +70,7 @@ static void the_longest_horizons_vote_where_none_can_part() {
 /// A pair closer than 2.5 bandwidths is one mode if its shapes are alike, two if they are not; one output cannot tell.
 static void a_close_pair_is_split_only_by_its_shapes() {
     for (const bool alike : {true, false}) {
-        auto runs = rate(0, 100, 100, 3);
+        auto runs = rate(6, 100, 3);
         give(runs, 0, 6, track(10, 0.01, bending));
         give(runs, 0, 5, track(10.3, 0.01, alike ? bending : torsion));
         const auto modes = find_agreement(runs);
@@ -113,7 +78,7 @@ static void a_close_pair_is_split_only_by_its_shapes() {
         TEST_ASSERT_TRUE(modes[0].confident());
         TEST_ASSERT_EQUAL(alike, has(modes[1], "split"));
     }
-    auto runs = rate(0, 100, 300, 1);
+    auto runs = rate(6, 300, 1);
     give(runs, 0, 6, track(10, 0.01, {1.0}));
     give(runs, 0, 5, track(10.3, 0.01, {1.0}));
     for (const consensus_mode& mode : find_agreement(runs)) TEST_ASSERT_TRUE(mode.confident());
@@ -121,12 +86,12 @@ static void a_close_pair_is_split_only_by_its_shapes() {
 
 /// Beside a stronger mode of the same shape, further off than its bandwidth, but no run can tell one from the other.
 static void a_shadow_of_a_mode_is_split() {
-    auto runs = rate(0, 100, 30, 3); // 0.3 s x 3 outputs x 0.5 Hz = 0.45 beats
+    auto runs = rate(6, 30, 3); // 0.3 s x 3 outputs x 0.5 Hz = 0.45 beats
     give(runs, 0, 6, track(10, 0.001, bending));
     give(runs, 0, 5, track(10.5, 0.001, bending));
     auto modes = find_agreement(runs);
     TEST_ASSERT_TRUE(modes[0].confident() && has(modes[1], "split"));
-    runs = rate(0, 100, 60, 3); // 0.9 beats
+    runs = rate(6, 60, 3); // 0.9 beats
     give(runs, 0, 6, track(10, 0.001, bending));
     give(runs, 0, 5, track(10.5, 0.001, bending));
     modes = find_agreement(runs);
@@ -135,21 +100,21 @@ static void a_shadow_of_a_mode_is_split() {
 
 /// A slow mode: three quarters of a period for one output, less where several look together.
 static void the_horizon_holds_a_mode() {
-    TEST_ASSERT_TRUE(can_see(rate(0, 100, 30, 1)[0], 2.51) && !can_see(rate(0, 100, 30, 1)[0], 2.49));
-    TEST_ASSERT_TRUE(can_see(rate(0, 100, 30, 6)[0], 1.26) && !can_see(rate(0, 100, 30, 6)[0], 1.24));
-    TEST_ASSERT_TRUE(can_see(rate(0, 100, 30, 60)[0], 1.01) && !can_see(rate(0, 100, 30, 60)[0], 0.99));
-    TEST_ASSERT_TRUE(can_see(rate(0, 100, 30, 1)[0], 41.9) && !can_see(rate(0, 100, 30, 1)[0], 42.1));
+    TEST_ASSERT_TRUE(can_see(rate(6, 30, 1)[0], 2.51) && !can_see(rate(6, 30, 1)[0], 2.49));
+    TEST_ASSERT_TRUE(can_see(rate(6, 30, 6)[0], 1.26) && !can_see(rate(6, 30, 6)[0], 1.24));
+    TEST_ASSERT_TRUE(can_see(rate(6, 30, 60)[0], 1.01) && !can_see(rate(6, 30, 60)[0], 0.99));
+    TEST_ASSERT_TRUE(can_see(rate(6, 30, 1)[0], 41.9) && !can_see(rate(6, 30, 1)[0], 42.1));
 }
 
 /// Outputs 1 and 3 measure accelerations, 2 a velocity; the structure has normal modes.
 static void velocities_beside_accelerations_are_no_noise() {
     const std::complex<double> i(0, 1);
     const std::vector<double> hz = {4, 9, 15}, real[] = {{1, 0.6, 0.3}, {1, -0.7, -0.5}, {0.4, 0.9, 1}};
-    auto runs = rate(0, 100, 60, 3);
+    auto runs = rate(6, 60, 3);
     for (std::size_t k = 0; k < 3; ++k) {
         shape of = {real[k][0], real[k][1], real[k][2]};
         of[1] *= -i;
-        give(runs, 0, 4, track(hz[k], 0.01, of));
+        give(runs, 0, 4, track(hz[k], 0.01, of, 1, shape_collinearity(of, {})));
     }
     for (const consensus_mode& mode : find_agreement(runs)) TEST_ASSERT_TRUE(mode.mpc < 0.6);
     std::vector<bool> turned;

@@ -140,10 +140,13 @@ static void blocks_hold_every_row() {
         TEST_ASSERT_EQUAL_INT64(0, okid_accumulator_rows(taken.sums));
         const std::vector<std::byte> state = memory.state();
         level_memory again(n_u, n_y, lags + 4, 100), other(n_u, n_y, lags, 100);
-        TEST_ASSERT_EQUAL_UINT64(0, other.put_back(state.data(), state.size()));
-        for (std::size_t cut = 0; cut < state.size(); cut += 501)
-            TEST_ASSERT_EQUAL_UINT64(0, again.put_back(state.data(), cut));
-        TEST_ASSERT_EQUAL_UINT64(state.size(), again.put_back(state.data(), state.size()));
+        const auto taken_by = [&](level_memory& by, std::size_t bytes) {
+            byte_reader from(state.data(), bytes);
+            return by.put_back(from) && from.left() == 0;
+        };
+        TEST_ASSERT_FALSE(taken_by(other, state.size()));
+        for (std::size_t cut = 0; cut < state.size(); cut += 501) TEST_ASSERT_FALSE(taken_by(again, cut));
+        TEST_ASSERT_TRUE(taken_by(again, state.size()));
         const owned_sums twice = sums_like(lags);
         again.merge(memory);
         TEST_ASSERT_TRUE(again.take(twice.sums));
@@ -166,7 +169,7 @@ static void nothing_is_lost_between_older_and_newest() {
     TEST_ASSERT_EQUAL_MEMORY(rows.data() + (count - set.count()) * m, set.samples.data(), set.samples.size() * 8);
     TEST_ASSERT_EQUAL_INT64(older->samples(), older->level(0).samples());
     TEST_ASSERT_EQUAL_INT64(older->samples(), older->begun());
-    TEST_ASSERT_EQUAL(0, older->records());
+    TEST_ASSERT_EQUAL_INT64(0, older->records());
     const owned_sums sums = sums_like(lags), direct = sums_like(lags);
     TEST_ASSERT_TRUE(older->level(0).take(sums.sums));
     for (std::size_t n = 0; n < count; ++n) rows[n * m + 2] -= 5;
@@ -189,7 +192,7 @@ static void records_go_as_a_whole_and_screened() {
     const auto older = split_older(set, options());
     TEST_ASSERT_NOT_NULL(older.get());
     TEST_ASSERT_EQUAL_INT64(0, older->begun());
-    TEST_ASSERT_EQUAL(24, older->records() + static_cast<int>(set.records.size()));
+    TEST_ASSERT_EQUAL_INT64(24, older->records() + static_cast<long long>(set.records.size()));
     for (const record_data& record : set.records) TEST_ASSERT_EQUAL_UINT64(each, record.count);
     TEST_ASSERT_EQUAL_INT64(1, older->missing());
     TEST_ASSERT_EQUAL_INT64(static_cast<long long>(each), older->longest());
@@ -199,8 +202,7 @@ static void records_go_as_a_whole_and_screened() {
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_energy(sums.sums, OKID_DETREND_NONE, energy));
     TEST_ASSERT_TRUE(energy[1] < 1e7);
     const std::vector<std::byte> state = older->state();
-    older_samples again(options());
-    again.put_back("", state.data(), state.size());
+    older_samples again(options(), "", state);
     TEST_ASSERT_TRUE(again.state() == state);
     TEST_ASSERT_TRUE(static_cast<double>(state.size()) < older_samples::bytes(n_u, n_y));
     again.merge(*older);
