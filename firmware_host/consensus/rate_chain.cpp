@@ -46,8 +46,9 @@ std::vector<double> rate_chain::state() const {
     std::vector<double> out;
     for (const rate& each : rates_) {
         const std::size_t kept = std::min(each.waiting.size(), each.weights.size() * m_);
+        const std::size_t rows = kept / m_;
         out.push_back(static_cast<double>(each.came));
-        out.push_back(static_cast<double>(kept / m_));
+        out.push_back(static_cast<double>(rows));
         out.insert(out.end(), each.waiting.end() - static_cast<std::ptrdiff_t>(kept), each.waiting.end());
     }
     return out;

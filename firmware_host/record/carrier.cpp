@@ -237,12 +237,11 @@ bool surely(const carried_mode& one) { return one.damping_std < doubted * one.da
 /// Of what several orders say of a mode, the one whose deviation of damping is the middle one of those known.
 std::optional<carried_mode> middle(std::vector<carried_mode> all) {
     if (all.empty()) return std::nullopt;
-    const auto known = std::stable_partition(all.begin(), all.end(),
-                                             [](const carried_mode& one) { return std::isfinite(one.damping_std); });
-    std::stable_sort(all.begin(), known,
-                     [](const carried_mode& a, const carried_mode& b) { return a.damping_std < b.damping_std; });
-    const auto count = static_cast<std::size_t>(known - all.begin());
-    return all[count > 0 ? (count - 1) / 2 : 0];
+    std::vector<std::pair<double, std::size_t>> known;
+    for (std::size_t i = 0; i < all.size(); ++i)
+        if (std::isfinite(all[i].damping_std)) known.emplace_back(all[i].damping_std, i);
+    std::sort(known.begin(), known.end());
+    return std::move(all[known.empty() ? 0 : known[(known.size() - 1) / 2].second]);
 }
 
 } // namespace
