@@ -19,6 +19,10 @@ constexpr int long_rows = 30, lags_of_observer = 40, most_order = 64;
 /// Block rows x outputs: the states of a Hankel matrix. A plate of 23 modes under one accelerometer has 46, and as many again
 /// of noise beside them. Few channels ask for long horizons, and there they are cheap.
 constexpr int rows_of_outputs = 90;
+constexpr int enough_order = 28;   ///< in any case; 64 with few states changes no mode of the corpora
+constexpr int orders_of_state = 2; ///< for each state above noise: orders beyond repeat what is known
+constexpr double edge_margin =
+    1.1; ///< samples that remember, and the future forces taken out, move the edge by a few percent
 constexpr int most_unknowns = 450; ///< block rows x channels: the decomposition costs their third power
 constexpr double short_share = 0.6, middle_share = 0.8;
 constexpr int fewest_rows = 4;
@@ -26,6 +30,9 @@ constexpr int enough_voters = 4, few_voters = 2; ///< runs that tell a mode from
 constexpr double beats_wanted = 1.25;            ///< of both in the horizon: with room for the shorter ones
 constexpr double most_decays = 2;                ///< times in which the mode falls to 1 / e: what is over tells nothing
 constexpr int most_factor = 96;
+/// Of the samples, in rows of the longest lags: then shorter ones need no sums of their own. What falls away stands at the
+/// beginning of records, where a struck structure rings most.
+constexpr double least_kept = 0.999;
 
 std::unique_ptr<std::byte[]> memory(std::size_t bytes) {
     return std::unique_ptr<std::byte[]>(bytes ? new (std::nothrow) std::byte[bytes] : nullptr);
@@ -46,14 +53,30 @@ int rows_of(int n_u, int n_y, long long samples) {
     return static_cast<int>(std::min<long long>({wanted, borne, std::max(6, most_unknowns / (n_u + n_y))}));
 }
 
-bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, consensus_run& run) {
+/// States of a canonical variate analysis whose correlation of past and future is more than that of noise: beyond the edge of
+/// Wachter's distribution, the largest that samples without any memory show (Johnstone, Ann. Statist. 36 (2008) 2638).
+int states_above_noise(const okid_identified_t& model) {
+    const double rows = static_cast<double>(model.regression_rows) - static_cast<double>(model.rows) * model.n_u;
+    const double past = std::min(1.0, model.rows * (model.n_u + model.n_y) / rows);
+    const double future = std::min(1.0, model.rows * model.n_y / rows);
+    const double edge = std::sqrt(past * (1 - future)) + std::sqrt(future * (1 - past));
+    return static_cast<int>(std::count_if(model.singular_values, model.singular_values + model.singular_count,
+                                          [&](okid_real_t value) { return value > edge_margin * edge; }));
+}
+
+/// @param states  above noise; 0 before the first canonical variate analysis, which counts them
+bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, int& states, consensus_run& run) {
     const std::size_t bytes = okid_identify_memsize(&config);
     const auto block = memory(bytes);
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
     if (!block || !sums.sums || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK) return false;
-    const okid_status_t status = okid_identify_run(identifier, sums.sums, &model);
-    if (status < 0 && status != OKID_ERR_NO_MODES) return false; // of the lowest order: higher ones may have modes
+    if (okid_identify_decompose(identifier, sums.sums, &model) != OKID_OK) return false;
+    if (states == 0 && run.method == OKID_METHOD_N4SID_CVA) states = states_above_noise(model);
+    if (states > 0) {
+        const int most = std::max(enough_order, orders_of_state * states);
+        run.orders.erase(std::upper_bound(run.orders.begin(), run.orders.end(), most), run.orders.end());
+    }
     collect_poles(identifier, model, run);
     link_tracks(run);
     return true;
@@ -154,36 +177,61 @@ owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, boo
     return out;
 }
 
+namespace {
+
+/// Sums with fewer lags from those with more; none where that would leave out too many of the level's samples.
+owned_sums shortened(const record_level& level, const owned_sums& longest, int lags, int n_u, int n_y) {
+    okid_accumulator_config_t shape = okid_accumulator_defaults(n_u, n_y, lags);
+    shape.edges = 1;
+    owned_sums out;
+    if (!longest.sums ||
+        static_cast<double>(okid_accumulator_rows(longest.sums)) < least_kept * static_cast<double>(level.samples))
+        return out;
+    out = owned_sums(shape);
+    if (out.sums && okid_accumulator_merge(out.sums, longest.sums) < 0) out.sums = nullptr;
+    return out;
+}
+
+/// The runs of one level with their poles linked, those with the longest horizon first.
+std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const record_level& level, int n_u, int n_y,
+                                     bool at_rest) {
+    const auto lags_of = [&](const consensus_run& run) {
+        const okid_identify_config_t config = run_config(run, n_u, n_y);
+        return okid_identify_lags(&config);
+    };
+    std::stable_sort(runs.begin(), runs.end(), [&](const consensus_run& a, const consensus_run& b) {
+        return std::make_pair(lags_of(a), a.method == OKID_METHOD_N4SID_CVA) >
+               std::make_pair(lags_of(b), b.method == OKID_METHOD_N4SID_CVA);
+    });
+    const int most = runs.empty() ? 1 : lags_of(runs.front());
+    const owned_sums longest = level_sums(level, n_u, n_y, most, at_rest);
+    owned_sums own;
+    int lags = most, states = 0;
+    std::vector<consensus_run> out;
+    for (consensus_run& run : runs) {
+        if (lags_of(run) != lags) {
+            lags = lags_of(run);
+            own = shortened(level, longest, lags, n_u, n_y);
+            if (!own.sums) own = level_sums(level, n_u, n_y, lags, at_rest);
+        }
+        if (find_poles(run_config(run, n_u, n_y), lags < most ? own : longest, states, run))
+            out.push_back(std::move(run));
+    }
+    return out;
+}
+
+} // namespace
+
 std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std::size_t first, int n_u, int n_y,
                                    bool at_rest, int threads) {
-    struct piece { // runs of one level that share their sums
-        const record_level* level;
-        int lags;
-        std::vector<consensus_run> runs;
-    };
-    std::vector<piece> pieces;
-    for (std::size_t k = first; k < levels.size(); ++k) {
-        const record_level& level = levels[k];
-        const std::size_t begin = pieces.size();
-        for (consensus_run& run : plan_runs(n_u, n_y, static_cast<int>(k), level)) {
-            const okid_identify_config_t config = run_config(run, n_u, n_y);
-            const int lags = okid_identify_lags(&config);
-            auto at = std::find_if(pieces.begin() + static_cast<std::ptrdiff_t>(begin), pieces.end(),
-                                   [lags](const piece& one) { return one.lags >= lags; });
-            if (at == pieces.end() || at->lags != lags) at = pieces.insert(at, {&level, lags, {}});
-            at->runs.push_back(std::move(run));
-        }
-    }
-    side_by_side(pieces.size(), threads, [&](std::size_t i) {
-        piece& mine = pieces[i];
-        const owned_sums sums = level_sums(*mine.level, n_u, n_y, mine.lags, at_rest);
-        for (consensus_run& run : mine.runs)
-            if (!find_poles(run_config(run, n_u, n_y), sums, run)) run.orders.clear();
+    std::vector<std::vector<consensus_run>> of_level(levels.size() - first);
+    side_by_side(of_level.size(), threads, [&](std::size_t i) {
+        const record_level& level = levels[first + i];
+        of_level[i] = run_level(plan_runs(n_u, n_y, static_cast<int>(first + i), level), level, n_u, n_y, at_rest);
     });
     std::vector<consensus_run> out;
-    for (piece& one : pieces)
-        for (consensus_run& run : one.runs)
-            if (!run.orders.empty()) out.push_back(std::move(run));
+    for (auto& runs : of_level)
+        for (consensus_run& run : runs) out.push_back(std::move(run));
     return out;
 }
 

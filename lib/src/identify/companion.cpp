@@ -71,15 +71,12 @@ void power_steps(const companion& c, okid_real_t* v, okid_real_t* spare, int cou
 
 /// next less its part along the first `count` basis vectors, which goes to `h`; twice, for orthogonality to rounding.
 void orthogonalise(const companion& c, const companion_work& w, int count, okid_real_t* next, okid_real_t* h) {
-    const auto n = static_cast<size_t>(c.size);
-    for (int pass = 0; pass < 2; ++pass)
-        for (int i = 0; i < count; ++i) {
-            const okid_real_t* b = w.basis + static_cast<size_t>(i) * n;
-            okid_real_t along = 0;
-            for (size_t e = 0; e < n; ++e) along += b[e] * next[e];
-            for (size_t e = 0; e < n; ++e) next[e] -= along * b[e];
-            h[i] += along;
-        }
+    okid_real_t along[dense_limit + 1];
+    for (int pass = 0; pass < 2; ++pass) {
+        linalg::multiply(true, false, count, 1, c.size, 1, w.basis, c.size, next, c.size, 0, along, count);
+        linalg::multiply(false, false, c.size, 1, count, -1, w.basis, c.size, along, count, 1, next, c.size);
+        for (int i = 0; i < count; ++i) h[i] += along[i];
+    }
 }
 
 /// Arnoldi on top of `kept` basis vectors that span Ritz vectors (0: none) and the unit vector behind them.
@@ -243,7 +240,8 @@ void take_feedback(int n_u, int n_y, int p, const okid_real_t* theta, okid_real_
 }
 
 template <class Scale>
-double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const Scale* scale, companion_work& w) {
+double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const Scale* scale, bool growth_alone,
+                        companion_work& w) {
     const companion c{n_y, n_y * p, w.feedback};
     take_feedback(n_u, n_y, p, theta, w.feedback);
     rescale(n_y, p, scale, w.feedback);
@@ -254,6 +252,7 @@ double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const
         growth = std::min(growth, growth_of(c, w));
     }
     if (!(growth < growth_limit)) return growth;
+    if (growth_alone) return 0;
     start_vector(w.basis, c.size);
     power_steps(c, w.basis, w.basis + c.size, warm_steps);
     ritz_pair pair;
@@ -265,7 +264,7 @@ double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const
     return pair.size;
 }
 
-template double companion_radius(int, int, int, const okid_real_t*, const float*, companion_work&);
-template double companion_radius(int, int, int, const okid_real_t*, const double*, companion_work&);
+template double companion_radius(int, int, int, const okid_real_t*, const float*, bool, companion_work&);
+template double companion_radius(int, int, int, const okid_real_t*, const double*, bool, companion_work&);
 
 } // namespace okid

@@ -9,6 +9,9 @@
 #include <okid/steps/era.h>
 
 #include "identify/era_correlation.hpp"
+#include "identify/era_leading.hpp"
+#include "identify/identify.hpp"
+#include "identify/triangular.hpp"
 #include "linalg/linalg.hpp"
 
 #include <algorithm>
@@ -138,6 +141,29 @@ okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov) {
     okid::linalg::multiply(true, false, e.rank, e.rank, e.height, 1, e.left, e.height, e.product, e.height, 0, e.core,
                            e.rank);
     if (correlated(e)) e.correlation.observability(e.rank, e.left);
+    return OKID_OK;
+}
+
+okid_status_t okid::decompose_leading(okid_era_t* self, const okid_real_t* markov, int count, int past) {
+    okid_era& e = *self;
+    leading_triplets found(e.config, past, count);
+    arena counted;
+    found.lay_out(counted);
+    if (correlated(e) || counted.bytes() > linalg::svd_work(e.height, e.breadth) * sizeof(okid_real_t))
+        return okid_era_decompose(self, markov);
+    arena memory(e.work); // that of an SVD, which is not made
+    found.lay_out(memory);
+    if (!found.find(markov)) return okid_era_decompose(self, markov);
+    const auto put = [](const double* from, int many, okid_real_t* to) {
+        for (int k = 0; k < many; ++k) to[k] = static_cast<okid_real_t>(from[k]);
+    };
+    std::fill_n(e.values, e.rank, okid_real_t{0});
+    put(found.values, found.count, e.values);
+    put(found.left, found.count * e.height, e.left);
+    for (int c = 0; c < found.count; ++c)
+        put(found.core + at(0, c, found.count), found.count, e.core + at(0, c, e.rank));
+    for (int c = 0; c < e.config.n_u; ++c)
+        put(found.first + at(0, c, found.count), found.count, e.right + at(0, c, e.rank));
     return OKID_OK;
 }
 

@@ -219,6 +219,7 @@ okid_identify okid::plan_of(const okid_identify_config_t& config) { return plan(
 okid_status_t okid::replicate(okid_identify& s, okid_accumulator_t* accumulator, int order, okid_identified_t* out) {
     begin(s, out, okid_accumulator_rows(accumulator));
     s.follow = order;
+    s.poles_only = false;
     okid_status_t status = decompose(s, accumulator, out);
     if (status == OKID_OK) status = realise_model(s, order);
     s.follow = 0;
@@ -267,15 +268,31 @@ okid_status_t okid_identify_create(okid_identify_t** self, const okid_identify_c
                           : okid_era_create(&s->era, &s->era_config, s->storey_block, okid_era_memsize(&s->era_config));
 }
 
-okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator, okid_identified_t* out) {
-    if (self == nullptr || accumulator == nullptr || out == nullptr) return OKID_ERR_NULL;
-    okid_identify& s = *self;
+namespace {
+
+/// What the sums must be for this configuration; then their decomposition.
+okid_status_t take_sums(okid_identify& s, okid_accumulator_t* accumulator, bool poles_only, okid_identified_t* out) {
     okid_accumulator_config_t held;
     okid_accumulator_config(accumulator, &held);
     begin(s, out, okid_accumulator_rows(accumulator));
     if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.lags) return OKID_ERR_MISMATCH;
     s.from_sums = true;
-    return finish(s, decompose(s, accumulator, out), out);
+    s.poles_only = poles_only;
+    return decompose(s, accumulator, out);
+}
+
+} // namespace
+
+okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accumulator, okid_identified_t* out) {
+    if (self == nullptr || accumulator == nullptr || out == nullptr) return OKID_ERR_NULL;
+    return finish(*self, take_sums(*self, accumulator, false, out), out);
+}
+
+okid_status_t okid_identify_decompose(okid_identify_t* self, okid_accumulator_t* accumulator, okid_identified_t* out) {
+    if (self == nullptr || accumulator == nullptr || out == nullptr) return OKID_ERR_NULL;
+    const okid_status_t status = take_sums(*self, accumulator, true, out);
+    if (status == OKID_OK) point_to(*self, out);
+    return status;
 }
 
 okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root, okid_identified_t* out) {
@@ -287,7 +304,7 @@ okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t
     if (held.n_u != s.n_u || held.n_y != s.n_y || held.lags != s.lags || s.config.solver != OKID_SOLVER_DENSE ||
         s.by_covariance)
         return OKID_ERR_MISMATCH;
-    s.from_sums = false;
+    s.from_sums = s.poles_only = false;
     return finish(s,
                   s.by_subspace ? okid::decompose_subspace_factor(s, square_root, out)
                                 : okid::decompose_observer_factor(s, square_root, out),

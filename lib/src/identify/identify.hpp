@@ -56,6 +56,7 @@ struct okid_identify {
     double *head, *tail, *sum; ///< of one run
     okid_real_t *theta, *innovation, *markov, *gain;
     int follow;                   ///< order of replicate(), 0: a full identification
+    bool poles_only;              ///< nobody asks for more than poles of orders up to max_order
     okid::followed_era* followed; ///< ERA of replicate() near a known model, or nullptr
     int width;                    ///< columns of a block of the Hankel matrix
     okid_real_t* sequence;        ///< blocks 0 .. markov_last of the Hankel matrix, n_y x width; block 0 is not used
@@ -95,6 +96,10 @@ bool knows_noise(const okid_identify_config_t& config);
 
 /// Blocks of the Hankel matrix out of the Markov parameters, as config.hankel says.
 const okid_real_t* hankel_blocks(okid_identify& s);
+
+/// okid_era_decompose() for the `count` largest singular values, of Markov parameters of an ARX model of `past` lags; all of
+/// them where the leading ones alone would lose digits.
+okid_status_t decompose_leading(okid_era_t* self, const okid_real_t* markov, int count, int past);
 
 /// A, B, C, K of one order by ERA; `whole` false: A and C are enough.
 okid_status_t realise_era(okid_identify& s, int order, bool whole);

@@ -41,8 +41,10 @@ okid_status_t observe_dense(okid_identify& s, okid_accumulator_t* accumulator, o
     const int64_t rows = out->regression_rows;
     status = check_constant_gram(s, s.n, out);
     if (status != OKID_OK) return status;
-    return okid_observer_solve(&s.observer_config, s.gram, rows, s.theta, s.innovation, &out->observer_info,
-                               s.observer_work, s.observer_bytes);
+    okid_observer_config_t config = s.observer_config;
+    if (s.poles_only) config.unstable = 3;
+    return okid_observer_solve(&config, s.gram, rows, s.theta, s.innovation, &out->observer_info, s.observer_work,
+                               s.observer_bytes);
 }
 
 /// theta from the sums of one run.
@@ -85,7 +87,8 @@ okid_status_t decompose_theta(okid_identify& s, okid_identified_t* out) {
     std::copy(s.markov, s.markov + s.n_y * s.n_u, s.D);
     if (s.config.hankel == OKID_HANKEL_LITERAL) out->warnings |= OKID_NOTE_LITERAL_HANKEL;
     if (s.follow > 0 && s.followed != nullptr) return OKID_OK;
-    return okid_era_decompose(s.era, hankel_blocks(s));
+    return s.poles_only ? decompose_leading(s.era, hankel_blocks(s), s.max_order, s.config.p)
+                        : okid_era_decompose(s.era, hankel_blocks(s));
 }
 
 } // namespace

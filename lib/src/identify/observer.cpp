@@ -251,9 +251,12 @@ okid_status_t okid_observer_solve(const okid_observer_config_t* config, const do
         if (innovation != nullptr) s.innovation(innovation);
         return OKID_OK;
     }
-    auto radius = [&] { return okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.scale + s.n_u, s.w.companion); };
+    auto radius = [&] {
+        return okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.scale + s.n_u, config->unstable == 3,
+                                      s.w.companion);
+    };
     info->radius = info->radius_plain = radius();
-    if (!(info->radius < 1) && config->unstable == 0) {
+    if (!(info->radius < 1) && config->unstable != 1) {
         const okid_status_t status = okid::stabilise(ridge_min, [&](double ridge) {
             if (!s.solve(ridge, false, theta)) return false;
             info->radius = radius();

@@ -263,7 +263,8 @@ okid_status_t okid_observer_solve_factor(const okid_observer_config_t* config, c
     const okid_status_t fit = okid::check(s, config->p);
     if (fit != OKID_OK) return fit;
     auto radius = [&] {
-        return okid::companion_radius(config->n_u, config->n_y, config->p, theta, s.w.scale + s.q, s.w.companion);
+        return okid::companion_radius(config->n_u, config->n_y, config->p, theta, s.w.scale + s.q, false,
+                                      s.w.companion);
     };
     if (!s.solve(std::max(config->ridge_min, okid::ridge_floor), theta)) return OKID_ERR_NUMERIC;
     info->radius = info->radius_plain = radius();

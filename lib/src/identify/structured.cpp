@@ -440,7 +440,9 @@ okid_status_t okid_structured_solve(const okid_observer_config_t* config, okid_d
     const bool numerical = ridge_min <= 1e-10; // a floor only: refinement takes it out again
     if (!s.solve(ridge_min, numerical, theta, innovation) && !s.solve(ridge_min * 1e2, numerical, theta, innovation))
         return OKID_ERR_NUMERIC;
-    auto radius = [&] { return okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.scale + s.n_u, s.w.companion); };
+    auto radius = [&] {
+        return okid::companion_radius(s.n_u, s.n_y, s.p, theta, s.w.scale + s.n_u, false, s.w.companion);
+    };
     info->radius = info->radius_plain = radius();
     if (info->radius < 1 || config->unstable != 0) return OKID_OK;
     return okid::stabilise(ridge_min, [&](double ridge) {

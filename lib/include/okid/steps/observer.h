@@ -18,7 +18,8 @@ typedef struct okid_observer_config_t {
     int32_t p;        ///< lags
     double ridge_min; ///< ridge on the unit-diagonal Gram, >= 0; 0 = 1e-12
     /// 0 = search the smallest ridge on a half-decade grid that makes the ARX model stable; 1 = leave it; 2 = theta and
-    /// the innovation only, for a record like one already solved: radius, condition and excitation are not looked at (0)
+    /// the innovation only, for a record like one already solved: radius, condition and excitation are not looked at (0);
+    /// 3 = as 0, where a model of more than 64 states is unstable only if it grows over 64 samples (from a Gram matrix)
     int32_t unstable;
 } okid_observer_config_t;
 
