@@ -56,7 +56,7 @@ def read_geometry(
     if not numbers:
         found = {name: one.get("dof") for name, one in (live or {}).items()}
         numbers = {name: dof for name, dof in found.items() if isinstance(dof, int) and dof != 0}
-    known = list(shape_dofs) if shape_dofs else [numbers.get(name) for name in outputs]
+    known: list[int | None] = list(shape_dofs) if shape_dofs else [numbers.get(name) for name in outputs]
     if all(number is None for number in known):
         if len(dofs) != len(outputs):
             raise InputError(

@@ -84,7 +84,7 @@ class Mode(NamedTuple):
         """Of an entry of "modes"."""
         f, zeta, mpc, emac = numbers([one[key] for key in ("frequency_hz", "damping_ratio", "mpc", "emac")]).tolist()
         shape = numbers(one["shape_re"]) + 1j * numbers(one["shape_im"])
-        why = [tuple(map(str, one.get(key) or one.get("why") or ())) for key in ("why", "why_text")]
+        why, texts = (tuple(map(str, one.get(key) or one.get("why") or ())) for key in ("why", "why_text"))
         return cls(
             f,
             zeta,
@@ -97,7 +97,8 @@ class Mode(NamedTuple):
             _optional(one.get("shape_im_std")),
             one.get("confident"),
             known(one.get("found_in")),
-            *why,
+            why,
+            texts,
             known(one.get("modal_mass")),
         )
 
