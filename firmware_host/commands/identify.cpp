@@ -11,6 +11,7 @@
 #include "progress.hpp"
 #include "record/csv.hpp"
 #include "record/csv_header.hpp"
+#include "record/hit_files.hpp"
 #include "record/record.hpp"
 #include "record/request.hpp"
 #include "result/mat_file.hpp"
@@ -30,6 +31,7 @@ struct identify_arguments {
     std::vector<std::string> records;
     std::string inputs, outputs, range, json, model;
     std::string exponential, references; ///< of frequency responses; of set-ups
+    std::string places;                  ///< a regular expression on the names of the files
     bool quiet = false, all_modes = false, frf = false, set_ups = false;
 };
 
@@ -102,8 +104,8 @@ record_set read_records(const identify_arguments& given, const std::vector<std::
                                       fmt::format("--fs {:g} is used, {} says {:g} Hz: every frequency "
                                                   "scales with it",
                                                   *request.fs_hz, path, *record.said_fs_hz));
-        if (options.mass.wanted() && record.units != units)
-            usage(fmt::format("{}: the units in the header are not those of {}, expected the same for M, K and R", path,
+        if ((options.mass.wanted() || !options.hits.empty()) && record.units != units)
+            usage(fmt::format("{}: the units in the header are not those of {}, expected the same", path,
                               given.records.front()));
         if (std::abs(record.fs_hz - options.fs_hz) > 1e-6 * options.fs_hz)
             usage(fmt::format(
@@ -155,6 +157,7 @@ std::vector<set_up> read_each_set_up(const identify_arguments& given, record_opt
 record_result identify_files_of_responses(const identify_arguments& given) {
     response_request asked{given.wanted, given.exponential, given.all_modes};
     if (!given.range.empty()) usage("--range is an option of records, found with --frf");
+    if (!given.places.empty()) usage("--places is an option of records, found with --frf");
     if (given.set_ups) usage("--setups is an option of records: several files with --frf are always set-ups");
     if (!given.inputs.empty()) asked.wanted.inputs = split_names("--inputs", given.inputs);
     if (!given.outputs.empty()) asked.wanted.outputs = split_names("--outputs", given.outputs);
@@ -169,6 +172,11 @@ record_result identify_files_of_samples(identify_arguments given) {
     const auto references =
         given.references.empty() ? std::vector<std::string>() : split_names("--references", given.references);
     if (given.set_ups) take_set_up_options(given);
+    if (!given.places.empty()) {
+        if (!given.wanted.hit_dofs.empty())
+            usage("--places: --hit-dofs says where the records were struck, leave one of them out");
+        given.wanted.hit_dofs = places_of_names(given.places, given.records);
+    }
     record_options options = check_request(given.wanted);
     check_targets(given);
     options.all_modes = given.all_modes;
@@ -265,6 +273,13 @@ void add_identify(CLI::App& app) {
                      "direction reversed). Each place becomes an input of its own")
         ->type_name("LIST");
     command
+        ->add_option("--places", given->places,
+                     "the same from the names of the files: a regular expression whose one group is the number of the "
+                     "place, as 'P(\\d+)_' of P07_1.csv")
+        ->type_name("REGEX");
+    command->add_flag("--keep-all", given->wanted.keep_all,
+                      "use the bad hits of --hit-dofs and --places too (a double hit, an overload ...)");
+    command
         ->add_option("--output-dofs", given->wanted.output_dofs,
                      "where each sensor stands; every degree of freedom needs a force or a sensor, one needs both")
         ->type_name("LIST");
@@ -312,6 +327,7 @@ void add_identify(CLI::App& app) {
     command->footer(
         "Examples:\n  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --json result.json\n"
         "  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --input-dofs 1 --output-dofs 1,2,3\n"
+        "  okid identify P*.csv --inputs hammer --outputs acc1,acc2 --places 'P(\\d+)_' --output-dofs 1,5\n"
         "  okid identify responses.uff --frf --json result.json\n"
         "  okid identify a.csv b.csv --setups --outputs ref1,ref2,deck1,deck2,deck3,deck4\n"
         "A CSV has a line of column names, numbers below, and \"# fs_hz: 1024\" above (or use --fs).");

@@ -39,6 +39,7 @@ constexpr std::array arguments{argument{"--inputs", "inputs", ""},
                                argument{"--modes", "modes", ""},
                                argument{"--threads", "threads", " N "},
                                argument{"--hit-dofs", "hit_dofs", ""},
+                               argument{"--keep-all", "keep_all", ""},
                                argument{"--exponential", "exponential", " S "},
                                argument{"--json", "to_dict()", ""}};
 

@@ -36,7 +36,7 @@ asked read_record(const char* text) {
     places.texts.emplace_back("modes", &out.request.modes);
     places.texts.emplace_back("threads", &out.request.threads);
     places.texts.emplace_back("hit_dofs", &out.request.hit_dofs);
-    places.flags = {{"stabilization", &out.request.stabilization}};
+    places.flags = {{"stabilization", &out.request.stabilization}, {"keep_all", &out.request.keep_all}};
     places.lists.emplace_back("units", &out.units);
     places.lists.emplace_back("references", &out.references);
     read_options(text, places);

@@ -61,6 +61,16 @@ void add_deviations(const deviations& sigma, const okid_identified_t& m, std::ve
     to.push_back({"modes.shape_im_std", shape_view(sigma.shape_im.data(), m)});
 }
 
+/// Shapes over other places than those of the outputs.
+void place(const placed_shapes& placed, std::vector<named_array>& to) {
+    const std::size_t n = placed.dofs.size(), modes = placed.modal_mass.size();
+    for (const auto& [name, values] :
+         {std::pair{"modes.shape_re", &placed.re}, std::pair{"modes.shape_im", &placed.im},
+          std::pair{"modes.shape_re_std", &placed.re_std}, std::pair{"modes.shape_im_std", &placed.im_std}})
+        for (named_array& one : to)
+            if (std::strcmp(one.name, name) == 0) one.array = {values->data(), 2, {modes, n, 1}, {n, 1, 1}};
+}
+
 void add_mass(const mass_matrices& mass, std::vector<named_array>& to) {
     const std::pair<const char*, const std::vector<double>*> all[] = {{"mkr.M", &mass.M},
                                                                       {"mkr.K", &mass.K},
@@ -88,6 +98,7 @@ std::vector<named_array> arrays_of(const okid_host_result_t& self) {
                                     std::pair{"fit.prediction_percent", &about.prediction_percent}})
         if (*fit) out.push_back({name, vector_view((*fit)->data(), (*fit)->size())});
     if (about.sigma) add_deviations(*about.sigma, model, out);
+    if (about.placed) place(*about.placed, out);
     if (about.mass) add_mass(*about.mass, out);
     return out;
 }

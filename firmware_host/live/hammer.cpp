@@ -5,32 +5,39 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <fmt/format.h>
 
 namespace okid_host {
-namespace {
-
-constexpr double pulse_share = 0.1; // of the peak: what belongs to a pulse
-constexpr double least_peak = 20;   // in deviations of the force before the hit
-constexpr double most_motion = 0.1; // rms before the hit, of that after it
-constexpr double band_share = 0.1;  // of the greatest amplitude: -20 dB
-constexpr std::size_t frequencies = 128;
-constexpr std::size_t flat_top = 5; // samples that are exactly equal at the peak: an amplifier at its limit
-
-} // namespace
 
 hammer::hammer(const live_config& config, std::int64_t lags)
-    : wanted_(config.hammer), channels_(config.channels), rate_hz_(config.rate_hz), width_(config.channels.size()),
-      identified_(config.n_u + config.n_y), left_(config.hammer.total()) {
+    : wanted_(config.hammer), channel_(wanted_.enabled ? config.channels[wanted_.channel].name : ""),
+      rate_hz_(config.rate_hz), width_(config.channels.size()), left_(config.hammer.total()) {
     if (!wanted_.enabled) return;
     const channel_config& channel = config.channels[wanted_.channel];
-    unit_ = channel.unit.empty() ? "" : " " + channel.unit;
-    scale_ = channel.layout.scale;
-    offset_ = channel.layout.offset;
+    window_.unit = channel.unit.empty() ? "" : " " + channel.unit;
+    window_.scale = channel.layout.scale;
+    window_.offset = channel.layout.offset;
     before_ = std::max<std::int64_t>(std::llround(wanted_.pretrigger_s * rate_hz_), lags + lags / 8 + 4);
     after_ = std::max<std::int64_t>(std::llround(wanted_.length_s * rate_hz_), 16);
     rows_.assign(rows() * width_, missing_sample);
+    for (std::size_t c = 0; c < config.n_u + config.n_y; ++c) {
+        const drv_signal_t& layout = config.channels[c].layout;
+        hit_channel& one = judged_.emplace_back();
+        one.name = config.channels[c].name;
+        one.force = config.channels[c].role == channel_role::force;
+        if (layout.value != DRV_VALUE_INTEGER || layout.length > 32) continue;
+        one.high = std::ldexp(1.0, layout.length - (layout.is_signed ? 1 : 0)) - 1;
+        one.low = layout.is_signed ? -one.high - 1 : -1; // 0 of an unsigned code is no limit
+    }
+    window_.count = rows();
+    window_.width = width_;
+    window_.before = static_cast<std::size_t>(before_);
+    window_.fewest_before = 0;
+    window_.rate_hz = rate_hz_;
+    window_.hammer = wanted_.channel;
+    window_.sign = wanted_.level > 0 ? 1 : -1;
+    window_.double_percent = wanted_.double_percent;
+    window_.spectrum_hz = wanted_.spectrum_hz;
 }
 
 void hammer::keep(const double* row) {
@@ -43,7 +50,7 @@ void hammer::keep(const double* row) {
 }
 
 bool hammer::crosses(const double* row) {
-    const double now = row ? offset_ + scale_ * row[wanted_.channel] : missing_sample;
+    const double now = row ? window_.offset + window_.scale * row[wanted_.channel] : missing_sample;
     if (std::isnan(now)) return false;
     const bool up = wanted_.level > 0, before = have_last_ && (up ? last_ < wanted_.level : last_ > wanted_.level);
     last_ = now;
@@ -79,145 +86,22 @@ bool hammer::add(std::int64_t index, const double* row, std::int64_t count) {
     return false;
 }
 
-bool hammer::refuse(const char* fault, std::string text) {
-    report_.fault = fault;
-    report_.text = std::move(text);
-    return true;
-}
-
-/// A sample that is missing in the middle of a hit cannot be asked for again, but the hit can.
-bool hammer::find_missing() {
-    std::size_t lost = 0;
-    for (std::size_t i = 0; i < rows(); ++i)
-        lost += std::any_of(at(i), at(i) + identified_, [](double x) { return std::isnan(x); });
-    return lost > 0 && refuse("samples_lost", fmt::format("{} of {} samples are missing", lost, rows()));
-}
-
-bool hammer::find_overload() {
-    for (std::size_t c = 0; c < identified_; ++c) {
-        const drv_signal_t& layout = channels_[c].layout;
-        if (layout.value != DRV_VALUE_INTEGER || layout.length > 32) continue;
-        const double high = std::ldexp(1.0, layout.length - (layout.is_signed ? 1 : 0)) - 1;
-        const double low = layout.is_signed ? -high - 1 : -1; // 0 of an unsigned code is no limit
-        std::size_t full = 0;
-        for (std::size_t i = 0; i < rows(); ++i) full += at(i)[c] >= high || at(i)[c] <= low;
-        if (full > 0)
-            return refuse("overload",
-                          fmt::format("{} stood at full scale for {} sample{}: strike softer or lower its gain",
-                                      channels_[c].name, full, full == 1 ? "" : "s"));
-    }
-    std::size_t equal = 0;
-    for (std::size_t i = begin_; i < end_; ++i) equal += force(i) == force(top_);
-    return equal >= flat_top &&
-           refuse("overload",
-                  fmt::format("the force has a flat top of {} samples at {:.4g}{}: its amplifier was at its "
-                              "limit",
-                              equal, force(top_), unit_));
-}
-
-/// Peak and extent of the hit, and the noise of the force before it.
-void hammer::measure() {
-    const auto quiet = static_cast<std::size_t>(before_) * 7 / 8;
-    double sum = 0, squares = 0;
-    for (std::size_t i = 0; i < quiet; ++i) sum += force(i);
-    base_ = sum / static_cast<double>(quiet);
-    for (std::size_t i = 0; i < quiet; ++i) squares += (force(i) - base_) * (force(i) - base_);
-    noise_ = std::sqrt(squares / static_cast<double>(quiet));
-    const double sign = wanted_.level > 0 ? 1 : -1;
-    top_ = static_cast<std::size_t>(before_);
-    for (std::size_t i = top_; i < rows(); ++i)
-        if (sign * force(i) > sign * force(top_)) top_ = i;
-    report_.peak = force(top_) - base_;
-    const auto inside = [&](std::size_t i) { return (force(i) - base_) / report_.peak > pulse_share; };
-    begin_ = top_;
-    end_ = top_ + 1;
-    while (begin_ > 0 && inside(begin_ - 1)) --begin_;
-    while (end_ < rows() && inside(end_)) ++end_;
-    report_.duration_s = static_cast<double>(end_ - begin_) / rate_hz_;
-}
-
-bool hammer::find_second_blow() {
-    const double share = wanted_.double_percent / 100;
-    const std::size_t apart = std::max<std::size_t>(3, (end_ - begin_) / 2);
-    const auto struck = [&](std::size_t i) { return (force(i) - base_) / report_.peak > share; };
-    for (std::size_t i = static_cast<std::size_t>(before_) * 7 / 8; i < rows(); ++i) {
-        if (i + apart >= begin_ && i < end_ + apart) continue;
-        if (struck(i))
-            return refuse("double_hit",
-                          fmt::format("a second hit of {:.0f} % {:.1f} ms {}", 100 * (force(i) - base_) / report_.peak,
-                                      1e3 * std::abs(static_cast<double>(i) - static_cast<double>(top_)) / rate_hz_,
-                                      i > top_ ? "later" : "earlier"));
-    }
-    return false;
-}
-
-/// Is the structure still ringing from what was before? The rms before the hit against that behind it.
-bool hammer::find_motion() {
-    const auto count = static_cast<std::size_t>(before_);
-    const auto rms = [&](std::size_t c, std::size_t first, std::size_t last) {
-        double sum = 0, squares = 0;
-        for (std::size_t i = first; i < last; ++i) sum += at(i)[c], squares += at(i)[c] * at(i)[c];
-        const double n = static_cast<double>(last - first), mean = sum / n;
-        return std::sqrt(std::max(0.0, squares / n - mean * mean));
-    };
-    std::size_t forces = 0;
-    while (forces < identified_ && channels_[forces].role == channel_role::force) ++forces;
-    for (std::size_t c = forces; c < identified_; ++c) {
-        const double was = rms(c, 0, count * 7 / 8), is = rms(c, count, std::min(rows(), 2 * count));
-        if (was > most_motion * is)
-            return refuse("moving",
-                          fmt::format("{} still moved before the hit, by {:.0f} % of what the hit caused (rms): "
-                                      "wait longer, or strike harder",
-                                      channels_[c].name, 100 * was / is));
-    }
-    return false;
-}
-
-/// Where the spectrum of the pulse has fallen to a tenth of its greatest amplitude.
-void hammer::find_band() {
-    const std::size_t margin = 2 + (end_ - begin_) / 2;
-    const std::size_t first = begin_ > margin ? begin_ - margin : 0, last = std::min(rows(), end_ + margin);
-    double greatest = 0;
-    report_.band_hz = rate_hz_ / 2;
-    for (std::size_t k = 0; k <= frequencies; ++k) {
-        const double f = static_cast<double>(k) / (2.0 * frequencies); // of the rate
-        std::complex<double> sum = 0;
-        for (std::size_t i = first; i < last; ++i)
-            sum +=
-                (force(i) - base_) * std::polar(1.0, -2 * 3.14159265358979323846 * f * static_cast<double>(i - first));
-        greatest = std::max(greatest, std::abs(sum));
-        if (std::abs(sum) >= band_share * greatest) continue;
-        report_.band_hz = f * rate_hz_;
-        return;
-    }
-}
-
 void hammer::judge() {
-    const auto weak = [&] {
-        return !(std::abs(report_.peak) > least_peak * noise_) &&
-               refuse("weak", fmt::format("a peak of {:.4g}{} is only {:.1f} times the noise of the force",
-                                          report_.peak, unit_, std::abs(report_.peak) / noise_));
-    };
-    const auto narrow = [&] {
-        return report_.band_hz < wanted_.spectrum_hz &&
-               refuse("spectrum", fmt::format("the force reaches to {:.4g} Hz only (-20 dB), wanted {:.4g} Hz: take a "
-                                              "harder tip",
-                                              report_.band_hz, wanted_.spectrum_hz));
-    };
-    const bool bad =
-        (early_ && refuse("too_early", fmt::format("it came before {:.2f} s of quiet were recorded: wait for the lamp",
-                                                   static_cast<double>(before_) / rate_hz_))) ||
-        find_missing();
-    if (!bad) {
-        measure();
-        find_band();
-        (void)(find_overload() || weak() || find_second_blow() || find_motion() || narrow());
+    std::rotate(rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(next_) * width_),
+                rows_.end());
+    next_ = 0;
+    window_.rows = rows_.data();
+    window_.channels = &judged_;
+    if (early_) {
+        report_.fault = "too_early";
+        report_.text = fmt::format("it came before {:.2f} s of quiet were recorded: wait for the lamp",
+                                   static_cast<double>(before_) / rate_hz_);
+    } else {
+        static_cast<hit_verdict&>(report_) = judge_hit(window_);
     }
     if (report_.good()) {
         ++accepted_;
         --left_;
-        report_.text = fmt::format("accepted: {:.4g}{}, {:.2f} ms, force up to {:.4g} Hz", report_.peak, unit_,
-                                   1e3 * report_.duration_s, report_.band_hz);
     } else {
         const auto known =
             std::find_if(refused_.begin(), refused_.end(), [&](const auto& one) { return one.first == report_.fault; });
@@ -239,8 +123,7 @@ std::string hammer::awaited() const {
     const int point = next_point(), there = left_ - (left_ - 1) / wanted_.hits * wanted_.hits;
     const std::string at = point == 0 ? "" : fmt::format(" point {}", point);
     return fmt::format("{}{}, {}{} of {} left", last,
-                       armed() ? fmt::format("strike{} ({} beyond {:.4g}{})", at, channels_[wanted_.channel].name,
-                                             wanted_.level, unit_)
+                       armed() ? fmt::format("strike{} ({} beyond {:.4g}{})", at, channel_, wanted_.level, window_.unit)
                        : point ? fmt::format("wait, next{}", at)
                                : "wait",
                        point ? fmt::format("{} of {} there, ", there, wanted_.hits) : "", left_, wanted_.total());
@@ -249,8 +132,8 @@ std::string hammer::awaited() const {
 std::string hammer::shortfall() const {
     if (!wanted() || left_ == 0) return "";
     if (heard_ == 0)
-        return fmt::format("no hit was detected: {} stayed between {:.4g} and {:.4g}{}, level is {:.4g}",
-                           channels_[wanted_.channel].name, least_, most_, unit_, wanted_.level);
+        return fmt::format("no hit was detected: {} stayed between {:.4g} and {:.4g}{}, level is {:.4g}", channel_,
+                           least_, most_, window_.unit, wanted_.level);
     std::string why;
     for (const auto& [fault, count] : refused_) why += fmt::format("{}{} {}", why.empty() ? ": " : ", ", count, fault);
     const int refused = heard_ - accepted_ - (capturing_ ? 1 : 0);

@@ -3,11 +3,10 @@
 // judges whether they are worth adding to the others.
 //
 // A hit begins where the force crosses `level`. Before it at least as many quiet samples are kept as the identification
-// has lags, so that all of it counts. It is refused, with the reason, when samples are missing, a channel stood at full scale,
-// the structure still moved, the force hardly exceeds its noise, there was a second hit, or its spectrum ends too early.
-// No exponential window is put on the response: a model needs none, and it would add damping.
+// has lags, so that all of it counts.
 #pragma once
 #include "config/config.hpp"
+#include "record/hit_verdict.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -18,16 +17,11 @@
 namespace okid_host {
 
 /// What became of a hit.
-struct hit_report {
+struct hit_report : hit_verdict {
     int number = 0;             ///< of the hits heard, 1 = the first
     std::int64_t sample = 0;    ///< with which the force crossed the level
-    std::string fault, text;    ///< fault "" = accepted; text is for people
-    double peak = 0;            ///< in the channel's unit, with its sign
-    double duration_s = 0;      ///< above 10 % of the peak
-    double band_hz = 0;         ///< up to here the force has a tenth of its greatest spectral amplitude
     int accepted = 0, left = 0; ///< of all so far
     int point = 0;              ///< where it was struck by the plan; 0: there is none
-    bool good() const { return fault.empty(); }
 };
 
 class hammer {
@@ -57,34 +51,23 @@ class hammer {
     const double* at(std::size_t i) const {
         return rows_.data() + (static_cast<std::size_t>(next_) + i) % rows() * width_;
     }
-    double force(std::size_t i) const { return offset_ + scale_ * at(i)[wanted_.channel]; }
     void keep(const double* row);
     bool crosses(const double* row);
     void judge();
-    bool find_missing();
-    bool find_overload();
-    bool find_motion();
-    void measure();
-    bool find_second_blow();
-    void find_band();
-    bool refuse(const char* fault, std::string text);
     /// Where the next good one has to be struck; 0: no plan, or all are there.
     int next_point() const { return wanted_.points.empty() || left_ == 0 ? 0 : wanted_.point_of(accepted_); }
 
     hammer_config wanted_;
-    std::vector<channel_config> channels_;
-    std::string unit_;
-    double scale_ = 1, offset_ = 0, rate_hz_;
-    std::size_t width_, identified_;
+    std::string channel_; ///< its name
+    double rate_hz_;
+    std::size_t width_;
     std::int64_t before_ = 0, after_ = 0;
+    std::vector<hit_channel> judged_;
+    hit_window window_;
     std::vector<double> rows_; ///< a ring of before_ + after_ rows
     std::int64_t next_ = 0, kept_ = 0, to_come_ = 0;
     bool capturing_ = false, early_ = false, have_last_ = false;
     double last_ = 0, least_ = 0, most_ = 0; ///< of the force, so far
-    // Of the hit that is judged.
-    double base_ = 0, noise_ = 0;
-    std::size_t top_ = 0, begin_ = 0,
-                end_ = 0; ///< rows of the peak, and of the first and behind the last above 10 % of it
     int heard_ = 0, left_ = 0, accepted_ = 0;
     hit_report report_;
     std::vector<std::pair<std::string, int>> refused_; ///< how often, by fault

@@ -5,6 +5,7 @@
 
 #include "error.hpp"
 #include "growing_poles.hpp"
+#include "hit_files.hpp"
 #include "record_auto.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
@@ -325,6 +326,14 @@ result_context describe_records(const record_set& set, const record_options& opt
 
 record_result identify_records(record_set records, const record_options& options, const older_samples* before) {
     check_hits(records, options.hits);
+    if (options.judge_hits) {
+        record_options good = options;
+        good.judge_hits = false;
+        std::vector<hit_line> hits = choose_hits(records, good);
+        record_result out = identify_records(std::move(records), good);
+        out.context.hits = std::move(hits);
+        return out;
+    }
     if (options.method == "auto") return identify_auto(std::move(records), options, before);
     if (!options.hits.empty()) {
         record_options other = options;

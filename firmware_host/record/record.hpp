@@ -29,16 +29,19 @@ struct record_options {
         "no";       ///< maximum likelihood after the identification: yes, no, or (method auto) where it serves
     mass_plan mass; ///< where the channels stand, when M, K and R are wanted
     remarks said;   ///< known before the data are seen
-    bool stabilization = false;                    ///< look at all orders and some horizons too
-    int sigma_blocks = 20;                         ///< blocks left out in turn for the standard deviations; 0 = none
-    bool analytic = true;                          ///< to first order where the method has a derivative, else anew
-    std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
-    int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
-    int threads = 0;                               ///< of auto, at a time; 0: all processors
-    bool all_modes = false;                        ///< auto lists also what few runs found
-    bool modes_without_matrices = false;           ///< auto: what stands in the way of M, K, R is a remark
-    std::vector<int> modes;                        ///< numbers of the modes picked by hand (auto); empty: all
-    std::vector<int> sensing;                      ///< okid_sensing_t of each output; empty: all are accelerations
+    bool stabilization = false;                     ///< look at all orders and some horizons too
+    int sigma_blocks = 20;                          ///< blocks left out in turn for the standard deviations; 0 = none
+    bool analytic = true;                           ///< to first order where the method has a derivative, else anew
+    std::optional<std::pair<double, double>> band;  ///< Hz, of the modes wanted (auto)
+    int decimate = 1;                               ///< auto looks at no higher rate than a so many-th
+    int threads = 0;                                ///< of auto, at a time; 0: all processors
+    bool all_modes = false;                         ///< auto lists also what few runs found
+    bool modes_without_matrices = false;            ///< auto: what stands in the way of M, K, R is a remark
+    std::vector<int> modes;                         ///< numbers of the modes picked by hand (auto); empty: all
+    std::vector<int> sensing;                       ///< okid_sensing_t of each output; empty: all are accelerations
+    bool judge_hits = false, keep_all_hits = false; ///< are bad hits sought; are they used nevertheless
+    std::string hit_unit;                           ///< of their force
+    mass_plan placed;      ///< of hits: the places struck and those of the sensors, when these are told
     std::vector<int> hits; ///< where each record was struck, from 1 (-3: at 3, reversed); empty: not told
     std::function<void(const char* stage)> stage; ///< told what begins; may be empty
 };

@@ -15,6 +15,7 @@
 #include "modal_model.hpp"
 #include "modal_refine.hpp"
 #include "older_samples.hpp"
+#include "place_shapes.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_hold.hpp"
@@ -354,19 +355,6 @@ void find_matrix_deviations(const std::vector<listed_mode>& listed, const record
     add_deviations(statistics.finish(), *work.context.mass);
 }
 
-/// Of every channel, the mean of the means of the records.
-std::vector<double> means_of(const record_set& set) {
-    std::vector<double> out(set.channels(), 0.0);
-    for (const record_data& record : set.records)
-        for (std::size_t k = 0; k < set.channels(); ++k) {
-            double sum = 0, count = 0;
-            for (std::size_t i = 0; i < record.count; ++i)
-                if (const double x = set.rows(record)[i * set.channels() + k]; !std::isnan(x)) sum += x, ++count;
-            if (count > 0) out[k] += sum / count / static_cast<double>(set.records.size());
-        }
-    return out;
-}
-
 /// M, K, R from the model of the modes that are confident; then the model of all listed, its gain and fits.
 void make_models(std::vector<listed_mode> listed, const record_options& options, record_work& work) {
     std::vector<double> means(work.set.channels(), 0.0);
@@ -410,6 +398,10 @@ record_options without_outputs(record_options options, const std::vector<bool>& 
     options.sensing = std::move(sensing);
     options.outputs = std::move(outputs);
     options.mass.outputs = std::move(places);
+    std::vector<mass_channel> standing;
+    for (std::size_t k = 0; k < kept.size() && !options.placed.outputs.empty(); ++k)
+        if (kept[k]) standing.push_back(options.placed.outputs[k]);
+    options.placed.outputs = std::move(standing);
     return options;
 }
 
@@ -433,6 +425,19 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
     if (options.detrend != "none") remove_means(work.set);
     fit_places(listed, options.hits, options.fs_hz, work);
     return listed;
+}
+
+/// Of records struck at different places: M, K and R where there is a mode for each, and shapes over the places.
+void find_placed(const std::vector<listed_mode>& listed, const record_options& options, record_work& work) {
+    const auto modes =
+        std::count_if(listed.begin(), listed.end(), [](const listed_mode& mode) { return mode.in_model; });
+    record_options wanted = options;
+    if (!options.mass.wanted() || modes < options.mass.size()) {
+        wanted.mass.inputs.clear();
+        wanted.mass.outputs = options.placed.outputs;
+    }
+    find_matrices_agreed(wanted, work);
+    if (work.set.n_u == 1) place_shapes(listed, options, work); // else the force never rests
 }
 
 } // namespace
@@ -479,7 +484,7 @@ record_result identify_auto(record_set records, const record_options& given, con
     const bool placed = work.model.n_u > 0; // by find_struck
     if (!placed) make_models(listed, options, work);
     remark_contradiction(listed, options.hits, options.fs_hz, work);
-    if (placed) find_matrices_agreed(options, work);
+    if (placed) find_placed(listed, options, work);
     if (!all) put_back_outputs(screened.kept, work);
     work.context.outputs = given.outputs;
     record_result result;

@@ -143,6 +143,18 @@ void take_mean(double* first, std::size_t channels, std::size_t count) {
 
 } // namespace
 
+std::vector<double> means_of(const record_set& set) {
+    std::vector<double> out(set.channels(), 0.0);
+    for (const record_data& record : set.records)
+        for (std::size_t k = 0; k < set.channels(); ++k) {
+            double sum = 0, count = 0;
+            for (std::size_t i = 0; i < record.count; ++i)
+                if (const double x = set.rows(record)[i * set.channels() + k]; !std::isnan(x)) sum += x, ++count;
+            if (count > 0) out[k] += sum / count / static_cast<double>(set.records.size());
+        }
+    return out;
+}
+
 void remove_means(record_set& set) {
     const std::size_t channels = set.channels();
     for (const record_data& record : set.records) {

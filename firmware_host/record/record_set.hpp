@@ -48,6 +48,9 @@ std::pair<std::string, std::string> missing_samples(const missing_count& missing
 /// Lengths of the unbroken runs of complete samples.
 std::vector<long long> complete_runs(const record_set& set);
 
+/// Of every channel, the mean of the means of the records.
+std::vector<double> means_of(const record_set& set);
+
 /// Remove the mean of each channel of each record over its present samples.
 void remove_means(record_set& set);
 

@@ -76,8 +76,6 @@ mass_plan check_dofs(const record_request& given, const record_options& options,
         for (std::size_t i = 0; i < sensing.size(); ++i) plan.outputs[i].sensing = sensing[i];
         plan.hold = options.hold;
         read_dofs("--output-dofs", given.output_dofs, "output", plan.outputs);
-        if (const std::string fault = plan_fault(plan); !fault.empty())
-            usage(fmt::format("--hit-dofs, --output-dofs: {}", fault));
         return plan;
     }
     for (const auto& [option, other, list] : {std::tuple{"--input-dofs", "--output-dofs", &given.input_dofs},
@@ -232,8 +230,15 @@ record_options check_request(const record_request& given) {
     const std::string fault = one_of_all ? "" : hankel_fault(given.hankel, options.method, options.inputs.size());
     if (!fault.empty()) usage("--hankel: " + fault);
     options.hits = check_hit_dofs(given);
+    options.judge_hits = !options.hits.empty();
+    options.keep_all_hits = given.keep_all;
+    if (given.keep_all && options.hits.empty()) usage("--keep-all belongs to --hit-dofs and --places");
     options.sensing = check_sensing(given.sensing, options.outputs.size());
     options.mass = check_dofs(given, options, options.sensing);
+    if (!options.hits.empty()) {
+        options.placed = options.mass;
+        if (!plan_fault(options.placed).empty()) options.mass = {}; // shapes need no force or sensor everywhere
+    }
     return options;
 }
 
@@ -256,11 +261,16 @@ double check_rate(const std::string& text) {
 
 void take_record_units(const std::vector<std::string>& units, record_options& options) {
     remark_exchanged(units, options, options.said);
-    if (!options.mass.wanted()) return;
-    std::vector<std::string> placed = units; // of roving hits one column a place
-    if (!options.hits.empty() && !units.empty())
-        placed.insert(placed.begin(), options.mass.inputs.size() - 1, units[0]);
-    take_units(placed, options.mass, options.said);
+    if (options.hits.empty()) {
+        if (options.mass.wanted()) take_units(units, options.mass, options.said);
+        return;
+    }
+    if (!units.empty()) options.hit_unit = units[0];
+    if (!options.placed.wanted()) return;
+    std::vector<std::string> placed = units; // one column a place
+    if (!units.empty()) placed.insert(placed.begin(), options.placed.inputs.size() - 1, units[0]);
+    take_units(placed, options.placed, options.said);
+    if (options.mass.wanted()) options.mass = options.placed;
 }
 
 } // namespace okid_host

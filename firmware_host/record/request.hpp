@@ -18,6 +18,7 @@ struct record_request {
     std::string hit_dofs;                       ///< one number a record
     std::string refine;                         ///< auto, yes or no; empty: auto under method auto, else no
     bool stabilization = false;
+    bool keep_all = false; ///< of hits: bad ones too
 };
 
 /// Throws `failure` (exit 2) naming the option, what was found and what was expected. `fs_hz` stays 0.

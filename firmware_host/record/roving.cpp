@@ -5,6 +5,7 @@
 #include "roving.hpp"
 
 #include "error.hpp"
+#include "hit_verdict.hpp"
 #include "record_fit.hpp"
 #include "record_refine.hpp"
 #include "residue_fit.hpp"
@@ -19,8 +20,6 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double struck = 0.05;       // of the largest force: the hit is on
-constexpr double least_decay = 0.3;   // of a record
 constexpr double explained = 0.5;     // of a record's energy that its own B and D must not leave: the modes are its own
 constexpr double contradiction = 0.1; // more of the energy left by the others' B and D: a third of the amplitude
 constexpr std::size_t most_named = 8;
@@ -29,29 +28,14 @@ std::size_t index_of(const std::vector<int>& places, int hit) {
     return static_cast<std::size_t>(std::find(places.begin(), places.end(), std::abs(hit)) - places.begin());
 }
 
-/// One past the last sample of the force beyond 5 % of its largest, about its median.
-std::size_t end_of_blow(const record_set& set, const record_data& record) {
-    const double* rows = set.rows(record);
-    std::vector<double> force;
-    for (std::size_t i = 0; i < record.count; ++i) force.push_back(rows[i * set.channels()]);
-    std::vector<double> sorted;
-    std::copy_if(force.begin(), force.end(), std::back_inserter(sorted), [](double x) { return !std::isnan(x); });
-    if (sorted.empty()) return record.count;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    double largest = 0;
-    for (const double x : force) largest = std::fmax(largest, std::abs(x - *middle));
-    std::size_t last = 0;
-    for (std::size_t i = 0; i < record.count; ++i)
-        if (std::abs(force[i] - *middle) > struck * largest) last = i + 1;
-    return last;
+hit_span span_of(const record_set& set, const record_data& record) {
+    return find_hit(set.rows(record), record.count, set.channels());
 }
 
 /// Every record is one hit and what follows it: then nothing moves before, however short the time before the hit.
 bool are_blows(const record_set& set) {
     return set.n_u == 1 && std::all_of(set.records.begin(), set.records.end(), [&](const record_data& record) {
-               return static_cast<double>(record.count - end_of_blow(set, record)) >=
-                      least_decay * static_cast<double>(record.count);
+               return span_of(set, record).free >= least_free;
            });
 }
 
@@ -171,7 +155,7 @@ record_set free_decays(const record_set& set) {
     out.n_y = set.n_y;
     if (!are_blows(set)) return {};
     for (const record_data& record : set.records) {
-        const std::size_t first = end_of_blow(set, record);
+        const std::size_t first = span_of(set, record).end;
         std::vector<double> rows;
         for (std::size_t i = first; i < record.count; ++i) {
             const double* y = set.rows(record) + i * set.channels() + set.n_u;
@@ -225,6 +209,34 @@ void fit_places(const std::vector<listed_mode>& modes, const std::vector<int>& h
     model.markov = arrays.markov.data();
     work.context.simulation_percent = work.context.prediction_percent = percent;
     work.context.x0 = std::move(states);
+}
+
+place_residues find_residues(const std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz,
+                             const record_set& set) {
+    const std::vector<int> places = hit_places(hits);
+    const auto n = std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; });
+    const auto count = static_cast<Eigen::Index>(places.size());
+    place_residues out{Eigen::MatrixXcd(n, count), Eigen::MatrixXd(n, count)};
+    const auto b_of = [n](const std::vector<const residue_sums*>& records) {
+        const VectorXd x = fit_residues(records);
+        return Eigen::VectorXcd(Eigen::Map<const Eigen::VectorXcd>(
+            reinterpret_cast<const std::complex<double>*>(x.data()), n)); // real and imaginary parts alternate
+    };
+    Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(n);
+    Eigen::ArrayXd hits_there(count);
+    double free = 0;
+    for (Eigen::Index j = 0; j < count; ++j) {
+        const auto sums = sum_residues(modes, fs_hz, records_at(set, hits, places[static_cast<std::size_t>(j)]), true);
+        std::vector<const residue_sums*> all;
+        for (const residue_sums& one : sums) all.push_back(&one);
+        out.b.col(j) = b_of(all);
+        for (const residue_sums& one : sums) squares += (b_of({&one}) - out.b.col(j)).array().abs2();
+        hits_there[j] = static_cast<double>(sums.size());
+        free += hits_there[j] - 1;
+    }
+    for (Eigen::Index j = 0; j < count; ++j) // 0 / 0: nothing to be said
+        out.std.col(j) = (squares * (free > 0 ? 1 / free : NAN) / hits_there[j]).sqrt();
+    return out;
 }
 
 void check_hits(const record_set& set, const std::vector<int>& hits) {

@@ -4,6 +4,7 @@
 #include "modal_model.hpp"
 #include "record_work.hpp"
 
+#include <Eigen/Core>
 #include <vector>
 
 namespace okid_host {
@@ -20,11 +21,19 @@ record_set one_column_a_place(const record_set& set, const std::vector<int>& hit
 /// Their names: "force@3".
 std::vector<std::string> place_names(const std::string& force, const std::vector<int>& hits);
 
-/// What follows the last sample of each hit, outputs alone; empty where that is less than 30 % of a record.
+/// What follows the last sample of each hit, outputs alone; empty where that is less than 30 % of what follows its beginning.
 record_set free_decays(const record_set& set);
 
 /// B, D and fits of a modal model of which each place has its own records.
 void fit_places(const std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz, record_work& work);
+
+/// Of each mode in the model (rows) and place (columns): what a hit does to it, and one standard deviation.
+struct place_residues {
+    Eigen::MatrixXcd b;
+    Eigen::MatrixXd std; ///< from the scatter of the hits of one place, one for all places; NaN: one hit each
+};
+place_residues find_residues(const std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz,
+                             const record_set& set);
 
 /// The modes of a model, those of little EMAC not in it.
 std::vector<listed_mode> modes_of(const okid_identified_t& model);

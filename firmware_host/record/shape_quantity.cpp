@@ -9,9 +9,10 @@
 #include <cmath>
 
 namespace okid_host {
-namespace {
 
 int times_differentiated(int kind) { return kind == OKID_SENSE_ACCELERATION ? 2 : kind == OKID_SENSE_VELOCITY ? 1 : 0; }
+
+namespace {
 
 /// Deviations of re and im of an entry multiplied by a number.
 void scale_deviations(std::complex<double> factor, double& re_std, double& im_std) {

@@ -146,7 +146,7 @@ constexpr int most_shape_columns = 6;                         // more would not 
 
 std::string mode_rows(const okid_identified_t& model, const result_context& context) {
     const bool agreed = !context.verdicts.empty();
-    const bool shapes = model.n_y > 1 && model.n_y <= most_shape_columns;
+    const bool shapes = model.n_y > 1 && model.n_y <= most_shape_columns && !context.placed;
     const std::vector<mode_verdict> verdicts = mode_verdicts(model, context);
     std::vector<std::string> left_out;
     std::vector<std::size_t> width;
@@ -189,6 +189,14 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
     return out;
 }
 
+/// Which modes the table lists.
+std::vector<bool> shown_modes(const okid_identified_t& model, const result_context& context) {
+    std::vector<bool> out;
+    for (const mode_verdict& verdict : mode_verdicts(model, context))
+        out.push_back(verdict.confident || context.all_modes);
+    return out;
+}
+
 /// "12.3 Hz, 45.6 Hz": confident modes of whose values and standard deviations something holds.
 std::string confident_modes(
     const okid_identified_t& model, const result_context& context,
@@ -205,7 +213,8 @@ std::string confident_modes(
 
 } // namespace
 
-nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma) {
+nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma,
+                                  const placed_shapes* placed) {
     ordered_json out = ordered_json::array();
     const auto deviation = [&](std::vector<double> deviations::* of, int k) {
         return sigma ? number_json((sigma->*of)[static_cast<std::size_t>(k)]) : ordered_json(nullptr);
@@ -227,6 +236,7 @@ nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviatio
         mode["mpc"] = number_json(model.mpc[k]);
         mode["emac"] = number_json(model.emac[k]);
         mode["cmi"] = number_json(model.cmi[k]);
+        if (placed) put_shape_json(*placed, static_cast<std::size_t>(k), mode);
         out.push_back(std::move(mode));
     }
     return out;
@@ -258,7 +268,9 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["singular_noise"] = number_json(model.noise_level);
     if (arrays) put_arrays_json(model, context, out);
     out["judged_by"] = judged_by_agreement(context) ? "agreement" : "emac";
-    out["modes"] = modes_json(model, context.sigma ? &*context.sigma : nullptr);
+    out["modes"] =
+        modes_json(model, context.sigma ? &*context.sigma : nullptr, context.placed ? &*context.placed : nullptr);
+    if (context.placed) out["shape_dofs"] = context.placed->dofs;
     if (!context.shape_quantity.empty()) out["shape_quantity"] = context.shape_quantity;
     if (agreed) {
         out["band_hz"] = context.band_hz
@@ -274,6 +286,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     if (context.refined) out["refinement"] = refinement_json(*context.refined, context.outputs);
     if (context.skew) out["skew"] = skew_json(*context.skew, context.outputs);
     if (context.mass) put_mass_json(*context.mass, out);
+    if (!context.hits.empty()) out["hits"] = hits_json(context.hits);
     out["warnings"] = ordered_json::array();
     for (const auto& [code, text] : result_warnings(model, context))
         out["warnings"].push_back(ordered_json{{"code", code}, {"text", text}});
@@ -308,10 +321,13 @@ std::string result_table(const okid_identified_t& model, const result_context& c
             fmt::format("\nmodes sought between {:.3g} and {:.4g} Hz", context.band_hz->first, context.band_hz->second);
     if (!context.rates_hz.empty()) out += fmt::format(", at rates down to {:.4g} Hz", context.rates_hz.back());
     out += fmt::format("\n{}, order {}, detrend {}\n\n", horizon, model.n_z, context.detrend);
-    out += mode_rows(model, context) + fit_text(context);
+    out += mode_rows(model, context);
+    if (context.placed) out += shapes_text(*context.placed, model.frequency_hz, shown_modes(model, context));
+    out += fit_text(context);
     if (context.stable) out += stabilization_text(*context.stable);
     if (context.refined) out += refinement_text(*context.refined, context.outputs);
     if (context.mass) out += mass_text(*context.mass);
+    if (!context.hits.empty()) out += hits_text(context.hits);
     const auto warnings = result_warnings(model, context);
     if (!warnings.empty()) out += "\n";
     for (const auto& [code, text] : warnings) out += fmt::format("warning {}: {}\n", code, text);

@@ -2,7 +2,9 @@
 // An identified model as people and programs see it: okid.result/1 and the modal table.
 #pragma once
 #include "deviations.hpp"
+#include "hit_table.hpp"
 #include "mode_verdict.hpp"
+#include "placed_shapes.hpp"
 #include "refinement.hpp"
 #include "stabilization.hpp"
 
@@ -40,13 +42,17 @@ struct result_context {
     std::optional<stabilization> stable;                       ///< where it was asked for
     std::optional<refinement> refined;                         ///< of a model that was refined
     std::optional<channel_skew> skew;                          ///< delays of the outputs, of a refined model
+    std::vector<hit_line> hits;                                ///< of a hammer test in files
+    std::optional<placed_shapes> placed;                       ///< of a hammer that roves: shapes over its places
     std::optional<mass_matrices> mass;                         ///< M, K, R where the channels have degrees of freedom
     std::vector<std::pair<std::string, std::string>> warnings; ///< further (code, text)
 };
 
 /// {"frequency_hz": …, "damping_ratio": …, "shape_re": […], "shape_im": […], "mpc": …, "emac": …, "cmi": …} of every mode.
 /// @param sigma  their standard deviations, or nullptr (null)
-nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma);
+/// @param placed  shapes over other places than those of the outputs, or nullptr
+nlohmann::ordered_json modes_json(const okid_identified_t& model, const deviations* sigma,
+                                  const placed_shapes* placed = nullptr);
 
 /// The whole okid.result/1 object. @param arrays  false: without singular_values, model and markov
 nlohmann::ordered_json result_json(const okid_identified_t& model, const result_context& context, bool arrays = true);

@@ -8,6 +8,8 @@ import pathlib
 import re
 from typing import Any
 
+import beam
+import numpy as np
 import okid as package
 import pytest
 import systems
@@ -46,8 +48,12 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
     long = package.identify(*systems.record(structure, 66_000, 2.0, 1), fs=structure.fs, sigma="none")
     agreed = okid("identify", rig / "a.csv", "--inputs", "force1", "--outputs", "acc1,acc2", "--json", "-")
     assert agreed.returncode == 0, agreed.stderr
+    hits = [beam.record(beam.Hit(place, 100.0, 0.0015), np.random.default_rng(place)) for place in (1, 2)]
+    sides = [hit[:, :1] for hit in hits], [hit[:, 1:] for hit in hits]
+    struck = package.identify(*sides, fs=beam.FS, hit_dofs=[1, 2], output_dofs=[1, 5])
     return [
         json.loads(agreed.stdout),
+        struck.to_dict(),
         identified(rig, *full),
         identified(rig, "--method", "n4sid-cva"),
         identified(rig, "--sensing", "acceleration,velocity"),

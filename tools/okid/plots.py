@@ -78,7 +78,7 @@ def shapes(result: Result) -> Picture:
     picture = _sheet(9.0, 2.1 * rows)
     for k, mode in enumerate(modes):
         title = f"{mode.frequency_hz:.4g} Hz, {100 * mode.damping_ratio:.2g} %"
-        figures.draw_shape(picture.add_subplot(rows, 3, k + 1), np.asarray(mode.shape), result.outputs, title)
+        figures.draw_shape(picture.add_subplot(rows, 3, k + 1), np.asarray(mode.shape), result.shape_places, title)
     return picture
 
 

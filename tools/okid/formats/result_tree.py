@@ -53,11 +53,12 @@ def _matrices(part: Mapping[str, Any] | None) -> dict[str, Any]:
 
 
 def mode_arrays(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """frequency_hz, damping_ratio, their std, mpc, emac, cmi, confident (1 or 0), found_in (n,), shapes (n_y, n)."""
+    """frequency_hz, damping_ratio, their std, mpc, emac, cmi, confident (1 or 0), found_in (n,), shapes
+    (outputs or shape_dofs, n)."""
     modes = raw["modes"]
     out: dict[str, Any] = {key: np.array([_float(mode.get(key)) for mode in modes]) for key in _NUMBERS}
     shapes = [np.array(mode["shape_re"], float) + 1j * np.array(mode["shape_im"], float) for mode in modes]
-    out["shapes"] = np.array(shapes, np.complex128).reshape(len(modes), len(raw["outputs"])).T
+    out["shapes"] = np.array(shapes, np.complex128).reshape(len(modes), -1 if modes else 0).T
     return out
 
 

@@ -274,7 +274,9 @@ def write_uff(
             raw, _ = without_left_out(raw)
             outputs = [places[name] for name in raw["outputs"]]
             inputs = list(_places(raw["inputs"], geometry).values())
-            parts += [text.encode() for text in _chosen(mode_sets(raw, outputs, sensing), modes)]
+            struck = raw.get("shape_dofs")
+            of_shapes = list(_places(list(map(str, struck)), geometry).values()) if struck else outputs
+            parts += [text.encode() for text in _chosen(mode_sets(raw, of_shapes, sensing), modes)]
             parts += _frf_bytes(raw, outputs, inputs, binary, sensing)
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None

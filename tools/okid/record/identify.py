@@ -54,6 +54,7 @@ def identify(
     decimate: int | None = None,
     modes: Sequence[int] | None = None,
     hit_dofs: Sequence[int] | None = None,
+    keep_all: bool = False,
     threads: int | None = None,
 ) -> Result:
     """Identify a structure from measured inputs and outputs.
@@ -98,7 +99,8 @@ def identify(
     rates; `threads` the processors used (default all; the result is the same for any number).
 
     `hit_dofs`: where each record was struck (roving hammer), one number a record: each place becomes an input of its
-    own; with `output_dofs` it says where the forces of M, K and R act.
+    own, and shapes cover the places (result.shape_dofs), with `output_dofs` those of the sensors too. Bad hits (a
+    double hit, an overload ..) are left out: result.hits; `keep_all` uses them. M, K, R where each place has a mode.
 
     Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
 
@@ -120,7 +122,7 @@ def identify(
         "sensing": sensing, "refine": ("no", "yes")[refine] if isinstance(refine, bool) else refine,
         "sigma": sigma, "sigma_blocks": sigma_blocks, "units": units,
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
-        "hit_dofs": hit_dofs, "threads": threads,
+        "hit_dofs": hit_dofs, "keep_all": keep_all, "threads": threads,
     }  # fmt: skip
     said = {key: value for key, value in options.items() if value is not _UNSAID.get(key)}
     return of_host(host_result.identify(said, inputs, outputs))  # type: ignore[no-any-return]

@@ -25,7 +25,7 @@ WHY = {"few_runs": "fewer than half of the set-ups found it"}
 
 
 def _common(results: Sequence[Result], references: Sequence[str] | None) -> list[str]:
-    shared = [name for name in results[0].outputs if all(name in one.outputs for one in results)]
+    shared = [name for name in results[0].shape_places if all(name in one.shape_places for one in results)]
     missing = [name for name in references or () if name not in shared]
     if missing:
         raise InputError(f"references has {missing[0]!r}, which is not an output of every set-up")
@@ -36,7 +36,7 @@ def _common(results: Sequence[Result], references: Sequence[str] | None) -> list
 
 
 def _entries(mode: Mode, result: Result, names: Sequence[str]) -> Complex:
-    return np.array([mode.shape[result.outputs.index(name)] for name in names], dtype=np.complex128)
+    return np.array([mode.shape[result.shape_places.index(name)] for name in names], dtype=np.complex128)
 
 
 def _gathered(results: Sequence[Result], references: Sequence[str]) -> list[dict[int, Mode]]:
@@ -71,7 +71,7 @@ def _shape(group: dict[int, Mode], results: Sequence[Result], references: Sequen
         own = _entries(mode, results[place], references)
         power = float(np.vdot(own, own).real)
         factor = complex(np.vdot(own, first)) / power if power > 0.0 else 0.0
-        for name, value in zip(results[place].outputs, mode.shape, strict=True):
+        for name, value in zip(results[place].shape_places, mode.shape, strict=True):
             scaled.setdefault(name, []).append(factor * value)
     return normalised([complex(np.mean(scaled[name])) if name in scaled else complex(np.nan) for name in names])
 
@@ -181,7 +181,7 @@ def merge_setups(results: Sequence[Result], *, references: Sequence[str] | None 
     if len(results) < 2:
         raise InputError(f"{len(results)} results to merge, expected at least two set-ups")
     common = _common(results, references)
-    names = list(dict.fromkeys(name for one in results for name in one.outputs))
+    names = list(dict.fromkeys(name for one in results for name in one.shape_places))
     modes = [_mode(group, _shape(group, results, common, names), len(results)) for group in _gathered(results, common)]
     if not modes:
         raise InputError("no set-up has a confident mode: there is nothing to merge")

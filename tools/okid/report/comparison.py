@@ -26,10 +26,10 @@ class Other(NamedTuple):
 
 
 def _common(a: Loaded, b: Loaded) -> tuple[list[str], Complex, Complex]:
-    """Outputs that both have, and the shapes of the confident modes at them."""
-    names = [name for name in a.outputs if name in b.outputs]
+    """Places that the shapes of both have, and the shapes of the confident modes at them."""
+    names = [name for name in a.places if name in b.places]
     own, other = (
-        one.shapes[one.confident][:, [one.outputs.index(name) for name in names]] if one.confident else
+        one.shapes[one.confident][:, [one.places.index(name) for name in names]] if one.confident else
         np.zeros((0, len(names)), np.complex128) for one in (a, b)
     )  # fmt: skip
     return names, own[:MOST_MODES], other[:MOST_MODES]

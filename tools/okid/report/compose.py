@@ -71,11 +71,11 @@ def _placed(m: Material, geometry: Place | None, config: Place | None) -> None:
     """Geometry and texts of the configurations: [geometry] of `geometry`, else of `config` when it has one."""
     live = {} if m.events is None else m.events.channels
     if geometry is not None:
-        m.geometry = read_geometry(geometry, m.result.outputs, live)
+        m.geometry = read_geometry(geometry, m.result.places, live, m.result.raw.get("shape_dofs"))
         if m.geometry is None:
             raise InputError(f"{geometry}: no section [geometry], expected nodes, dofs and lines")
     elif config is not None:
-        m.geometry = read_geometry(config, m.result.outputs, live)
+        m.geometry = read_geometry(config, m.result.places, live, m.result.raw.get("shape_dofs"))
     for place in dict.fromkeys(str(one) for one in (config, geometry) if one is not None):
         m.texts.append((place, read_toml(place)[1]))
 

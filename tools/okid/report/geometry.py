@@ -36,13 +36,17 @@ class Geometry(NamedTuple):
 
 
 def read_geometry(
-    path: str | Path, outputs: Sequence[str], live: Mapping[str, Mapping[str, Any]] | None = None
+    path: str | Path,
+    outputs: Sequence[str],
+    live: Mapping[str, Mapping[str, Any]] | None = None,
+    shape_dofs: Sequence[int] | None = None,
 ) -> Geometry | None:
     """[geometry] of a CONFIG.toml for these outputs, None when the file has none.
 
     dofs[k] is the place of degree of freedom k + 1; the `dof` of an output's [[channel]] says which is its own
     (negative: reversed), else that of the channel in the events of a run (`live`, by name). Without such numbers the
-    outputs count in their order. InputError names file and key.
+    outputs count in their order. `shape_dofs`: of a roving hammer, the numbers themselves. InputError names file and
+    key.
     """
     source = str(path)
     given = geometry_of(read_toml(path)[0], source)
@@ -52,7 +56,7 @@ def read_geometry(
     if not numbers:
         found = {name: one.get("dof") for name, one in (live or {}).items()}
         numbers = {name: dof for name, dof in found.items() if isinstance(dof, int) and dof != 0}
-    known = [numbers.get(name) for name in outputs]
+    known: list[int | None] = list(shape_dofs) if shape_dofs else [numbers.get(name) for name in outputs]
     if all(number is None for number in known):
         if len(dofs) != len(outputs):
             raise InputError(
@@ -64,7 +68,8 @@ def read_geometry(
     for name, number in zip(outputs, known, strict=True):
         if number is not None and abs(number) > len(dofs):
             raise InputError(
-                f"{source}: channel {name!r} is at dof {number}, but [geometry] dofs has {len(dofs)} places"
+                f"{source}: {'place' if shape_dofs else 'channel'} {name!r} is at dof {number}, but [geometry] dofs "
+                f"has {len(dofs)} places"
             )
         place = None if number is None else dofs[abs(number) - 1]
         if place is not None and number is not None and number < 0:

@@ -24,7 +24,7 @@ LEAST_EMAC = 0.5
 
 @dataclass
 class Loaded:
-    """The parts of a result file as arrays: shapes (modes, n_y), singular_values (s,), markov (count, n_y, n_u).
+    """The parts of a result file as arrays: shapes (modes, places), singular_values (s,), markov (count, n_y, n_u).
 
     Of method "auto" there are no singular values. Outputs that were left out (warning "screened") are in `left_out` and
     in `whole`, the result as it came, alone.
@@ -60,6 +60,11 @@ class Loaded:
         return list(self.raw["outputs"])
 
     @property
+    def places(self) -> list[str]:
+        """Names of the entries of a shape: the outputs, or the degrees of freedom of a roving hammer."""
+        return _places(self.raw)
+
+    @property
     def shown_hz(self) -> float:
         """Upper end of the frequency axes: Nyquist, or well above the highest mode when the modes are all low."""
         highest = 2.0 * float(np.max(self.frequency_hz, initial=0.0))
@@ -75,6 +80,11 @@ class Loaded:
         usable = gain.shape == (n_z, n_y) and bool(np.all(np.isfinite(gain)))
         usable = usable and float(np.max(np.abs(np.linalg.eigvals(m["A"] - gain @ m["C"])))) < 1.0
         return Model(m["A"], m["B"], m["C"], m["D"], gain if usable else np.zeros((n_z, n_y)), 1.0 / self.fs), usable
+
+
+def _places(raw: dict[str, Any]) -> list[str]:
+    """What the entries of a shape belong to: degrees of freedom (a roving hammer), else the outputs."""
+    return [str(dof) for dof in raw.get("shape_dofs") or raw["outputs"]]
 
 
 def _consistent(mode: dict[str, Any]) -> bool:
@@ -104,7 +114,7 @@ def loaded_from(raw: Any, source: str) -> Loaded:
     model = _matrices(raw, source)
     shapes = np.array(
         [np.array(m["shape_re"], float) + 1j * np.array(m["shape_im"], float) for m in raw["modes"]], np.complex128
-    ).reshape(len(raw["modes"]), n_y)
+    ).reshape(len(raw["modes"]), len(_places(raw)))
     frequency = np.array([float(m["frequency_hz"]) for m in raw["modes"]], dtype=np.float64)
     values = np.array(raw["singular_values"] or [], dtype=np.float64)
     return Loaded(raw, model, shapes, frequency, values, _markov(raw, n_y, n_u, source), left, whole)

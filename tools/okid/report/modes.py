@@ -73,7 +73,7 @@ def against(mode: dict[str, Any]) -> str:
 def _save(m: Material) -> str:
     """Buttons that save the chosen modes, and what they save."""
     whole = {**m.result.whole, "markov": None, "singular_values": None}
-    geometry, count = m.geometry, len(m.result.outputs)
+    geometry, count = m.geometry, len(m.result.places)
     dofs = [(k + 1, "x") for k in range(count)] if geometry is None else geometry.dofs
     places = [None if dof is None else (dof[0], AXES.index(dof[1][-1]), -1 if dof[1][0] == "-" else 1) for dof in dofs]
     head = units_text() + ("" if geometry is None else nodes_text(geometry.nodes) + lines_text(geometry.lines))
@@ -96,15 +96,15 @@ def _shown(m: Material, most: int) -> list[int]:
 
 def _sticks(m: Material) -> list[str]:
     shown = _shown(m, MOST_SHAPES)
-    columns = min(4, len(shown)) if len(m.result.outputs) <= 12 else min(2, len(shown))
+    columns = min(4, len(shown)) if len(m.result.places) <= 12 else min(2, len(shown))
     bands = -(-len(shown) // columns)
-    letters = max(len(figures.short(name)) for name in m.result.outputs)
+    letters = max(len(figures.short(name)) for name in m.result.places)
     height = 1.9 + (0.06 * letters if letters > 6 else 0.0)  # long names stand upright
-    drawing = figures.figure(9.6 if len(m.result.outputs) > 12 else min(9.6, 3.2 * columns), height * bands)
+    drawing = figures.figure(9.6 if len(m.result.places) > 12 else min(9.6, 3.2 * columns), height * bands)
     for place, k in enumerate(shown, 1):
         damping = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
         title = f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz, {damping:.2f} %"
-        figures.draw_shape(drawing.add_subplot(bands, columns, place), m.result.shapes[k], m.result.outputs, title)
+        figures.draw_shape(drawing.add_subplot(bands, columns, place), m.result.shapes[k], m.result.places, title)
     words = "Sign from the real part, largest entry 1, outputs in their order."
     count = len(m.result.confident)
     if count > len(shown):
@@ -125,7 +125,7 @@ def _player(m: Material) -> list[str]:
     )
     payload = {
         "geometry": {
-            "nodes": geometry.nodes, "lines": geometry.lines, "dofs": geometry.dofs, "names": result.outputs,
+            "nodes": geometry.nodes, "lines": geometry.lines, "dofs": geometry.dofs, "names": result.places,
         },
         "shapes": [
             {"re": [round(float(x), 5) for x in shape.real], "im": [round(float(x), 5) for x in shape.imag]}
@@ -146,7 +146,7 @@ def _player(m: Material) -> list[str]:
         ax = drawing.add_subplot(bands, columns, place)
         drawings.draw_at_rest_and_moved(ax, geometry, result.shapes[k])
         ax.set_title(f"{k + 1}: {result.frequency_hz[k]:.2f} Hz")
-    absent = [name for name, dof in zip(result.outputs, geometry.dofs, strict=True) if dof is None]
+    absent = [name for name, dof in zip(result.places, geometry.dofs, strict=True) if dof is None]
     words = "Dashed: at rest." + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
     return [live, m.pictures.inline(drawing, "still pictures of the mode shapes", "still"), page.note(words)]
 
@@ -158,7 +158,7 @@ def shape_sections(m: Material) -> list[page.Section]:
     moving = _player(m) if m.geometry is not None else []
     parts = [*moving, *([page.heading("By output")] if moving else []), *_sticks(m)]
     out = [page.section("Mode shapes", *parts, name="Shapes")]
-    if len(m.result.outputs) < 2:
+    if len(m.result.places) < 2:
         return out
     return [*out, _complexity(m), _automac(m)]
 

@@ -202,7 +202,7 @@ def check_section(m: Material) -> page.Section | None:
         close = [one for one in own if abs(one.frequency_hz / f - 1.0) < max(0.02, 2.0 * zeta)]
         best = max(close, key=lambda one: mac(one.shape, m.result.shapes[k]), default=None)
         told = ["–"] * 3
-        if best is not None and len(best.shape) == len(m.result.outputs):
+        if best is not None and len(best.shape) == len(m.result.places):
             told = [f"{best.frequency_hz:.4f}", f"{100.0 * best.damping_ratio:.3f}",
                     f"{mac(best.shape, m.result.shapes[k]):.3f}"]  # fmt: skip
         rows.append([str(k + 1), f"{f:.4f}", f"{100.0 * zeta:.3f}", f"{share:.1f} %", *told])

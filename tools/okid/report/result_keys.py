@@ -15,6 +15,7 @@ NEEDED = (
 _TOP = {
     "fs_hz": "rate", "samples": "count", "records": "count?", "gaps": "count?", "inputs": "names", "outputs": "names",
     "judged_samples": "count?", "p": "count?", "rows": "count?", "order": "count", "method": "text?", "hold": "text?",
+    "shape_dofs": "numbers?", "hits": "objects?",
     "detrend": "text?", "start": "text?", "version": "text?", "singular_values": "numbers?", "model": "object",
     "markov": "object?", "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
 }  # fmt: skip
@@ -102,8 +103,10 @@ def check_keys(raw: Any, source: str) -> None:
     for number, mode in enumerate(raw["modes"]):
         _check(mode, _MODE, f"modes[{number}].", source)
         for key in ("shape_re", "shape_im"):
-            if len(mode[key]) != len(raw["outputs"]):
-                text = f"has {len(mode[key])} numbers, expected {len(raw['outputs'])}, one an output"
+            places = raw.get("shape_dofs") or raw["outputs"]
+            if len(mode[key]) != len(places):
+                whose = "a place of shape_dofs" if raw.get("shape_dofs") else "an output"
+                text = f"has {len(mode[key])} numbers, expected {len(places)}, one {whose}"
                 raise InputError(f"{source}: modes[{number}].{key} {text}")
         if mode["frequency_hz"] <= 0:
             raise InputError(f"{source}: modes[{number}].frequency_hz is {mode['frequency_hz']!r}, expected Hz above 0")

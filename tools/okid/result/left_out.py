@@ -19,7 +19,8 @@ def without_left_out(raw: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]
     model = dict(raw["model"])
     model.update({key: own(model[key]) for key in ("C", "D") if model.get(key)})
     model["K"] = [own(row) for row in model.get("K") or []]
-    keys = [f"shape_{part}{std}" for part in ("re", "im") for std in ("", "_std")]
+    parts = () if raw.get("shape_dofs") else ("re", "im")  # places that were struck stay
+    keys = [f"shape_{part}{std}" for part in parts for std in ("", "_std")]
     modes = [{**mode, **{key: own(mode[key]) for key in keys if mode.get(key)}} for mode in raw["modes"]]
     markov = {"Y": [own(block) for block in (raw.get("markov") or {}).get("Y") or []]}
     left = [name for name, stays in zip(raw["outputs"], kept, strict=True) if not stays]

@@ -46,6 +46,8 @@ class Observer(NamedTuple):
 
 class Mode(NamedTuple):
     """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known.
+    Of a roving hammer shape has an entry a place (Result.shape_dofs); modal_mass: kg of this shape, where a sensor
+    stood at a place that was struck. shape / sqrt(modal_mass) is mass-normalised.
 
     confident: an expert would sign it; found_in: share of the runs of "auto" that could have seen it and did; why:
     codes of what speaks against it, why_text the same in words. None: not judged, or by EMAC alone (found_in of a
@@ -65,6 +67,7 @@ class Mode(NamedTuple):
     found_in: float | None = None
     why: tuple[str, ...] = ()
     why_text: tuple[str, ...] = ()
+    modal_mass: float | None = None
 
     @property
     def doubtful(self) -> bool:
@@ -81,7 +84,7 @@ class Mode(NamedTuple):
         """Of an entry of "modes"."""
         f, zeta, mpc, emac = numbers([one[key] for key in ("frequency_hz", "damping_ratio", "mpc", "emac")]).tolist()
         shape = numbers(one["shape_re"]) + 1j * numbers(one["shape_im"])
-        why = [tuple(map(str, one.get(key) or one.get("why") or ())) for key in ("why", "why_text")]
+        why, texts = (tuple(map(str, one.get(key) or one.get("why") or ())) for key in ("why", "why_text"))
         return cls(
             f,
             zeta,
@@ -94,7 +97,9 @@ class Mode(NamedTuple):
             _optional(one.get("shape_im_std")),
             one.get("confident"),
             known(one.get("found_in")),
-            *why,
+            why,
+            texts,
+            known(one.get("modal_mass")),
         )
 
     def _repr_html_(self) -> str:

@@ -91,6 +91,8 @@ class Result:
     singular_noise: float | None  # singular values up to this can come from the observer's errors alone
     refinement: Refinement | None  # with refine=True
     skew: Skew | None  # with refine=True and degrees of freedom
+    shape_dofs: list[int] | None  # of a roving hammer: the place of each entry of a shape; None: the outputs
+    hits: list[dict[str, Any]]  # of a roving hammer: file, place, accepted, reason, text, peak, duration_s, band_hz
     _source: Any = field(repr=False, compare=False)
 
     @classmethod
@@ -155,6 +157,7 @@ class Result:
         self.inputs, self.outputs = list(about["inputs"]), list(about["outputs"])
         self.modes = [Mode.of(one) for one in about["modes"]]
         self.mkr, self.pdc = MassMatrices.of(about.get("mkr")), ProportionalDamping.of(about.get("pdc"))
+        self.shape_dofs, self.hits = about.get("shape_dofs"), list(about.get("hits") or [])
         self.hankel, self.singular_noise = about.get("hankel"), about.get("singular_noise")
         self.refinement, self.skew = Refinement.of(about.get("refinement")), Skew.of(about.get("skew"), self.outputs)
 
@@ -165,6 +168,11 @@ class Result:
     def confident_modes(self) -> list[Mode]:
         """The modes an expert would sign: the poles of the model of "auto"; of a named method EMAC from 0.5 on."""
         return [mode for mode in self.modes if mode.confident is not False]
+
+    @property
+    def shape_places(self) -> list[str]:
+        """Names of the entries of a shape: the outputs, of a roving hammer the numbers of its places."""
+        return [str(dof) for dof in self.shape_dofs or self.outputs]
 
     @cached_property
     def identifier(self) -> Identifier | None:

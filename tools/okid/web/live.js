@@ -199,11 +199,12 @@ function takeSpectra(found) {
 
 // -- the picture of the shape -------------------------------------------------------------------------------------------
 
-// Place of every response: on the geometry of the config, else on a stick of one node a response.
-function geometry(names) {
+// Place of every entry of a shape: on the geometry of the config, else on a stick of one node an entry. `struck`: the numbers
+// of the places of a roving hammer.
+function geometry(names, struck) {
   const own = page.facts.geometry, channels = outputs();
   if (own && own.dofs.length) {
-    const dofs = names.map((_, k) => own.dofs[((channels[k] && channels[k].dof) || k + 1) - 1] || null);
+    const dofs = names.map((_, k) => own.dofs[((struck ? struck[k] : channels[k] && channels[k].dof) || k + 1) - 1] || null);
     return { nodes: own.nodes, lines: own.lines, dofs, names };
   }
   const nodes = names.map((_, k) => [0, 0, k + 1]);
@@ -219,8 +220,9 @@ function showShapes() {
   options(select, list.map((mode, k) => `${k + 1}: ${mode.frequency_hz.toPrecision(5)} Hz`));
   select.selectedIndex = Math.min(chosen, list.length - 1);
   const shapes = list.map((mode) => ({ re: mode.shape_re, im: mode.shape_im }));
-  const names = outputs().length === shapes[0].re.length ? outputs().map((one) => one.name) : shapes[0].re.map((_, k) => String(k + 1));
-  const place = geometry(names), key = JSON.stringify([page.run, names]);
+  const struck = source.shape_dofs;
+  const names = struck ? struck.map(String) : outputs().length === shapes[0].re.length ? outputs().map((one) => one.name) : shapes[0].re.map((_, k) => String(k + 1));
+  const place = geometry(names, struck), key = JSON.stringify([page.run, names]);
   if (!shape) {
     shape = window.okidShapes(by("shape-canvas"), place, shapes);
     shape.show(select.selectedIndex);

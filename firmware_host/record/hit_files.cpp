@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+#include "hit_files.hpp"
+
+#include "error.hpp"
+#include "files/nearest_name.hpp"
+#include "hit_verdict.hpp"
+#include "request.hpp"
+#include "roving.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <map>
+#include <regex>
+
+namespace okid_host {
+namespace {
+
+constexpr std::size_t most_hits_named = 8;
+constexpr std::size_t longest_name = 256; // of a file, that a regular expression looks at
+
+std::string file_name(const std::string& path) {
+    const std::string name = std::filesystem::path(path).filename().string();
+    return name.empty() ? path : name;
+}
+
+hit_line line_of(const record_set& set, const record_data& record, const std::vector<hit_channel>& channels,
+                 const hit_span& span, const record_options& options) {
+    hit_window window;
+    window.rows = set.rows(record);
+    window.count = record.count;
+    window.width = set.channels();
+    window.before = span.begin;
+    window.rate_hz = options.fs_hz;
+    window.channels = &channels;
+    window.sign = span.sign;
+    window.unit = options.hit_unit.empty() ? "" : " " + options.hit_unit;
+    if (options.band) window.spectrum_hz = std::min(options.band->second, options.fs_hz / 2);
+    const hit_verdict found = judge_hit(window);
+    hit_line out;
+    out.file = file_name(record.path);
+    out.fault = found.fault;
+    out.text = found.text + (found.note.empty() ? "" : "; " + found.note);
+    out.peak = found.peak;
+    out.duration_s = found.duration_s;
+    out.band_hz = found.band_hz;
+    out.accepted = found.good() || options.keep_all_hits;
+    return out;
+}
+
+std::vector<hit_channel> channels_of_hit(const record_options& options) {
+    std::vector<hit_channel> out;
+    for (const std::string& name : options.inputs) out.push_back({name, true, true});
+    for (const std::string& name : options.outputs) out.push_back({name, false, false}); // a gap is left out
+    return out;
+}
+
+void say_left_out(const std::vector<hit_line>& hits, remarks& said) {
+    std::vector<std::string> names;
+    std::size_t count = 0;
+    for (const hit_line& hit : hits)
+        if (!hit.accepted && ++count <= most_hits_named)
+            names.push_back(fmt::format("{}: {}, {}", hit.file, hit.fault, hit.text));
+    if (count == 0) return;
+    said.emplace_back(
+        "hits_left_out",
+        fmt::format("{} of {} hits: {}{}; --keep-all takes them", count, hits.size(), fmt::join(names, "; "),
+                    count > most_hits_named ? fmt::format("; and {} more", count - most_hits_named) : std::string()));
+    std::map<int, bool> places;
+    for (const hit_line& hit : hits) places[std::abs(hit.place)] |= hit.accepted;
+    std::vector<int> missing;
+    for (const auto& [place, any] : places)
+        if (!any) missing.push_back(place);
+    if (!missing.empty())
+        said.emplace_back("place_missing", fmt::format("no good hit at place {}: the shapes are without {}",
+                                                       fmt::join(missing, ", "), missing.size() == 1 ? "it" : "them"));
+}
+
+[[noreturn]] void throw_no_hit(const std::vector<hit_line>& hits) {
+    std::map<std::string, int> faults;
+    for (const hit_line& hit : hits) ++faults[hit.fault];
+    std::vector<std::string> counted;
+    for (const auto& [fault, count] : faults) counted.push_back(fmt::format("{} {}", count, fault));
+    throw failure(exit_no_model, fmt::format("no hit was accepted: {}; of {}: {}. --keep-all takes them",
+                                             fmt::join(counted, ", "), hits.front().file, hits.front().text));
+}
+
+/// The places that are left, and M, K and R if they still have a force or a sensor each.
+void keep_places(record_options& options) {
+    const std::vector<int> left = hit_places(options.hits);
+    for (mass_plan* plan : {&options.placed, &options.mass})
+        plan->inputs.erase(std::remove_if(plan->inputs.begin(), plan->inputs.end(),
+                                          [&](const mass_channel& one) {
+                                              return !std::binary_search(left.begin(), left.end(), one.dof);
+                                          }),
+                           plan->inputs.end());
+    if (options.mass.wanted() && !plan_fault(options.mass).empty()) options.mass = {};
+}
+
+} // namespace
+
+std::vector<hit_line> choose_hits(record_set& records, record_options& options) {
+    const std::vector<hit_channel> channels = channels_of_hit(options);
+    std::vector<hit_span> spans;
+    std::size_t resting = 0;
+    for (const record_data& record : records.records) {
+        spans.push_back(find_hit(records.rows(record), record.count, records.channels()));
+        resting += spans.back().free >= least_free;
+    }
+    if (2 * resting < spans.size()) return {};
+    std::vector<hit_line> hits;
+    record_set kept;
+    kept.n_u = records.n_u;
+    kept.n_y = records.n_y;
+    kept.complete = records.complete;
+    std::vector<int> places;
+    for (std::size_t r = 0; r < spans.size(); ++r) {
+        const record_data& record = records.records[r];
+        hits.push_back(line_of(records, record, channels, spans[r], options));
+        hits.back().place = options.hits[r];
+        if (!hits.back().accepted) continue;
+        kept.add(record.path, records.rows(record), record.count);
+        places.push_back(options.hits[r]);
+    }
+    if (places.empty()) throw_no_hit(hits);
+    say_left_out(hits, options.said);
+    records = std::move(kept);
+    options.hits = std::move(places);
+    keep_places(options);
+    return hits;
+}
+
+std::string places_of_names(const std::string& expression, const std::vector<std::string>& paths) {
+    std::regex wanted;
+    try {
+        wanted.assign(expression);
+    } catch (const std::regex_error& fault) {
+        throw failure(exit_usage, fmt::format("--places: \"{}\" is no regular expression", printable(expression)));
+    }
+    if (wanted.mark_count() != 1)
+        throw failure(exit_usage, fmt::format("--places: \"{}\" has {} groups, expected one, around the number of the "
+                                              "place, as in P(\\d+)_",
+                                              printable(expression), wanted.mark_count()));
+    std::vector<std::string> out;
+    for (const std::string& path : paths) {
+        const std::string name = file_name(path).substr(0, longest_name);
+        std::smatch found;
+        if (!std::regex_search(name, found, wanted))
+            throw failure(exit_usage,
+                          fmt::format("--places: \"{}\" does not match the file name {}", printable(expression), path));
+        const std::string place = found[1];
+        if (whole_number(fmt::format("--places, {}", path), place, -10000, 10000) == 0)
+            throw failure(exit_usage,
+                          fmt::format("--places, {}: found \"{}\", expected a number from 1", path, printable(place)));
+        out.push_back(place);
+    }
+    return fmt::format("{}", fmt::join(out, ","));
+}
+
+} // namespace okid_host
