@@ -19,7 +19,7 @@ constexpr int long_rows = 30, lags_of_observer = 40, most_order = 64;
 /// Block rows x outputs: the states of a Hankel matrix. A plate of 23 modes under one accelerometer has 46, and as many again
 /// of noise beside them. Few channels ask for long horizons, and there they are cheap.
 constexpr int rows_of_outputs = 90;
-constexpr int enough_order = 28;   ///< in any case; 64 with few states changes no mode of the corpora
+constexpr int enough_order = 28;   ///< in any case; with 64 no signed mode of the corpora is found that was not
 constexpr int orders_of_state = 2; ///< for each state above noise: orders beyond repeat what is known
 constexpr double edge_margin =
     1.1; ///< samples that remember, and the future forces taken out, move the edge by a few percent

@@ -191,6 +191,7 @@ double spread(const std::vector<double>& values, double factor) {
 
 /// @param factor  of the sum of squares about the mean
 void put_spread(const std::vector<replicate>& all, double factor, response_modes& to) {
+    to.sigma.replicates = static_cast<int>(all.size());
     const auto over = [&](auto of) {
         std::vector<double> values;
         for (const replicate& one : all) values.push_back(of(one));

@@ -4,7 +4,8 @@
  * @brief Everything between the kernels (okid/okid.h) and a user, for every language: the face of libokid_host.
  *
  * What it does: measured records to a result (okid_host/record.h), samples as they arrive to results
- * (okid_host/stream.h), sensors that are missing (okid_host/virtual.h), frames and bytes of devices to samples and events (okid_host/capture.h), configurations, CSV files
+ * (okid_host/stream.h), two results to the shifts between them (okid_host/compare.h), sensors that are missing
+ * (okid_host/virtual.h), frames and bytes of devices to samples and events (okid_host/capture.h), configurations, CSV files
  * and signal descriptions read (okid_host/files.h). The program `okid` and the Python package stand on the same code.
  *
  * Calls return 0, or the exit code the program would end with: 2 wrong usage or bad input, 3 no reliable model,
@@ -50,6 +51,7 @@ OKID_HOST_API int32_t okid_host_error_status(void);
 #endif
 
 #include <okid_host/capture.h>
+#include <okid_host/compare.h>
 #include <okid_host/files.h>
 #include <okid_host/record.h>
 #include <okid_host/responses.h>

@@ -139,9 +139,10 @@ std::vector<std::complex<double>> in_units(const std::vector<std::complex<double
 }
 
 void describe_modes(const std::vector<listed_pair>& found, const std::vector<double>& scale, std::size_t n_u,
-                    bool deviations_wanted, std::vector<listed_mode>& modes, record_work& work) {
+                    int sigma_blocks, std::vector<listed_mode>& modes, record_work& work) {
     result_context& context = work.context;
     deviations sigma;
+    sigma.replicates = sigma_blocks;
     for (const auto& [mode, carried] : found) {
         std::complex<double> largest;
         auto shape = in_units(mode.shape, scale.data() + n_u, largest);
@@ -162,7 +163,7 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
             sigma.shape_im.push_back(known ? carried->shape_im_std[i] * unit : NAN);
         }
     }
-    if (deviations_wanted) context.sigma = std::move(sigma);
+    if (sigma_blocks > 0) context.sigma = std::move(sigma);
 }
 
 [[noreturn]] void throw_no_modes(const std::vector<listed_pair>& found, std::size_t runs) {
@@ -282,7 +283,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     if (options.band) work.context.band_hz = *options.band;
     for (const record_level& level : levels) work.context.rates_hz.push_back(level.fs_hz);
     std::vector<listed_mode> listed;
-    describe_modes(found, scale, set.n_u, options.sigma_blocks > 0, listed, work);
+    describe_modes(found, scale, set.n_u, options.sigma_blocks, listed, work);
     work.scale = std::move(scale);
     return listed;
 }

@@ -268,6 +268,8 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["singular_noise"] = number_json(model.noise_level);
     if (arrays) put_arrays_json(model, context, out);
     out["judged_by"] = judged_by_agreement(context) ? "agreement" : "emac";
+    out["sigma_blocks"] = context.sigma && context.sigma->replicates > 0 ? ordered_json(context.sigma->replicates)
+                                                                         : ordered_json(nullptr);
     out["modes"] =
         modes_json(model, context.sigma ? &*context.sigma : nullptr, context.placed ? &*context.placed : nullptr);
     if (context.placed) out["shape_dofs"] = context.placed->dofs;

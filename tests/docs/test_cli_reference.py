@@ -51,7 +51,7 @@ def test_every_command_has_an_example() -> None:
 
 
 def test_exit_codes_are_those_of_the_source() -> None:
-    enum = re.search(r"enum exit_code \{(.*?)\}", (ROOT / "firmware_host" / "error.hpp").read_text())
+    enum = re.search(r"(?s)enum exit_code \{(.*?)\}", (ROOT / "firmware_host" / "error.hpp").read_text())
     assert enum
     known = set(re.findall(r"= (\d+)", enum[1]))
     assert set(re.findall(r"(?m)^\| (\d+) \|", PAGE.read_text())) == known

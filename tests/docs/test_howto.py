@@ -17,6 +17,7 @@ PAGES = {  # how many blocks of commands each has at least
     "port-to-a-board.md": 2,
     "long-term-monitoring.md": 3,
     "hammer-test.md": 2,
+    "compare-two-tests.md": 3,
 }
 
 

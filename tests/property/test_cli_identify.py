@@ -20,7 +20,7 @@ CHANNELS = ["--inputs", "u1", "--outputs", "y1,y2"]
 RESULT_KEYS = [
     "schema", "version", "method", "fs_hz", "samples", "records", "gaps", "inputs", "outputs", "p", "rows", "hankel",
     "order", "hold", "detrend", "start", "singular_values", "singular_noise", "model", "markov", "judged_by",
-    "modes", "fit", "warnings",
+    "sigma_blocks", "modes", "fit", "warnings",
 ]  # fmt: skip
 MODE_KEYS = [
     "frequency_hz", "damping_ratio", "shape_re", "shape_im", "frequency_std_hz", "damping_ratio_std", "shape_re_std",

@@ -52,12 +52,33 @@ def test_another_result_beside(tmp_path: Path) -> None:
     moved[:, 2] = 0.7 * y[:, 2] + 0.3 * y[:, 0]  # a sensor that no longer measures what it did
     okid.identify(force, moved, fs=1010.0, output_names=names, sigma_blocks=0).save(tmp_path / "other.json")
     text = build(loaded_from(one.to_dict(), "result"), compare=tmp_path / "other.json")
-    rows = _cells(text, "comparison")
-    assert [row[:2] for row in rows] == [["1", "1"], ["2", "2"], ["3", "3"]]
-    assert all(float(row[4]) == pytest.approx(1.0, abs=0.1) and float(row[7]) < 0.999 for row in rows)
-    assert "CoMAC" in text and "Beside other.json" in text
+    rows = [row for row in _cells(text, "comparison") if row]
+    assert [row[:2] for row in rows] == 2 * [["1", "1"], ["2", "2"], ["3", "3"]]  # frequency, then damping
+    for row in rows[:3]:  # this result minus the earlier one, whose rate was said 1 % too high
+        assert float(row[4]) == pytest.approx(-100.0 / 101.0, abs=0.1) and float(row[6]) < 0.999
+        assert re.match(r"lower by (0.9|1)\S* %, no standard deviation", row[7])
+    assert "CoMAC" in text and "Compared with other.json" in text
     okid.identify(force, y[:, 0], fs=1000.0, output_names=["z"], sigma_blocks=0).save(tmp_path / "z.json")
-    assert "no output of the same name" in build(loaded_from(one.to_dict(), "result"), compare=tmp_path / "z.json")
+    alone = build(loaded_from(one.to_dict(), "result"), compare=tmp_path / "z.json")
+    assert "have no output in common" in alone and len([row for row in _cells(alone, "comparison") if row]) == 6
+
+
+def test_a_softer_spring_in_the_report(tmp_path: Path) -> None:
+    """The same comparison as `okid compare`: shift with ± and z, and which are more than chance."""
+    names = ["a", "b", "c"]
+    results = []
+    for factor in (1.0, 0.96):
+        frame = okid.Structure.chain([1.0, 0.8, 1.2], [factor * 3e4, 2e4, 2.5e4], zeta=(0.01, 0.01))
+        force = np.random.default_rng(1).normal(size=(20000, 1))
+        y = frame.model(1000.0, force_dofs=[1], sense_dofs=[1, 2, 3]).simulate(force)
+        y += 0.01 * y.std(axis=0) * np.random.default_rng(2).normal(size=y.shape)
+        results.append(okid.identify(force, y, fs=1000.0, output_names=names))
+    results[0].save(tmp_path / "before.json")
+    text = build(loaded_from(results[1].to_dict(), "result"), compare=tmp_path / "before.json")
+    found = okid.compare(tmp_path / "before.json", results[1])
+    rows = [row for row in _cells(text, "comparison") if row]
+    assert found.changed and [row[7] for row in rows[:3]] == [one.verdict for one in found.pairs]
+    assert any("more than chance (z -" in row[7] for row in rows[:3]) and all("±" in row[4] for row in rows)
 
 
 def test_deflection_of_an_ambient_record() -> None:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from okid.mechanics.structure import Structure
     from okid.mechanics.virtual import Estimate, VirtualSensors
     from okid.record.setups import identify_setups, merge_setups
+    from okid.result.comparison import ComparedMode, ComparedPair, Comparison, compare
     from okid.result.modal_table import ModalTable
     from okid.result.model import Model
     from okid.result.parts import Fit, MassMatrices, Mode, ProportionalDamping
@@ -37,6 +38,9 @@ __all__ = [
     "ChangeTest",
     "ChangeVerdict",
     "Cluster",
+    "ComparedMode",
+    "ComparedPair",
+    "Comparison",
     "Criteria",
     "Error",
     "Estimate",
@@ -62,6 +66,7 @@ __all__ = [
     "Stats",
     "Structure",
     "VirtualSensors",
+    "compare",
     "demo",
     "demo_frame",
     "demo_record",
@@ -87,6 +92,7 @@ _NAMES = {
     "mechanics.grey_box": "FittedMode, GreyBox, fit_structure",
     "identification.change_test": "ChangeTest, ChangeVerdict, ModeShift",
     "identification.identifier": "Identified, Identifier, usable_p",
+    "result.comparison": "ComparedMode, ComparedPair, Comparison, compare",
     "result.modal_table": "ModalTable",
     "result.model": "Model",
     "result.parts": "Fit, MassMatrices, Mode, ProportionalDamping",

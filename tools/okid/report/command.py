@@ -61,7 +61,7 @@ def _parser() -> _Parser:
     parser.add_argument("--events", metavar="FILE.jsonl", help="events of the run: adds completeness, tracking, alarms")
     parser.add_argument("--geometry", metavar="CONFIG.toml", help="its section [geometry]: adds moving mode shapes")
     parser.add_argument("--config", metavar="CONFIG.toml", help="its text goes into the report, its [geometry] too")
-    parser.add_argument("--compare", metavar="OTHER.json", help="another result: its modes beside these, MAC, CoMAC")
+    parser.add_argument("--compare", metavar="EARLIER.json", help="an earlier result: shifts since then, MAC, CoMAC")
     parser.add_argument("--out", metavar="FILE.html|-", help="default: the result's name with .html; - is stdout")
     parser.add_argument("--pdf", metavar="FILE.pdf", help="print the page too; needs Chromium or Chrome on PATH")
     parser.add_argument("--title", metavar="TEXT", help="heading of the report")

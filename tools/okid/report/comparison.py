@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The section that lays the modes of another result beside those of this one: table, MAC, CoMAC."""
+"""The section that lays the modes of another result beside those of this one: shifts with ± σ, MAC, CoMAC."""
 
 from __future__ import annotations
 
@@ -13,81 +13,83 @@ from okid.report import page
 from okid.report.loaded import Loaded
 from okid.report.material import Material
 from okid.result import figures
+from okid.result.comparison import ComparedMode, Comparison, compare
 
 Complex = NDArray[np.complex128]
-NEAR, ALIKE, MOST_MODES = 0.15, 0.5, 40  # in frequency; MAC
+MOST_MODES = 40  # in the picture
 
 
 class Other(NamedTuple):
-    """Another result and its name."""
+    """The earlier result and its name."""
 
     result: Loaded
     name: str
 
 
-def _common(a: Loaded, b: Loaded) -> tuple[list[str], Complex, Complex]:
-    """Places that the shapes of both have, and the shapes of the confident modes at them."""
-    names = [name for name in a.places if name in b.places]
-    own, other = (
-        one.shapes[one.confident][:, [one.places.index(name) for name in names]] if one.confident else
-        np.zeros((0, len(names)), np.complex128) for one in (a, b)
-    )  # fmt: skip
-    return names, own[:MOST_MODES], other[:MOST_MODES]
+def _signed(percent: float, std: float | None, z: float | None) -> list[str]:
+    return [f"{percent:+.3f}" + ("" if std is None else f" ± {std:.2g}"), "–" if z is None else f"{z:+.1f}"]
 
 
-def pairs_of(a: Loaded, b: Loaded, mac: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Places among the confident modes of both that are one mode: within 15 %, MAC of 0.5 or more, the best first."""
-    f, g = a.frequency_hz[a.confident], b.frequency_hz[b.confident]
-    ranked = sorted(
-        (abs(g[j] / f[i] - 1.0) + 0.2 * (1.0 - mac[i, j]), i, j) for i, j in np.ndindex(mac.shape)
-        if abs(g[j] / f[i] - 1.0) < NEAR and mac[i, j] >= ALIKE
-    )  # fmt: skip
-    out: list[tuple[int, int]] = []
-    for _, i, j in ranked:
-        if all(i != one and j != two for one, two in out):
-            out.append((i, j))
-    return sorted(out)
+def _tables(found: Comparison) -> list[str]:
+    frequencies, dampings = [], []
+    for one in found.pairs:
+        modes = [f"{one.a.mode}", f"{one.b.mode}"]
+        frequencies.append([
+            *modes, f"{one.a.frequency_hz:.4f}", f"{one.b.frequency_hz:.4f}",
+            *_signed(one.shift_percent, one.shift_std_percent, one.z), "–" if one.mac is None else f"{one.mac:.3f}",
+            one.verdict,
+        ])  # fmt: skip
+        dampings.append([
+            *modes, f"{100.0 * one.a.damping_ratio:.3f}", f"{100.0 * one.b.damping_ratio:.3f}",
+            *_signed(one.damping_shift_percent, one.damping_shift_std_percent, one.damping_z), one.damping_verdict,
+        ])  # fmt: skip
+    head = ["mode before", "now"]
+    return [
+        page.table([*head, "f before [Hz]", "f now [Hz]", "shift [%]", "z", "MAC", "verdict"], frequencies),
+        page.table([*head, "ζ before [%]", "ζ now [%]", "shift [% of ζ]", "z", "verdict"], dampings),
+    ]
 
 
-def _table(a: Loaded, b: Loaded, mac: NDArray[np.float64], pairs: list[tuple[int, int]]) -> str:
-    rows = []
-    for i, j in pairs:
-        here, there = a.raw["modes"][a.confident[i]], b.raw["modes"][b.confident[j]]
-        f, g = float(here["frequency_hz"]), float(there["frequency_hz"])
-        zeta = f"{100.0 * here['damping_ratio']:.3f}", f"{100.0 * there['damping_ratio']:.3f}"
-        rows.append([str(a.confident[i] + 1), str(b.confident[j] + 1), f"{f:.4f}", f"{g:.4f}",
-                     f"{100.0 * (g / f - 1.0):+.3f}", *zeta, f"{mac[i, j]:.3f}"])  # fmt: skip
-    return page.table(["mode", "its mode", "f [Hz]", "its f [Hz]", "change [%]", "ζ [%]", "its ζ [%]", "MAC"], rows)
+def _alone(modes: list[ComparedMode], where: str) -> list[str]:
+    listed = ", ".join(f"{one.mode} ({one.frequency_hz:.4g} Hz)" for one in modes)
+    return [page.note(f"Only in {where}: mode {listed}.")] if modes else []
+
+
+def _shapes(of: Loaded, modes: list[int], names: list[str]) -> Complex:
+    return of.shapes[np.ix_([k - 1 for k in modes], [of.places.index(name) for name in names])]
 
 
 def comparison_section(m: Material) -> page.Section | None:
-    """None without another result."""
+    """None without an earlier result."""
     if m.other is None:
         return None
-    a, b = m.result, m.other.result
-    names, own, other = _common(a, b)
-    title = f"Beside {m.other.name}"
-    if not names or not len(own) or not len(other):
-        words = "no output of the same name" if not names else "a confident mode in one of them only"
-        return page.section(title, page.absent(f"There is {words}: nothing can be compared."), name="Comparison")
-    mac = modal.mac_matrix(own, other)
-    pairs = pairs_of(a, b, mac)
-    drawing = figures.figure(min(7.4, 2.7 + 0.5 * len(other)), min(6.6, 1.9 + 0.5 * len(own)))
-    labels = [f"{k + 1}: {a.frequency_hz[k]:.2f} Hz" for k in a.confident[:MOST_MODES]]
-    axes = drawing.add_subplot()
-    figures.draw_mac(axes, own, labels, other)
-    axes.set_xlabel("mode of the other result, in its order")
-    parts = [_table(a, b, mac, pairs)] if pairs else [page.absent("No mode of one is a mode of the other.")]
-    parts.append(m.pictures.inline(drawing, "modal assurance criterion of the modes of both results"))
-    if pairs and len(names) > 1:
-        first, second = (shapes[[pair[k] for pair in pairs]] for k, shapes in enumerate((own, other)))
-        values = modal.comac(first, second)
+    before, now = m.other.result, m.result
+    found = compare(before.whole, now.whole)
+    raw = found.to_dict()
+    title = f"Compared with {m.other.name}"
+    parts = _tables(found) if found.pairs else [page.absent("No mode of one is a mode of the other.")]
+    parts += [*_alone(found.only_a, f"{m.other.name}, the earlier one"), *_alone(found.only_b, "this result")]
+    names = [name for name in raw["channels"] if name in before.places and name in now.places]
+    if found.cross_mac.size and names:
+        rows, columns = raw["a"]["modes"][:MOST_MODES], raw["b"]["modes"][:MOST_MODES]
+        drawing = figures.figure(min(7.4, 2.7 + 0.5 * len(columns)), min(6.6, 1.9 + 0.5 * len(rows)))
+        axes = drawing.add_subplot()
+        labels = [f"{k}: {before.frequency_hz[k - 1]:.2f} Hz" for k in rows]
+        figures.draw_mac(axes, _shapes(before, rows, names), labels, _shapes(now, columns, names))
+        axes.set_xlabel("confident mode of this result, in its order")
+        parts.append(m.pictures.inline(drawing, "modal assurance criterion of the modes of both results"))
+    if found.pairs and len(names) > 1:
+        first = _shapes(before, [one.a.mode for one in found.pairs], names)
+        second = _shapes(now, [one.b.mode for one in found.pairs], names)
         drawing = figures.figure(max(4.0, min(9.6, 2.0 + 0.6 * len(names))), 2.4)
-        figures.draw_comac(drawing.add_subplot(), names, values.tolist())
+        figures.draw_comac(drawing.add_subplot(), names, modal.comac(first, second).tolist())
         parts.append(m.pictures.inline(drawing, "coordinate MAC of every common output"))
     words = (
-        f"Modes of both within {100 * NEAR:.0f} % and with a MAC of {ALIKE} or more at the {len(names)} outputs of one "
-        "name. CoMAC: an output that is low in it is where the two differ (a sensor that was moved, exchanged or is "
-        "faulty); it does not see signs."
+        f"Shift = this result minus {m.other.name}, ± one standard deviation. More than chance: below "
+        f"{100 * raw['false_alarm']:g} % over all {raw['tests']} shifts together (Holm; Student's t, "
+        f"{raw['degrees_of_freedom']} degrees of freedom). Modes are paired by MAC and frequency at the {len(names)} "
+        "outputs that both have. CoMAC: an output that is low in it is where the two differ (a sensor that was moved, "
+        "exchanged or is faulty); it does not see signs."
     )
-    return page.section(title, *parts, page.note(words), name="Comparison")
+    parts += [page.note(text) for text in [words, *found.warnings]]
+    return page.section(title, *parts, name="Comparison")

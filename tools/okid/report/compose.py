@@ -95,8 +95,8 @@ def build(
     """The report as one HTML string; the same arguments and files give the same string.
 
     `record`: a file, or what read_csv returns; `events`: JSON lines of the run; `geometry`, `config`: CONFIG.toml;
-    `compare`: another result file; `source`: the file of the result, named in the provenance; `written`: when and
-    by what, None = not told.
+    `compare`: the file of an earlier result; `source`: the file of the result, named in the provenance; `written`:
+    when and by what, None = not told.
     Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
     """
     m = Material(result)
