@@ -18,7 +18,7 @@ static void create(int models, int poles, double share) {
     const okid_stabilization_config_t c = {.n_y = RIG_NY, .max_models = models, .max_poles = poles, .share = share};
     const size_t bytes = okid_stabilization_memsize(&c);
     TEST_ASSERT_GREATER_THAN(0, bytes);
-    free(block);
+    free(own);
     block = malloc(bytes);
     TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_stabilization_create(&diagram, &c, block, bytes - 1));
     TEST_ASSERT_EQUAL(OKID_OK, okid_stabilization_create(&diagram, &c, block, bytes));
@@ -35,7 +35,7 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-    free(block);
+    free(own);
     free(memory[0]);
     free(memory[1]);
     block = memory[0] = memory[1] = NULL;
@@ -179,6 +179,57 @@ static void orders_of_a_record_give_its_modes(void) {
     free(v);
 }
 
+/// The leading singular triplets alone (okid_identify_decompose()) give the poles that the whole decomposition gives.
+static void poles_need_no_whole_decomposition(void) {
+    enum { N = 6000, P = 20, MOST = 16 };
+    rig_t rig;
+    rig_make(&rig);
+    double* v = rig_record(&rig, N, 0.05, NULL, 2);
+    const okid_method_t methods[] = {OKID_METHOD_OKID_ERA, OKID_METHOD_N4SID_MOESP, OKID_METHOD_N4SID_CVA,
+                                     OKID_METHOD_N4SID_SSARX};
+    for (int i = 0; i < 4; ++i) {
+        okid_identify_config_t c = {
+            .n_u = RIG_NU, .n_y = RIG_NY, .p = P, .max_order = MOST, .order = 4, .fs_hz = RIG_FS};
+        c.method = methods[i];
+        if (i == 0) c.hankel = OKID_HANKEL_INNOVATIONS;
+        const okid_accumulator_config_t a = {
+            .n_u = RIG_NU, .n_y = RIG_NY, .lags = okid_identify_lags(&c), .forgetting = 1, .edges = 1};
+        const size_t bytes = okid_identify_memsize(&c), more = okid_accumulator_memsize(&a);
+        char *own = malloc(bytes), *sums = malloc(more);
+        okid_identify_t* identifier;
+        okid_accumulator_t* accumulator;
+        okid_identified_t one;
+        double whole[MOST / 2][POLES][2];
+        int count[MOST / 2];
+        TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&identifier, &c, own, bytes));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&accumulator, &a, sums, more));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
+        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &one));
+        for (int order = 2; order <= MOST; order += 2) {
+            TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_poles(identifier, order, &one));
+            count[order / 2 - 1] = one.mode_count;
+            for (int k = 0; k < one.mode_count; ++k) {
+                whole[order / 2 - 1][k][0] = one.frequency_hz[k];
+                whole[order / 2 - 1][k][1] = one.emac[k];
+            }
+        }
+        TEST_ASSERT_EQUAL(OKID_OK, okid_identify_decompose(identifier, accumulator, &one));
+        for (int order = 2; order <= MOST; order += 2) {
+            TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_poles(identifier, order, &one));
+            TEST_ASSERT_EQUAL(count[order / 2 - 1], one.mode_count);
+            for (int k = 0; k < one.mode_count; ++k) {
+                TEST_ASSERT_DOUBLE_WITHIN(1e-6 * RIG_FS, whole[order / 2 - 1][k][0], one.frequency_hz[k]);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-4, whole[order / 2 - 1][k][1], one.emac[k]);
+            }
+        }
+        free(own);
+        free(sums);
+    }
+    okid_identified_t none;
+    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_identify_decompose(NULL, NULL, &none));
+    free(v);
+}
+
 static void what_does_not_fit_is_refused(void) {
     create(2, 2, 0);
     put(1, 0.1, 0);
@@ -215,6 +266,7 @@ int main(void) {
     RUN_TEST(flags_compare_with_the_order_before_of_the_same_horizon);
     RUN_TEST(modes_are_found_and_noise_is_not);
     RUN_TEST(orders_of_a_record_give_its_modes);
+    RUN_TEST(poles_need_no_whole_decomposition);
     RUN_TEST(what_does_not_fit_is_refused);
     return UNITY_END();
 }
