@@ -19,10 +19,6 @@ constexpr int long_rows = 30, lags_of_observer = 40, most_order = 64;
 /// Block rows x outputs: the states of a Hankel matrix. A plate of 23 modes under one accelerometer has 46, and as many again
 /// of noise beside them. Few channels ask for long horizons, and there they are cheap.
 constexpr int rows_of_outputs = 90;
-constexpr int enough_order = 28;   ///< in any case; with 64 no signed mode of the corpora is found that was not
-constexpr int orders_of_state = 2; ///< for each state above noise: orders beyond repeat what is known
-constexpr double edge_margin =
-    1.1; ///< samples that remember, and the future forces taken out, move the edge by a few percent
 constexpr int most_unknowns = 450; ///< block rows x channels: the decomposition costs their third power
 constexpr double short_share = 0.6, middle_share = 0.8;
 constexpr int fewest_rows = 4;
@@ -53,30 +49,13 @@ int rows_of(int n_u, int n_y, long long samples) {
     return static_cast<int>(std::min<long long>({wanted, borne, std::max(6, most_unknowns / (n_u + n_y))}));
 }
 
-/// States of a canonical variate analysis whose correlation of past and future is more than that of noise: beyond the edge of
-/// Wachter's distribution, the largest that samples without any memory show (Johnstone, Ann. Statist. 36 (2008) 2638).
-int states_above_noise(const okid_identified_t& model) {
-    const double rows = static_cast<double>(model.regression_rows) - static_cast<double>(model.rows) * model.n_u;
-    const double past = std::min(1.0, model.rows * (model.n_u + model.n_y) / rows);
-    const double future = std::min(1.0, model.rows * model.n_y / rows);
-    const double edge = std::sqrt(past * (1 - future)) + std::sqrt(future * (1 - past));
-    return static_cast<int>(std::count_if(model.singular_values, model.singular_values + model.singular_count,
-                                          [&](okid_real_t value) { return value > edge_margin * edge; }));
-}
-
-/// @param states  above noise; 0 before the first canonical variate analysis, which counts them
-bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, int& states, consensus_run& run) {
+bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, consensus_run& run) {
     const std::size_t bytes = okid_identify_memsize(&config);
     const auto block = memory(bytes);
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
     if (!block || !sums.sums || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK) return false;
     if (okid_identify_decompose(identifier, sums.sums, &model) != OKID_OK) return false;
-    if (states == 0 && run.method == OKID_METHOD_N4SID_CVA) states = states_above_noise(model);
-    if (states > 0) {
-        const int most = std::max(enough_order, orders_of_state * states);
-        run.orders.erase(std::upper_bound(run.orders.begin(), run.orders.end(), most), run.orders.end());
-    }
     collect_poles(identifier, model, run);
     link_tracks(run);
     return true;
@@ -199,14 +178,12 @@ std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const reco
         const okid_identify_config_t config = run_config(run, n_u, n_y);
         return okid_identify_lags(&config);
     };
-    std::stable_sort(runs.begin(), runs.end(), [&](const consensus_run& a, const consensus_run& b) {
-        return std::make_pair(lags_of(a), a.method == OKID_METHOD_N4SID_CVA) >
-               std::make_pair(lags_of(b), b.method == OKID_METHOD_N4SID_CVA);
-    });
+    std::stable_sort(runs.begin(), runs.end(),
+                     [&](const consensus_run& a, const consensus_run& b) { return lags_of(a) > lags_of(b); });
     const int most = runs.empty() ? 1 : lags_of(runs.front());
     const owned_sums longest = level_sums(level, n_u, n_y, most, at_rest);
     owned_sums own;
-    int lags = most, states = 0;
+    int lags = most;
     std::vector<consensus_run> out;
     for (consensus_run& run : runs) {
         if (lags_of(run) != lags) {
@@ -214,8 +191,7 @@ std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const reco
             own = shortened(level, longest, lags, n_u, n_y);
             if (!own.sums) own = level_sums(level, n_u, n_y, lags, at_rest);
         }
-        if (find_poles(run_config(run, n_u, n_y), lags < most ? own : longest, states, run))
-            out.push_back(std::move(run));
+        if (find_poles(run_config(run, n_u, n_y), lags < most ? own : longest, run)) out.push_back(std::move(run));
     }
     return out;
 }
