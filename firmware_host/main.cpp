@@ -88,6 +88,7 @@ int main(int argc, char** argv) {
                "Example:\n  okid identify frame.csv --inputs force --outputs acc1,acc2,acc3");
     okid_host::add_identify(app);
     okid_host::add_compare(app);
+    okid_host::add_merge(app);
     okid_host::add_run(app);
     okid_host::add_record(app);
     okid_host::add_replay(app);

@@ -7,6 +7,7 @@ namespace okid_host {
 
 void add_identify(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_merge(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_run(CLI::App& app);
 void add_record(CLI::App& app);

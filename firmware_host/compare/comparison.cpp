@@ -18,8 +18,7 @@ namespace okid_host {
 namespace {
 
 constexpr double alike = 0.8;            // MAC from which two shapes are one
-constexpr double farthest = 0.3;         // |ln| of the ratio of frequencies of one mode whose shape is known
-constexpr double farthest_alone = 0.1;   // the same without shapes
+constexpr double half_alike = 0.5;       // MAC
 constexpr double near_sigmas = 3;        // of the shift: the frequencies agree
 constexpr double near_frequency = 0.05;  // and no farther than this, however wide the standard deviation
 constexpr int usual_blocks = 20;         // behind the deviations of a file that does not say
@@ -168,14 +167,16 @@ std::vector<std::vector<double>> mac_of(const std::vector<const known_mode*>& a,
 
 std::vector<std::pair<std::size_t, std::size_t>> pair_modes(const std::vector<const known_mode*>& a,
                                                             const std::vector<const known_mode*>& b,
-                                                            const std::vector<std::vector<double>>& mac) {
+                                                            const std::vector<std::vector<double>>& mac,
+                                                            const pair_rule& rule) {
     std::vector<candidate> shapes, frequencies;
     for (std::size_t i = 0; i < a.size(); ++i)
         for (std::size_t j = 0; j < b.size(); ++j) {
             const double far = apart(*a[i], *b[j]), same = mac.empty() ? NAN : mac[i][j];
-            if (same >= alike && far < farthest)
-                shapes.push_back({far / farthest + (1 - same) / (1 - alike), i, j});
-            else if (std::isnan(same) ? far < farthest_alone : agree(*a[i], *b[j]))
+            if (same >= alike && far < rule.of_one_shape)
+                shapes.push_back({far / rule.of_one_shape + (1 - same) / (1 - alike), i, j});
+            else if (std::isnan(same) ? far < rule.without_shape
+                                      : agree(*a[i], *b[j]) || (same >= half_alike && far < rule.of_half_shape))
                 frequencies.push_back({far, i, j});
         }
     std::vector<bool> taken_a(a.size()), taken_b(b.size());
@@ -196,7 +197,7 @@ comparison compare_results(known_result before, known_result after) {
     found.by_shape = common.size() >= fewest_places;
     const auto a = chosen(found.a, found.modes_a), b = chosen(found.b, found.modes_b);
     if (found.by_shape) found.mac = mac_of(a, b, common);
-    for (const auto& [i, j] : pair_modes(a, b, found.mac)) {
+    for (const auto& [i, j] : pair_modes(a, b, found.mac, of_two_tests)) {
         mode_pair& pair = found.pairs.emplace_back();
         pair.a = found.modes_a[i];
         pair.b = found.modes_b[j];

@@ -52,14 +52,24 @@ std::vector<std::vector<double>> mac_of(const std::vector<const known_mode*>& a,
                                         const std::vector<const known_mode*>& b,
                                         const std::vector<std::pair<std::size_t, std::size_t>>& common);
 
+/// How far apart in frequency, as a share of it, two modes may be that are one: of one shape, and where no shape is known.
+struct pair_rule {
+    double of_one_shape, without_shape;
+    double of_half_shape; ///< from a MAC of 0.5 on
+};
+/// Set-ups are of one day: their modes lie near, and a reference or two say less of a shape.
+constexpr pair_rule of_two_tests{0.3, 0.1, 0}, of_set_ups{0.1, 0.03, 0.01};
+
 /// Which modes of two lists are one: places in both, the best pair first.
 ///
-/// Modes are one where the MAC is 0.8 or more within 30 % of frequency. Below 0.8 they are one only where the frequencies
-/// agree within three standard deviations: a sensor may spoil a shape, but no other mode moves exactly there.
-/// @param mac  of each with each; empty: no shapes, then within 10 % of frequency alone
+/// Modes are one where the MAC is 0.8 or more and the frequencies are as near as the rule asks. Below 0.8 they are one only
+/// where the frequencies agree within three standard deviations: a sensor may spoil a shape, but no other mode moves exactly
+/// there.
+/// @param mac  of each with each; empty: no shapes
 std::vector<std::pair<std::size_t, std::size_t>> pair_modes(const std::vector<const known_mode*>& a,
                                                             const std::vector<const known_mode*>& b,
-                                                            const std::vector<std::vector<double>>& mac);
+                                                            const std::vector<std::vector<double>>& mac,
+                                                            const pair_rule& rule);
 
 /// Names that both lists have, in the order of the first: places in both.
 std::vector<std::pair<std::size_t, std::size_t>> common_places(const std::vector<std::string>& a,

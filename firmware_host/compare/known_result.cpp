@@ -3,9 +3,9 @@
 // METHOD   every key is checked when it is read; nesting and size are bounded; keys that are not needed are ignored
 #include "known_result.hpp"
 
-#include "error.hpp"
+#include "result_keys.hpp"
+
 #include "files/input_file.hpp"
-#include "files/nearest_name.hpp"
 #include "result/mode_verdict.hpp"
 
 #include <algorithm>
@@ -18,74 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int deepest = 32;                                    // lists and objects within one another
 constexpr std::size_t largest_result = std::size_t{256} << 20; // bytes; as the Python package reads
-
-/// An object of the file, and where it stands in it.
-struct keys_of {
-    const json& object;
-    const std::string& file;
-    std::string where; ///< "modes[2]." or ""
-
-    [[noreturn]] void refuse(const std::string& key, const std::string& found, const std::string& expected) const {
-        throw failure(exit_usage, fmt::format("{}: {}{}: found {}, expected {}", file, where, key, found, expected));
-    }
-    [[noreturn]] void refuse_value(const std::string& key, const json& found, const std::string& expected) const {
-        const bool whole = found.is_array() || found.is_object();
-        refuse(key,
-               whole ? std::string(found.is_array() ? "a list" : "an object")
-                     : printable(found.dump(-1, ' ', false, json::error_handler_t::replace)),
-               expected);
-    }
-    /// nullptr: not there, or null.
-    const json* find(const char* key) const {
-        const auto at = object.find(key);
-        return at == object.end() || at->is_null() ? nullptr : &*at;
-    }
-    const json& need(const char* key, const std::string& expected) const {
-        const json* found = find(key);
-        if (!found) refuse(key, object.contains(key) ? "null" : "nothing", expected);
-        return *found;
-    }
-    double number(const char* key, const json& from, const char* expected) const {
-        if (!from.is_number()) refuse_value(key, from, expected);
-        return from.get<double>();
-    }
-    /// NaN: not there, or null.
-    double maybe(const char* key, const char* expected) const {
-        const json* found = find(key);
-        return found ? number(key, *found, expected) : NAN;
-    }
-    double above_zero(const char* key, const char* expected) const {
-        const double value = number(key, need(key, expected), expected);
-        if (!(value > 0)) refuse(key, fmt::format("{:g}", value), expected);
-        return value;
-    }
-    /// A standard deviation: NaN where none is known.
-    double deviation(const char* key) const {
-        constexpr const char* expected = "a number from 0 on, or null";
-        const double value = maybe(key, expected);
-        if (value < 0) refuse(key, fmt::format("{:g}", value), expected);
-        return value;
-    }
-    long long count(const char* key, long long otherwise) const {
-        constexpr const char* expected = "a whole number from 0 on";
-        const json* found = find(key);
-        if (!found) return otherwise;
-        if (!found->is_number_integer() || found->get<long long>() < 0) refuse_value(key, *found, expected);
-        return found->get<long long>();
-    }
-    std::string text(const char* key) const {
-        const json* found = find(key);
-        if (found && !found->is_string()) refuse_value(key, *found, "text");
-        return found ? found->get<std::string>() : std::string();
-    }
-    const json& list(const char* key, const std::string& expected) const {
-        const json& found = need(key, expected);
-        if (!found.is_array()) refuse_value(key, found, expected);
-        return found;
-    }
-};
 
 /// Numbers of a list of so many, NaN for null.
 std::vector<double> numbers_in(const keys_of& from, const char* key, std::size_t count) {
@@ -119,7 +52,7 @@ std::vector<std::string> places_in(const keys_of& from, const std::vector<std::s
     std::vector<std::string> out;
     for (const json& one : *dofs) {
         if (!one.is_number_integer()) from.refuse_value("shape_dofs", one, expected);
-        out.push_back(fmt::format("dof {}", one.get<long long>()));
+        out.push_back(std::to_string(one.get<long long>()));
     }
     return out;
 }
@@ -151,32 +84,6 @@ void read_warnings(const keys_of& from, known_result& to) {
     }
 }
 
-/// "3:17" of a byte.
-std::string line_and_column(const std::string& text, std::size_t byte) {
-    const std::size_t end = std::min(byte > 0 ? byte - 1 : 0, text.size());
-    const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(end), '\n');
-    const std::size_t before = end == 0 ? std::string::npos : text.rfind('\n', end - 1);
-    return fmt::format("{}:{}", line + 1, before == std::string::npos ? end + 1 : end - before);
-}
-
-json parse_result(const std::string& text, const std::string& name) {
-    const auto bounded = [&](int depth, json::parse_event_t, json&) {
-        if (depth > deepest)
-            throw failure(exit_usage,
-                          fmt::format("{}: nested deeper than {} levels, expected an okid.result/1", name, deepest));
-        return true;
-    };
-    try {
-        return json::parse(text, bounded);
-    } catch (const json::parse_error& fault) {
-        throw failure(exit_usage, fmt::format("{}:{}: not JSON, expected an okid.result/1, as okid identify --json "
-                                              "writes it",
-                                              name, line_and_column(text, fault.byte)));
-    } catch (const json::exception&) {
-        throw failure(exit_usage, fmt::format("{}: a number is not finite, expected numbers or null", name));
-    }
-}
-
 } // namespace
 
 std::vector<std::size_t> known_result::confident() const {
@@ -187,13 +94,8 @@ std::vector<std::size_t> known_result::confident() const {
 }
 
 known_result read_known_result(const std::string& text, const std::string& name) {
-    const json raw = parse_result(text, name);
-    const json none = json::object();
-    const keys_of top{raw.is_object() ? raw : none, name, ""};
-    const json* schema = top.find("schema");
-    constexpr const char* expected = "\"okid.result/1\", as okid identify --json writes it";
-    if (!schema) top.refuse("schema", "nothing", expected);
-    if (*schema != "okid.result/1") top.refuse_value("schema", *schema, expected);
+    const json raw = parse_known_result(text, name);
+    const keys_of top{raw, name, ""};
     known_result out;
     out.name = name;
     out.method = top.text("method");

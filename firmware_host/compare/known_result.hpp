@@ -24,7 +24,7 @@ struct known_result {
     long long samples = 0, records = 1, gaps = 0;
     int sigma_blocks = 0;             ///< that the standard deviations rest on; 0: the file does not say
     std::vector<std::string> outputs; ///< as the file has them
-    std::vector<std::string> places;  ///< of the entries of a shape: the outputs, or "dof N" of shape_dofs
+    std::vector<std::string> places;  ///< of the entries of a shape: the outputs, or the numbers of shape_dofs
     std::vector<known_mode> modes;
     std::vector<std::pair<std::string, std::string>> warnings; ///< code, text
 

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  results that exist, compared for other languages
-// METHOD   both texts are made at once, so that asking for them cannot fail
+// PURPOSE  results that exist, compared, merged and shown for other languages
+// METHOD   both texts of a comparison are made at once, so that asking for them cannot fail
 #include "guard.hpp"
 
 #include "compare/comparison.hpp"
+#include "compare/known_table.hpp"
+#include "compare/merge.hpp"
 #include "result/result.hpp"
+#include "result_handle.hpp"
 
+#include <cstring>
 #include <memory>
 #include <okid_host/compare.h>
+#include <string_view>
 
 struct okid_host_comparison {
     std::string json, table;
@@ -33,3 +38,25 @@ const char* okid_host_comparison_json(const okid_host_comparison_t* self) { retu
 const char* okid_host_comparison_table(const okid_host_comparison_t* self) { return self->table.c_str(); }
 
 void okid_host_comparison_delete(okid_host_comparison_t* self) { delete self; }
+
+int32_t okid_host_merge(const char* const* results, const char* const* names, int32_t count, const char* references,
+                        okid_host_result_t** out) {
+    *out = nullptr;
+    return face::guard([&] {
+        std::vector<known_result> known;
+        for (int32_t i = 0; i < count; ++i) known.push_back(read_known_result(results[i], names[i]));
+        std::vector<std::string> wanted;
+        for (const char* at = references; *at;) {
+            const std::string_view line(at, std::strcspn(at, "\n"));
+            wanted.emplace_back(line);
+            at += line.size() + (at[line.size()] == '\n' ? 1 : 0);
+        }
+        *out = face::make_result(merge_results(known, wanted));
+    });
+}
+
+const char* okid_host_table(const char* result, const char* name) {
+    static thread_local std::string text;
+    const int code = face::guard([&] { text = face::argument_words(known_table(result, name)); });
+    return code == 0 ? text.c_str() : nullptr;
+}

@@ -30,7 +30,7 @@ constexpr std::array<std::pair<const char*, const char*>, 11> words{{
 } // namespace
 
 bool judged_by_agreement(const result_context& context) {
-    return context.method == "auto" || context.method == "plscf";
+    return context.method == "auto" || context.method == "plscf" || context.method == "poser";
 }
 
 std::string why_text(const std::string& code) {

@@ -249,6 +249,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["method"] = context.method;
     out["fs_hz"] = number_json(context.fs_hz);
     out["samples"] = context.samples;
+    if (context.responses) out["responses"] = true;
     if (context.judged_samples > 0) out["judged_samples"] = context.judged_samples;
     out["records"] = context.records;
     out["gaps"] = context.gaps;
@@ -305,16 +306,17 @@ std::string result_text(const nlohmann::ordered_json& result) {
 }
 
 std::string result_table(const okid_identified_t& model, const result_context& context) {
-    const bool fractions = context.method == "plscf";
+    const bool fractions = context.method == "plscf", merged = context.method == "poser";
     const std::string what = context.responses
                                  ? fmt::format("responses at {}", counted(context.samples, "line"))
                                  : fmt::format("{} at {:g} Hz ({:.4g} s)", counted(context.samples, "sample"),
                                                context.fs_hz, static_cast<double>(context.samples) / context.fs_hz);
     std::string out =
         fmt::format("{}: {} to {}, {}, {}", context.method, counted(model.n_u, "input"), counted(model.n_y, "output"),
-                    what, counted(context.records, fractions && context.records > 1 ? "set-up" : "record"));
+                    what, counted(context.records, merged || (fractions && context.records > 1) ? "set-up" : "record"));
     if (context.gaps) out += ", " + counted(context.gaps, "gap");
-    const std::string horizon = fractions ? "agreement of several degrees, weights and normalisations"
+    const std::string horizon = merged      ? "modes of the set-ups paired by frequency and shape"
+                                : fractions ? "agreement of several degrees, weights and normalisations"
                                 : judged_by_agreement(context) ? "agreement of several methods, horizons and rates"
                                 : model.observer               ? fmt::format("p {}, {} block rows", model.p, model.rows)
                                                                : fmt::format("{} block rows", model.rows);
@@ -347,14 +349,17 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
     const std::string without = confident_modes(model, context, [](double, double f_std, double, double zeta_std) {
         return !std::isfinite(f_std) || !std::isfinite(zeta_std);
     });
-    if (!without.empty())
+    const auto said = [&](const char* code) {
+        return std::any_of(out.begin(), out.end(), [&](const auto& one) { return one.first == code; });
+    };
+    if (!without.empty() && !said("no_deviation") && context.method != "poser")
         out.emplace_back(
             "no_deviation",
             fmt::format("no ± for {}: with some block of the record left out, the model does not hold it", without));
     const std::string wide = confident_modes(model, context, [](double f, double f_std, double zeta, double zeta_std) {
         return f_std > widest_frequency * f || zeta_std > widest_damping * zeta;
     });
-    if (!wide.empty() && judged_by_agreement(context))
+    if (!wide.empty() && judged_by_agreement(context) && !said("wide_sigma"))
         out.emplace_back("wide_sigma", fmt::format("one standard deviation is as large as the damping, or {:.0f} % of "
                                                    "the frequency, at {}: with some block of the record left out, the "
                                                    "model has it elsewhere",

@@ -96,7 +96,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write(folder / name, names, both)
     for name, own in (("a", ["deck1", "deck2"]), ("b", ["deck3", "deck4"]), ("c", ["deck1", "deck4"])):
         write(folder / f"{name}.csv", ["ref1", "ref2", *own], [y[:, :2], y[:, 2:], y[:, 1:2] - y[:, 2:]])
-    for name in ("before", "after"):
+    for name in ("before", "after", "span1", "span2"):
         okid.identify(u, y, fs=250.0, method="okid-era").save(folder / f"{name}.json")
     measured = okid.frf.h1(u, y, 250.0, nperseg=2048)
     for name in ("responses", "one", "two"):

@@ -54,6 +54,7 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
     return [
         json.loads(agreed.stdout),
         struck.to_dict(),
+        package.identify_frf(package.frf.h1(u, y, 250.0, nperseg=1024)).to_dict(),
         identified(rig, *full),
         identified(rig, "--method", "n4sid-cva"),
         identified(rig, "--sensing", "acceleration,velocity"),

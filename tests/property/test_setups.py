@@ -23,7 +23,7 @@ def test_roving_sensors_become_one_shape() -> None:
         results.append(okid.identify(u[part], -2.0 * y[part][:, columns] if k == 1 else y[part][:, columns],
                                      fs=structure.fs, output_names=own, sigma_blocks=0))  # fmt: skip
     whole = okid.identify(u, y, fs=structure.fs, output_names=names, sigma_blocks=0)
-    merged = okid.merge_setups(results)
+    merged = okid.merge(results)
     assert merged.outputs == ["ref1", "ref2", "a", "b", "c", "d"] and merged.records == 3 and merged.inputs == []
     assert len(merged.modes) == len(whole.confident_modes) == 6
     for one, other in zip(merged.modes, whole.confident_modes, strict=True):
@@ -41,14 +41,14 @@ def test_a_mode_of_one_set_up_is_doubted_and_has_gaps() -> None:
     u, y = record(structure, 6000, 1.0, 6)
     parts = [okid.identify(u, y[:, [0, 1, k]], fs=structure.fs, output_names=["a", "b", f"c{k}"], sigma_blocks=0,
                            band=band) for k, band in ((2, None), (3, (0.0, 10.0)), (4, (0.0, 10.0)))]  # fmt: skip
-    merged = okid.merge_setups(parts)
+    merged = okid.merge(parts)
     alone = [mode for mode in merged.modes if mode.frequency_hz > 10.5]
     assert alone and all(mode.why == ("few_runs",) and not mode.confident for mode in alone)
     assert all(np.isnan(mode.shape[3:]).all() and np.isfinite(mode.shape[:3]).all() for mode in alone)
     with pytest.raises(okid.InputError, match="no output in common"):
-        okid.merge_setups([parts[0], okid.identify(u, y[:, 3], fs=structure.fs, output_names=["z"])])
-    with pytest.raises(okid.InputError, match="1 results to merge"):
-        okid.merge_setups(parts[:1])
+        okid.merge([parts[0], okid.identify(u, y[:, 3], fs=structure.fs, output_names=["z"])])
+    with pytest.raises(okid.InputError, match="found 1 result to merge"):
+        okid.merge(parts[:1])
 
 
 def test_indicators_of_shapes() -> None:

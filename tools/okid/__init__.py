@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from okid.mechanics.grey_box import FittedMode, GreyBox, fit_structure
     from okid.mechanics.structure import Structure
     from okid.mechanics.virtual import Estimate, VirtualSensors
-    from okid.record.setups import identify_setups, merge_setups
+    from okid.record.setups import identify_setups, merge, merge_setups
     from okid.result.comparison import ComparedMode, ComparedPair, Comparison, compare
     from okid.result.modal_table import ModalTable
     from okid.result.model import Model
@@ -76,6 +76,7 @@ __all__ = [
     "identify_frf",
     "identify_setups",
     "library_version",
+    "merge",
     "merge_setups",
     "modal",
     "read_csv",
@@ -99,7 +100,7 @@ _NAMES = {
     "result.result": "Result",
     "result.stabilization": "Cluster, Criteria, OrderPoles, Stabilization",
     "session": "Session",
-    "record.setups": "identify_setups, merge_setups",
+    "record.setups": "identify_setups, merge, merge_setups",
     "mechanics.structure": "Structure",
     "mechanics.virtual": "Estimate, VirtualSensors",
 }  # of the modules; they load when they are first used, NumPy and the libraries with them

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /**
  * @file compare.h
- * @brief Results that exist: which modes moved between two of them, and whether that is more than chance.
+ * @brief Results that exist: the shifts between two of them, several set-ups as one, and the table of one.
  */
 #ifndef OKID_HOST_COMPARE_H
 #define OKID_HOST_COMPARE_H
 
 #include <okid_host.h>
+#include <okid_host/record.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -32,6 +33,22 @@ OKID_HOST_API const char* okid_host_comparison_json(const okid_host_comparison_t
 OKID_HOST_API const char* okid_host_comparison_table(const okid_host_comparison_t* self);
 
 OKID_HOST_API void okid_host_comparison_delete(okid_host_comparison_t* self);
+
+/**
+ * What `okid merge` does with its files: results of set-ups with outputs in common as one result (PoSER).
+ * @param results, names  of each: a text of schema okid.result/1, and its name for messages
+ * @param references      names of the outputs that scale the shapes, one a line; "": all that every result has
+ * @return 0 and the result, or 2; then `*out` is NULL
+ */
+OKID_HOST_API int32_t okid_host_merge(const char* const* results, const char* const* names, int32_t count,
+                                      const char* references, okid_host_result_t** out);
+
+/**
+ * The table for a person, as `okid identify` printed it.
+ * @param result, name  a text of schema okid.result/1, and its name for messages
+ * @return valid until the next call of this thread; NULL: okid_host_error() names the key
+ */
+OKID_HOST_API const char* okid_host_table(const char* result, const char* name);
 
 #ifdef __cplusplus
 }

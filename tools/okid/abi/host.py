@@ -75,6 +75,8 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_comparison_json": (_text, [_handle]),
     "okid_host_comparison_table": (_text, [_handle]),
     "okid_host_comparison_delete": (None, [_handle]),
+    "okid_host_merge": (_status, [ctypes.POINTER(_text), ctypes.POINTER(_text), _status, _text, _out]),
+    "okid_host_table": (_text, [_text, _text]),
     "okid_host_csv_read": (_status, [_text, _out]),
     "okid_host_csv_json": (_text, [_handle]),
     "okid_host_csv_samples": (ctypes.POINTER(ctypes.c_double), [_handle, _sizes, _sizes]),
@@ -170,6 +172,14 @@ def csv(path: str | Path) -> tuple[dict[str, Any], NDArray[np.float64]]:
     weakref.finalize(memory, library().okid_host_csv_delete, made).atexit = False
     about: dict[str, Any] = json.loads(library().okid_host_csv_json(made))
     return about, np.ctypeslib.as_array(memory).reshape(rows.value, columns.value)
+
+
+def table(result: bytes, name: bytes) -> str:
+    """The modal table of an okid.result/1. Raises InputError that names the key."""
+    text: bytes | None = library().okid_host_table(result, name)
+    if text is None:
+        raise error(2)
+    return text.decode("utf-8", "replace")
 
 
 def unit_of_name(name: str) -> str:

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import Error, InputError
+from okid.abi import host
 from okid.data.whole_file import whole_file
 from okid.result.modal_table import ModalTable
 from okid.result.model import Model
 from okid.result.parts import Fit, MassMatrices, Mode, Observer, ProportionalDamping, Refinement, Skew, Warning, numbers
+from okid.result.result_file import read_result
 from okid.result.stabilization import Criteria, Stabilization, of_identifiers
 from okid.shown.notebook_html import summary
 
@@ -33,7 +35,6 @@ class _Parsed(NamedTuple):
     """An okid.result/1 object in the place of a result of the library."""
 
     raw: dict[str, Any]
-    text: str
 
     def json(self) -> str:
         return json.dumps(self.raw, allow_nan=False) + "\n"
@@ -42,7 +43,7 @@ class _Parsed(NamedTuple):
         return self.raw
 
     def table(self) -> str:
-        return self.text
+        return host.table(self.json().encode(), b"the result")
 
     def array(self, name: str) -> Real | None:
         part: Any = self.raw
@@ -104,17 +105,27 @@ class Result:
 
     @classmethod
     def from_dict(cls, raw: Mapping[str, Any]) -> Result:
-        """The result of an okid.result/1 object, as json.loads() gives it; without decomposition, and its table() is
-        rows only. InputError when it is not complete."""
-        return cls._read(dict(raw), "")
+        """The result of an okid.result/1 object, as to_dict() and json.loads() give it: all but what stabilization()
+        needs. InputError when it is not complete."""
+        return cls._read(dict(raw))
 
     @classmethod
-    def _read(cls, raw: dict[str, Any], text: str) -> Result:
+    def load(cls, path: str | Path) -> Result:
+        """The result of a file of save() or `okid identify --json`; without decomposition, as from_dict(). InputError
+        of one line names the file, and line and column or key."""
+        try:
+            return cls._read(read_result(path))
+        except InputError as fault:
+            named = str(fault).startswith(str(path))
+            raise fault if named else InputError(f"{path}: {fault}") from None
+
+    @classmethod
+    def _read(cls, raw: dict[str, Any]) -> Result:
         if raw.get("schema") != "okid.result/1":
             raise InputError(f"schema is {raw.get('schema')!r}, expected 'okid.result/1'")
         try:
             json.dumps(raw, allow_nan=False)  # a missing number is null
-            out = cls.of_host(_Parsed(raw, text))
+            out = cls.of_host(_Parsed(raw))
             for one in fields(cls):
                 getattr(out, one.name)
             return out
@@ -162,7 +173,7 @@ class Result:
         self.refinement, self.skew = Refinement.of(about.get("refinement")), Skew.of(about.get("skew"), self.outputs)
 
     def __reduce__(self) -> Any:  # what holds memory of the C library cannot be pickled
-        return Result._read, (self.to_dict(), self._source.table())
+        return Result._read, (self.to_dict(),)
 
     @property
     def confident_modes(self) -> list[Mode]:

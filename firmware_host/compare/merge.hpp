@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// Results of set-ups of one structure as one result: PoSER merging, by modes.
+#pragma once
+#include "known_result.hpp"
+#include "record/record.hpp"
+
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+/// One set of modes over all places, each named once; method "poser", without inputs, B and D. Throws `failure` (exit 2).
+/// @param references  places that scale the shapes, which every result has; empty: all such
+record_result merge_results(const std::vector<known_result>& results, const std::vector<std::string>& references);
+
+} // namespace okid_host
