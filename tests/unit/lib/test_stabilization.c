@@ -18,7 +18,7 @@ static void create(int models, int poles, double share) {
     const okid_stabilization_config_t c = {.n_y = RIG_NY, .max_models = models, .max_poles = poles, .share = share};
     const size_t bytes = okid_stabilization_memsize(&c);
     TEST_ASSERT_GREATER_THAN(0, bytes);
-    free(own);
+    free(block);
     block = malloc(bytes);
     TEST_ASSERT_EQUAL(OKID_ERR_MEMORY, okid_stabilization_create(&diagram, &c, block, bytes - 1));
     TEST_ASSERT_EQUAL(OKID_OK, okid_stabilization_create(&diagram, &c, block, bytes));
@@ -35,7 +35,7 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-    free(own);
+    free(block);
     free(memory[0]);
     free(memory[1]);
     block = memory[0] = memory[1] = NULL;
