@@ -35,6 +35,11 @@ int count_at(const json& from, const char* key) {
     return value >= 0 && value < 1e9 ? static_cast<int>(value) : 0;
 }
 
+std::string text_at(const json& from, const char* key) {
+    const auto at = from.find(key);
+    return at != from.end() && at->is_string() ? at->get<std::string>() : std::string();
+}
+
 std::vector<json> list_at(const json& from, const char* key) {
     const auto at = from.find(key);
     return at == from.end() || !at->is_array() ? std::vector<json>() : at->get<std::vector<json>>();
@@ -115,8 +120,7 @@ std::optional<mass_matrices> mass_in(const json& from) {
     out.beta_std = number_at(pdc, "beta_std");
     out.residual = number_at(checks, "ww_residual");
     out.feedthrough = number_at(checks, "feedthrough_misfit");
-    const auto output = checks.find("feedthrough_output");
-    if (output != checks.end() && output->is_string()) out.feedthrough_output = output->get<std::string>();
+    out.feedthrough_output = text_at(checks, "feedthrough_output");
     const double margin = number_at(checks, "selection_margin");
     out.margin = std::isfinite(margin) ? margin : 0;
     out.admissible = count_at(checks, "admissible_modes");
@@ -124,6 +128,36 @@ std::optional<mass_matrices> mass_in(const json& from) {
     for (const json& note : list_at(checks, "notes"))
         for (std::uint32_t bit = 1; bit; bit <<= 1)
             if (const char* known = okid_mkr_note(bit); known && note == known) out.notes |= bit;
+    return out;
+}
+
+std::optional<placed_shapes> placed_in(const json& from, const known_result& known) {
+    placed_shapes out;
+    for (const json& dof : list_at(from, "shape_dofs")) out.dofs.push_back(dof.get<int>());
+    if (out.dofs.empty()) return std::nullopt;
+    const std::vector<json> modes = list_at(from, "modes");
+    for (std::size_t k = 0; k < known.modes.size(); ++k) {
+        for (const auto& entry : known.modes[k].shape) {
+            out.re.push_back(entry.real());
+            out.im.push_back(entry.imag());
+        }
+        out.modal_mass.push_back(number_at(modes[k], "modal_mass"));
+    }
+    return out;
+}
+
+std::vector<hit_line> hits_in(const json& from) {
+    std::vector<hit_line> out;
+    for (const json& one : list_at(from, "hits")) {
+        if (!one.is_object()) continue;
+        hit_line& hit = out.emplace_back();
+        hit.file = text_at(one, "file");
+        const double place = number_at(one, "place");
+        hit.place = std::abs(place) < 1e9 ? static_cast<int>(place) : 0;
+        hit.accepted = flag_at(one, "accepted");
+        hit.fault = text_at(one, "reason");
+        hit.text = text_at(one, "text");
+    }
     return out;
 }
 
@@ -152,7 +186,7 @@ okid_identified_t model_of(const json& raw, const known_result& known, table_num
         const double cmi = number_at(modes[k], "cmi");
         to.cmi.push_back(std::isfinite(cmi) ? cmi : to.emac.back() * to.mpc.back());
         for (std::size_t i = 0; i < known.outputs.size(); ++i) {
-            const bool own = known.places == known.outputs; // else it is not the outputs that the shape is about
+            const bool own = known.places == known.outputs; // else the shape is of other places
             to.re.push_back(own ? known.modes[k].shape[i].real() : NAN);
             to.im.push_back(own ? known.modes[k].shape[i].imag() : NAN);
         }
@@ -205,6 +239,8 @@ result_context context_of(const json& raw, const known_result& known) {
     out.stable = stable_in(raw);
     out.refined = refined_in(raw, known.outputs);
     out.mass = mass_in(raw);
+    out.placed = placed_in(raw, known);
+    out.hits = hits_in(raw);
     out.warnings = known.warnings;
     return out;
 }

@@ -206,7 +206,7 @@ void stream::add_mass(result_context& about) const {
 void stream::add_sigma(result_context& about) {
     if (identifier_.agreed()) return;
     about.sigma = identifier_.sigma(about.mass ? config_.mass : mass_plan{});
-    if (about.mass && about.sigma) add_deviations(*about.sigma, *about.mass);
+    if (about.mass && about.sigma) add_deviations(*about.sigma, *about.mass, about.warnings);
 }
 
 } // namespace okid_host

@@ -195,7 +195,7 @@ void find_deviations(long long rows, const std::vector<replicate_model>& replica
         return;
     }
     work.context.sigma = deviations_of(work.model, replicates, options.mass);
-    if (work.context.mass) add_deviations(*work.context.sigma, *work.context.mass);
+    if (work.context.mass) add_deviations(*work.context.sigma, *work.context.mass, work.context.warnings);
     if (!work.context.refined) // the likelihood knows no p
         remark_finite_p(work, rows, *work.context.sigma, work.context.warnings);
 }

@@ -353,7 +353,7 @@ void find_matrix_deviations(const std::vector<listed_mode>& listed, const record
         const okid_model_t view = as_taken(part.model, other);
         statistics.add(&view, 1.0 / static_cast<double>(blocks));
     }
-    add_deviations(statistics.finish(), *work.context.mass);
+    add_deviations(statistics.finish(), *work.context.mass, work.context.warnings);
 }
 
 /// M, K, R from the model of the modes that are confident; then the model of all listed, its gain and fits.

@@ -88,13 +88,14 @@ std::vector<mode_shift> modes_in(const okid_model_t& model, double dt) {
 
 std::string plus_minus(double deviation) { return std::isfinite(deviation) ? fmt::format("±{:.2g}", deviation) : "-"; }
 
-void add_deviations(const deviations& found, mass_matrices& to) {
+void add_deviations(const deviations& found, mass_matrices& to, remarks& said) {
     to.M_std = found.M;
     to.K_std = found.K;
     to.R_std = found.R;
     to.R_normal_std = found.R_normal;
     to.alpha_std = found.alpha;
     to.beta_std = found.beta;
+    drop_undetermined(to, said);
 }
 
 } // namespace okid_host

@@ -66,6 +66,6 @@ std::vector<mode_shift> modes_in(const okid_model_t& model, double dt);
 std::string plus_minus(double deviation);
 
 /// The deviations of M, K, R, alpha and beta to where the matrices are.
-void add_deviations(const deviations& found, mass_matrices& to);
+void add_deviations(const deviations& found, mass_matrices& to, remarks& said);
 
 } // namespace okid_host

@@ -18,6 +18,8 @@ namespace okid_host {
 namespace {
 
 constexpr int most_dofs = 100000;
+constexpr double least_in_sigmas = 2; // a mass or stiffness known to half of itself
+constexpr double hardly_moves = 0.1;  // of the largest motion of a shape: a named reason, no criterion
 constexpr std::uint32_t doubts =
     OKID_MKR_POLARITY | OKID_MKR_MASS | OKID_MKR_STIFFNESS | OKID_MKR_RESIDUAL | OKID_MKR_FEEDTHROUGH | OKID_MKR_SPREAD;
 constexpr const char* kinds[] = {"displacement", "velocity", "acceleration"};
@@ -119,8 +121,15 @@ mass_matrices take(const okid_mkr_t& result, const mass_plan& plan) {
     out.R.assign(result.R, result.R + n * n);
     out.R_normal.assign(result.R_normal, result.R_normal + n * n);
     for (std::size_t k = 0; k < n; ++k)
-        out.modes.push_back({result.mode[k] + 1, result.frequency_hz[k], result.damping_ratio[k], result.strength[k],
-                             result.mpc[k], result.phase[k], result.pair_spread[k]});
+        out.modes.push_back({result.mode[k] + 1,
+                             result.frequency_hz[k],
+                             result.damping_ratio[k],
+                             result.strength[k],
+                             result.mpc[k],
+                             result.phase[k],
+                             result.pair_spread[k],
+                             1,
+                             {}});
     out.admissible = result.admissible;
     out.pairs = result.pairs;
     if (result.feedthrough_row >= 0)
@@ -135,6 +144,27 @@ mass_matrices take(const okid_mkr_t& result, const mass_plan& plan) {
     if (status >= 0) status = okid_pdc_damping(result.n_x, &out.pdc, out.M.data(), out.K.data(), out.R_pdc.data());
     if (status < 0) throw failure(exit_no_model, fmt::format("no proportional damping: {}", okid_status_text(status)));
     return out;
+}
+
+/// Of each mode taken, how much it moves where a force and a sensor stand together.
+void find_motion_at_forces(const okid_identified_t& model, const mass_plan& plan, mass_matrices& found) {
+    for (mass_mode& mode : found.modes) {
+        const int k = mode.number - 1;
+        if (k < 0 || k >= model.mode_count) continue;
+        const auto size = [&](std::size_t i) {
+            const std::size_t at = i + static_cast<std::size_t>(k) * plan.outputs.size();
+            return std::hypot(static_cast<double>(model.shape_re[at]), static_cast<double>(model.shape_im[at])) *
+                   plan.outputs[i].si;
+        };
+        double largest = 0, own = -1;
+        for (std::size_t i = 0; i < plan.outputs.size(); ++i) {
+            if (plan.outputs[i].dof > 0) largest = std::max(largest, size(i));
+            for (const mass_channel& force : plan.inputs)
+                if (force.dof > 0 && force.dof == plan.outputs[i].dof && size(i) > own)
+                    own = size(i), mode.force_name = force.name;
+        }
+        if (largest > 0 && own >= 0) mode.at_force = own / largest;
+    }
 }
 
 } // namespace
@@ -253,6 +283,7 @@ mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan
     mass_matrices found = take(tried.result, plan);
     if (plan.hold == "band") // the modes of another realization: those of this model by their frequency
         for (mass_mode& mode : found.modes) mode.number = nearest_mode(model, mode.frequency_hz) + 1;
+    find_motion_at_forces(model, plan, found);
     const remarks notes = mass_remarks(found);
     said.insert(said.end(), notes.begin(), notes.end());
     const bool misread =
@@ -261,6 +292,57 @@ mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan
     const std::string cause = likely_cause(model, plan);
     if (!cause.empty()) said.emplace_back("mkr_likely_cause", fmt::format("every check passes with {}", cause));
     return found;
+}
+
+void drop_undetermined(mass_matrices& found, remarks& said) {
+    const auto n = static_cast<std::size_t>(found.n_x);
+    const auto below = [&](const std::vector<double>& values, const std::vector<double>& std) { // diagonal entries
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < n && std.size() == n * n; ++i)
+            if (std::abs(values[i * (n + 1)]) < least_in_sigmas * std[i * (n + 1)]) ++count;
+        return count;
+    };
+    const auto clear = [](std::vector<double>& values, std::vector<double>& std) {
+        std::fill(values.begin(), values.end(), NAN);
+        std::fill(std.begin(), std.end(), NAN);
+    };
+    std::vector<std::string> names;
+    std::vector<std::string> guesses;
+    if (below(found.M, found.M_std) > 0) {
+        clear(found.M, found.M_std);
+        names.emplace_back("M");
+        guesses.insert(guesses.end(), {"mkr_polarity", "mkr_mass_indefinite"});
+    }
+    if (below(found.K, found.K_std) > 0) {
+        clear(found.K, found.K_std);
+        names.emplace_back("K");
+        guesses.emplace_back("mkr_stiffness_indefinite");
+    }
+    if (!names.empty()) std::fill(found.R_pdc.begin(), found.R_pdc.end(), NAN); // alpha M + beta K
+    if (below(found.R, found.R_std) == n) {
+        clear(found.R, found.R_std);
+        names.emplace_back("R");
+        guesses.emplace_back("mkr_damping_indefinite");
+    }
+    if (below(found.R_normal, found.R_normal_std) == n) clear(found.R_normal, found.R_normal_std);
+    if (names.empty()) return;
+    const auto weakest =
+        std::min_element(found.modes.begin(), found.modes.end(),
+                         [](const mass_mode& a, const mass_mode& b) { return a.at_force < b.at_force; });
+    const bool node = weakest != found.modes.end() && weakest->at_force < hardly_moves;
+    if (node) guesses.emplace_back("mkr_likely_cause"); // else a slip may well be why
+    said.erase(std::remove_if(said.begin(), said.end(),
+                              [&](const auto& one) {
+                                  return std::find(guesses.begin(), guesses.end(), one.first) != guesses.end();
+                              }),
+               said.end());
+    std::string reason = "their standard deviations are as large as their diagonal entries";
+    if (node)
+        reason = fmt::format(
+            "mode {} at {:.4g} Hz hardly moves at \"{}\" ({:.2g} % of its largest motion), and nothing else "
+            "scales it. Put a force and a sensor where it moves",
+            weakest->number, weakest->frequency_hz, weakest->force_name, 100 * weakest->at_force);
+    said.emplace_back("mkr_undetermined", fmt::format("{} not determined: {}", fmt::join(names, ", "), reason));
 }
 
 } // namespace okid_host

@@ -36,6 +36,8 @@ using remarks = std::vector<std::pair<std::string, std::string>>; ///< (code, te
 struct mass_mode {
     int number = 0; ///< in `modes` of the result, from 1
     double frequency_hz = 0, damping_ratio = 0, strength = 0, mpc = 0, phase = 0, pair_spread = 0;
+    double at_force = 1;    ///< largest motion where a force and a sensor stand together, over that of the whole shape
+    std::string force_name; ///< of the force there
 };
 
 /// Column-major n_x x n_x matrices and the numbers of okid_mkr_t; rows and columns are the degrees of freedom 1 … n_x.
@@ -79,6 +81,10 @@ void take_units(const std::vector<std::string>& units, mass_plan& plan, remarks&
 /// M, K, R and the proportional damping. Throws `failure` (exit 3) when the model cannot give them; what the checks find
 /// goes into `said`, with the change of hold, polarity or sensing that would clear it, where there is one.
 mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan& plan, remarks& said);
+
+/// Matrices that their standard deviations leave open become NaN: M or K with a diagonal entry below twice its own, R with
+/// none above. `said` gets the reason ("mkr_undetermined") in place of the causes that were guessed from their signs.
+void drop_undetermined(mass_matrices& found, remarks& said);
 
 /// Keys "mkr" and "pdc" of okid.result/1.
 void put_mass_json(const mass_matrices& found, nlohmann::ordered_json& result);

@@ -53,6 +53,7 @@ ordered_json checks_json(const mass_matrices& found) {
 /// With a row of standard deviations below each row of values, where there are any.
 std::string square_text(const std::string& title, const std::vector<double>& values, const std::vector<double>& std,
                         int n) {
+    if (n > 0 && std::isnan(values[0])) return fmt::format("{}: not determined\n", title);
     std::string out = fmt::format("{}{}\n  dof", title, std.empty() ? "" : ", ± one standard deviation");
     for (int j = 0; j < n; ++j) out += fmt::format(" {:>12}", j + 1);
     out += "\n";

@@ -90,6 +90,6 @@ def test_causes_kinds_and_reasons_are_those_of_the_source() -> None:
     recorder = (ROOT / "firmware_host" / "journal" / "recorder.cpp").read_text()
     assert records == set(re.findall(r'tell\("(\w+)"', recorder)) | {"segment", "started"} and '"segment"' in recorder
     reasons = set(codes(documented(text["hit"])["reason"])) - {"null"}
-    hammer = (ROOT / "firmware_host" / "live" / "hammer.cpp").read_text()
-    assert reasons == set(re.findall(r'refuse\("(\w+)"', hammer))
+    verdict = (ROOT / "firmware_host" / "record" / "hit_verdict.cpp").read_text()
+    assert len(reasons) == 8 and reasons == set(re.findall(r'refuse\(\s*"(\w+)"', verdict))
     assert all(f'"{cause}"' in everything for cause in causes)

@@ -24,6 +24,8 @@ COMMANDS = [
     "init",
     "check",
     "doctor",
+    "compare",
+    "merge",
     "bench",
     "support-bundle",
     "completion",

@@ -29,6 +29,8 @@ def _matrix(title: str, values: Any, deviations: Any = None) -> str:
     rows = np.array(values, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[0] != rows.shape[1]:
         raise InputError(f"not a complete okid.result/1: {title} has shape {rows.shape}, expected a square matrix")
+    if rows.size and bool(np.isnan(rows).all()):
+        return f"{page.heading(title)}\n{page.note('Not determined: see the warnings.')}"
     largest = float(np.max(np.abs(rows), initial=0.0))
     digits = 0 if largest <= 0.0 else int(np.clip(5 - np.floor(np.log10(largest)), 0, 10))
     style = f".{digits}f" if 1e-6 <= largest < 1e8 else ".4e"
