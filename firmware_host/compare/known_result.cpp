@@ -94,7 +94,10 @@ std::vector<std::size_t> known_result::confident() const {
 }
 
 known_result read_known_result(const std::string& text, const std::string& name) {
-    const json raw = parse_known_result(text, name);
+    return take_known_result(parse_known_result(text, name), name);
+}
+
+known_result take_known_result(const json& raw, const std::string& name) {
     const keys_of top{raw, name, ""};
     known_result out;
     out.name = name;

@@ -3,6 +3,7 @@
 #pragma once
 #include <complex>
 #include <cstddef>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +36,7 @@ struct known_result {
 /// @param name  of the file, for messages
 /// Throws `failure` (exit 2) with file, line and column or key, what was found and what was expected.
 known_result read_known_result(const std::string& text, const std::string& name);
+known_result take_known_result(const nlohmann::json& raw, const std::string& name); ///< of parse_known_result()
 
 /// The same of a file.
 known_result load_known_result(const std::string& path);

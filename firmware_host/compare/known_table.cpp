@@ -248,8 +248,8 @@ result_context context_of(const json& raw, const known_result& known) {
 } // namespace
 
 std::string known_table(const std::string& text, const std::string& name) {
-    const known_result known = read_known_result(text, name);
     const json raw = parse_known_result(text, name);
+    const known_result known = take_known_result(raw, name);
     table_numbers numbers;
     const okid_identified_t model = model_of(raw, known, numbers);
     return result_table(model, context_of(raw, known));

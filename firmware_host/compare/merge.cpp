@@ -6,6 +6,7 @@
 #include "merge.hpp"
 
 #include "comparison.hpp"
+#include "consensus/quantity.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "record/modal_model.hpp"
@@ -18,7 +19,6 @@
 namespace okid_host {
 namespace {
 
-using shape_t = std::vector<std::complex<double>>;
 using places_t = std::vector<std::pair<std::size_t, std::size_t>>;
 
 /// A mode over the set-ups: at most one of each; nullptr: a set-up lacks it.
@@ -62,7 +62,7 @@ mean_value mean_of(const std::vector<std::pair<double, double>>& known) {
 bool there(const std::complex<double>& entry) { return std::isfinite(std::abs(entry)); }
 
 /// The factor that brings `own` nearest to `to`, over the entries that both have.
-std::complex<double> scale_to(const shape_t& own, const shape_t& to) {
+std::complex<double> scale_to(const mode_shape& own, const mode_shape& to) {
     std::complex<double> cross = 0;
     double power = 0;
     for (std::size_t i = 0; i < own.size(); ++i)
@@ -107,8 +107,8 @@ class merger {
         references_ = wanted.empty() ? common : wanted;
     }
 
-    shape_t at_references(const known_mode& mode, const known_result& of) const {
-        shape_t out;
+    mode_shape at_references(const known_mode& mode, const known_result& of) const {
+        mode_shape out;
         for (const std::string& name : references_)
             out.push_back(mode.shape[static_cast<std::size_t>(std::find(of.places.begin(), of.places.end(), name) -
                                                               of.places.begin())]);
@@ -118,13 +118,13 @@ class merger {
     /// Means over the set-ups, as far as the pairing needs them.
     void renew(merged_mode& mode) const {
         std::vector<std::pair<double, double>> f, zeta;
-        shape_t sum(references_.size());
+        mode_shape sum(references_.size());
         std::vector<double> count(references_.size());
-        shape_t first;
+        mode_shape first;
         for (std::size_t k = 0; k < results_.size(); ++k) {
             if (!mode.of[k]) continue;
             f.emplace_back(mode.of[k]->frequency_hz, mode.of[k]->frequency_std_hz);
-            const shape_t own = at_references(*mode.of[k], results_[k]);
+            const mode_shape own = at_references(*mode.of[k], results_[k]);
             if (first.empty()) first = own;
             const std::complex<double> factor = scale_to(own, first);
             for (std::size_t i = 0; i < own.size(); ++i)
@@ -196,8 +196,8 @@ class merger {
     }
 
     /// Over all places, largest entry 1; NaN where only set-ups without the mode have been.
-    shape_t whole_shape(const merged_mode& mode) const {
-        shape_t sum(names_.size());
+    mode_shape whole_shape(const merged_mode& mode) const {
+        mode_shape sum(names_.size());
         std::vector<double> count(names_.size());
         for (std::size_t k = 0; k < results_.size(); ++k) {
             if (!mode.of[k]) continue;
@@ -213,14 +213,6 @@ class merger {
         if (largest != 0.0)
             for (auto& entry : sum) entry /= largest;
         return sum;
-    }
-
-    static double collinearity(const shape_t& shape) {
-        double xx = 0, yy = 0, xy = 0;
-        for (const auto& entry : shape)
-            if (there(entry))
-                xx += entry.real() * entry.real(), yy += entry.imag() * entry.imag(), xy += entry.real() * entry.imag();
-        return xx + yy > 0 ? ((xx - yy) * (xx - yy) + 4 * xy * xy) / ((xx + yy) * (xx + yy)) : 0;
     }
 
     double median_emac(const merged_mode& mode) const {
@@ -254,7 +246,7 @@ class merger {
         describe_set_ups(work.context);
         work.set.n_y = names_.size();
         std::vector<listed_mode> listed;
-        std::vector<shape_t> shapes;
+        std::vector<mode_shape> shapes;
         deviations sigma;
         int blocks = 0;
         for (const known_result& one : results_)
@@ -272,10 +264,10 @@ class merger {
             sigma.damping_ratio.push_back(damping.deviation);
             sigma.shape_re.insert(sigma.shape_re.end(), names_.size(), NAN);
             shapes.push_back(whole_shape(mode));
-            shape_t states = shapes.back();
+            mode_shape states = shapes.back();
             for (auto& entry : states)
                 if (!there(entry)) entry = 0;
-            listed.push_back({frequency.value, damping.value, collinearity(shapes.back()), median_emac(mode),
+            listed.push_back({frequency.value, damping.value, shape_collinearity(states, {}), median_emac(mode),
                               std::move(states), true});
             mode_verdict& verdict = work.context.verdicts.emplace_back();
             verdict.found_in = static_cast<double>(mode.count()) / static_cast<double>(results_.size());

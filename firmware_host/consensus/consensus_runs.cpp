@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <new>
 
@@ -174,24 +175,24 @@ owned_sums shortened(const record_level& level, const owned_sums& longest, int l
 /// The runs of one level with their poles linked, those with the longest horizon first.
 std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const record_level& level, int n_u, int n_y,
                                      bool at_rest) {
-    const auto lags_of = [&](const consensus_run& run) {
+    std::vector<int> lags;
+    for (const consensus_run& run : runs) {
         const okid_identify_config_t config = run_config(run, n_u, n_y);
-        return okid_identify_lags(&config);
-    };
-    std::stable_sort(runs.begin(), runs.end(),
-                     [&](const consensus_run& a, const consensus_run& b) { return lags_of(a) > lags_of(b); });
-    const int most = runs.empty() ? 1 : lags_of(runs.front());
-    const owned_sums longest = level_sums(level, n_u, n_y, most, at_rest);
-    owned_sums own;
-    int lags = most;
+        lags.push_back(okid_identify_lags(&config));
+    }
+    std::vector<int> horizons = lags;
+    std::sort(horizons.begin(), horizons.end(), std::greater<>());
+    horizons.erase(std::unique(horizons.begin(), horizons.end()), horizons.end());
     std::vector<consensus_run> out;
-    for (consensus_run& run : runs) {
-        if (lags_of(run) != lags) {
-            lags = lags_of(run);
-            own = shortened(level, longest, lags, n_u, n_y);
-            if (!own.sums) own = level_sums(level, n_u, n_y, lags, at_rest);
-        }
-        if (find_poles(run_config(run, n_u, n_y), lags < most ? own : longest, run)) out.push_back(std::move(run));
+    owned_sums longest, own;
+    for (const int horizon : horizons) {
+        const bool first = horizon == horizons.front();
+        if (!first) own = shortened(level, longest, horizon, n_u, n_y);
+        owned_sums& sums = first ? longest : own;
+        if (!sums.sums) sums = level_sums(level, n_u, n_y, horizon, at_rest);
+        for (std::size_t i = 0; i < runs.size(); ++i)
+            if (lags[i] == horizon && find_poles(run_config(runs[i], n_u, n_y), sums, runs[i]))
+                out.push_back(std::move(runs[i]));
     }
     return out;
 }

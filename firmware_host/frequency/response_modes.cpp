@@ -11,6 +11,7 @@
 #include "error.hpp"
 #include "matrix_fraction.hpp"
 #include "record/request.hpp"
+#include "result/hold.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -444,10 +445,7 @@ std::vector<std::string> common_outputs(const std::vector<response_set>& sets) {
     return out;
 }
 
-complex pole_of(const consensus_mode& mode) {
-    const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
-    return {-zeta * w, w * std::sqrt(1 - zeta * zeta)};
-}
+complex pole_of(const consensus_mode& mode) { return continuous_pole(mode.frequency_hz, mode.damping_ratio); }
 
 void take_window_out(double constant_s, const char* nothing_left, consensus_mode& mode) {
     if (!(constant_s > 0)) return;

@@ -7,6 +7,7 @@
 #include "record_fit.hpp"
 #include "record_refine.hpp"
 #include "result/deviations.hpp"
+#include "result/hold.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -63,8 +64,7 @@ void put_states(const std::vector<listed_mode>& modes, refined_arrays& to, okid_
 } // namespace
 
 std::complex<double> discrete_pole(const listed_mode& mode, double dt) {
-    const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
-    return std::exp(std::complex<double>(-zeta * w, w * std::sqrt(1 - zeta * zeta)) * dt);
+    return std::exp(continuous_pole(mode.frequency_hz, mode.damping_ratio) * dt);
 }
 
 void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, record_work& work) {

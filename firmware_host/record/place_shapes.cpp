@@ -7,8 +7,8 @@
 #include "place_shapes.hpp"
 
 #include "consensus/quantity.hpp"
+#include "result/hold.hpp"
 #include "roving.hpp"
-#include "shape_quantity.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -35,17 +35,12 @@ struct drive_point {
     int dof;
 };
 
-complex pole_of(const listed_mode& mode) {
-    const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
-    return {-zeta * w, w * std::sqrt(1 - zeta * zeta)};
-}
+complex pole_of(const listed_mode& mode) { return continuous_pole(mode.frequency_hz, mode.damping_ratio); }
 
 /// What one sample of a force adds to the state of a pole with residue 1, at the pole.
 complex held_sample(complex lambda, double dt, const std::string& hold) {
     const complex mu = std::exp(lambda * dt);
-    if (hold == "band") return mu * dt;
-    const complex g1 = (mu - 1.0) / lambda, g2 = (mu - 1.0 - lambda * dt) / (lambda * lambda * dt);
-    return hold == "foh" ? g1 - g2 + g2 * mu : g1;
+    return hold == "band" ? mu * dt : held_force(lambda, mu, dt, hold);
 }
 
 /// The shape of a mode at the sensors as displacement, signs as the plan has them.
@@ -88,6 +83,7 @@ class placer {
         std::vector<listed_mode> all = modes;
         for (listed_mode& mode : all) mode.in_model = true;
         place_residues out = find_residues(all, options.hits, options.fs_hz, work_.set);
+        if (std::all_of(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; })) return out;
         const place_residues confident = find_residues(modes, options.hits, options.fs_hz, work_.set);
         Eigen::Index row = 0;
         for (std::size_t k = 0; k < modes.size(); ++k) {
@@ -197,6 +193,19 @@ class placer {
 };
 
 } // namespace
+
+mass_plan matrices_of_places(const std::vector<listed_mode>& modes, const record_options& options, remarks& said) {
+    const auto found = std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; });
+    if (options.mass.wanted() && found >= options.mass.size()) return options.mass;
+    if (options.mass.wanted())
+        said.emplace_back(
+            "mkr_failed",
+            fmt::format("no M, K and R: they need a mode for each of {} degrees of freedom, {} were found",
+                        options.mass.size(), found));
+    mass_plan none;
+    none.outputs = options.placed.outputs;
+    return none;
+}
 
 void place_shapes(const std::vector<listed_mode>& modes, const record_options& options, record_work& work) {
     placer(modes, options, work).place();

@@ -12,4 +12,7 @@ namespace okid_host {
 /// @param modes  as listed; the records of `work` are those of one force about their means
 void place_shapes(const std::vector<listed_mode>& modes, const record_options& options, record_work& work);
 
+/// The plan of M, K and R: the one of `options` where there are modes enough for it, else one without forces, and `said` has why.
+mass_plan matrices_of_places(const std::vector<listed_mode>& modes, const record_options& options, remarks& said);
+
 } // namespace okid_host

@@ -430,13 +430,8 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
 
 /// Of records struck at different places: M, K and R where there is a mode for each, and shapes over the places.
 void find_placed(const std::vector<listed_mode>& listed, const record_options& options, record_work& work) {
-    const auto modes =
-        std::count_if(listed.begin(), listed.end(), [](const listed_mode& mode) { return mode.in_model; });
     record_options wanted = options;
-    if (!options.mass.wanted() || modes < options.mass.size()) {
-        wanted.mass.inputs.clear();
-        wanted.mass.outputs = options.placed.outputs;
-    }
+    wanted.mass = matrices_of_places(listed, options, work.context.warnings);
     find_matrices_agreed(wanted, work);
     if (work.set.n_u == 1) place_shapes(listed, options, work); // else the force never rests
 }

@@ -2,6 +2,7 @@
 #include "shape_quantity.hpp"
 
 #include "consensus/quantity.hpp"
+#include "result/hold.hpp"
 
 #include <okid/mkr.h>
 
@@ -9,8 +10,6 @@
 #include <cmath>
 
 namespace okid_host {
-
-int times_differentiated(int kind) { return kind == OKID_SENSE_ACCELERATION ? 2 : kind == OKID_SENSE_VELOCITY ? 1 : 0; }
 
 namespace {
 

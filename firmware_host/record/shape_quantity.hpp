@@ -8,9 +8,6 @@
 
 namespace okid_host {
 
-/// How often a kind of sensor (okid_sensing_t) differentiates the displacement.
-int times_differentiated(int kind);
-
 /// Divide each entry of a shape by lambda (velocity) or lambda^2 (acceleration) where `sensing` (okid_sensing_t of each output) has
 /// more than one kind: shapes, their deviations, MPC and CMI. C and D stay in what the sensors measure.
 void shapes_in_one_quantity(const std::vector<int>& sensing, kept_model& model, result_context& context);

@@ -55,8 +55,7 @@ bool find_poles(const okid_identified_t& model, response& out) {
     out.shape.resize(model.n_y, out.lambda.size());
     for (Index j = 0; j < out.lambda.size(); ++j) {
         const mode_shift& mode = kept[static_cast<std::size_t>(j)];
-        const double w = 2 * M_PI * mode.frequency_hz, zeta = mode.damping_ratio;
-        out.lambda[j] = complex(-zeta * w, w * std::sqrt(1 - zeta * zeta));
+        out.lambda[j] = continuous_pole(mode.frequency_hz, mode.damping_ratio);
         out.shape.col(j) = Eigen::Map<const VectorXcd>(mode.shape.data(), model.n_y);
     }
     return !kept.empty();
@@ -84,10 +83,8 @@ bool find_response(const okid_identified_t& model, response& out) {
 complex term(complex lambda, complex s, complex z, double dt, int b, const std::string& hold) {
     if (hold == "band") return std::pow(s, b) / (s - lambda);
     const complex mu = std::exp(lambda * dt);
-    const complex g1 = (mu - 1.0) / lambda, g2 = (mu - 1.0 - lambda * dt) / (lambda * lambda * dt);
-    const complex held = hold == "foh" ? g1 - g2 + g2 * z : g1;
     const complex direct = b == 2 ? lambda : complex(0); // of velocities it cancels in the sum over normal modes
-    return std::pow(lambda, b) * held / (z - mu) + direct;
+    return std::pow(lambda, b) * held_force(lambda, z, dt, hold) / (z - mu) + direct;
 }
 
 /// Columns for real and imaginary part of each residue.
@@ -107,11 +104,11 @@ MatrixXd basis(const response& r, int b, const std::string& hold) {
     return out;
 }
 
-/// How often a kind of sensor differentiates the displacement.
+/// Of the sensor of an output; without `sensing` all are accelerations.
 int times_differentiated(const std::vector<int>& sensing, int output) {
-    const int kind = static_cast<std::size_t>(output) < sensing.size() ? sensing[static_cast<std::size_t>(output)]
-                                                                       : static_cast<int>(OKID_SENSE_ACCELERATION);
-    return kind == OKID_SENSE_ACCELERATION ? 2 : kind == OKID_SENSE_VELOCITY ? 1 : 0;
+    return okid_host::times_differentiated(static_cast<std::size_t>(output) < sensing.size()
+                                               ? sensing[static_cast<std::size_t>(output)]
+                                               : static_cast<int>(OKID_SENSE_ACCELERATION));
 }
 
 /// Residues of displacement, modes x (n_y n_u). @return relative misfit
@@ -157,6 +154,19 @@ hold_fit fit_of(const response& r, int n_y, const std::vector<int>& sensing, con
 }
 
 } // namespace
+
+complex continuous_pole(double frequency_hz, double damping_ratio) {
+    const double w = 2 * M_PI * frequency_hz;
+    return {-damping_ratio * w, w * std::sqrt(1 - damping_ratio * damping_ratio)};
+}
+
+complex held_force(complex pole, complex z, double dt, const std::string& hold) {
+    const complex mu = std::exp(pole * dt);
+    const complex g1 = (mu - 1.0) / pole, g2 = (mu - 1.0 - pole * dt) / (pole * pole * dt);
+    return hold == "foh" ? g1 - g2 + g2 * z : g1;
+}
+
+int times_differentiated(int kind) { return kind == OKID_SENSE_ACCELERATION ? 2 : kind == OKID_SENSE_VELOCITY ? 1 : 0; }
 
 hold_fit fit_hold(const okid_identified_t& model, const std::vector<int>& sensing, const std::string& hold) {
     response r;

@@ -2,11 +2,22 @@
 // What a force did between samples: held, linear, or band-limited as a load cell behind an anti-alias filter gives it.
 #pragma once
 #include <okid/identify.h>
+#include <okid/mkr.h>
 
+#include <complex>
 #include <string>
 #include <vector>
 
 namespace okid_host {
+
+/// The continuous pole of a mode, 1/s.
+std::complex<double> continuous_pole(double frequency_hz, double damping_ratio);
+
+/// What one sample of a force, held (zoh) or linear (foh), adds at z to the state of a pole with residue 1.
+std::complex<double> held_force(std::complex<double> pole, std::complex<double> z, double dt, const std::string& hold);
+
+/// How often a kind of sensor (okid_sensing_t) differentiates the displacement.
+int times_differentiated(int kind);
 
 /// How well continuous modes explain the response of a discrete model, when the force is taken to be so between samples.
 struct hold_fit {

@@ -296,35 +296,27 @@ mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan
 
 void drop_undetermined(mass_matrices& found, remarks& said) {
     const auto n = static_cast<std::size_t>(found.n_x);
-    const auto below = [&](const std::vector<double>& values, const std::vector<double>& std) { // diagonal entries
-        std::size_t count = 0;
-        for (std::size_t i = 0; i < n && std.size() == n * n; ++i)
-            if (std::abs(values[i * (n + 1)]) < least_in_sigmas * std[i * (n + 1)]) ++count;
-        return count;
-    };
-    const auto clear = [](std::vector<double>& values, std::vector<double>& std) {
-        std::fill(values.begin(), values.end(), NAN);
-        std::fill(std.begin(), std.end(), NAN);
-    };
-    std::vector<std::string> names;
-    std::vector<std::string> guesses;
-    if (below(found.M, found.M_std) > 0) {
-        clear(found.M, found.M_std);
-        names.emplace_back("M");
-        guesses.insert(guesses.end(), {"mkr_polarity", "mkr_mass_indefinite"});
+    const struct {
+        const char* name;
+        std::vector<double>&values, &std;
+        std::size_t most_open; ///< diagonal entries that may be open
+        std::vector<std::string> guesses;
+    } all[] = {{"M", found.M, found.M_std, 0, {"mkr_polarity", "mkr_mass_indefinite"}},
+               {"K", found.K, found.K_std, 0, {"mkr_stiffness_indefinite"}},
+               {"R", found.R, found.R_std, n - 1, {"mkr_damping_indefinite"}},
+               {"R of normal modes", found.R_normal, found.R_normal_std, n - 1, {}}};
+    std::vector<std::string> names, guesses;
+    for (const auto& one : all) {
+        std::size_t open = 0;
+        for (std::size_t i = 0; i < n && one.std.size() == n * n; ++i)
+            open += std::abs(one.values[i * (n + 1)]) < least_in_sigmas * one.std[i * (n + 1)];
+        if (open <= one.most_open) continue;
+        std::fill(one.values.begin(), one.values.end(), NAN);
+        std::fill(one.std.begin(), one.std.end(), NAN);
+        names.emplace_back(one.name);
+        guesses.insert(guesses.end(), one.guesses.begin(), one.guesses.end());
+        if (one.most_open == 0) std::fill(found.R_pdc.begin(), found.R_pdc.end(), NAN); // alpha M + beta K
     }
-    if (below(found.K, found.K_std) > 0) {
-        clear(found.K, found.K_std);
-        names.emplace_back("K");
-        guesses.emplace_back("mkr_stiffness_indefinite");
-    }
-    if (!names.empty()) std::fill(found.R_pdc.begin(), found.R_pdc.end(), NAN); // alpha M + beta K
-    if (below(found.R, found.R_std) == n) {
-        clear(found.R, found.R_std);
-        names.emplace_back("R");
-        guesses.emplace_back("mkr_damping_indefinite");
-    }
-    if (below(found.R_normal, found.R_normal_std) == n) clear(found.R_normal, found.R_normal_std);
     if (names.empty()) return;
     const auto weakest =
         std::min_element(found.modes.begin(), found.modes.end(),

@@ -16,8 +16,8 @@ HOST, PACKAGE = ROOT / "firmware_host", ROOT / "tools" / "okid"
 
 # Below first. A file may include what stands in its own room or in one before it.
 ROOMS = [
-    "files", "result", "consensus", "compare", "record", "frequency", "config", "align", "acquire", "journal", "publish",
-    "live", "rig", "face", "commands",
+    "files", "result", "consensus", "record", "compare", "frequency", "config", "align", "acquire", "journal",
+    "publish", "live", "rig", "face", "commands",
 ]  # fmt: skip
 
 

@@ -21,7 +21,7 @@ void take_feedback(int n_u, int n_y, int p, const okid_real_t* theta, okid_real_
 /// of up to 64 states are solved densely, larger ones by Arnoldi with thick restarts until the dominant Ritz pair has a
 /// residual below 1e-7 (6e-6 in float), at most 24 rounds.
 /// @param scale         n_y numbers > 0, float or double
-/// @param growth_alone  beyond 64 states 0 in place of a radius of what does not grow: a tenth of the cost
+/// @param growth_alone  beyond 64 states 0 in place of a radius of what does not grow
 template <class Scale>
 double companion_radius(int n_u, int n_y, int p, const okid_real_t* theta, const Scale* scale, bool growth_alone,
                         companion_work& work);

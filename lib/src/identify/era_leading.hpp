@@ -10,8 +10,10 @@ namespace okid {
 /// What ERA needs of H(0) = R Sigma S^T and H(1), for the `count` largest singular values.
 struct leading_triplets {
     int rows, cols, n_y, n_u, span, count;
-    double *values, *left, *core,
-        *first; ///< descending; r n_y x count; R^T H(1) S; S^T of the first block column, count x n_u
+    double* values = nullptr; ///< descending
+    double* left = nullptr;   ///< r n_y x count
+    double* core = nullptr;   ///< R^T H(1) S
+    double* first = nullptr;  ///< S^T of the first block column, count x n_u
 
     /// Of a Hankel matrix whose block rows from `past` on are combinations of the `past` rows before each of them, as those of
     /// an ARX model are.
@@ -24,7 +26,8 @@ struct leading_triplets {
     bool find(const okid_real_t* markov);
 
   private:
-    double *blocks_, *gram_, *head_, *through_, *square_, *vectors_, *product_, *work_;
+    double *blocks_ = nullptr, *gram_ = nullptr, *head_ = nullptr, *through_ = nullptr, *square_ = nullptr;
+    double *vectors_ = nullptr, *product_ = nullptr, *work_ = nullptr;
 
     void fill_gram(const okid_real_t* markov);
     bool decompose();
