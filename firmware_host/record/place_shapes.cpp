@@ -57,7 +57,8 @@ class placer {
     placer(const std::vector<listed_mode>& modes, const record_options& options, record_work& work)
         : modes_(modes), outputs_(options.placed.outputs), inputs_(options.placed.inputs), work_(work),
           places_(hit_places(options.hits)), dt_(1 / options.fs_hz), own_(residues_of(modes, options)) {
-        std::vector<int>& dofs = shapes_.dofs = places_;
+        shapes_.dofs = places_;
+        std::vector<int>& dofs = shapes_.dofs;
         for (std::size_t o = 0; o < outputs_.size(); ++o) {
             const int dof = outputs_[o].dof;
             const auto at = std::lower_bound(places_.begin(), places_.end(), dof);
