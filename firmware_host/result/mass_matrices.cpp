@@ -308,8 +308,10 @@ void drop_undetermined(mass_matrices& found, remarks& said) {
     std::vector<std::string> names, guesses;
     for (const auto& one : all) {
         std::size_t open = 0;
+        double square = 0; // an entry that a slip made small is known, and what the slip is must stand there
+        for (std::size_t i = 0; i < n; ++i) square += one.values[i * (n + 1)] * one.values[i * (n + 1)];
         for (std::size_t i = 0; i < n && one.std.size() == n * n; ++i)
-            open += std::abs(one.values[i * (n + 1)]) < least_in_sigmas * one.std[i * (n + 1)];
+            open += std::sqrt(square / static_cast<double>(n)) < least_in_sigmas * one.std[i * (n + 1)];
         if (open <= one.most_open) continue;
         std::fill(one.values.begin(), one.values.end(), NAN);
         std::fill(one.std.begin(), one.std.end(), NAN);

@@ -82,8 +82,9 @@ void take_units(const std::vector<std::string>& units, mass_plan& plan, remarks&
 /// goes into `said`, with the change of hold, polarity or sensing that would clear it, where there is one.
 mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan& plan, remarks& said);
 
-/// Matrices that their standard deviations leave open become NaN: M or K with a diagonal entry below twice its own, R with
-/// none above. `said` gets the reason ("mkr_undetermined") in place of the causes that were guessed from their signs.
+/// Matrices that their standard deviations leave open become NaN: of a diagonal entry, twice the deviation is above the root
+/// mean square of the diagonal; M or K with one such entry, R with no other. `said` gets the reason ("mkr_undetermined") in
+/// place of the causes that were guessed from their signs.
 void drop_undetermined(mass_matrices& found, remarks& said);
 
 /// Keys "mkr" and "pdc" of okid.result/1.

@@ -368,9 +368,9 @@ def read_whole_result(path: Path) -> None:
     raw = read_result(path)
     try:
         found = okid.Result.from_dict(raw)
+        found.table()
     except Error as told:  # of an object, which has no file
         raise okid.InputError(f"{path}: {told}") from None
-    found.table()
     repr(found), found.confident_modes
     json.dumps(found.to_dict())
 

@@ -132,8 +132,10 @@ def test_python_ends_while_a_thread_is_inside(what: str) -> None:
     text = f"""
         import threading, numpy as np, okid
         x = np.random.default_rng(1).standard_normal((20000, 4))
-        for n in range(2, 20000):  # noise alone has no model
-            x[n, 1:] += 1.9 * x[n - 1, 1:] - 0.98 * x[n - 2, 1:]
+        moved = np.zeros(20000)  # noise alone has no model, and a thread that ends with an error says so
+        for n in range(2, 20000):
+            moved[n] = x[n, 0] + 1.9 * moved[n - 1] - 0.98 * moved[n - 2]
+        x[:, 1:] += moved[:, None] * [1.0, -0.5, 0.8]
         session, sums = okid.Session(1, 3, fs=100.0), okid.Accumulator(1, 3, 20)
         begun = threading.Event()
         def work():

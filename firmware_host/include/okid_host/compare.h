@@ -7,11 +7,12 @@
 #define OKID_HOST_COMPARE_H
 
 #include <okid_host.h>
-#include <okid_host/record.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+struct okid_host_result; /* okid_host/record.h */
 
 /** Two results, compared. */
 typedef struct okid_host_comparison okid_host_comparison_t;
@@ -41,7 +42,7 @@ OKID_HOST_API void okid_host_comparison_delete(okid_host_comparison_t* self);
  * @return 0 and the result, or 2; then `*out` is NULL
  */
 OKID_HOST_API int32_t okid_host_merge(const char* const* results, const char* const* names, int32_t count,
-                                      const char* references, okid_host_result_t** out);
+                                      const char* references, struct okid_host_result** out);
 
 /**
  * The table for a person, as `okid identify` printed it.
