@@ -2,10 +2,10 @@
 // PURPOSE  okid identify: measured records in, modes and a state-space model out
 #include "commands.hpp"
 
+#include "compare/set_ups.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "files/whole_file.hpp"
-#include "frequency/identify_lags.hpp"
 #include "frequency/identify_responses.hpp"
 #include "frequency/response_file.hpp"
 #include "progress.hpp"
@@ -79,8 +79,9 @@ void check_targets(const identify_arguments& given) {
 }
 
 /// @param outputs  those of options.outputs that the records have
+/// @param units  becomes those of the first record
 record_set read_records(const identify_arguments& given, const std::vector<std::string>& outputs,
-                        record_options& options, progress& display) {
+                        record_options& options, std::vector<std::string>& units, progress& display) {
     csv_request request;
     request.columns = options.inputs;
     request.columns.insert(request.columns.end(), outputs.begin(), outputs.end());
@@ -88,7 +89,6 @@ record_set read_records(const identify_arguments& given, const std::vector<std::
     record_set set;
     set.n_u = options.inputs.size();
     set.n_y = outputs.size();
-    std::vector<std::string> units;
     for (const std::string& path : given.records) {
         request.progress = [&](double megabytes) {
             display.stage(fmt::format("reading {}, {:.0f} MB", path, megabytes));
@@ -97,7 +97,6 @@ record_set read_records(const identify_arguments& given, const std::vector<std::
         if (set.records.empty()) {
             options.fs_hz = record.fs_hz;
             units = record.units;
-            take_record_units(units, options);
         }
         if (request.fs_hz && record.said_fs_hz && std::abs(*record.said_fs_hz / *request.fs_hz - 1) > 1e-9)
             options.said.emplace_back("fs_overrides_file",
@@ -117,23 +116,31 @@ record_set read_records(const identify_arguments& given, const std::vector<std::
     return set;
 }
 
-void take_set_up_options(identify_arguments& given) {
-    std::string& method = given.wanted.method;
-    if (given.records.size() < 2) usage("--setups: found one file, expected one for each set-up");
-    if (!method.empty() && method != lag_method)
-        usage(fmt::format("--setups identifies with plscf, found --method {}: leave it out", method));
-    method = lag_method;
+/// Units of the channels of a set-up among those of all; a sensor has one.
+void keep_units(const std::vector<std::string>& outputs, const std::string& path, const std::vector<std::string>& own,
+                const record_options& options, std::vector<std::string>& all) {
+    for (std::size_t c = 0; c < own.size(); ++c) {
+        const std::size_t n_u = options.inputs.size();
+        const auto at = c < n_u ? options.inputs.end()
+                                : std::find(options.outputs.begin(), options.outputs.end(), outputs[c - n_u]);
+        std::string& known = all[c < n_u ? c : n_u + static_cast<std::size_t>(at - options.outputs.begin())];
+        if (!known.empty() && !own[c].empty() && known != own[c])
+            usage(fmt::format("{}: \"{}\" is in {}, in an earlier file in {}; expected one unit for a sensor", path,
+                              printable(c < n_u ? options.inputs[c] : outputs[c - n_u]), printable(own[c]),
+                              printable(known)));
+        if (!own[c].empty()) known = own[c];
+    }
 }
 
 /// Every file a set-up with those of the outputs that it has.
 std::vector<set_up> read_each_set_up(const identify_arguments& given, record_options& options, progress& display) {
     std::vector<set_up> out;
-    std::vector<std::string> left = options.outputs;
+    std::vector<std::string> left = options.outputs, units(options.inputs.size() + options.outputs.size());
     for (const std::string& path : given.records) {
         const std::vector<std::string> columns = read_csv_columns(path);
         set_up one;
         for (const std::string& name : options.outputs)
-            if (std::find(columns.begin(), columns.end(), name) != columns.end()) {
+            if (has_column(columns, name)) {
                 one.outputs.push_back(name);
                 left.erase(std::remove(left.begin(), left.end(), name), left.end());
             }
@@ -142,7 +149,9 @@ std::vector<set_up> read_each_set_up(const identify_arguments& given, record_opt
         identify_arguments alone = given;
         alone.records = {path};
         const double before = options.fs_hz;
-        one.set = read_records(alone, one.outputs, options, display);
+        std::vector<std::string> own;
+        one.set = read_records(alone, one.outputs, options, own, display);
+        keep_units(one.outputs, path, own, options, units);
         if (!out.empty() && std::abs(options.fs_hz - before) > 1e-6 * before)
             usage(fmt::format("{}: found a sample rate of {} Hz, expected {} Hz as in {}", path, options.fs_hz, before,
                               given.records.front()));
@@ -151,6 +160,7 @@ std::vector<set_up> read_each_set_up(const identify_arguments& given, record_opt
     if (!left.empty())
         usage(fmt::format("--outputs: no file has {}; {} has: {}", list_names(left), given.records.front(),
                           list_names(read_csv_columns(given.records.front()))));
+    take_record_units(units, options);
     return out;
 }
 
@@ -171,7 +181,8 @@ record_result identify_files_of_samples(identify_arguments given) {
     if (!given.set_ups && !given.references.empty()) usage("--references belongs to --setups");
     const auto references =
         given.references.empty() ? std::vector<std::string>() : split_names("--references", given.references);
-    if (given.set_ups) take_set_up_options(given);
+    if (given.set_ups && given.records.size() < 2) usage("--setups: found one file, expected one for each set-up");
+    given.wanted.set_ups = given.set_ups;
     if (!given.places.empty()) {
         if (!given.wanted.hit_dofs.empty())
             usage("--places: --hit-dofs says where the records were struck, leave one of them out");
@@ -182,9 +193,15 @@ record_result identify_files_of_samples(identify_arguments given) {
     options.all_modes = given.all_modes;
     progress display(!given.quiet);
     options.stage = [&](const char* stage) { display.stage(stage); };
-    record_result result = given.set_ups
-                               ? identify_set_ups(read_each_set_up(given, options, display), options, references)
-                               : identify_by_method(read_records(given, options.outputs, options, display), options);
+    record_result result;
+    if (given.set_ups) {
+        result = identify_set_ups(read_each_set_up(given, options, display), options, references);
+    } else {
+        std::vector<std::string> units;
+        record_set records = read_records(given, options.outputs, options, units, display);
+        take_record_units(units, options);
+        result = identify_by_method(std::move(records), options);
+    }
     finish_fits(result);
     result.context.all_modes = given.all_modes;
     return result;
@@ -313,7 +330,8 @@ void add_identify(CLI::App& app) {
     command->add_flag(
         "--setups", given->set_ups,
         "every file is a set-up of one structure, with those of the --outputs that it has: one set of modes, shapes "
-        "scaled at the outputs in common (with a force: at the force). ± is the scatter between the set-ups");
+        "scaled at the outputs in common (else at the force). Each set-up is identified by itself and the modes are "
+        "merged; --method plscf fits all together");
     command
         ->add_option("--references", given->references,
                      "the outputs that scale the shapes of --setups (default: all that every file has)")

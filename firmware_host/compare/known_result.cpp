@@ -33,8 +33,7 @@ std::vector<double> numbers_in(const keys_of& from, const char* key, std::size_t
     return out;
 }
 
-std::vector<std::string> names_in(const keys_of& from, const char* key) {
-    const char* expected = "a list of names";
+std::vector<std::string> names_in(const keys_of& from, const char* key, const char* expected) {
     std::vector<std::string> out;
     for (const json& one : from.list(key, expected)) {
         if (!one.is_string()) from.refuse_value(key, one, expected);
@@ -71,6 +70,7 @@ known_mode read_mode(const keys_of& from, int number, std::size_t places) {
     if (confident && !confident->is_boolean()) from.refuse_value("confident", *confident, "true or false");
     // results before release 0.2 judge no mode
     out.confident = confident ? confident->get<bool>() : !(out.emac < doubtful_emac);
+    if (from.find("why")) out.why = names_in(from, "why", "a list of codes");
     return out;
 }
 
@@ -109,7 +109,7 @@ known_result take_known_result(const json& raw, const std::string& name) {
     out.records = top.count("records", 1);
     out.gaps = top.count("gaps", 0);
     out.sigma_blocks = static_cast<int>(std::min(top.count("sigma_blocks", 0), 1000000LL));
-    out.outputs = names_in(top, "outputs");
+    out.outputs = names_in(top, "outputs", "a list of names");
     out.places = places_in(top, out.outputs);
     const json& modes = top.list("modes", "a list of modes");
     for (std::size_t k = 0; k < modes.size(); ++k) {

@@ -16,6 +16,9 @@ struct known_mode {
     double frequency_hz = 0, damping_ratio = 0, frequency_std_hz = 0, damping_ratio_std = 0, emac = 0;
     std::vector<std::complex<double>> shape; ///< one entry a place
     bool confident = false;
+    std::vector<std::string> why; ///< codes of a doubtful one
+    /// At each force, what scales as the shape does: conj(b)/|b|^2 of what a force does to the mode, b. Empty: not known.
+    std::vector<std::complex<double>> drive;
 };
 
 struct known_result {

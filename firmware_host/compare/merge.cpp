@@ -2,7 +2,9 @@
 // PURPOSE  results of set-ups of one structure as one result
 // METHOD   PoSER: confident modes are paired over the set-ups by frequency and MAC at the references, each shape is brought to
 //          one scale there (least squares), f and damping are means with the weight 1/sigma^2. The deviation of a mean is
-//          1/sqrt(sum of weights), widened where the set-ups scatter by more than their own deviations say (Birge 1932)
+//          1/sqrt(sum of weights), widened where the set-ups scatter by more than their own deviations say (Birge 1932).
+//          A set-up that doubts such a mode gives its shape there and nothing else; what most set-ups list as doubtful at one
+//          frequency is listed as doubtful. Without references the forces scale the shapes: they act where they acted before
 #include "merge.hpp"
 
 #include "comparison.hpp"
@@ -14,6 +16,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <map>
 #include <utility>
 
 namespace okid_host {
@@ -21,10 +25,17 @@ namespace {
 
 using places_t = std::vector<std::pair<std::size_t, std::size_t>>;
 
+/// Doubtful modes are one where most would call two peaks of a spectrum one.
+constexpr pair_rule of_doubtful{0.01, 0.01, 0.01};
+
 /// A mode over the set-ups: at most one of each; nullptr: a set-up lacks it.
 struct merged_mode {
-    std::vector<const known_mode*> of;
-    known_mode mean; ///< shape at the references
+    std::vector<const known_mode*> of;   ///< that know f and damping
+    std::vector<const known_mode*> also; ///< that doubt it: for the shape
+    known_mode mean;                     ///< shape at the references
+    bool doubtful = false;
+
+    explicit merged_mode(std::size_t set_ups) : of(set_ups), also(set_ups) {}
 
     std::size_t count() const {
         return of.size() - static_cast<std::size_t>(std::count(of.begin(), of.end(), nullptr));
@@ -101,13 +112,21 @@ class merger {
                 throw failure(exit_usage,
                               fmt::format("references: found \"{}\"{}, expected outputs that every set-up has: {}",
                                           printable(name), did_you_mean(name, common), list_names(common)));
-        if (common.empty())
+        if (common.empty() && !(by_force_ = forces_known()))
             throw failure(exit_usage, "the set-ups have no output in common, expected a reference that stays where it "
                                       "is, with the same name in every result");
         references_ = wanted.empty() ? common : wanted;
     }
 
+    bool forces_known() const {
+        return std::all_of(results_.begin(), results_.end(), [](const known_result& one) {
+            return std::none_of(one.modes.begin(), one.modes.end(),
+                                [](const known_mode& mode) { return mode.confident && mode.drive.empty(); });
+        });
+    }
+
     mode_shape at_references(const known_mode& mode, const known_result& of) const {
+        if (by_force_) return mode.drive;
         mode_shape out;
         for (const std::string& name : references_)
             out.push_back(mode.shape[static_cast<std::size_t>(std::find(of.places.begin(), of.places.end(), name) -
@@ -115,11 +134,19 @@ class merger {
         return out;
     }
 
+    std::size_t reference_count() const {
+        if (!by_force_) return references_.size();
+        for (const known_result& one : results_)
+            for (const known_mode& mode : one.modes)
+                if (!mode.drive.empty()) return mode.drive.size();
+        return 0;
+    }
+
     /// Means over the set-ups, as far as the pairing needs them.
     void renew(merged_mode& mode) const {
-        std::vector<std::pair<double, double>> f, zeta;
-        mode_shape sum(references_.size());
-        std::vector<double> count(references_.size());
+        std::vector<std::pair<double, double>> f;
+        mode_shape sum(reference_count());
+        std::vector<double> count(sum.size());
         mode_shape first;
         for (std::size_t k = 0; k < results_.size(); ++k) {
             if (!mode.of[k]) continue;
@@ -139,57 +166,85 @@ class merger {
     }
 
     /// Pairs of two lists by their shapes at the references; with one reference by frequency alone.
-    std::vector<std::pair<std::size_t, std::size_t>> pairs(const std::vector<const known_mode*>& a,
-                                                           const std::vector<const known_mode*>& b) const {
+    places_t pairs(const std::vector<const known_mode*>& a, const std::vector<const known_mode*>& b,
+                   const pair_rule& rule) const {
         places_t common;
-        for (std::size_t i = 0; i < references_.size(); ++i) common.emplace_back(i, i);
-        return pair_modes(a, b, references_.size() < 2 ? std::vector<std::vector<double>>() : mac_of(a, b, common),
-                          of_set_ups);
+        for (std::size_t i = 0; i < reference_count(); ++i) common.emplace_back(i, i);
+        return pair_modes(a, b, common.size() < 2 ? std::vector<std::vector<double>>() : mac_of(a, b, common), rule);
     }
 
-    void add_set_up(std::size_t k) {
-        const std::vector<std::size_t> confident = results_[k].confident();
+    /// Pairs of modes that are known over the set-ups (a) with those of one at these places (b).
+    places_t pairs_with(const std::vector<merged_mode>& modes, std::size_t k, const std::vector<std::size_t>& which,
+                        const pair_rule& rule) const {
         std::vector<known_mode> own;
-        for (const std::size_t m : confident) {
+        for (const std::size_t m : which) {
             own.push_back(results_[k].modes[m]);
             own.back().shape = at_references(own.back(), results_[k]);
         }
         std::vector<const known_mode*> known, fresh;
-        for (const merged_mode& mode : modes_) known.push_back(&mode.mean);
+        for (const merged_mode& mode : modes) known.push_back(&mode.mean);
         for (const known_mode& mode : own) fresh.push_back(&mode);
-        std::vector<bool> placed(own.size());
-        for (const auto& [g, m] : pairs(known, fresh)) {
-            modes_[g].of[k] = &results_[k].modes[confident[m]];
+        return pairs(known, fresh, rule);
+    }
+
+    void add_set_up(std::size_t k, const std::vector<std::size_t>& which, const pair_rule& rule,
+                    std::vector<merged_mode>& to) const {
+        std::vector<bool> placed(which.size());
+        for (const auto& [g, m] : pairs_with(to, k, which, rule)) {
+            to[g].of[k] = &results_[k].modes[which[m]];
             placed[m] = true;
         }
-        for (std::size_t m = 0; m < own.size(); ++m) {
-            if (placed[m]) continue;
-            modes_.emplace_back().of.resize(results_.size());
-            modes_.back().of[k] = &results_[k].modes[confident[m]];
-        }
-        for (merged_mode& mode : modes_) renew(mode);
+        for (std::size_t m = 0; m < which.size(); ++m)
+            if (!placed[m]) to.emplace_back(results_.size()).of[k] = &results_[k].modes[which[m]];
+        for (merged_mode& mode : to) renew(mode);
     }
 
     /// Two lines of set-ups that turned out to be one mode: the order of the files does not decide.
-    bool join_two() {
-        for (std::size_t g = 0; g < modes_.size(); ++g)
-            for (std::size_t h = g + 1; h < modes_.size(); ++h) {
+    bool join_two(std::vector<merged_mode>& modes, const pair_rule& rule) const {
+        for (std::size_t g = 0; g < modes.size(); ++g)
+            for (std::size_t h = g + 1; h < modes.size(); ++h) {
                 bool apart = true;
+                for (std::size_t k = 0; k < results_.size(); ++k) apart = apart && !(modes[g].of[k] && modes[h].of[k]);
+                if (!apart || pairs({&modes[g].mean}, {&modes[h].mean}, rule).empty()) continue;
                 for (std::size_t k = 0; k < results_.size(); ++k)
-                    apart = apart && !(modes_[g].of[k] && modes_[h].of[k]);
-                if (!apart || pairs({&modes_[g].mean}, {&modes_[h].mean}).empty()) continue;
-                for (std::size_t k = 0; k < results_.size(); ++k)
-                    if (modes_[h].of[k]) modes_[g].of[k] = modes_[h].of[k];
-                modes_.erase(modes_.begin() + static_cast<std::ptrdiff_t>(h));
-                renew(modes_[g]);
+                    if (modes[h].of[k]) modes[g].of[k] = modes[h].of[k];
+                modes.erase(modes.begin() + static_cast<std::ptrdiff_t>(h));
+                renew(modes[g]);
                 return true;
             }
         return false;
     }
 
+    /// Doubtful modes of a set-up that no mode of all of them has yet; those that it knows otherwise lend their shape.
+    std::vector<std::size_t> lend_shapes(std::size_t k) {
+        std::vector<std::size_t> doubtful;
+        for (std::size_t m = 0; m < results_[k].modes.size(); ++m) {
+            const known_mode& mode = results_[k].modes[m];
+            if (!mode.confident && !at_references(mode, results_[k]).empty()) doubtful.push_back(m);
+        }
+        std::vector<bool> lent(doubtful.size());
+        for (const auto& [g, m] : pairs_with(modes_, k, doubtful, of_doubtful)) {
+            lent[m] = true;
+            if (!modes_[g].of[k]) modes_[g].also[k] = &results_[k].modes[doubtful[m]];
+        }
+        std::vector<std::size_t> left;
+        for (std::size_t m = 0; m < doubtful.size(); ++m)
+            if (!lent[m]) left.push_back(doubtful[m]);
+        return left;
+    }
+
     void gather() {
-        for (std::size_t k = 0; k < results_.size(); ++k) add_set_up(k);
-        while (join_two()) {
+        for (std::size_t k = 0; k < results_.size(); ++k) add_set_up(k, results_[k].confident(), of_set_ups, modes_);
+        while (join_two(modes_, of_set_ups)) {
+        }
+        if (modes_.empty()) return;
+        std::vector<merged_mode> doubtful;
+        for (std::size_t k = 0; k < results_.size(); ++k) add_set_up(k, lend_shapes(k), of_doubtful, doubtful);
+        while (join_two(doubtful, of_doubtful)) {
+        }
+        for (merged_mode& mode : doubtful) {
+            mode.doubtful = true;
+            if (2 * mode.count() >= results_.size()) modes_.push_back(std::move(mode));
         }
         std::sort(modes_.begin(), modes_.end(),
                   [](const merged_mode& a, const merged_mode& b) { return a.mean.frequency_hz < b.mean.frequency_hz; });
@@ -200,10 +255,11 @@ class merger {
         mode_shape sum(names_.size());
         std::vector<double> count(names_.size());
         for (std::size_t k = 0; k < results_.size(); ++k) {
-            if (!mode.of[k]) continue;
-            const std::complex<double> factor = scale_to(at_references(*mode.of[k], results_[k]), mode.mean.shape);
+            const known_mode* one = mode.of[k] ? mode.of[k] : mode.also[k];
+            if (!one) continue;
+            const std::complex<double> factor = scale_to(at_references(*one, results_[k]), mode.mean.shape);
             for (const auto& [at, own] : common_places(names_, results_[k].places))
-                if (there(mode.of[k]->shape[own])) sum[at] += factor * mode.of[k]->shape[own], ++count[at];
+                if (there(one->shape[own])) sum[at] += factor * one->shape[own], ++count[at];
         }
         std::complex<double> largest = 0;
         for (std::size_t i = 0; i < sum.size(); ++i) {
@@ -236,9 +292,36 @@ class merger {
             to.fs_hz = std::max(to.fs_hz, one.fs_hz);
             to.samples += one.samples;
             to.gaps += one.gaps;
-            for (const auto& [code, text] : one.warnings)
-                to.warnings.emplace_back(code, fmt::format("set-up {}: {}", k + 1, text));
         }
+        for (const auto& [code, said] : remarks_by_code())
+            to.warnings.emplace_back(code, fmt::format("set-up{} {}: {}", said.first.size() > 1 ? "s" : "",
+                                                       fmt::join(said.first, ", "), said.second));
+    }
+
+    /// Of each code the set-ups that say it, and what the first of them says.
+    std::vector<std::pair<std::string, std::pair<std::vector<std::size_t>, std::string>>> remarks_by_code() const {
+        std::vector<std::pair<std::string, std::pair<std::vector<std::size_t>, std::string>>> out;
+        for (std::size_t k = 0; k < results_.size(); ++k)
+            for (const auto& [code, text] : results_[k].warnings) {
+                auto at = std::find_if(out.begin(), out.end(),
+                                       [&, code = code](const auto& one) { return one.first == code; });
+                if (at == out.end()) at = out.insert(out.end(), {code, {{}, text}});
+                std::vector<std::size_t>& set_ups = at->second.first;
+                if (set_ups.empty() || set_ups.back() != k + 1) set_ups.push_back(k + 1);
+            }
+        return out;
+    }
+
+    /// Codes of at least half of the set-ups that list a doubtful mode.
+    static std::vector<std::string> reasons(const merged_mode& mode) {
+        std::map<std::string, std::size_t> count;
+        for (const known_mode* one : mode.of)
+            for (const std::string& code : one ? one->why : std::vector<std::string>()) ++count[code];
+        std::vector<std::string> out;
+        for (const auto& [code, times] : count)
+            if (2 * times >= mode.count()) out.push_back(code);
+        if (out.empty()) out.emplace_back("few_runs");
+        return out;
     }
 
     record_result describe() {
@@ -268,11 +351,11 @@ class merger {
             for (auto& entry : states)
                 if (!there(entry)) entry = 0;
             listed.push_back({frequency.value, damping.value, shape_collinearity(states, {}), median_emac(mode),
-                              std::move(states), true});
+                              std::move(states), !mode.doubtful});
             mode_verdict& verdict = work.context.verdicts.emplace_back();
             verdict.found_in = static_cast<double>(mode.count()) / static_cast<double>(results_.size());
-            verdict.confident = 2 * mode.count() >= results_.size();
-            if (!verdict.confident) verdict.why.emplace_back("few_runs");
+            verdict.confident = !mode.doubtful && 2 * mode.count() >= results_.size();
+            if (!verdict.confident) verdict.why = mode.doubtful ? reasons(mode) : std::vector<std::string>{"few_runs"};
         }
         sigma.shape_im = sigma.shape_re;
         sigma.replicates = blocks;
@@ -291,6 +374,7 @@ class merger {
 
     const std::vector<known_result>& results_;
     std::vector<std::string> names_, references_;
+    bool by_force_ = false; ///< no output is in common
     std::vector<merged_mode> modes_;
 };
 

@@ -5,7 +5,7 @@
 #include "options.hpp"
 #include "result_handle.hpp"
 
-#include "frequency/identify_lags.hpp"
+#include "compare/set_ups.hpp"
 #include "frequency/response_set.hpp"
 #include "record/csv.hpp"
 #include "record/csv_header.hpp"
@@ -244,7 +244,7 @@ int32_t okid_host_identify_set_ups(const char* options, int32_t count, const oki
         std::vector<std::string> all;
         for (const std::string& name : given.request.outputs) (void)place_of(all, name);
         given.request.outputs = all;
-        given.request.method = lag_method;
+        given.request.set_ups = true;
         *result = face::make_result(identify_set_ups(std::move(set_ups), face::checked(given), given.references));
     });
 }

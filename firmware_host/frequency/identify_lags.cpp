@@ -271,23 +271,9 @@ void make_model(lag_work& work, const response_modes& found, record_work& to) {
     remark_low_fit(*to.context.prediction_percent, false, to.context);
 }
 
-void check_references(const lag_work& work, const std::vector<std::string>& wanted) {
-    std::vector<response_set> sets(work.set_ups.size());
-    for (std::size_t j = 0; j < sets.size(); ++j) sets[j].outputs = work.set_ups[j].outputs;
-    const std::vector<std::string> common = common_outputs(sets);
-    for (const std::string& name : wanted)
-        if (std::find(common.begin(), common.end(), name) == common.end())
-            throw failure(exit_usage,
-                          fmt::format("--references: found \"{}\"{}, expected outputs that every set-up has: {}",
-                                      printable(name), did_you_mean(name, common), list_names(common)));
-    if (common.empty() && !struck(work))
-        throw failure(exit_usage, "the set-ups have no output in common, expected a reference that stays where it is, "
-                                  "with the same name in every set-up");
-}
-
 /// Each set-up less its means or lines, checked. @return what is known before anything is computed
 result_context prepare(lag_work& work) {
-    if (work.options.mass.wanted())
+    if (work.options.mass.wanted() || work.options.placed.wanted())
         throw failure(exit_usage,
                       "--input-dofs: M, K and R belong to --method auto or okid-era, found with plscf: it gives "
                       "modes");
@@ -326,11 +312,10 @@ result_context prepare(lag_work& work) {
 
 } // namespace
 
-record_result identify_set_ups(std::vector<set_up> set_ups, const record_options& options,
-                               const std::vector<std::string>& references) {
+record_result identify_set_ups_together(std::vector<set_up> set_ups, const record_options& options,
+                                        const std::vector<std::string>& references) {
     lag_work work{std::move(set_ups), options, {}, {}, 0, 0};
     work.options.method = lag_method;
-    check_references(work, references);
     record_work to;
     to.context = prepare(work);
     to.context.all_modes = options.all_modes;
@@ -358,7 +343,7 @@ record_result identify_by_method(record_set records, const record_options& optio
     if (!options.hits.empty()) throw failure(exit_usage, "--hit-dofs belongs to --method auto, found with plscf");
     std::vector<set_up> one;
     one.push_back({std::move(records), options.outputs});
-    return identify_set_ups(std::move(one), options, {});
+    return identify_set_ups_together(std::move(one), options, {});
 }
 
 } // namespace okid_host

@@ -11,10 +11,10 @@ struct set_up {
     std::vector<std::string> outputs;
 };
 
-/// `options.outputs`: of all set-ups; `options.inputs`: of each. Throws `failure`.
+/// From their correlations together (PreGER), method plscf. Throws `failure`.
 /// @param references  outputs that stand in every set-up and scale the shapes; empty: all such
-record_result identify_set_ups(std::vector<set_up> set_ups, const record_options& options,
-                               const std::vector<std::string>& references);
+record_result identify_set_ups_together(std::vector<set_up> set_ups, const record_options& options,
+                                        const std::vector<std::string>& references);
 
 /// Method plscf, else identify_records().
 record_result identify_by_method(record_set records, const record_options& options);

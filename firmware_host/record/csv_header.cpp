@@ -166,6 +166,11 @@ std::size_t find_csv_column(const std::string& path, const csv_header& header, c
     throw failure(exit_usage, text);
 }
 
+bool has_column(const std::vector<std::string>& columns, const std::string& name) {
+    return std::any_of(columns.begin(), columns.end(),
+                       [&](const std::string& one) { return one == name || base_of_name(one) == name; });
+}
+
 std::string unit_of_name(const std::string& name) {
     const std::size_t open = name.find_first_of("[(");
     if (open != std::string::npos) {

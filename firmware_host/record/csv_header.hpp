@@ -28,6 +28,9 @@ void read_csv_names(const std::string& path, std::size_t number, std::string_vie
 /// Index of a column by its name, or by its name without the unit (`acc1` for `acc1 [g]`); throws with the nearest name.
 std::size_t find_csv_column(const std::string& path, const csv_header& header, const std::string& name);
 
+/// Is one of these columns called so, with or without its unit?
+bool has_column(const std::vector<std::string>& columns, const std::string& name);
+
 /// "g" of `acc1 [g]`, `acc1 (g)` and `acc1_g`; "" when the name carries no known unit.
 std::string unit_of_name(const std::string& name);
 

@@ -7,7 +7,7 @@
 #include "place_shapes.hpp"
 
 #include "consensus/quantity.hpp"
-#include "result/hold.hpp"
+#include "drive_mass.hpp"
 #include "roving.hpp"
 
 #include <algorithm>
@@ -36,12 +36,6 @@ struct drive_point {
 };
 
 complex pole_of(const listed_mode& mode) { return continuous_pole(mode.frequency_hz, mode.damping_ratio); }
-
-/// What one sample of a force adds to the state of a pole with residue 1, at the pole.
-complex held_sample(complex lambda, double dt, const std::string& hold) {
-    const complex mu = std::exp(lambda * dt);
-    return hold == "band" ? mu * dt : held_force(lambda, mu, dt, hold);
-}
 
 /// The shape of a mode at the sensors as displacement, signs as the plan has them.
 std::vector<complex> at_sensors(const listed_mode& mode, const std::vector<mass_channel>& outputs) {
@@ -134,23 +128,20 @@ class placer {
     /// Of a shape divided by `largest`, from the residues at the drive points. NaN: there is none, or they contradict.
     double modal_mass(std::size_t k, const std::vector<complex>& c, complex largest) {
         const complex lambda = pole_of(modes_[k]);
-        const complex turn = complex(0, 2 * lambda.imag()) / (2.0 * held_sample(lambda, dt_, work_.context.hold));
-        complex sum = 0;
-        double power = 0;
+        const complex turn = drive_factor(lambda, dt_, work_.context.hold) / 2.0; // b is of two real states
+        drive_mass mass;
         bool clear = true;
         for (const drive_point& point : points_) {
             const complex b = own_.b(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(point.place));
             const complex psi = b / largest;
             const complex r = turn * c[point.output] * b * outputs_[point.output].si / inputs_[point.place].si;
-            sum += std::conj(psi * psi) * r;
-            power += std::norm(psi * psi);
+            mass.add(psi, r);
             if (!(std::abs(psi) >= near_node)) continue;
             const double cosine = (std::conj(psi * psi) * r).real() / std::abs(psi * psi * r);
             clear = clear && cosine > drive_cosine;
             if (modes_[k].in_model) cosines_[point.output].emplace_back(cosine, modes_[k].frequency_hz);
         }
-        const double mass = power / sum.real();
-        return clear && std::isfinite(mass) && mass > 0 ? mass : NAN;
+        return clear ? mass.kg() : NAN;
     }
 
     /// At a drive point every mode moves with the force.

@@ -87,7 +87,7 @@ mass_plan check_dofs(const record_request& given, const record_options& options,
     plan.hold = options.hold;
     read_dofs("--input-dofs", given.input_dofs, "input", plan.inputs);
     read_dofs("--output-dofs", given.output_dofs, "output", plan.outputs);
-    if (const std::string fault = plan_fault(plan); !fault.empty())
+    if (const std::string fault = plan_fault(plan); !fault.empty() && !given.set_ups)
         usage(fmt::format("--input-dofs, --output-dofs: {}", fault));
     return plan;
 }
@@ -239,6 +239,7 @@ record_options check_request(const record_request& given) {
         options.placed = options.mass;
         if (!plan_fault(options.placed).empty()) options.mass = {}; // shapes need no force or sensor everywhere
     }
+    if (given.set_ups) std::swap(options.placed, options.mass);
     return options;
 }
 
@@ -262,7 +263,8 @@ double check_rate(const std::string& text) {
 void take_record_units(const std::vector<std::string>& units, record_options& options) {
     remark_exchanged(units, options, options.said);
     if (options.hits.empty()) {
-        if (options.mass.wanted()) take_units(units, options.mass, options.said);
+        for (mass_plan* plan : {&options.mass, &options.placed})
+            if (plan->wanted()) take_units(units, *plan, options.said);
         return;
     }
     if (!units.empty()) options.hit_unit = units[0];

@@ -19,6 +19,7 @@ struct record_request {
     std::string refine;                         ///< auto, yes or no; empty: auto under method auto, else no
     bool stabilization = false;
     bool keep_all = false; ///< of hits: bad ones too
+    bool set_ups = false;  ///< sensors were moved between the records
 };
 
 /// Throws `failure` (exit 2) naming the option, what was found and what was expected. `fs_hz` stays 0.

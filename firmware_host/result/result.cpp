@@ -355,7 +355,10 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
     if (!without.empty() && !said("no_deviation") && context.method != "poser")
         out.emplace_back(
             "no_deviation",
-            fmt::format("no ± for {}: with some block of the record left out, the model does not hold it", without));
+            fmt::format("no ± for {}: with some block of the record left out, the model does not hold it. {}", without,
+                        context.detrend == "linear" ? "Record longer, or ask for another --order"
+                                                    : "If a channel drifts, --detrend linear; else record longer, or "
+                                                      "ask for another --order"));
     const std::string wide = confident_modes(model, context, [](double f, double f_std, double zeta, double zeta_std) {
         return f_std > widest_frequency * f || zeta_std > widest_damping * zeta;
     });

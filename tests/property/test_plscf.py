@@ -57,13 +57,13 @@ def test_ambient_set_ups_become_one_set_of_modes() -> None:
     s = _ambient()
     _, y = _set_ups(s, 0, 1)
     names = [[NAMES[c] for c in columns] for columns in SETUPS]
-    result = okid.identify_setups(None, y, fs=s.fs, output_names=names)
+    result = okid.identify_setups(None, y, fs=s.fs, output_names=names, method="plscf")
     _check(result, s, 3e-3, 0.35, 0.97)
     assert (result.method, result.records, result.samples, result.inputs) == ("plscf", 3, 45000, [])
     assert result.outputs == ["a", "d", "b", "c", "e", "f"]
     for mode in result.confident_modes:
         assert mode.frequency_std_hz and 1e-5 < mode.frequency_std_hz / mode.frequency_hz < 1e-2  # between set-ups
-    one = okid.identify_setups(None, y, fs=s.fs, output_names=names, references=["d", "a"], sigma="none")
+    one = okid.identify_setups(None, y, fs=s.fs, output_names=names, references=["d", "a"], sigma="none", method="plscf")
     _check(one, s, 3e-3, 0.35, 0.97)
     assert one.modes[0].frequency_std_hz is None
 
@@ -73,7 +73,7 @@ def test_set_ups_under_one_force_need_no_reference() -> None:
     u, y = _set_ups(s, 2, 2)
     y = [one[:, 2:] for one in y]
     names = [[NAMES[c] for c in columns[2:]] for columns in SETUPS]
-    _check(okid.identify_setups(u, y, fs=s.fs, output_names=names), s, 1e-3, 0.1, 0.98)
+    _check(okid.identify_setups(u, y, fs=s.fs, output_names=names, method="plscf"), s, 1e-3, 0.1, 0.98)
 
 
 def test_command_gives_what_python_gives(tmp_path: Path) -> None:
@@ -85,18 +85,17 @@ def test_command_gives_what_python_gives(tmp_path: Path) -> None:
         head = f"# fs_hz: {s.fs!r}\n" + ",".join(NAMES[c] for c in columns)
         np.savetxt(paths[-1], y[k], delimiter=",", header=head, comments="", fmt="%.17g")
     out = tmp_path / "r.json"
-    common = [*paths, "--setups", "--json", out, "--quiet"]
+    common = [*paths, "--setups", "--method", "plscf", "--json", out, "--quiet"]
     program("identify", *common, "--outputs", "a,b,c,d,e,f", status=0)
     by_program = okid.Result.from_dict(json.loads(out.read_text(encoding="utf-8")))
     _check(by_program, s, 3e-3, 0.35, 0.97)
     assert by_program.outputs == NAMES
     own = [[NAMES[c] for c in sorted(columns)] for columns in SETUPS]
     ordered = [one[:, np.argsort(columns)] for one, columns in zip(y, SETUPS, strict=True)]
-    by_python = okid.identify_setups(None, ordered, fs=s.fs, output_names=own)
+    by_python = okid.identify_setups(None, ordered, fs=s.fs, output_names=own, method="plscf")
     assert [m.frequency_hz for m in by_program.modes] == pytest.approx([m.frequency_hz for m in by_python.modes])
     for arguments, words in ((["--outputs", "a,b,z"], "no file has z"), (["--outputs", "b,c,e"], "no output in common"),
-                             (["--outputs", "a,b,c,d", "--references", "b"], '--references: found "b"'),
-                             (["--outputs", "a,d", "--method", "auto"], "--setups identifies with plscf")):  # fmt: skip
+                             (["--outputs", "a,b,c,d", "--references", "b"], '--references: found "b"')):  # fmt: skip
         assert words in program("identify", *common, *arguments, status=2).stderr
     alone = program("identify", paths[0], "--outputs", "a", "--references", "a", status=2)
     assert "belongs to --setups" in alone.stderr

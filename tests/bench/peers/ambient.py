@@ -74,7 +74,7 @@ def of_okid(f: Any, y: Any, modes: list[Any]) -> list[list[float]]:
     if f[1]:
         parts, channels = halves(y)
         names = [[f"y{k}" for k in own] for own in channels]
-        result = okid.identify_setups(None, parts, fs=f[0], output_names=names, band=band)
+        result = okid.identify_setups(None, parts, fs=f[0], output_names=names, band=band, method="plscf")
     else:
         result = okid.identify(None, y, fs=f[0], method="plscf", band=band)
     return [[m.frequency_hz, m.damping_ratio] for m in result.confident_modes]
