@@ -35,6 +35,14 @@ struct merged_mode {
     known_mode mean;                     ///< shape at the references
     bool doubtful = false;
 
+    /// More than half of the set-ups are sure of it, or half, and the others list it with a shape that is none of noise.
+    bool most_have_it() const {
+        const auto listed = static_cast<std::size_t>(std::count_if(also.begin(), also.end(), [](const known_mode* one) {
+            return one && std::find(one->why.begin(), one->why.end(), "noise_shape") == one->why.end();
+        }));
+        return 2 * count() > of.size() || (2 * count() == of.size() && count() + listed == of.size());
+    }
+
     explicit merged_mode(std::size_t set_ups) : of(set_ups), also(set_ups) {}
 
     std::size_t count() const {
@@ -354,7 +362,7 @@ class merger {
                               std::move(states), !mode.doubtful});
             mode_verdict& verdict = work.context.verdicts.emplace_back();
             verdict.found_in = static_cast<double>(mode.count()) / static_cast<double>(results_.size());
-            verdict.confident = !mode.doubtful && 2 * mode.count() >= results_.size();
+            verdict.confident = !mode.doubtful && mode.most_have_it();
             if (!verdict.confident) verdict.why = mode.doubtful ? reasons(mode) : std::vector<std::string>{"few_runs"};
         }
         sigma.shape_im = sigma.shape_re;

@@ -177,7 +177,8 @@ class set_up_merger {
         std::string why;
         for (const auto& one : failed_) why += (why.empty() ? "" : "; ") + one.second;
         throw failure(exit_no_model,
-                      fmt::format("no model: {} set-up has modes, expected two or more. {}", found_.size(), why));
+                      fmt::format("no model: modes were found in {} of {} set-ups, expected two or more. {}",
+                                  found_.size(), found_.size() + failed_.size(), why));
     }
 
     /// Shapes at the degrees of freedom, in their order, as displacement; modal masses from the drive points.

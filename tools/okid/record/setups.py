@@ -103,7 +103,7 @@ def merge(
     >>> parts = [okid.identify(force, y[:, two], fs=1000.0, output_names=names)
     ...          for two, names in (([0, 1], ["a", "b"]), ([0, 2], ["a", "c"]))]
     >>> merged = okid.merge(parts)
-    >>> merged.outputs, [f"{mode.frequency_hz:.1f}" for mode in merged.modes]
+    >>> merged.outputs, [f"{mode.frequency_hz:.1f}" for mode in merged.confident_modes]
     (['a', 'b', 'c'], ['11.0', '31.8', '45.7'])
     """
     known = [text_and_name(one, f"result {k}") for k, one in enumerate(results, 1)]
