@@ -18,7 +18,7 @@ def completeness(m: Material) -> list[tuple[str, int, int]]:
             if isinstance(one, dict)
         ]
     if m.measured is not None and m.measured.missing is not None:
-        names, total = m.result.inputs + m.result.outputs, m.measured.samples
+        names, total = m.channels, m.measured.samples
         return [(name, total, total - int(gone)) for name, gone in zip(names, m.measured.missing, strict=True)]
     return []
 

@@ -41,7 +41,7 @@ def headline(m: Material) -> str:
 
 def _simulated(m: Material) -> list[float | None]:
     """Simulation fits of the outputs: of the record when it is given, else those of the result."""
-    if m.measured is not None:
+    if m.measured is not None and m.measured.fit is not None:
         return list(m.measured.fit.simulation_percent.values())
     return known_fit(m.result.raw, "simulation_percent")
 
@@ -55,7 +55,7 @@ def _scale_doubts(m: Material) -> list[str]:
 
 def _order_doubts(m: Material) -> list[str]:
     """Modes that the diagram holds and the model lacks, and the order that has them."""
-    if m.measured is None:
+    if m.measured is None or m.measured.rows is None:
         return []
     order = int(m.result.raw["order"])
     lost = missed_modes(m.measured.rows, m.result.frequency_hz)
@@ -129,7 +129,8 @@ def _looked_at(m: Material) -> tuple[list[str], dict[str, list[str]]]:
 
     given, ambient = m.measured, not m.result.inputs
     seen += ["consistency of the modes"] if m.result.raw["modes"] else []
-    no_record = "" if given is not None else "no record given"
+    of_responses = bool(m.result.raw.get("responses"))
+    no_record = "" if given is not None else "no responses given" if of_responses else "no record given"
     file("completeness", "" if completeness(m) else no_record or "nothing tells it")
     if not ambient:
         file("fit", "" if any(v is not None for v in _simulated(m)) else no_record or "the model gives no simulation")

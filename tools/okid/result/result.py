@@ -230,9 +230,13 @@ class Result:
         """Poles of other orders from the same decomposition, each compared with the order before, and their clusters.
 
         Default: every even order the data carry. Orders they cannot carry are left out. Several horizons:
-        okid.stabilization(). Raises Error on a result that was unpickled: it has no decomposition any more; and on one
-        of method "auto", which has none.
+        okid.stabilization(). A result that was identified with `--stabilization` (stabilization=True) gives the poles
+        that it holds, when no orders or criteria are asked for. Raises Error on other results that were loaded or
+        unpickled: they have no decomposition any more; and on one of method "auto", which has none.
         """
+        kept = self._source.about(False).get("stabilization")
+        if kept and orders is None and criteria is None and self.identifier is None:
+            return Stabilization.from_dict(kept)
         if self.method == "auto":
             raise Error(
                 'a result of method "auto" has no decomposition of its own: name a method for a stabilization diagram, '
