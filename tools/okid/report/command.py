@@ -74,19 +74,15 @@ def _parser() -> _Parser:
 
 def _check_targets(args: argparse.Namespace, target: Path | None) -> None:
     """Nothing that is read is written over, the two outputs are two files, and both have a folder."""
-    inputs = {key: getattr(args, key) for key in ("result", "events", "geometry", "config", "compare")}
+    inputs = {key: getattr(args, key) for key in ("result", "record", "events", "geometry", "config", "compare")}
     if target is not None:
         check_target(target, inputs)
-        for one in args.record:
-            check_target(target, {"record": one})
         if args.out or target.parent.is_dir():  # else the result is not there either
             check_place(target, "--out")
     if args.pdf == "-":
         raise InputError("--pdf -: a PDF is not written to stdout, expected the name of a file")
     if args.pdf:
         check_target(args.pdf, {**inputs, "report": target}, ".pdf")
-        for one in args.record:
-            check_target(args.pdf, {"record": one}, ".pdf")
         check_place(args.pdf, "--pdf", ".pdf")
 
 

@@ -49,6 +49,8 @@ def losses(m: Material) -> str:
 
 def complete_table(m: Material) -> str:
     rows = completeness(m)
+    if not rows and m.result.raw.get("responses"):
+        return ""
     if not rows:
         return page.note("Completeness: give --record FILE or --events FILE.jsonl.")
     cells = []

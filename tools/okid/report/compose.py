@@ -163,10 +163,11 @@ def write_report(
     if not isinstance(path, str | Path):
         raise InputError(f"path is {path!r:.60}, expected the name of the HTML file to write")
     source = result if isinstance(result, str | Path) else None
-    for one in listed(record):
-        if isinstance(one, str | Path):
-            check_target(path, {"record": one})
-    check_target(path, {"result": source, "events": events, "geometry": geometry, "config": config, "compare": compare})
+    named = [one for one in listed(record) if isinstance(one, str | Path)]
+    check_target(
+        path, {"result": source, "record": named, "events": events, "geometry": geometry, "config": config,
+               "compare": compare},
+    )  # fmt: skip
     check_place(path, "path")
     text = build(
         _loaded(result), record, title, events=events, geometry=geometry, config=config, compare=compare, source=source,

@@ -86,13 +86,15 @@ def _responses(result: Loaded, given: Sequence[Given]) -> Measured:
     source = source or "the responses given"
     wanted = result.inputs, result.outputs
     ends = frf.names()
-    if not (set(wanted[0]) <= set(ends[0]) and set(wanted[1]) <= set(ends[1])):  # by reciprocity
+    there = [set(one) for one in ends]
+    straight = set(wanted[0]) <= there[0] and set(wanted[1]) <= there[1]
+    if not straight and set(wanted[0]) <= there[1] and set(wanted[1]) <= there[0]:  # by reciprocity
         ends = ends[::-1]
         frf = frf._replace(response=frf.response.transpose(0, 2, 1), coherence=np.full(frf.response.shape[::2], np.nan))
-    for names, there, what in zip(wanted, ends, ("force", "response"), strict=True):
-        lost = [name for name in names if name not in there]
+    for names, known, what in zip(wanted, ends, ("force", "response"), strict=True):
+        lost = [name for name in names if name not in known]
         if lost:
-            raise InputError(f"{source}: has no {what} {lost[0]!r}, found {', '.join(there[:20])}")
+            raise InputError(f"{source}: has no {what} {lost[0]!r}, found {', '.join(known[:20])}")
     columns = [ends[0].index(name) for name in wanted[0]]
     rows = [ends[1].index(name) for name in wanted[1]]
     kept = (frf.frequency_hz > 0.0) & np.all(np.isfinite(frf.response[:, rows][:, :, columns]), axis=(1, 2))

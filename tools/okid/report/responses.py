@@ -241,6 +241,7 @@ def check_section(m: Material) -> page.Section | None:
         rows.append([*row, *told])
     if own is None:
         words = "Explained: 100 (1 − ‖H − Ĥ‖/‖H‖) over two half-power widths around the mode, Ĥ of the result."
+        words += " A window makes a measured resonance wider; the damping of the result is without it."
         table = page.table(["mode", "f [Hz]", "ζ [%]", "explained"], rows)
         return page.section("Check in the frequency domain", table, page.note(words), name="Check")
     head = ["mode", "f [Hz]", "ζ [%]", "H1 explained", "f of H1 [Hz]", "ζ of H1 [%]", "MAC"]

@@ -24,6 +24,9 @@ def _notes(m: Material) -> dict[str, str]:
 
 
 def _method(r: dict[str, Any]) -> str:
+    if r.get("method") in ("plscf", "poser"):
+        said = "degrees, weights and normalisations of matrix fractions" if r["method"] == "plscf" else "set-ups"
+        return f"{r['method']}: what several {said} agree on; order {r['order']}"
     if r["p"] is None and r["rows"] is None:
         return f"{r.get('method', '–')}: what several methods, horizons and rates agree on; order {r['order']}"
     return f"{r.get('method', '–')}, p = {r['p']}, {r['rows']} block rows, order {r['order']}"
@@ -76,7 +79,7 @@ def _facts(m: Material) -> list[tuple[str, str]]:
         said = f"hold {r.get('hold', '–')}, detrend {r.get('detrend', '–')}, start {r.get('start', 'moving')}"
         rows.append(("Treatment", said))
     if m.measured is not None:
-        rows.append(("Responses" if r.get("responses") else "Record", m.measured.source))
+        rows.append(("File" if r.get("responses") else "Record", m.measured.source))
         rows += [("Looked at", m.measured.part)] if m.measured.part else []
     return rows
 

@@ -16,6 +16,7 @@ from okid.report.page import count_of
 from okid.report.result_warnings import warning_doubt
 from okid.report.stamps import foreign_doubts, rate_doubt, rate_unseen
 
+NOT_OF_RESPONSES = ("completeness", "units", "whiteness of the residual", "rate by the time stamps")
 MOST_WORDS = 4  # doubts that are named in the verdict, besides those on the time stamps and the warnings
 
 
@@ -74,7 +75,8 @@ def _model_doubts(m: Material) -> list[str]:
     out = _scale_doubts(m) + _order_doubts(m)
     fits = [value for value in _simulated(m) if value is not None]
     if fits and min(fits) < 80.0:
-        out.append(f"the simulation explains only {min(fits):.1f} % of an output")
+        what = "the responses" if raw.get("responses") else "an output"
+        out.append(f"the simulation explains only {min(fits):.1f} % of {what}")
     checks = (raw.get("mkr") or {}).get("checks") or {}
     bad = [x for x, key in (("M", "m_positive_definite"), ("K", "k_positive_definite")) if checks.get(key) is False]
     if bad:
@@ -118,18 +120,18 @@ def _doubts(m: Material) -> str:
 
 def _looked_at(m: Material) -> tuple[list[str], dict[str, list[str]]]:
     """What the verdict rests on, and by reason what it does not."""
+    of_responses = bool(m.result.raw.get("responses"))
     seen, unseen = ["warnings of the identification"], dict[str, list[str]]()
 
     def file(what: str, why: str) -> None:
         """Under what was looked at, or under the reason why not."""
-        if why:
+        if why and not (of_responses and what in NOT_OF_RESPONSES):
             unseen.setdefault(why, []).append(what)
-        else:
+        elif not why:
             seen.append(what)
 
     given, ambient = m.measured, not m.result.inputs
     seen += ["consistency of the modes"] if m.result.raw["modes"] else []
-    of_responses = bool(m.result.raw.get("responses"))
     no_record = "" if given is not None else "no responses given" if of_responses else "no record given"
     file("completeness", "" if completeness(m) else no_record or "nothing tells it")
     if not ambient:

@@ -196,7 +196,7 @@ def draw_frf(axes: Sequence[Axes], measured: Frf | None, line: Real, model: Comp
     magnitude, phase = axes[0], axes[1]
     if measured is not None:
         f, h = measured.frequency_hz[1:], measured.response[1:, out, into]
-        magnitude.semilogy(f, np.abs(h), color=GREY, lw=1.0, label="measured (H1)")
+        magnitude.semilogy(f, np.abs(h), color=GREY, lw=1.0, label="measured (H1)" if measured.averages else "measured")
         phase.plot(f, _without_jumps(np.degrees(np.angle(h))), color=GREY, lw=0.8)
         if len(axes) > 2:
             axes[2].plot(f, measured.coherence[1:, out], color=ORANGE, lw=0.8)

@@ -237,10 +237,13 @@ class Result:
         kept = self._source.about(False).get("stabilization")
         if kept and orders is None and criteria is None and self.identifier is None:
             return Stabilization.from_dict(kept)
-        if self.method == "auto":
+        if self.method in ("auto", "plscf", "poser"):
+            other = "okid.identify_frf(responses, stabilization=True)"
+            if not self._source.about(False).get("responses"):
+                other = 'okid.identify(u, y, fs=fs, method="okid-era"), or call okid.stabilization()'
             raise Error(
-                'a result of method "auto" has no decomposition of its own: name a method for a stabilization diagram, '
-                'as in okid.identify(u, y, fs=fs, method="okid-era"), or call okid.stabilization()'
+                f'a result of method "{self.method}" has no decomposition of its own: for a stabilization diagram '
+                f"identify again, as in {other}"
             )
         if self.identifier is None:
             raise Error("this result no longer holds its decomposition: identify again for a stabilization diagram")
