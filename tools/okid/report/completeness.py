@@ -49,7 +49,7 @@ def losses(m: Material) -> str:
 
 def complete_table(m: Material) -> str:
     rows = completeness(m)
-    if not rows and m.result.raw.get("responses"):
+    if not rows and (m.result.raw.get("responses") or m.result.raw.get("set_ups")):
         return ""
     if not rows:
         return page.note("Completeness: give --record FILE or --events FILE.jsonl.")

@@ -119,6 +119,8 @@ def build(
         sections = [one for one in _sections(m, written) if one is not None]
     raw = result.raw
     forces = f"hits at {count_of(len(result.inputs), 'place')}" if m.struck else count_of(len(result.inputs), "input")
+    if result.raw.get("set_ups"):
+        forces = count_of(len(result.raw["set_ups"]), "set-up")
     subtitle = (
         f"{count_of(len(result.confident), 'confident mode')}, {forces}, {count_of(len(result.outputs), 'output')}"
     )

@@ -147,10 +147,13 @@ def draw_at_rest_and_moved(ax: Axes, geometry: Geometry, shape: Complex) -> None
     along = (turned * np.exp(-0.5j * np.angle(np.sum(turned**2)))).real
     at_rest = _seen(np.array(geometry.nodes), geometry)
     moved = _seen(geometry.displaced(along / max(float(np.max(np.abs(along))), 1e-300), 0.16), geometry)
+    without = geometry.unknown(shape)
     for points, colour, thick, dash in ((at_rest, FAINT, 0.8, "--"), (moved, BLUE, 1.6, "-")):
         for a, b in geometry.lines:
-            ax.plot(points[[a - 1, b - 1], 0], points[[a - 1, b - 1], 1], color=colour, lw=thick, ls=dash)
-    ax.plot(moved[:, 0], moved[:, 1], "o", color=DARK, ms=2.4)
+            if points is at_rest or not {a, b} & without:
+                ax.plot(points[[a - 1, b - 1], 0], points[[a - 1, b - 1], 1], color=colour, lw=thick, ls=dash)
+    seen = [k for k in range(len(moved)) if k + 1 not in without]
+    ax.plot(moved[seen, 0], moved[seen, 1], "o", color=DARK, ms=2.4)
     both = np.vstack([at_rest, moved])
     centre = (both.min(axis=0) + both.max(axis=0)) / 2.0
     reach = max(0.55 * float(np.max(np.ptp(both, axis=0))), 1e-12)

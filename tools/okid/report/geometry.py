@@ -15,6 +15,7 @@ from okid.data.toml_file import read_toml
 from okid.result.shape_places import places_of_shapes
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 class Geometry(NamedTuple):
@@ -23,6 +24,14 @@ class Geometry(NamedTuple):
     nodes: list[tuple[float, float, float]]
     lines: list[tuple[int, int]]
     dofs: list[tuple[int, str] | None]
+
+    def unknown(self, entries: Complex) -> set[int]:
+        """Nodes, from 1, at which a shape has entries but no value: it was not measured there."""
+        known: dict[int, bool] = {}
+        for dof, there in zip(self.dofs, np.isfinite(entries).tolist(), strict=True):
+            if dof is not None:
+                known[dof[0]] = known.get(dof[0], False) or there
+        return {node for node, there in known.items() if not there}
 
     def displaced(self, entries: Real, swing: float) -> Real:
         """Nodes (n, 3) moved by the entries (places,) of a shape; entry 1 moves by `swing` of the structure's size, one

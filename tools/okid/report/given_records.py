@@ -14,14 +14,13 @@ from okid._errors import InputError
 from okid.data.records import Record
 from okid.formats.frf_file import read_frf
 from okid.frf import Frf
-from okid.record.identify_frf import identify_frf
 from okid.report.answers import detrended
 from okid.report.loaded import Loaded
 from okid.report.material import Source, is_struck
 from okid.report.measured import Measured, channels_of, measure, measured_from, open_record
 from okid.report.other_kinds import check_kind
 from okid.report.provenance import source_of
-from okid.report.struck import files_beside, hits_of_files, measure_hits
+from okid.report.struck import files_beside, fitted_again, hits_of_files, measure_hits
 
 MOST_SOURCES = 6  # files that are named one by one
 Given = str | Path | Record | Frf
@@ -81,9 +80,8 @@ def _responses(result: Loaded, given: Sequence[Given]) -> Measured:
     frf = next((one for one in given if isinstance(one, Frf)), None)
     if (frf is not None and len(given) > 1) or (frf is None and len(paths) < len(given)):
         raise InputError("record: the result is of frequency responses, expected their files, or what read_frf() gave")
-    source = "the responses given" if frf is None and not paths else ", ".join(path.name for path in paths[:4])
+    source = ", ".join(path.name for path in paths[:4]) or "the responses given"
     frf = read_frf(*paths) if frf is None else frf
-    source = source or "the responses given"
     wanted = result.inputs, result.outputs
     ends = frf.names()
     there = [set(one) for one in ends]
@@ -106,8 +104,8 @@ def _responses(result: Loaded, given: Sequence[Given]) -> Measured:
     model, _ = result.model()
     made = data._replace(response=model.frequency_response(f))
     band = result.raw.get("band_hz")
-    again = identify_frf(data, band=None if band is None else tuple(band), stabilization=True)
-    return Measured(data, "", again.stabilization(), None, source, simulated=made)
+    again = fitted_again(data, (float(f[0]), float(f[-1])) if band is None else (float(band[0]), float(band[1])))
+    return Measured(data, "", None if again is None else again.stabilization(), None, source, simulated=made)
 
 
 def _joined(result: Loaded, records: Sequence[Record], names: Sequence[str]) -> Record:

@@ -155,7 +155,8 @@ def _player(m: Material) -> list[str]:
         drawings.draw_at_rest_and_moved(ax, geometry, result.shapes[k])
         ax.set_title(f"{k + 1}: {result.frequency_hz[k]:.2f} Hz")
     absent = [name for name, dof in zip(result.places, geometry.dofs, strict=True) if dof is None]
-    words = "Dashed: at rest." + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
+    gaps = "" if np.all(np.isfinite(result.shapes[chosen])) else " A node that was not measured is not drawn."
+    words = f"Dashed: at rest.{gaps}" + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
     return [live, m.pictures.inline(drawing, "still pictures of the mode shapes", "still"), page.note(words)]
 
 

@@ -19,6 +19,7 @@ from okid.report.loaded import Loaded
 from okid.report.measured import Measured, Struck, channels_of, excerpt_of, residual_of
 from okid.report.scale import factor_of
 from okid.result.model import Model
+from okid.result.result import Result
 from okid.result.shape_places import struck_at
 
 Real = NDArray[np.float64]
@@ -107,8 +108,8 @@ def _averaged(result: Loaded, hits: Sequence[Hit], data: Sequence[tuple[Real, Re
     return Frf(first.frequency_hz, response, nothing, len(hits), first.resolution_hz, *names), coherence
 
 
-def _fitted_again(result: Loaded, responses: Frf) -> Any:
-    """What pLSCF makes of the averaged responses by themselves; None when it finds nothing."""
+def fitted_again(responses: Frf, band: tuple[float, float]) -> Result | None:
+    """What pLSCF makes of measured responses by themselves, with its diagram; None when it finds nothing."""
     n_y, n_u = responses.response.shape[1:]
     if n_y * n_u > MOST_COLUMNS:
         strongest = int(np.argmax(np.sum(np.abs(responses.response) ** 2, axis=(0, 2))))
@@ -116,7 +117,6 @@ def _fitted_again(result: Loaded, responses: Frf) -> Any:
             response=responses.response[:, [strongest]], outputs=(responses.outputs[strongest],)
         )
     try:
-        band = (responses.resolution_hz, min(result.shown_hz, 0.98 * result.fs / 2.0))
         return identify_frf(responses, band=band, stabilization=True)
     except Error:
         return None
@@ -162,7 +162,7 @@ def measure_hits(result: Loaded, records: Sequence[tuple[dict[str, Any], Record,
     if all(one.simulated is not None and np.all(np.isfinite(one.simulated)) for one in answered):
         made = [(one.u, one.simulated) for one in answered]
         simulated, _ = _averaged(result, hits, made)  # type: ignore[arg-type]
-    again = _fitted_again(result, responses)
+    again = fitted_again(responses, (responses.resolution_hz, min(result.shown_hz, 0.98 * result.fs / 2.0)))
     white, covariance = residual_of(result, answered)
     good = sum(bool(hit["accepted"]) for hit in result.raw["hits"])
     counts = [sum(hit.column == k for hit in hits) for k in range(len(result.inputs))]

@@ -133,6 +133,7 @@ def _looked_at(m: Material) -> tuple[list[str], dict[str, list[str]]]:
     given, ambient = m.measured, not m.result.inputs
     seen += ["consistency of the modes"] if m.result.raw["modes"] else []
     no_record = "" if given is not None else "no responses given" if of_responses else "no record given"
+    no_record = "several set-ups" if m.result.raw.get("set_ups") else no_record
     file("completeness", "" if completeness(m) else no_record or "nothing tells it")
     if not ambient:
         file("fit", "" if any(v is not None for v in _simulated(m)) else no_record or "the model gives no simulation")
