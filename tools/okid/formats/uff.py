@@ -36,7 +36,7 @@ from okid.formats.uff_model import (
 )
 from okid.result.left_out import kept_outputs, without_left_out
 from okid.result.result import Result
-from okid.result.shape_places import entry_numbers, force_numbers, named_node, places_of_shapes
+from okid.result.shape_places import entry_numbers, force_numbers, known_numbers, named_node, places_of_shapes
 
 FRF_LINES = 1025
 Place = tuple[int, int, int]  # node, axis 0..2, sign
@@ -296,7 +296,7 @@ def _result_bytes(
         places = [one for one, stays in zip(places, kept_outputs(raw), strict=True) if stays]
     raw, _ = without_left_out(raw)
     out += [text.encode() for text in _chosen(mode_sets(raw, places, sensing), modes)]
-    own = raw.get("output_dofs") or [None] * len(raw["outputs"])
+    own = known_numbers(raw, "output_dofs", "outputs")
     outputs = _ends(raw, "outputs", own, geometry) if struck else places
     inputs = _ends(raw, "inputs", force_numbers(raw), geometry)
     return out + (_frf_bytes(raw, outputs, inputs, binary, sensing) if raw["inputs"] else [])

@@ -24,17 +24,25 @@ def _live_dof(live: Mapping[str, Mapping[str, Any]], name: str) -> int | None:
     return dof if isinstance(dof, int) and dof != 0 else None
 
 
+def known_numbers(raw: Mapping[str, Any], key: str, of: str) -> list[int | None]:
+    """`input_dofs` or `output_dofs` of the result, one for each of `of`; None = not said."""
+    given, count = raw.get(key), len(raw[of])
+    if not isinstance(given, list) or len(given) != count:
+        return [None] * count
+    return [dof if isinstance(dof, int) and dof != 0 else None for dof in given]
+
+
 def entry_numbers(raw: Mapping[str, Any], live: Mapping[str, Mapping[str, Any]] | None = None) -> list[int | None]:
     """The number of each entry of a shape (negative: reversed), None = not said. `live`: channels of a run."""
     if raw.get("shape_dofs"):
         return list(raw["shape_dofs"])
-    own = raw.get("output_dofs") or [None] * len(raw["outputs"])
+    own = known_numbers(raw, "output_dofs", "outputs")
     return [_live_dof(live or {}, name) or dof for name, dof in zip(raw["outputs"], own, strict=True)]
 
 
 def force_numbers(raw: Mapping[str, Any]) -> list[int | None]:
     """The degree of freedom of each input, None = not said."""
-    known = raw.get("input_dofs") or [None] * len(raw["inputs"])
+    known = known_numbers(raw, "input_dofs", "inputs")
     struck = [struck_at(name) for name in raw["inputs"]] if raw.get("shape_dofs") else [None] * len(known)
     return [one if at is None else at[1] for one, at in zip(known, struck, strict=True)]
 

@@ -151,10 +151,10 @@ class Stabilization(Sequence[OrderPoles]):
             own = [one for one in raw["poles"] if (one["horizon"], one["order"]) == (horizon, order)]
             column = {key: np.array([one[key] for one in own]) for key in own[0]} if own else {}
             empty = np.zeros(0)
-            flags = [column.get(f"stable_{key}", empty).astype(bool) for key in ("frequency", "damping", "shape")]
+            held = [column.get(f"stable_{key}", empty).astype(bool) for key in ("frequency", "damping", "shape")]
             rows.append(OrderPoles(
                 order, column.get("frequency_hz", empty), column.get("damping_ratio", empty),
-                np.zeros((len(own), 0), np.complex128), *flags, horizon,
+                np.zeros((len(own), 0), np.complex128), held[0], held[1], held[2], horizon,
                 column.get("cluster", empty).astype(np.int32),
             ))  # fmt: skip
         shape = np.zeros(0, np.complex128)
