@@ -179,7 +179,7 @@ def _table(m: Material, explained: Real, coherence: Real, used: NDArray[np.bool_
 def place_section(m: Material) -> tuple[page.Section, list[tuple[int, int]]]:
     """Responses averaged over the good hits of each place, over those of the model; and the pairs shown whole."""
     title, name = "Frequency responses of the places", "Responses"
-    line, model = synthesised_at(m.result, 1.05 * reach_hz(m.result))
+    line, model = synthesised_at(m.result, min(m.result.shown_hz, 1.05 * reach_hz(m.result)))
     given = m.measured
     if given is None or given.frf is None or given.struck is None:
         nothing = np.zeros((len(m.result.outputs), len(m.result.inputs)))
