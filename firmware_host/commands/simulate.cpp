@@ -23,8 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct simulate_arguments {
-    std::string rig, log, truth, csv, dbc, config, to;
-    int baud = rig_line_baud;
+    std::string rig, log, truth, csv, dbc, config, to, hits;
+    int baud = rig_line_baud, each = 3;
     bool quiet = false;
 };
 
@@ -47,7 +47,7 @@ std::string dbc_from_config(const std::string& dbc, const std::string& config) {
 
 void check_targets(const simulate_arguments& given, const std::string& dbc) {
     const std::vector<std::string> targets{given.log, given.truth, given.csv, dbc, given.config};
-    bool any = !given.to.empty();
+    bool any = !given.to.empty() || !given.hits.empty();
     for (std::size_t i = 0; i < targets.size(); ++i) {
         if (targets[i].empty()) continue;
         any = true;
@@ -62,7 +62,7 @@ void check_targets(const simulate_arguments& given, const std::string& dbc) {
     }
     if (!any)
         throw failure(exit_usage,
-                      "nothing to write: give at least one of --log, --truth, --csv, --dbc, --config, --to");
+                      "nothing to write: give at least one of --log, --truth, --csv, --hits, --dbc, --config, --to");
 }
 
 void warn(const simulate_arguments& given, const std::string& text) {
@@ -87,6 +87,21 @@ void check_bus(const simulate_arguments& given, const rig_run& run) {
                 "{} frames a sample at {:g} Hz would load a 1 Mbit/s bus by {:.0f} %: the log is valid, but no classic "
                 "CAN bus could carry it",
                 messages, run.rate_hz, 100 * needed));
+}
+
+/// The folder of a roving hammer: P01_1.csv, P01_2.csv … P02_1.csv …, the number of the place first.
+void write_hits(const simulate_arguments& given, const rig& rig) {
+    if (rig.excitation != "hammer")
+        throw failure(exit_usage, fmt::format("--hits: {} has excitation = \"{}\", expected \"hammer\"", given.rig,
+                                              rig.excitation));
+    std::error_code fault;
+    fs::create_directories(given.hits, fault);
+    if (fault) throw failure(exit_usage, fmt::format("--hits: {}: {}", given.hits, fault.message()));
+    for (std::size_t place = 0; place < rig.force_dofs.size(); ++place)
+        for (int number = 1; number <= given.each; ++number) {
+            const std::string name = fmt::format("P{:02}_{}.csv", rig.force_dofs[place], number);
+            write_whole_file((fs::path(given.hits) / name).string(), rig_csv(simulate_hit(rig, place, number)));
+        }
 }
 
 std::string summary(const rig& rig, const rig_run& run) {
@@ -115,6 +130,7 @@ void simulate(const simulate_arguments& given) {
         if (!given.log.empty()) write_whole_file(given.log, rig_log(run));
         if (!given.truth.empty()) write_whole_file(given.truth, rig_truth(rig));
         if (!given.csv.empty()) write_whole_file(given.csv, rig_csv(run));
+        if (!given.hits.empty()) write_hits(given, rig);
         if (!dbc.empty()) write_whole_file(dbc, rig_dbc(run));
         if (!given.config.empty())
             write_whole_file(given.config, is_device(given.to)
@@ -140,6 +156,15 @@ void add_simulate(CLI::App& app) {
     command->add_option("--log", given->log, "CAN frames in the format of candump -L")->type_name("FILE.log");
     command->add_option("--truth", given->truth, "true modes and matrices, okid.truth/1")->type_name("FILE.json");
     command->add_option("--csv", given->csv, "the same samples in engineering units")->type_name("FILE.csv");
+    command
+        ->add_option(
+            "--hits", given->hits,
+            "a folder of hits, as a roving hammer leaves it: one CSV each, P01_1.csv is the first at force_dofs "
+            "number 1")
+        ->type_name("FOLDER");
+    command->add_option("--each", given->each, "hits at each place for --hits, 1 to 100 (default 3)")
+        ->type_name("N")
+        ->check(CLI::Range(1, 100).description(""));
     command->add_option("--dbc", given->dbc, "description of the frames")->type_name("FILE.dbc");
     command
         ->add_option("--config", given->config, "CONFIG.toml for okid run and okid replay (writes the DBC beside it)")

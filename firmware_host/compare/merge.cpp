@@ -297,6 +297,7 @@ class merger {
         to.detrend = results_.front().detrend;
         for (std::size_t k = 0; k < results_.size(); ++k) {
             const known_result& one = results_[k];
+            to.set_ups.push_back({file_name(one.name), one.outputs});
             to.fs_hz = std::max(to.fs_hz, one.fs_hz);
             to.samples += one.samples;
             to.gaps += one.gaps;

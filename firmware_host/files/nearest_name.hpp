@@ -18,4 +18,7 @@ std::string list_names(const std::vector<std::string>& names, std::size_t most =
 /// Text of a file made fit for one line of a message: control bytes replaced, cut after `most` bytes.
 std::string printable(const std::string& text, std::size_t most = 40);
 
+/// The last part of a path, for a result that must not hold the folders of a machine.
+std::string file_name(const std::string& path);
+
 } // namespace okid_host

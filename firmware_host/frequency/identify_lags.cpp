@@ -306,6 +306,8 @@ result_context prepare(lag_work& work) {
     if (work.set_ups.size() > 1) {
         out.records = static_cast<int>(work.set_ups.size());
         out.inputs.clear();
+        for (const set_up& one : work.set_ups)
+            out.set_ups.push_back({file_name(one.set.records.front().path), one.outputs});
     }
     return out;
 }

@@ -232,6 +232,7 @@ record_result identify_responses(const response_set& measured, const response_re
     make_result(set, constant_s, find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization),
                 work);
     find_matrices(options, work);
+    describe_dofs(options, work.context);
     record_result result;
     result.model = kept_model(work.model);
     result.context = std::move(work.context);

@@ -29,7 +29,8 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr double widest_damping = 0.5; // sigma of damping over damping
+constexpr std::size_t middle_of_whole_band = 2; // among the runs of fit_matrix_fractions()
+constexpr double widest_damping = 0.5;          // sigma of damping over damping
 constexpr double widest_frequency = 0.05;
 constexpr double least_strength = 2;                              // of a residue matrix over its noise
 constexpr int first_steps = 2, window_steps = 5, last_steps = 12; // of the poles
@@ -391,7 +392,7 @@ void add_model(const consensus_run& run, int order, int set_up, okid_stabilizati
     if (okid_stabilization_add(to, &model) == OKID_OK) out.models.emplace_back(set_up, order);
 }
 
-/// The poles of the middle weight that keeps noise unstable, of every set-up: its number in the place of a horizon.
+/// The poles over the whole band with the middle weight and the normalisation that keeps noise unstable, of every set-up: its number in the place of a horizon.
 stabilization diagram_of(const joint_responses& from, const std::vector<consensus_run>& runs) {
     const std::size_t of_each = runs.size() / from.sets.size();
     stabilization out;
@@ -399,7 +400,7 @@ stabilization diagram_of(const joint_responses& from, const std::vector<consensu
     out.criteria.frequency = 0.01, out.criteria.damping = 0.05, out.criteria.mac = 0.98, out.criteria.share = 0.5;
     std::vector<const consensus_run*> shown;
     for (std::size_t j = 0; j < from.sets.size(); ++j) {
-        shown.push_back(&runs[j * of_each + of_each / 3]);
+        shown.push_back(&runs[j * of_each + middle_of_whole_band]);
         out.criteria.max_models += static_cast<std::int32_t>(shown.back()->orders.size());
         out.criteria.max_poles =
             std::max(out.criteria.max_poles, static_cast<std::int32_t>(shown.back()->poles.size()));

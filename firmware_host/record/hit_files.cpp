@@ -8,7 +8,6 @@
 #include "roving.hpp"
 
 #include <algorithm>
-#include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
@@ -19,11 +18,6 @@ namespace {
 
 constexpr std::size_t most_hits_named = 8;
 constexpr std::size_t longest_name = 256; // of a file, that a regular expression looks at
-
-std::string file_name(const std::string& path) {
-    const std::string name = std::filesystem::path(path).filename().string();
-    return name.empty() ? path : name;
-}
 
 hit_line line_of(const record_set& set, const record_data& record, const std::vector<hit_channel>& channels,
                  const hit_span& span, const record_options& options) {

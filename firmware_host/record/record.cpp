@@ -303,6 +303,17 @@ void detrend_linear(record_set& set, const record_options& options) {
     }
 }
 
+void describe_dofs(const record_options& options, result_context& to) {
+    const mass_plan& plan = options.placed.wanted() ? options.placed : options.mass;
+    const auto numbers = [](const std::vector<mass_channel>& channels) {
+        std::vector<int> out;
+        for (const mass_channel& one : channels) out.push_back(one.reversed ? -one.dof : one.dof);
+        return out;
+    };
+    to.input_dofs = numbers(plan.inputs);
+    to.output_dofs = numbers(plan.outputs);
+}
+
 result_context describe_records(const record_set& set, const record_options& options, const missing_count& missing) {
     check_measured(missing, set, options);
     const std::size_t total = set.count();
@@ -320,6 +331,7 @@ result_context describe_records(const record_set& set, const record_options& opt
     context.hold = options.hold;
     context.detrend = options.detrend;
     context.start = options.start;
+    describe_dofs(options, context);
     if (missing.samples) context.warnings.push_back(missing_samples(missing, static_cast<long long>(total)));
     return context;
 }

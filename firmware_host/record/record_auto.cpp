@@ -483,6 +483,7 @@ record_result identify_auto(record_set records, const record_options& given, con
     if (placed) find_placed(listed, options, work);
     if (!all) put_back_outputs(screened.kept, work);
     work.context.outputs = given.outputs;
+    describe_dofs(given, work.context);
     record_result result;
     result.model = kept_model(work.model);
     result.context = std::move(work.context);

@@ -51,6 +51,9 @@ struct record_work {
     std::vector<std::vector<mode_shift>> shifts; ///< auto: of each listed mode, a block each; empty: not known
 };
 
+/// input_dofs and output_dofs, where they are said.
+void describe_dofs(const record_options& options, result_context& to);
+
 /// What is known of a result before anything is computed.
 result_context describe_records(const record_set& set, const record_options& options, const missing_count& missing);
 

@@ -255,6 +255,10 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["gaps"] = context.gaps;
     out["inputs"] = context.inputs;
     out["outputs"] = context.outputs;
+    if (!context.input_dofs.empty()) out["input_dofs"] = context.input_dofs;
+    if (!context.output_dofs.empty()) out["output_dofs"] = context.output_dofs;
+    for (const set_up_line& one : context.set_ups)
+        out["set_ups"].push_back(ordered_json{{"name", one.name}, {"outputs", one.outputs}});
     const bool agreed = judged_by_agreement(context); // of many horizons, without a Hankel matrix of its own
     out["p"] = agreed ? ordered_json(nullptr) : ordered_json(model.p);
     out["rows"] = agreed ? ordered_json(nullptr) : ordered_json(model.rows);

@@ -18,6 +18,12 @@
 
 namespace okid_host {
 
+/// Which sensors a set-up has.
+struct set_up_line {
+    std::string name; ///< of its file
+    std::vector<std::string> outputs;
+};
+
 /// What the library does not know about a result.
 struct result_context {
     std::string method = "okid-era";
@@ -29,6 +35,8 @@ struct result_context {
     long long judged_samples = 0; ///< auto: the newest, that the modes are judged from; 0: all of them
     long long gaps = 0;
     std::vector<std::string> inputs, outputs;
+    std::vector<int> input_dofs, output_dofs; ///< where they are, from 1 (-3: at 3, reversed); empty: not said
+    std::vector<set_up_line> set_ups;         ///< of several
     std::string hold = "zoh", detrend = "mean", start = "moving";
     std::optional<std::vector<std::vector<double>>> x0;        ///< one initial state per record; absent live (null)
     std::optional<std::vector<double>> simulation_percent;     ///< per output; absent live (null)

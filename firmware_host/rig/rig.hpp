@@ -31,6 +31,7 @@ struct rig {
     double force_rms = 1, noise_percent = 0;
     int bits = 16;
     std::vector<rig_change> changes; ///< in order of time
+    bool one_hit = false;            ///< of the hammer, at the beginning of the record
 
     std::size_t samples() const;
     std::vector<std::string> warnings; ///< of a rig that is legal but hard to identify

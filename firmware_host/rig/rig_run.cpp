@@ -17,7 +17,15 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Purposes of random streams; a channel number is added.
-enum stream : std::uint64_t { stream_force = 0, stream_noise = 1000, stream_start = 2000, stream_hammer = 3000 };
+enum stream : std::uint64_t {
+    stream_force = 0,
+    stream_noise = 1000,
+    stream_start = 2000,
+    stream_hammer = 3000,
+    stream_strength = 4000
+};
+
+constexpr double before_hit = 0.1; // s, where a record holds one hit
 
 /// Full scale stands this far above the largest value, so that nothing saturates.
 constexpr double headroom = 1.25;
@@ -66,8 +74,8 @@ void hammer(const rig& rig, MatrixXd& u) {
     const double highest = structure_modes(rig.body).frequency_hz.back();
     const double width = std::max(2 / rig.rate_hz, 0.5 / highest); // s
     const double pause = std::min(2.0, rig.duration_s / static_cast<double>(3 * u.rows()));
-    double at = 0.05 * pause;
-    for (Index hit = 0; at < rig.duration_s; ++hit) {
+    double at = rig.one_hit ? std::min(before_hit, 0.05 * rig.duration_s) : 0.05 * pause;
+    for (Index hit = 0; at < rig.duration_s && !(rig.one_hit && hit); ++hit) {
         const double strength = 0.7 + 0.6 * random.uniform();
         const Index first = static_cast<Index>(std::ceil(at * rig.rate_hz));
         for (Index n = first; n < u.cols(); ++n) {
@@ -162,6 +170,17 @@ rig_run simulate_rig(const rig& rig) {
         out.channels.push_back(make_channel(rig, false, rig.sense_dofs[k]));
         convert(y.row(row), rig.bits, out.channels.back());
     }
+    return out;
+}
+
+rig_run simulate_hit(rig rig, std::size_t place, int number) {
+    const std::uint64_t seed = rig.seed + 1000 * (place + 1) + static_cast<std::uint64_t>(number);
+    rig.force_dofs = {rig.force_dofs[place]};
+    rig.seed = seed;
+    rig.one_hit = true;
+    rig.force_rms *= 0.7 + 0.6 * gaussian(seed, stream_strength).uniform();
+    rig_run out = simulate_rig(rig);
+    out.channels.front().name = "hammer";
     return out;
 }
 

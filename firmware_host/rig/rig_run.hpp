@@ -30,4 +30,8 @@ Eigen::MatrixXd rig_forces(const rig& rig, std::size_t count);
 /// white, sigma = noise_percent of each output's rms. Without excitation it swings freely from random first velocities.
 rig_run simulate_rig(const rig& rig);
 
+/// One record of a roving hammer: one hit at one of the forces, from rest, all with one name for the force: "hammer".
+/// @param place  in force_dofs  @param number  of the hit there: each has its own strength and noise
+rig_run simulate_hit(rig rig, std::size_t place, int number);
+
 } // namespace okid_host

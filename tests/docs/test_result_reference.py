@@ -51,8 +51,11 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
     hits = [beam.record(beam.Hit(place, 100.0, 0.0015), np.random.default_rng(place)) for place in (1, 2)]
     sides = [hit[:, :1] for hit in hits], [hit[:, 1:] for hit in hits]
     struck = package.identify(*sides, fs=beam.FS, hit_dofs=[1, 2], output_dofs=[1, 5])
+    parts = [package.identify(u, y[:, order], fs=250.0, p=12, output_names=names)
+             for order, names in (([0, 1], ["a", "b"]), ([1, 0], ["b", "c"]))]  # fmt: skip
     return [
         json.loads(agreed.stdout),
+        package.merge(parts).to_dict(),
         struck.to_dict(),
         package.identify_frf(package.frf.h1(u, y, 250.0, nperseg=1024)).to_dict(),
         identified(rig, *full),

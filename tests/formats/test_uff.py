@@ -301,8 +301,8 @@ lines = [[1, 2]]
 def test_geometry_of_a_config(tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(CONFIG, encoding="utf-8")
     found = read_geometry(tmp_path / "c.toml")
-    assert (found.nodes[1], found.lines, found.place("storey1", 1)) == ((0.0, 0.0, 1.5), [(1, 2)], (2, 2, -1))
-    with pytest.raises(okid.InputError, match="dofs has 2 entries, channel 'storey3' needs number 3"):
+    assert (found.nodes[1], found.lines, found.places(["storey1"])) == ((0.0, 0.0, 1.5), [(1, 2)], [(2, "-z")])
+    with pytest.raises(okid.InputError, match="c.toml: sensor 'storey3' is at dof 3, but .geometry. dofs has 2"):
         write_uff(tmp_path / "r.uff", identified(), geometry=found)
     for old, new, words in (
         ('"-z"', '"w"', r"dofs, entry 2: found .2, 'w'., expected a node from 1 to 2"),

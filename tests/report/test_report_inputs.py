@@ -84,21 +84,21 @@ def test_events_that_are_none(tmp_path: Path, text: str | bytes | None, words: s
 def test_geometry_follows_the_numbers_of_the_channels(tmp_path: Path) -> None:
     path = tmp_path / "c.toml"
     path.write_text(NODES + 'dofs = [[2, "x"], [3, "-z"]]\nlines = [[1, 2]]\n', encoding="utf-8")
-    by_order = read_geometry(path, ["a", "b"])
+    by_order = read_geometry(path, {"outputs": ["a", "b"]})
     assert by_order is not None
     assert by_order.dofs == [(2, "x"), (3, "-z")]
     live = {"b": {"dof": 1}, "a": {"dof": -2}, "c": {"dof": None}}
-    by_run = read_geometry(path, ["a", "b", "c"], live)
+    by_run = read_geometry(path, {"outputs": ["a", "b", "c"]}, live)
     assert by_run is not None
     assert by_run.dofs == [(3, "z"), (2, "x"), None]
     path.write_text(path.read_text() + '[[channel]]\nname = "a"\ndof = 1\n', encoding="utf-8")
-    by_config = read_geometry(path, ["a"], live)
+    by_config = read_geometry(path, {"outputs": ["a"]}, live)
     assert by_config is not None
     assert by_config.dofs == [(2, "x")]
     moved = by_config.displaced(np.array([1.0]), 0.1)
     assert moved[1].tolist() == pytest.approx([0.1 * np.sqrt(2.0), 0.0, 1.0])
     path.write_text("[acquisition]\n", encoding="utf-8")
-    assert read_geometry(path, ["a"]) is None
+    assert read_geometry(path, {"outputs": ["a"]}) is None
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_geometry_follows_the_numbers_of_the_channels(tmp_path: Path) -> None:
 def test_geometry_that_is_wrong(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "c.toml").write_text(text, encoding="utf-8")
     with pytest.raises(okid.InputError) as told:
-        read_geometry(tmp_path / "c.toml", ["a", "b"])
+        read_geometry(tmp_path / "c.toml", {"outputs": ["a", "b"]})
     assert words in str(told.value)
     assert "c.toml" in str(told.value)
 

@@ -117,7 +117,7 @@ def _segments(data: Real, length: int, step: int) -> list[Real]:
     return [data[k : k + length] for first, end in _runs(data) for k in range(first, end - length + 1, step)]
 
 
-def _struck_part(data: Real, n_u: int) -> Real:
+def struck_part(data: Real, n_u: int) -> Real:
     """The run of complete samples with the hardest hit: what a record of a hammer test with gaps is good for."""
     drive = data[:, :n_u] - np.nanmedian(data[:, :n_u], axis=0)
     force = np.nan_to_num(np.sum(drive**2, axis=1))
@@ -205,7 +205,7 @@ def h1(
     hit = all(is_hit(one) for one in inputs)
     records = [np.hstack(pair) for pair in zip(inputs, outputs, strict=True)]
     if nperseg is None and hit:
-        records = [_struck_part(data, n_u) for data in records]
+        records = [struck_part(data, n_u) for data in records]
         nperseg = min(len(data) for data in records)
         if nperseg < SHORTEST:
             raise InputError(f"only {nperseg} unbroken samples around a hit, a response function takes {SHORTEST}")

@@ -116,6 +116,8 @@ def fit(result: Result) -> Picture:
 @_styled
 def frf(result: Result, measured: Frf | None = None, output: int = 0, force: int = 0) -> Picture:
     """Response of the model from input `force` to `output` (numbers from 0), with what okid.frf.h1() measured."""
+    if not result.inputs:
+        raise InputError("this result has no inputs, so there is no response to draw: identify with a measured force")
     if not (0 <= output < len(result.outputs) and 0 <= force < len(result.inputs)):
         raise InputError(
             f"output {output}, force {force}: expected 0 to {len(result.outputs) - 1} and 0 to {len(result.inputs) - 1}"

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,28 +13,64 @@ from okid._errors import InputError
 from okid.data.toml_file import read_toml
 
 AXES = ("x", "y", "z")
+Place = tuple[int, str]  # node and direction: "x", "-z" ..
 
 
 @dataclass(frozen=True)
 class Geometry:
     """nodes: coordinates (x, y, z), node k + 1 at index k. dofs: node and direction ("x", "-z" ..) of degree of freedom
     k + 1. lines: pairs of nodes, from 1 on. channel_dofs: degree of freedom of each channel by name (negative: with
-    reversed polarity), where it is known.
+    reversed polarity), where it is known. source: its file, for messages.
     """
 
     nodes: list[tuple[float, float, float]]
     dofs: list[tuple[int, str]]
     lines: list[tuple[int, int]] = field(default_factory=list)
     channel_dofs: dict[str, int] = field(default_factory=dict)
+    source: str = field(default="the geometry", compare=False)
 
-    def place(self, name: str, fallback: int) -> tuple[int, int, int]:
-        """Node, axis 0..2 and sign of the channel; `fallback` is its degree of freedom when the config does not say."""
-        dof = self.channel_dofs.get(name, fallback)
-        if not 1 <= abs(dof) <= len(self.dofs):
-            raise InputError(f"[geometry] dofs has {len(self.dofs)} entries, channel {name!r} needs number {abs(dof)}")
-        node, direction = self.dofs[abs(dof) - 1]
-        sign = -1 if direction.startswith("-") else 1
-        return node, AXES.index(direction[-1]), sign if dof > 0 else -sign
+    def places(
+        self,
+        names: Sequence[str],
+        numbers: Sequence[int | None] = (),
+        noun: str = "sensor",
+    ) -> list[Place | None]:
+        """Node and direction of each sensor or place, None: not on the geometry.
+
+        The degree of freedom is that of the [[channel]] of this name, else that in `numbers` (negative: reversed).
+        Where neither knows any, the names count in their order. InputError names the first that does not fit.
+        """
+        known = [None if noun == "place" else self.channel_dofs.get(name) for name in names]
+        known = [a if a is not None else b for a, b in zip(known, numbers or [None] * len(names), strict=True)]
+        if all(number is None for number in known):
+            if self.channel_dofs:
+                raise InputError(
+                    f"{self.source}: no [[channel]] has the name {names[0]!r}, nor that of another {noun} of the "
+                    'result: give each its number by the key "dof"'
+                )
+            if len(self.dofs) != len(names):
+                raise InputError(
+                    f"{self.source}: [geometry] dofs has {len(self.dofs)} places and the result {len(names)} outputs: "
+                    'give every output its number by the key "dof" of [[channel]]'
+                )
+            known = list(range(1, len(names) + 1))
+        out: list[Place | None] = []
+        for name, number in zip(names, known, strict=True):
+            if number is not None and not 1 <= abs(number) <= len(self.dofs):
+                raise InputError(
+                    f"{self.source}: {noun} {name!r} is at dof {number}, but [geometry] dofs has {len(self.dofs)} "
+                    "places"
+                )
+            place = None if number is None else self.dofs[abs(number) - 1]
+            if place is not None and number is not None and number < 0:
+                place = (place[0], place[1][1:] if place[1].startswith("-") else f"-{place[1]}")
+            out.append(place)
+        return out
+
+
+def axis_and_sign(direction: str) -> tuple[int, int]:
+    """ "-z" is (2, -1)."""
+    return AXES.index(direction[-1]), -1 if direction.startswith("-") else 1
 
 
 def _direction(text: object) -> str | None:
@@ -94,7 +130,7 @@ def geometry_of(config: Mapping[str, Any], source: str) -> Geometry | None:
         for one in (channels if isinstance(channels, list) else [])
         if isinstance(one, dict) and "name" in one and isinstance(one.get("dof"), int) and one["dof"] != 0
     }
-    return Geometry(nodes, dofs, lines, numbers)
+    return Geometry(nodes, dofs, lines, numbers, source)
 
 
 def read_geometry(path: str | Path) -> Geometry:

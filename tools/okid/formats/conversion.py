@@ -129,7 +129,9 @@ def _convert_result(args: argparse.Namespace, source: Path, target: Path) -> str
             raise InputError(f"{option} is for samples, {source} is an identified model")
     raw = load_result(source)
     write_result(target, raw, None if args.geometry is None else read_geometry(args.geometry))
-    return f"{target}: {len(raw['modes'])} modes of {len(raw['outputs'])} outputs"
+    places = raw.get("shape_dofs")
+    over = f"over {len(places)} places" if places else f"of {len(raw['outputs'])} outputs"
+    return f"{target}: {len(raw['modes'])} modes {over}"
 
 
 def _live_lines(path: Path) -> Iterator[bytes]:

@@ -13,7 +13,8 @@ import numpy as np
 
 from okid import abi, frf
 from okid._errors import InputError
-from okid.data.geometry import Geometry
+from okid.data.geometry import Geometry, axis_and_sign
+from okid.data.geometry import Place as GeometryPlace
 from okid.data.records import Record, even_rate
 from okid.data.whole_file import whole_file
 from okid.formats.foreign_library import reading
@@ -33,8 +34,9 @@ from okid.formats.uff_model import (
     read_units,
     units_text,
 )
-from okid.result.left_out import without_left_out
+from okid.result.left_out import kept_outputs, without_left_out
 from okid.result.result import Result
+from okid.result.shape_places import entry_numbers, force_numbers, known_numbers, named_node, places_of_shapes
 
 FRF_LINES = 1025
 Place = tuple[int, int, int]  # node, axis 0..2, sign
@@ -180,9 +182,48 @@ def _record_bytes(record: Record, binary: bool) -> list[bytes]:
     return out
 
 
-def _places(names: Sequence[str], geometry: Geometry | None) -> dict[str, Place]:
-    """Of each channel; without a geometry channel k is at node k along x."""
-    return {name: (k, 0, 1) if geometry is None else geometry.place(name, k) for k, name in enumerate(names, 1)}
+def nodes_of(places: Sequence[GeometryPlace | None]) -> list[Place | None]:
+    """Node, axis and sign of each node and direction."""
+    return [None if one is None else (one[0], *axis_and_sign(one[1])) for one in places]
+
+
+def _by_number(names: Sequence[str], numbers: Sequence[int | None]) -> list[Place | None]:
+    """Without a geometry the node is the degree of freedom, or stands in the name ("12z"); else they are counted."""
+    named = [named_node(name) for name in names]
+    if any(one is not None for one in numbers):
+        return [None if dof is None else (abs(dof), 0, -1 if dof < 0 else 1) for dof in numbers]
+    if all(one is not None for one in named):
+        return nodes_of(named)
+    return [(k, 0, 1) for k in range(1, len(names) + 1)]
+
+
+def shape_places(raw: Mapping[str, Any], geometry: Geometry | None = None) -> list[Place | None]:
+    """Where each entry of the shapes of an okid.result/1 is. InputError names what has no place on the geometry."""
+    names = [str(one) for one in raw.get("shape_dofs") or raw["outputs"]]
+    if geometry is None:
+        return _by_number(names, entry_numbers(raw))
+    places = nodes_of(places_of_shapes(geometry, raw))
+    if None in places:
+        raise InputError(
+            f"{geometry.source}: sensor {names[places.index(None)]!r} has no place: give its number by the key "
+            '"dof" of a [[channel]] of this name'
+        )
+    return places
+
+
+def _ends(
+    raw: Mapping[str, Any], which: str, numbers: list[int | None], geometry: Geometry | None
+) -> list[Place | None]:
+    """Where the "outputs" or "inputs" are; None = not known: beside a geometry or struck places nothing is counted."""
+    names = raw[which]
+    if geometry is None and (not raw.get("shape_dofs") or any(numbers)):
+        return _by_number(names, numbers)
+    if geometry is None:
+        return [None] * len(names)
+    known = [geometry.channel_dofs.get(name, number) for name, number in zip(names, numbers, strict=True)]
+    if all(one is None for one in known):
+        return [None] * len(names)
+    return nodes_of(geometry.places(names, known))
 
 
 def _chosen(texts: list[str], modes: Sequence[int] | None) -> list[str]:
@@ -203,15 +244,20 @@ def _judgement(mode: Mapping[str, Any]) -> str:
 
 
 def mode_sets(raw: Mapping[str, Any], places: Sequence[Place | None], sensing: str = "acceleration") -> list[str]:
-    """The modes as data sets 55, a text each; places: node, axis 0..2 and sign of each output, None = nowhere."""
+    """The modes as data sets 55, a text each; places: node, axis 0..2 and sign of each entry, None = nowhere. A node at
+    which a mode was not measured is not in its set."""
     arrays = mode_arrays(raw)
-    nodes = sorted({place[0] for place in places if place is not None})
     out = []
     for k, one in enumerate(raw["modes"]):
+        entries = [
+            (place, value)
+            for place, value in zip(places, arrays["shapes"][:, k], strict=True)
+            if place is not None and np.isfinite(value)
+        ]
+        nodes = sorted({place[0] for place, _ in entries})
         shape = np.zeros((len(nodes), 3), dtype=np.complex128)
-        for value, place in zip(arrays["shapes"][:, k], places, strict=True):
-            if place is not None:
-                shape[nodes.index(place[0]), place[1]] = place[2] * value
+        for place, value in entries:
+            shape[nodes.index(place[0]), place[1]] = place[2] * value
         f, z = float(arrays["frequency_hz"][k]), float(arrays["damping_ratio"][k])
         remark = f"okid mode {k + 1}: {f!r} Hz, damping ratio {z!r}"
         title = f"{raw.get('title') or 'okid'} {raw.get('method', '')}".strip()
@@ -221,7 +267,7 @@ def mode_sets(raw: Mapping[str, Any], places: Sequence[Place | None], sensing: s
 
 
 def _frf_bytes(
-    raw: dict[str, Any], outputs: list[Place], inputs: list[Place], binary: bool, sensing: str
+    raw: dict[str, Any], outputs: list[Place | None], inputs: list[Place | None], binary: bool, sensing: str
 ) -> list[bytes]:
     """The responses of the model at FRF_LINES even lines from 0 Hz to Nyquist, output over input."""
     model = result_tree(raw)["model"]
@@ -231,13 +277,29 @@ def _frf_bytes(
     out = []
     for o, name in enumerate(raw["outputs"]):
         for i, other in enumerate(raw["inputs"]):
-            ends = [(node, sign * (axis + 1)) for node, axis, sign in (outputs[o], inputs[i])]
+            ends = [(0, 0) if one is None else (one[0], one[2] * (one[1] + 1)) for one in (outputs[o], inputs[i])]
             one = UffFunction(
                 f"{name} / {other}", FRF, response[:, o, i], 0.0, step, None, unit, "N", ends[0], ends[1],
                 title=str(raw.get("title") or ""), known={"df_hz": step},
             )  # fmt: skip
             out.append(function_bytes(one, code, 13, binary))
     return out
+
+
+def _result_bytes(
+    raw: dict[str, Any], geometry: Geometry | None, binary: bool, sensing: str, modes: Sequence[int] | None
+) -> list[bytes]:
+    """Nodes and lines, modes, and the responses of the model."""
+    out = [] if geometry is None else [nodes_text(geometry.nodes).encode(), lines_text(geometry.lines).encode()]
+    places, struck = shape_places(raw, geometry), bool(raw.get("shape_dofs"))
+    if not struck:
+        places = [one for one, stays in zip(places, kept_outputs(raw), strict=True) if stays]
+    raw, _ = without_left_out(raw)
+    out += [text.encode() for text in _chosen(mode_sets(raw, places, sensing), modes)]
+    own = known_numbers(raw, "output_dofs", "outputs")
+    outputs = _ends(raw, "outputs", own, geometry) if struck else places
+    inputs = _ends(raw, "inputs", force_numbers(raw), geometry)
+    return out + (_frf_bytes(raw, outputs, inputs, binary, sensing) if raw["inputs"] else [])
 
 
 def write_uff(
@@ -267,19 +329,10 @@ def write_uff(
         if isinstance(what, Record):
             parts += _record_bytes(what, binary)
         else:
-            raw = result_dict(what)
-            if geometry is not None:
-                parts += [nodes_text(geometry.nodes).encode(), lines_text(geometry.lines).encode()]
-            places = _places(raw["outputs"], geometry)
-            raw, _ = without_left_out(raw)
-            outputs = [places[name] for name in raw["outputs"]]
-            inputs = list(_places(raw["inputs"], geometry).values())
-            struck = raw.get("shape_dofs")
-            of_shapes = list(_places(list(map(str, struck)), geometry).values()) if struck else outputs
-            parts += [text.encode() for text in _chosen(mode_sets(raw, of_shapes, sensing), modes)]
-            parts += _frf_bytes(raw, outputs, inputs, binary, sensing)
+            parts += _result_bytes(result_dict(what), geometry, binary, sensing, modes)
     except InputError as fault:
-        raise InputError(f"{path}: {fault}") from None
+        told = geometry is not None and str(fault).startswith(geometry.source)
+        raise fault if told else InputError(f"{path}: {fault}") from None
     with whole_file(path) as part, part.open("wb") as out:
         out.writelines(parts)
 

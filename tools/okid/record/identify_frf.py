@@ -25,13 +25,15 @@ def identify_frf(
     modes: Sequence[int] | None = None,
     all_modes: bool = False,
     exponential: float | None = None,
+    stabilization: bool = False,
 ) -> Result:
     """Identify a structure from measured frequency responses: pLSCF over many orders, residues by LSFD.
 
     `responses`: an okid.frf.Frf (of okid.read_frf(), okid.frf.h1() or Frf.of(frequency_hz, response)), or files, read
     by okid.read_frf(). Several set-ups of one structure are one set of responses. `band` (low, high) in Hz; `sensing`,
     `input_dofs`, `output_dofs`, `modes`: as in okid.identify(). `exponential`: time constant in s of an exponential
-    window in the responses; its damping is taken out of the modes.
+    window in the responses; its damping is taken out of the modes. `stabilization`: keep the poles of all orders, for
+    result.stabilization().
 
     The result is one as of okid.identify(): method "plscf", mode.confident, .found_in and .why by the agreement of six
     fits, deviations by what the fit leaves, emac NaN. With more inputs than outputs (a roving hammer) both are
@@ -64,7 +66,7 @@ def identify_frf(
     options = {
         "inputs": inputs, "outputs": outputs, "sensing": sensing, "input_dofs": input_dofs, "output_dofs": output_dofs,
         "band": None if band is None else ":".join(map(str, band)), "modes": modes, "all_modes": all_modes,
-        "exponential": exponential, "set_ups": responses.set_ups,
+        "exponential": exponential, "set_ups": responses.set_ups, "stabilization": stabilization,
     }  # fmt: skip
     handle, rows = ctypes.c_void_p(), np.ascontiguousarray(h.transpose(0, 2, 1))
     f = np.ascontiguousarray(f)

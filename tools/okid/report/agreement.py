@@ -21,7 +21,7 @@ def fit_section(m: Material) -> page.Section:
     names = m.result.outputs
     parts = [known_fit(m.result.raw, key) for key in ("simulation_percent", "prediction_percent")]
     origin = ""
-    if m.measured is not None:
+    if m.measured is not None and m.measured.fit is not None:
         made, kind = m.measured.fit, 0 if m.result.inputs else 1
         told = [value for value in parts[kind] if value is not None]
         parts = [[part[name] for name in names] for part in (made.simulation_percent, made.prediction_percent)]
@@ -31,16 +31,18 @@ def fit_section(m: Material) -> page.Section:
             own = f"; the result itself says {' to '.join(ends)} %"
         origin = f" Computed by this report from {m.measured.source}{own}."
     if all(value is None for part in parts for value in part):
-        words = "The result holds no fit (a live result keeps no record)"
-        more = (
-            ": run okid-report again with --record FILE.csv."
-            if m.measured is None
-            else ", nor does the record give one."
-        )
-        return page.section("Fit", page.absent(words + more))
+        if m.result.raw.get("set_ups"):
+            words = "Modes of several set-ups have no fit of their own: see the report of each set-up."
+        elif m.measured is None:
+            words = f"The result holds no fit (a live result keeps no record): the picture {m.needs_record}."
+        else:
+            words = "The result holds no fit (a live result keeps no record), nor does the record give one."
+        return page.section("Fit", page.absent(words))
     drawing = figures.figure(max(4.0, min(9.6, 2.0 + 0.6 * len(names))), 3.0)
     figures.draw_fit(drawing.add_subplot(), names, parts[0], parts[1])
     words = "100 (1 − ‖y − ŷ‖ / ‖y − mean‖). Simulation: from input and initial state; prediction: one step ahead."
+    if m.result.raw.get("responses"):
+        words = "100 (1 − ‖H − Ĥ‖ / ‖H‖) of the responses of each output over the band of the result."
     title = "Fit, computed by this report" if origin else "Fit"
     picture = m.pictures.inline(drawing, "fit percentage of each output")
     return page.section(title, picture, page.note(words + origin), name="Fit")
@@ -54,7 +56,7 @@ def _told(pairs: Sequence[tuple[int, int]], count: int) -> list[int]:
 
 def history_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Section | None:
     """Measured and simulated (ambient: predicted) responses over time with their difference; None without a record."""
-    if m.measured is None:
+    if m.measured is None or m.result.raw.get("responses"):
         return None
     title, excerpt = "Time histories, measured and modelled", m.measured.excerpt
     if excerpt is None:
@@ -74,6 +76,7 @@ def history_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Secti
             error.set_xlabel("time [s]")
     kind = "simulated from the inputs alone" if excerpt.simulated else "predicted one sample ahead"
     where = "around the hardest hit" if excerpt.hit else "where the responses are largest"
+    where += f" ({excerpt.file})" if excerpt.file else ""
     words = f"{len(excerpt.time_s)} samples {where}, {kind}. Shown: {len(shown)} of {len(m.result.outputs)} outputs."
     picture = m.pictures.inline(drawing, "measured and modelled responses over time")
     return page.section(title, picture, page.note(words), name="Time histories")
@@ -87,7 +90,7 @@ def _white_rows(m: Material, white: Whiteness) -> list[list[str]]:
         row = [name, f"{white.rms[k]:.3g}", f"{white.auto[lag, k]:+.3f} at {lag}", f"{within:.0f} %"]
         row.append("< 0.0001" if white.p_value[k] < 1e-4 else f"{white.p_value[k]:.2g}")
         told = white.verdict(k)
-        past = [white.beyond(k, into) for into in range(len(m.result.inputs))]
+        past = [white.beyond(k, into) for into in range(white.cross.shape[2])]
         if past:
             most = max(hits for hits, _ in past)
             row.append(f"{most} of {white.lags + 1}")
@@ -116,7 +119,7 @@ def _white_picture(m: Material, white: Whiteness) -> str:
             into = int(np.argmax(np.max(np.abs(white.cross[:, out]), axis=0)))
             other = drawing.add_subplot(bands, columns, columns * place + 2)
             drawings.draw_cross(other, white, out, into)
-            other.set_title(f"with input {figures.short(m.result.inputs[into])}")
+            other.set_title("with the force" if m.struck else f"with input {figures.short(m.result.inputs[into])}")
         for one in drawing.axes[-2:] if place >= len(shown) - (1 if n_u else columns) else ():
             one.set_xlabel("lag [samples]")
     return m.pictures.inline(drawing, "correlations of the residual")
@@ -124,7 +127,7 @@ def _white_picture(m: Material, white: Whiteness) -> str:
 
 def residual_section(m: Material) -> page.Section | None:
     """Correlations of the innovation with itself and with the inputs; None without a record."""
-    if m.measured is None:
+    if m.measured is None or m.result.raw.get("responses"):
         return None
     title, white = "Residual: is it noise?", m.measured.whiteness
     if white is None:
@@ -143,7 +146,7 @@ def residual_section(m: Material) -> page.Section | None:
             "force. Shown: the input with the largest correlation."
         )
     if m.measured.excerpt is not None and m.measured.excerpt.hit:
-        words += " The force is one hit: its bounds are rough."
+        words += " The force is a hit: its bounds are rough."
     if len(m.result.outputs) > MOST_SHOWN:
         words += f" Pictures: the {MOST_SHOWN} outputs with the largest correlations."
     rows = page.table([*head, "verdict"], _white_rows(m, white), "words")

@@ -26,8 +26,8 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         if "arguments are required" in message:
-            message = f"RESULT.json is missing: an okid.result/1, {MADE_BY}"
-        elif found := re.fullmatch(r"argument (\S+): expected one argument", message):
+            message = f"RESULT.json is missing: an okid.result/1, {MADE_BY}; it is named before --record"
+        elif found := re.fullmatch(r"argument (\S+): expected (?:one|at least one) argument", message):
             message = f"{found[1]} needs {self._wanted[found[1]]} after it"
         print(f"{self.prog}: {message} (example and all options: {self.prog} --help)", file=sys.stderr)
         raise SystemExit(2)
@@ -57,7 +57,11 @@ def _parser() -> _Parser:
         "okid-report r.json --record run.csv --out report.html",
     )
     parser.add_argument("result", metavar="RESULT.json", help="okid.result/1, as `okid identify --json` writes it")
-    parser.add_argument("--record", metavar="FILE", help="the record: adds measured responses, stabilization, residual")
+    parser.add_argument(
+        "--record", metavar="FILE", nargs="+", action="extend", default=[],
+        help="the record, the hits, or the frequency responses that the result is of (one file or several; default: "
+        "the hits that it names): adds measured responses, stabilization, residual",
+    )  # fmt: skip
     parser.add_argument("--events", metavar="FILE.jsonl", help="events of the run: adds completeness, tracking, alarms")
     parser.add_argument("--geometry", metavar="CONFIG.toml", help="its section [geometry]: adds moving mode shapes")
     parser.add_argument("--config", metavar="CONFIG.toml", help="its text goes into the report, its [geometry] too")
@@ -88,7 +92,7 @@ def _page(args: argparse.Namespace, written: str) -> str:
     from okid.report.loaded import load_result
 
     return build(
-        load_result(args.result), args.record, args.title, events=args.events, geometry=args.geometry,
+        load_result(args.result), args.record or None, args.title, events=args.events, geometry=args.geometry,
         config=args.config, compare=args.compare, source=args.result, written=written,
     )  # fmt: skip
 

@@ -18,7 +18,7 @@ def completeness(m: Material) -> list[tuple[str, int, int]]:
             if isinstance(one, dict)
         ]
     if m.measured is not None and m.measured.missing is not None:
-        names, total = m.result.inputs + m.result.outputs, m.measured.samples
+        names, total = m.channels, m.measured.samples
         return [(name, total, total - int(gone)) for name, gone in zip(names, m.measured.missing, strict=True)]
     return []
 
@@ -49,6 +49,8 @@ def losses(m: Material) -> str:
 
 def complete_table(m: Material) -> str:
     rows = completeness(m)
+    if not rows and (m.result.raw.get("responses") or m.result.raw.get("set_ups")):
+        return ""
     if not rows:
         return page.note("Completeness: give --record FILE or --events FILE.jsonl.")
     cells = []

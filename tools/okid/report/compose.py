@@ -3,28 +3,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
 import matplotlib
 
 from okid._errors import InputError
-from okid.data.records import Record
 from okid.data.toml_file import read_toml
 from okid.report import page
 from okid.report.agreement import fit_section, history_section, residual_section
 from okid.report.comparison import Other, comparison_section
 from okid.report.events import read_events
 from okid.report.geometry import read_geometry
+from okid.report.given_records import Given, listed, take_records
 from okid.report.loaded import Loaded, load_result, loaded_from
 from okid.report.mass import mass_section
 from okid.report.material import Material
-from okid.report.measured import measure, measured_from
 from okid.report.modes import shape_sections, table_section
 from okid.report.operating import operating_section
 from okid.report.other_kinds import check_kind
 from okid.report.page import count_of
+from okid.report.places import hits_section, place_section, set_ups_section
 from okid.report.provenance import provenance_section, source_of
 from okid.report.responses import (
     check_section,
@@ -46,19 +46,21 @@ Place = str | Path
 def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]:
     yield summary_section(m)
     yield table_section(m)
+    yield set_ups_section(m)
     yield from shape_sections(m)
     yield comparison_section(m)
+    yield hits_section(m)
     yield from mass_section(m)
     yield tracking_section(m)
     yield stabilization_section(m)
     yield singular_section(m)
     pairs: list[tuple[int, int]] = []
     if m.result.inputs:
-        responses, pairs = frf_section(m)
+        responses, pairs = (place_section if m.struck else frf_section)(m)
         yield responses
         yield check_section(m)
         yield markov_section(m, pairs)
-    else:
+    elif not m.result.raw.get("set_ups"):
         yield spectra_section(m)
         yield operating_section(m)
     yield fit_section(m)
@@ -71,18 +73,18 @@ def _placed(m: Material, geometry: Place | None, config: Place | None) -> None:
     """Geometry and texts of the configurations: [geometry] of `geometry`, else of `config` when it has one."""
     live = {} if m.events is None else m.events.channels
     if geometry is not None:
-        m.geometry = read_geometry(geometry, m.result.places, live, m.result.raw.get("shape_dofs"))
+        m.geometry = read_geometry(geometry, m.result.raw, live)
         if m.geometry is None:
             raise InputError(f"{geometry}: no section [geometry], expected nodes, dofs and lines")
     elif config is not None:
-        m.geometry = read_geometry(config, m.result.places, live, m.result.raw.get("shape_dofs"))
+        m.geometry = read_geometry(config, m.result.raw, live)
     for place in dict.fromkeys(str(one) for one in (config, geometry) if one is not None):
         m.texts.append((place, read_toml(place)[1]))
 
 
 def build(
     result: Loaded,
-    record: Place | Record | None = None,
+    record: Given | Sequence[Given] | None = None,
     title: str | None = None,
     *,
     events: Place | None = None,
@@ -94,15 +96,15 @@ def build(
 ) -> str:
     """The report as one HTML string; the same arguments and files give the same string.
 
-    `record`: a file, or what read_csv returns; `events`: JSON lines of the run; `geometry`, `config`: CONFIG.toml;
-    `compare`: the file of an earlier result; `source`: the file of the result, named in the provenance; `written`:
-    when and by what, None = not told.
+    `record`: a file, what read_csv (of a result of responses: read_frf) returns, or a list of them: every hit of a
+    hammer test, by the names of the files; records that were merged. Without one the hits that the result names are
+    read, where all their files are beside `source` or here. `events`: JSON lines of the run; `geometry`, `config`:
+    CONFIG.toml; `compare`: the file of an earlier result; `source`: the file of the result, named in the provenance;
+    `written`: when and by what, None = not told.
     Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
     """
     m = Material(result)
-    named = record if isinstance(record, str | Path) else None
-    places = {"result": source, "record": named, "events": events, "geometry": geometry, "config": config,
-              "compare": compare}  # fmt: skip
+    places = {"result": source, "events": events, "geometry": geometry, "config": config, "compare": compare}
     for kind, path in places.items():
         if path is not None:
             check_kind(path, {"geometry": "config", "compare": "result"}.get(kind, kind))
@@ -110,17 +112,18 @@ def build(
     m.other = None if compare is None else Other(load_result(compare), Path(compare).name)
     m.events = None if events is None else read_events(events)
     _placed(m, geometry, config)
-    if named is not None:
-        m.measured = measure(result, named)
-    elif isinstance(record, Record):
-        m.measured = measured_from(result, record, "the record given")
-    elif record is not None:
-        raise InputError(f"record is {record!r:.60}, expected the name of a file or what okid.read_csv() returns")
+    taken = take_records(result, record, source)
+    m.measured, m.no_record = taken.measured, taken.absent
+    m.sources[1 if source is not None else 0 : 1 if source is not None else 0] = taken.sources
     with matplotlib.rc_context(cast(Any, figures.STYLE)):
         sections = [one for one in _sections(m, written) if one is not None]
     raw = result.raw
-    subtitle = f"{count_of(len(result.confident), 'confident mode')}, {count_of(len(result.inputs), 'input')}, "
-    subtitle += count_of(len(result.outputs), "output")
+    forces = f"hits at {count_of(len(result.inputs), 'place')}" if m.struck else count_of(len(result.inputs), "input")
+    if result.raw.get("set_ups"):
+        forces = count_of(len(result.raw["set_ups"]), "set-up")
+    subtitle = (
+        f"{count_of(len(result.confident), 'confident mode')}, {forces}, {count_of(len(result.outputs), 'output')}"
+    )
     foot = f"okid {raw.get('version', '')}, schema {raw['schema']}. SI units unless the channel names say otherwise."
     known = m.events.notes.get("title") if m.events is not None else None
     return page.page(title or str(raw.get("title") or known or "Modal identification"), subtitle, sections, foot)
@@ -145,7 +148,7 @@ def _loaded(result: object) -> Loaded:
 def write_report(
     result: Result | Loaded | dict[str, Any] | Place,
     path: Place,
-    record: Place | Record | None = None,
+    record: Given | Sequence[Given] | None = None,
     *,
     title: str | None = None,
     events: Place | None = None,
@@ -162,7 +165,7 @@ def write_report(
     if not isinstance(path, str | Path):
         raise InputError(f"path is {path!r:.60}, expected the name of the HTML file to write")
     source = result if isinstance(result, str | Path) else None
-    named = record if isinstance(record, str | Path) else None
+    named = [one for one in listed(record) if isinstance(one, str | Path)]
     check_target(
         path, {"result": source, "record": named, "events": events, "geometry": geometry, "config": config,
                "compare": compare},

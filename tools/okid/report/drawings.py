@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from okid.frf import Spectra
+from okid.frf import Frf, Spectra
 from okid.modal import normalised
 from okid.report.events import Events, Point
 from okid.report.geometry import Geometry
 from okid.report.measured import Excerpt
 from okid.report.residual import BOUND_95, BOUND_99, Whiteness
-from okid.result.figures import BLUE, DARK, EDGE, FAINT, GREY, ORANGE, RED, log_axis
+from okid.result.figures import BLUE, DARK, EDGE, FAINT, GREEN, GREY, ORANGE, RED, draw_frf, log_axis
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -81,6 +81,28 @@ def draw_spectra(ax: Axes, measured: Spectra, line: Real, model: Complex | None,
     log_axis(ax)
 
 
+def draw_estimators(axes: Sequence[Axes], measured: Frf, line: Real, model: Complex, output: int) -> None:
+    """Responses to one input, as draw_frf(), with H2 and Hv where there is a coherence: H1 / coherence and its mean."""
+    size, coherence = np.abs(measured.response[1:, output, 0]), measured.coherence[1:, output]
+    if np.any(np.isfinite(coherence)):
+        over = np.maximum(np.nan_to_num(coherence, nan=1.0), 1e-6)
+        f = measured.frequency_hz[1:]
+        axes[0].semilogy(f, size / over, color=ORANGE, lw=0.8, label="H2")
+        axes[0].semilogy(f, size / np.sqrt(over), color=GREEN, lw=0.8, label="Hv")
+    draw_frf(axes, measured, line, model, (output, 0))
+
+
+def thinned_peaks(frequency_hz: Real, size: Real) -> tuple[Real, Real]:
+    """At most MOST_POINTS lines; of several in one the largest, so that no resonance is lost."""
+    step = -(-len(size) // MOST_POINTS)
+    if step <= 1:
+        return frequency_hz, size
+    whole = len(size) // step * step
+    blocks = size[:whole].reshape(-1, step)
+    at = np.argmax(blocks, axis=1) + step * np.arange(len(blocks))
+    return frequency_hz[at], size[at]
+
+
 def thinned(points: Sequence[Point]) -> list[Point]:
     """At most MOST_POINTS of them, evenly, first and last kept."""
     if len(points) <= MOST_POINTS:
@@ -121,14 +143,17 @@ def _track_limits(f: Real, std: Real, settled: NDArray[np.bool_]) -> tuple[float
 
 def draw_at_rest_and_moved(ax: Axes, geometry: Geometry, shape: Complex) -> None:
     """One mode on the geometry at its largest beside the structure at rest, seen from the corner (flat: the front)."""
-    turned = normalised(shape)
+    turned = np.nan_to_num(normalised(shape))
     along = (turned * np.exp(-0.5j * np.angle(np.sum(turned**2)))).real
     at_rest = _seen(np.array(geometry.nodes), geometry)
     moved = _seen(geometry.displaced(along / max(float(np.max(np.abs(along))), 1e-300), 0.16), geometry)
+    without = geometry.unknown(shape)
     for points, colour, thick, dash in ((at_rest, FAINT, 0.8, "--"), (moved, BLUE, 1.6, "-")):
         for a, b in geometry.lines:
-            ax.plot(points[[a - 1, b - 1], 0], points[[a - 1, b - 1], 1], color=colour, lw=thick, ls=dash)
-    ax.plot(moved[:, 0], moved[:, 1], "o", color=DARK, ms=2.4)
+            if points is at_rest or not {a, b} & without:
+                ax.plot(points[[a - 1, b - 1], 0], points[[a - 1, b - 1], 1], color=colour, lw=thick, ls=dash)
+    seen = [k for k in range(len(moved)) if k + 1 not in without]
+    ax.plot(moved[seen, 0], moved[seen, 1], "o", color=DARK, ms=2.4)
     both = np.vstack([at_rest, moved])
     centre = (both.min(axis=0) + both.max(axis=0)) / 2.0
     reach = max(0.55 * float(np.max(np.ptp(both, axis=0))), 1e-12)

@@ -1,20 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""The outputs of a result on the geometry of a CONFIG.toml."""
+"""The shapes of a result on the geometry of a CONFIG.toml."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from okid._errors import InputError
-from okid.data.geometry import AXES, geometry_of
+from okid.data.geometry import axis_and_sign, geometry_of
 from okid.data.toml_file import read_toml
+from okid.result.shape_places import places_of_shapes
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 class Geometry(NamedTuple):
@@ -24,55 +25,36 @@ class Geometry(NamedTuple):
     lines: list[tuple[int, int]]
     dofs: list[tuple[int, str] | None]
 
+    def unknown(self, entries: Complex) -> set[int]:
+        """Nodes, from 1, at which a shape has entries but no value: it was not measured there."""
+        known: dict[int, bool] = {}
+        for dof, there in zip(self.dofs, np.isfinite(entries).tolist(), strict=True):
+            if dof is not None:
+                known[dof[0]] = known.get(dof[0], False) or there
+        return {node for node, there in known.items() if not there}
+
     def displaced(self, entries: Real, swing: float) -> Real:
-        """Nodes (n, 3) moved by the entries (outputs,) of a shape; entry 1 moves by `swing` of the structure's size."""
+        """Nodes (n, 3) moved by the entries (places,) of a shape; entry 1 moves by `swing` of the structure's size, one
+        that was not measured (NaN) not at all."""
         at = np.array(self.nodes, dtype=np.float64)
         size = float(np.linalg.norm(np.ptp(at, axis=0))) or 1.0
         for dof, entry in zip(self.dofs, entries.tolist(), strict=True):
-            if dof is not None:
-                sign = -1.0 if dof[1].startswith("-") else 1.0
-                at[dof[0] - 1, AXES.index(dof[1][-1])] += sign * swing * size * entry
+            if dof is not None and np.isfinite(entry):
+                axis, sign = axis_and_sign(dof[1])
+                at[dof[0] - 1, axis] += sign * swing * size * entry
         return at
 
 
 def read_geometry(
-    path: str | Path,
-    outputs: Sequence[str],
-    live: Mapping[str, Mapping[str, Any]] | None = None,
-    shape_dofs: Sequence[int] | None = None,
+    path: str | Path, raw: Mapping[str, Any], live: Mapping[str, Mapping[str, Any]] | None = None
 ) -> Geometry | None:
-    """[geometry] of a CONFIG.toml for these outputs, None when the file has none.
+    """[geometry] of a CONFIG.toml for the shapes of an okid.result/1, None when the file has none.
 
-    dofs[k] is the place of degree of freedom k + 1; the `dof` of an output's [[channel]] says which is its own
-    (negative: reversed), else that of the channel in the events of a run (`live`, by name). Without such numbers the
-    outputs count in their order. `shape_dofs`: of a roving hammer, the numbers themselves. InputError names file and
-    key.
+    dofs[k] is the place of degree of freedom k + 1. Which one an output is at says the `dof` of its [[channel]], else
+    that of the channel in the events of a run (`live`, by name), else `output_dofs` of the result; without such numbers
+    the outputs count in their order. Of a roving hammer the places are the numbers. InputError names file and key.
     """
-    source = str(path)
-    given = geometry_of(read_toml(path)[0], source)
+    given = geometry_of(read_toml(path)[0], str(path))
     if given is None:
         return None
-    dofs, numbers = given.dofs, given.channel_dofs
-    if not numbers:
-        found = {name: one.get("dof") for name, one in (live or {}).items()}
-        numbers = {name: dof for name, dof in found.items() if isinstance(dof, int) and dof != 0}
-    known: list[int | None] = list(shape_dofs) if shape_dofs else [numbers.get(name) for name in outputs]
-    if all(number is None for number in known):
-        if len(dofs) != len(outputs):
-            raise InputError(
-                f"{source}: [geometry] dofs has {len(dofs)} places and the result {len(outputs)} outputs: give every "
-                'output its number by the key "dof" of [[channel]]'
-            )
-        known = list(range(1, len(outputs) + 1))
-    placed: list[tuple[int, str] | None] = []
-    for name, number in zip(outputs, known, strict=True):
-        if number is not None and abs(number) > len(dofs):
-            raise InputError(
-                f"{source}: {'place' if shape_dofs else 'channel'} {name!r} is at dof {number}, but [geometry] dofs "
-                f"has {len(dofs)} places"
-            )
-        place = None if number is None else dofs[abs(number) - 1]
-        if place is not None and number is not None and number < 0:
-            place = (place[0], place[1][1:] if place[1].startswith("-") else f"-{place[1]}")
-        placed.append(place)
-    return Geometry(given.nodes, given.lines, placed)
+    return Geometry(given.nodes, given.lines, places_of_shapes(given, raw, live))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,7 +19,7 @@ from okid.report.answers import Answer, answers, detrended, fit_of
 from okid.report.loaded import Loaded, known_fit
 from okid.report.residual import Whiteness, whiteness
 from okid.report.scale import Agreement, agreement
-from okid.result.parts import Fit
+from okid.result.parts import Fit, Mode
 from okid.result.stabilization import Stabilization
 
 Real = NDArray[np.float64]
@@ -36,6 +37,14 @@ class Excerpt(NamedTuple):
     modelled: Real
     simulated: bool
     hit: bool
+    file: str = ""  # of several records
+
+
+class Struck(NamedTuple):
+    """Of a hammer test in files: `averages` of each place (input) and the coherence (F, n_y, places) of its hits."""
+
+    averages: list[int]
+    coherence: Real
 
 
 @dataclass
@@ -45,13 +54,15 @@ class Measured:
     missing (channels,): samples of the record that are missing, inputs first; samples: rows of the record; part: which
     of them everything else is made of, "" = all; record: the whole record, its channels as the model has them;
     factor (n_y,): simulation over record, NaN = not comparable; converted: what was said of units that were made SI;
-    simulated: the responses of the simulated outputs, estimated as frf is.
+    simulated: the responses of the simulated outputs, estimated as frf is (of measured responses: synthesised); rows:
+    None = no diagram; fit: None = that of the result stands; struck: of a hammer test in files; own_modes: what the
+    responses give by themselves, None = nobody has looked.
     """
 
     frf: Frf | None
     no_frf: str
-    rows: Stabilization
-    fit: Fit
+    rows: Stabilization | None
+    fit: Fit | None
     source: str
     spectra: Spectra | None = None
     innovation: Real | None = None
@@ -64,6 +75,8 @@ class Measured:
     factor: Real | None = None
     converted: list[str] = field(default_factory=list)
     simulated: Frf | None = None
+    struck: Struck | None = None
+    own_modes: list[Mode] | None = None
 
 
 def open_record(path: str | Path) -> Record:
@@ -75,9 +88,9 @@ def open_record(path: str | Path) -> Record:
     return read_record(path)
 
 
-def _channels(result: Loaded, record: Record, source: str) -> Record:
+def channels_of(result: Loaded, record: Record, source: str, names: list[str] | None = None) -> Record:
     """The channels of the result in its order, inputs first. InputError when a name is missing or the rate another."""
-    own = record.select(result.inputs + result.outputs, source)
+    own = record.select(names or result.inputs + result.outputs, source)
     if record.fs_hz is not None and abs(record.fs_hz - result.fs) > 1e-3 * result.fs:
         raise InputError(
             f"{source}: sampled at {record.fs_hz:g} Hz, but the result is of {result.fs:g} Hz: "
@@ -105,8 +118,9 @@ def _poles(result: Loaded, u: Real, y: Real, source: str) -> Stabilization:
         raise type(fault)(f"{source}: {fault}", fault.status) from None
 
 
-def _excerpt(result: Loaded, answered: list[Answer]) -> Excerpt | None:
-    """About twelve periods of the lowest mode, 120 to 600 samples, where the responses are largest."""
+def excerpt_of(result: Loaded, answered: Sequence[Answer], files: Sequence[str] = ()) -> Excerpt | None:
+    """About twelve periods of the lowest mode, 120 to 600 samples, where the responses are largest. `files`: names."""
+    names = files or [""] * len(answered)
     usable = [one for one in answered if one.simulated is not None or one.predicted is not None]
     if not usable:
         return None
@@ -128,10 +142,11 @@ def _excerpt(result: Loaded, answered: list[Answer]) -> Excerpt | None:
     if not np.all(np.isfinite(modelled[part])):
         return None  # an unstable model runs away
     time = (best.first + np.arange(part.start, part.stop)) / result.fs
-    return Excerpt(time, best.y[part], modelled[part], best.simulated is not None, hit)
+    file = next(name for name, one in zip(names, answered, strict=True) if one is best)
+    return Excerpt(time, best.y[part], modelled[part], best.simulated is not None, hit, file)
 
 
-def _residual(result: Loaded, answered: list[Answer]) -> tuple[Whiteness | None, Real | None]:
+def residual_of(result: Loaded, answered: Sequence[Answer]) -> tuple[Whiteness | None, Real | None]:
     """Correlations of the innovation, and its covariance (n_y, n_y); the predictor settles first."""
     settle = 5 * len(result.matrices["A"])
     pieces = []
@@ -189,7 +204,7 @@ def _simulated_frf(result: Loaded, data: Real, answered: list[Answer], frf: Frf 
 
 def measured_from(result: Loaded, record: Record, source: str) -> Measured:
     """The same from a record that is already read."""
-    own = _channels(result, record, source)
+    own = channels_of(result, record, source)
     missing, rows = np.sum(~np.isfinite(own.samples), axis=0), len(own.samples)
     used, part = _used_rows(result, rows)
     n_u, detrend = len(result.inputs), str(result.raw.get("detrend", "mean"))
@@ -201,8 +216,8 @@ def measured_from(result: Loaded, record: Record, source: str) -> Measured:
     responses, own_spectra, reason = _answering(result, u, y)
     data = detrended(np.hstack([u, y]), detrend)
     answered = answers(model, predict, data, n_u)
-    white, covariance = _residual(result, answered)
-    excerpt = _excerpt(result, answered)
+    white, covariance = residual_of(result, answered)
+    excerpt = excerpt_of(result, answered)
     if excerpt is not None:
         excerpt = excerpt._replace(time_s=excerpt.time_s + used.start / result.fs)
     return Measured(

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from okid import modal
-from okid.data.geometry import AXES
-from okid.formats.uff import mode_sets
+from okid.formats.uff import mode_sets, nodes_of, shape_places
 from okid.formats.uff_model import lines_text, nodes_text, units_text
 from okid.report import drawings, page
 from okid.report.material import Material
@@ -73,9 +74,8 @@ def against(mode: dict[str, Any]) -> str:
 def _save(m: Material) -> str:
     """Buttons that save the chosen modes, and what they save."""
     whole = {**m.result.whole, "markov": None, "singular_values": None}
-    geometry, count = m.geometry, len(m.result.places)
-    dofs = [(k + 1, "x") for k in range(count)] if geometry is None else geometry.dofs
-    places = [None if dof is None else (dof[0], AXES.index(dof[1][-1]), -1 if dof[1][0] == "-" else 1) for dof in dofs]
+    geometry = m.geometry
+    places = shape_places(m.result.raw) if geometry is None else nodes_of(geometry.dofs)
     head = units_text() + ("" if geometry is None else nodes_text(geometry.nodes) + lines_text(geometry.lines))
     sets = mode_sets(m.result.raw, places)
     buttons = "".join(
@@ -105,11 +105,19 @@ def _sticks(m: Material) -> list[str]:
         damping = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
         title = f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz, {damping:.2f} %"
         figures.draw_shape(drawing.add_subplot(bands, columns, place), m.result.shapes[k], m.result.places, title)
-    words = "Sign from the real part, largest entry 1, outputs in their order."
+    along = "the numbers are the places" if m.result.raw.get("shape_dofs") else "outputs in their order"
+    words = f"Sign from the real part, largest entry 1, {along}."
+    if not np.all(np.isfinite(m.result.shapes[shown])):
+        words += " A place without a bar was not measured."
     count = len(m.result.confident)
     if count > len(shown):
         words += f" The {len(shown)} of {count} confident modes with the highest EMAC are shown."
     return [m.pictures.inline(drawing, "mode shapes against the outputs"), page.note(words)]
+
+
+def _rounded(values: Any) -> list[float | None]:
+    """As JSON has them; an entry that was not measured is null."""
+    return [round(float(x), 5) if np.isfinite(x) else None for x in values]
 
 
 def _player(m: Material) -> list[str]:
@@ -128,7 +136,7 @@ def _player(m: Material) -> list[str]:
             "nodes": geometry.nodes, "lines": geometry.lines, "dofs": geometry.dofs, "names": result.places,
         },
         "shapes": [
-            {"re": [round(float(x), 5) for x in shape.real], "im": [round(float(x), 5) for x in shape.imag]}
+            {"re": _rounded(shape.real), "im": _rounded(shape.imag)}
             for shape in result.shapes[chosen]
         ],
     }  # fmt: skip
@@ -147,7 +155,8 @@ def _player(m: Material) -> list[str]:
         drawings.draw_at_rest_and_moved(ax, geometry, result.shapes[k])
         ax.set_title(f"{k + 1}: {result.frequency_hz[k]:.2f} Hz")
     absent = [name for name, dof in zip(result.places, geometry.dofs, strict=True) if dof is None]
-    words = "Dashed: at rest." + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
+    gaps = "" if np.all(np.isfinite(result.shapes[chosen])) else " A node that was not measured is not drawn."
+    words = f"Dashed: at rest.{gaps}" + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
     return [live, m.pictures.inline(drawing, "still pictures of the mode shapes", "still"), page.note(words)]
 
 
@@ -156,7 +165,11 @@ def shape_sections(m: Material) -> list[page.Section]:
     if not len(m.result.shapes):
         return []
     moving = _player(m) if m.geometry is not None else []
-    parts = [*moving, *([page.heading("By output")] if moving else []), *_sticks(m)]
+    parts = [
+        *moving,
+        *([page.heading("By place" if m.result.raw.get("shape_dofs") else "By output")] if moving else []),
+        *_sticks(m),
+    ]
     out = [page.section("Mode shapes", *parts, name="Shapes")]
     if len(m.result.places) < 2:
         return out

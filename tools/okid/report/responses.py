@@ -10,18 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import Error
-from okid.frf import cmif, synthesise, synthesise_spectra
+from okid.frf import cmif, synthesise_spectra
 from okid.modal import mac
 from okid.record.identify_frf import identify_frf
 from okid.report import drawings, page
 from okid.report.material import Material
+from okid.report.response_fit import explained_percent, picture_lines, reach_hz, synthesised_at
 from okid.result import figures
+from okid.result.shape_places import struck_at
 from okid.result.stabilization import Stabilization
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 MOST_PAIRS = 4
-LINES = 1200  # of a synthesised response
+MOST_ROWS = 60  # of the table of pairs
 
 
 def singular_section(m: Material) -> page.Section:
@@ -54,13 +56,17 @@ def _background(m: Material) -> tuple[Real, Real] | None:
 def _how_to_read(m: Material, rows: Stabilization) -> list[str]:
     """The caption of the diagram, for somebody who sees one for the first time."""
     order, tried, limits = int(m.result.raw["order"]), sorted({row.order for row in rows}), rows.criteria
+    again, two = "the record was identified again with orders", " (a mode takes two)"
+    line = f"Blue dashed line: order {order}, that of the model of this report; green"
+    if m.struck or m.result.raw.get("responses"):
+        again, two, line = "matrix fractions (pLSCF) were fitted to the measured responses, with degrees", "", "Green"
     words = [
-        f"How to read it: the record was identified again with orders from {tried[0]} to {tried[-1]} (a mode takes "
-        "two). A mark is a pole: a mode that the model of this order has at this frequency. Modes of the "
-        "structure appear at every order and form a column of green dots; poles of noise scatter.",
-        f"Blue dashed line: order {order}, that of the model of this report; green vertical lines: the "
-        f"{page.count_of(len(m.result.frequency_hz), 'mode')} of it. A column without a green line is a mode that the "
-        "model lacks (try a higher order), a green line without a column is a doubtful mode.",
+        f"How to read it: {again} from {tried[0]} to {tried[-1]}{two}. A mark is a pole: a mode that the model of "
+        "this order has at this frequency. Modes of the structure appear at every order and form a column of "
+        "green dots; poles of noise scatter.",
+        f"{line} vertical lines: the {page.count_of(len(m.result.frequency_hz), 'mode')} of this report. A column "
+        "without a green line is a mode that the model lacks (try a higher order), a green line "
+        "without a column is a doubtful mode.",
         "Marks: a value is stable when the next lower order has a pole near it, within "
         f"{100.0 * limits.frequency:g} % in frequency, {100.0 * limits.damping:g} % in damping and with the same shape "
         f"(MAC ≥ {limits.mac:g}). Green dot: all three are stable. Blue triangle: frequency and shape, the damping "
@@ -78,9 +84,10 @@ def _how_to_read(m: Material, rows: Stabilization) -> list[str]:
 def stabilization_section(m: Material) -> page.Section:
     """Poles over frequency and order with the modes of the result."""
     title = "Stabilization diagram"
-    if m.measured is None:
-        absent = page.absent("Needs the record: run okid-report again with --record FILE.csv.")
-        return page.section(title, absent, name="Stabilization")
+    if m.measured is None or m.measured.rows is None:
+        why = m.needs_record if m.measured is None else "is left out: the responses by themselves give no stable model"
+        return page.section(title, page.absent(f"The diagram {why}."), name="Stabilization")
+    of_responses = m.struck or bool(m.result.raw.get("responses"))
     drawing = figures.figure(9.6, 4.8)
     behind = _background(m)
     figures.draw_stabilization(
@@ -89,7 +96,7 @@ def stabilization_section(m: Material) -> page.Section:
         m.result.shown_hz,
         m.result.frequency_hz.tolist(),
         behind,
-        int(m.result.raw["order"]),
+        None if of_responses else int(m.result.raw["order"]),
     )
     picture = m.pictures.inline(drawing, "poles over frequency and model order")
     return page.section(title, picture, *map(page.note, _how_to_read(m, m.measured.rows)), name="Stabilization")
@@ -124,9 +131,10 @@ def arranged(count: int) -> tuple[int, int]:
 
 def _frf_title(m: Material, pair: tuple[int, int]) -> str:
     out, into = m.result.outputs[pair[0]], m.result.inputs[pair[1]]
+    struck = struck_at(into) if m.struck else None
     units = [m.unit(out), m.unit(into)]
     unit = f"  [({units[0]})/{units[1]}]" if all(units) else ""
-    return f"{figures.short(out)} / {figures.short(into)}{unit}"
+    return f"{figures.short(out)} / {figures.short(into) if struck is None else f'place {struck[1]}'}{unit}"
 
 
 def _frf_words(m: Material, shown: int, with_coherence: bool) -> str:
@@ -137,8 +145,10 @@ def _frf_words(m: Material, shown: int, with_coherence: bool) -> str:
     if measured is not None and measured.frf is None:
         return f"{words} Model only, the measured responses are left out: {measured.no_frf}."
     if measured is None or measured.frf is None:
-        return f"{words} Model only: the measured response and the coherence need --record FILE.csv."
+        return f"{words} Model only. Measured responses: the picture {m.needs_record}."
     data = measured.frf
+    if m.result.raw.get("responses"):
+        return f"{words} Measured: as the files have them, {len(data.frequency_hz)} lines."
     averages = page.count_of(data.averages, "average")
     words += f" Measured: H1, {averages}, {data.resolution_hz:.3g} Hz lines; multiple coherence."
     return words + ("" if with_coherence else " Too few averages for a coherence.")
@@ -146,9 +156,7 @@ def _frf_words(m: Material, shown: int, with_coherence: bool) -> str:
 
 def frf_section(m: Material) -> tuple[page.Section, list[tuple[int, int]]]:
     """Frequency responses of the chosen pairs, and which those are."""
-    a, raw = m.result.matrices, m.result.raw
-    line = np.linspace(m.result.shown_hz / 2000.0, m.result.shown_hz, LINES)
-    model = synthesise(a["A"], a["B"], a["C"], a["D"], float(raw["model"]["dt"]), line)
+    line, model = synthesised_at(m.result, m.result.shown_hz)
     data = None if m.measured is None else m.measured.frf
     pairs = choose_pairs(model if data is None else data.response[1:], None if data is None else data.coherence[1:])
     with_coherence = data is not None and bool(np.any(np.isfinite(data.coherence)))
@@ -172,7 +180,25 @@ def frf_section(m: Material) -> tuple[page.Section, list[tuple[int, int]]]:
     text = "frequency responses of the model" + ("" if data is None else " and of the record")
     picture = m.pictures.inline(drawing, text)
     words = page.note(_frf_words(m, len(pairs), with_coherence))
-    return page.section(title, picture, words, name="Responses"), pairs
+    return page.section(title, picture, words, *_every_pair(m), name="Responses"), pairs
+
+
+def _every_pair(m: Material) -> list[str]:
+    """A table of all responses where the file gave them; the worst of very many."""
+    if m.measured is None or m.measured.frf is None or not m.result.raw.get("responses"):
+        return []
+    explained = explained_percent(m.measured, m.result)
+    order = np.argsort(explained, axis=None, kind="stable")
+    rows = [
+        [m.result.outputs[o], m.result.inputs[k], f"{explained[o, k]:.1f}"]
+        for o, k in sorted(divmod(int(one), explained.shape[1]) for one in order[:MOST_ROWS])
+    ]
+    words = f"Explained: 100 (1 − ‖H − Ĥ‖/‖H‖) up to {reach_hz(m.result):.4g} Hz, Ĥ synthesised from the result."
+    if len(order) > len(rows):
+        words += f" The {len(rows)} of {len(order)} pairs that fit worst."
+    size = len(rows) if len(rows) <= 12 else -(-len(rows) // 3)
+    head = ["response", "force", "explained [%]"]
+    return [page.beside(*(page.table(head, rows[k : k + size]) for k in range(0, len(rows), size))), page.note(words)]
 
 
 def _around(m: Material, k: int, line: Real) -> NDArray[np.bool_]:
@@ -186,11 +212,13 @@ def check_section(m: Material) -> page.Section | None:
     responses themselves have it. None without measured responses."""
     if m.measured is None or m.measured.frf is None or m.measured.simulated is None or not m.result.confident:
         return None
-    data, made = m.measured.frf, m.measured.simulated
-    try:
-        own = identify_frf(data, band=(0.0, min(m.result.shown_hz, 0.98 * m.result.fs / 2.0))).confident_modes
-    except Error:
-        own = []
+    data, made, own = m.measured.frf, m.measured.simulated, m.measured.own_modes
+    of_responses = bool(m.result.raw.get("responses"))
+    if own is None and not of_responses:
+        try:
+            own = identify_frf(data, band=(0.0, min(m.result.shown_hz, 0.98 * m.result.fs / 2.0))).confident_modes
+        except Error:
+            own = []
     scale = np.maximum(np.linalg.norm(data.response, axis=0), 1e-300)
     rows = []
     for k in m.result.confident:
@@ -199,13 +227,23 @@ def check_section(m: Material) -> page.Section | None:
         size = float(np.linalg.norm(whole))
         share = 100.0 * (1.0 - float(np.linalg.norm(left)) / size) if size > 0.0 else 0.0
         f, zeta = float(m.result.frequency_hz[k]), float(m.result.raw["modes"][k]["damping_ratio"])
-        close = [one for one in own if abs(one.frequency_hz / f - 1.0) < max(0.02, 2.0 * zeta)]
+        row = [str(k + 1), f"{f:.4f}", f"{100.0 * zeta:.3f}", f"{share:.1f} %"]
+        if own is None:
+            rows.append(row)
+            continue
+        there = [one for one in own if len(one.shape) == len(m.result.places)]
+        close = [one for one in there if abs(one.frequency_hz / f - 1.0) < max(0.02, 2.0 * zeta)]
         best = max(close, key=lambda one: mac(one.shape, m.result.shapes[k]), default=None)
         told = ["–"] * 3
-        if best is not None and len(best.shape) == len(m.result.places):
+        if best is not None:
             told = [f"{best.frequency_hz:.4f}", f"{100.0 * best.damping_ratio:.3f}",
                     f"{mac(best.shape, m.result.shapes[k]):.3f}"]  # fmt: skip
-        rows.append([str(k + 1), f"{f:.4f}", f"{100.0 * zeta:.3f}", f"{share:.1f} %", *told])
+        rows.append([*row, *told])
+    if own is None:
+        words = "Explained: 100 (1 − ‖H − Ĥ‖/‖H‖) over two half-power widths around the mode, Ĥ of the result."
+        words += " A window makes a measured resonance wider; the damping of the result is without it."
+        table = page.table(["mode", "f [Hz]", "ζ [%]", "explained"], rows)
+        return page.section("Check in the frequency domain", table, page.note(words), name="Check")
     head = ["mode", "f [Hz]", "ζ [%]", "H1 explained", "f of H1 [Hz]", "ζ of H1 [%]", "MAC"]
     words = (
         "H1 explained: 100 (1 − ‖H − Ĥ‖/‖H‖) over two half-power widths around the mode, Ĥ estimated from the "
@@ -227,11 +265,10 @@ def spectra_section(m: Material) -> page.Section:
     """Spectra of the outputs of an ambient record, measured and of the innovation model."""
     title, data = "Spectra of the outputs", None if m.measured is None else m.measured.spectra
     if data is None:
-        why = "need the record: run okid-report again with --record FILE.csv"
-        why = why if m.measured is None else f"are left out: {m.measured.no_frf}"
-        return page.section(title, page.absent(f"The spectra {why}."), name="Spectra")
+        why = m.needs_record if m.measured is None else f"is left out: {m.measured.no_frf}"
+        return page.section(title, page.absent(f"The picture {why}."), name="Spectra")
     assert m.measured is not None
-    line = np.linspace(m.result.shown_hz / 2000.0, m.result.shown_hz, LINES)
+    line = picture_lines(m.result.shown_hz)
     model, usable = m.result.model()
     made = None
     if usable and m.measured.innovation is not None:

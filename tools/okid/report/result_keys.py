@@ -15,7 +15,8 @@ NEEDED = (
 _TOP = {
     "fs_hz": "rate", "samples": "count", "records": "count?", "gaps": "count?", "inputs": "names", "outputs": "names",
     "judged_samples": "count?", "p": "count?", "rows": "count?", "order": "count", "method": "text?", "hold": "text?",
-    "shape_dofs": "numbers?", "hits": "objects?",
+    "shape_dofs": "numbers?", "hits": "objects?", "input_dofs": "numbers?", "output_dofs": "numbers?",
+    "set_ups": "objects?",
     "detrend": "text?", "start": "text?", "version": "text?", "singular_values": "numbers?", "model": "object",
     "markov": "object?", "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
 }  # fmt: skip
@@ -26,6 +27,11 @@ _MODE = {
     "cmi": "number?", "confident": "flag?", "found_in": "number?", "why": "list?",
     "why_text": "list?",
 }  # fmt: skip
+_HIT = {
+    "file": "text", "place": "number", "accepted": "flag", "reason": "text?", "text": "text?", "peak": "number?",
+    "duration_s": "number?", "band_hz": "number?",
+}  # fmt: skip
+_SET_UP = {"name": "text", "outputs": "names"}
 _FIT = {"simulation_percent": "by name?", "prediction_percent": "by name?"}
 _MKR = {
     "M": "matrix", "K": "matrix", "R": "matrix", "R_normal_modes": "matrix", "checks": "object",
@@ -110,6 +116,14 @@ def check_keys(raw: Any, source: str) -> None:
                 raise InputError(f"{source}: modes[{number}].{key} {text}")
         if mode["frequency_hz"] <= 0:
             raise InputError(f"{source}: modes[{number}].frequency_hz is {mode['frequency_hz']!r}, expected Hz above 0")
+    for key, kinds in (("hits", _HIT), ("set_ups", _SET_UP)):
+        for number, one in enumerate(raw.get(key) or []):
+            _check(one, kinds, f"{key}[{number}].", source)
+    for key, of in (("input_dofs", "inputs"), ("output_dofs", "outputs")):
+        if raw.get(key) and len(raw[key]) != len(raw[of]):
+            raise InputError(
+                f"{source}: {key} has {len(raw[key])} numbers, expected {len(raw[of])}, one for each of {of}"
+            )
     _check(raw.get("fit") or {}, _FIT, "fit.", source)
     if raw.get("mkr") and raw.get("pdc"):
         _check(raw["mkr"], _MKR, "mkr.", source)

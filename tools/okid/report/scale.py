@@ -39,10 +39,9 @@ def _factors(model: Model, u: Real, y: Real) -> Real:
     The beginning, where the unknown initial state acts, is left out unless the force is a hit. NaN where the
     correlation is below 0.9.
     """
-    n_y = y.shape[1]
     radius = model.radius()
     settle = math.ceil(math.log(1e-3) / math.log(radius)) if 0.0 < radius < 1.0 else 0
-    sums = np.zeros((3, n_y))
+    sums = np.zeros((3, y.shape[1]))
     for piece in stretches(u, max(20, 2 * model.order)):
         skip = 0 if is_hit(u[piece]) else min(settle, (piece.stop - piece.start) // 4)
         made, there = model.simulate(u[piece])[skip:], y[piece][skip:]
@@ -50,7 +49,12 @@ def _factors(model: Model, u: Real, y: Real) -> Real:
         made, there = np.where(use, made, 0.0), np.where(use, there, 0.0)
         with np.errstate(over="ignore", invalid="ignore"):
             sums += np.array([np.sum(made * there, axis=0), np.sum(there**2, axis=0), np.sum(made**2, axis=0)])
-    out = np.full(n_y, np.nan)
+    return factor_of(sums)
+
+
+def factor_of(sums: Real) -> Real:
+    """Of sums (3, n_y) of simulation times record, record squared, simulation squared; NaN where they do not agree."""
+    out = np.full(sums.shape[1], np.nan)
     usable = np.all(np.isfinite(sums), axis=0) & (sums[1] > 0.0) & (sums[2] > 0.0)
     across, own, other = sums[:, usable]
     factor = across / own

@@ -11,6 +11,7 @@ from okid.report.material import Material
 from okid.report.page import count_of
 from okid.report.result_warnings import warning_list
 from okid.report.verdict import verdict
+from okid.result.shape_places import struck_at
 
 WORDS = ("title", "structure", "operator", "notes")
 
@@ -23,9 +24,34 @@ def _notes(m: Material) -> dict[str, str]:
 
 
 def _method(r: dict[str, Any]) -> str:
+    if r.get("method") in ("plscf", "poser"):
+        said = "degrees, weights and normalisations of matrix fractions" if r["method"] == "plscf" else "set-ups"
+        return f"{r['method']}: what several {said} agree on; order {r['order']}"
     if r["p"] is None and r["rows"] is None:
         return f"{r.get('method', '–')}: what several methods, horizons and rates agree on; order {r['order']}"
     return f"{r.get('method', '–')}, p = {r['p']}, {r['rows']} block rows, order {r['order']}"
+
+
+def _amount(m: Material) -> list[tuple[str, str]]:
+    """How much was measured."""
+    r = m.result.raw
+    count, records = int(r["samples"]), r.get("records", 1)
+    if r.get("responses"):
+        band = r.get("band_hz") or []
+        where = f" from {band[0]:.4g} to {band[1]:.4g} Hz" if len(band) == 2 else ""
+        return [("Responses", f"{count} lines{where}" + (f", {records} set-ups" if records > 1 else ""))]
+    of = count_of(records, "set-up" if r.get("set_ups") else "record")
+    seconds = count / m.result.fs
+    return [("Samples", f"{count} at {m.result.fs:g} Hz ({seconds:.2f} s) in {of}"), ("Gaps", f"{r.get('gaps', 0)}")]
+
+
+def _forces(m: Material) -> str:
+    if m.struck:
+        ends = [struck_at(name) or (name, 0) for name in m.result.inputs]
+        return f"{ends[0][0]}, roving over {len(ends)} places ({', '.join(str(place) for _, place in ends)})"
+    if m.result.raw.get("set_ups"):
+        return "none in the result: the modes of several set-ups"
+    return ", ".join(m.result.inputs) or "none: ambient"
 
 
 def _facts(m: Material) -> list[tuple[str, str]]:
@@ -40,22 +66,20 @@ def _facts(m: Material) -> list[tuple[str, str]]:
     elif record is not None and record.start_time is not None:
         rows.append(("Begun", record.start_time.isoformat()))
     stamped = None if m.events is None else m.events.stamped_hz
-    seconds = int(r["samples"]) / m.result.fs
+    rows += [*_amount(m), *([] if stamped is None else [("Rate by the stamps", f"{stamped:.6g} Hz")])]
+    hits = r.get("hits") or []
     rows += [
-        (
-            "Samples",
-            f"{r['samples']} at {m.result.fs:g} Hz ({seconds:.2f} s) in {count_of(r.get('records', 1), 'record')}",
-        ),
-        *([] if stamped is None else [("Rate by the stamps", f"{stamped:.6g} Hz")]),
-        ("Gaps", f"{r.get('gaps', 0)}"),
-        ("Inputs", ", ".join(m.result.inputs) or "none: ambient"),
+        *([("Hits", f"{sum(bool(one.get('accepted')) for one in hits)} of {len(hits)} used")] if hits else []),
+        ("Inputs", _forces(m)),
         ("Outputs", ", ".join(m.result.outputs)),
         *([("Left out", f"{', '.join(m.result.left_out)} (screened: see the warnings)")] if m.result.left_out else []),
         ("Method", _method(r)),
-        ("Treatment", f"hold {r.get('hold', '–')}, detrend {r.get('detrend', '–')}, start {r.get('start', 'moving')}"),
     ]
+    if not r.get("responses"):
+        said = f"hold {r.get('hold', '–')}, detrend {r.get('detrend', '–')}, start {r.get('start', 'moving')}"
+        rows.append(("Treatment", said))
     if m.measured is not None:
-        rows.append(("Record", m.measured.source))
+        rows.append(("File" if r.get("responses") else "Record", m.measured.source))
         rows += [("Looked at", m.measured.part)] if m.measured.part else []
     return rows
 

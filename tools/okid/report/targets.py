@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from okid._errors import InputError
@@ -51,16 +51,17 @@ def check_place(target: Place, option: str, kind: str = ".html") -> None:
         raise PermissionError(errno.EACCES, text, str(target))
 
 
-def check_target(target: Place, inputs: Mapping[str, Place | None], kind: str = ".html") -> None:
+def check_target(target: Place, inputs: Mapping[str, Place | Sequence[Place] | None], kind: str = ".html") -> None:
     """InputError when `target` is one of the files `inputs` (what for -> name), has the name of the other kind, or
     exists and is not of this kind.
 
     `kind`: ".html" or ".pdf". An existing file may always be replaced when its name ends so (HTML: .htm too).
     """
     goal = Path(target)
-    for what, path in inputs.items():
-        if path is not None and _same(goal, Path(path)):
-            raise InputError(f"{target}: {_READ[what]}, a report does not overwrite it: give another name")
+    for what, given in inputs.items():
+        for path in [given] if isinstance(given, str | Path) else given or ():
+            if _same(goal, Path(path)):
+                raise InputError(f"{target}: {_READ[what]}, a report does not overwrite it: give another name")
     if kind == ".html" and goal.suffix.lower() == ".pdf":
         raise InputError(
             f"{target}: the page is HTML, expected a name that ends in .html; --pdf {target} prints it too"

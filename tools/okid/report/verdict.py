@@ -16,6 +16,7 @@ from okid.report.page import count_of
 from okid.report.result_warnings import warning_doubt
 from okid.report.stamps import foreign_doubts, rate_doubt, rate_unseen
 
+NOT_OF_RESPONSES = ("completeness", "units", "whiteness of the residual", "rate by the time stamps")
 MOST_WORDS = 4  # doubts that are named in the verdict, besides those on the time stamps and the warnings
 
 
@@ -41,7 +42,7 @@ def headline(m: Material) -> str:
 
 def _simulated(m: Material) -> list[float | None]:
     """Simulation fits of the outputs: of the record when it is given, else those of the result."""
-    if m.measured is not None:
+    if m.measured is not None and m.measured.fit is not None:
         return list(m.measured.fit.simulation_percent.values())
     return known_fit(m.result.raw, "simulation_percent")
 
@@ -55,7 +56,7 @@ def _scale_doubts(m: Material) -> list[str]:
 
 def _order_doubts(m: Material) -> list[str]:
     """Modes that the diagram holds and the model lacks, and the order that has them."""
-    if m.measured is None:
+    if m.measured is None or m.measured.rows is None:
         return []
     order = int(m.result.raw["order"])
     lost = missed_modes(m.measured.rows, m.result.frequency_hz)
@@ -74,7 +75,8 @@ def _model_doubts(m: Material) -> list[str]:
     out = _scale_doubts(m) + _order_doubts(m)
     fits = [value for value in _simulated(m) if value is not None]
     if fits and min(fits) < 80.0:
-        out.append(f"the simulation explains only {min(fits):.1f} % of an output")
+        what = "the responses" if raw.get("responses") else "an output"
+        out.append(f"the simulation explains only {min(fits):.1f} % of {what}")
     checks = (raw.get("mkr") or {}).get("checks") or {}
     bad = [x for x, key in (("M", "m_positive_definite"), ("K", "k_positive_definite")) if checks.get(key) is False]
     if bad:
@@ -118,18 +120,20 @@ def _doubts(m: Material) -> str:
 
 def _looked_at(m: Material) -> tuple[list[str], dict[str, list[str]]]:
     """What the verdict rests on, and by reason what it does not."""
+    of_responses = bool(m.result.raw.get("responses"))
     seen, unseen = ["warnings of the identification"], dict[str, list[str]]()
 
     def file(what: str, why: str) -> None:
         """Under what was looked at, or under the reason why not."""
-        if why:
+        if why and not (of_responses and what in NOT_OF_RESPONSES):
             unseen.setdefault(why, []).append(what)
-        else:
+        elif not why:
             seen.append(what)
 
     given, ambient = m.measured, not m.result.inputs
     seen += ["consistency of the modes"] if m.result.raw["modes"] else []
-    no_record = "" if given is not None else "no record given"
+    no_record = "" if given is not None else "no responses given" if of_responses else "no record given"
+    no_record = "several set-ups" if m.result.raw.get("set_ups") else no_record
     file("completeness", "" if completeness(m) else no_record or "nothing tells it")
     if not ambient:
         file("fit", "" if any(v is not None for v in _simulated(m)) else no_record or "the model gives no simulation")

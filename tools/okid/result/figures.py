@@ -183,20 +183,27 @@ def _nearest_pole(rows: Stabilization, mode: Cluster) -> tuple[float, int]:
     return float(own), row.order
 
 
+def _without_jumps(degrees: Real) -> Real:
+    """The same with a gap where the angle goes from one end of the scale to the other."""
+    out = degrees.copy()
+    out[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
+    return out
+
+
 def draw_frf(axes: Sequence[Axes], measured: Frf | None, line: Real, model: Complex, pair: tuple[int, int]) -> None:
     """Magnitude, phase and (three axes) coherence of one output and input, measured in grey and synthesised in blue."""
     out, into = pair
     magnitude, phase = axes[0], axes[1]
     if measured is not None:
         f, h = measured.frequency_hz[1:], measured.response[1:, out, into]
-        magnitude.semilogy(f, np.abs(h), color=GREY, lw=1.0, label="measured (H1)")
-        phase.plot(f, np.degrees(np.angle(h)), color=GREY, lw=0.8)
+        magnitude.semilogy(f, np.abs(h), color=GREY, lw=1.0, label="measured (H1)" if measured.averages else "measured")
+        phase.plot(f, _without_jumps(np.degrees(np.angle(h))), color=GREY, lw=0.8)
         if len(axes) > 2:
             axes[2].plot(f, measured.coherence[1:, out], color=ORANGE, lw=0.8)
             axes[2].set_ylim(0.0, 1.05)
             axes[2].set_yticks([0.0, 0.5, 1.0])
     magnitude.semilogy(line, np.abs(model[:, out, into]), color=BLUE, lw=1.1, label="model")
-    phase.plot(line, np.degrees(np.angle(model[:, out, into])), color=BLUE, lw=0.9)
+    phase.plot(line, _without_jumps(np.degrees(np.angle(model[:, out, into]))), color=BLUE, lw=0.9)
     log_axis(magnitude)
     phase.set_ylim(-190.0, 190.0)
     phase.set_yticks([-180, 0, 180])

@@ -7,10 +7,16 @@ from collections.abc import Mapping
 from typing import Any
 
 
+def kept_outputs(raw: Mapping[str, Any]) -> list[bool]:
+    """Of each output: is it in the model; all where there is none."""
+    kept = [all(value is not None for value in row) for row in raw["model"]["C"]]
+    return kept if any(kept) and len(kept) == len(raw["outputs"]) else [True] * len(raw["outputs"])
+
+
 def without_left_out(raw: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """The same okid.result/1 with the outputs the model has, and the names of the others."""
-    kept = [all(value is not None for value in row) for row in raw["model"]["C"]]
-    if all(kept) or not any(kept) or len(kept) != len(raw["outputs"]):
+    kept = kept_outputs(raw)
+    if all(kept):
         return dict(raw), []
 
     def own(rows: list[Any]) -> list[Any]:
@@ -24,4 +30,6 @@ def without_left_out(raw: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]
     modes = [{**mode, **{key: own(mode[key]) for key in keys if mode.get(key)}} for mode in raw["modes"]]
     markov = {"Y": [own(block) for block in (raw.get("markov") or {}).get("Y") or []]}
     left = [name for name, stays in zip(raw["outputs"], kept, strict=True) if not stays]
-    return {**raw, "outputs": own(raw["outputs"]), "model": model, "modes": modes, "markov": markov}, left
+    dofs = {"output_dofs": own(raw["output_dofs"])} if raw.get("output_dofs") else {}
+    out = {**raw, **dofs, "outputs": own(raw["outputs"]), "model": model, "modes": modes, "markov": markov}
+    return out, left

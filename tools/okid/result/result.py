@@ -230,13 +230,20 @@ class Result:
         """Poles of other orders from the same decomposition, each compared with the order before, and their clusters.
 
         Default: every even order the data carry. Orders they cannot carry are left out. Several horizons:
-        okid.stabilization(). Raises Error on a result that was unpickled: it has no decomposition any more; and on one
-        of method "auto", which has none.
+        okid.stabilization(). A result that was identified with `--stabilization` (stabilization=True) gives the poles
+        that it holds, when no orders or criteria are asked for. Raises Error on other results that were loaded or
+        unpickled: they have no decomposition any more; and on one of method "auto", which has none.
         """
-        if self.method == "auto":
+        kept = self._source.about(False).get("stabilization")
+        if kept and orders is None and criteria is None and self.identifier is None:
+            return Stabilization.from_dict(kept)
+        if self.method in ("auto", "plscf", "poser"):
+            other = "okid.identify_frf(responses, stabilization=True)"
+            if not self._source.about(False).get("responses"):
+                other = 'okid.identify(u, y, fs=fs, method="okid-era"), or call okid.stabilization()'
             raise Error(
-                'a result of method "auto" has no decomposition of its own: name a method for a stabilization diagram, '
-                'as in okid.identify(u, y, fs=fs, method="okid-era"), or call okid.stabilization()'
+                f'a result of method "{self.method}" has no decomposition of its own: for a stabilization diagram '
+                f"identify again, as in {other}"
             )
         if self.identifier is None:
             raise Error("this result no longer holds its decomposition: identify again for a stabilization diagram")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -142,6 +142,23 @@ class Stabilization(Sequence[OrderPoles]):
             ],
             "clusters": [{key: getattr(cluster, key) for key in keys} for cluster in self.clusters],
         }
+
+    @classmethod
+    def from_dict(cls, raw: Mapping[str, Any]) -> Stabilization:
+        """Of the key "stabilization" of okid.result/1, which keeps no shapes: they are empty here."""
+        rows = []
+        for horizon, order in raw["models"]:
+            own = [one for one in raw["poles"] if (one["horizon"], one["order"]) == (horizon, order)]
+            column = {key: np.array([one[key] for one in own]) for key in own[0]} if own else {}
+            empty = np.zeros(0)
+            held = [column.get(f"stable_{key}", empty).astype(bool) for key in ("frequency", "damping", "shape")]
+            rows.append(OrderPoles(
+                order, column.get("frequency_hz", empty), column.get("damping_ratio", empty),
+                np.zeros((len(own), 0), np.complex128), held[0], held[1], held[2], horizon,
+                column.get("cluster", empty).astype(np.int32),
+            ))  # fmt: skip
+        shape = np.zeros(0, np.complex128)
+        return cls(rows, [Cluster(**one, shape=shape) for one in raw["clusters"]], Criteria(**raw["criteria"]))
 
 
 class Collector:

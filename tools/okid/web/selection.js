@@ -7,7 +7,7 @@ const okidSelection = {
   csv(result, numbers) {
     const quoted = (text) => `"${String(text).replaceAll('"', '""')}"`;
     const keys = ["frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac", "confident", "found_in"];
-    const shapes = result.outputs.flatMap((name) => [`${name} re`, `${name} im`]).map(quoted);
+    const shapes = (result.shape_dofs || result.outputs).flatMap((name) => [`${name} re`, `${name} im`]).map(quoted);
     const rows = numbers.map((k) => {
       const mode = result.modes[k - 1];
       const entries = (mode.shape_re || []).flatMap((re, i) => [re, mode.shape_im[i]]);

@@ -8,7 +8,8 @@
 // dofs    [[node, "x"], ...]         one for each entry of a shape: where it is and which way it counts: x y z -x -y -z
 //                                    (null: this entry is not on the picture)
 // names   ["a1", ...]                one for each entry, written beside its node; optional
-// shapes  [{re: [...], im: [...]}, ...]   one for each mode, largest entry 1; im may be missing
+// shapes  [{re: [...], im: [...]}, ...]   one for each mode, largest entry 1; im may be missing; null: not measured, the
+//                                    node is then not drawn
 //
 // view.show(k)    mode k, counted from 0; outside of the list: the structure at rest
 // view.play()     move (also the space bar on the canvas); view.pause() stops where it is
@@ -54,6 +55,15 @@ function okidShapes(canvas, geometry, shapes) {
     return out;
   }
 
+  // Nodes of which this mode has no value (null): it was not measured there.
+  function unknown() {
+    const out = new Set(), known = new Set(), shape = shapes[mode];
+    if (!shape) return out;
+    dofs.forEach((dof, k) => { if (dof) (Number.isFinite(shape.re[k]) ? known : out).add(dof[0]); });
+    known.forEach((node) => out.delete(node));
+    return out;
+  }
+
   // Orthographic: turned about z, then tilted; y of the screen points down.
   function projected(points, width, height) {
     const scale = (view.zoom * Math.min(width, height)) / (size * 1.2);
@@ -65,13 +75,13 @@ function okidShapes(canvas, geometry, shapes) {
     });
   }
 
-  function strokes(points, colour, thick, dash) {
+  function strokes(points, colour, thick, dash, without = new Set()) {
     context.strokeStyle = context.fillStyle = colour;
     context.lineWidth = thick;
     context.setLineDash(dash);
     context.beginPath();
     for (const [a, b] of lines) {
-      if (!points[a - 1] || !points[b - 1]) continue;
+      if (!points[a - 1] || !points[b - 1] || without.has(a) || without.has(b)) continue;
       context.moveTo(...points[a - 1]);
       context.lineTo(...points[b - 1]);
     }
@@ -79,8 +89,9 @@ function okidShapes(canvas, geometry, shapes) {
     context.setLineDash([]);
   }
 
-  function dots(points, radius) {
-    for (const [x, y] of points) {
+  function dots(points, radius, without) {
+    for (const [k, [x, y]] of points.entries()) {
+      if (without.has(k + 1)) continue;
       context.beginPath();
       context.arc(x, y, radius, 0, 2 * Math.PI);
       context.fill();
@@ -118,8 +129,9 @@ function okidShapes(canvas, geometry, shapes) {
     context.clearRect(0, 0, width, height);
     const still = projected(nodes, width, height), now = projected(moved(phase), width, height);
     strokes(still, colour("--muted", "gray"), 1, [4, 4]);
-    strokes(now, colour("--accent", "blue"), 2.5, []);
-    dots(now, nodes.length > 60 ? 2 : 4);
+    const without = unknown();
+    strokes(now, colour("--accent", "blue"), 2.5, [], without);
+    dots(now, nodes.length > 60 ? 2 : 4, without);
     labels(still, colour("--ink", "black"), width);
   }
 
