@@ -20,6 +20,7 @@ MARKS = (
 )
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "support"))
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before anything imports NumPy, and for what tests start
 
 # Under nohup, or behind an & of a script, these are ignored, and what the tests start would inherit that.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -82,13 +82,13 @@ def test_long_campaigns_have_the_stated_rate(law: str, bad: float) -> None:
 @pytest.mark.parametrize("law", LAWS if SLOW else ["laplace", "cold"])
 def test_a_drop_is_found_in_a_long_campaign(law: str) -> None:
     """1.5 % in two modes of 1,000 groups, 5 % of them wrong: within 5 groups in 95 of 100."""
-    found = 0
-    for seed in range(100):
+    found, count = 0, 100 if SLOW else 20
+    for seed in range(count):
         found += any(700 <= row < 705 for row in watched(campaign(seed, law, 0.05, 0.015)))
-    assert found >= 95
+    assert found >= 0.95 * count
 
 
-@pytest.mark.parametrize("law", ["laplace", "t3"])
+@pytest.mark.parametrize("law", ["laplace", "t3"] if SLOW else ["laplace"])
 def test_wrong_groups_are_no_change_of_the_mean(monkeypatch: pytest.MonkeyPatch, law: str) -> None:
     """Ten campaigns with 5 % wrong groups: a change of the mean in none; one of 2 sigma is measured.
 

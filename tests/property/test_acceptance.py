@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 Array = NDArray[np.float64]
+SLOW = os.environ.get("OKID_SLOW") == "1"  # the long tier
 QUANTITIES = ("f", "zeta", "M", "K", "R", "R by PDC", "alpha", "beta")
 # (structure, noise in percent) -> worst error of each of them over the seeds and methods of the specification
 ACCEPTED = {
@@ -64,11 +66,12 @@ def errors(s: systems.Structure, result: okid.Result) -> tuple[float, ...]:
 @pytest.mark.parametrize("noise", [1, 5])
 @pytest.mark.parametrize("name", sorted(HORIZON))
 def test_noisy_records(name: str, noise: int) -> None:
-    """1.5 times the table, held by 19 of 20 unseen seeds in every cell, by every method."""
+    """1.5 times the table, held by 19 of 20 unseen seeds in every cell, by every method; by each of the first five."""
     s = getattr(systems, name)()
     limit = 1.5 * np.array(ACCEPTED[name, noise])
     held = {method: np.zeros(len(limit), int) for method in METHODS}
-    for seed in range(7000, 7020):
+    count = 20 if SLOW else 5
+    for seed in range(7000, 7000 + count):
         u, y = systems.record(s, 10000, noise, seed)
         for method in METHODS:
             result = identify(s, u, y, name, method)
@@ -77,7 +80,7 @@ def test_noisy_records(name: str, noise: int) -> None:
                 result.mkr is not None and relative(result.mkr.R_normal_modes, s.R) < 0.1 * limit[QUANTITIES.index("R")]
             )
             assert {w.code for w in result.warnings} <= {"mkr_damping_indefinite"}, result.warnings
-    short = {m: dict(zip(QUANTITIES, map(int, n), strict=True)) for m, n in held.items() if int(np.min(n)) < 19}
+    short = {m: dict(zip(QUANTITIES, n.tolist(), strict=True)) for m, n in held.items() if np.min(n) < 0.95 * count}
     assert not short, short
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import okid as okid_module
 import pytest
 from laboratory import Laboratory, ambient, chain, forced, plate
 from program import okid
+
+SLOW = os.environ.get("OKID_SLOW") == "1"  # the long tier
 
 
 def identify(lab: Laboratory, folder: Path, *options: str) -> dict[str, Any]:
@@ -63,9 +66,10 @@ def test_forced_structure_with_a_close_pair(seed: int, tmp_path: Path) -> None:
 
 
 def test_deviations_hold_behind_an_anti_alias_filter(tmp_path: Path) -> None:
-    """Damping and frequency within two deviations, six records pooled; refined values there would hold in 76 %."""
+    """Damping and frequency within two deviations, records pooled; refined values there would hold in 76 %."""
     held: dict[str, list[bool]] = {"frequency_hz": [], "damping_ratio": []}
-    for seed in range(31, 37):
+    count = 6 if SLOW else 3
+    for seed in range(31, 31 + count):
         lab = forced(seed)
         result = identify(lab, tmp_path)
         assert result["hold"] == "band" and "refinement" not in result
@@ -74,7 +78,7 @@ def test_deviations_hold_behind_an_anti_alias_filter(tmp_path: Path) -> None:
                 sigma = mode["frequency_std_hz" if key == "frequency_hz" else "damping_ratio_std"]
                 held[key].append(abs(mode[key] - truth[i]) < 2 * sigma)
     for key, values in held.items():
-        assert len(values) > 40 and np.mean(values) >= 0.92, (key, np.mean(values))
+        assert len(values) > 7 * count and np.mean(values) >= 0.92, (key, np.mean(values))
 
 
 def test_a_run_without_modes_at_the_lowest_order_votes_with_the_others(tmp_path: Path) -> None:

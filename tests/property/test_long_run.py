@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A stream without end through `okid replay`: memory stays what it was after the first minute, and the sliding window
-holds what a batch over its samples gives. 15 simulated minutes; OKID_SLOW=1: 72 hours."""
+holds what a batch over its samples gives. 6 simulated minutes; OKID_SLOW=1: 72 hours."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RATE, PERIOD_S = 1024, 64  # 65,536 samples: counter, fraction of the second and
 WINDOW_S, SLOT, P = 125, 6400, 20  # 20 closed slots and the open one, which is full at the end of the stream
 SAMPLES = RATE * PERIOD_S
 SLOW = os.environ.get("OKID_SLOW") == "1"
-SIMULATED_S = 72 * 3600 if SLOW else 15 * 60
+SIMULATED_S = 72 * 3600 if SLOW else 375  # whole slots
 NAMES = ["f1", "f2", "a1", "a2", "a3", "a4", "a5", "a6"]
 BEGIN_S = 1_700_000_000
 

@@ -115,7 +115,7 @@ def beams(found: list[dict[str, Any]]) -> dict[int, list[tuple[float, float, boo
     return out
 
 
-@pytest.mark.parametrize("memory", MEMORIES)
+@pytest.mark.parametrize("memory", MEMORIES if SLOW else ["fixed"])  # auto: test_chosen_window.py, too
 @pytest.mark.parametrize("seed", range(50) if SLOW else [1])
 def test_frequency_of_the_loaded_beam(seed: int, memory: str, tmp_path: Path) -> None:
     """Half a window late, within 2 % of the truth then; no track changes its beam while both are 2 % apart."""

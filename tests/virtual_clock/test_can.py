@@ -44,10 +44,19 @@ def told(run: Run, kind: str, cause: Callable[[], object]) -> float:
     return time.monotonic() - begin
 
 
+def opened() -> list[socket.socket]:
+    """Both buses."""
+    buses = [socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) for _ in (0, 1)]
+    for number, each in enumerate(buses):
+        each.bind((f"vcan{number}",))
+    return buses
+
+
 def test_what_happens_to_a_bus_is_told_at_once(live: Run) -> None:
+    buses = opened()
     for _ in range(100):
-        sh("cansend", "vcan0", "100#0000")
-        sh("cansend", "vcan1", "100#0000")
+        for each in buses:
+            each.send(struct.pack("=IB3xh6x", 0x100, 2, 0))
         time.sleep(1 / RATE)
     time.sleep(0.35)  # anywhere between two regular looks
     for kind, cause in (
@@ -64,9 +73,7 @@ def test_what_happens_to_a_bus_is_told_at_once(live: Run) -> None:
 
 def test_the_clock_is_set(live: Run) -> None:
     """By hand, by NTP in steps, by days: no frame is lost, none is elsewhere, in the samples and in the journal."""
-    buses = [socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) for _ in (0, 1)]
-    for number, each in enumerate(buses):
-        each.bind((f"vcan{number}",))
+    buses = opened()
     draw, motion = random.Random(1), [0.0, 0.0]
     sent = []
     for _ in range(SAMPLES):

@@ -128,7 +128,7 @@ fault_plan_t plan_of(std::uint32_t seed) {
 
 unsigned seeds() {
     if (std::getenv("OKID_FAULT_SEEDS")) return static_cast<unsigned>(std::atoi(std::getenv("OKID_FAULT_SEEDS")));
-    return draw_seeds(1000, 10000);
+    return draw_seeds(250, 10000);
 }
 
 std::string title(const char* what, const fault_plan_t& plan, const outcome& o) {
