@@ -16,7 +16,7 @@ HOST, PACKAGE = ROOT / "firmware_host", ROOT / "tools" / "okid"
 
 # Below first. A file may include what stands in its own room or in one before it.
 ROOMS = [
-    "files", "result", "consensus", "record", "compare", "frequency", "config", "align", "acquire", "journal",
+    "files", "result", "consensus", "record", "frequency", "compare", "config", "align", "acquire", "journal",
     "publish", "live", "rig", "face", "commands",
 ]  # fmt: skip
 

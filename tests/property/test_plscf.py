@@ -63,7 +63,9 @@ def test_ambient_set_ups_become_one_set_of_modes() -> None:
     assert result.outputs == ["a", "d", "b", "c", "e", "f"]
     for mode in result.confident_modes:
         assert mode.frequency_std_hz and 1e-5 < mode.frequency_std_hz / mode.frequency_hz < 1e-2  # between set-ups
-    one = okid.identify_setups(None, y, fs=s.fs, output_names=names, references=["d", "a"], sigma="none", method="plscf")
+    one = okid.identify_setups(
+        None, y, fs=s.fs, output_names=names, references=["d", "a"], sigma="none", method="plscf"
+    )
     _check(one, s, 3e-3, 0.35, 0.97)
     assert one.modes[0].frequency_std_hz is None
 

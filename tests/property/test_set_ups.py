@@ -130,8 +130,8 @@ def test_python_gives_what_the_command_gives(tmp_path: Path) -> None:
     files = footbridge(tmp_path)
     told = run(tmp_path, files, "--outputs", "P1,P4,P7,P2,P3,P5,P6,P8")
     parts = [package.read_csv(path) for path in files]
-    found = package.identify_setups(None, [part.samples for part in parts], fs=100.0,
-                                    output_names=[[name.split()[0] for name in part.names] for part in parts])  # fmt: skip
+    names = [[name.split()[0] for name in part.names] for part in parts]
+    found = package.identify_setups(None, [part.samples for part in parts], fs=100.0, output_names=names)
     mine = found.to_dict()
     assert mine["outputs"] == told["outputs"]
     assert [mode["frequency_hz"] for mode in mine["modes"]] == [mode["frequency_hz"] for mode in told["modes"]]

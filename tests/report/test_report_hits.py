@@ -138,6 +138,7 @@ def test_three_hundred_files(folder: Path, tmp_path: Path) -> None:
         raw["model"][key] = np.array(raw["model"][key])[:, columns].tolist()
     raw["markov"]["Y"] = np.array(raw["markov"]["Y"])[:, :, columns].tolist()
     raw["inputs"] = [f"Hammer@{k}" for k in range(1, count + 1)]
+    raw["input_dofs"] = list(range(1, count + 1))
     raw["hits"] = [
         dict(raw["hits"][0], file=f"P{k:03}_{n}.csv", place=k) for k in range(1, count + 1) for n in (1, 2, 3)
     ]

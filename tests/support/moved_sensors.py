@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Structures whose sensors are moved between records: known modes and shapes, responses as the sum of the modes.
 
-Each mode is exact for a force that is held over a quarter of a sample (or an eighth), behind an anti-alias filter. Drift,
-machines, dead channels and noise are those of a site. Nothing of okid takes part.
+Each mode is exact for a force that is held over a quarter of a sample, behind an anti-alias filter. Drift, machines,
+dead channels and noise are those of a site. Nothing of okid takes part.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Several set-ups of one structure as one result: each by itself and merged by modes (PoSER), or all together from their
-correlations (PreGER); the host library's work."""
+"""Several set-ups of one structure as one result: each by itself and merged by modes (PoSER), or all together from
+their correlations (PreGER); the host library's work."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ def identify_setups(
 ) -> Result:
     """Identify several set-ups of one structure: one set of modes, shapes over the sensors of all.
 
-    `y`: of each set-up (N, n_y), with `output_names` of each; one name is one sensor that stays where it is. Set-ups with
-    the same names are records of one set-up. `references`: the outputs that scale the shapes (default: all that every
-    set-up has). `u` None: ambient, which may excite every set-up another way. With `u` (N, n_u) of each set-up, forces at
-    the same places, no reference is needed.
-    `method`: "auto" or a named one identifies each set-up by itself and merges the modes (PoSER): frequency and damping are
-    means weighted by their variances, *_std that of the mean, wider where set-ups contradict; `found_in` is the share of
-    set-ups. "plscf" fits all set-ups together from their correlations (PreGER), *_std is the scatter between them; then
-    `modes` are numbers of the listed modes that are kept.
+    `y`: of each set-up (N, n_y), with `output_names` of each; one name is one sensor that stays where it is. Set-ups
+    with the same names are records of one set-up. `references`: the outputs that scale the shapes (default: all that
+    every set-up has). `u` None: ambient, which may excite every set-up another way. With `u` (N, n_u) of each set-up,
+    forces at the same places, no reference is needed.
+    `method`: "auto" or a named one identifies each set-up by itself and merges the modes (PoSER): frequency and damping
+    are means weighted by their variances, *_std that of the mean, wider where set-ups contradict; `found_in` is the
+    share of set-ups. "plscf" fits all set-ups together from their correlations (PreGER), *_std is the scatter between
+    them; then `modes` are numbers of the listed modes that are kept.
     `band` (low, high) in Hz; `detrend` "none", "mean" or "linear"; sigma="none": no *_std. `input_dofs`, `output_dofs`
-    (one number for each of the inputs, and for each output once, in the order in which they appear): shapes stand at these
-    degrees of freedom, with `modal_mass` where a force and a sensor share one. Inputs, B and D are left out.
+    (one number for each of the inputs, and for each output once, in the order in which they appear): shapes stand at
+    these degrees of freedom, with `modal_mass` where a force and a sensor share one. Inputs, B and D are left out.
 
     Raises InputError (a wrong argument) or IdentificationError (no reliable mode).
 
