@@ -13,9 +13,8 @@
 namespace okid_host {
 namespace {
 
-constexpr double most_numbers = 1e7;    // of hits at several places: 80 MB
-constexpr double same_as_before = 0.01; // of its frequency, from one decision to the next
-constexpr double numbers_a_number = 8;  // an identification holds the record, its lower rates and copies of both
+constexpr double most_numbers = 1e7;   // of hits at several places: 80 MB
+constexpr double numbers_a_number = 8; // an identification holds the record, its lower rates and copies of both
 
 record_options options_of(const stream_config& config) {
     record_options out;
@@ -170,17 +169,6 @@ void agreement::place_hits(const record_set& set, const mass_plan& mass) {
         options_.mass.inputs[k].name = names[k], options_.mass.inputs[k].dof = places[k];
 }
 
-/// Has this run() the modes of the one before?
-void agreement::settle() {
-    std::vector<double> now;
-    const okid_identified_t& model = found_.model.view();
-    for (std::size_t k = 0; k < found_.context.verdicts.size(); ++k)
-        if (found_.context.verdicts[k].confident) now.push_back(model.frequency_hz[k]);
-    settled_ = !now.empty() && std::equal(now.begin(), now.end(), decided_hz_.begin(), decided_hz_.end(),
-                                          [](double a, double b) { return std::abs(a - b) <= same_as_before * b; });
-    decided_hz_ = std::move(now);
-}
-
 okid_status_t agreement::run(const mass_plan& mass) {
     const std::pair<std::int64_t, bool> now{came_, mass.wanted()};
     if (run_of_ == now) return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
@@ -198,7 +186,6 @@ okid_status_t agreement::run(const mass_plan& mass) {
         found_ = {};
     }
     decided_on_ = basis();
-    settle();
     followed_.begin(found_);
     model_ = kept_model(found_.model.view());
     sigma_ = found_.context.sigma;

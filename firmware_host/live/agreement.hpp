@@ -48,10 +48,13 @@ class agreement {
     const okid_identified_t& model() const { return model_.view(); } ///< of the last run() or follow()
     const std::optional<deviations>& sigma() const { return sigma_; }
     [[noreturn]] void refuse() const { throw failure(*fault_); } ///< of the last run()
-    /// An eighth of all came since the last run(), a quarter where the last two had the same modes: the runs of a long stream
-    /// grow with the logarithm of its length.
+    /// An eighth of all came since the last run(), a quarter once the oldest samples are in sums alone: the runs of a long
+    /// stream grow with the logarithm of its length. What came decides, not what was found: a stream is decided alike
+    /// whether it is late or in time.
     bool due() const { return asked_ || due_after(came_ - run_at_); }
-    bool due_after(std::int64_t samples) const { return (settled_ ? 4 : 8) * samples >= basis(); }
+    bool due_after(std::int64_t samples) const {
+        return (older_ && older_->samples() > 0 ? 4 : 8) * samples >= basis();
+    }
     void ask() { asked_ = true; } ///< the next run() is due now
     /// This decision is not made: the next one is due as if it had been, and nothing is followed until then.
     void pass() {
@@ -78,7 +81,6 @@ class agreement {
     const double* at(std::int64_t sample) const { return rows_.data() + static_cast<std::size_t>(sample - base_) * m_; }
     record_set records() const;
     void place_hits(const record_set& set, const mass_plan& mass);
-    void settle();
 
     std::string where_;
     std::size_t m_;
@@ -94,8 +96,7 @@ class agreement {
     std::vector<double> missing_;                                  ///< one row
     okid_accumulator_stats_t counts_{};
     std::int64_t run_at_ = 0, decided_on_ = 0; ///< samples that had come, that were kept, at the last run()
-    bool asked_ = false, settled_ = false;
-    std::vector<double> decided_hz_; ///< the confident modes of the last run()
+    bool asked_ = false;
     followed_modes followed_;
     kept_model model_;
     std::optional<deviations> sigma_;
