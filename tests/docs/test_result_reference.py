@@ -84,7 +84,8 @@ def source_codes() -> set[str]:
     out = set(re.findall(r'case OKID_NOTE_\w+: return "(\w+)"', library + _c_sources()))
     out |= {f"mkr_{name}" for name in re.findall(r'case OKID_MKR_\w+: return "(\w+)"', library)}
     for path in (ROOT / "firmware_host").rglob("*.cpp"):
-        said = r'(?:(?:warnings|said|out|unit_remarks|failed_)\.emplace_back\(\s*"(\w+)",|return \{"(\w+)",\s*fmt::format)'
+        lists = "warnings|said|out|unit_remarks|failed_"
+        said = rf'(?:(?:{lists})\.emplace_back\(\s*"(\w+)",|return \{{"(\w+)",\s*fmt::format)'
         out |= {one or other for one, other in re.findall(said, path.read_text())}
     for path in (ROOT / "tools" / "okid").rglob("*.py"):
         out |= set(re.findall(r'Remark\(\s*f?"(\w+)"', path.read_text()))
