@@ -24,8 +24,8 @@ constexpr double least_square = 1e-9, least_pivot = 1e-12; // over the largest
 } // namespace
 
 leading_triplets::leading_triplets(const okid_era_config_t& c, int past, int count_)
-    : rows(c.rows), cols(c.cols), n_y(c.n_y), n_u(c.n_u), span(std::min(past, c.rows) * c.n_y),
-      count(std::min({count_, span, c.cols * c.n_u})) {}
+    : rows(c.rows), cols(c.cols), n_y(c.n_y), n_u(c.n_u), span(std::min<int>(past, c.rows) * c.n_y),
+      count(std::min<int>({count_, span, c.cols * c.n_u})) {}
 
 void leading_triplets::lay_out(arena& memory) {
     const int height = rows * n_y;
