@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <functional>
 #include <map>
 
 namespace okid_host {
@@ -31,13 +32,13 @@ struct one_set_up {
     std::vector<std::size_t> at; ///< its outputs, among all of them
     known_result known;
     std::string hold;
-    std::vector<std::vector<complex>>
-        b; ///< of each mode at each force, in units of its shape as displacement; empty: not known
+    /// What each force does to each mode: times the shape, the residue of the displacement. Empty: not known.
+    std::vector<std::vector<complex>> b;
 };
 
 /// Of `values`, one for all outputs, those of this set-up.
 std::vector<int> those_at(const std::vector<std::size_t>& at, const std::vector<int>& values) {
-    if (values.size() < 2) return values;
+    if (values.empty()) return values;
     std::vector<int> out;
     for (const std::size_t o : at) out.push_back(values[o]);
     return out;
@@ -50,17 +51,6 @@ record_options options_of_one(const record_options& all, const set_up& one, cons
     out.placed = {};
     out.said.clear();
     out.all_modes = true;
-    return out;
-}
-
-/// The shape of a mode as displacement, all of its sensors on one scale.
-std::vector<complex> as_displacement(const std::vector<complex>& shape, complex lambda,
-                                     const std::vector<int>& sensing) {
-    std::vector<complex> out = shape;
-    for (std::size_t o = 0; o < out.size(); ++o) {
-        const int kind = sensing.empty() ? OKID_SENSE_ACCELERATION : sensing[sensing.size() > 1 ? o : 0];
-        out[o] *= std::pow(lambda, -times_differentiated(kind));
-    }
     return out;
 }
 
@@ -81,13 +71,12 @@ void find_forces(const record_result& found, const record_options& options, one_
         (solver.eigenvalues().array() - mu).abs().minCoeff(&near);
         if (std::abs(solver.eigenvalues()[near] - mu) > 1e-3 * std::abs(1.0 - mu)) continue; // it is not in the model
         const Eigen::VectorXcd seen = C.cast<complex>() * right.col(near);
-        const std::vector<complex> moved =
-            as_displacement({seen.data(), seen.data() + seen.size()}, lambda, options.sensing);
         complex along = 0;
         double power = 0, square = 0;
-        for (std::size_t o = 0; o < moved.size(); ++o) {
+        for (std::size_t o = 0; o < mode.shape.size(); ++o) {
             if (!std::isfinite(std::abs(mode.shape[o]))) continue;
-            along += std::conj(mode.shape[o]) * moved[o];
+            const int kind = options.sensing.empty() ? OKID_SENSE_ACCELERATION : options.sensing[o];
+            along += std::conj(mode.shape[o]) * seen[static_cast<Eigen::Index>(o)] * to_displacement(lambda, kind);
             power += std::norm(mode.shape[o]);
         }
         std::vector<complex> b;
@@ -146,6 +135,9 @@ class set_up_merger {
         context.warnings.insert(context.warnings.begin(), options_.said.begin(), options_.said.end());
         context.warnings.insert(context.warnings.end(), failed_.begin(), failed_.end());
         if (options_.sigma_blocks == 0) context.sigma.reset();
+        const std::vector<int>& kinds = options_.sensing;
+        if (std::adjacent_find(kinds.begin(), kinds.end(), std::not_equal_to<>()) != kinds.end())
+            context.shape_quantity = "displacement";
         if (options_.placed.wanted()) place(out);
         return out;
     }
@@ -181,7 +173,8 @@ class set_up_merger {
                                   found_.size(), found_.size() + failed_.size(), why));
     }
 
-    /// Shapes at the degrees of freedom, in their order, as displacement; modal masses from the drive points.
+    /// Shapes at the degrees of freedom, in their order; modal masses from the drive points. Whatever its sensors measure, a
+    /// set-up has its shapes in one quantity.
     void place(record_result& out) const {
         const mass_plan& plan = options_.placed;
         placed_shapes shapes;
@@ -191,7 +184,6 @@ class set_up_merger {
         for (const auto& [dof, o] : output_at) shapes.dofs.push_back(dof);
         const okid_identified_t& model = out.model.view();
         for (int k = 0; k < model.mode_count; ++k) {
-            const complex lambda = continuous_pole(model.frequency_hz[k], model.damping_ratio[k]);
             std::vector<complex> whole(options_.outputs.size(), NAN);
             for (int o = 0; o < model.n_y; ++o) {
                 const auto at = std::find(options_.outputs.begin(), options_.outputs.end(),
@@ -199,7 +191,6 @@ class set_up_merger {
                 whole[static_cast<std::size_t>(at - options_.outputs.begin())] = {model.shape_re[k * model.n_y + o],
                                                                                   model.shape_im[k * model.n_y + o]};
             }
-            if (out.context.shape_quantity.empty()) whole = as_displacement(whole, lambda, options_.sensing);
             complex most = 0;
             for (const auto& [dof, o] : output_at) {
                 whole[o] *= (plan.outputs[o].reversed ? -1.0 : 1.0) * plan.outputs[o].si;

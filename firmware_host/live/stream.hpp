@@ -67,8 +67,8 @@ class stream {
     void identify();
     /// Throws `failure` (exit 3): why the last identification gave no model.
     [[noreturn]] void refuse(okid_status_t status, const result_context& about) const;
-    /// Is there anything to update? Auto decides which modes there are when an eighth of what it keeps is new
-    /// (agreement::due()), and follows those it has in between.
+    /// Is there anything to update? Auto decides which modes there are when enough is new (agreement::due()), and
+    /// follows those it has in between.
     bool due() const { return identifier_.due(); }
     /// What is known of the result of the last identify() or update(), without standard deviations.
     /// @param said  what to say first

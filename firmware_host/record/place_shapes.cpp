@@ -42,7 +42,7 @@ std::vector<complex> at_sensors(const listed_mode& mode, const std::vector<mass_
     std::vector<complex> out;
     for (std::size_t o = 0; o < outputs.size(); ++o)
         out.push_back((outputs[o].reversed ? -1.0 : 1.0) * mode.shape[o] *
-                      std::pow(pole_of(mode), -times_differentiated(outputs[o].sensing)));
+                      to_displacement(pole_of(mode), outputs[o].sensing));
     return out;
 }
 

@@ -25,7 +25,7 @@ mode_shape factors(const std::vector<int>& sensing, std::complex<double> pole, c
     mode_shape out;
     std::complex<double> largest = 0;
     for (std::size_t i = 0; i < shape.size(); ++i) {
-        out.push_back(std::pow(pole, -times_differentiated(sensing[i])));
+        out.push_back(to_displacement(pole, sensing[i]));
         if (std::isfinite(shape[i].real()) && std::abs(out[i] * shape[i]) > std::abs(largest))
             largest = out[i] * shape[i];
     }

@@ -19,6 +19,11 @@ std::complex<double> held_force(std::complex<double> pole, std::complex<double> 
 /// How often a kind of sensor (okid_sensing_t) differentiates the displacement.
 int times_differentiated(int kind);
 
+/// What makes a displacement of an entry of a shape that such a sensor measured.
+inline std::complex<double> to_displacement(std::complex<double> pole, int kind) {
+    return std::pow(pole, -times_differentiated(kind));
+}
+
 /// How well continuous modes explain the response of a discrete model, when the force is taken to be so between samples.
 struct hold_fit {
     double misfit = 1; ///< of the response in the band, relative

@@ -84,6 +84,30 @@ def test_a_shaker_that_stays_needs_no_reference(tmp_path: Path) -> None:
         assert mode["modal_mass"] == pytest.approx(true, rel=0.05) if abs(s.shapes[4, k]) > 0.2 else True
 
 
+def test_velocities_beside_accelerations(tmp_path: Path) -> None:
+    """Three accelerations and nine velocities, no sensor stays: one shape, real as the structure's is."""
+    s, files = site.plate(), []
+    at = np.zeros((12, 1))
+    at[4] = 1.0
+    for k in range(2):
+        rng = np.random.default_rng(70 + k)
+        force = rng.standard_normal((20000 * site.FINER, 1))
+        moved = s.respond(force, at)
+        moved[:, 3:] = s.respond(force, at, velocity=True)[:, 3:]
+        both = np.hstack([s.sampled(force), s.sampled(moved)])
+        both += 0.01 * both.std(axis=0) * rng.standard_normal(both.shape)
+        places = range(6 * k, 6 * k + 6)
+        names = ["force", *(f"a{p + 1}" for p in places)]
+        files.append(site.write(tmp_path / f"{k}.csv", s.fs, names, both[:, [0, *(p + 1 for p in places)]]))
+    kinds = ",".join(["acceleration"] * 3 + ["velocity"] * 9)
+    options = ["--inputs", "force", "--outputs", ",".join(f"a{p + 1}" for p in range(12)), "--sensing", kinds]
+    for more in ([], ["--input-dofs", "5", "--output-dofs", ",".join(map(str, range(1, 13)))]):
+        found = run(tmp_path, files, *options, *more)
+        check(found, s, list(range(12)), 0.99, sigmas=5.0)
+        assert found["shape_quantity"] == "displacement"
+        assert min(mode["mpc"] for mode in found["modes"] if mode["confident"]) > 0.95
+
+
 def test_a_building_in_four_set_ups_with_a_dead_channel(tmp_path: Path) -> None:
     s, files = site.building(), []
     for k in range(4):
@@ -145,13 +169,15 @@ def test_what_is_refused_in_one_line(tmp_path: Path) -> None:
     other = site.write(tmp_path / "b.csv", 100.0, ["r [m/s^2]", "c", "d"], y)
     fast = site.write(tmp_path / "f.csv", 200.0, ["r [g]", "c", "d"], y)
     alone = site.write(tmp_path / "n.csv", 100.0, ["c", "d", "e"], y)
-    for files, outputs, words in (
+    cases: list[tuple[list[Any], str, str]] = [
         ([a, other], "r,a,b,c,d", '"r" is in m/s^2, in an earlier file in g'),
         ([a, fast], "r,a,b,c,d", "200 Hz, expected 100 Hz"),
         ([a, alone], "a,b,c,d,e", "no output in common"),
         ([a, tmp_path / "nothing.csv"], "r,a", "nothing.csv"),
         ([a], "r,a", "found one file"),
-    ):
+        ([a, other, "--places", "(.)"], "r,a,b,c,d", "leave one out"),
+    ]
+    for files, outputs, words in cases:
         text = okid("identify", *files, "--setups", "--outputs", outputs, status=2).stderr
         assert words in text and len(text.strip().splitlines()) == 1, text
     text = okid("identify", a, site.write(tmp_path / "m.csv", 100.0, ["r [g]", "c", "d"], y), "--setups", "--outputs",

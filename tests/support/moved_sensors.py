@@ -28,8 +28,8 @@ class Structure:
     shapes: Real
     mass: Real
 
-    def respond(self, force: Real, at: Real) -> Real:
-        """Accelerations of all places; `force` (samples at the finer rate, forces), `at` (places, forces)."""
+    def respond(self, force: Real, at: Real, velocity: bool = False) -> Real:
+        """Accelerations or velocities of all places; `force` (finer samples, forces), `at` (places, forces)."""
         dt = 1 / (self.fs * FINER)
         modal = force @ (at.T @ self.shapes) / self.mass
         out = np.zeros((len(force), len(self.shapes)))
@@ -38,7 +38,8 @@ class Structure:
             pole = complex(-zeta * w, w * np.sqrt(1 - zeta**2))
             turn = np.exp(pole * dt)
             state = lfilter([0, (turn - 1) / pole], [1, -turn], modal[:, k].astype(complex))
-            motion = modal[:, k] + 2 * np.real(pole**2 / (2j * pole.imag) * state)
+            residue = 1 / (2j * pole.imag)
+            motion = 2 * np.real(residue * (pole if velocity else pole**2) * state) + (0 if velocity else modal[:, k])
             out += motion[:, None] * self.shapes[:, k]
         return out
 

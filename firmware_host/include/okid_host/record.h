@@ -55,11 +55,11 @@ OKID_HOST_API int32_t okid_host_identify_columns(const char* options, int32_t re
                                                  okid_host_stage_t stage, void* context, okid_host_result_t** result);
 
 /**
- * Identify several set-ups of one structure together; what `okid identify --setups` does with its files.
+ * Identify several set-ups of one structure; what `okid identify --setups` does with its files.
  *
  * @param options  as for okid_host_identify(): fs, inputs, outputs (of every set-up in turn: as many names as it has columns;
- *                 the same name is the same sensor), band, modes, detrend, sigma; references: names of outputs that every
- *                 set-up has
+ *                 the same name is the same sensor), method, band, detrend, sigma, input_dofs, output_dofs, modes (method
+ *                 plscf); references: names of outputs that every set-up has
  */
 OKID_HOST_API int32_t okid_host_identify_set_ups(const char* options, int32_t count, const okid_host_columns_t* inputs,
                                                  const okid_host_columns_t* outputs, const size_t* counts,
