@@ -91,13 +91,21 @@ std::complex<double> scale_to(const mode_shape& own, const mode_shape& to) {
 
 class merger {
   public:
-    merger(const std::vector<known_result>& results, const std::vector<std::string>& references) : results_(results) {
+    merger(const std::vector<known_result>& results, const std::vector<std::string>& references,
+           const std::vector<std::string>& order)
+        : results_(results) {
         if (results.size() < 2)
             throw failure(exit_usage,
                           fmt::format("found {} result to merge, expected two set-ups or more", results.size()));
-        for (const known_result& one : results)
-            for (const std::string& name : one.places)
-                if (std::find(names_.begin(), names_.end(), name) == names_.end()) names_.push_back(name);
+        std::vector<std::string> found;
+        for (const known_result& one : results) found.insert(found.end(), one.places.begin(), one.places.end());
+        const auto has = [](const std::vector<std::string>& names, const std::string& name) {
+            return std::find(names.begin(), names.end(), name) != names.end();
+        };
+        for (const std::string& name : order)
+            if (has(found, name)) names_.push_back(name);
+        for (const std::string& name : found)
+            if (!has(names_, name)) names_.push_back(name);
         choose_references(references);
     }
 
@@ -389,8 +397,9 @@ class merger {
 
 } // namespace
 
-record_result merge_results(const std::vector<known_result>& results, const std::vector<std::string>& references) {
-    return merger(results, references).merge();
+record_result merge_results(const std::vector<known_result>& results, const std::vector<std::string>& references,
+                            const std::vector<std::string>& order) {
+    return merger(results, references, order).merge();
 }
 
 } // namespace okid_host

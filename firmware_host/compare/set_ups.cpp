@@ -127,7 +127,7 @@ class set_up_merger {
         std::vector<known_result> known;
         known.reserve(found_.size());
         for (const one_set_up& one : found_) known.push_back(one.known);
-        record_result out = merge_results(known, references_);
+        record_result out = merge_results(known, references_, options_.outputs);
         result_context& context = out.context;
         context.method = options_.method;
         context.band_hz = band_;

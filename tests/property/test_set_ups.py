@@ -54,7 +54,8 @@ def footbridge(tmp_path: Path, unit: str = " [m/s^2]") -> list[Path]:
 def test_a_footbridge_in_two_set_ups(tmp_path: Path) -> None:
     found = run(tmp_path, footbridge(tmp_path), "--outputs", "P1,P2,P3,P4,P5,P6,P7,P8")
     check(found, site.footbridge(), [int(name[1:]) - 1 for name in found["outputs"]], 0.97)
-    assert found["method"] == "auto" and found["records"] == 2 and len(found["outputs"]) == 8
+    assert found["method"] == "auto" and found["records"] == 2
+    assert found["outputs"] == [f"P{k}" for k in range(1, 9)]  # in the order in which they were asked for
     lines = [mode for mode in found["modes"] if abs(mode["frequency_hz"] - 16.67) < 0.05]
     assert lines and all("tone" in line["why"] for line in lines)
 

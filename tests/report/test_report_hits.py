@@ -129,6 +129,16 @@ def test_files_that_do_not_belong(folder: Path, tmp_path: Path, capsys: pytest.C
     assert not (tmp_path / "o.html").exists()
 
 
+def test_modal_masses_stand_beside_the_modes(folder: Path) -> None:
+    """Of the shape with largest entry 1, as the result has them."""
+    raw, page = json.loads((folder / "all.json").read_text()), (folder / "all.html").read_text()
+    sure = [row for row in cells(page, "modes") if len(row) > 8]
+    masses = [mode["modal_mass"] for mode in raw["modes"] if mode["confident"]]
+    assert "mass [kg]" in page and len(sure) >= len(masses) == 7
+    for row, mass in zip(sure, masses, strict=False):
+        assert f"{mass:.4g}" in row
+
+
 def test_three_hundred_files(folder: Path, tmp_path: Path) -> None:
     """Bounded: so many pictures as for twelve places, the table has all, hits are folded."""
     raw = json.loads((folder / "all.json").read_text())

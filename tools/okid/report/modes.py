@@ -43,7 +43,9 @@ def _table(modes: Sequence[dict[str, Any]], shown: Sequence[int], sure: bool) ->
     f_std = any(modes[k].get("frequency_std_hz") is not None for k in shown)
     z_std = any(modes[k].get("damping_ratio_std") is not None for k in shown)
     voted = any(modes[k].get("found_in") is not None for k in shown)
+    weighed = any(modes[k].get("modal_mass") is not None for k in shown)
     head = ["mode", "f [Hz]", *(["± σ [Hz]"] if f_std else []), "ζ [%]", *(["± σ [%]"] if z_std else [])]
+    head += ["mass [kg]"] if weighed else []
     head += ["MPC", "EMAC", "CMI", *(["found in"] if voted else []), *([] if sure else ["why doubtful"])]
     rows = []
     for k in shown:
@@ -52,6 +54,7 @@ def _table(modes: Sequence[dict[str, Any]], shown: Sequence[int], sure: bool) ->
         row += [plain(one.get("frequency_std_hz"), ".2g")] if f_std else []
         row.append(plain(one["damping_ratio"], ".4f", 100.0))
         row += [plain(one.get("damping_ratio_std"), ".2g", 100.0)] if z_std else []
+        row += [plain(one.get("modal_mass"), ".4g")] if weighed else []
         both = one.get("mpc") is not None and one.get("emac") is not None
         cmi = one.get("cmi", float(one["mpc"]) * float(one["emac"]) if both else None)
         row += [plain(one.get("mpc"), ".4f"), plain(one.get("emac"), ".4f"), plain(cmi, ".4f")]
