@@ -179,7 +179,7 @@ std::string tell_hold(const okid_identified_t& model, const std::vector<int>& se
     const hold_fit held = fit_of(r, model.n_y, sensing, "zoh"), linear = fit_of(r, model.n_y, sensing, "foh"),
                    band = fit_of(r, model.n_y, sensing, "band");
     if (held.phase <= std::min(linear.phase, band.phase)) return "zoh";
-    if (falls) return "band";
+    if (falls && linear.phase >= band.phase) return "band"; // short pulses fall too, and can be straight between samples
     return linear.misfit < far_better * band.misfit ? "foh" : "band";
 }
 
