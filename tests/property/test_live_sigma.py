@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The deviation beside a mode of an update is that of the number beside it, between two decisions of method auto as well."""
+"""The deviation beside a mode of an update belongs to that number, between two decisions of method auto as well."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def errors_over_sigma(folder: Path, seed: int) -> list[list[float]]:
 
 
 def test_followed_modes_have_a_deviation_of_their_own(tmp_path: Path) -> None:
-    """A mode known by likelihood moved as far as its carrier, whose noise is up to four times as large: rms 1.6, up to 6."""
+    """A mode known by likelihood moved as far as its carrier, whose noise is up to four times as large: rms was 1.8."""
     z = np.array([one for seed in range(200, 206) for one in errors_over_sigma(tmp_path, seed)])
     assert len(z) >= 6 * len(FOLLOWED_AT) * 3
     rms = np.sqrt((z**2).mean(axis=0))

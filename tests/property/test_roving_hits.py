@@ -141,7 +141,7 @@ def test_wrong_places(tmp_path: Path, options: list[str], words: str) -> None:
 
 
 def test_short_pulses_that_are_straight_between_samples(tmp_path: Path) -> None:
-    """Their spectrum falls towards half the rate, as behind a filter; taken for filtered, M was 9 % off and nothing said so."""
+    """Their spectrum falls towards half the rate, as behind a filter; taken for filtered, M was 9 % off."""
     done = program("simulate", ROOT / "examples" / "recipes" / "hits_rig.toml", "--hits", tmp_path / "hits", "--quiet")
     assert done.returncode == 0, done.stderr
     files = sorted((tmp_path / "hits").glob("*.csv"))
