@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import program
 import pytest
+from methods import by_method
 
 CONFIG = """[acquisition]
 rate_hz = 1000
@@ -121,7 +122,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     names = {"log": "a.log", "truth": "t.json", "dbc": "a.dbc", "config": "a.toml"}
     given = [x for option, name in names.items() for x in (f"--{option}", folder / name)]
     program.okid("simulate", folder / "rig.toml", *given, status=0)
-    text = (folder / "a.toml").read_text()
+    text = by_method((folder / "a.toml").read_text())
     bus = '[[bus]]\nname = "can1"\ntype = "socketcan"\ninterface = "vcan1"\ndbc = "a.dbc"\n\n[[channel]]'
     text = text.replace("[[channel]]", bus, 1).replace('bus = "can0"\n', 'bus = "can1"\n', 1)
     (folder / "b.toml").write_text(text.replace('sequence = "Counter"\n', "", 1))
