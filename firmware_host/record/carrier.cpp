@@ -26,37 +26,6 @@ std::unique_ptr<std::byte[]> carrier_memory(std::size_t bytes) {
     return std::unique_ptr<std::byte[]>(bytes ? new (std::nothrow) std::byte[bytes] : nullptr);
 }
 
-/// The run of CVA with the longest horizon at a level.
-const consensus_run* long_run(const std::vector<consensus_run>& runs, int level) {
-    const consensus_run* out = nullptr;
-    for (const consensus_run& run : runs)
-        if (run.level == level && run.method == OKID_METHOD_N4SID_CVA && (!out || run.rows > out->rows)) out = &run;
-    return out;
-}
-
-/// Orders of this run, the best carrier of the modes wanted first: where its poles lie nearest to what the runs agree on, in
-/// half-power bandwidths. At an order that cuts through a mode its pole is elsewhere, and a block less takes it out.
-std::vector<int> carrying_orders(const consensus_run& run, const std::vector<mode_shift>& wanted) {
-    std::vector<std::pair<double, int>> order;
-    for (const int n : run.orders) {
-        double away = 0;
-        for (const mode_shift& mode : wanted) {
-            double least = farthest;
-            for (const run_pole& pole : run.poles) {
-                if (pole.order != n || shape_mac(pole.shape, mode.shape) < carried_shape) continue;
-                const double f = (pole.frequency_hz / mode.frequency_hz - 1) / mode.damping_ratio;
-                least = std::min(least, std::hypot(f, pole.damping_ratio / mode.damping_ratio - 1));
-            }
-            away += least * least;
-        }
-        if (away < static_cast<double>(wanted.size()) * farthest * farthest) order.emplace_back(away, n);
-    }
-    std::sort(order.begin(), order.end());
-    std::vector<int> out;
-    for (const auto& [away, n] : order) out.push_back(n);
-    return out;
-}
-
 /// The records of a level, in units of the channels where the sums of older samples are.
 record_set set_of(const record_level& level, std::size_t n_u, std::size_t n_y) {
     record_set out;
@@ -142,6 +111,34 @@ carried_mode carried(const okid_identified_t& model, const std::optional<deviati
 }
 
 } // namespace
+
+const consensus_run* long_run(const std::vector<consensus_run>& runs, int level) {
+    const consensus_run* out = nullptr;
+    for (const consensus_run& run : runs)
+        if (run.level == level && run.method == OKID_METHOD_N4SID_CVA && (!out || run.rows > out->rows)) out = &run;
+    return out;
+}
+
+std::vector<int> carrying_orders(const consensus_run& run, const std::vector<mode_shift>& wanted) {
+    std::vector<std::pair<double, int>> order;
+    for (const int n : run.orders) {
+        double away = 0;
+        for (const mode_shift& mode : wanted) {
+            double least = farthest;
+            for (const run_pole& pole : run.poles) {
+                if (pole.order != n || shape_mac(pole.shape, mode.shape) < carried_shape) continue;
+                const double f = (pole.frequency_hz / mode.frequency_hz - 1) / mode.damping_ratio;
+                least = std::min(least, std::hypot(f, pole.damping_ratio / mode.damping_ratio - 1));
+            }
+            away += least * least;
+        }
+        if (away < static_cast<double>(wanted.size()) * farthest * farthest) order.emplace_back(away, n);
+    }
+    std::sort(order.begin(), order.end());
+    std::vector<int> out;
+    for (const auto& [away, n] : order) out.push_back(n);
+    return out;
+}
 
 std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& model,
                                                     const std::vector<replicate_model>& replicates,

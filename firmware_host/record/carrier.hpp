@@ -26,6 +26,13 @@ std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& mod
                                                     const std::vector<replicate_model>& replicates,
                                                     const std::vector<mode_shift>& wanted);
 
+/// The run of CVA with the longest horizon at a level; nullptr: none.
+const consensus_run* long_run(const std::vector<consensus_run>& runs, int level);
+
+/// Orders of this run, the best carrier of the modes wanted first: where its poles lie nearest to what the runs agree on, in
+/// half-power bandwidths. At an order that cuts through a mode its pole is elsewhere, and a block less takes it out.
+std::vector<int> carrying_orders(const consensus_run& run, const std::vector<mode_shift>& wanted);
+
 /// The modes of `modes` that belong to this level, from one CVA model of the lowest order that has them all; none where the
 /// model lacks them. @param blocks  left out in turn for the standard deviations, 0 = none
 /// @param analytic  to first order

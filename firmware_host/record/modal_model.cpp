@@ -61,6 +61,28 @@ void put_states(const std::vector<listed_mode>& modes, refined_arrays& to, okid_
     model.K = to.K.data();
 }
 
+/// B and D from residues: y = Re(shape x) of a state x that a unit force moves by b has 2 residue = shape b.
+bool put_inputs(const std::vector<listed_mode>& modes, const mode_inputs& inputs, refined_arrays& to,
+                const okid_identified_t& model) {
+    if (inputs.residues.size() != modes.size() || inputs.residues.empty()) return false;
+    const Eigen::Index n_u = model.n_u, n_y = model.n_y;
+    to.B.assign(static_cast<std::size_t>(model.n_z * model.n_u), 0.0);
+    Eigen::Map<Eigen::MatrixXd> B(to.B.data(), model.n_z, n_u);
+    Eigen::Index row = 0;
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        if (!modes[k].in_model) continue;
+        const Eigen::Map<const Eigen::VectorXcd> shape(modes[k].shape.data(), n_y);
+        if (inputs.residues[k].size() > 0) {
+            const Eigen::RowVectorXcd b = 2 * shape.adjoint() * inputs.residues[k] / shape.squaredNorm();
+            B.row(row) = b.real();
+            B.row(row + 1) = b.imag();
+        }
+        row += 2;
+    }
+    to.D.assign(inputs.D.data(), inputs.D.data() + inputs.D.size());
+    return true;
+}
+
 } // namespace
 
 std::complex<double> discrete_pole(const listed_mode& mode, double dt) {
@@ -78,7 +100,9 @@ void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, recor
     put_modes(modes, arrays, model);
     put_states(modes, arrays, model);
     if (model.n_u == 0) return;
-    const okid_status_t status = fit_outputs(work.set, model.n_z, model.A, model.C, arrays.B, arrays.D);
+    const bool known = put_inputs(modes, work.inputs, arrays, model);
+    const okid_status_t status =
+        known ? OKID_OK : fit_outputs(work.set, model.n_z, model.A, model.C, arrays.B, arrays.D);
     if (status < 0) {
         std::fill(arrays.B.begin(), arrays.B.end(), 0.0);
         std::fill(arrays.D.begin(), arrays.D.end(), 0.0);

@@ -70,6 +70,7 @@ bool refine_agreed(const record_options& options, std::vector<listed_mode>& list
                 fmt::format("the modes are those of the agreement, the refinement was rejected: {}", fault));
         return false;
     };
+    if (work.force_is_older) return reject("the newest samples have too little of the force");
     if (!keeps_enough(work))
         return reject(
             fmt::format("it could use the newest {} of {} samples alone", work.set.count(), work.context.samples));

@@ -127,6 +127,21 @@ void older_samples::merge(const older_samples& other) {
     longest_ = std::max({longest_, other.longest_, other.length_});
 }
 
+std::vector<bool> older_samples::moved() const {
+    const auto n_u = static_cast<int>(n_u_), n_y = static_cast<int>(n_y_);
+    okid_accumulator_config_t config = okid_accumulator_defaults(n_u, n_y, 1);
+    config.edges = 1;
+    const owned_sums sums(config);
+    const std::size_t m = n_u_ + n_y_, size = 2 * m;
+    std::vector<double> gram(size * size);
+    std::vector<bool> out(m, false);
+    if (!sums.sums || !levels_[0].take(sums.sums) ||
+        okid_accumulator_gram(sums.sums, OKID_DETREND_NONE, gram.data(), nullptr) < 0)
+        return out;
+    for (std::size_t k = 0; k < m; ++k) out[k] = gram[k * (size + 1)] > 0;
+    return out;
+}
+
 void older_samples::lend_sums(const std::vector<double>& scale, std::vector<record_level>& levels) const {
     for (std::size_t k = 0; k < levels.size(); ++k) {
         levels_[k].settle();

@@ -42,6 +42,8 @@ class older_samples {
     long long longest() const { return longest_; }
     long long begun() const { return within_ ? length_ : 0; }
 
+    /// Of each channel, does it move?
+    std::vector<bool> moved() const;
     /// Sums for the levels of the newest samples; scale: what one unit of a level is in each channel.
     void lend_sums(const std::vector<double>& scale, std::vector<record_level>& levels) const;
     /// Counts, and what is to be said of missing and faulty samples, with those of the newest. newest: missing as they came

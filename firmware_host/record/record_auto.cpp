@@ -18,7 +18,7 @@
 #include "place_shapes.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
-#include "record_hold.hpp"
+#include "record_matrices.hpp"
 #include "record_rest.hpp"
 #include "request.hpp"
 #include "result/hold.hpp"
@@ -185,16 +185,6 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
                     runs, seen.empty() ? std::string() : "; doubtful: " + seen));
 }
 
-/// Numbers of M, K, R's modes count the confident ones: here they count those listed.
-void renumber(const std::vector<mode_verdict>& verdicts, mass_matrices& mass) {
-    std::vector<int> place;
-    for (std::size_t i = 0; i < verdicts.size(); ++i)
-        if (verdicts[i].confident) place.push_back(static_cast<int>(i) + 1);
-    for (mass_mode& mode : mass.modes)
-        if (mode.number >= 1 && static_cast<std::size_t>(mode.number) <= place.size())
-            mode.number = place[static_cast<std::size_t>(mode.number) - 1];
-}
-
 /// The band and the modes picked by hand.
 void keep_wanted(const record_options& options, std::vector<consensus_mode>& modes) {
     if (!options.band) return;
@@ -241,6 +231,29 @@ void remark_mixed(const std::vector<bool>& turned, const record_options& options
                     fmt::join(groups[0], ", "), fmt::join(groups[1], ", ")));
 }
 
+/// The newest samples fit B and D and show the fits; a force that has ended before them does so in sums alone.
+void take_inputs_from_sums(const std::vector<listed_pair>& found, const record_level& level,
+                           const std::vector<consensus_run>& runs, record_work& work) {
+    std::vector<mode_shift> wanted;
+    for (const auto& [mode, carried] : found)
+        if (mode.confident()) wanted.push_back({mode.frequency_hz, mode.damping_ratio, mode.shape});
+    mode_inputs of_wanted = summed_inputs(level, runs, wanted, static_cast<int>(work.set.n_u),
+                                          static_cast<int>(work.set.n_y), work.at_rest);
+    work.force_is_older = true;
+    work.context.warnings.emplace_back(
+        "force_earlier",
+        fmt::format("the newest {} samples have less than a twentieth of the energy of a force: {}", work.set.count(),
+                    of_wanted.residues.empty()
+                        ? "what it does to the modes is not known. End the record with the force"
+                        : "what it does to the modes (B, D, M, K, R) comes from the sums of all samples, without "
+                          "standard deviations, and no fit is given"));
+    if (of_wanted.residues.empty()) return;
+    work.inputs.D = std::move(of_wanted.D);
+    std::size_t next = 0;
+    for (const auto& [mode, carried] : found)
+        work.inputs.residues.push_back(mode.confident() ? std::move(of_wanted.residues[next++]) : Eigen::MatrixXcd());
+}
+
 /// Everything up to the modes, their standard deviations and the shapes.
 std::vector<listed_mode> find_modes_agreed(const record_options& options, record_work& work) {
     const auto tell = [&](const char* stage) {
@@ -284,76 +297,10 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     for (const record_level& level : levels) work.context.rates_hz.push_back(level.fs_hz);
     std::vector<listed_mode> listed;
     describe_modes(found, scale, set.n_u, options.sigma_blocks, listed, work);
+    if (work.before && force_is_older(levels[0], n_u, n_y, work.at_rest))
+        take_inputs_from_sums(found, levels[0], runs, work);
     work.scale = std::move(scale);
     return listed;
-}
-
-void find_matrices_agreed(const record_options& options, record_work& work) {
-    remarks& said = work.context.warnings;
-    said.insert(said.end(), options.said.begin(), options.said.end());
-    mass_plan plan = options.mass;
-    if (plan.outputs.empty()) plan.outputs.resize(work.set.n_y);
-    if (work.set.n_u > 0 && options.hold == "auto") work.context.hold = told_hold(work.set, work.model, plan);
-    if (options.hold == "auto" && work.set.n_u == 0) work.context.hold = "zoh";
-    plan.hold = work.context.hold;
-    if (!options.mass.wanted()) return;
-    try {
-        work.context.mass = find_mass_matrices(work.model, plan, said);
-    } catch (const failure& why) {
-        if (!options.modes_without_matrices) throw;
-        said.emplace_back("mkr_failed", why.what());
-        return;
-    }
-    renumber(work.context.verdicts, *work.context.mass);
-}
-
-/// The listed modes without a block, in the model those that are confident.
-std::vector<listed_mode> without_block(std::vector<listed_mode> listed, const record_work& work, std::size_t block) {
-    std::vector<listed_mode> out;
-    for (std::size_t k = 0; k < listed.size(); ++k) {
-        listed_mode& mode = listed[k];
-        if (!mode.in_model) continue;
-        if (block < work.shifts[k].size()) {
-            const mode_shift& shift = work.shifts[k][block];
-            mode.frequency_hz += shift.frequency_hz;
-            mode.damping_ratio += shift.damping_ratio;
-            for (std::size_t i = 0; i < mode.shape.size(); ++i) mode.shape[i] += shift.shape[i];
-        }
-        out.push_back(std::move(mode));
-    }
-    return out;
-}
-
-/// Standard deviations of M, K, R: modes, B and D without one block of the records each.
-void find_matrix_deviations(const std::vector<listed_mode>& listed, const record_options& options, record_work& work) {
-    std::size_t blocks = 0;
-    for (const auto& shifts : work.shifts) blocks = std::max(blocks, shifts.size());
-    if (!work.context.mass || blocks < std::size_t{fewest_blocks}) return;
-    mass_plan plan = options.mass;
-    const bool band = work.context.hold == "band";
-    plan.hold = band ? "zoh" : work.context.hold;
-    std::vector<int> sensing;
-    for (const mass_channel& channel : plan.outputs) sensing.push_back(channel.sensing);
-    const auto as_taken = [&](const okid_identified_t& model, held_model& held) {
-        return model_view(band && as_if_held(model, sensing, held) ? held.view : model);
-    };
-    replicate_statistics statistics(work.model.n_u, work.model.n_y, work.model.n_z, plan, work.model.dt);
-    held_model held;
-    statistics.begin(as_taken(work.model, held));
-    record_work part;
-    for (std::size_t b = 0; b < blocks; ++b) {
-        part.set = work.set;
-        const std::size_t count = part.set.count(), m = part.set.channels();
-        for (std::size_t n = b * count / blocks; n < (b + 1) * count / blocks; ++n)
-            std::fill_n(part.set.samples.begin() + static_cast<std::ptrdiff_t>(n * m + part.set.n_u), part.set.n_y,
-                        NAN);
-        part.set.complete = false;
-        make_modal_model(without_block(listed, work, b), options.fs_hz, part);
-        held_model other;
-        const okid_model_t view = as_taken(part.model, other);
-        statistics.add(&view, 1.0 / static_cast<double>(blocks));
-    }
-    add_deviations(statistics.finish(), *work.context.mass, work.context.warnings);
 }
 
 /// M, K, R from the model of the modes that are confident; then the model of all listed, its gain and fits.
@@ -381,6 +328,11 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
     find_gain(work);
     fit_records(work.set, work.model, work.context);
     if (options.modes.empty()) remark_unexplained(listed, options.fs_hz, work);
+    if (work.force_is_older) {
+        work.context.simulation_percent.reset();
+        work.context.prediction_percent.reset();
+        return;
+    }
     remark_noisy_output(work.context);
     remark_low_fit(*work.context.prediction_percent, false, work.context); // a simulation has only the modes listed
 }
@@ -451,8 +403,10 @@ record_result identify_auto(record_set records, const record_options& given, con
     const bool all = std::all_of(screened.kept.begin(), screened.kept.end(), [](bool kept) { return kept; });
     if (!all) work.set = without_outputs(work.set, screened.kept);
     const record_options options = all ? given : without_outputs(given, screened.kept);
-    check_moving(work.set, options, !screened.said.empty());
-    check_different_inputs(moments_of(work.set), options);
+    const std::vector<bool> moved = work.before && all ? work.before->moved() : std::vector<bool>();
+    check_moving(work.set, options, !screened.said.empty(), moved);
+    if (std::find(moved.begin(), moved.end(), true) == moved.end())
+        check_different_inputs(moments_of(work.set), options); // else they need not have been alike before
     const missing_count missing = count_missing(work.set);
     work.context = describe_records(work.set, options, missing);
     if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened

@@ -130,8 +130,9 @@ void check_measured(const missing_count& missing, const record_set& set, const r
                               no_measured_value));
 }
 
-void check_moving(const record_set& set, const record_options& options, bool screened) {
+void check_moving(const record_set& set, const record_options& options, bool screened, const std::vector<bool>& moved) {
     for (std::size_t k = 0; k < set.channels(); ++k) {
+        if (!moved.empty() && moved[k]) continue;
         const channel_movement found = movement_of(set, k);
         if (found.moves) continue;
         const bool input = k < set.n_u;

@@ -22,7 +22,9 @@ std::vector<input_moments> moments_of(const record_set& set);
 void check_measured(const missing_count& missing, const record_set& set, const record_options& options);
 
 /// A channel that never moves makes any model a guess. `screened`: some samples were left out for their looks.
-void check_moving(const record_set& set, const record_options& options, bool screened = false);
+/// @param moved  of each channel, did it in samples before the records; empty: there are none
+void check_moving(const record_set& set, const record_options& options, bool screened = false,
+                  const std::vector<bool>& moved = {});
 
 /// Inputs that repeat each other share their effect in any proportion; `about`: moments_of() the records.
 void check_different_inputs(const std::vector<input_moments>& about, const record_options& options);

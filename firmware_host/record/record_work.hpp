@@ -4,6 +4,7 @@
 #include "consensus/level_memory.hpp"
 #include "record.hpp"
 #include "record_uncertainty.hpp"
+#include "summed_inputs.hpp"
 
 #include <cstddef>
 #include <memory>
@@ -39,6 +40,8 @@ struct record_work {
     okid_identified_t model{};
     result_context context;
     const older_samples* before = nullptr; ///< auto: what is known of the samples before those of `set`
+    bool force_is_older = false;           ///< … and they have the force: B and D come from sums
+    mode_inputs inputs;                    ///< then, of each listed mode; no residues: not known
     std::unique_ptr<std::byte[]> memory;
     okid_identify_t* identifier = nullptr;
     const level_memory* older = nullptr; ///< sums of samples before those of `set`

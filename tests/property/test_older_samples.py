@@ -147,3 +147,28 @@ def test_an_output_that_is_left_out() -> None:
     codes = [warning.code for warning in found.warnings]
     assert "newest_only" in codes and "screened" in codes and found.to_dict()["samples"] <= KEPT
     np.testing.assert_allclose([mode.frequency_hz for mode in confident(found)], W2.modes()[0], rtol=1e-3)
+
+
+@pytest.mark.parametrize("left", [0.0, 1e-3])
+def test_a_force_that_ended_before_the_newest_samples(left: float) -> None:
+    """The shaker was off at the end: a force of exact zeros, or the noise of its load cell. All samples count."""
+    noise = np.random.default_rng(5).standard_normal((80_000, 8))
+    quiet = noise * 0.02 * rows().std(axis=0) + rows().mean(axis=0)
+    quiet[:, :2] = left * rows()[:, :2].std(axis=0) * noise[:, :2]
+    samples = np.vstack([rows()[:100_000], quiet])
+    found = okid.identify(*split(samples), fs=W2.fs, input_dofs=[1, 4], output_dofs=[1, 2, 3, 4, 5, 6])
+    codes = [warning.code for warning in found.warnings]
+    assert "force_earlier" in codes and "fit_low" not in codes and found.to_dict()["samples"] == 180_000
+    np.testing.assert_allclose([mode.frequency_hz for mode in confident(found)], W2.modes()[0], rtol=1e-4)
+    assert found.mkr is not None
+    np.testing.assert_allclose(found.mkr.M, W2.M, atol=0.02 * W2.M.max())
+    live = session()
+    live.feed(samples)
+    assert [mode.frequency_hz for mode in live.identify().modes] == [mode.frequency_hz for mode in found.modes]
+
+
+def test_a_force_that_never_acted_is_refused() -> None:
+    still = rows().copy()
+    still[:, 1] = 0.0
+    with pytest.raises(okid.IdentificationError, match='input "u2" is constant'):
+        okid.identify(*split(still), fs=W2.fs)
