@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 LONG = 30  # words that a sentence may have
-ENDS = re.compile(r"(?<=[.!?])[)\"'*_]*\s+(?=[(\"'*_\[]*(?:[A-Z0-9]|okid|code))")
+ENDS = re.compile(r"(?<=[.!?])[)\"'*_]*\s+(?=[(\"'*_\[]*(?:[A-Z0-9±α-ωΑ-Ω]|okid|code))")
 SHORT = re.compile(r"\b(?:e\.g|i\.e|vs|ch|eq|no|al|approx|etc|Fig)\.", re.IGNORECASE)
 
 
