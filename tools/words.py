@@ -2,9 +2,8 @@
 """Words of the pages: how many, how long the sentences are, how many words carry a digit.
 
 usage: tools/words.py [--check] [PAGE ..]     default: README.md and all of docs/
-Columns: words, longest sentence, sentences over 30 words, share of words with a digit in percent. Code blocks, HTML
-comments and addresses of links are no words. Code in backquotes is one word a piece, tables are words of the page but
-neither sentences nor part of the share of digits. --check compares with the bounds in tools/words.toml.
+Columns: words, longest sentence, sentences over 30 words, percent of words with a digit. Code blocks, comments and
+addresses are no words, code in backquotes is one. Tables count as words only. --check: bounds of tools/words.toml.
 exit codes: 0 within the bounds, 1 a bound is passed, 2 wrong usage
 """
 
@@ -20,7 +19,7 @@ from typing import NamedTuple
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 LONG = 30  # words that a sentence may have
 ENDS = re.compile(r"(?<=[.!?])[)\"'*_]*\s+(?=[(\"'*_\[]*(?:[A-Z0-9±α-ωΑ-Ω]|okid|code))")
-SHORT = re.compile(r"\b(?:e\.g|i\.e|vs|ch|eq|no|al|approx|etc|Fig)\.", re.IGNORECASE)
+SHORT = re.compile(r"\b(?:e\.g|i\.e|vs|ch|eq|al|etc)\.", re.IGNORECASE)
 
 
 class Count(NamedTuple):
@@ -54,6 +53,7 @@ def readable(text: str) -> str:
     text = re.sub(r"(?ms)^( *)(`{3,})[^\n]*\n.*?^\1\2 *$", "", text)
     text = re.sub(r"(?ms)^\$\$.*?^\$\$ *$|<!--.*?-->", "", text)
     text = re.sub(r"(?m)^ {4,}(?![-*\d ]).*$", "", text)
+    text = re.sub(r"(?m)^(#+ )\d+\. ", r"\1", re.sub(r"(?m)^( *)\d+\. ", r"\1- ", text))  # numbers of items
     text = re.sub(r"(`+)(?:(?!\1).)+?\1|\$[^$\n]+\$", "code", text)
     return re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", re.sub(r"<[^>\n]+>", "", text))
 
@@ -95,7 +95,7 @@ def counts(which: list[pathlib.Path]) -> dict[str, Count]:
 def passed(found: dict[str, Count]) -> list[str]:
     """Bounds that are passed, in words."""
     bounds = tomllib.loads((ROOT / "tools" / "words.toml").read_text("utf-8"))
-    out = []
+    out: list[str] = []
     for name, bound in bounds.items():
         for what, most in bound.items() if name in found else ():
             if (there := getattr(found[name], what)) > most:
@@ -112,7 +112,7 @@ def main(arguments: list[str] | None = None) -> int:
     for name, one in found.items():
         print(f"{one.words:7} {one.longest:4} {one.over:4} {one.percent:5.1f}  {name}")
     faults = passed(found) if given.check else []
-    print(*faults, sep="\n", end="\n" if faults else "", file=sys.stderr)
+    print("".join(f"{fault}\n" for fault in faults), end="", file=sys.stderr)
     return 1 if faults else 0
 
 
