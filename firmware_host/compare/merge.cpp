@@ -321,7 +321,7 @@ class merger {
         for (std::size_t k = 0; k < results_.size(); ++k)
             for (const auto& [code, text] : results_[k].warnings) {
                 auto at = std::find_if(out.begin(), out.end(),
-                                       [&, code = code](const auto& one) { return one.first == code; });
+                                       [&, wanted = code](const auto& one) { return one.first == wanted; });
                 if (at == out.end()) at = out.insert(out.end(), {code, {{}, text}});
                 std::vector<std::size_t>& set_ups = at->second.first;
                 if (set_ups.empty() || set_ups.back() != k + 1) set_ups.push_back(k + 1);

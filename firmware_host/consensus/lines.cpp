@@ -23,7 +23,9 @@ constexpr double steady = 0.25;          // spread over mean of an amplitude; 0.
 constexpr std::size_t fewest_blocks = 8; // to speak of a spread
 constexpr std::size_t line_blocks = 64;
 constexpr double loudest_silence =
-    0.07; // half the amplitude of a line of 3 % of the spread in the tenth of a record after a hit
+    0.07;                      // half the amplitude of a line of 3 % of the spread in the tenth of a record after a hit
+constexpr double begun = 0.05; // of the largest force
+constexpr double quieter = 0.5;       // amplitude before the hits over that of the record
 constexpr double line_periods = 8;    // at least so many in a block
 constexpr double fewest_periods = 3;  // … where a fall is looked for
 constexpr double line_damping = 0.01; // a pole damped more is no line
@@ -165,6 +167,41 @@ bool decays(const std::vector<std::vector<complex>>& records, double decay) {
     return -slope > falls * sigma && -slope > decay / as_damped && -slope < decay * as_damped;
 }
 
+/// Samples of a record before its force sets in.
+std::size_t quiet_samples(const sample_rows& rows, std::size_t m, std::size_t n_u) {
+    std::size_t out = rows.size() / m;
+    for (std::size_t c = 0; c < n_u; ++c) {
+        double largest = 0;
+        for (std::size_t i = c; i < rows.size(); i += m) largest = std::fmax(largest, std::abs(rows[i]));
+        for (std::size_t i = 0; i < out; ++i)
+            if (std::abs(rows[i * m + c]) > begun * largest) out = i;
+    }
+    return out;
+}
+
+/// Is its amplitude less before the hits than over the records? That of a line is the same. Half a period of quiet at least.
+bool quieter_before(const record_level& level, std::size_t m, std::size_t n_u, const std::vector<complex>& weights,
+                    double frequency_hz, double over_all) {
+    const double half_period = level.fs_hz / frequency_hz / 2;
+    if (n_u == 0) return false;
+    double square = 0, records = 0;
+    for (const sample_rows& rows : level.records) {
+        const double halves = std::floor(static_cast<double>(quiet_samples(rows, m, n_u)) / half_period);
+        if (halves < 1) continue;
+        const auto count = static_cast<std::size_t>(halves * half_period);
+        complex sum = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            complex along = 0;
+            for (std::size_t c = 0; c < weights.size(); ++c) along += weights[c] * rows[i * m + n_u + c];
+            sum += along * std::polar(1.0, -2 * M_PI * frequency_hz / level.fs_hz * static_cast<double>(i));
+        }
+        if (std::isnan(sum.real())) continue;
+        square += std::norm(sum / static_cast<double>(count));
+        ++records;
+    }
+    return records > 0 && std::sqrt(square / records) < quieter * over_all;
+}
+
 bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
     std::size_t longest = 0;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
@@ -176,9 +213,10 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     const std::size_t block = std::max(periods, longest / line_blocks);
     const std::vector<complex> weights = weights_along(mode.shape),
                                a = amplitudes(level, m, n_u, weights, mode.frequency_hz, block);
-    if (at_rest && strength(a) > loudest_silence) return false;
+    if (at_rest &&
+        (strength(a) > loudest_silence || quieter_before(level, m, n_u, weights, mode.frequency_hz, strength(a))))
+        return false;
     if (!endless) return a.size() >= fewest_blocks && spread_over_mean(a) < steady;
-    if (at_rest) return true;
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= fewest_blocks * level.records.size()

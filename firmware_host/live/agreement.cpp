@@ -192,17 +192,12 @@ okid_status_t agreement::run(const mass_plan& mass) {
     return fault_ ? OKID_ERR_NO_MODES : OKID_OK;
 }
 
-/// Deviations shrink with the root of what they rest on.
 bool agreement::follow() {
     if (!followed_.any()) return false;
     model_ = kept_model(found_.model.view());
-    followed_.follow(model_);
     sigma_ = found_.context.sigma;
-    if (!sigma_) return true;
-    const double narrower =
-        std::sqrt(static_cast<double>(decided_on_) / static_cast<double>(std::max(decided_on_, basis())));
-    for (auto* each : {&sigma_->frequency_hz, &sigma_->damping_ratio, &sigma_->shape_re, &sigma_->shape_im})
-        for (double& one : *each) one *= narrower;
+    followed_.follow(static_cast<double>(decided_on_) / static_cast<double>(std::max(decided_on_, basis())), model_,
+                     sigma_);
     return true;
 }
 

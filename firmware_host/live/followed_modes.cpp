@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  where the modes of auto are now, between two decisions which they are
 // METHOD   the filters of consensus/levels.hpp sample by sample, an accumulator for each rate. The models that carried the modes
-//          when they were decided are made anew; a mode moves as far as its carrier did, and keeps what the runs agreed on
+//          when they were decided are made again; a mode moves by the share of the move of its carrier that is not the carrier's
+//          own noise, and keeps what the runs agreed on
 #include "followed_modes.hpp"
 
 #include "consensus/consensus_runs.hpp"
@@ -96,6 +97,13 @@ std::vector<std::optional<std::pair<double, double>>> followed_modes::now(const 
     return out;
 }
 
+/// Share of a carrier's move that its mode makes too. A mode known better than its carrier (by maximum likelihood) is an efficient
+/// estimate: what the carrier's variance has beyond it is noise of its own. Var(v) / Var(c) is the regression of one move on the other.
+double followed_modes::share_of(double deviation, double of_carrier) {
+    const double share = deviation / of_carrier;
+    return share < 1 ? share * share : 1; // not known: all of it
+}
+
 void followed_modes::begin(const record_result& found) {
     groups_.clear();
     if (found.scale.size() != m_) return; // places of a hammer, or an output that is left out
@@ -114,20 +122,26 @@ void followed_modes::begin(const record_result& found) {
             at = groups_.insert(at, {k, by.config, {}, {}, {}});
             at->config.detrend = OKID_DETREND_MEAN;
         }
-        at->modes.push_back(i);
+        const std::optional<deviations>& sigma = found.context.sigma;
+        at->modes.push_back({i, share_of(sigma ? sigma->frequency_hz[i] : NAN, by.frequency_std_hz),
+                             share_of(sigma ? sigma->damping_ratio[i] : NAN, by.damping_std)});
         at->wanted.push_back({by.frequency_hz, by.damping_ratio, by.shape});
     }
     for (group& one : groups_) one.then = now(one);
 }
 
-void followed_modes::follow(kept_model& to) {
+void followed_modes::follow(double kept, kept_model& to, std::optional<deviations>& sigma) {
     double *f = to.own(to.view().frequency_hz), *zeta = to.own(to.view().damping_ratio);
     for (const group& one : groups_) {
         const auto found = now(one);
         for (std::size_t i = 0; i < found.size(); ++i) {
             if (!found[i] || !one.then[i]) continue;
-            f[one.modes[i]] += found[i]->first - one.then[i]->first;
-            zeta[one.modes[i]] = std::max(0.0, zeta[one.modes[i]] + found[i]->second - one.then[i]->second);
+            const auto& [mode, share_f, share_zeta] = one.modes[i];
+            f[mode] += share_f * (found[i]->first - one.then[i]->first);
+            zeta[mode] = std::max(0.0, zeta[mode] + share_zeta * (found[i]->second - one.then[i]->second));
+            if (!sigma) continue;
+            sigma->frequency_hz[mode] *= std::sqrt(1 - share_f * (1 - kept));
+            sigma->damping_ratio[mode] *= std::sqrt(1 - share_zeta * (1 - kept));
         }
     }
 }

@@ -32,19 +32,25 @@ class followed_modes {
     void begin(const record_result& found);
     void stop() { groups_.clear(); } ///< until the next begin()
     bool any() const { return !groups_.empty(); }
-    /// Frequencies and damping of the modes that begin() was given, moved as far as their carriers moved since.
-    void follow(kept_model& to);
+    /// Frequencies and damping of the modes that begin() was given, moved as their carriers moved since, and their deviations.
+    /// @param kept  share that the samples at begin() are of those of now
+    void follow(double kept, kept_model& to, std::optional<deviations>& sigma);
 
   private:
+    struct followed {
+        std::size_t mode;                  ///< of begin()
+        double frequency = 1, damping = 1; ///< share of the carrier's move that it makes
+    };
     /// Modes that one model carries.
     struct group {
         std::size_t rate;
         okid_identify_config_t config;
-        std::vector<std::size_t> modes;
+        std::vector<followed> modes;
         std::vector<mode_shift> wanted;
         std::vector<std::optional<std::pair<double, double>>> then; ///< frequency and damping at begin()
     };
     static okid_accumulator_config_t sums_config(const stream_config& config, double fs_hz, std::int64_t window);
+    static double share_of(double deviation, double of_carrier);
     std::vector<std::optional<std::pair<double, double>>> now(const group& of);
 
     int n_u_, n_y_;

@@ -226,7 +226,9 @@ std::vector<std::optional<carried_mode>> carry_at(const carrier_task& task, int 
         if (!one) continue;
         one->exact = exact;
         unfold(zoom, *one);
-        if (!task.level.zoomed) one->by = {task.run.level, config, one->frequency_hz, one->damping_ratio, one->shape};
+        if (!task.level.zoomed)
+            one->by = {task.run.level,        config,          one->frequency_hz, one->damping_ratio, one->shape,
+                       one->frequency_std_hz, one->damping_std};
     }
     return out;
 }

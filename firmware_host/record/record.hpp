@@ -51,7 +51,8 @@ struct mode_carrier {
     int level = -1;                  ///< of record_level; -1: none, or a zoomed band
     okid_identify_config_t config{}; ///< with its order
     double frequency_hz = 0, damping_ratio = 0;
-    std::vector<std::complex<double>> shape; ///< of channels in units of `scale`
+    std::vector<std::complex<double>> shape;          ///< of channels in units of `scale`
+    double frequency_std_hz = NAN, damping_std = NAN; ///< of what the carrier says; NAN: not known
 };
 
 class older_samples;

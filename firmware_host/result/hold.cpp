@@ -32,7 +32,7 @@ constexpr double beyond = 1.05;    // of the last mode, where that lies higher
 constexpr double grid_end = 0.42;
 constexpr double vibration = 0.3;  // damping above is none
 constexpr double explained = 0.2;  // misfit above: the modes are not what makes the response
-constexpr double far_better = 0.5; // misfit of one hold over that of another
+constexpr double far_better = 0.5; // misfit or phase of one hold over that of another
 
 /// Poles and shapes of a model, its response over the grid.
 struct response {
@@ -179,7 +179,8 @@ std::string tell_hold(const okid_identified_t& model, const std::vector<int>& se
     const hold_fit held = fit_of(r, model.n_y, sensing, "zoh"), linear = fit_of(r, model.n_y, sensing, "foh"),
                    band = fit_of(r, model.n_y, sensing, "band");
     if (held.phase <= std::min(linear.phase, band.phase)) return "zoh";
-    if (falls) return "band";
+    // Behind a filter the spectrum falls; that of short pulses does too, and those can be straight between samples.
+    if (falls && linear.phase > far_better * band.phase) return "band";
     return linear.misfit < far_better * band.misfit ? "foh" : "band";
 }
 

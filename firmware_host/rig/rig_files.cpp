@@ -75,12 +75,7 @@ std::string config_head(const rig& rig, const rig_run& run) {
 }
 
 std::string config_tail(const rig& rig) {
-    // A free decay has no forces: nothing for an observer to learn from, the canonical weighting finds its modes.
-    const char* method =
-        rig.force_dofs.empty() ? "method = \"n4sid-cva\"\nrows = 30" : "method = \"okid-era\"\np = 40\nrows = 80";
-    return fmt::format("\n[identification]\n{}\norder = \"auto\"\nhold = \"{}\"\ndetrend = \"mean\"\n"
-                       "update_s = 1.0\nmkr = {}\n",
-                       method, rig.hold, mass_is_seen(rig));
+    return fmt::format("\n[identification]\nhold = \"{}\"\nupdate_s = 1.0\nmkr = {}\n", rig.hold, mass_is_seen(rig));
 }
 
 } // namespace

@@ -20,6 +20,7 @@ from typing import Any
 
 from cobs import cobs
 from command_help import OKID
+from methods import by_method
 from okid.capture.stream import Capture
 from waiting import until
 
@@ -86,7 +87,7 @@ def changing_frame(folder: pathlib.Path) -> list[Event]:
     """A frame that loses stiffness and gets it back: frames lost, a change, an alarm that ends, a result."""
     (folder / "rig.toml").write_text(FRAME)
     okid(folder, "simulate", "rig.toml", "--log", "rig.log", "--config", "frame.toml", "--quiet")
-    quick = (folder / "frame.toml").read_text().replace("p = 40\nrows = 80", "p = 12\nrows = 24")
+    quick = by_method((folder / "frame.toml").read_text(), p=12, rows=24)
     (folder / "frame.toml").write_text(quick)
     log = (folder / "rig.log").read_text().splitlines(keepends=True)
     (folder / "lossy.log").write_text("".join(log[:500] + log[520:]))

@@ -13,7 +13,7 @@ PAGE = ROOT / "docs" / "tutorial.md"
 
 
 def test_the_tutorial_from_top_to_bottom(tmp_path: Path) -> None:
-    assert Reader(tmp_path).follow(PAGE) >= 20
+    assert Reader(tmp_path).follow(PAGE) >= 19
 
 
 def test_what_a_page_shows_is_compared() -> None:

@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from methods import by_method
 from program import PROGRAM as OKID
 from two_masses import rig_text
 from waiting import until
@@ -77,7 +78,7 @@ def rig(tmp_path: Path, sim: Sim) -> Path:
     names = {"--log": "a.log", "--truth": "t.json", "--dbc": "a.dbc", "--config": "a.toml"}
     options = [str(part) for option, name in names.items() for part in (option, tmp_path / name)]
     subprocess.run([OKID, "simulate", str(tmp_path / "rig.toml"), *options], check=True, capture_output=True)
-    text = (tmp_path / "a.toml").read_text().replace("p = 40\nrows = 80", "p = 12\nrows = 24")
+    text = by_method((tmp_path / "a.toml").read_text(), p=12, rows=24)
     text = text.replace("update_s = 1.0", "update_s = 0.5")
     text += f'\n[trigger]\nsource = "gpio"\nchip = "{sim.chip}"\nline = "START"\npretrigger_s = 0.5\n'
     text += f'\n[lamps]\narmed = {{ chip = "{sim.chip}", line = 4 }}\n'

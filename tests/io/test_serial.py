@@ -16,6 +16,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lines import Reader, Run, line, of_type, packet, unpack
+from methods import by_method
 
 RIG = """rate_hz = 250.0
 duration_s = {seconds}
@@ -95,7 +96,7 @@ def test_own_stream_gives_what_the_can_log_gives(tmp_path: Path, bits: int) -> N
     assert stats["bus"]["node"]["received"] == len(rig.codes)
     assert stats["bus"]["node"]["lost"] == 0
     assert not of_type(events, "gap")
-    can = (tmp_path / "can.toml").read_text().replace("p = 40", "p = 30").replace("rows = 80", "rows = 60")
+    can = by_method((tmp_path / "can.toml").read_text(), p=30, rows=60)
     (tmp_path / "can.toml").write_text(can.replace("update_s = 1.0", "update_s = 10.0\nsigma_blocks = 0"))
     done = program.okid("replay", tmp_path / "rig.log", "-c", tmp_path / "can.toml", "--json", "-")
     by_can = json.loads(done.stdout)

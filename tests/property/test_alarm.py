@@ -10,6 +10,7 @@ import pathlib
 from typing import Any
 
 import pytest
+from methods import by_method
 from program import okid
 
 W1 = {
@@ -56,8 +57,7 @@ def replay(
     folder: pathlib.Path, name: str, window: int | None, update: float = 0.5, more: str = "", p: int = 40
 ) -> list[dict[str, Any]]:
     text = (folder / "a.toml").read_text().replace("update_s = 1.0", f"update_s = {update}")
-    text = text.replace("p = 40\nrows = 80", f"p = {p}\nrows = {2 * p}")
-    assert f"p = {p}\n" in text
+    text = by_method(text, p=p, rows=2 * p)
     text = text.replace("mkr = true", f"window_s = {window / RIGS[name]['rate_hz']}" if window else "mkr = false")
     (folder / "b.toml").write_text(text + more)
     done = okid("replay", folder / "a.log", "-c", folder / "b.toml", "--events", folder / "e.jsonl")
@@ -131,7 +131,7 @@ def test_nothing_changes(tmp_path: pathlib.Path, name: str, window: int | None, 
 def test_change_test(tmp_path: pathlib.Path, softer: int | None) -> None:
     """Beside the alarm, which is off: 2 % of a spring of W2 in mid-record; an alarm in each test after it only."""
     truth = simulate(tmp_path, "W2", 36000, 5, softer, 0.98)
-    text = (tmp_path / "a.toml").read_text().replace("mkr = true", "mkr = false").replace("p = 40\nrows = 80", "p = 10")
+    text = by_method((tmp_path / "a.toml").read_text(), p=10).replace("mkr = true", "mkr = false")
     (tmp_path / "b.toml").write_text(text + "[alarm]\nenabled = false\ntest_s = 29.0\n")
     done = okid("replay", tmp_path / "a.log", "-c", tmp_path / "b.toml", "--events", tmp_path / "e.jsonl", status=0)
     tests = of_type([json.loads(line) for line in (tmp_path / "e.jsonl").read_text().splitlines()], "change_test")

@@ -8,6 +8,7 @@ import subprocess
 import numpy as np
 import okid as package
 import pytest
+from methods import by_method
 from program import ROOT, okid
 
 TRUTH = [10.96009, 31.84210, 45.66197]
@@ -85,9 +86,8 @@ def misread(rig: pathlib.Path, tmp_path: pathlib.Path, old: str, new: str) -> tu
     dbc = (rig / "rig.dbc").read_text()
     assert old in dbc
     (tmp_path / "misread.dbc").write_text(dbc.replace(old, new))
-    text = (rig / "rig.toml").read_text().replace("rig.dbc", "misread.dbc")
-    assert 'order = "auto"' in text
-    (tmp_path / "misread.toml").write_text(text.replace('order = "auto"', "order = 6\nsigma_blocks = 0"))
+    text = by_method((rig / "rig.toml").read_text()).replace("rig.dbc", "misread.dbc")
+    (tmp_path / "misread.toml").write_text(text.replace("update_s", "order = 6\nsigma_blocks = 0\nupdate_s"))
     out = tmp_path / "r.json"
     done = okid("replay", rig / "rig.log", "-c", tmp_path / "misread.toml", "--json", out)
     found = json.loads(out.read_text())["warnings"] if out.exists() else []

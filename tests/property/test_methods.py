@@ -13,7 +13,7 @@ import pytest
 import systems
 from csv_record import write_csv
 from measured_data import data_file
-from methods import METHODS, N4SID
+from methods import METHODS, N4SID, by_method
 from numpy.typing import NDArray
 from okid import abi
 from program import ROOT
@@ -21,7 +21,6 @@ from program import okid as run
 from scipy.signal import detrend
 
 Array = NDArray[np.float64]
-CONFIG = '[identification]\nmethod = "okid-era"\np = 40\nrows = 80\n'
 
 
 def errors(s: systems.Structure, f: Array, zeta: Array) -> tuple[float, float]:
@@ -166,7 +165,6 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("rig")
     run("simulate", ROOT / "tests" / "replay" / "demo_rig.toml", "--log", folder / "rig.log", "--truth",
         folder / "truth.json", "--dbc", folder / "okid.dbc", "--config", folder / "rig.toml", status=0)  # fmt: skip
-    assert CONFIG in (folder / "rig.toml").read_text()
     return folder
 
 
@@ -174,11 +172,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_replay_of_a_rig(method: str, rig: Path) -> None:
     """Live, from the bus: every method finds the modes of the virtual rig from its accumulator."""
     config = rig / f"{method}.toml"
-    config.write_text(
-        (rig / "rig.toml")
-        .read_text()
-        .replace(CONFIG, f'[identification]\nmethod = "{method}"\n' + ("" if method in N4SID else "p = 40\n"))
-    )
+    config.write_text(by_method((rig / "rig.toml").read_text(), method, None if method in N4SID else 40))
     assert method in run("check", config, status=0).stdout
     run("replay", rig / "rig.log", "-c", config, "--json", rig / f"{method}.json", status=0)
     result, truth = (json.loads((rig / name).read_text()) for name in (f"{method}.json", "truth.json"))

@@ -291,7 +291,7 @@ def test_without_the_wish_there_are_no_matrices(rig: Path, tmp_path: Path) -> No
 
 
 def test_live_result_without_enough_modes(rig: Path, tmp_path: Path) -> None:
-    config = (rig / "config").read_text(encoding="utf-8").replace('order = "auto"', "order = 4")
+    config = (rig / "config").read_text(encoding="utf-8").replace("update_s", "order = 4\nupdate_s")
     done = replayed(rig, config, "--json", str(tmp_path / "r.json"))
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))

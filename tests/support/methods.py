@@ -10,6 +10,13 @@ N4SID = METHODS[2:]
 HORIZON = {"w1": (40, 80, 40), "w2": (40, 80, 30), "w3": (40, 60, 25)}  # p, rows of okid, rows of n4sid
 
 
+def by_method(config: str, method: str = "okid-era", p: int | None = 40, rows: int | None = None) -> str:
+    """A config of `okid simulate`, which has the default method, with a named one, which is quick."""
+    keys = f'method = "{method}"\n' + (f"p = {p}\n" if p else "") + (f"rows = {rows}\n" if rows else "")
+    assert "[identification]\n" in config and "method" not in config
+    return config.replace("[identification]\n", "[identification]\n" + keys)
+
+
 def horizon(name: str, method: str) -> dict[str, Any]:
     """p and rows of a structure of systems.py."""
     p, rows, i = HORIZON[name]

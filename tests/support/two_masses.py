@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
+from methods import by_method
 from program import okid
 
 RIG = """
@@ -36,9 +36,6 @@ def simulate_rig(folder: Path, text: str, lags: int = 12) -> Path:
     options = [part for option, name in names.items() for part in (option, folder / name)]
     done = okid("simulate", folder / "rig.toml", *options)
     assert done.returncode == 0, done.stderr
-    config, found = re.subn(
-        r"(?m)^p = \d+\nrows = \d+$", f"p = {lags}\nrows = {2 * lags}", (folder / "a.toml").read_text()
-    )
-    assert found == 1
-    (folder / "a.toml").write_text(config)
+    config = by_method((folder / "a.toml").read_text(), p=lags, rows=2 * lags)
+    (folder / "a.toml").write_text(config.replace("update_s", 'order = "auto"\nupdate_s'))
     return folder
