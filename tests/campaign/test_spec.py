@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -136,8 +137,24 @@ def test_missing_file(tmp_path: Path) -> None:
         load_spec(tmp_path / "none.toml")
 
 
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "campaigns.md"
+
+
+def test_the_spec_of_the_page(tmp_path: Path) -> None:
+    """It is read, and finds the record whose name it describes."""
+    (text,) = re.findall(r"<!-- spec: is read by .*? -->\n```text\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    path = tmp_path / "SPEC.toml"
+    path.write_text(text)
+    (tmp_path / "records").mkdir()
+    (tmp_path / "records" / "2025-09-08T1200.npy").write_bytes(b"")
+    spec = load_spec(path)
+    assert spec.channels.columns == ("force", "a1", "a2", "temperature") and spec.identification.method == "auto"
+    (found,), skipped = list_records(spec)
+    assert found.time_s == 1757332800 and not skipped  # 2025-09-08 12:00 UTC
+
+
 def test_every_key_has_a_home() -> None:
     """What the checker takes, the page of the documentation names."""
-    text = (Path(__file__).resolve().parents[2] / "docs" / "howto" / "campaigns.md").read_text("utf-8")
+    text = PAGE.read_text("utf-8")
     missing = [f"[{section}] {key}" for section, keys in KEYS.items() for key in keys if f"`{key}`" not in text]
     assert not missing

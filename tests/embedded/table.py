@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The measured sizes, stacks and instruction counts of the node, as the tables of docs/porting.md.
+"""The measured sizes, stacks and instruction counts of the node, as the tables of docs/howto/port-to-a-board.md.
 
 usage: table.py FOLDER   (build-embedded, after tests/embedded/test_node.py has run)
 """

@@ -76,7 +76,7 @@ def w1() -> Codes:
 
 
 def compare(node: Modes, host: Modes, is_float: bool) -> None:
-    """Double: 1e-9 all over. Float: docs/porting.md."""
+    """Double: 1e-9 all over. Float: docs/howto/port-to-a-board.md."""
     f, zeta, shape, other = (3e-6, 1e-3, 1e-4, 1e-3) if is_float else (1e-9,) * 4
     assert (node.status, node.stage) == (0, 5)
     assert node.ridge == host.ridge

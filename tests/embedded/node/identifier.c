@@ -2,7 +2,7 @@
 // PURPOSE  sums of 16-bit codes, and from them modes: structured observer, Markov parameters, ERA, modes
 // METHOD   no Gram matrix (okid_structured_solve takes the sums themselves); observer and realization never meet, so they
 //          share one memory, which also carries the written state
-// REFERENCE docs/porting.md; paper eq. (36)-(54)
+// REFERENCE docs/howto/port-to-a-board.md; paper eq. (36)-(54)
 #include "identifier.h"
 
 #include <okid/modal.h>
