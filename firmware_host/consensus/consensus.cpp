@@ -18,7 +18,7 @@ namespace {
 
 constexpr double most_damping = 0.25;   // a pole above is no vibration to an engineer
 constexpr double overdamped = 0.2;      // a mode above is listed, not signed
-constexpr double same_frequency = 0.01; // within a run, and between runs (numerics.md section 5)
+constexpr double same_frequency = 0.01; // within a run, and between runs (docs/how-okid-decides.md)
 constexpr double same_damping = 0.3;    // from one order to the next
 constexpr double same_shape_run = 0.9;  // MAC from one order to the next
 constexpr double same_shape = 0.8;      // MAC between runs

@@ -14,7 +14,7 @@
 namespace okid_host {
 namespace {
 
-constexpr long long fewest_samples = 700; // numerics.md section 5
+constexpr long long fewest_samples = 700; // fewer carry no run of any method
 constexpr double top_decimated = 0.42;    // inside the pass band of the filter
 constexpr double top_full = 0.48;         // where the record has no filter of its own
 constexpr double edge_power = 0.1;        // of the usual power, above top_decimated: less means an anti-alias filter

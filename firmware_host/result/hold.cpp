@@ -3,7 +3,7 @@
 // METHOD   below the edge of the band the sampled response of band-limited signals is the continuous one: residues r_k of
 //          H(s) = sum s^b (r_k / (s - lambda_k) + conj), b = 2 for accelerations, by least squares to the model's response from
 //          below the first mode to 0.36 fs. Held and linear forces: the same with the sampled terms. Of normal modes
-//          2 j w_d r_k is real: the wrong hold turns it (docs/numerics.md section 5)
+//          2 j w_d r_k is real: the wrong hold turns it
 #include "hold.hpp"
 
 #include "deviations.hpp"

@@ -2,7 +2,7 @@
 // PURPOSE    filters in the modal coordinates of a given A, and the Gram matrix of their signals over a run of samples
 // METHOD     phi(t+1) = w phi(t) + u(t) for every eigenvalue and input; 64 samples at a time into the sums. Without a gap the
 //            sums of two signals a, b solve S - w_a S w_b = (what the inputs and the two ends add): run()
-// REFERENCE  docs/numerics.md section 2, "B,D,z0 by output error"
+// REFERENCE  docs/numerics.md, "Subspace methods"
 // NUMERICS   needs independent eigenvectors; unstable eigenvalues grow until the numbers end (the caller looks). run() divides
 //            by 1 - |w|^2: not below 1e-6
 // WORKSPACE  base^2 + (64 + n_y) base numbers and what okid_filters_t takes; base = n_z n_u + n_z + n_u. base^2 flop a sample,

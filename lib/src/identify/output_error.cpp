@@ -2,7 +2,7 @@
 // PURPOSE    B, D and initial states by output error, for given A and C, from records in memory
 // METHOD     linear least squares over [B; D] and one initial state a run: normal equations from the sums of the modal
 //            filters, each initial state eliminated when its run ends, and found again from the solution
-// REFERENCE  docs/numerics.md section 2, "B,D,z0 by output error"; Verhaegen (1994)
+// REFERENCE  docs/numerics.md, "Subspace methods"; Verhaegen (1994)
 // NUMERICS   unit diagonal, floor of 1e-13: modes that no output shows or that died at once are left near zero
 // WORKSPACE  the squares of n_z n_u + n_z + n_u and of n_u (n_z + n_y), n_z n_u (n_z + n_y) numbers a record
 #include "identify/modal_filters.hpp"
