@@ -23,7 +23,7 @@
 ///
 /// **Memory** is the caller's. X_memsize() tells how many bytes a configuration needs (0: it is invalid), X_create() lays
 /// the object out in the block, and nothing is ever freed or allocated after that. OKID_X_BYTES() are bounds for static
-/// arrays. Objects hold offsets, no pointers: a memcpy of a block is a snapshot. Matrices are column-major.
+/// arrays. Sums hold offsets, no pointers: a memcpy of their block is a snapshot. Matrices are column-major.
 ///
 /// **Threads.** One object belongs to one thread at a time; different objects do not know of each other. No locks, no
 /// hidden state, no clock, no input or output.

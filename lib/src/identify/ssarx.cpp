@@ -4,7 +4,8 @@
 //            samples is taken from Y_f: row a is y_(i+a) - D u_(i+a) - sum over h = 1..a of Ybar_h v_(i+a-h). SVD of
 //            S^-1 F21 with S S^T = cov(Ytilde_f); x_i = Sigma^(1/2) V^T F11^-1 W_p, x_(i+1) the same of the rows one
 //            sample later. y_i on [x_i; u_i] gives C, D; x_(i+1) on [x_i; u_i] A, B; residuals K
-// REFERENCE  Jansson (2003) for the method (the paper names it without equations, trap 8); docs/numerics.md, "Subspace methods"
+// REFERENCE  Jansson (2003) for the method (the paper names it without equations, trap 8);
+//            docs/numerics.md, "Subspace methods"
 // NUMERICS   the coordinates of the past are orthonormal, so that the states are too and one set of products serves
 //            every order. F11 is singular without noise: the ridge of the factor bounds what is read through it
 // WORKSPACE  n_y m i^2 w + h^2 w flop once, an order 4 n_z m w
