@@ -238,8 +238,10 @@ std::vector<bool> voters(const std::vector<consensus_run>& runs, double f, doubl
         vote[r] = can_part(runs[r], spacing_hz, n_y);
         see.push_back(r);
     }
-    std::stable_sort(see.begin(), see.end(),
-                     [&](std::size_t a, std::size_t b) { return runs[a].horizon_s() > runs[b].horizon_s(); });
+    std::sort(see.begin(), see.end(), [&](std::size_t a, std::size_t b) {
+        const double one = runs[a].horizon_s(), other = runs[b].horizon_s();
+        return one > other || (!(other > one) && a < b);
+    });
     for (std::size_t i = 0; i < std::min(fewest_voters, see.size()); ++i) vote[see[i]] = true;
     return vote;
 }
