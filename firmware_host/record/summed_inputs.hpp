@@ -2,6 +2,7 @@
 // What the forces do to the modes, from sums: where they act in samples that are no longer kept.
 #pragma once
 #include "consensus/consensus_runs.hpp"
+#include "result/deviations.hpp"
 
 #include <Eigen/Dense>
 #include <vector>
