@@ -25,7 +25,9 @@ namespace {
 
 using complex = std::complex<double>;
 
-constexpr double same_mode = 0.01; // of its frequency: a mode in one set-up and in all of them
+constexpr double dead_spread = 0.01; // of the usual spread of sensors of a kind
+constexpr double dead_percent = 10;  // explained one sample ahead
+constexpr double same_mode = 0.01;   // of its frequency: a mode in one set-up and in all of them
 
 /// A set-up by itself, and what its model says of its forces.
 struct one_set_up {
@@ -116,6 +118,36 @@ std::vector<set_up> joined(std::vector<set_up> all) {
     return out;
 }
 
+/// Spread of each output over all records.
+std::vector<double> spreads_of(const record_set& set) {
+    std::vector<double> out;
+    for (std::size_t o = 0; o < set.n_y; ++o) {
+        double sum = 0, square = 0, count = 0;
+        for (std::size_t i = set.n_u + o; i < set.samples.size(); i += set.channels())
+            if (const double y = set.samples[i]; !std::isnan(y)) sum += y, ++count;
+        for (std::size_t i = set.n_u + o; i < set.samples.size(); i += set.channels())
+            if (const double y = set.samples[i] - sum / count; !std::isnan(y)) square += y * y;
+        out.push_back(count > 0 ? std::sqrt(square / count) : 0);
+    }
+    return out;
+}
+
+/// Outputs that hardly move beside the others of their kind, and not as the modes do: a dead sensor gives its own noise.
+std::vector<std::size_t> dead_outputs(const std::vector<double>& spreads, const std::vector<int>& sensing,
+                                      const std::optional<std::vector<double>>& explained) {
+    std::vector<std::size_t> out;
+    for (std::size_t o = 0; explained && o < spreads.size(); ++o) {
+        std::vector<double> alike;
+        for (std::size_t other = 0; other < spreads.size(); ++other)
+            if (sensing.empty() || sensing[other] == sensing[o]) alike.push_back(spreads[other]);
+        const auto middle = alike.begin() + static_cast<std::ptrdiff_t>(alike.size() / 2);
+        std::nth_element(alike.begin(), middle, alike.end());
+        if (alike.size() >= 3 && spreads[o] < dead_spread * *middle && !((*explained)[o] >= dead_percent))
+            out.push_back(o);
+    }
+    return out;
+}
+
 class set_up_merger {
   public:
     set_up_merger(const record_options& options, const std::vector<std::string>& references)
@@ -148,6 +180,7 @@ class set_up_merger {
         out.at = places_of_outputs(one, options_.outputs);
         record_options own = options_of_one(options_, one, out.at);
         const std::string path = one.set.records.front().path;
+        const std::vector<double> spreads = spreads_of(one.set);
         if (options_.stage)
             own.stage = [&, k, count](const char* text) {
                 options_.stage(fmt::format("set-up {} of {} ({}): {}", k + 1, count, path, text).c_str());
@@ -155,6 +188,13 @@ class set_up_merger {
         try {
             const record_result found = identify_records(std::move(one.set), own);
             out.known = take_known_result(result_json(found.model.view(), found.context, false), path);
+            for (const std::size_t o : dead_outputs(spreads, own.sensing, found.context.prediction_percent)) {
+                for (known_mode& mode : out.known.modes) mode.shape[o] = {NAN, NAN};
+                failed_.emplace_back(
+                    "screened", fmt::format("{}: output \"{}\" hardly moves beside the others and not as the modes do: "
+                                            "not measured. Look at its sensor and cable",
+                                            path, one.outputs[o]));
+            }
             out.hold = found.context.hold;
             if (!band_) band_ = found.context.band_hz;
             find_forces(found, own, out);

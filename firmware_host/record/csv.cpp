@@ -46,6 +46,15 @@ std::vector<std::string> read_csv_columns(const std::string& path) {
     return read_head(reader, path).names;
 }
 
+/// "time_s", and what loggers write: "Time [s]", "t (s)".
+static bool is_time_in_seconds(const std::string& name) {
+    if (name == "time_s") return true;
+    std::string small;
+    for (const char c : name)
+        if (c != ' ') small += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return small == "time[s]" || small == "time(s)" || small == "t[s]" || small == "t(s)";
+}
+
 /// A column of another name that may be meant as the time.
 static std::string time_like(const std::vector<std::string>& names) {
     for (const std::string& name : names) {
@@ -85,7 +94,7 @@ csv_record read_csv(const std::string& path, const csv_request& asked) {
     out.comments = header.comments;
     out.said_fs_hz = header.fs_hz;
     row_parser rows(path, header, request, out);
-    const auto time = std::find(header.names.begin(), header.names.end(), "time_s");
+    const auto time = std::find_if(header.names.begin(), header.names.end(), is_time_in_seconds);
     const bool use_time = !request.fs_hz && !header.fs_hz && time != header.names.end();
     if (use_time && !request.whole) rows.want_time(static_cast<std::size_t>(time - header.names.begin()));
     if (!request.fs_hz && !header.fs_hz && !use_time && !request.whole)

@@ -4,10 +4,13 @@
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "hit_verdict.hpp"
+#include "record_check.hpp"
 #include "request.hpp"
 #include "roving.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <map>
@@ -17,7 +20,9 @@ namespace okid_host {
 namespace {
 
 constexpr std::size_t most_hits_named = 8;
-constexpr std::size_t longest_name = 256; // of a file, that a regular expression looks at
+constexpr std::size_t longest_name = 256;                 // of a file, that a regular expression looks at
+constexpr double same_peak = 1e-3;                        // peaks of different hits closer than this are one number
+constexpr std::size_t fewest_alike = 3, share_alike = 10; // hits, and one of so many, with it: by chance hardly any
 
 hit_line line_of(const record_set& set, const record_data& record, const std::vector<hit_channel>& channels,
                  const hit_span& span, const record_options& options) {
@@ -48,6 +53,29 @@ std::vector<hit_channel> channels_of_hit(const record_options& options) {
     for (const std::string& name : options.inputs) out.push_back({name, true, true});
     for (const std::string& name : options.outputs) out.push_back({name, false, false}); // a gap is left out
     return out;
+}
+
+/// A force that no hit exceeds and several reach: the limit of its amplifier. Copies of a hit count once; infinity: none.
+double force_limit(const record_set& set, const std::vector<hit_span>& spans) {
+    std::vector<double> peaks;
+    std::vector<std::size_t> counted;
+    for (std::size_t r = 0; r < spans.size(); ++r) {
+        const record_data& record = set.records[r];
+        if (std::any_of(counted.begin(), counted.end(),
+                        [&](std::size_t other) { return same_samples(set, record, set.records[other]); }))
+            continue;
+        counted.push_back(r);
+        double peak = 0;
+        for (std::size_t i = 0; i < record.count; ++i)
+            peak = std::fmax(peak, spans[r].sign * set.rows(record)[i * set.channels()]);
+        peaks.push_back(peak);
+    }
+    std::sort(peaks.rbegin(), peaks.rend());
+    std::size_t alike = 0;
+    while (alike < peaks.size() && peaks[alike] >= (1 - same_peak) * peaks.front()) ++alike;
+    return alike >= std::max(fewest_alike, (peaks.size() + share_alike - 1) / share_alike)
+               ? (1 - same_peak) * peaks.front()
+               : INFINITY;
 }
 
 void say_left_out(const std::vector<hit_line>& hits, remarks& said) {
@@ -95,7 +123,7 @@ void keep_places(record_options& options) {
 } // namespace
 
 std::vector<hit_line> choose_hits(record_set& records, record_options& options) {
-    const std::vector<hit_channel> channels = channels_of_hit(options);
+    std::vector<hit_channel> channels = channels_of_hit(options);
     std::vector<hit_span> spans;
     std::size_t resting = 0;
     for (const record_data& record : records.records) {
@@ -103,6 +131,8 @@ std::vector<hit_line> choose_hits(record_set& records, record_options& options) 
         resting += spans.back().free >= least_free;
     }
     if (2 * resting < spans.size()) return {};
+    channels.front().high = force_limit(records, spans);
+    channels.front().low = -channels.front().high;
     std::vector<hit_line> hits;
     record_set kept;
     kept.n_u = records.n_u;
@@ -138,6 +168,8 @@ std::string places_of_names(const std::string& expression, const std::vector<std
                                               printable(expression), wanted.mark_count()));
     std::vector<std::string> out;
     for (const std::string& path : paths) {
+        if (!std::filesystem::is_regular_file(path))
+            throw failure(exit_usage, fmt::format("{}: no such file, expected the records of the hits", path));
         const std::string name = file_name(path).substr(0, longest_name);
         std::smatch found;
         if (!std::regex_search(name, found, wanted))

@@ -359,6 +359,7 @@ record_result identify_records(record_set records, const record_options& options
     const missing_count missing = count_missing(work.set);
     work.set.complete = missing.samples == 0;
     work.context = describe_records(work.set, options, missing);
+    remark_repeated(work.set, work.context.warnings);
     check_moving(work.set, options);
     check_different_outputs(work.set, options);
     std::vector<input_moments> about = moments_of(work.set);

@@ -393,6 +393,8 @@ void find_placed(const std::vector<listed_mode>& listed, const record_options& o
 record_result identify_auto(record_set records, const record_options& given, const older_samples* before) {
     record_work work;
     work.set = std::move(records);
+    remarks repeated;
+    remark_repeated(work.set, repeated);
     std::unique_ptr<older_samples> split;
     if (!before && given.hits.empty()) split = split_older(work.set, given);
     work.before = before && before->samples() > 0 ? before : split.get();
@@ -410,6 +412,7 @@ record_result identify_auto(record_set records, const record_options& given, con
     const missing_count missing = count_missing(work.set);
     work.context = describe_records(work.set, options, missing);
     if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened
+    work.context.warnings.insert(work.context.warnings.end(), repeated.begin(), repeated.end());
     if (work.before && !all) {
         work.context.warnings.emplace_back(
             "newest_only",

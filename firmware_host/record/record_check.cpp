@@ -8,7 +8,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <fmt/format.h>
+#include <string_view>
+#include <unordered_map>
 
 namespace okid_host {
 namespace {
@@ -157,6 +160,31 @@ void check_moving(const record_set& set, const record_options& options, bool scr
                         input ? "force sensor" : "sensor"),
             input ? OKID_ERR_INPUT : OKID_ERR_OUTPUT);
     }
+}
+
+bool same_samples(const record_set& set, const record_data& one, const record_data& other) {
+    return one.count == other.count && // bit by bit: missing samples are alike, too
+           std::memcmp(set.rows(one), set.rows(other), one.count * set.channels() * sizeof(double)) == 0;
+}
+
+void remark_repeated(const record_set& set, remarks& said) {
+    std::size_t copies = 0;
+    std::string first;
+    std::unordered_map<std::string_view, std::size_t> seen; // by their bytes
+    for (std::size_t r = 0; r < set.records.size(); ++r) {
+        const record_data& record = set.records[r];
+        const auto* const bytes = reinterpret_cast<const char*>(set.rows(record));
+        const auto [at, is_new] =
+            seen.emplace(std::string_view(bytes, record.count * set.channels() * sizeof(double)), r);
+        if (is_new || record.count == 0) continue;
+        if (++copies == 1) first = fmt::format("{} and {}", set.records[at->second].path, record.path);
+    }
+    if (copies > 0)
+        said.emplace_back(
+            "records_repeated",
+            fmt::format("{} of {} records hold the samples of another one ({}): they count twice, and the "
+                        "standard deviations are too small. Name each file once",
+                        copies, set.records.size(), first));
 }
 
 std::vector<double> largest_of(const record_set& set, const record_data& record) {

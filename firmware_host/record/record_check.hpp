@@ -32,6 +32,12 @@ void check_different_inputs(const std::vector<input_moments>& about, const recor
 /// Outputs that hold the same numbers leave a model directions that nothing was measured of.
 void check_different_outputs(const record_set& set, const record_options& options);
 
+/// Are two records the same numbers?
+bool same_samples(const record_set& set, const record_data& one, const record_data& other);
+
+/// A record that is there twice counts twice, and the result looks surer than it is.
+void remark_repeated(const record_set& set, remarks& said);
+
 /// Largest magnitude in each channel of a record.
 std::vector<double> largest_of(const record_set& set, const record_data& record);
 

@@ -49,7 +49,7 @@ std::vector<int> check_hit_dofs(const record_request& given) {
     std::vector<int> out;
     if (given.hit_dofs.empty()) return out;
     if (given.inputs.size() != 1)
-        usage(fmt::format("--hit-dofs: found {} force columns in --inputs, expected one, that of the hammer",
+        usage(fmt::format("--hit-dofs or --places: found {} columns in --inputs, expected one, the force of the hammer",
                           given.inputs.size()));
     if (!given.input_dofs.empty()) usage("--input-dofs: --hit-dofs says where the forces act, leave one of them out");
     for (std::size_t at = 0; at <= given.hit_dofs.size();) {

@@ -22,6 +22,8 @@ constexpr double usual_runs = 8;     // times the longest of all but the rarest 
 constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
 constexpr double spike_spreads = 15, spike_ratio = 5;
 constexpr std::size_t spike_reach = 6;
+constexpr double pulse_share = 0.1;       // of the largest force
+constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
 constexpr const char* lost_words =
     ": the whole output is left out, its shape entries are empty. Look at its sensor, range and cable";
 
@@ -111,7 +113,27 @@ void find_frozen(const output_view& y, const std::vector<stretch_of_equal>& runs
     }
 }
 
-void find_spikes(const output_view& y, fault& found) {
+/// Samples about the pulses of forces that rest otherwise: what a sensor near the hammer answers is as short as the hit.
+std::vector<bool> struck_samples(const record_set& set, const record_data& record) {
+    std::vector<bool> out(record.count, false);
+    const double* rows = set.rows(record);
+    for (std::size_t k = 0; k < set.n_u; ++k) {
+        double largest = 0;
+        std::vector<std::size_t> pulse;
+        for (std::size_t i = 0; i < record.count; ++i)
+            largest = std::fmax(largest, std::abs(rows[i * set.channels() + k]));
+        for (std::size_t i = 0; i < record.count; ++i)
+            if (std::abs(rows[i * set.channels() + k]) > pulse_share * largest) pulse.push_back(i);
+        if (pulse.size() * resting_share > record.count) continue;
+        for (const std::size_t i : pulse)
+            for (std::size_t j = i > spike_reach ? i - spike_reach : 0; j < std::min(record.count, i + spike_reach + 1);
+                 ++j)
+                out[j] = true;
+    }
+    return out;
+}
+
+void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& found) {
     std::vector<double> values;
     for (std::size_t i = 0; i < y.size(); ++i)
         if (!std::isnan(y.at(i))) values.push_back(y.at(i));
@@ -125,7 +147,7 @@ void find_spikes(const output_view& y, fault& found) {
     if (!(spread > 0)) return;
     for (std::size_t i = spike_reach; i + spike_reach < y.size(); ++i) {
         const double here = std::abs(y.at(i) - centre);
-        if (!(here > spike_spreads * spread)) continue;
+        if (!(here > spike_spreads * spread) || struck[i]) continue;
         double beside = 0;
         for (std::size_t d = 2; d <= spike_reach; ++d)
             beside = std::fmax(beside, std::fmax(std::abs(y.at(i - d) - centre), std::abs(y.at(i + d) - centre)));
@@ -160,7 +182,7 @@ std::string fault_text(const std::string& output, const record_data& record, con
 }
 
 /// Faults of one output of one record; their samples become missing.
-std::vector<std::string> screen(const output_view& y, const std::string& name) {
+std::vector<std::string> screen(const output_view& y, const std::vector<bool>& struck, const std::string& name) {
     const std::vector<stretch_of_equal> runs = equal_stretches(y);
     if (runs.size() == 1 && y.size() >= frozen_run) { // of one of several records: is_dead() has seen the others
         for (std::size_t i = 0; i < y.size(); ++i) y.drop(i);
@@ -173,7 +195,7 @@ std::vector<std::string> screen(const output_view& y, const std::string& name) {
     find_clipped(y, high, high - low, runs, clipped);
     find_clipped(y, low, high - low, runs, clipped);
     find_frozen(y, runs, spread_of(y, 0, y.size()), low, high, frozen, zeros);
-    find_spikes(y, spikes);
+    find_spikes(y, struck, spikes);
     std::vector<std::string> out;
     for (fault* found : {&clipped, &frozen, &zeros, &spikes}) {
         if (found->samples.empty()) continue;
@@ -216,7 +238,8 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
         for (const record_data& record : set.records) {
             const output_view view{record, set.rows(record) + set.n_u + k, set.channels()};
             before += usable(view);
-            for (std::string& text : screen(view, outputs[k])) faults.push_back(std::move(text));
+            for (std::string& text : screen(view, struck_samples(set, record), outputs[k]))
+                faults.push_back(std::move(text));
             after += usable(view);
         }
         const bool lost = static_cast<double>(after) < (1 - share_lost) * static_cast<double>(before);

@@ -120,9 +120,17 @@ def test_sample_rates_that_disagree(rig: Path) -> None:
 
 
 def test_a_time_of_another_name(rig: Path) -> None:
-    (rig / "t.csv").write_text("Time [s],u,y\n" + "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99)))
+    for name in ("Time [s]", "t (s)"):
+        text = (rig / "a.csv").read_text().splitlines()
+        rows = [f"{k / 250},{line}" for k, line in enumerate(line for line in text[1:] if not line.startswith("#"))]
+        head, *rest = rows[0].split(",", 1)[1], *(row for row in rows[1:])
+        times = [f"{k / 250}," + row.split(",", 1)[1] for k, row in enumerate(rest)]
+        (rig / "s.csv").write_text("\n".join([f"{name},{head}", *times]) + "\n")
+        done = okid("identify", rig / "s.csv", "--inputs", "force1", "--outputs", "acc1,acc2", "--p", 12, "--order", 4)
+        assert done.returncode == 0 and "at 250 Hz" in done.stdout, done.stderr
+    (rig / "t.csv").write_text("Time,u,y\n" + "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99)))
     done = okid("identify", rig / "t.csv", "--inputs", "u", "--outputs", "y")
-    assert done.returncode == 2 and '(is "Time [s]" the time in seconds? Then call it time_s)' in done.stderr
+    assert done.returncode == 2 and '(is "Time" the time in seconds? Then call it time_s)' in done.stderr
     (rig / "ms.csv").write_text("Time [ms],u,y\n" + "".join(f"{10 * k},{k % 7},{k % 5}\n" for k in range(99)))
     done = okid("identify", rig / "ms.csv", "--inputs", "u", "--outputs", "y")
     assert done.returncode == 2 and '("Time [ms]" is not in seconds: give the rate with --fs)' in done.stderr

@@ -41,7 +41,7 @@ def _names(hits: Sequence[dict[str, Any]]) -> list[str]:
 def files_beside(result: Loaded, folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
     """The files of the accepted hits in the first of these folders that has any, and the names of those not there."""
     names = [name for hit, name in zip(result.raw["hits"], _names(result.raw["hits"]), strict=True) if hit["accepted"]]
-    for folder in folders:
+    for folder in [*folders, *(inner for one in folders for inner in sorted(one.glob("*/")) if inner.is_dir())]:
         found = [folder / name for name in names if (folder / name).is_file()]
         if found and len(set(names)) == len(names):
             return found, [name for name in names if not (folder / name).is_file()]
