@@ -137,12 +137,12 @@ std::vector<std::size_t> dead_outputs(const std::vector<double>& spreads, const 
                                       const std::optional<std::vector<double>>& explained) {
     std::vector<std::size_t> out;
     for (std::size_t o = 0; explained && o < spreads.size(); ++o) {
-        std::vector<double> alike;
+        std::vector<double> of_kind;
         for (std::size_t other = 0; other < spreads.size(); ++other)
-            if (sensing.empty() || sensing[other] == sensing[o]) alike.push_back(spreads[other]);
-        const auto middle = alike.begin() + static_cast<std::ptrdiff_t>(alike.size() / 2);
-        std::nth_element(alike.begin(), middle, alike.end());
-        if (alike.size() >= 3 && spreads[o] < dead_spread * *middle && !((*explained)[o] >= dead_percent))
+            if (sensing.empty() || sensing[other] == sensing[o]) of_kind.push_back(spreads[other]);
+        const auto middle = of_kind.begin() + static_cast<std::ptrdiff_t>(of_kind.size() / 2);
+        std::nth_element(of_kind.begin(), middle, of_kind.end());
+        if (of_kind.size() >= 3 && spreads[o] < dead_spread * *middle && !((*explained)[o] >= dead_percent))
             out.push_back(o);
     }
     return out;

@@ -33,6 +33,8 @@ constexpr std::size_t fewest_voters = 6; // those with the longest horizons vote
 constexpr double one_half = 0.5;         // votes and agreement
 constexpr double scatter_scale = 0.6;    // relative scatter of damping over the runs that halves the agreement
 constexpr int fewest_runs = 3;
+constexpr double clear_vibration = 0.8; // agreement of a mode that all runs find
+constexpr double most_filled = 0.75;    // of a run's states, by two for each mode: above, weak ones find no room
 
 double median(std::vector<double> values) {
     if (values.empty()) return NAN;
@@ -345,6 +347,22 @@ void mark_split(std::vector<consensus_mode>& modes) {
     for (const std::size_t i : split) modes[i].why.emplace_back("split");
 }
 
+/// Mark the runs that have too few states for the vibrations of their band.
+void mark_full(const std::vector<cluster>& clusters, const std::vector<consensus_mode>& modes,
+               std::vector<consensus_run>& runs) {
+    std::vector<double> vibrations;
+    for (std::size_t i = 0; i < clusters.size(); ++i)
+        if (modes[i].agreement >= clear_vibration * modes[i].found_in && at_one_rate(runs, clusters[i]))
+            vibrations.push_back(clusters[i].frequency_hz);
+    for (consensus_run& run : runs) {
+        const auto inside = std::count_if(vibrations.begin(), vibrations.end(), [&](double f) {
+            const double share = run.zoom().folded(f) / run.fs_hz;
+            return share >= 0 && share < 0.5;
+        });
+        run.full = run.states > 0 && 2.0 * static_cast<double>(inside) > most_filled * run.states;
+    }
+}
+
 } // namespace
 
 void judge_agreement(consensus_mode& mode) {
@@ -411,7 +429,7 @@ bool can_see(const consensus_run& run, double frequency_hz) {
     return in_band(run, frequency_hz) && frequency_hz * run.horizon_s() >= periods;
 }
 
-std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs, std::vector<bool>* turned) {
+std::vector<consensus_mode> find_agreement(std::vector<consensus_run>& runs, std::vector<bool>* turned) {
     std::vector<consensus_mode> modes;
     const std::vector<cluster> clusters = gather(runs);
     const std::vector<double> apart = spacings(runs, clusters);
@@ -428,6 +446,7 @@ std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& run
         for (std::size_t i = 0; i < clusters.size() && !quarter.empty(); ++i)
             modes[i] = mode_of(runs, clusters[i], apart[i], quarter);
     }
+    mark_full(clusters, modes, runs);
     std::sort(modes.begin(), modes.end(),
               [](const consensus_mode& a, const consensus_mode& b) { return a.frequency_hz < b.frequency_hz; });
     mark_split(modes);

@@ -40,6 +40,9 @@ struct consensus_run {
     zoom_band zoom() const { return {fs_hz, band}; }
     double horizon_s() const { return rows / fs_hz; }
     std::vector<int> orders;
+    int most_order = 64; ///< asked for
+    int states = 0;      ///< of the highest order; 0: no limit
+    bool full = false;   ///< of modes: find_agreement() says so
     std::vector<run_pole> poles;
     std::vector<run_track> tracks;
 };
@@ -75,10 +78,11 @@ void link_tracks(consensus_run& run);
 /// three outputs together: less)?
 bool can_see(const consensus_run& run, double frequency_hz);
 
-/// Clusters over the runs (tracks linked), ascending in frequency, with votes, values and first codes in `why`.
+/// Clusters over the runs (tracks linked), ascending in frequency, with votes, values and first codes in `why`. Marks the runs
+/// that are full of modes.
 /// @param turned  in: outputs known to stand a quarter of a turn off the others (quantity.hpp), empty: not known;
 ///                out: those that do. nullptr: shapes are taken as they are
-std::vector<consensus_mode> find_agreement(const std::vector<consensus_run>& runs, std::vector<bool>* turned = nullptr);
+std::vector<consensus_mode> find_agreement(std::vector<consensus_run>& runs, std::vector<bool>* turned = nullptr);
 
 /// The rule that makes a mode confident, of records, set-ups and responses alike: half of the runs that could see it, three at
 /// least, and an agreement of one half. Sets .agreement and the codes few_runs and noise_shape.

@@ -16,10 +16,10 @@
 namespace okid_host {
 namespace {
 
-constexpr int long_rows = 30, lags_of_observer = 40, most_order = 64;
+constexpr int long_rows = 30, lags_of_observer = 40, usual_order = 64, order_of_crowds = 128;
 /// Block rows x outputs: the states of a Hankel matrix. A plate of 23 modes under one accelerometer has 46, and as many again
 /// of noise beside them. Few channels ask for long horizons, and there they are cheap.
-constexpr int rows_of_outputs = 90;
+constexpr int rows_of_outputs = 90, rows_of_crowds = 180;
 constexpr int most_unknowns = 450; ///< block rows x channels: the decomposition costs their third power
 constexpr double short_share = 0.6, middle_share = 0.8;
 constexpr int fewest_rows = 4;
@@ -43,11 +43,17 @@ consensus_run run_of(okid_method_t method, int rows) {
 }
 
 /// Block rows that so many samples bear.
-int rows_of(int n_u, int n_y, long long samples) {
+int rows_of(int n_u, int n_y, long long samples, bool crowded) {
     // Ten samples an unknown of one output; what more than three outputs have in common is estimated from all of them.
     const long long borne = samples * std::max(3, n_y) / 30 / (n_y + 2LL * n_u);
-    const int wanted = std::max(long_rows, (rows_of_outputs + n_y - 1) / n_y);
+    const int wanted = std::max(long_rows, ((crowded ? rows_of_crowds : rows_of_outputs) + n_y - 1) / n_y);
     return static_cast<int>(std::min<long long>({wanted, borne, std::max(6, most_unknowns / (n_u + n_y))}));
+}
+
+/// States that the Hankel matrix of a run holds, an even number, at most `most`.
+int most_states(const consensus_run& run, int n_y, int most) {
+    const int held = (is_subspace(run.method) ? run.rows - 1 : run.rows) * n_y;
+    return std::min(most, held - held % 2);
 }
 
 bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, consensus_run& run) {
@@ -62,12 +68,24 @@ bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, co
     return true;
 }
 
+void place_run(consensus_run& run, const record_level& level, int number, int n_u, int n_y) {
+    run.level = number;
+    run.outputs = n_y;
+    run.fs_hz = level.fs_hz;
+    run.top = level.top;
+    run.bottom = level.bottom;
+    run.band = level.band;
+    const okid_identify_config_t config = run_config(run, n_u, n_y);
+    run.orders = consensus_orders(std::min(config.max_order, okid_identify_max_order(&config)));
+    run.states = run.orders.empty() ? 0 : run.orders.back();
+}
+
 } // namespace
 
-std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_level& level) {
+std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_level& level, bool crowded) {
     const int m = n_u + n_y;
     const long long samples = level.samples;
-    const int rows = rows_of(n_u, n_y, samples);
+    const int rows = rows_of(n_u, n_y, samples, crowded);
     const int less = std::max(fewest_rows, static_cast<int>(std::lround(short_share * rows)));
     const int middle = std::max(fewest_rows, static_cast<int>(std::lround(middle_share * rows)));
     std::vector<consensus_run> out;
@@ -75,21 +93,14 @@ std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_
         out = {run_of(OKID_METHOD_N4SID_MOESP, rows), run_of(OKID_METHOD_N4SID_MOESP, less),
                run_of(OKID_METHOD_N4SID_CVA, rows), run_of(OKID_METHOD_N4SID_CVA, less),
                run_of(OKID_METHOD_N4SID_SSARX, middle)};
-    const int lags = std::max(lags_of_observer, (rows_of_outputs + n_y - 1) / n_y);
+    const int lags = std::max(lags_of_observer, ((crowded ? rows_of_crowds : rows_of_outputs) + n_y - 1) / n_y);
     int p = n_u > 0 ? okid_identify_usable_p(n_u, n_y, lags, samples)
                     : static_cast<int>(std::min<long long>(lags, samples / 20));
     p = std::min(p, std::max(8, most_unknowns / m));
     if (p * n_y >= fewest_rows) out.push_back(run_of(OKID_METHOD_OKID_ERA, p));
     for (consensus_run& run : out) {
-        run.level = number;
-        run.outputs = n_y;
-        run.fs_hz = level.fs_hz;
-        run.top = level.top;
-        run.bottom = level.bottom;
-        run.band = level.band;
-        const okid_identify_config_t config = run_config(run, n_u, n_y);
-        const int most = is_subspace(run.method) ? (run.rows - 1) * n_y : run.rows * n_y;
-        run.orders = consensus_orders(std::min({most_order, most, okid_identify_max_order(&config)}));
+        run.most_order = crowded ? order_of_crowds : usual_order;
+        place_run(run, level, number, n_u, n_y);
     }
     return out;
 }
@@ -105,15 +116,14 @@ okid_identify_config_t run_config(const consensus_run& run, int n_u, int n_y) {
         config.p = run.rows;
     if (n_u > 0 && !is_subspace(run.method)) config.hankel = OKID_HANKEL_INNOVATIONS;
     config.order = fewest_rows;
-    const int most = is_subspace(run.method) ? (run.rows - 1) * n_y : run.rows * n_y;
-    config.max_order = std::min(most_order, most - most % 2);
+    config.max_order = most_states(run, n_y, run.most_order);
     config.fs_hz = run.fs_hz;
     config.detrend = OKID_DETREND_NONE; // levels are centred
     return config;
 }
 
-okid_identify_config_t longest_run(int n_u, int n_y, double fs_hz) {
-    consensus_run run = run_of(OKID_METHOD_N4SID_CVA, rows_of(n_u, n_y, std::numeric_limits<int>::max()));
+okid_identify_config_t longest_run(int n_u, int n_y, double fs_hz, bool crowded) {
+    consensus_run run = run_of(OKID_METHOD_N4SID_CVA, rows_of(n_u, n_y, std::numeric_limits<int>::max(), crowded));
     run.fs_hz = fs_hz;
     return run_config(run, n_u, n_y);
 }
@@ -123,7 +133,7 @@ int longest_lags(int n_u, int n_y) {
     endless.fs_hz = 1;
     endless.samples = std::numeric_limits<int>::max();
     int out = 1;
-    for (const consensus_run& run : plan_runs(n_u, n_y, 0, endless)) {
+    for (const consensus_run& run : plan_runs(n_u, n_y, 0, endless, true)) {
         const okid_identify_config_t config = run_config(run, n_u, n_y);
         out = std::max(out, okid_identify_lags(&config));
     }
@@ -172,30 +182,49 @@ owned_sums shortened(const record_level& level, const owned_sums& longest, int l
     return out;
 }
 
-/// The runs of one level with their poles linked, those with the longest horizon first.
-std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const record_level& level, int n_u, int n_y,
-                                     bool at_rest) {
-    std::vector<int> lags;
-    for (const consensus_run& run : runs) {
-        const okid_identify_config_t config = run_config(run, n_u, n_y);
-        lags.push_back(okid_identify_lags(&config));
+/// One level's sums, the longest first; shorter ones from it where that keeps the samples.
+class sums_of_level {
+  public:
+    sums_of_level(const record_level& level, int n_u, int n_y, bool at_rest)
+        : level_(level), n_u_(n_u), n_y_(n_y), at_rest_(at_rest) {}
+
+    /// Linked poles of these runs, those with the longest horizon first.
+    std::vector<consensus_run> look(std::vector<consensus_run> runs) {
+        std::vector<consensus_run> out;
+        std::vector<int> lags;
+        for (const consensus_run& run : runs) {
+            const okid_identify_config_t config = run_config(run, n_u_, n_y_);
+            lags.push_back(okid_identify_lags(&config));
+        }
+        std::vector<int> horizons = lags;
+        std::sort(horizons.begin(), horizons.end(), std::greater<>());
+        horizons.erase(std::unique(horizons.begin(), horizons.end()), horizons.end());
+        for (const int horizon : horizons) {
+            const owned_sums& sums = of(horizon);
+            for (std::size_t i = 0; i < runs.size(); ++i)
+                if (lags[i] == horizon && find_poles(run_config(runs[i], n_u_, n_y_), sums, runs[i]))
+                    out.push_back(std::move(runs[i]));
+        }
+        return out;
     }
-    std::vector<int> horizons = lags;
-    std::sort(horizons.begin(), horizons.end(), std::greater<>());
-    horizons.erase(std::unique(horizons.begin(), horizons.end()), horizons.end());
-    std::vector<consensus_run> out;
-    owned_sums longest, own;
-    for (const int horizon : horizons) {
-        const bool first = horizon == horizons.front();
-        if (!first) own = shortened(level, longest, horizon, n_u, n_y);
-        owned_sums& sums = first ? longest : own;
-        if (!sums.sums) sums = level_sums(level, n_u, n_y, horizon, at_rest);
-        for (std::size_t i = 0; i < runs.size(); ++i)
-            if (lags[i] == horizon && find_poles(run_config(runs[i], n_u, n_y), sums, runs[i]))
-                out.push_back(std::move(runs[i]));
+
+  private:
+    const owned_sums& of(int lags) {
+        if (!longest_.sums) {
+            longest_lags_ = lags;
+            return longest_ = level_sums(level_, n_u_, n_y_, lags, at_rest_);
+        }
+        if (lags == longest_lags_) return longest_;
+        own_ = shortened(level_, longest_, lags, n_u_, n_y_);
+        if (!own_.sums) own_ = level_sums(level_, n_u_, n_y_, lags, at_rest_);
+        return own_;
     }
-    return out;
-}
+
+    const record_level& level_;
+    int n_u_, n_y_, longest_lags_ = 0;
+    bool at_rest_;
+    owned_sums longest_, own_;
+};
 
 } // namespace
 
@@ -204,12 +233,34 @@ std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std:
     std::vector<std::vector<consensus_run>> of_level(levels.size() - first);
     side_by_side(of_level.size(), threads, [&](std::size_t i) {
         const record_level& level = levels[first + i];
-        of_level[i] = run_level(plan_runs(n_u, n_y, static_cast<int>(first + i), level), level, n_u, n_y, at_rest);
+        of_level[i] = sums_of_level(level, n_u, n_y, at_rest)
+                          .look(plan_runs(n_u, n_y, static_cast<int>(first + i), level, false));
     });
     std::vector<consensus_run> out;
     for (auto& runs : of_level)
         for (consensus_run& run : runs) out.push_back(std::move(run));
     return out;
+}
+
+bool look_closer(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest, int threads,
+                 std::vector<consensus_run>& runs) {
+    std::vector<int> crowded;
+    for (const consensus_run& run : runs)
+        if (run.full && is_subspace(run.method) && (crowded.empty() || crowded.back() != run.level))
+            crowded.push_back(run.level);
+    std::vector<std::vector<consensus_run>> of_level(crowded.size());
+    side_by_side(crowded.size(), threads, [&](std::size_t i) {
+        const record_level& level = levels[static_cast<std::size_t>(crowded[i])];
+        of_level[i] = sums_of_level(level, n_u, n_y, at_rest).look(plan_runs(n_u, n_y, crowded[i], level, true));
+    });
+    const auto replaced = [&](const consensus_run& run) {
+        const auto at = std::find(crowded.begin(), crowded.end(), run.level);
+        return at != crowded.end() && !of_level[static_cast<std::size_t>(at - crowded.begin())].empty();
+    };
+    runs.erase(std::remove_if(runs.begin(), runs.end(), replaced), runs.end());
+    for (auto& found : of_level)
+        for (consensus_run& run : found) runs.push_back(std::move(run));
+    return !crowded.empty();
 }
 
 std::vector<record_level> zoomed_levels(const std::vector<record_level>& levels,
@@ -228,7 +279,7 @@ std::vector<record_level> zoomed_levels(const std::vector<record_level>& levels,
             continue;
         for (int factor = 2; factor <= most_factor;
              factor = factor % 3 ? factor * 3 / 2 : factor * 4 / 3) { // 2 3 4 6 8 ..
-            const int rows = rows_of(n_u, n_y, first.samples / factor);
+            const int rows = rows_of(n_u, n_y, first.samples / factor, false);
             if (rows * factor / first.fs_hz < wanted_s) continue;
             const auto has = [&](const record_level& level) {
                 return level.fs_hz <= first.fs_hz / factor * (1 + 1e-9) && shows(level, mode.frequency_hz);

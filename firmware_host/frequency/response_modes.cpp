@@ -465,7 +465,7 @@ refined_modes fit_response_modes(const joint_responses& from, const std::vector<
 
 response_modes find_response_modes(const joint_responses& from, bool all, const std::vector<int>& numbers,
                                    bool diagram) {
-    const auto runs = runs_of(from);
+    auto runs = runs_of(from);
     response_modes out;
     if (diagram) out.stable = diagram_of(from, runs);
     std::vector<bool>

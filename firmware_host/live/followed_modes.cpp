@@ -26,7 +26,7 @@ std::unique_ptr<std::byte[]> memory(std::size_t bytes) {
 
 okid_accumulator_config_t followed_modes::sums_config(const stream_config& config, double fs_hz, std::int64_t window) {
     const auto n_u = static_cast<int>(config.inputs.size()), n_y = static_cast<int>(config.outputs.size());
-    const okid_identify_config_t carrier = longest_run(n_u, n_y, fs_hz);
+    const okid_identify_config_t carrier = longest_run(n_u, n_y, fs_hz, true);
     okid_accumulator_config_t out = okid_accumulator_defaults(n_u, n_y, okid_identify_lags(&carrier));
     out.edges = 1;
     if (window > 0) {
@@ -81,6 +81,25 @@ void followed_modes::reset() {
     groups_.clear();
 }
 
+/// Sums with as many lags as a run asks for, out of those of its rate; none: they have as many.
+owned_sums followed_modes::shortened(const group& of) const {
+    okid_accumulator_config_t held{};
+    const int lags = okid_identify_lags(&of.config);
+    okid_accumulator_config(sums_[of.rate].sums, &held);
+    if (held.lags == lags) return {};
+    okid_accumulator_config_t shape = okid_accumulator_defaults(n_u_, n_y_, lags);
+    shape.edges = 1;
+    owned_sums out(shape);
+    okid_accumulator_t* const from = sums_[of.rate].sums;
+    const auto take = [&] {
+        return held.slots > 0 ? okid_accumulator_take_slots(out.sums, from, 0, okid_accumulator_slots(from))
+                              : okid_accumulator_merge(out.sums, from);
+    };
+    if (out.sums && take() < 0) out.sums = nullptr;
+    if (out.sums) okid_accumulator_set_units(out.sums, units_.data(), nullptr);
+    return out;
+}
+
 /// What the carrier of a group says of its modes.
 std::vector<std::optional<std::pair<double, double>>> followed_modes::now(const group& of) {
     std::vector<std::optional<std::pair<double, double>>> out(of.modes.size());
@@ -88,8 +107,9 @@ std::vector<std::optional<std::pair<double, double>>> followed_modes::now(const 
     const auto block = memory(bytes);
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
+    const owned_sums own = shortened(of);
     if (!block || okid_identify_create(&identifier, &of.config, block.get(), bytes) != OKID_OK ||
-        okid_identify_run(identifier, sums_[of.rate].sums, &model) < 0)
+        okid_identify_run(identifier, own.sums ? own.sums : sums_[of.rate].sums, &model) < 0)
         return out;
     const auto found = carried_by(model, {}, of.wanted);
     for (std::size_t i = 0; i < found.size(); ++i)
@@ -107,15 +127,17 @@ double followed_modes::share_of(double deviation, double of_carrier) {
 void followed_modes::begin(const record_result& found) {
     groups_.clear();
     if (found.scale.size() != m_) return; // places of a hammer, or an output that is left out
-    std::vector<double> units;
-    for (const double spread : found.scale) units.push_back(1 / spread);
-    for (const owned_sums& each : sums_) okid_accumulator_set_units(each.sums, units.data(), nullptr);
+    units_.clear();
+    for (const double spread : found.scale) units_.push_back(1 / spread);
+    for (const owned_sums& each : sums_) okid_accumulator_set_units(each.sums, units_.data(), nullptr);
     for (std::size_t i = 0; i < found.carriers.size(); ++i) {
         const mode_carrier& by = found.carriers[i];
         if (by.level < 0) continue;
         const auto k = static_cast<std::size_t>(by.level);
-        const okid_identify_config_t full = longest_run(n_u_, n_y_, chain_.fs_hz(k));
-        if (by.config.rows != full.rows || by.config.n_u != n_u_ || by.config.n_y != n_y_) continue; // too short as yet
+        const int usual = longest_run(n_u_, n_y_, chain_.fs_hz(k), false).rows,
+                  crowded = longest_run(n_u_, n_y_, chain_.fs_hz(k), true).rows;
+        if (by.config.n_u != n_u_ || by.config.n_y != n_y_) continue;
+        if (by.config.rows != usual && by.config.rows != crowded) continue; // too short as yet
         auto at = std::find_if(groups_.begin(), groups_.end(),
                                [&](const group& one) { return one.rate == k && one.config.order == by.config.order; });
         if (at == groups_.end()) {

@@ -51,13 +51,14 @@ class followed_modes {
     };
     static okid_accumulator_config_t sums_config(const stream_config& config, double fs_hz, std::int64_t window);
     static double share_of(double deviation, double of_carrier);
+    owned_sums shortened(const group& of) const;
     std::vector<std::optional<std::pair<double, double>>> now(const group& of);
 
     int n_u_, n_y_;
     std::size_t m_;
     rate_chain chain_;
     std::vector<owned_sums> sums_; ///< of each rate
-    std::vector<double> missing_;
+    std::vector<double> missing_, units_;
     std::vector<group> groups_;
 };
 

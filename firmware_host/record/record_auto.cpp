@@ -274,6 +274,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     std::vector<bool> turned = turned_by(options.sensing);
     const bool known = !turned.empty();
     auto modes = find_agreement(runs, &turned);
+    if (look_closer(levels, n_u, n_y, work.at_rest, options.threads, runs)) modes = find_agreement(runs, &turned);
     if (auto zoomed = zoomed_levels(levels, modes, n_u, n_y, work.at_rest); !zoomed.empty()) {
         tell("looking into bands with many modes");
         const std::size_t before = levels.size();

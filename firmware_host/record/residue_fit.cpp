@@ -36,9 +36,11 @@ modal_basis basis_of(const std::vector<listed_mode>& modes, double fs_hz) {
 }
 
 /// Gram matrix of [Re z, Im z of each mode and drive; u; y]; a drive is an input or, last, the initial state.
-MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_data& record, bool at_rest) {
+MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_data& record, bool at_rest, int beside,
+                 double& rows) {
     const std::size_t n = basis.mu.size(), drives = set.n_u + (at_rest ? 0 : 1);
-    const auto size = static_cast<Index>(2 * n * drives + set.channels());
+    const std::size_t near = 2 * static_cast<std::size_t>(beside) * set.n_u;
+    const auto size = static_cast<Index>(2 * n * drives + set.channels() + near);
     MatrixXd G = MatrixXd::Zero(size, size), X = MatrixXd::Zero(size, block);
     std::vector<complex> z(n * drives);
     if (!at_rest) std::fill(z.begin() + static_cast<std::ptrdiff_t>(n * set.n_u), z.end(), complex(1));
@@ -52,11 +54,23 @@ MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_d
         if (std::any_of(row, row + set.n_u, [](double u) { return std::isnan(u); })) break;
         if (std::none_of(row + set.n_u, row + set.channels(), [](double y) { return std::isnan(y); })) {
             auto x = X.col(filled++);
+            ++rows;
             for (std::size_t k = 0; k < z.size(); ++k) {
                 x[static_cast<Index>(2 * k)] = z[k].real();
                 x[static_cast<Index>(2 * k) + 1] = z[k].imag();
             }
             std::copy_n(row, set.channels(), x.data() + 2 * z.size());
+            double* other = x.data() + 2 * z.size() + set.channels();
+            for (int lag = 1; lag <= beside; ++lag)
+                for (const std::ptrdiff_t step : {-lag, lag}) {
+                    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(t) + step;
+                    const bool there = at >= 0 && at < static_cast<std::ptrdiff_t>(record.count);
+                    for (std::size_t j = 0; j < set.n_u; ++j, ++other)
+                        *other = there ? row[step * static_cast<std::ptrdiff_t>(set.channels()) +
+                                             static_cast<std::ptrdiff_t>(j)]
+                                       : 0;
+                    if (!there) continue;
+                }
             if (filled == block) fold();
         }
         for (std::size_t j = 0; j < drives; ++j)
@@ -68,10 +82,11 @@ MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_d
 }
 
 /// What each unknown adds to output o, in the rows of the Gram matrix: modes of each drive, then D.
-MatrixXd map_of(const modal_basis& basis, const record_set& set, std::size_t drives, std::size_t o) {
-    const std::size_t n = basis.mu.size(), states = 2 * n * drives;
-    MatrixXd T =
-        MatrixXd::Zero(static_cast<Index>(states + set.channels()), static_cast<Index>(states + set.n_y * set.n_u));
+MatrixXd map_of(const modal_basis& basis, const record_set& set, std::size_t drives, std::size_t o, int beside) {
+    const std::size_t n = basis.mu.size(), states = 2 * n * drives,
+                      near = 2 * static_cast<std::size_t>(beside) * set.n_u;
+    MatrixXd T = MatrixXd::Zero(static_cast<Index>(states + set.channels() + near),
+                                static_cast<Index>(states + set.n_y * (set.n_u + near)));
     for (std::size_t j = 0; j < drives; ++j)
         for (std::size_t k = 0; k < n; ++k) {
             const auto at = static_cast<Index>(2 * (j * n + k));
@@ -80,6 +95,9 @@ MatrixXd map_of(const modal_basis& basis, const record_set& set, std::size_t dri
         }
     for (std::size_t j = 0; j < set.n_u; ++j)
         T(static_cast<Index>(states + j), static_cast<Index>(states + j * set.n_y + o)) = 1;
+    for (std::size_t j = 0; j < near; ++j)
+        T(static_cast<Index>(states + set.channels() + j), static_cast<Index>(states + (set.n_u + j) * set.n_y + o)) =
+            1;
     return T;
 }
 
@@ -103,19 +121,20 @@ void eliminate(Index first, Index count, residue_sums& sums) {
 } // namespace
 
 std::vector<residue_sums> sum_residues(const std::vector<listed_mode>& modes, double fs_hz, const record_set& set,
-                                       bool at_rest) {
+                                       bool at_rest, int beside) {
     const modal_basis basis = basis_of(modes, fs_hz);
     const std::size_t n = basis.mu.size(), drives = set.n_u + (at_rest ? 0 : 1);
     const auto states = static_cast<Index>(2 * n * drives);
     std::vector<MatrixXd> grams;
     VectorXd power = VectorXd::Constant(static_cast<Index>(set.n_y), 1e-300);
+    std::vector<double> rows(set.records.size());
     for (const record_data& record : set.records) {
-        grams.push_back(gram_of(basis, set, record, at_rest));
-        power += grams.back().diagonal().tail(static_cast<Index>(set.n_y));
+        grams.push_back(gram_of(basis, set, record, at_rest, beside, rows[grams.size()]));
+        power += grams.back().diagonal().segment(states + static_cast<Index>(set.n_u), static_cast<Index>(set.n_y));
     }
     std::vector<residue_sums> out(grams.size());
     for (std::size_t o = 0; o < set.n_y; ++o) {
-        const MatrixXd T = map_of(basis, set, drives, o);
+        const MatrixXd T = map_of(basis, set, drives, o, beside);
         const auto at = states + static_cast<Index>(set.n_u + o);
         const double weight = 1 / power[static_cast<Index>(o)];
         for (std::size_t r = 0; r < grams.size(); ++r) {
@@ -123,6 +142,7 @@ std::vector<residue_sums> sum_residues(const std::vector<listed_mode>& modes, do
             out[r].N.noalias() += weight * (T.transpose() * (grams[r] * T));
             out[r].h.noalias() += weight * (T.transpose() * grams[r].col(at));
             out[r].energy += weight * grams[r](at, at);
+            out[r].samples = rows[r] * static_cast<double>(set.n_y);
         }
     }
     for (residue_sums& sums : out) {
@@ -130,6 +150,29 @@ std::vector<residue_sums> sum_residues(const std::vector<listed_mode>& modes, do
         if (!at_rest) eliminate(static_cast<Index>(2 * n * set.n_u), static_cast<Index>(2 * n), sums);
     }
     return out;
+}
+
+void keep_samples_beside(std::vector<residue_sums>& records, int beside, std::size_t n_y) {
+    const auto cut = [](residue_sums sums, Index count) {
+        sums.N = sums.N.topLeftCorner(count, count).eval();
+        sums.h = sums.h.head(count).eval();
+        return sums;
+    };
+    std::vector<residue_sums> best;
+    double least = INFINITY;
+    for (int lag = 0; lag <= beside; ++lag) {
+        const Index count = records.front().h.size() - 2 * (beside - lag) * static_cast<Index>(n_y);
+        std::vector<residue_sums> all;
+        std::vector<const residue_sums*> each;
+        for (const residue_sums& sums : records) all.push_back(cut(sums, count));
+        for (const residue_sums& sums : all) each.push_back(&sums);
+        const VectorXd x = fit_residues(each);
+        double left = 0, samples = 0;
+        for (const residue_sums& sums : all) left += sums.energy * residue_left(sums, x), samples += sums.samples;
+        const double cost = samples * std::log(std::max(left, 1e-300)) + static_cast<double>(count) * std::log(samples);
+        if (cost < least) least = cost, best = std::move(all);
+    }
+    records = std::move(best);
 }
 
 VectorXd fit_residues(const std::vector<const residue_sums*>& records) {

@@ -23,6 +23,7 @@ using Eigen::VectorXd;
 constexpr double explained = 0.5;     // of a record's energy that its own B and D must not leave: the modes are its own
 constexpr double contradiction = 0.1; // more of the energy left by the others' B and D: a third of the amplitude
 constexpr std::size_t most_named = 8;
+constexpr int most_beside = 4; // samples of the force before and after an output's that it may follow at once
 
 std::size_t index_of(const std::vector<int>& places, int hit) {
     return static_cast<std::size_t>(std::find(places.begin(), places.end(), std::abs(hit)) - places.begin());
@@ -226,7 +227,9 @@ place_residues find_residues(const std::vector<listed_mode>& modes, const std::v
     Eigen::ArrayXd hits_there(count);
     double free = 0;
     for (Eigen::Index j = 0; j < count; ++j) {
-        const auto sums = sum_residues(modes, fs_hz, records_at(set, hits, places[static_cast<std::size_t>(j)]), true);
+        auto sums =
+            sum_residues(modes, fs_hz, records_at(set, hits, places[static_cast<std::size_t>(j)]), true, most_beside);
+        keep_samples_beside(sums, most_beside, set.n_y);
         std::vector<const residue_sums*> all;
         for (const residue_sums& one : sums) all.push_back(&one);
         out.b.col(j) = b_of(all);

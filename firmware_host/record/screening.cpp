@@ -22,7 +22,7 @@ constexpr double usual_runs = 8;     // times the longest of all but the rarest 
 constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
 constexpr double spike_spreads = 15, spike_ratio = 5;
 constexpr std::size_t spike_reach = 6;
-constexpr double pulse_share = 0.1;       // of the largest force
+constexpr double struck_share = 0.1;      // of the largest force
 constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
 constexpr const char* lost_words =
     ": the whole output is left out, its shape entries are empty. Look at its sensor, range and cable";
@@ -123,7 +123,7 @@ std::vector<bool> struck_samples(const record_set& set, const record_data& recor
         for (std::size_t i = 0; i < record.count; ++i)
             largest = std::fmax(largest, std::abs(rows[i * set.channels() + k]));
         for (std::size_t i = 0; i < record.count; ++i)
-            if (std::abs(rows[i * set.channels() + k]) > pulse_share * largest) pulse.push_back(i);
+            if (std::abs(rows[i * set.channels() + k]) > struck_share * largest) pulse.push_back(i);
         if (pulse.size() * resting_share > record.count) continue;
         for (const std::size_t i : pulse)
             for (std::size_t j = i > spike_reach ? i - spike_reach : 0; j < std::min(record.count, i + spike_reach + 1);

@@ -50,6 +50,15 @@ bool weak_is_split(int rows, const run_track& strong, const run_track& weak) {
     return has(all[1], "split");
 }
 
+/// Six runs with so many states that find so many modes: are they full?
+bool are_full(int states, int count, double emac = 1) {
+    auto runs = rate(6, 30);
+    for (consensus_run& run : runs) run.states = states;
+    for (int k = 0; k < count; ++k) give(runs, 0, 3, track(10 + k, 0.001, bending, emac));
+    find_agreement(runs);
+    return runs[0].full && runs[5].full;
+}
+
 } // namespace
 
 void setUp() {}
@@ -325,6 +334,15 @@ static void values_come_from_runs_that_are_sharp() {
 }
 
 /// The level is the highest rate that sees it well; the scatter is that of its subspace runs about the values.
+/// Two states a mode fill three quarters of them. A mode that only half of the runs find counts, one of noise does not.
+static void runs_are_full_of_modes() {
+    TEST_ASSERT_FALSE(are_full(24, 9));
+    TEST_ASSERT_TRUE(are_full(24, 10));
+    TEST_ASSERT_FALSE(are_full(24, 10, 0.79));
+    TEST_ASSERT_TRUE(are_full(24, 10, 0.81));
+    TEST_ASSERT_FALSE(are_full(0, 10)); // no limit, as of responses
+}
+
 static void level_and_scatter_are_those_of_the_highest_rate() {
     auto runs = joined(rate(4, 30, 3, 1), rate(4, 30, 3, 0));
     runs[7].method = OKID_METHOD_OKID_ERA;
@@ -360,6 +378,7 @@ int main() {
     RUN_TEST(only_a_stronger_confident_mode_splits);
     RUN_TEST(two_outputs_split_nothing);
     RUN_TEST(values_come_from_runs_that_are_sharp);
+    RUN_TEST(runs_are_full_of_modes);
     RUN_TEST(level_and_scatter_are_those_of_the_highest_rate);
     return UNITY_END();
 }
