@@ -18,9 +18,7 @@ PLACES = ["--places", r"P(\d+)_"]
 BAD = {(4, 2): "double_hit", (9, 1): "overload"}
 
 
-def identified(
-    folder: Path, records: dict[str, Any], *options: str
-) -> tuple[dict[str, Any], str]:
+def identified(folder: Path, records: dict[str, Any], *options: str) -> tuple[dict[str, Any], str]:
     paths = beam.write(folder, records)
     done = program(
         "identify",
@@ -53,9 +51,7 @@ def some(*faults: str) -> dict[str, Any]:
             (0.2 if fault == "weak" else 100.0),
             (0.004 if "force" in fault else 0.0015),
         )
-        out[f"P2_{k + 2}.csv"] = beam.record(
-            beam.Hit(2, peak, width, fault), rng, 0.002
-        )
+        out[f"P2_{k + 2}.csv"] = beam.record(beam.Hit(2, peak, width, fault), rng, 0.002)
     return out
 
 
@@ -66,45 +62,27 @@ def codes(result: dict[str, Any]) -> list[str]:
 def test_modes_and_shapes_over_all_places(tmp_path: Path) -> None:
     within = []
     for seed in (1, 2):
-        result, told = identified(
-            tmp_path, beam.hammer_test(seed, BAD), "--output-dofs", "1,5"
-        )
+        result, told = identified(tmp_path, beam.hammer_test(seed, BAD), "--output-dofs", "1,5")
         modes = confident(result)
         assert len(modes) == 7
         for k, mode in enumerate(modes):
-            within.append(
-                abs(mode["frequency_hz"] - beam.FREQUENCY[k])
-                < 2 * mode["frequency_std_hz"]
-            )
-            within.append(
-                abs(mode["damping_ratio"] - beam.DAMPING[k])
-                < 2 * mode["damping_ratio_std"]
-            )
+            within.append(abs(mode["frequency_hz"] - beam.FREQUENCY[k]) < 2 * mode["frequency_std_hz"])
+            within.append(abs(mode["damping_ratio"] - beam.DAMPING[k]) < 2 * mode["damping_ratio_std"])
             assert beam.mac(shape_of(mode), beam.shapes()[:, k]) > 0.999
             assert mode["modal_mass"] == pytest.approx(beam.modal_mass()[k], rel=0.03)
         assert result["shape_dofs"] == list(range(1, 13))
-        left = {
-            hit["file"]: hit["reason"] for hit in result["hits"] if not hit["accepted"]
-        }
+        left = {hit["file"]: hit["reason"] for hit in result["hits"] if not hit["accepted"]}
         assert left == {"P04_2.csv": "double_hit", "P09_1.csv": "overload"}
         assert len(result["hits"]) == 36 and "hits_left_out" in codes(result)
-        assert (
-            "34 of 36 hits used" in told
-            and "left out, double_hit" in told
-            and "ring-down cut off" in told
-        )
+        assert "34 of 36 hits used" in told and "left out, double_hit" in told and "ring-down cut off" in told
         assert "mkr" not in result  # twelve places, seven modes
     assert np.mean(within) >= 0.9
 
 
 def test_sensors_where_nothing_was_struck(tmp_path: Path) -> None:
-    """Acc2 at a place of its own comes in by Acc1 at a drive point; without places of sensors those struck alone. Two hits a
-    place: the force of a single soft one has its zero where a mode is, and tells nothing of it."""
-    records = {
-        name: rows
-        for name, rows in beam.hammer_test(3, {}, each=2).items()
-        if not name.startswith("P05")
-    }
+    """Acc2 at a place of its own comes in by Acc1 at a drive point; without places of sensors those struck alone.
+    Two hits a place: the force of a single soft one has its zero where a mode is, and tells nothing of it."""
+    records = {name: rows for name, rows in beam.hammer_test(3, {}, each=2).items() if not name.startswith("P05")}
     result, _ = identified(tmp_path, records, "--output-dofs", "1,5")
     assert result["shape_dofs"] == list(range(1, 13))
     for k, mode in enumerate(confident(result)):
@@ -120,10 +98,7 @@ def test_a_polarity_at_a_drive_point(tmp_path: Path) -> None:
         rows[:, 2] *= -1
     result, _ = identified(tmp_path, records, "--output-dofs", "1,5")
     said = {warning["code"]: warning["text"] for warning in result["warnings"]}
-    assert (
-        '"Acc2" at place 5' in said["drive_point_polarity"]
-        and "-5" in said["drive_point_polarity"]
-    )
+    assert '"Acc2" at place 5' in said["drive_point_polarity"] and "-5" in said["drive_point_polarity"]
     result, _ = identified(tmp_path, records, "--output-dofs", "1,-5")
     assert not [code for code in codes(result) if code.startswith("drive_point")]
 
@@ -147,9 +122,7 @@ def test_each_reason(tmp_path: Path, fault: str, reason: str | None) -> None:
     assert [hit["reason"] for hit in result["hits"]] == [None, None, None, reason]
     assert result["records"] == (4 if reason is None else 3)
     kept, _ = identified(tmp_path, records, *one, "--keep-all")
-    assert [hit["accepted"] for hit in kept["hits"]] == [True] * 4 and kept["hits"][3][
-        "reason"
-    ] == reason
+    assert [hit["accepted"] for hit in kept["hits"]] == [True] * 4 and kept["hits"][3]["reason"] == reason
 
 
 def test_both_sides_of_a_second_hit(tmp_path: Path) -> None:
@@ -162,19 +135,12 @@ def test_both_sides_of_a_second_hit(tmp_path: Path) -> None:
 
 
 def test_places_and_tests_without_a_good_hit(tmp_path: Path) -> None:
-    records = {
-        k: v for k, v in some("double_hit", "overload").items() if k != "P2_1.csv"
-    }
+    records = {k: v for k, v in some("double_hit", "overload").items() if k != "P2_1.csv"}
     result, _ = identified(tmp_path, records)
     assert result["shape_dofs"] == [1, 3] and "place_missing" in codes(result)
     only = {k: v for k, v in records.items() if k.startswith("P2")}
-    done = program(
-        "identify", *beam.write(tmp_path, only), *CHANNELS, *PLACES, status=3
-    )
-    assert (
-        "no hit was accepted: 1 double_hit, 1 overload" in done.stderr
-        and done.stderr.count("\n") == 1
-    )
+    done = program("identify", *beam.write(tmp_path, only), *CHANNELS, *PLACES, status=3)
+    assert "no hit was accepted: 1 double_hit, 1 overload" in done.stderr and done.stderr.count("\n") == 1
 
 
 def test_bad_input(tmp_path: Path) -> None:
@@ -203,20 +169,14 @@ def test_a_hammer_that_clips_in_many_hits(tmp_path: Path) -> None:
     """A smooth top behind the filter of the recorder, the same in several hits: the limit of an amplifier before it."""
     records = beam.hammer_test(5, {}, each=2)
     limit = float(np.sort([rows[:, 0].max() for rows in records.values()])[-7])
-    clipped = [
-        name for name, rows in records.items() if rows[:, 0].max() > 1.02 * limit
-    ]
+    clipped = [name for name, rows in records.items() if rows[:, 0].max() > 1.02 * limit]
     for name in clipped:  # one sample at the limit and none beside it: no flat top
         force = records[name][:, 0]
         force[:] = np.where(force > 0.9 * limit, 0.9 * limit, force)
         force[force.argmax()] = limit
     result, _ = identified(tmp_path, records, "--method", "n4sid-cva")
     left = {hit["file"]: hit["reason"] for hit in result["hits"] if not hit["accepted"]}
-    assert (
-        set(clipped) <= set(left)
-        and set(left.values()) == {"overload"}
-        and len(left) <= len(clipped) + 1
-    )
+    assert set(clipped) <= set(left) and set(left.values()) == {"overload"} and len(left) <= len(clipped) + 1
     first = tmp_path / clipped[0]
     for name in records:  # one hit in twenty-four files is one hit
         (tmp_path / name).write_bytes(first.read_bytes())
@@ -243,11 +203,7 @@ def test_a_sensor_beside_the_hammer_has_no_spikes(tmp_path: Path) -> None:
     rows = records["P03_1.csv"]
     rows[3000, 1] += 40 * np.std(rows[:, 1])  # a bad contact, long after the hit
     result, _ = identified(tmp_path, records)
-    texts = [
-        warning["text"]
-        for warning in result["warnings"]
-        if warning["code"] == "screened"
-    ]
+    texts = [warning["text"] for warning in result["warnings"] if warning["code"] == "screened"]
     assert len(texts) == 1 and "P03_1.csv" in texts[0] and '"Acc1"' in texts[0]
 
 
@@ -267,7 +223,5 @@ def test_python_is_the_command(tmp_path: Path) -> None:
     assert result.shape_dofs == told["shape_dofs"] == [1, 2, 3]
     assert [hit["reason"] for hit in result.hits] == [None, None, None, "double_hit"]
     for mine, theirs in zip(result.confident_modes, confident(told), strict=True):
-        np.testing.assert_allclose(
-            mine.shape, shape_of(theirs), atol=1e-3
-        )  # the file has seven digits
+        np.testing.assert_allclose(mine.shape, shape_of(theirs), atol=1e-3)  # the file has seven digits
     assert okid.identify(force, motion, fs=beam.FS, keep_all=True, **names).records == 4

@@ -33,16 +33,10 @@ def blows(
     for place in places:
         force = np.zeros((8 * COUNT, 1))
         first = int(rng.integers(40, 60))
-        force[first : first + 4, 0] = rng.uniform(50, 150) * np.array(
-            [0.3, 1.0, 0.8, 0.2]
-        )
-        motion = respond(
-            np.sign(place) * force, at_places[[abs(place) - 1]], at_sensors, f, z, FS
-        )[:COUNT]
+        force[first : first + 4, 0] = rng.uniform(50, 150) * np.array([0.3, 1.0, 0.8, 0.2])
+        motion = respond(np.sign(place) * force, at_places[[abs(place) - 1]], at_sensors, f, z, FS)[:COUNT]
         motion = motion + noise * motion.std(0) * rng.standard_normal(motion.shape)
-        records.append(
-            np.hstack([force[:COUNT] + 0.02 * rng.standard_normal((COUNT, 1)), motion])
-        )
+        records.append(np.hstack([force[:COUNT] + 0.02 * rng.standard_normal((COUNT, 1)), motion]))
     return records
 
 
@@ -58,45 +52,28 @@ def structure() -> tuple[Real, Real, Real]:
 
 
 def identify(records: list[Real], **more: object) -> okid.Result:
-    return okid.identify(
-        [r[:, :1] for r in records], [r[:, 1:] for r in records], fs=FS, **more
-    )  # type: ignore[arg-type]
+    return okid.identify([r[:, :1] for r in records], [r[:, 1:] for r in records], fs=FS, **more)  # type: ignore[arg-type]
 
 
 def test_each_place_is_an_input(structure: tuple[Real, Real, Real]) -> None:
     f, z, shapes = structure
     hits = [7, 2, 5, 2, -7, 9]
-    result = identify(
-        blows(hits, shapes, shapes[:3], f, z), hit_dofs=hits, input_names=["hammer"]
-    )
+    result = identify(blows(hits, shapes, shapes[:3], f, z), hit_dofs=hits, input_names=["hammer"])
     assert result.inputs == ["hammer@2", "hammer@5", "hammer@7", "hammer@9"]
-    assert [mode.frequency_hz for mode in result.confident_modes] == pytest.approx(
-        f, rel=1e-4
-    )
-    assert [mode.damping_ratio for mode in result.confident_modes] == pytest.approx(
-        z, rel=0.01
-    )
-    b = (
-        result.model.B[0::2] + 1j * result.model.B[1::2]
-    )  # modes x places: what a blow there does to a mode
+    assert [mode.frequency_hz for mode in result.confident_modes] == pytest.approx(f, rel=1e-4)
+    assert [mode.damping_ratio for mode in result.confident_modes] == pytest.approx(z, rel=0.01)
+    b = result.model.B[0::2] + 1j * result.model.B[1::2]  # modes x places: what a blow there does to a mode
     wanted = shapes[[1, 4, 6, 8]].T
     for k in range(len(f)):
         strongest = np.argmax(np.abs(wanted[k]))
         expected = wanted[k] / wanted[k, strongest]
         np.testing.assert_allclose(b[k] / b[k, strongest], expected, atol=0.02)
-    assert (
-        min(
-            value
-            for value in result.fit.simulation_percent.values()
-            if value is not None
-        )
-        > 95
-    )
+    assert min(value for value in result.fit.simulation_percent.values() if value is not None) > 95
     assert "records_contradict" not in [w.code for w in result.warnings]
 
 
 def test_many_modes_and_two_sensors() -> None:
-    """28 modes with two accelerometers: 56 states, as many as a usual run holds. Seen by runs with twice the horizon."""
+    """28 modes with two accelerometers: 56 states fill the usual runs, those with twice the horizon have room."""
     rng = np.random.default_rng(31)
     f = 1.0 * ((np.arange(28) + 1.5) / 1.5) ** 1.6  # 1 to 110 Hz at 256 Hz
     z, shapes = rng.uniform(0.002, 0.006, 28), rng.standard_normal((10, 28))
@@ -114,13 +91,9 @@ def test_many_modes_and_two_sensors() -> None:
 def test_many_records_one_place_each(structure: tuple[Real, Real, Real]) -> None:
     """As many inputs as places, and no more unknowns in the search: nine places, all modes."""
     f, z, shapes = structure
-    result = identify(
-        blows(list(range(1, 10)), shapes, shapes[:2], f, z), hit_dofs=range(1, 10)
-    )
+    result = identify(blows(list(range(1, 10)), shapes, shapes[:2], f, z), hit_dofs=range(1, 10))
     assert len(result.inputs) == 9
-    assert [mode.frequency_hz for mode in result.confident_modes] == pytest.approx(
-        f, rel=1e-4
-    )
+    assert [mode.frequency_hz for mode in result.confident_modes] == pytest.approx(f, rel=1e-4)
 
 
 def test_matrices_of_a_roving_hammer() -> None:
@@ -138,24 +111,14 @@ def test_matrices_of_a_roving_hammer() -> None:
 
 
 @pytest.mark.parametrize("method", [None, "n4sid-moesp"])
-def test_records_that_contradict_are_named(
-    structure: tuple[Real, Real, Real], method: str | None
-) -> None:
+def test_records_that_contradict_are_named(structure: tuple[Real, Real, Real], method: str | None) -> None:
     f, z, shapes = structure
     records = blows([4, 4, 4, 8], shapes, shapes[:3], f, z)
-    said = [
-        w.text
-        for w in identify(records, method=method).warnings
-        if w.code == "records_contradict"
-    ]
+    said = [w.text for w in identify(records, method=method).warnings if w.code == "records_contradict"]
     assert len(said) == 1
     alike, other = said[0].split("; otherwise ")
     assert [f"record {k} " in alike for k in range(4)] == [True, True, True, False]
-    assert (
-        "record 3 " in other
-        and "--hit-dofs" not in said[0]
-        and "hit_dofs says where" in said[0]
-    )
+    assert "record 3 " in other and "--hit-dofs" not in said[0] and "hit_dofs says where" in said[0]
     same = identify(blows([4, 4, 4, 4], shapes, shapes[:3], f, z), method=method)
     assert "records_contradict" not in [w.code for w in same.warnings]
     wrong = identify(records, hit_dofs=[1, 1, 1, 1])
@@ -170,9 +133,7 @@ def test_continuous_forces(structure: tuple[Real, Real, Real]) -> None:
     def shaken(place: int) -> Real:
         force = rng.standard_normal((2 * COUNT, 1))
         motion = respond(force, shapes[[place]], shapes[:3], f, z, FS)
-        return np.hstack(
-            [force, motion + 0.01 * rng.standard_normal(motion.shape) * motion.std(0)]
-        )[COUNT // 2 :]
+        return np.hstack([force, motion + 0.01 * rng.standard_normal(motion.shape) * motion.std(0)])[COUNT // 2 :]
 
     for places, contradict in (((3, 3), False), ((3, 7), True)):
         codes = [w.code for w in identify([shaken(place) for place in places]).warnings]
@@ -184,21 +145,10 @@ def test_measured_blows_at_different_places() -> None:
     paths = [data_file("uliege_plane_hammer", f"lab1_0000{k}.csv") for k in (1, 2, 3)]
     channels = ["--inputs", "force_N", "--outputs", "acc1_g,acc2_g,acc3_g"]
     told = program("identify", *paths, *channels, status=0).stdout
-    line = next(
-        line
-        for line in told.splitlines()
-        if line.startswith("warning records_contradict")
-    )
-    assert (
-        line.index("lab1_00001.csv")
-        < line.index("lab1_00002.csv")
-        < line.index("; otherwise")
-    )
+    line = next(line for line in told.splitlines() if line.startswith("warning records_contradict"))
+    assert line.index("lab1_00001.csv") < line.index("lab1_00002.csv") < line.index("; otherwise")
     assert "lab1_00003.csv" in line.split("; otherwise")[1]
-    assert (
-        "records_contradict"
-        not in program("identify", *paths[:2], *channels, status=0).stdout
-    )
+    assert "records_contradict" not in program("identify", *paths[:2], *channels, status=0).stdout
 
 
 @pytest.mark.parametrize(

@@ -19,9 +19,7 @@ from program import okid
 Real = NDArray[np.float64]
 
 
-def run(
-    tmp_path: Path, files: list[Path], *options: str, status: int = 0
-) -> dict[str, Any]:
+def run(tmp_path: Path, files: list[Path], *options: str, status: int = 0) -> dict[str, Any]:
     out = tmp_path / "all.json"
     okid("identify", *files, "--setups", "--json", out, *options, status=status)
     found: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
@@ -42,18 +40,10 @@ def check(
 ) -> None:
     """Each mode once and no other; within so many of its own standard deviations; shapes of all places."""
     modes = [mode for mode in found["modes"] if mode["confident"]]
-    assert [mode["frequency_hz"] for mode in modes] == pytest.approx(
-        s.frequency, rel=0.01
-    )
+    assert [mode["frequency_hz"] for mode in modes] == pytest.approx(s.frequency, rel=0.01)
     for k, mode in enumerate(modes):
-        assert (
-            abs(mode["frequency_hz"] - s.frequency[k])
-            < sigmas * mode["frequency_std_hz"]
-        ), k
-        assert (
-            abs(mode["damping_ratio"] - s.damping[k])
-            < sigmas * mode["damping_ratio_std"]
-        ), k
+        assert abs(mode["frequency_hz"] - s.frequency[k]) < sigmas * mode["frequency_std_hz"], k
+        assert abs(mode["damping_ratio"] - s.damping[k]) < sigmas * mode["damping_ratio_std"], k
         assert modal.mac(whole(mode), s.shapes[places, k]) > least_mac, k
         assert mode["found_in"] == 1.0
 
@@ -76,16 +66,10 @@ def footbridge(tmp_path: Path, unit: str = " [m/s^2]") -> list[Path]:
 
 def test_a_footbridge_in_two_set_ups(tmp_path: Path) -> None:
     found = run(tmp_path, footbridge(tmp_path), "--outputs", "P1,P2,P3,P4,P5,P6,P7,P8")
-    check(
-        found, site.footbridge(), [int(name[1:]) - 1 for name in found["outputs"]], 0.97
-    )
+    check(found, site.footbridge(), [int(name[1:]) - 1 for name in found["outputs"]], 0.97)
     assert found["method"] == "auto" and found["records"] == 2
-    assert found["outputs"] == [
-        f"P{k}" for k in range(1, 9)
-    ]  # in the order in which they were asked for
-    lines = [
-        mode for mode in found["modes"] if abs(mode["frequency_hz"] - 16.67) < 0.05
-    ]
+    assert found["outputs"] == [f"P{k}" for k in range(1, 9)]  # in the order in which they were asked for
+    lines = [mode for mode in found["modes"] if abs(mode["frequency_hz"] - 16.67) < 0.05]
     assert lines and all("tone" in line["why"] for line in lines)
 
 
@@ -129,17 +113,9 @@ def test_a_shaker_that_stays_needs_no_reference(tmp_path: Path) -> None:
     )
     assert placed["shape_dofs"] == list(range(1, 13))
     for k, mode in enumerate(mode for mode in placed["modes"] if mode["confident"]):
-        assert modal.mac(whole(mode), s.shapes[:, k]) > 0.99 and max(
-            abs(whole(mode))
-        ) == pytest.approx(1.0)
-        true = (
-            s.mass[k] / np.max(np.abs(s.shapes[:, k])) ** 2
-        )  # of a shape whose largest entry is 1
-        assert (
-            mode["modal_mass"] == pytest.approx(true, rel=0.05)
-            if abs(s.shapes[4, k]) > 0.2
-            else True
-        )
+        assert modal.mac(whole(mode), s.shapes[:, k]) > 0.99 and max(abs(whole(mode))) == pytest.approx(1.0)
+        true = s.mass[k] / np.max(np.abs(s.shapes[:, k])) ** 2  # of a shape whose largest entry is 1
+        assert mode["modal_mass"] == pytest.approx(true, rel=0.05) if abs(s.shapes[4, k]) > 0.2 else True
 
 
 def test_velocities_beside_accelerations(tmp_path: Path) -> None:
@@ -184,33 +160,23 @@ def test_velocities_beside_accelerations(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
-def test_a_building_in_four_set_ups_with_a_dead_channel(
-    tmp_path: Path, noise: float
-) -> None:
+def test_a_building_in_four_set_ups_with_a_dead_channel(tmp_path: Path, noise: float) -> None:
     """The cable is off: one value for ever, or the recorder's own noise."""
     s, files = site.building(), []
     for k in range(4):
         places = [8, 9, 2 * k, 2 * k + 1]
         y = site.ambient(s, 900.0, 50 + k)[:, places]
         if k == 2:
-            y[:, 3] = 0.25 + noise * y[:, 2].std() * np.random.default_rng(
-                60
-            ).standard_normal(len(y))
-        files.append(
-            site.write(tmp_path / f"{k}.csv", s.fs, [f"f{p}" for p in places], y)
-        )
+            y[:, 3] = 0.25 + noise * y[:, 2].std() * np.random.default_rng(60).standard_normal(len(y))
+        files.append(site.write(tmp_path / f"{k}.csv", s.fs, [f"f{p}" for p in places], y))
     found = run(tmp_path, files, "--outputs", ",".join(f"f{p}" for p in range(10)))
     there = [name for name in found["outputs"] if name != "f5"]
     at = [found["outputs"].index(name) for name in there]
     modes = [mode for mode in found["modes"] if mode["confident"]]
-    assert [mode["frequency_hz"] for mode in modes] == pytest.approx(
-        s.frequency, rel=0.01
-    )
+    assert [mode["frequency_hz"] for mode in modes] == pytest.approx(s.frequency, rel=0.01)
     for k, mode in enumerate(modes):
         shape = whole(mode)
-        assert (
-            modal.mac(shape[at], s.shapes[[int(name[1:]) for name in there], k]) > 0.97
-        )
+        assert modal.mac(shape[at], s.shapes[[int(name[1:]) for name in there], k]) > 0.97
         assert np.isnan(shape[found["outputs"].index("f5")])
     assert any("f5" in one["text"] for one in found["warnings"])
 
@@ -238,14 +204,9 @@ def test_free_decays_of_a_pipe(tmp_path: Path) -> None:
             )
     found = run(tmp_path, files, "--outputs", ",".join(f"q{p}" for p in range(12)))
     modes = [mode for mode in found["modes"] if mode["confident"]]
-    assert [mode["frequency_hz"] for mode in modes] == pytest.approx(
-        s.frequency, rel=0.01
-    )
+    assert [mode["frequency_hz"] for mode in modes] == pytest.approx(s.frequency, rel=0.01)
     places = [int(name[1:]) for name in found["outputs"]]
-    assert (
-        min(modal.mac(whole(mode), s.shapes[places, k]) for k, mode in enumerate(modes))
-        > 0.97
-    )
+    assert min(modal.mac(whole(mode), s.shapes[places, k]) for k, mode in enumerate(modes)) > 0.97
     assert found["records"] == 2
 
 
@@ -254,17 +215,11 @@ def test_python_gives_what_the_command_gives(tmp_path: Path) -> None:
     told = run(tmp_path, files, "--outputs", "P1,P4,P7,P2,P3,P5,P6,P8")
     parts = [package.read_csv(path) for path in files]
     names = [[name.split()[0] for name in part.names] for part in parts]
-    found = package.identify_setups(
-        None, [part.samples for part in parts], fs=100.0, output_names=names
-    )
+    found = package.identify_setups(None, [part.samples for part in parts], fs=100.0, output_names=names)
     mine = found.to_dict()
     assert mine["outputs"] == told["outputs"]
-    assert [mode["frequency_hz"] for mode in mine["modes"]] == [
-        mode["frequency_hz"] for mode in told["modes"]
-    ]
-    assert [mode["shape_re"] for mode in mine["modes"]] == [
-        mode["shape_re"] for mode in told["modes"]
-    ]
+    assert [mode["frequency_hz"] for mode in mine["modes"]] == [mode["frequency_hz"] for mode in told["modes"]]
+    assert [mode["shape_re"] for mode in mine["modes"]] == [mode["shape_re"] for mode in told["modes"]]
 
 
 def test_what_is_refused_in_one_line(tmp_path: Path) -> None:
@@ -283,9 +238,7 @@ def test_what_is_refused_in_one_line(tmp_path: Path) -> None:
         ([a, other, "--places", "(.)"], "r,a,b,c,d", "leave one out"),
     ]
     for files, outputs, words in cases:
-        text = okid(
-            "identify", *files, "--setups", "--outputs", outputs, status=2
-        ).stderr
+        text = okid("identify", *files, "--setups", "--outputs", outputs, status=2).stderr
         assert words in text and len(text.strip().splitlines()) == 1, text
     text = okid("identify", a, site.write(tmp_path / "m.csv", 100.0, ["r [g]", "c", "d"], y), "--setups", "--outputs",
                 "r,a,b,c,d", status=3).stderr  # fmt: skip
