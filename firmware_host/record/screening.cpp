@@ -7,7 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <fmt/format.h>
+#include <map>
+#include <string_view>
 
 namespace okid_host {
 namespace {
@@ -24,6 +27,7 @@ constexpr double spike_spreads = 15, spike_ratio = 5;
 constexpr std::size_t spike_reach = 6;
 constexpr double struck_share = 0.1;      // of the largest force
 constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
+constexpr std::string_view never_moves = "never moves";
 constexpr const char* lost_words =
     ": the whole output is left out, its shape entries are empty. Look at its sensor, range and cable";
 
@@ -61,8 +65,9 @@ double spread_of(const output_view& y, std::size_t first, std::size_t last) {
 }
 
 struct fault {
-    const char* kind;
+    std::string_view kind;
     std::vector<std::size_t> samples;
+    const record_data* record = nullptr;
 };
 
 /// Samples at one extreme, where they are a flat top: far more than just below it, and than at the next value below it.
@@ -175,18 +180,26 @@ bool is_dead(const record_set& set, std::size_t output) {
     return !(high > low);
 }
 
-std::string fault_text(const std::string& output, const record_data& record, const fault& found) {
-    return fmt::format("output \"{}\"{}: {} ({} sample{}, the first is number {})", output,
-                       record.path.empty() ? "" : " of " + record.path, found.kind, found.samples.size(),
-                       found.samples.size() == 1 ? "" : "s", found.samples.front());
+/// Faults of one kind in records, the first of them named.
+std::string fault_text(const std::string& output, const std::vector<const fault*>& found) {
+    const fault& first = *found.front();
+    const std::string& path = first.record->path;
+    std::size_t samples = 0;
+    for (const fault* one : found) samples += one->samples.size();
+    const std::string begin = fmt::format("output \"{}\"{}", output, path.empty() ? "" : " of " + path);
+    const std::string more =
+        found.size() > 1 ? fmt::format(" and {} more record{}", found.size() - 1, found.size() > 2 ? "s" : "") : "";
+    if (first.kind == never_moves) return begin + more + " never moves";
+    return fmt::format("{}{}: {} ({} sample{}, the first is number {})", begin, more, first.kind, samples,
+                       samples == 1 ? "" : "s", first.samples.front());
 }
 
 /// Faults of one output of one record; their samples become missing.
-std::vector<std::string> screen(const output_view& y, const std::vector<bool>& struck, const std::string& name) {
+std::vector<fault> screen(const output_view& y, const std::vector<bool>& struck) {
     const std::vector<stretch_of_equal> runs = equal_stretches(y);
     if (runs.size() == 1 && y.size() >= frozen_run) { // of one of several records: is_dead() has seen the others
         for (std::size_t i = 0; i < y.size(); ++i) y.drop(i);
-        return {fmt::format("output \"{}\" of {} never moves", name, y.record.path)};
+        return {{never_moves, {}, &y.record}};
     }
     if (runs.size() < 3) return {};
     double low = INFINITY, high = -INFINITY;
@@ -196,12 +209,13 @@ std::vector<std::string> screen(const output_view& y, const std::vector<bool>& s
     find_clipped(y, low, high - low, runs, clipped);
     find_frozen(y, runs, spread_of(y, 0, y.size()), low, high, frozen, zeros);
     find_spikes(y, struck, spikes);
-    std::vector<std::string> out;
+    std::vector<fault> out;
     for (fault* found : {&clipped, &frozen, &zeros, &spikes}) {
         if (found->samples.empty()) continue;
         std::sort(found->samples.begin(), found->samples.end());
-        out.push_back(fault_text(name, y.record, *found));
         for (const std::size_t i : found->samples) y.drop(i);
+        found->record = &y.record;
+        out.push_back(std::move(*found));
     }
     return out;
 }
@@ -233,21 +247,24 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
                                   fmt::format("output \"{}\" {}", outputs[k], std::string("never moves") + lost_words));
             continue;
         }
-        std::vector<std::string> faults;
+        std::map<std::string_view, std::vector<const fault*>> kinds;
+        std::deque<fault> faults;
         std::size_t before = 0, after = 0;
         for (const record_data& record : set.records) {
             const output_view view{record, set.rows(record) + set.n_u + k, set.channels()};
             before += usable(view);
-            for (std::string& text : screen(view, struck_samples(set, record), outputs[k]))
-                faults.push_back(std::move(text));
+            for (fault& found : screen(view, struck_samples(set, record))) {
+                faults.push_back(std::move(found));
+                kinds[faults.back().kind].push_back(&faults.back());
+            }
             after += usable(view);
         }
         const bool lost = static_cast<double>(after) < (1 - share_lost) * static_cast<double>(before);
         if (!faults.empty() && lost) out.kept[k] = false;
         usable_of[k] = after;
-        for (const std::string& text : faults)
+        for (const auto& [kind, found] : kinds)
             out.said.emplace_back("screened",
-                                  text + (lost ? lost_words : ": left out as gaps, nothing is interpolated"));
+                                  fault_text(outputs[k], found) + (lost ? lost_words : ": left out as gaps, nothing is interpolated"));
     }
     leave_out_sparse(outputs, usable_of, out);
     if (std::none_of(out.kept.begin(), out.kept.end(), [](bool kept) { return kept; })) {

@@ -144,8 +144,12 @@ def test_result_as_pyuff_sees_it(tmp_path: Path) -> None:
 
 def test_result_comes_back(tmp_path: Path) -> None:
     result = identified()
-    write_uff(tmp_path / "r.uff", result.to_dict())
+    tree = result.to_dict()
+    tree["modes"][1]["modal_mass"] = 2.5
+    write_uff(tmp_path / "r.uff", tree)
     found = read_uff(tmp_path / "r.uff")
+    assert [seen["modal_m"] for seen in seen_by_pyuff(tmp_path / "r.uff", 55)] == [0.0, 2.5, 0.0]
+    assert [mode.modal_mass for mode in found.modes] == [0.0, 2.5, 0.0]
     for mode, known in zip(found.modes, result.modes, strict=True):
         assert mode.frequency_hz == pytest.approx(known.frequency_hz, rel=1e-6)
         np.testing.assert_allclose(mode.shape[:, 0], known.shape, rtol=5e-6)

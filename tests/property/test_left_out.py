@@ -104,6 +104,19 @@ def test_a_sensor_that_dies_between_records_costs_no_record() -> None:
         assert mode.frequency_hz == pytest.approx(truth, rel=1e-3)
 
 
+def test_one_line_for_the_same_fault_of_many_records() -> None:
+    lab = forced(21, count=10000)
+    u, y = lab.samples[:, : lab.n_u], lab.samples[:, lab.n_u :].copy()
+    us, ys = np.array_split(u, 5), np.array_split(y, 5)
+    for k in (1, 2, 4):
+        ys[k][500 + k, 3] += 60 * ys[k][:, 3].std()
+    result = okid.identify(us, ys, fs=lab.fs, output_names=NAMES)
+    (said,) = [w.text for w in result.warnings if w.code == "screened"]
+    assert said.startswith(
+        'output "y3" of record 1 (counted from 0) and 2 more records: spikes (3 samples, the first is number 501)'
+    )
+
+
 def test_outputs_that_are_all_dead_are_refused() -> None:
     rng = np.random.default_rng(3)
     with pytest.raises(okid.IdentificationError, match='output "y1" is constant'):

@@ -261,7 +261,7 @@ def mode_sets(raw: Mapping[str, Any], places: Sequence[Place | None], sensing: s
         f, z = float(arrays["frequency_hz"][k]), float(arrays["damping_ratio"][k])
         remark = f"okid mode {k + 1}: {f!r} Hz, damping ratio {z!r}"
         title = f"{raw.get('title') or 'okid'} {raw.get('method', '')}".strip()
-        mode = UffMode(k + 1, f, z, nodes, shape, title, _judgement(one))
+        mode = UffMode(k + 1, f, z, nodes, shape, title, float(one.get("modal_mass") or 0.0), _judgement(one))
         out.append(mode_text(mode, _SENSING[sensing][0], remark))
     return out
 

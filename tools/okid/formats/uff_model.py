@@ -27,6 +27,7 @@ class UffMode:
     nodes: list[int]
     shape: NDArray[np.complex128]
     title: str = ""
+    modal_mass: float = 0.0  # kg of this shape; 0: not known
     judgement: str = ""  # of okid: "confident ..." or "doubtful: why", on the third ID line
 
     @property
@@ -46,15 +47,15 @@ def read_mode(block: Block) -> UffMode | None:
     number = block.integers(6, (10,) * 4)[3]
     values = [block.number(text, 7) for text in block.fields(7, (13,) * 4)]
     if analysis == 2:
-        frequency, damping = values[0], values[2]
+        frequency, mass, damping = values[:3]
     else:
-        size = float(np.hypot(values[0], values[1]))
+        size, mass = float(np.hypot(values[0], values[1])), 0.0
         frequency, damping = size / (2.0 * np.pi), -values[0] / size if size > 0.0 else 0.0
     nodes, shape = _shape(block, width, data == 5)
     title = block.lines[0][:80].strip()
     told = block.lines[2][:80].strip()
     judged = told if told.startswith(("confident", "doubtful")) else ""
-    return UffMode(number, frequency, damping, nodes, shape, "" if title.upper() == "NONE" else title, judged)
+    return UffMode(number, frequency, damping, nodes, shape, "" if title.upper() == "NONE" else title, mass, judged)
 
 
 def _shape(block: Block, width: int, complex_values: bool) -> tuple[list[int], NDArray[np.complex128]]:
@@ -155,7 +156,7 @@ def mode_text(mode: UffMode, kind: int, remark: str) -> str:
     head += text_line(mode.judgement[:80], "ID line") + "".join(text_line("", "ID line") for _ in range(2))
     head += "".join(f"{n:10d}" for n in (1, 2, 2, kind, 5, 3)) + "\n"
     head += "".join(f"{n:10d}" for n in (2, 4, 1, mode.number)) + "\n"
-    head += "".join(short_number(value) for value in (mode.frequency_hz, 0.0, mode.damping_ratio, 0.0)) + "\n"
+    head += "".join(short_number(value) for value in (mode.frequency_hz, mode.modal_mass, mode.damping_ratio, 0.0)) + "\n"
     rows = []
     for node, row in zip(mode.nodes, mode.shape, strict=True):
         numbers = "".join(short_number(part) for value in row for part in (value.real, value.imag))
