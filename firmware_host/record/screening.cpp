@@ -263,8 +263,8 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
         if (!faults.empty() && lost) out.kept[k] = false;
         usable_of[k] = after;
         for (const auto& [kind, found] : kinds)
-            out.said.emplace_back("screened",
-                                  fault_text(outputs[k], found) + (lost ? lost_words : ": left out as gaps, nothing is interpolated"));
+            out.said.emplace_back("screened", fault_text(outputs[k], found) +
+                                                  (lost ? lost_words : ": left out as gaps, nothing is interpolated"));
     }
     leave_out_sparse(outputs, usable_of, out);
     if (std::none_of(out.kept.begin(), out.kept.end(), [](bool kept) { return kept; })) {

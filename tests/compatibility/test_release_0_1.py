@@ -121,7 +121,11 @@ def test_records_merged(tmp_path: Path) -> None:
     ]
     given += ["--method", "n4sid-moesp", "--sigma-blocks", 8, "--input-dofs", "1", "--output-dofs", "1,2", "--quiet"]
     done("identify", OLD / "record.csv", OLD / "record.csv", *given, "--json", tmp_path / "r.json")
-    compare(json.loads((tmp_path / "r.json").read_text()), json.loads((OLD / "results" / "merged.json").read_text()))
+    now = json.loads((tmp_path / "r.json").read_text())
+    new = [warning for warning in now["warnings"] if warning["code"] == "records_repeated"]  # 0.1 did not say so
+    assert len(new) == 1
+    now["warnings"].remove(new[0])
+    compare(now, json.loads((OLD / "results" / "merged.json").read_text()))
 
 
 @pytest.mark.parametrize("name", [*METHODS, "ambient", "refined", "merged"])

@@ -104,11 +104,11 @@ def singular_values(result: Result) -> Picture:
 
 @_styled
 def fit(result: Result) -> Picture:
-    """Simulation and prediction fit of each output in percent. InputError of a stream, whose samples were not kept, and of
-    set-ups or results that were merged."""
+    """Simulation and prediction fit of each output in percent. InputError of a stream, whose samples were not kept,
+    and of set-ups or results that were merged."""
     both = [[one[name] for name in result.outputs] for one in result.fit]
     if all(value is None for values in both for value in values):
-        raise InputError("this result has no fit: it takes one record (okid.identify), not a stream, set-ups or a merger")
+        raise InputError("this result has no fit: it takes a record (okid.identify), not a stream, set-ups or a merger")
     picture = _sheet(max(4.0, 0.5 * len(result.outputs) + 2.0), 3.2)
     figures.draw_fit(picture.add_subplot(), result.outputs, both[0], both[1])
     return picture

@@ -156,7 +156,9 @@ def mode_text(mode: UffMode, kind: int, remark: str) -> str:
     head += text_line(mode.judgement[:80], "ID line") + "".join(text_line("", "ID line") for _ in range(2))
     head += "".join(f"{n:10d}" for n in (1, 2, 2, kind, 5, 3)) + "\n"
     head += "".join(f"{n:10d}" for n in (2, 4, 1, mode.number)) + "\n"
-    head += "".join(short_number(value) for value in (mode.frequency_hz, mode.modal_mass, mode.damping_ratio, 0.0)) + "\n"
+    head += (
+        "".join(short_number(value) for value in (mode.frequency_hz, mode.modal_mass, mode.damping_ratio, 0.0)) + "\n"
+    )
     rows = []
     for node, row in zip(mode.nodes, mode.shape, strict=True):
         numbers = "".join(short_number(part) for value in row for part in (value.real, value.imag))
