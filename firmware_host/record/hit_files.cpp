@@ -23,6 +23,9 @@ constexpr std::size_t most_hits_named = 8;
 constexpr std::size_t longest_name = 256;                 // of a file, that a regular expression looks at
 constexpr double same_peak = 1e-3;                        // peaks of different hits closer than this are one number
 constexpr std::size_t fewest_alike = 3, share_alike = 10; // hits, and one of so many, with it: by chance hardly any
+constexpr double same_pulse = 0.95;      // of the sum of a pulse: closer, and it is one force again and again
+constexpr double weaker = 0.9;           // of the limit: a hit below does not reach it
+constexpr double belongs_to_pulse = 0.1; // of the peak
 
 hit_line line_of(const record_set& set, const record_data& record, const std::vector<hit_channel>& channels,
                  const hit_span& span, const record_options& options) {
@@ -55,9 +58,29 @@ std::vector<hit_channel> channels_of_hit(const record_options& options) {
     return out;
 }
 
-/// A force that no hit exceeds and several reach: the limit of its amplifier. Copies of a hit count once; infinity: none.
-double force_limit(const record_set& set, const std::vector<hit_span>& spans) {
-    std::vector<double> peaks;
+/// Largest force of a hit, and the sum of its samples beyond 10 % of it.
+struct pulse_size {
+    double peak = 0, sum = 0;
+};
+
+pulse_size size_of(const record_set& set, const record_data& record, double sign) {
+    pulse_size out;
+    const auto force = [&](std::size_t i) { return sign * set.rows(record)[i * set.channels()]; };
+    for (std::size_t i = 0; i < record.count; ++i) out.peak = std::fmax(out.peak, force(i));
+    for (std::size_t i = 0; i < record.count; ++i)
+        if (force(i) > belongs_to_pulse * out.peak) out.sum += force(i);
+    return out;
+}
+
+/// A force that no hit exceeds.
+struct force_limit {
+    double at = INFINITY; ///< infinity: none is seen
+    bool sure = false;    ///< there are weaker hits, too: it is the limit of an amplifier
+};
+
+/// Several hits reach it, though they are not the same force again. Copies of a record count once.
+force_limit limit_of(const record_set& set, const std::vector<hit_span>& spans) {
+    std::vector<pulse_size> pulses;
     std::vector<std::size_t> counted;
     for (std::size_t r = 0; r < spans.size(); ++r) {
         const record_data& record = set.records[r];
@@ -65,17 +88,18 @@ double force_limit(const record_set& set, const std::vector<hit_span>& spans) {
                         [&](std::size_t other) { return same_samples(set, record, set.records[other]); }))
             continue;
         counted.push_back(r);
-        double peak = 0;
-        for (std::size_t i = 0; i < record.count; ++i)
-            peak = std::fmax(peak, spans[r].sign * set.rows(record)[i * set.channels()]);
-        peaks.push_back(peak);
+        pulses.push_back(size_of(set, record, spans[r].sign));
     }
-    std::sort(peaks.rbegin(), peaks.rend());
+    std::sort(pulses.begin(), pulses.end(),
+              [](const pulse_size& one, const pulse_size& other) { return one.peak > other.peak; });
+    const double limit = (1 - same_peak) * pulses.front().peak;
     std::size_t alike = 0;
-    while (alike < peaks.size() && peaks[alike] >= (1 - same_peak) * peaks.front()) ++alike;
-    return alike >= std::max(fewest_alike, (peaks.size() + share_alike - 1) / share_alike)
-               ? (1 - same_peak) * peaks.front()
-               : INFINITY;
+    double least = INFINITY, most = 0;
+    for (; alike < pulses.size() && pulses[alike].peak >= limit; ++alike)
+        least = std::fmin(least, pulses[alike].sum), most = std::fmax(most, pulses[alike].sum);
+    if (alike < std::max(fewest_alike, (pulses.size() + share_alike - 1) / share_alike) || least > same_pulse * most)
+        return {};
+    return {limit, pulses.back().peak < weaker * limit};
 }
 
 void say_left_out(const std::vector<hit_line>& hits, remarks& said) {
@@ -131,8 +155,8 @@ std::vector<hit_line> choose_hits(record_set& records, record_options& options) 
         resting += spans.back().free >= least_free;
     }
     if (2 * resting < spans.size()) return {};
-    channels.front().high = force_limit(records, spans);
-    channels.front().low = -channels.front().high;
+    const force_limit limit = limit_of(records, spans);
+    if (limit.sure) channels.front().high = limit.at, channels.front().low = -limit.at;
     std::vector<hit_line> hits;
     record_set kept;
     kept.n_u = records.n_u;
@@ -143,6 +167,8 @@ std::vector<hit_line> choose_hits(record_set& records, record_options& options) 
         const record_data& record = records.records[r];
         hits.push_back(line_of(records, record, channels, spans[r], options));
         hits.back().place = options.hits[r];
+        if (hits.back().accepted && !limit.sure && std::abs(hits.back().peak) >= limit.at)
+            hits.back().text += "; the peak of other hits, too: was the amplifier at its limit?";
         if (!hits.back().accepted) continue;
         kept.add(record.path, records.rows(record), record.count);
         places.push_back(options.hits[r]);

@@ -192,6 +192,25 @@ def test_a_hammer_that_clips_in_many_hits(tmp_path: Path) -> None:
     assert "records_repeated" in codes(again)
 
 
+def test_the_same_force_again_and_again_is_no_limit(tmp_path: Path) -> None:
+    """A simulated force, or a shaker's pulse: the same samples in every file. Where only the peaks are the same, and no
+    hit is weaker, the hits are kept and the limit is asked for."""
+    records = beam.hammer_test(7, {}, each=1)
+    pulse = 100 * np.sin(np.pi * np.arange(1, 5) / 5)
+    for rows in records.values():
+        at = rows[:, 0].argmax()
+        rows[:, 0] = 0
+        rows[at : at + 4, 0] = pulse
+    result, told = identified(tmp_path, records, "--method", "n4sid-cva")
+    assert all(hit["accepted"] for hit in result["hits"])
+    assert "limit?" not in told
+    for k, rows in enumerate(records.values()):
+        rows[rows[:, 0].argmax() + 3, 0] += 4 * k
+    result, told = identified(tmp_path, records, "--method", "n4sid-cva")
+    assert all(hit["accepted"] for hit in result["hits"])
+    assert told.count("was the amplifier at its limit?") == len(records)
+
+
 def test_a_sensor_beside_the_hammer_has_no_spikes(tmp_path: Path) -> None:
     """What a light structure answers at the place of the hit is one sample long and far above what rings on."""
     records = beam.hammer_test(6, {}, each=1)
