@@ -128,5 +128,5 @@ def test_pictures_have_one_style() -> None:
         okid.plots.frf(result, output=3)
     session = okid.Session(["shaker"], ["a1", "a2", "a3"], fs=1000.0, p=20)
     session.feed(np.hstack([force, acceleration]))
-    with pytest.raises(okid.InputError, match="a stream keeps none"):
+    with pytest.raises(okid.InputError, match="not a stream"):
         okid.plots.fit(session.identify())
