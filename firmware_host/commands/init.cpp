@@ -7,13 +7,13 @@
 #include "config/config.hpp"
 #include "config/dbc.hpp"
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 #include "files/units.hpp"
 #include "files/whole_file.hpp"
 #include "record/csv_header.hpp"
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <drv/candump.h>
@@ -92,8 +92,7 @@ std::string role_of_unit(const std::string& unit) {
 }
 
 bool counts_samples(const dbc_signal& signal) {
-    std::string name = signal.name;
-    for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const std::string name = lower_case(signal.name);
     const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
     return signal.unit.empty() && !signal.layout.is_signed && signal.layout.length >= 4 && signal.layout.scale == 1 &&
            (has("count") || has("cnt") || has("seq") || has("number") || has("sample"));

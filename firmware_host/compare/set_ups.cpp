@@ -10,6 +10,7 @@
 #include "merge.hpp"
 #include "record/drive_mass.hpp"
 #include "record/modal_model.hpp"
+#include "record/record_check.hpp"
 #include "result/hold.hpp"
 #include "result/method.hpp"
 
@@ -118,24 +119,12 @@ std::vector<set_up> joined(std::vector<set_up> all) {
     return out;
 }
 
-/// Spread of each output over all records.
-std::vector<double> spreads_of(const record_set& set) {
-    std::vector<double> out;
-    for (std::size_t o = 0; o < set.n_y; ++o) {
-        double sum = 0, square = 0, count = 0;
-        for (std::size_t i = set.n_u + o; i < set.samples.size(); i += set.channels())
-            if (const double y = set.samples[i]; !std::isnan(y)) sum += y, ++count;
-        for (std::size_t i = set.n_u + o; i < set.samples.size(); i += set.channels())
-            if (const double y = set.samples[i] - sum / count; !std::isnan(y)) square += y * y;
-        out.push_back(count > 0 ? std::sqrt(square / count) : 0);
-    }
-    return out;
-}
-
 /// Outputs that hardly move beside the others of their kind, and not as the modes do: a dead sensor gives its own noise.
-std::vector<std::size_t> dead_outputs(const std::vector<double>& spreads, const std::vector<int>& sensing,
+std::vector<std::size_t> dead_outputs(const std::vector<output_spread>& about, const std::vector<int>& sensing,
                                       const std::optional<std::vector<double>>& explained) {
     std::vector<std::size_t> out;
+    std::vector<double> spreads;
+    for (const output_spread& one : about) spreads.push_back(one.count > 0 ? std::sqrt(one.squares / one.count) : 0);
     for (std::size_t o = 0; explained && o < spreads.size(); ++o) {
         std::vector<double> of_kind;
         for (std::size_t other = 0; other < spreads.size(); ++other)
@@ -180,7 +169,7 @@ class set_up_merger {
         out.at = places_of_outputs(one, options_.outputs);
         record_options own = options_of_one(options_, one, out.at);
         const std::string path = one.set.records.front().path;
-        const std::vector<double> spreads = spreads_of(one.set);
+        const std::vector<output_spread> spreads = spreads_of(one.set);
         if (options_.stage)
             own.stage = [&, k, count](const char* text) {
                 options_.stage(fmt::format("set-up {} of {} ({}): {}", k + 1, count, path, text).c_str());

@@ -12,11 +12,13 @@
 #include <functional>
 #include <limits>
 #include <new>
+#include <numeric>
+#include <set>
 
 namespace okid_host {
 namespace {
 
-constexpr int long_rows = 30, lags_of_observer = 40, usual_order = 64, order_of_crowds = 128;
+constexpr int long_rows = 30, lags_of_observer = 40, order_of_crowds = 128;
 /// Block rows x outputs: the states of a Hankel matrix. A plate of 23 modes under one accelerometer has 46, and as many again
 /// of noise beside them. Few channels ask for long horizons, and there they are cheap.
 constexpr int rows_of_outputs = 90, rows_of_crowds = 180;
@@ -42,11 +44,14 @@ consensus_run run_of(okid_method_t method, int rows) {
     return run;
 }
 
+/// Block rows, or lags, with which rows x outputs is what a run's states ask for.
+int rows_for_states(int n_y, bool crowded) { return ((crowded ? rows_of_crowds : rows_of_outputs) + n_y - 1) / n_y; }
+
 /// Block rows that so many samples bear.
 int rows_of(int n_u, int n_y, long long samples, bool crowded) {
     // Ten samples an unknown of one output; what more than three outputs have in common is estimated from all of them.
     const long long borne = samples * std::max(3, n_y) / 30 / (n_y + 2LL * n_u);
-    const int wanted = std::max(long_rows, ((crowded ? rows_of_crowds : rows_of_outputs) + n_y - 1) / n_y);
+    const int wanted = std::max(long_rows, rows_for_states(n_y, crowded));
     return static_cast<int>(std::min<long long>({wanted, borne, std::max(6, most_unknowns / (n_u + n_y))}));
 }
 
@@ -93,13 +98,13 @@ std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_
         out = {run_of(OKID_METHOD_N4SID_MOESP, rows), run_of(OKID_METHOD_N4SID_MOESP, less),
                run_of(OKID_METHOD_N4SID_CVA, rows), run_of(OKID_METHOD_N4SID_CVA, less),
                run_of(OKID_METHOD_N4SID_SSARX, middle)};
-    const int lags = std::max(lags_of_observer, ((crowded ? rows_of_crowds : rows_of_outputs) + n_y - 1) / n_y);
+    const int lags = std::max(lags_of_observer, rows_for_states(n_y, crowded));
     int p = n_u > 0 ? okid_identify_usable_p(n_u, n_y, lags, samples)
                     : static_cast<int>(std::min<long long>(lags, samples / 20));
     p = std::min(p, std::max(8, most_unknowns / m));
     if (p * n_y >= fewest_rows) out.push_back(run_of(OKID_METHOD_OKID_ERA, p));
     for (consensus_run& run : out) {
-        run.most_order = crowded ? order_of_crowds : usual_order;
+        if (crowded) run.most_order = order_of_crowds;
         place_run(run, level, number, n_u, n_y);
     }
     return out;
@@ -171,70 +176,45 @@ namespace {
 
 /// Sums with fewer lags from those with more; none where that would leave out too many of the level's samples.
 owned_sums shortened(const record_level& level, const owned_sums& longest, int lags, int n_u, int n_y) {
-    okid_accumulator_config_t shape = okid_accumulator_defaults(n_u, n_y, lags);
-    shape.edges = 1;
-    owned_sums out;
     if (!longest.sums ||
         static_cast<double>(okid_accumulator_rows(longest.sums)) < least_kept * static_cast<double>(level.samples))
-        return out;
-    out = owned_sums(shape);
-    if (out.sums && okid_accumulator_merge(out.sums, longest.sums) < 0) out.sums = nullptr;
+        return {};
+    return with_fewer_lags(longest.sums, n_u, n_y, lags);
+}
+
+/// The runs of one level with their poles linked, those with the longest horizon first.
+std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const record_level& level, int n_u, int n_y,
+                                     bool at_rest) {
+    std::vector<int> lags;
+    for (const consensus_run& run : runs) {
+        const okid_identify_config_t config = run_config(run, n_u, n_y);
+        lags.push_back(okid_identify_lags(&config));
+    }
+    std::vector<int> horizons = lags;
+    std::sort(horizons.begin(), horizons.end(), std::greater<>());
+    horizons.erase(std::unique(horizons.begin(), horizons.end()), horizons.end());
+    std::vector<consensus_run> out;
+    owned_sums longest, own;
+    for (const int horizon : horizons) {
+        const bool first = horizon == horizons.front();
+        if (!first) own = shortened(level, longest, horizon, n_u, n_y);
+        owned_sums& sums = first ? longest : own;
+        if (!sums.sums) sums = level_sums(level, n_u, n_y, horizon, at_rest);
+        for (std::size_t i = 0; i < runs.size(); ++i)
+            if (lags[i] == horizon && find_poles(run_config(runs[i], n_u, n_y), sums, runs[i]))
+                out.push_back(std::move(runs[i]));
+    }
     return out;
 }
 
-/// One level's sums, the longest first; shorter ones from it where that keeps the samples.
-class sums_of_level {
-  public:
-    sums_of_level(const record_level& level, int n_u, int n_y, bool at_rest)
-        : level_(level), n_u_(n_u), n_y_(n_y), at_rest_(at_rest) {}
-
-    /// Linked poles of these runs, those with the longest horizon first.
-    std::vector<consensus_run> look(std::vector<consensus_run> runs) {
-        std::vector<consensus_run> out;
-        std::vector<int> lags;
-        for (const consensus_run& run : runs) {
-            const okid_identify_config_t config = run_config(run, n_u_, n_y_);
-            lags.push_back(okid_identify_lags(&config));
-        }
-        std::vector<int> horizons = lags;
-        std::sort(horizons.begin(), horizons.end(), std::greater<>());
-        horizons.erase(std::unique(horizons.begin(), horizons.end()), horizons.end());
-        for (const int horizon : horizons) {
-            const owned_sums& sums = of(horizon);
-            for (std::size_t i = 0; i < runs.size(); ++i)
-                if (lags[i] == horizon && find_poles(run_config(runs[i], n_u_, n_y_), sums, runs[i]))
-                    out.push_back(std::move(runs[i]));
-        }
-        return out;
-    }
-
-  private:
-    const owned_sums& of(int lags) {
-        if (!longest_.sums) {
-            longest_lags_ = lags;
-            return longest_ = level_sums(level_, n_u_, n_y_, lags, at_rest_);
-        }
-        if (lags == longest_lags_) return longest_;
-        own_ = shortened(level_, longest_, lags, n_u_, n_y_);
-        if (!own_.sums) own_ = level_sums(level_, n_u_, n_y_, lags, at_rest_);
-        return own_;
-    }
-
-    const record_level& level_;
-    int n_u_, n_y_, longest_lags_ = 0;
-    bool at_rest_;
-    owned_sums longest_, own_;
-};
-
-} // namespace
-
-std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std::size_t first, int n_u, int n_y,
-                                   bool at_rest, int threads) {
-    std::vector<std::vector<consensus_run>> of_level(levels.size() - first);
-    side_by_side(of_level.size(), threads, [&](std::size_t i) {
-        const record_level& level = levels[first + i];
-        of_level[i] = sums_of_level(level, n_u, n_y, at_rest)
-                          .look(plan_runs(n_u, n_y, static_cast<int>(first + i), level, false));
+/// The runs of these levels, one level after the other.
+std::vector<consensus_run> run_levels(const std::vector<record_level>& levels, const std::vector<std::size_t>& numbers,
+                                      int n_u, int n_y, bool at_rest, int threads, bool crowded) {
+    std::vector<std::vector<consensus_run>> of_level(numbers.size());
+    side_by_side(numbers.size(), threads, [&](std::size_t i) {
+        const record_level& level = levels[numbers[i]];
+        of_level[i] =
+            run_level(plan_runs(n_u, n_y, static_cast<int>(numbers[i]), level, crowded), level, n_u, n_y, at_rest);
     });
     std::vector<consensus_run> out;
     for (auto& runs : of_level)
@@ -242,25 +222,27 @@ std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std:
     return out;
 }
 
+} // namespace
+
+std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std::size_t first, int n_u, int n_y,
+                                   bool at_rest, int threads) {
+    std::vector<std::size_t> numbers(levels.size() - first);
+    std::iota(numbers.begin(), numbers.end(), first);
+    return run_levels(levels, numbers, n_u, n_y, at_rest, threads, false);
+}
+
 bool look_closer(const std::vector<record_level>& levels, int n_u, int n_y, bool at_rest, int threads,
                  std::vector<consensus_run>& runs) {
-    std::vector<int> crowded;
+    std::set<std::size_t> crowded;
     for (const consensus_run& run : runs)
-        if (run.full && is_subspace(run.method) && (crowded.empty() || crowded.back() != run.level))
-            crowded.push_back(run.level);
-    std::vector<std::vector<consensus_run>> of_level(crowded.size());
-    side_by_side(crowded.size(), threads, [&](std::size_t i) {
-        const record_level& level = levels[static_cast<std::size_t>(crowded[i])];
-        of_level[i] = sums_of_level(level, n_u, n_y, at_rest).look(plan_runs(n_u, n_y, crowded[i], level, true));
-    });
+        if (run.full && is_subspace(run.method)) crowded.insert(static_cast<std::size_t>(run.level));
+    auto closer = run_levels(levels, {crowded.begin(), crowded.end()}, n_u, n_y, at_rest, threads, true);
     const auto replaced = [&](const consensus_run& run) {
-        const auto at = std::find(crowded.begin(), crowded.end(), run.level);
-        return at != crowded.end() && !of_level[static_cast<std::size_t>(at - crowded.begin())].empty();
+        return std::any_of(closer.begin(), closer.end(), [&](const auto& other) { return other.level == run.level; });
     };
     runs.erase(std::remove_if(runs.begin(), runs.end(), replaced), runs.end());
-    for (auto& found : of_level)
-        for (consensus_run& run : found) runs.push_back(std::move(run));
-    return !crowded.empty();
+    for (consensus_run& run : closer) runs.push_back(std::move(run));
+    return !closer.empty();
 }
 
 std::vector<record_level> zoomed_levels(const std::vector<record_level>& levels,

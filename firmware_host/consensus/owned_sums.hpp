@@ -22,4 +22,18 @@ struct owned_sums {
     }
 };
 
+/// The rows of `from`, a window or not, as sums with fewer lags; none without memory.
+inline owned_sums with_fewer_lags(okid_accumulator_t* from, int n_u, int n_y, int lags) {
+    okid_accumulator_config_t held{}, shape = okid_accumulator_defaults(n_u, n_y, lags);
+    okid_accumulator_config(from, &held);
+    shape.edges = 1;
+    owned_sums out(shape);
+    if (!out.sums) return out;
+    const okid_status_t status = held.slots > 0
+                                     ? okid_accumulator_take_slots(out.sums, from, 0, okid_accumulator_slots(from))
+                                     : okid_accumulator_merge(out.sums, from);
+    if (status < 0) out.sums = nullptr;
+    return out;
+}
+
 } // namespace okid_host

@@ -9,11 +9,6 @@
 namespace okid_host {
 namespace {
 
-std::string lower(std::string text) {
-    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return text;
-}
-
 std::size_t edit_distance(const std::string& a, const std::string& b) {
     std::vector<std::size_t> row(b.size() + 1);
     std::iota(row.begin(), row.end(), std::size_t{0});
@@ -31,14 +26,19 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 
 } // namespace
 
+std::string lower_case(std::string text) {
+    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return text;
+}
+
 std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates) {
     if (name.size() > 200) return "";
-    const std::string wanted = lower(name);
+    const std::string wanted = lower_case(name);
     std::string best;
     std::size_t best_distance = std::max<std::size_t>(2, name.size() / 3) + 1;
     for (const std::string& candidate : candidates) {
         if (candidate.empty() || candidate.size() > 200) continue;
-        const std::string known = lower(candidate);
+        const std::string known = lower_case(candidate);
         const bool begun =
             wanted.size() >= 3 && known.compare(0, wanted.size(), wanted) == 0; // "noise" for noise_percent
         const std::size_t distance = begun ? 1 : edit_distance(wanted, known);

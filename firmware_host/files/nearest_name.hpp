@@ -6,6 +6,9 @@
 
 namespace okid_host {
 
+/// ASCII letters in lower case.
+std::string lower_case(std::string text);
+
 /// The candidate with the smallest edit distance (letter case ignored), "" when none is near enough to be meant.
 std::string nearest_name(const std::string& name, const std::vector<std::string>& candidates);
 

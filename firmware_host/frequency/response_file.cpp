@@ -319,9 +319,7 @@ response_set read_table(const std::string& path) {
 
 response_set read_responses(const std::string& path) {
     const std::size_t dot = path.rfind('.');
-    std::string ending = dot == path.npos ? "" : path.substr(dot);
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const std::string ending = dot == path.npos ? "" : lower_case(path.substr(dot));
     return ending == ".uff" || ending == ".unv" ? read_universal(path) : read_table(path);
 }
 

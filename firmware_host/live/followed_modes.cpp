@@ -87,15 +87,7 @@ owned_sums followed_modes::shortened(const group& of) const {
     const int lags = okid_identify_lags(&of.config);
     okid_accumulator_config(sums_[of.rate].sums, &held);
     if (held.lags == lags) return {};
-    okid_accumulator_config_t shape = okid_accumulator_defaults(n_u_, n_y_, lags);
-    shape.edges = 1;
-    owned_sums out(shape);
-    okid_accumulator_t* const from = sums_[of.rate].sums;
-    const auto take = [&] {
-        return held.slots > 0 ? okid_accumulator_take_slots(out.sums, from, 0, okid_accumulator_slots(from))
-                              : okid_accumulator_merge(out.sums, from);
-    };
-    if (out.sums && take() < 0) out.sums = nullptr;
+    owned_sums out = with_fewer_lags(sums_[of.rate].sums, n_u_, n_y_, lags);
     if (out.sums) okid_accumulator_set_units(out.sums, units_.data(), nullptr);
     return out;
 }

@@ -11,7 +11,6 @@
 #include "npy.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <fmt/format.h>
 #include <iterator>
@@ -49,17 +48,15 @@ std::vector<std::string> read_csv_columns(const std::string& path) {
 /// "time_s", and what loggers write: "Time [s]", "t (s)".
 static bool is_time_in_seconds(const std::string& name) {
     if (name == "time_s") return true;
-    std::string small;
-    for (const char c : name)
-        if (c != ' ') small += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    std::string small = lower_case(name);
+    small.erase(std::remove(small.begin(), small.end(), ' '), small.end());
     return small == "time[s]" || small == "time(s)" || small == "t[s]" || small == "t(s)";
 }
 
 /// A column of another name that may be meant as the time.
 static std::string time_like(const std::vector<std::string>& names) {
     for (const std::string& name : names) {
-        std::string small;
-        for (const char c : name) small += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        const std::string small = lower_case(name);
         if (small.rfind("time", 0) == 0 && small.find("ms") != std::string::npos)
             return fmt::format(" (\"{}\" is not in seconds: give the rate with --fs)", printable(name));
         if (small == "t" || small.rfind("time", 0) == 0)

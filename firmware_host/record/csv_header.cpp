@@ -85,8 +85,7 @@ std::string base_of_name(const std::string& name) {
 } // namespace
 
 void read_csv_comment(const std::string& path, std::size_t number, std::string_view line, csv_header& header) {
-    std::string text(line);
-    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const std::string text = lower_case(std::string(line));
     auto value = value_of(text, "fs_hz");
     if (!value) value = value_of(text, "sample_rate_hz");
     if (!value) return;

@@ -168,6 +168,7 @@ bool same_samples(const record_set& set, const record_data& one, const record_da
 }
 
 void remark_repeated(const record_set& set, remarks& said) {
+    if (set.records.size() < 2) return;
     std::size_t copies = 0;
     std::string first;
     std::unordered_map<std::string_view, std::size_t> seen; // by their bytes
@@ -185,6 +186,18 @@ void remark_repeated(const record_set& set, remarks& said) {
             fmt::format("{} of {} records hold the samples of another one ({}): they count twice, and the "
                         "standard deviations are too small. Name each file once",
                         copies, set.records.size(), first));
+}
+
+std::vector<output_spread> spreads_of(const record_set& set) {
+    std::vector<output_spread> out(set.n_y);
+    for (std::size_t o = 0; o < set.n_y; ++o) {
+        double sum = 0;
+        for (std::size_t i = set.n_u + o; i < set.samples.size(); i += set.channels())
+            if (const double y = set.samples[i]; !std::isnan(y)) sum += y, ++out[o].count;
+        for (std::size_t i = set.n_u + o; i < set.samples.size(); i += set.channels())
+            if (const double y = set.samples[i] - sum / out[o].count; !std::isnan(y)) out[o].squares += y * y;
+    }
+    return out;
 }
 
 std::vector<double> largest_of(const record_set& set, const record_data& record) {

@@ -38,6 +38,12 @@ bool same_samples(const record_set& set, const record_data& one, const record_da
 /// A record that is there twice counts twice, and the result looks surer than it is.
 void remark_repeated(const record_set& set, remarks& said);
 
+/// Of an output over all records: samples, and the sum of their squares about their mean.
+struct output_spread {
+    double count = 0, squares = 0;
+};
+std::vector<output_spread> spreads_of(const record_set& set);
+
 /// Largest magnitude in each channel of a record.
 std::vector<double> largest_of(const record_set& set, const record_data& record);
 

@@ -61,15 +61,11 @@ MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_d
             }
             std::copy_n(row, set.channels(), x.data() + 2 * z.size());
             double* other = x.data() + 2 * z.size() + set.channels();
-            for (int lag = 1; lag <= beside; ++lag)
-                for (const std::ptrdiff_t step : {-lag, lag}) {
-                    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(t) + step;
-                    const bool there = at >= 0 && at < static_cast<std::ptrdiff_t>(record.count);
-                    for (std::size_t j = 0; j < set.n_u; ++j, ++other)
-                        *other = there ? row[step * static_cast<std::ptrdiff_t>(set.channels()) +
-                                             static_cast<std::ptrdiff_t>(j)]
-                                       : 0;
-                    if (!there) continue;
+            for (std::size_t lag = 1; lag <= static_cast<std::size_t>(beside); ++lag)
+                for (const bool before : {true, false}) {
+                    const bool there = before ? t >= lag : t + lag < record.count;
+                    const double* const force = set.rows(record) + (before ? t - lag : t + lag) * set.channels();
+                    for (std::size_t j = 0; j < set.n_u; ++j) *other++ = there ? force[j] : 0;
                 }
             if (filled == block) fold();
         }
@@ -153,10 +149,9 @@ std::vector<residue_sums> sum_residues(const std::vector<listed_mode>& modes, do
 }
 
 void keep_samples_beside(std::vector<residue_sums>& records, int beside, std::size_t n_y) {
-    const auto cut = [](residue_sums sums, Index count) {
-        sums.N = sums.N.topLeftCorner(count, count).eval();
-        sums.h = sums.h.head(count).eval();
-        return sums;
+    const auto cut = [](const residue_sums& sums, Index count) {
+        return residue_sums{sums.N.topLeftCorner(count, count), sums.h.head(count), sums.left, sums.energy,
+                            sums.samples};
     };
     std::vector<residue_sums> best;
     double least = INFINITY;

@@ -6,6 +6,7 @@
 
 #include "error.hpp"
 #include "hit_verdict.hpp"
+#include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_refine.hpp"
 #include "residue_fit.hpp"
@@ -52,17 +53,6 @@ record_set records_at(const record_set& set, const std::vector<int>& hits, int p
         if (hits[r] < 0)
             for (std::size_t i = first; i < out.samples.size(); i += out.channels()) out.samples[i] *= -1;
     }
-    return out;
-}
-
-/// Spread of each output about its mean, times the count, over a set.
-std::vector<double> spreads(const record_set& set) {
-    std::vector<double> sum(set.n_y), square(set.n_y), count(set.n_y), out;
-    for (std::size_t i = 0; i < set.samples.size(); i += set.channels())
-        for (std::size_t o = 0; o < set.n_y; ++o)
-            if (const double y = set.samples[i + set.n_u + o]; !std::isnan(y))
-                sum[o] += y, square[o] += y * y, ++count[o];
-    for (std::size_t o = 0; o < set.n_y; ++o) out.push_back(square[o] - sum[o] * sum[o] / std::max(count[o], 1.0));
     return out;
 }
 
@@ -190,11 +180,11 @@ void fit_places(const std::vector<listed_mode>& modes, const std::vector<int>& h
         one.D = arrays.D.data() + j * n_y;
         result_context context;
         fit_records(own, one, context);
-        const std::vector<double> about = spreads(own);
+        const std::vector<output_spread> about = spreads_of(own);
         for (std::size_t o = 0; o < n_y; ++o) {
             const double left = 1 - (*context.simulation_percent)[o] / 100;
-            residual[o] += left * left * about[o];
-            spread[o] += about[o];
+            residual[o] += left * left * about[o].squares;
+            spread[o] += about[o].squares;
         }
         std::size_t k = 0;
         for (std::size_t r = 0; r < hits.size(); ++r)

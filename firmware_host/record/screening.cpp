@@ -5,9 +5,10 @@
 //          beyond all neighbours
 #include "screening.hpp"
 
+#include "record_check.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <fmt/format.h>
 #include <map>
 #include <string_view>
@@ -99,8 +100,9 @@ bool moves_beside(const output_view& y, const stretch_of_equal& run, double usua
            (!any_after || spread_of(y, last, after) > moving_share * usual);
 }
 
-void find_frozen(const output_view& y, const std::vector<stretch_of_equal>& runs, double usual, double low, double high,
-                 fault& frozen, fault& zeros) {
+/// @param resting  samples at the beginning in which nothing acts: zeros there are no fault
+void find_frozen(const output_view& y, const std::vector<stretch_of_equal>& runs, std::size_t resting, double usual,
+                 double low, double high, fault& frozen, fault& zeros) {
     std::vector<std::size_t> lengths;
     for (const stretch_of_equal& run : runs) lengths.push_back(run.count);
     if (lengths.empty()) return;
@@ -111,6 +113,7 @@ void find_frozen(const output_view& y, const std::vector<stretch_of_equal>& runs
         const bool zero = run.value == 0;
         const bool extreme = run.value == low || run.value == high;
         if (extreme && run.count < frozen_run) continue; // a flat top
+        if (zero && run.first == 0 && run.count <= resting + zero_run) continue;
         if (static_cast<double>(run.count) < std::max(long_run, static_cast<double>(zero ? zero_run : frozen_run)) ||
             !moves_beside(y, run, usual))
             continue;
@@ -118,22 +121,26 @@ void find_frozen(const output_view& y, const std::vector<stretch_of_equal>& runs
     }
 }
 
-/// Samples about the pulses of forces that rest otherwise: what a sensor near the hammer answers is as short as the hit.
-std::vector<bool> struck_samples(const record_set& set, const record_data& record) {
-    std::vector<bool> out(record.count, false);
+/// Where the forces of a record act.
+struct force_times {
+    std::vector<bool> struck; ///< about a pulse, if the force rests otherwise: a sensor near it answers as briefly
+    std::size_t resting = 0;  ///< samples before the first force
+};
+
+force_times times_of_forces(const record_set& set, const record_data& record) {
+    force_times out{std::vector<bool>(record.count, false), set.n_u > 0 ? record.count : 0};
     const double* rows = set.rows(record);
+    const std::vector<double> largest = largest_of(set, record);
     for (std::size_t k = 0; k < set.n_u; ++k) {
-        double largest = 0;
         std::vector<std::size_t> pulse;
         for (std::size_t i = 0; i < record.count; ++i)
-            largest = std::fmax(largest, std::abs(rows[i * set.channels() + k]));
-        for (std::size_t i = 0; i < record.count; ++i)
-            if (std::abs(rows[i * set.channels() + k]) > struck_share * largest) pulse.push_back(i);
+            if (std::abs(rows[i * set.channels() + k]) > struck_share * largest[k]) pulse.push_back(i);
+        if (!pulse.empty()) out.resting = std::min(out.resting, pulse.front());
         if (pulse.size() * resting_share > record.count) continue;
         for (const std::size_t i : pulse)
             for (std::size_t j = i > spike_reach ? i - spike_reach : 0; j < std::min(record.count, i + spike_reach + 1);
                  ++j)
-                out[j] = true;
+                out.struck[j] = true;
     }
     return out;
 }
@@ -181,11 +188,11 @@ bool is_dead(const record_set& set, std::size_t output) {
 }
 
 /// Faults of one kind in records, the first of them named.
-std::string fault_text(const std::string& output, const std::vector<const fault*>& found) {
-    const fault& first = *found.front();
+std::string fault_text(const std::string& output, const std::vector<fault>& found) {
+    const fault& first = found.front();
     const std::string& path = first.record->path;
     std::size_t samples = 0;
-    for (const fault* one : found) samples += one->samples.size();
+    for (const fault& one : found) samples += one.samples.size();
     const std::string begin = fmt::format("output \"{}\"{}", output, path.empty() ? "" : " of " + path);
     const std::string more =
         found.size() > 1 ? fmt::format(" and {} more record{}", found.size() - 1, found.size() > 2 ? "s" : "") : "";
@@ -195,7 +202,7 @@ std::string fault_text(const std::string& output, const std::vector<const fault*
 }
 
 /// Faults of one output of one record; their samples become missing.
-std::vector<fault> screen(const output_view& y, const std::vector<bool>& struck) {
+std::vector<fault> screen(const output_view& y, const force_times& forces) {
     const std::vector<stretch_of_equal> runs = equal_stretches(y);
     if (runs.size() == 1 && y.size() >= frozen_run) { // of one of several records: is_dead() has seen the others
         for (std::size_t i = 0; i < y.size(); ++i) y.drop(i);
@@ -207,8 +214,8 @@ std::vector<fault> screen(const output_view& y, const std::vector<bool>& struck)
     fault clipped{"clipped", {}}, frozen{"frozen at one value", {}}, zeros{"dropped to zero", {}}, spikes{"spikes", {}};
     find_clipped(y, high, high - low, runs, clipped);
     find_clipped(y, low, high - low, runs, clipped);
-    find_frozen(y, runs, spread_of(y, 0, y.size()), low, high, frozen, zeros);
-    find_spikes(y, struck, spikes);
+    find_frozen(y, runs, forces.resting, spread_of(y, 0, y.size()), low, high, frozen, zeros);
+    find_spikes(y, forces.struck, spikes);
     std::vector<fault> out;
     for (fault* found : {&clipped, &frozen, &zeros, &spikes}) {
         if (found->samples.empty()) continue;
@@ -240,6 +247,8 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
     set.complete = false; // what is faulty becomes missing
     out.kept.assign(outputs.size(), true);
     std::vector<std::size_t> usable_of(outputs.size(), 0);
+    std::vector<force_times> forces;
+    for (const record_data& record : set.records) forces.push_back(times_of_forces(set, record));
     for (std::size_t k = 0; k < outputs.size(); ++k) {
         if (is_dead(set, k)) {
             out.kept[k] = false;
@@ -247,22 +256,19 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
                                   fmt::format("output \"{}\" {}", outputs[k], std::string("never moves") + lost_words));
             continue;
         }
-        std::map<std::string_view, std::vector<const fault*>> kinds;
-        std::deque<fault> faults;
+        std::map<std::string_view, std::vector<fault>> faults; // by kind
         std::size_t before = 0, after = 0;
-        for (const record_data& record : set.records) {
+        for (std::size_t r = 0; r < set.records.size(); ++r) {
+            const record_data& record = set.records[r];
             const output_view view{record, set.rows(record) + set.n_u + k, set.channels()};
             before += usable(view);
-            for (fault& found : screen(view, struck_samples(set, record))) {
-                faults.push_back(std::move(found));
-                kinds[faults.back().kind].push_back(&faults.back());
-            }
+            for (fault& found : screen(view, forces[r])) faults[found.kind].push_back(std::move(found));
             after += usable(view);
         }
         const bool lost = static_cast<double>(after) < (1 - share_lost) * static_cast<double>(before);
         if (!faults.empty() && lost) out.kept[k] = false;
         usable_of[k] = after;
-        for (const auto& [kind, found] : kinds)
+        for (const auto& [kind, found] : faults)
             out.said.emplace_back("screened", fault_text(outputs[k], found) +
                                                   (lost ? lost_words : ": left out as gaps, nothing is interpolated"));
     }

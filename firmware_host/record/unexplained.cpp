@@ -12,6 +12,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <initializer_list>
 #include <utility>
 
 namespace okid_host {
@@ -64,10 +65,13 @@ bool accounted_for(double f, double line_hz, const std::vector<listed_mode>& lis
                    const std::vector<mode_verdict>& verdicts) {
     for (std::size_t k = 0; k < listed.size(); ++k) {
         const std::vector<std::string>& why = verdicts[k].why;
-        const bool unsure = std::find(why.begin(), why.end(), "few_runs") != why.end() ||
-                            std::find(why.begin(), why.end(), "noise_shape") != why.end();
+        const auto is_any = [&](std::initializer_list<const char*> codes) {
+            return std::any_of(codes.begin(), codes.end(),
+                               [&](const char* code) { return std::find(why.begin(), why.end(), code) != why.end(); });
+        };
+        const bool known = is_any({"tone", "pickup", "harmonic"}) || !is_any({"few_runs", "noise_shape"});
         const double width = 3 * std::max(line_hz, listed[k].damping_ratio * listed[k].frequency_hz);
-        if (!unsure && std::abs(listed[k].frequency_hz - f) < width) return true;
+        if (known && std::abs(listed[k].frequency_hz - f) < width) return true;
     }
     return false;
 }

@@ -121,11 +121,9 @@ def test_sample_rates_that_disagree(rig: Path) -> None:
 
 def test_a_time_of_another_name(rig: Path) -> None:
     for name in ("Time [s]", "t (s)"):
-        text = (rig / "a.csv").read_text().splitlines()
-        rows = [f"{k / 250},{line}" for k, line in enumerate(line for line in text[1:] if not line.startswith("#"))]
-        head, *rest = rows[0].split(",", 1)[1], *(row for row in rows[1:])
-        times = [f"{k / 250}," + row.split(",", 1)[1] for k, row in enumerate(rest)]
-        (rig / "s.csv").write_text("\n".join([f"{name},{head}", *times]) + "\n")
+        head, *rows = [line for line in (rig / "a.csv").read_text().splitlines()[1:] if not line.startswith("#")]
+        timed = [f"{name},{head}", *(f"{k / 250},{row}" for k, row in enumerate(rows))]
+        (rig / "s.csv").write_text("\n".join(timed) + "\n")
         done = okid("identify", rig / "s.csv", "--inputs", "force1", "--outputs", "acc1,acc2", "--p", 12, "--order", 4)
         assert done.returncode == 0 and "at 250 Hz" in done.stdout, done.stderr
     (rig / "t.csv").write_text("Time,u,y\n" + "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99)))

@@ -20,16 +20,7 @@ BAD = {(4, 2): "double_hit", (9, 1): "overload"}
 
 def identified(folder: Path, records: dict[str, Any], *options: str) -> tuple[dict[str, Any], str]:
     paths = beam.write(folder, records)
-    done = program(
-        "identify",
-        *paths,
-        *CHANNELS,
-        *PLACES,
-        *options,
-        "--json",
-        folder / "r.json",
-        status=0,
-    )
+    done = program("identify", *paths, *CHANNELS, *PLACES, *options, "--json", folder / "r.json", status=0)
     return json.loads((folder / "r.json").read_text()), done.stdout
 
 
@@ -47,10 +38,7 @@ def some(*faults: str) -> dict[str, Any]:
     hits = [beam.Hit(place, 100.0, 0.0015) for place in (1, 2, 3)]
     out = {f"P{hit.place}_1.csv": beam.record(hit, rng, 0.002) for hit in hits}
     for k, fault in enumerate(faults):
-        peak, width = (
-            (0.2 if fault == "weak" else 100.0),
-            (0.004 if "force" in fault else 0.0015),
-        )
+        peak, width = (0.2 if fault == "weak" else 100.0), (0.004 if "force" in fault else 0.0015)
         out[f"P2_{k + 2}.csv"] = beam.record(beam.Hit(2, peak, width, fault), rng, 0.002)
     return out
 
@@ -181,12 +169,7 @@ def test_a_hammer_that_clips_in_many_hits(tmp_path: Path) -> None:
     for name in records:  # one hit in twenty-four files is one hit
         (tmp_path / name).write_bytes(first.read_bytes())
     again, _ = identified(
-        tmp_path,
-        {},
-        "--method",
-        "n4sid-cva",
-        "--keep-all",
-        *map(str, sorted(tmp_path.glob("P*.csv"))),
+        tmp_path, {}, "--method", "n4sid-cva", "--keep-all", *map(str, sorted(tmp_path.glob("P*.csv")))
     )
     assert not [hit for hit in again["hits"] if hit["reason"] == "overload"]
     assert "records_repeated" in codes(again)
@@ -211,6 +194,19 @@ def test_the_same_force_again_and_again_is_no_limit(tmp_path: Path) -> None:
     assert told.count("was the amplifier at its limit?") == len(records)
 
 
+def test_silence_before_a_simulated_hit_is_no_dropout(tmp_path: Path) -> None:
+    """Zeros to the last digit until the force begins, as a simulation has them."""
+    records = beam.hammer_test(8, {}, each=1)
+    for rows in records.values():
+        rows[: rows[:, 0].argmax() - 12] = 0
+    result, _ = identified(tmp_path, records)
+    assert "screened" not in codes(result)
+    assert len(confident(result)) == 7
+    records["P02_1.csv"][:400, 1] = 0  # a cable that has no contact until after the hit
+    result, _ = identified(tmp_path, records)
+    assert codes(result).count("screened") == 1
+
+
 def test_a_sensor_beside_the_hammer_has_no_spikes(tmp_path: Path) -> None:
     """What a light structure answers at the place of the hit is one sample long and far above what rings on."""
     records = beam.hammer_test(6, {}, each=1)
@@ -229,15 +225,8 @@ def test_a_sensor_beside_the_hammer_has_no_spikes(tmp_path: Path) -> None:
 def test_python_is_the_command(tmp_path: Path) -> None:
     records = some("double_hit")
     told, _ = identified(tmp_path, records)
-    force, motion = (
-        [r[:, :1] for r in records.values()],
-        [r[:, 1:] for r in records.values()],
-    )
-    names: dict[str, Any] = {
-        "input_names": ["Hammer"],
-        "output_names": ["Acc1", "Acc2"],
-        "hit_dofs": [1, 2, 3, 2],
-    }
+    force, motion = [r[:, :1] for r in records.values()], [r[:, 1:] for r in records.values()]
+    names: dict[str, Any] = {"input_names": ["Hammer"], "output_names": ["Acc1", "Acc2"], "hit_dofs": [1, 2, 3, 2]}
     result = okid.identify(force, motion, fs=beam.FS, **names)
     assert result.shape_dofs == told["shape_dofs"] == [1, 2, 3]
     assert [hit["reason"] for hit in result.hits] == [None, None, None, "double_hit"]

@@ -19,14 +19,7 @@ Real = NDArray[np.float64]
 FS, COUNT = 256.0, 4096
 
 
-def blows(
-    places: list[int],
-    at_places: Real,
-    at_sensors: Real,
-    f: Real,
-    z: Real,
-    noise: float = 0.005,
-) -> list[Real]:
+def blows(places: list[int], at_places: Real, at_sensors: Real, f: Real, z: Real, noise: float = 0.005) -> list[Real]:
     """A record (samples, force and sensors) a blow: four samples of force after a short silence, its free decay."""
     rng = np.random.default_rng(5)
     records = []
@@ -44,11 +37,7 @@ def blows(
 def structure() -> tuple[Real, Real, Real]:
     """Frequencies, damping and shapes at nine places."""
     rng = np.random.default_rng(8)
-    return (
-        np.array([9.0, 15.5, 24.0, 37.0, 52.0, 71.0]),
-        rng.uniform(0.004, 0.01, 6),
-        rng.standard_normal((9, 6)),
-    )
+    return np.array([9.0, 15.5, 24.0, 37.0, 52.0, 71.0]), rng.uniform(0.004, 0.01, 6), rng.standard_normal((9, 6))
 
 
 def identify(records: list[Real], **more: object) -> okid.Result:
@@ -154,55 +143,25 @@ def test_measured_blows_at_different_places() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (
-            ["--hit-dofs", "1,2"],
-            "--hit-dofs: found 2 numbers for 1 records, expected one for each",
-        ),
+        (["--hit-dofs", "1,2"], "--hit-dofs: found 2 numbers for 1 records, expected one for each"),
         (["--hit-dofs", "0"], "--hit-dofs: found 0, expected numbers from 1"),
         (["--hit-dofs", "x"], '--hit-dofs: found "x", expected a whole number'),
-        (
-            ["--hit-dofs", "1", "--input-dofs", "1", "--output-dofs", "1"],
-            "--input-dofs: --hit-dofs says where",
-        ),
+        (["--hit-dofs", "1", "--input-dofs", "1", "--output-dofs", "1"], "--input-dofs: --hit-dofs says where"),
     ],
 )
 def test_wrong_places(tmp_path: Path, options: list[str], words: str) -> None:
     np.savetxt(tmp_path / "r.csv", np.random.default_rng(1).standard_normal((3000, 2)), delimiter=",",
                header="# fs_hz: 100\nu,y", comments="")  # fmt: skip
-    done = program(
-        "identify",
-        tmp_path / "r.csv",
-        "--inputs",
-        "u",
-        "--outputs",
-        "y",
-        *options,
-        status=2,
-    )
+    done = program("identify", tmp_path / "r.csv", "--inputs", "u", "--outputs", "y", *options, status=2)
     assert words in done.stderr
 
 
 def test_short_pulses_that_are_straight_between_samples(tmp_path: Path) -> None:
     """Their spectrum falls towards half the rate, as behind a filter; taken for filtered, M was 9 % off."""
-    done = program(
-        "simulate",
-        ROOT / "examples" / "recipes" / "hits_rig.toml",
-        "--hits",
-        tmp_path / "hits",
-        "--quiet",
-    )
+    done = program("simulate", ROOT / "examples" / "recipes" / "hits_rig.toml", "--hits", tmp_path / "hits", "--quiet")
     assert done.returncode == 0, done.stderr
     files = sorted((tmp_path / "hits").glob("*.csv"))
-    where = (
-        "--inputs",
-        "hammer",
-        "--outputs",
-        "acc2,acc5",
-        "--places",
-        r"P(\d+)_",
-        "--output-dofs",
-        "2,5",
-    )
+    where = ("--inputs", "hammer", "--outputs", "acc2,acc5", "--places", r"P(\d+)_", "--output-dofs", "2,5")
     done = program("identify", *files, *where, "--json", tmp_path / "r.json")
     assert done.returncode == 0, done.stderr
     result = okid.Result.load(tmp_path / "r.json")

@@ -333,7 +333,6 @@ static void values_come_from_runs_that_are_sharp() {
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0125, find_agreement(runs).at(0).damping_ratio);
 }
 
-/// The level is the highest rate that sees it well; the scatter is that of its subspace runs about the values.
 /// Two states a mode fill three quarters of them. A mode that only half of the runs find counts, one of noise does not.
 static void runs_are_full_of_modes() {
     TEST_ASSERT_FALSE(are_full(24, 9));
@@ -343,6 +342,7 @@ static void runs_are_full_of_modes() {
     TEST_ASSERT_FALSE(are_full(0, 10)); // no limit, as of responses
 }
 
+/// The level is the highest rate that sees it well; the scatter is that of its subspace runs about the values.
 static void level_and_scatter_are_those_of_the_highest_rate() {
     auto runs = joined(rate(4, 30, 3, 1), rate(4, 30, 3, 0));
     runs[7].method = OKID_METHOD_OKID_ERA;

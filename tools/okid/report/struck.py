@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,7 +42,8 @@ def _names(hits: Sequence[dict[str, Any]]) -> list[str]:
 def files_beside(result: Loaded, folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
     """The files of the accepted hits in the first of these folders that has any, and the names of those not there."""
     names = [name for hit, name in zip(result.raw["hits"], _names(result.raw["hits"]), strict=True) if hit["accepted"]]
-    for folder in [*folders, *(inner for one in folders for inner in sorted(one.glob("*/")) if inner.is_dir())]:
+    inside = (inner for one in folders for inner in sorted(one.glob("*/")) if inner.is_dir())
+    for folder in chain(folders, inside):
         found = [folder / name for name in names if (folder / name).is_file()]
         if found and len(set(names)) == len(names):
             return found, [name for name in names if not (folder / name).is_file()]
