@@ -5,6 +5,7 @@
 #include "compare/set_ups.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "files/units.hpp"
 #include "files/whole_file.hpp"
 #include "frequency/identify_responses.hpp"
 #include "frequency/response_file.hpp"
@@ -25,11 +26,13 @@
 namespace okid_host {
 namespace {
 
+constexpr std::size_t most_proposed = 64; ///< columns in a message
+
 /// The command line as it was typed.
 struct identify_arguments {
     record_request wanted;
     std::vector<std::string> records;
-    std::string inputs, outputs, range, json, model;
+    std::string inputs, outputs, range, group, json, model;
     std::string exponential, references; ///< of frequency responses; of set-ups
     std::string places;                  ///< a regular expression on the names of the files
     bool quiet = false, all_modes = false, frf = false, set_ups = false;
@@ -37,11 +40,53 @@ struct identify_arguments {
 
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
 
+enum class column_kind { unknown, force, response };
+
+/// By its unit, else by its name.
+column_kind kind_of_column(const std::string& name) {
+    if (const unit_rule* rule = find_unit(unit_of_name(name)); rule && *rule->si)
+        return rule->si[0] == 'N' ? column_kind::force : column_kind::response;
+    const std::string small = lower_case(name);
+    for (const char* word : {"force", "hammer", "shaker", "load"})
+        if (small.find(word) != std::string::npos) return column_kind::force;
+    const std::string begin = small.substr(0, small.find_last_not_of("0123456789 _xyz+-.") + 1);
+    if (begin == "f") return column_kind::force;
+    for (const char* word : {"a", "acc", "accel", "acceleration", "v", "vel", "velocity", "disp", "displacement", "out"})
+        if (begin == word) return column_kind::response;
+    return column_kind::unknown;
+}
+
+/// A list of names as it is typed, "" without names.
+std::string typed_names(const char* option, const std::vector<std::string>& names) {
+    if (names.empty()) return "";
+    std::string list;
+    for (const std::string& name : names)
+        list += (list.empty() ? "" : ",") + (name.find(',') == std::string::npos ? name : '"' + name + '"');
+    const bool plain = list.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.,-") ==
+                       std::string::npos;
+    for (std::size_t at = 0; (at = list.find('\'', at)) != std::string::npos; at += 4) list.replace(at, 1, "'\\''");
+    return fmt::format(" {} {}", option, plain ? list : "'" + list + "'");
+}
+
+/// The options that name these columns, as far as units and names tell which are forces; "" = they do not.
+std::string proposed_columns(const std::vector<std::string>& columns) {
+    std::vector<std::string> forces, responses;
+    for (const std::string& name : columns) {
+        const column_kind kind = kind_of_column(name);
+        if (kind != column_kind::unknown) (kind == column_kind::force ? forces : responses).push_back(name);
+    }
+    if (responses.empty() || forces.size() + responses.size() > most_proposed) return "";
+    return fmt::format("; by their names perhaps{}{}", typed_names("--inputs", forces),
+                       typed_names("--outputs", responses));
+}
+
 /// The names of the columns; says which there are when none were chosen.
 void choose_columns(identify_arguments& given) {
-    if (given.outputs.empty())
-        usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}",
-                          given.records.front(), list_names(read_csv_columns(given.records.front()))));
+    if (given.outputs.empty()) {
+        const std::vector<std::string> columns = read_csv_columns(given.records.front(), given.group);
+        usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}{}",
+                          given.records.front(), list_names(columns), proposed_columns(columns)));
+    }
     if (!given.inputs.empty()) given.wanted.inputs = split_names("--inputs", given.inputs);
     given.wanted.outputs = split_names("--outputs", given.outputs);
     for (const std::string& name : given.wanted.outputs)
@@ -86,6 +131,7 @@ record_set read_records(const identify_arguments& given, const std::vector<std::
     request.columns = options.inputs;
     request.columns.insert(request.columns.end(), outputs.begin(), outputs.end());
     if (!given.wanted.fs.empty()) request.fs_hz = check_rate(given.wanted.fs);
+    request.group = given.group;
     record_set set;
     set.n_u = options.inputs.size();
     set.n_y = outputs.size();
@@ -137,7 +183,7 @@ std::vector<set_up> read_each_set_up(const identify_arguments& given, record_opt
     std::vector<set_up> out;
     std::vector<std::string> left = options.outputs, units(options.inputs.size() + options.outputs.size());
     for (const std::string& path : given.records) {
-        const std::vector<std::string> columns = read_csv_columns(path);
+        const std::vector<std::string> columns = read_csv_columns(path, given.group);
         set_up one;
         for (const std::string& name : options.outputs)
             if (has_column(columns, name)) {
@@ -159,7 +205,7 @@ std::vector<set_up> read_each_set_up(const identify_arguments& given, record_opt
     }
     if (!left.empty())
         usage(fmt::format("--outputs: no file has {}; {} has: {}", list_names(left), given.records.front(),
-                          list_names(read_csv_columns(given.records.front()))));
+                          list_names(read_csv_columns(given.records.front(), given.group))));
     take_record_units(units, options);
     return out;
 }
@@ -168,6 +214,7 @@ record_result identify_files_of_responses(const identify_arguments& given) {
     response_request asked{given.wanted, given.exponential, given.all_modes};
     if (!given.range.empty()) usage("--range is an option of records, found with --frf");
     if (!given.places.empty()) usage("--places is an option of records, found with --frf");
+    if (!given.group.empty()) usage("--group is an option of records, found with --frf");
     if (given.set_ups) usage("--setups is an option of records: several files with --frf are always set-ups");
     if (!given.inputs.empty()) asked.wanted.inputs = split_names("--inputs", given.inputs);
     if (!given.outputs.empty()) asked.wanted.outputs = split_names("--outputs", given.outputs);
@@ -223,7 +270,10 @@ void identify(const identify_arguments& given) {
 void add_identify(CLI::App& app) {
     auto given = std::make_shared<identify_arguments>();
     CLI::App* command = app.add_subcommand("identify", "Identify modes and a model from measured CSV records");
-    command->add_option("records", given->records, "CSV records of one structure, merged exactly")
+    command
+        ->add_option("records", given->records,
+                     "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4, "
+                     ".tdms, .h5, .parquet, .wav, .flac, .mcap, .lvm)")
         ->required()
         ->type_name("RECORD.csv");
     command->add_option("--inputs", given->inputs, "force columns, with commas between; none = ambient: modes only")
@@ -340,6 +390,10 @@ void add_identify(CLI::App& app) {
         ->type_name("NAMES");
     command->add_option("--range", given->range, "only samples a up to b (from 0, b not included) of each record")
         ->type_name("A:B");
+    command
+        ->add_option("--group", given->group,
+                     "part of a file that holds several rasters (.mf4, .tdms, .uff ...): its error message lists them")
+        ->type_name("G");
     command->add_option("--json", given->json, "write okid.result/1 to this file, - is stdout")->type_name("FILE.json");
     command->add_option("--model", given->model, "write A, B, C, D, K, dt as a MAT file for scipy")
         ->type_name("FILE.mat");

@@ -167,10 +167,12 @@ def _parser() -> argparse.ArgumentParser:
         "while a run goes on, to .mcap; *.ros2.mcap is for ROS 2. "
         "Logs: .log (candump -L), .asc, .blf, .trc, .db, .mf4, .can.csv.",
         epilog="examples: okid-convert run.mf4 run.csv --channels force,a1,a2; "
-        "okid-convert result.json modes.uff --geometry frame.toml; okid-convert trace.blf trace.log",
+        "okid-convert result.json modes.uff --geometry frame.toml; okid-convert trace.blf trace.log; "
+        "okid-convert hits/*.mat tables/",
     )
-    parser.add_argument("source", metavar="IN", help="file to read, or socket of a run")
-    parser.add_argument("target", metavar="OUT", help="file to write, whole or not at all")
+    parser.add_argument("sources", metavar="IN", nargs="+", help="file to read, or socket of a run")
+    parser.add_argument("target", metavar="OUT", help="file to write, whole or not at all; a folder: each IN in it")
+    parser.add_argument("--to", metavar="EXT", help="of the files in a folder OUT: csv (default), mat, h5, log ...")
     parser.add_argument("--fs", type=float, metavar="HZ", help="sample rate, overrides that of the file")
     parser.add_argument("--channels", metavar="a,b", help="only these channels, in this order")
     parser.add_argument(
@@ -186,8 +188,27 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _run(args: argparse.Namespace) -> str:
-    source, target = Path(args.source), Path(args.target)
+def _pairs(args: argparse.Namespace) -> list[tuple[Path, Path]]:
+    """What is read and what is written; no two files of a folder may end under one name."""
+    target, sources = Path(args.target), [Path(one) for one in args.sources]
+    if not target.is_dir() and not args.target.endswith("/"):
+        if len(sources) > 1:
+            raise InputError(f"{target}: found {len(sources)} files for one OUT, expected a folder, as tables/")
+        if args.to is not None:
+            raise InputError(f"--to {args.to} is for a folder OUT, {target} says itself what it is")
+        return [(sources[0], target)]
+    ending = "." + (args.to or "csv").lstrip(".")
+    pairs = [(one, target / f"{one.stem}{ending}") for one in sources]
+    first: dict[Path, Path] = {}
+    for source, out in pairs:
+        if out in first:
+            raise InputError(f"{out}: {first[out]} and {source} would both be written there")
+        first[out] = source
+    target.mkdir(exist_ok=True)
+    return pairs
+
+
+def _run(args: argparse.Namespace, source: Path, target: Path) -> str:
     if not source.exists():
         raise InputError(f"{source}: No such file or directory")
     given, wanted = _kind(source, True), _kind(target, False)
@@ -196,7 +217,7 @@ def _run(args: argparse.Namespace) -> str:
         raise InputError("--geometry is for an identified model written as .uff or .unv")
     if target.exists() and target.samefile(source):
         raise InputError(f"{target}: IN and OUT are the same file: name another OUT")
-    if target.exists() and (target.is_dir() or not args.force):
+    if target.is_dir() or (target.exists() and not args.force):
         remedy = "" if target.is_dir() else ": give --force to replace it"
         raise InputError(f"{target}: is there already{remedy}")
     if given == "frames" and not args.config:
@@ -213,14 +234,15 @@ def convert(arguments: Sequence[str] | None = None) -> int:
     """The command with its arguments (None = those of the process); exit code 0, 2 or 130 (interrupted)."""
     args = _parser().parse_args(arguments)
     try:
-        print(_run(args))
+        for source, target in _pairs(args):
+            print(_run(args, source, target))
     except Error as fault:
         print(f"okid-convert: {fault}", file=sys.stderr)
         return EXIT_USAGE
     except OSError as fault:
-        print(f"okid-convert: {fault.filename or args.source}: {fault.strerror or fault}", file=sys.stderr)
+        print(f"okid-convert: {fault.filename or args.target}: {fault.strerror or fault}", file=sys.stderr)
         return EXIT_USAGE
     except KeyboardInterrupt:
-        print("okid-convert: interrupted, nothing was written", file=sys.stderr)
+        print("okid-convert: interrupted, the file in work was not written", file=sys.stderr)
         return EXIT_INTERRUPTED
     return EXIT_DONE

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: MIT
+"""`okid identify` on files of other programs: the same answer as from the CSV that okid-convert makes of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+from okid.data.records import Record
+from okid.formats import write_csv, write_record
+from okid.formats.command import main
+from program import PROGRAM, okid
+from sample_records import NAMES, shaken_frame
+
+CHOSEN = ("--inputs", NAMES[0], "--outputs", ",".join(NAMES[1:]))
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Temporary files of the program, in a folder that can be looked into."""
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    return tmp_path
+
+
+def frame() -> Record:
+    u, y = shaken_frame()
+    return Record(list(NAMES), np.hstack([u, y]), 1000.0, ["N", "m/s^2", "m/s^2", "m/s^2"])
+
+
+def time_history(node: int, quantity: int, name: str, data: np.ndarray) -> str:
+    """Data set 58 as its definition has it: function type 1, double precision, even spacing of 1 ms, ASCII."""
+    rows = [data[at : at + 4] for at in range(0, len(data), 4)]
+    lines = [
+        "    -1", "    58", name, "NONE", "22-NOV-26 12:00:00", "NONE", "NONE",
+        f"    1         0    0         0 {name:<10}{node:>10}   1 NONE               0   0",
+        f"         4{len(data):>10}         1  0.00000E+00  1.00000E-03  0.00000E+00",
+        f"        17    0    0    0 {'Time':<20} {'s':<20}",
+        f"{quantity:>10}    0    0    0 {name:<20} {'NONE':<20}",
+        *[f"{0:>10}    0    0    0 {'NONE':<20} {'NONE':<20}"] * 2,
+        *("".join(f"{value:20.12e}" for value in row) for row in rows), "    -1",
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def modes_of(path: Path, *more: str) -> object:
+    result = json.loads(okid("identify", path, *more, "--json", "-", status=0).stdout)
+    return result["modes"]
+
+
+@pytest.mark.parametrize("ending", ["mat", "h5", "mf4", "parquet", "uff"])
+def test_the_same_modes(folder: Path, ending: str) -> None:
+    path = folder / f"frame.{ending}"
+    write_csv(folder / "frame.csv", frame())
+    write_record(path, frame())
+    assert modes_of(path, *CHOSEN) == modes_of(folder / "frame.csv", *CHOSEN)
+    assert list((folder / "temporary").iterdir()) == []
+
+
+def test_files_that_no_writer_of_ours_made(folder: Path) -> None:
+    u, y = shaken_frame()
+    scipy.io.savemat(folder / "lab.mat", {"Fs": 1000.0, "hammer": u[:, 0], "acc": y})
+    columns = zip((13, 12, 12, 12), ("hammer", "acc1", "acc2", "acc3"), np.hstack([u, y]).T, strict=True)
+    sets = [time_history(node, quantity, name, data) for node, (quantity, name, data) in enumerate(columns, 1)]
+    (folder / "lab.uff").write_text("".join(sets))
+    for name in ("lab.mat", "lab.uff"):
+        said = okid("identify", folder / name, status=2).stderr
+        proposed = re.search(r"; by their names perhaps --inputs (\S+) --outputs (\S+)$", said.strip())
+        assert proposed, said
+        modes = modes_of(folder / name, "--inputs", proposed[1], "--outputs", proposed[2])
+        assert isinstance(modes, list) and len([one for one in modes if one["confident"]]) == 3, name
+
+
+def test_columns_are_proposed_as_they_are_typed(folder: Path) -> None:
+    record = frame()
+    record.names = ["Hammer, left [N]", "Acc 1 [m/s^2]", "b's", "a3"]
+    write_csv(folder / "logger.csv", record)
+    said = okid("identify", folder / "logger.csv", status=2).stderr.strip()
+    assert said.endswith(
+        """; by their names perhaps --inputs '"Hammer, left [N]"' --outputs 'Acc 1 [m/s^2],b'\\''s [m/s^2],a3 [m/s^2]'"""
+    ), said
+    command = f"{PROGRAM} identify {folder}/logger.csv {said.split('perhaps ')[1]} --json - --quiet"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0 and json.loads(done.stdout)["inputs"] == ["Hammer, left [N]"], done.stderr
+    np.save(folder / "plain.npy", record.samples)
+    assert okid("identify", folder / "plain.npy", status=2).stderr.strip().endswith("plain.npy has: c1, c2, c3, c4")
+
+
+def test_what_cannot_be_read_is_said_of_the_file(folder: Path) -> None:
+    (folder / "torn.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
+    said = okid("identify", folder / "torn.mat", *CHOSEN, status=2).stderr
+    assert said.startswith(f"okid: {folder}/torn.mat: ") and len(said.splitlines()) == 1, said
+    record = frame()
+    record.fs_hz = None
+    write_record(folder / "no_rate.mat", record)
+    said = okid("identify", folder / "no_rate.mat", *CHOSEN, status=2).stderr
+    assert said.startswith(f"okid: {folder}/no_rate.mat: no sample rate") and "samples.csv" not in said, said
+    assert okid("identify", folder / "no_rate.mat", *CHOSEN, "--fs", "1000", status=0)
+    said = okid("identify", folder / "missing.mat", *CHOSEN, status=2).stderr
+    assert said == f"okid: {folder}/missing.mat: No such file or directory\n"
+    assert list((folder / "temporary").iterdir()) == []
+
+
+def test_a_name_is_no_option(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_record(folder / "--force.mat", frame())
+    monkeypatch.chdir(folder)
+    done = subprocess.run(
+        [PROGRAM, "identify", *CHOSEN, "--json", "-", "--", "--force.mat"], capture_output=True, text=True, timeout=600
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_without_the_python_package(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_record(folder / "frame.mat", frame())
+    (folder / "bare").mkdir()
+    shutil.copy(PROGRAM, folder / "bare" / "okid")
+    (folder / "okid-convert").write_text("#!/bin/sh\ntouch ran\n")  # the folder one works in is not PATH
+    (folder / "okid-convert").chmod(0o755)
+    monkeypatch.chdir(folder)
+    done = subprocess.run(
+        [folder / "bare" / "okid", "identify", "frame.mat", *CHOSEN],
+        capture_output=True, text=True, timeout=600,
+        env={**os.environ, "PATH": ".:" + os.defpath.removeprefix(":")},
+    )  # fmt: skip
+    assert done.returncode == 2 and not (folder / "ran").exists()
+    assert done.stderr == (
+        "okid: frame.mat: okid-convert, which reads this format, is neither beside okid nor in PATH: pip install okid\n"
+    )
+
+
+def test_many_files_into_a_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("a", "b"):
+        write_record(folder / f"{name}.mat", frame())
+    many = [str(folder / "a.mat"), str(folder / "b.mat")]
+    assert main([*many, f"{folder}/tables/"]) == 0
+    assert sorted(path.name for path in (folder / "tables").iterdir()) == ["a.csv", "b.csv"]
+    assert main([*many, f"{folder}/tables/", "--to", "h5"]) == 0
+    assert (folder / "tables" / "b.h5").exists()
+    capsys.readouterr()
+    for arguments, reason in (
+        ([*many, f"{folder}/tables/"], f"{folder}/tables/a.csv: is there already: give --force to replace it"),
+        ([*many, f"{folder}/one.csv"], f"{folder}/one.csv: found 2 files for one OUT, expected a folder, as tables/"),
+        ([many[0], many[0], f"{folder}/two/"], f"{folder}/two/a.csv: {many[0]} and {many[0]} would both be written there"),
+        ([many[0], f"{folder}/one.csv", "--to", "h5"], "--to h5 is for a folder OUT"),
+    ):
+        assert main(arguments) == 2
+        assert reason in capsys.readouterr().err
+    assert not (folder / "two").exists()
