@@ -47,15 +47,18 @@ EXTRAS = {
 INTRODUCTION = """\
 # Dependencies
 
-What okid is built from, runs with and is tested with. None of it is part of this repository. Versions and licences are those of the machine where
-the release was tested, read off its packages by `tools/sbom.py`. That also writes a bill of materials (CycloneDX 1.5) into `build/sbom.cdx.json`.
+What okid is built from, runs with and is tested with. None of it is part of this repository. Versions and licences
+are those of the machine where the release was tested, read off its packages by `tools/sbom.py`. That also writes a
+bill of materials (CycloneDX 1.5) into `build/sbom.cdx.json`.
 
-How a package is used: `make …` and `packaging/release` stand for tests and checks only, `import okid` for what the Python package and its commands
-load. `okid[…]` is an extra, loaded when it is asked for. `a|b`: the first the distribution has. Licences stand as the packages name them.
+How a package is used: `make …` and `packaging/release` stand for tests and checks only, `import okid` for what the
+Python package and its commands load. `okid[…]` is an extra, loaded when it is asked for. `a|b`: the first the
+distribution has. Licences stand as the packages name them.
 
-The headers of Eigen, fmt, nlohmann-json, toml++ and CLI11 are compiled into the wheel. It links the run-time libraries of C and C++ only (that of
-`packaging/release` the one of C, with LLVM's libc++ inside). Both toml++ (MIT) and CLI11 (BSD-3-Clause) come from libtomlplusplus-dev and
-libcli11-dev, or from the source distributions of pytomlpp 1.1.0 and highspy 1.15.1."""
+The headers of Eigen, fmt, nlohmann-json, toml++ and CLI11 are compiled into the wheel. It links the run-time
+libraries of C and C++ only (that of `packaging/release` the one of C, with LLVM's libc++ inside). Both toml++ (MIT)
+and CLI11 (BSD-3-Clause) come from libtomlplusplus-dev and libcli11-dev, or from the source distributions of pytomlpp
+1.1.0 and highspy 1.15.1."""
 
 
 class Missing(Exception):

@@ -152,7 +152,7 @@ static void close_block(drv_clock_fit_t* self) {
     fit(self);
 }
 
-/// Everything but the rate begins anew at this pair.
+/// Everything but the rate starts again at this pair.
 static void begin(drv_clock_fit_t* self, int64_t device, int64_t host_ns) {
     double sigma = self->points > 1 ? sqrt(self->variance[2]) : self->rate_prior_sigma;
     if (self->points > 1) {

@@ -99,15 +99,15 @@ bool grid::in_two_steps(const lane& l) const {
     return std::abs(most - l.least - 1) < one_step;
 }
 
-/// The last quarter is less late than all before it, or the quarters are less and less late behind a stall: whoever was held
-/// up is making up for it.
+/// The last quarter is less late than all before it, or the quarters are ever less late behind a stall: a sender that was
+/// held up is making up for it.
 bool grid::catches_up(const lane& l) const {
     const std::array<double, 4> least = least_late(l);
     const bool less_and_less = least[3] < least[2] - catching_up && least[2] < least[1] - catching_up;
     return less_and_less || least[3] < std::min({least[0], least[1], least[2]}) - catching_up;
 }
 
-/// Less and less late, or later and later burst by burst, by more than a line loses: whoever sends is held up, or makes up for
+/// Less and less late, or later and later burst by burst, by more than a line loses: one is held up, or makes up for
 /// it. A loss is one step, however long, and hardly ever do losses stand before each of many bursts.
 bool grid::on_the_move(const lane& l) const {
     const std::array<double, 4> least = least_late(l);
@@ -254,7 +254,7 @@ bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
            std::abs(later) > full_later;
 }
 
-/// The bus told of a loss no later than before this frame.
+/// The bus reported a loss no later than before this frame.
 bool grid::told_of_loss(const lane& l, std::size_t last) const {
     return std::any_of(l.late.begin() + static_cast<std::ptrdiff_t>(l.placed),
                        l.late.begin() + static_cast<std::ptrdiff_t>(last) + 1,

@@ -86,7 +86,7 @@ struct identification_config {
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
     int sigma_blocks = 20;                         ///< blocks left out for the standard deviations; 0 = none
-    bool analytic = true;                          ///< to first order where the method has a derivative, else anew
+    bool analytic = true;                          ///< by the method's derivative, where it has one
     bool restart_on_change = true; ///< window and forgetting: samples from before a change of the structure are dropped
     bool mkr = false;              ///< M, K and R with the final result
     double max_memory_mb = 8192;   ///< of the identification
@@ -159,7 +159,7 @@ struct broker_address {
     net_address at;
     std::string user, password, prefix = "okid";
     std::string password_file; ///< read_password() finds it
-    bool discovery = false;    ///< Home Assistant is told what there is
+    bool discovery = false;    ///< announce the modes to Home Assistant
 };
 
 /// Where lines for InfluxDB go: a file, else by HTTP with a path, else by UDP.

@@ -61,7 +61,7 @@ struct consensus_mode {
     double resolved_hz = 0;                               ///< what stands closer to it, no three runs can tell from it
     std::vector<std::complex<double>> shape;
     std::vector<std::pair<int, int>> members; ///< run, track
-    std::vector<std::string> why;             ///< what speaks against it; empty: confident
+    std::vector<std::string> why;             ///< codes of why it is doubtful; empty: confident
     bool confident() const { return why.empty(); }
 };
 

@@ -33,7 +33,7 @@ class identifier {
     void reset();                         ///< forget all samples
 
     /// The sums as bytes (okid_accumulator_serialise()): any release reads them. Of a stream that refines its correlation sums
-    /// stand before them. Throws `failure` (exit 2) when no model has told yet how many lags these need.
+    /// stand before them. Throws `failure` (exit 2) when no model has shown yet how many lags these need.
     std::vector<std::byte> state();
     /// Go on where state() stood. Throws `failure` (exit 2) for bytes of another shape.
     void restore(const void* state, std::size_t bytes);

@@ -121,7 +121,7 @@ class session : public stream_target, private grid_sink {
     std::int64_t stats_told_ = 0;
     std::uint64_t updates_made_ = 0, updates_skipped_ = 0, updates_given_up_ = 0;
     relief relief_;
-    std::array<bool, relief::steps> overloaded_{}; ///< told, by step
+    std::array<bool, relief::steps> overloaded_{}; ///< reported, by step
     bool started_ = false, settled_ = false, alarm_ = false, due_ = false, remarked_ = false;
     update_thread updates_; ///< the last: it ends before what it works on
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  how much memory an identification takes, told before a byte is taken
+// PURPOSE  how much memory an identification needs, computed before any is taken
 // METHOD   the sizes the library tells for each object, added up; nothing depends on how much memory the machine has or how
 //          much of it is free, so that a config means the same on every machine
 #pragma once

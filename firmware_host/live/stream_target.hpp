@@ -36,7 +36,7 @@ class stream_target {
     virtual void frame(const drv_frame_t& frame) = 0;
     virtual void set_losses(std::size_t bus, const device_losses& losses) = 0;
     virtual void set_health(std::size_t bus, const bus_health& health) = 0;
-    /// Something happened on a bus; told once the stream has begun.
+    /// Something happened on a bus; reported once the stream has begun.
     virtual void bus_event(std::size_t bus, const char* kind, const std::string& text) = 0;
     /// Something happened to the recording.
     virtual void record_event(const std::string& kind, const std::string& text) = 0;
@@ -47,7 +47,7 @@ class stream_target {
     virtual lamp_state lamps() const = 0;
     virtual bool done() const = 0;
     virtual bool heard() const = 0;    ///< the stream has begun
-    virtual stream_check& check() = 0; ///< what speaks against the configuration
+    virtual stream_check& check() = 0; ///< what contradicts the configuration
     /// Every device is open; and, from then on at least every second: the thread that reads is at work. For a service manager.
     virtual void ready() {}
     /// @param caught_up  no frame waits that could be worked on

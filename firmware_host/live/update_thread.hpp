@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Mathematics beside the stream: rows of the grid and the places of the updates go into a queue, a thread sums and identifies
-// in the order of the stream, reports come back. Whoever reads, records, grids and publishes never waits for it.
+// in the order of the stream, reports come back. Threads that read, record, grid and publish never wait for it.
 //
 // An update that newer ones have caught up with is left out; one that the result depends on never (stream::obliged()). So
 // the sums, and with them the result, are those of the stream, however late the thread is. Rows wait as long as one update

@@ -17,7 +17,7 @@ class http_page {
   public:
     static constexpr std::size_t most = 16, most_request = 4096;
 
-    /// @param what  how messages name it; @param text  the page, made anew for each request
+    /// @param what  how messages name it; @param text  the page, made for each request
     /// Throws `failure` (exit 4) when the address cannot be listened on.
     http_page(const std::string& what, const net_address& at, std::string path, const char* type,
               std::function<std::string()> text);

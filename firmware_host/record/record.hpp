@@ -31,7 +31,7 @@ struct record_options {
     remarks said;   ///< known before the data are seen
     bool stabilization = false;                     ///< look at all orders and some horizons too
     int sigma_blocks = 20;                          ///< blocks left out in turn for the standard deviations; 0 = none
-    bool analytic = true;                           ///< to first order where the method has a derivative, else anew
+    bool analytic = true;                           ///< by the method's derivative, where it has one
     std::optional<std::pair<double, double>> band;  ///< Hz, of the modes wanted (auto)
     int decimate = 1;                               ///< auto looks at no higher rate than a so many-th
     int threads = 0;                                ///< of auto, at a time; 0: all processors
@@ -41,9 +41,9 @@ struct record_options {
     std::vector<int> sensing;                       ///< okid_sensing_t of each output; empty: all are accelerations
     bool judge_hits = false, keep_all_hits = false; ///< are bad hits sought; are they used nevertheless
     std::string hit_unit;                           ///< of their force
-    mass_plan placed;      ///< of hits: the places struck and those of the sensors, when these are told
-    std::vector<int> hits; ///< where each record was struck, from 1 (-3: at 3, reversed); empty: not told
-    std::function<void(const char* stage)> stage; ///< told what begins; may be empty
+    mass_plan placed;      ///< of hits: the places struck and those of the sensors, when these are given
+    std::vector<int> hits; ///< where each record was struck, from 1 (-3: at 3, reversed); empty: not given
+    std::function<void(const char* stage)> stage; ///< called with what begins; may be empty
 };
 
 /// Of auto: the model that carries a mode, as its rate sees it; what it says when the record has grown is where the mode is then.

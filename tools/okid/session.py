@@ -242,7 +242,7 @@ class Session:
     def to_bytes(self) -> bytes:
         """The sums, for a file or another machine: what okid.Accumulator.to_bytes() gives, behind rate and channels and
         with a check sum over all; of method auto the samples. Without the blocks for ±.
-        With `refine` the correlation sums too; InputError while no model has told how far these look back."""
+        With `refine` the correlation sums too; InputError while no model has shown how far these look back."""
         return self._stream.state()
 
     def restore(self, state: bytes) -> None:
