@@ -301,7 +301,7 @@ void grid::slip(lane& l, std::int64_t by) {
 }
 
 /// `lost` samples are missing no later than before the first frame that is about as early as any. Where the bus had a
-/// loss and the arrivals do not speak against it, they are missing there; else at a silence that is longer than that before
+/// loss and the arrivals do not contradict it, they are missing there; else at a silence that is longer than that before
 /// the oldest that waits; else before that one, and how much later they may be missing goes along.
 void grid::place_after_loss(lane& l, std::int64_t lost) {
     const std::size_t first = l.placed;
