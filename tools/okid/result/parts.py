@@ -122,7 +122,7 @@ class Fit(NamedTuple):
 
 
 class Warning(NamedTuple):
-    """A reason to doubt a valid result, or has to be known of it."""
+    """A reason to doubt a valid result, or a fact that its reader must know."""
 
     code: str
     text: str
