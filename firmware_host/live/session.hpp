@@ -24,7 +24,7 @@
 
 namespace okid_host {
 
-/// Looks on beside the files and terminals: every sample and gap of the grid, every event as a line.
+/// An observer beside files and terminals: gets every sample and gap of the grid, every event as a line.
 class session_listener : public grid_sink {
   public:
     virtual void on_event(const std::string& line) = 0;
@@ -65,7 +65,8 @@ class session : public stream_target, private grid_sink {
     void ready() override;
     void alive(bool caught_up) override;
 
-    /// Final stats, then result and table. Throws `failure` (exit 3) when no model can be had: then there is no result.
+    /// Final stats, then result and table. Throws `failure` (exit 3) when no model is possible: then there is no
+    /// result.
     void finish() override;
 
   private:

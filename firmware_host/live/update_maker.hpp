@@ -39,7 +39,7 @@ class update_maker {
         if (change_test_) change_test_->add_missing(count);
     }
 
-    /// How pressing it is to be done with an update.
+    /// How urgent it is to finish an update.
     struct haste {
         std::int64_t ahead = 0; ///< samples that wait behind it, up to the newest update
         bool hurry = false;     ///< only what is obliged

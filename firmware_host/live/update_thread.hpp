@@ -33,11 +33,11 @@ class update_thread {
     void add(const double* row);
     void add_missing(std::int64_t count); ///< 0: another record begins
     void update(std::int64_t samples);
-    void hurry(bool on); ///< the machine is too slow, or nobody looks: only what the result depends on
+    void hurry(bool on); ///< too slow, or no output shows updates: only what the result depends on
 
     /// What was found since the last call. Throws what the sums threw.
     std::vector<update_report> take();
-    /// Be done with all that waits. The sums are the caller's from then on. Throws as take().
+    /// Finish all that waits. The sums are the caller's from then on. Throws as take().
     std::vector<update_report> finish();
 
   private:
