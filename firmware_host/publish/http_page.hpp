@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One page over HTTP/1.1, for those who come and ask: GET and HEAD, one answer a connection. On the thread of the publisher;
+// One page over HTTP/1.1, for any client: GET and HEAD, one answer a connection. On the thread of the publisher;
 // a peer that is slow, silent or hostile costs 4 KiB for five seconds.
 #pragma once
 #include "config/config.hpp"
@@ -26,7 +26,7 @@ class http_page {
     http_page& operator=(const http_page&) = delete;
 
     void add_polls(std::vector<pollfd>& polls) const;
-    /// Whatever can be done now.
+    /// Does what can be done now, without waiting.
     void serve();
 
   private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Lines to a file or to stdout by a thread of their own: a disk, pipe or terminal that blocks holds up nobody else.
+// Lines to a file or to stdout by a thread of their own: a disk, pipe or terminal that blocks holds up no other output.
 #pragma once
 #include <condition_variable>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The modal table for people: redrawn in place on a terminal, one line an update elsewhere.
+// The modal table as text: redrawn in place on a terminal, one line an update elsewhere.
 #pragma once
 #include <cmath>
 #include <cstddef>
