@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""docs/howto/compare-two-tests.md: its Python runs. docs/reference/check-and-bench.md has every key of the comparison."""
+"""docs/howto/compare-two-tests.md: its Python runs. docs/reference/check-and-bench.md has each key of a comparison."""
 
 from __future__ import annotations
 
