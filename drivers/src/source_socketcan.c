@@ -37,7 +37,7 @@ static const int64_t look_ns = 1000000000; // how old the controller's counters 
 typedef struct socketcan_t {
     int fd;
     int poll_fd;       ///< epoll set of fd and watch_fd
-    int watch_fd;      ///< tells of changes of interfaces, -1 = netlink cannot be had
+    int watch_fd;      ///< reports changes of interfaces, -1 = no netlink
     int gone;          ///< the interface vanished: bind again when it is back
     int behind;        ///< the link was lost behind frames that still wait in the socket: its error comes before them
     int bound;         ///< index of the interface the socket is bound to
@@ -119,7 +119,7 @@ static int find_interface(drv_source_t* self, socketcan_t* state) {
 static int look_at_interface(int fd, const char* name, drv_link_t* out) {
     const int code = drv_link_read(name, out);
     if (code == 0 || code == -ENODEV) return code;
-    struct ifreq request; // netlink cannot be had
+    struct ifreq request; // no netlink
     memset(&request, 0, sizeof request);
     memcpy(request.ifr_name, name, strlen(name));
     if (ioctl(fd, SIOCGIFHWADDR, &request) != 0) return -errno;

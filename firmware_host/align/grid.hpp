@@ -45,7 +45,7 @@ class grid_sink {
     virtual void on_gap(const grid_gap& gap) = 0;
 };
 
-/// For so long a silent lane is waited for: an adapter, a sender or this computer may be late by so much, and nothing is
+/// A silent lane is waited for this long: an adapter, a sender or this computer may be late by as much, and nothing is
 /// lost. Less at high rates with many channels, for which there is no memory (most_rows_bytes).
 constexpr double silence_patience_s = 6;
 constexpr double most_rows_bytes = 64e6;

@@ -118,7 +118,7 @@ struct hammer_config {
     bool enabled = false;
     std::size_t channel = 0; ///< the force, index in live_config::channels
     double level = 0;        ///< in its unit; negative: a hit is negative
-    int hits = 5;            ///< good ones wanted, at every point
+    int hits = 5;            ///< accepted hits wanted, at every point
     std::vector<int> points; ///< places struck one after the other (-3: at 3, reversed); empty: one that is not named
     double length_s = 2;     ///< of a hit's ring-down
     double pretrigger_s = 0; ///< at least; as long as the lags in any case
@@ -126,13 +126,13 @@ struct hammer_config {
     double spectrum_hz = 0;     ///< the force must reach so far
 
     int total() const { return hits * std::max(1, static_cast<int>(points.size())); }
-    int point_of(int hit) const { return points[static_cast<std::size_t>(hit / hits)]; } ///< of a good one, from 0
+    int point_of(int hit) const { return points[static_cast<std::size_t>(hit / hits)]; } ///< of an accepted hit, from 0
 };
 
 /// Lines that are active while …
 struct lamps_config {
     std::optional<gpio_place> armed; ///< … the trigger is waited for; without a trigger while okid runs
-    std::optional<gpio_place> go;    ///< … the modal table has come to rest
+    std::optional<gpio_place> go;    ///< … the modal table has settled
     std::optional<gpio_place> alarm; ///< … an alarm stands
 };
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  tell lines from modes
-// METHOD   the amplitude along the mode's shape at its frequency, block by block: that of a vibration driven by chance wanders
-//          (its spread is half its mean), that of a line stays. A record silent before its force has no line louder than that
-//          silence. A multiple of a stronger vibration moves in phase with the power
-//          of that vibration (Kim & Powers 1979, in the time domain). A line of the force, a harmonic of a drive say, is in the
-//          responses too: where the force has a narrow peak and the responses over the force have none, there is no mode
+// METHOD   the amplitude along the mode's shape at its frequency, block by block: that of a randomly driven vibration
+//          scatters (its spread is half its mean), that of a line stays. A record silent before its force has no line
+//          louder than that silence. A multiple of a stronger vibration moves in phase with the power of that vibration
+//          (Kim & Powers 1979, in the time domain). A line of the force, a harmonic of a drive say, is in the responses
+//          too: where the force has a narrow peak and the responses over the force have none, there is no mode
 #include "lines.hpp"
 
 #include "spectrum.hpp"

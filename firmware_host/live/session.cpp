@@ -220,7 +220,7 @@ void session::begin(std::int64_t until) {
     });
 }
 
-/// A hit was judged: a good one goes in as a record of its own.
+/// A hit was judged: an accepted one goes in as a record of its own.
 void session::strike() {
     const hit_report& hit = hammer_.report();
     ordered_json event{

@@ -15,7 +15,8 @@ class line_writer {
   public:
     /// @param what   how messages name it, such as "--events run.jsonl"
     /// @param path   a file, created or emptied (by a service: gone on with); "-" = stdout
-    /// @param patient  true: put() waits while the queue is full, and every line arrives; false: the oldest line gives way,
+    /// @param patient  true: put() waits while the queue is full, and every line arrives; false: the oldest line is
+    /// dropped,
     ///                 and so does one that cannot be written (the next one is tried again); a line
     ///                 {"type":"lost","count":n} stands in the place of those that did
     /// Throws `failure` (exit 2) when it cannot be opened.

@@ -59,6 +59,9 @@ DIALECT = {  # in comments and docstrings; pattern -> what to write
     r"\bmend(?:s|ed)?\b": "fix",
     r"\bno one's business\b|\bis nobody's\b": "undefined, discarded",
     r"\bwho they are\b": "keep their identity",
+    r"\b(?:to be|cannot be|can be) had\b": "possible, available",
+    r"\bhonest\b": "reliable",
+    r"\bcomes? to rest\b": "settles",
     r"\bspeaks? against\b": "why it is doubtful, contradicts",
 }
 ACRONYMS = {  # spelled out where a newcomer meets them first, on the pages they begin with

@@ -86,7 +86,7 @@ def identify(
     (one a channel, inputs first). Every degree of freedom needs a force or a sensor, one needs both.
 
     `refine` True ("yes"): improve the model by maximum likelihood, with noise at the sensors to the Cramér-Rao bound
-    (result.refinement; a warning refine_failed when nothing was to be had). Needs u. Of a named method with degrees of
+    (result.refinement; a warning refine_failed when it was rejected). Needs u. Of a named method with degrees of
     freedom also the delay of every output (result.skew), which is taken out of M, K and R. "auto", the default of
     method "auto": where the residuals are nearly white and all modes keep their identity. "no" (False): not.
 
@@ -102,7 +102,7 @@ def identify(
     own, and shapes cover the places (result.shape_dofs), with `output_dofs` those of the sensors too. Bad hits (a
     double hit, an overload ..) are left out: result.hits; `keep_all` uses them. M, K, R where each place has a mode.
 
-    Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
+    Raises InputError (a wrong argument) or IdentificationError (no reliable model from these data).
 
     >>> import okid
     >>> force, acceleration = okid.demo_record()
