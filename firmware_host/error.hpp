@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a command may end with: one clear message and the exit code of docs (0 done, 1 a change where one was asked for,
-// 2 usage/input, 3 no honest model, 4 device, 130 interrupted).
+// 2 usage/input, 3 no reliable model, 4 device, 130 interrupted).
 #pragma once
 #include "files/shown_text.hpp"
 

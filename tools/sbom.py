@@ -47,13 +47,18 @@ EXTRAS = {
 INTRODUCTION = """\
 # Dependencies
 
-What okid is built from, runs with and is tested with; none of it is part of this repository. Versions and licences are
-those of the machine where the release was tested, read off its packages by `tools/sbom.py`, which also writes this list
-together with what the packages bring along as CycloneDX 1.5 into `build/sbom.cdx.json`. The wheel holds the
-libraries and the program with the headers of Eigen, fmt, nlohmann-json, toml++ and CLI11 compiled in and links the
-run-time libraries of C and C++ only (that of `packaging/release` the one of C, with LLVM's libc++ inside); toml++ (MIT)
-and CLI11 (BSD-3-Clause) are taken from libtomlplusplus-dev and libcli11-dev, or from the source distributions of
-pytomlpp 1.1.0 and highspy 1.15.1. `a|b`: the first the distribution has. Licences stand as the packages name them."""
+What okid is built from, runs with and is tested with. None of it is part of this repository. Versions and licences
+are those of the machine where the release was tested, read off its packages by `tools/sbom.py`. That also writes a
+bill of materials (CycloneDX 1.5) into `build/sbom.cdx.json`.
+
+How a package is used: `make …` and `packaging/release` stand for tests and checks only, `import okid` for what the
+Python package and its commands load. `okid[…]` is an extra, loaded when it is asked for. `a|b`: the first the
+distribution has. Licences stand as the packages name them.
+
+The headers of Eigen, fmt, nlohmann-json, toml++ and CLI11 are compiled into the wheel. It links the run-time
+libraries of C and C++ only (that of `packaging/release` the one of C, with LLVM's libc++ inside). Both toml++ (MIT)
+and CLI11 (BSD-3-Clause) come from libtomlplusplus-dev and libcli11-dev, or from the source distributions of pytomlpp
+1.1.0 and highspy 1.15.1."""
 
 
 class Missing(Exception):
@@ -290,6 +295,13 @@ def fetched() -> list[Part]:
     ]
 
 
+def shown(part: Part) -> tuple[str, ...]:
+    """The cells of a row; the introduction says what the short forms of `use` stand for."""
+    use = re.sub(r"^tests and checks only: |^loaded when asked for: |^loaded by | and its commands$", "", part.use)
+    purpose = re.sub(r"\.( .*)?$", "", part.purpose)  # the first sentence
+    return part.name, part.version, part.licence, purpose, use
+
+
 def table(parts: list[Part]) -> str:
     titles = {"deb": "Debian packages", "pypi": "Python packages", "generic": "Sources that tests fetch"}
     lines = [INTRODUCTION]
@@ -303,8 +315,7 @@ def table(parts: list[Part]) -> str:
         ]
         for part in parts:
             if part.system == system:
-                cells = (part.name, part.version, part.licence, part.purpose, part.use)
-                lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+                lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in shown(part)) + " |")
     return "\n".join(lines) + "\n"
 
 

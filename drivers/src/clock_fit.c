@@ -21,7 +21,7 @@ static const double edge = 1.0 / 64;       // the low quantile
 static const double abrupt = 0.5;          // jitters: what the first guess of the edge counts against the blocks
 static const double huber = 2.0;           // in scatters
 static const double longest_stall_s = 6.0; // a sender may be late by so much, …
-static const double stall_lasts_s = 1.0;   // … but not by the same for so long
+static const double stall_lasts_s = 1.0;   // … but not by the same for this long
 static const double rate_wander = 2e-6;    // by which a rate may have moved across a step
 
 int drv_clock_fit_init(drv_clock_fit_t* self, const drv_clock_config_t* config) {
@@ -152,7 +152,7 @@ static void close_block(drv_clock_fit_t* self) {
     fit(self);
 }
 
-/// Everything but the rate begins anew at this pair.
+/// Everything but the rate starts again at this pair.
 static void begin(drv_clock_fit_t* self, int64_t device, int64_t host_ns) {
     double sigma = self->points > 1 ? sqrt(self->variance[2]) : self->rate_prior_sigma;
     if (self->points > 1) {
@@ -187,7 +187,7 @@ static void gather(drv_clock_fit_t* self, int64_t device, double device_s, doubl
         close_block(self);
 }
 
-/// A pair far off: with the stamp counted on from the last good one, does it agree with those before it?
+/// A pair far off: with the stamp counted on from the last valid pair, does it agree with those before it?
 static drv_clock_verdict_t suspect(drv_clock_fit_t* self, uint64_t stamp, int64_t host_ns, double gate) {
     int64_t about = self->suspects ? self->suspect_device : self->last_device;
     int64_t device = unwrap(self, stamp, about);

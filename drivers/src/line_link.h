@@ -27,7 +27,7 @@ typedef struct line_link_t {
 int line_link_open(line_link_t* self, drv_source_t* source, const drv_line_config_t* config);
 
 /// What has arrived. A line that hung up is closed; it is tried again at most ten times a second.
-/// @param torn  out: 1 = what came before is never finished: the line is closed, or was opened anew just now
+/// @param torn  out: 1 = what came before is never finished: the line is closed, or was just opened again
 /// @return bytes, 0 = none now
 int line_link_read(line_link_t* self, drv_source_t* source, uint8_t* bytes, size_t capacity, int* torn);
 

@@ -2,8 +2,8 @@
 // PURPOSE  ring of frames from one thread to another; a writer that never waits
 // METHOD   two free-running counters. A full ring: the writer moves the reader's counter on before it writes over a
 //          slot. The reader copies, then claims what it copied by compare-and-swap on that counter: it fails when the
-//          writer was there meanwhile, and the copy is made anew. Slots are words, stored with release and loaded with
-//          acquire: whoever has seen a new word sees the counter that was moved before it
+//          writer was there meanwhile, and the copy is made again. Slots are words, stored with release and loaded with
+//          acquire: a reader that sees a new word sees the counter that was moved before it
 #include <drv/ring.h>
 
 #include <stdatomic.h>

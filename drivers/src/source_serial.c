@@ -28,7 +28,7 @@ typedef struct serial_t {
     int open_packet;
     unsigned reads;
     uint16_t kind;           ///< first field of the packets that count the samples of a line without any time
-    uint64_t passed, before; ///< samples of that kind so far; before the packet at hand
+    uint64_t passed, before; ///< samples so far; before the packet at hand
     // the device's clock, unwrapped
     int timed;
     uint64_t device_ns, device_wrapped_ns;

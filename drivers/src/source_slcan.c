@@ -75,7 +75,7 @@ static int slcan_fd(const drv_source_t* self) {
     return state ? state->link.port.fd : -1;
 }
 
-/// Milliseconds of a minute to a running time; whole minutes of silence are told by the host's clock.
+/// Milliseconds of a minute to a running time; whole minutes of silence are seen by the host's clock.
 static int64_t unwrap_stamp(slcan_t* state, int stamp_ms) {
     if (!state->stamped) {
         state->device_ms = stamp_ms + 1; // 0 means no stamp

@@ -37,8 +37,8 @@ static const int64_t look_ns = 1000000000; // how old the controller's counters 
 typedef struct socketcan_t {
     int fd;
     int poll_fd;       ///< epoll set of fd and watch_fd
-    int watch_fd;      ///< tells of changes of interfaces, -1 = netlink cannot be had
-    int gone;          ///< the interface vanished: bind anew when it is back
+    int watch_fd;      ///< reports changes of interfaces, -1 = no netlink
+    int gone;          ///< the interface vanished: bind again when it is back
     int behind;        ///< the link was lost behind frames that still wait in the socket: its error comes before them
     int bound;         ///< index of the interface the socket is bound to
     uint32_t counted;  ///< the kernel's drop counter of this socket, as far as it stands in the counts
@@ -119,7 +119,7 @@ static int find_interface(drv_source_t* self, socketcan_t* state) {
 static int look_at_interface(int fd, const char* name, drv_link_t* out) {
     const int code = drv_link_read(name, out);
     if (code == 0 || code == -ENODEV) return code;
-    struct ifreq request; // netlink cannot be had
+    struct ifreq request; // no netlink
     memset(&request, 0, sizeof request);
     memcpy(request.ifr_name, name, strlen(name));
     if (ioctl(fd, SIOCGIFHWADDR, &request) != 0) return -errno;
@@ -210,7 +210,7 @@ static void count_driver_losses(drv_source_t* self, socketcan_t* state) {
 /// Take in what the driver tells of the controller. Its overruns come as error messages too: the larger count holds.
 static void take_link(drv_source_t* self, socketcan_t* state, const drv_link_t* link) {
     drv_stats_t* counts = &self->counts;
-    if (link->index == state->link.index) { // a device made anew counts from 0
+    if (link->index == state->link.index) { // a device that was made again counts from 0
         uint64_t dropped = link->rx_dropped - state->link.rx_dropped,
                  overran = link->rx_over_errors - state->link.rx_over_errors;
         if (link->rx_dropped >= state->link.rx_dropped) state->driver_dropped += dropped;
@@ -321,7 +321,7 @@ static void link_lost(drv_source_t* self, socketcan_t* state, int gone, int behi
     }
 }
 
-/// Bind anew when the interface is there again. @return 1 when it is
+/// Bind again when the interface is back. @return 1 when it is
 static int try_again(drv_source_t* self, socketcan_t* state) {
     int up = 0;
     if (find_interface(self, state) != 0) return 0;

@@ -13,7 +13,7 @@ struct bus_event {
     const char* kind; ///< link_down, link_up, bus_off, restarted, error_passive, driver_loss, socket_overflow, no_ack,
                       ///< no_packets, refused
     std::string text; ///< a sentence without the name of the interface
-    bool urgent;      ///< to be told to the person in front of the screen
+    bool urgent;      ///< to be shown on the terminal at once
 };
 
 class bus_watch {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Is a CAN interface as a measurement needs it? What is wrong, and the command that mends it.
+// Is a CAN interface as a measurement needs it? What is wrong, and the command that fixes it.
 #pragma once
 #include "config/config.hpp"
 
@@ -12,7 +12,7 @@ namespace okid_host {
 
 struct link_finding {
     std::string found;
-    std::string remedy;   ///< a command; "" = nothing to mend
+    std::string remedy;   ///< a command; "" = nothing to fix
     bool missing = false; ///< it stands in the way; else worth knowing
 };
 

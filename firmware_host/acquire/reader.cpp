@@ -29,7 +29,7 @@ constexpr auto busy = std::chrono::milliseconds(2), rest = std::chrono::millisec
 constexpr auto publish_every = std::chrono::milliseconds(20);
 constexpr int batches_between_looks = 64;
 
-/// Another number whenever something happened to the bus that is to be told at once.
+/// Another number whenever something happened to the bus that is to be reported at once.
 std::uint64_t happenings(const drv_stats_t& counts) {
     return 2 * (counts.bus_off + counts.restarts + counts.error_passive + counts.link_down + counts.reopened) +
            static_cast<std::uint64_t>(counts.link_is_down);

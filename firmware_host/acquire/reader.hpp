@@ -22,7 +22,7 @@ class bus_reader {
   public:
     /// Opens the interface or the serial line. Throws `failure` (exit 4) that says what is there and what to do.
     /// @param bus  number given to every frame; @param wake  signalled when frames wait
-    /// @param mark  how far the bus was read, for whoever merges; ended when the thread has
+    /// @param mark  how far the bus was read, for the merge; ended when the thread has
     bus_reader(const live_config& config, std::size_t bus, wake_event& wake, watermark& mark);
     ~bus_reader();
     bus_reader(const bus_reader&) = delete;

@@ -50,7 +50,7 @@ sync_report sync_sender::report() const {
     return report_;
 }
 
-/// One frame; an interface that was made anew is opened anew.
+/// One frame; an interface that was made again is opened again.
 bool sync_sender::send(const drv_frame_t& frame, int patience_ms) {
     int code = sink_.fd < 0 ? -ENXIO : drv_sink_write(&sink_, &frame, patience_ms);
     if (code == -ENXIO || code == -ENODEV) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Many threads tell one that something waits for it. Only the first of them writes; the others see that it was told.
+// Many threads signal to one that something waits for it. Only the first of them writes; the others see that it did.
 #pragma once
 #include <array>
 #include <atomic>

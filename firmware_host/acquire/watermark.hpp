@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How far a bus was read: no frame with an older stamp is still to come. Its reader writes it, whoever merges buses asks.
+// How far a bus was read: no frame with an older stamp is still to come. Its reader writes it, the merge asks.
 //
 // A read that leaves the queue empty has brought all that was stamped before it began. While the reader sleeps for want of
 // anything to read, a look at the queue by the asker moves the mark on, so a bus that is silent, down or gone holds

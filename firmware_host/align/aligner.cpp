@@ -93,7 +93,7 @@ void aligner::on_gap(const grid_gap& gap) {
         sink_.on_gap(gap);
 }
 
-/// To whoever comes next: the filter of the decimation, or the session.
+/// To the next stage: the filter of the decimation, or the session.
 void aligner::hand_on(std::int64_t index, const double* row, std::int64_t count) {
     grid_sink& to = decimator_ ? static_cast<grid_sink&>(*decimator_) : sink_;
     if (row)
@@ -104,7 +104,7 @@ void aligner::hand_on(std::int64_t index, const double* row, std::int64_t count)
 
 /// A sample of the reference waits for the nodes.
 void aligner::take(std::int64_t index, const double* row, std::int64_t stamp) {
-    while (index - next_ > wait_) // nobody is waited for longer
+    while (index - next_ > wait_) // after this time no node is waited for
         if (!begin() || !emit(true)) ++next_;
     double* to = &waiting_[slot(index) * counted_.size()];
     if (row)
@@ -115,7 +115,7 @@ void aligner::take(std::int64_t index, const double* row, std::int64_t stamp) {
     taken_ = index + 1;
 }
 
-/// The output begins when all clocks are known. Samples before that are nobody's.
+/// The output begins when all clocks are known. Samples before that are discarded.
 bool aligner::begin() {
     if (origin_ >= 0) return true;
     if (!clock_.settled()) return false;

@@ -18,7 +18,7 @@ class decimator : public grid_sink, private cause_source {
     void on_missing(std::int64_t index, std::int64_t count) override;
     void on_gap(const grid_gap& gap) override { causes_.add(gap); }
 
-    /// Gaps that are open are told; samples whose filter reaches beyond the end are left off.
+    /// Gaps that are open are reported; samples whose filter reaches beyond the end are left off.
     void finish() { gaps_.finish(*this, to_); }
     void set_limit(std::int64_t count) { limit_ = count; }
     std::int64_t emitted() const { return gaps_.rows(); }

@@ -15,7 +15,7 @@ constexpr double off_ppm = 20000;             // cheap sensors run 1 % off their
 constexpr double good_enough = 0.02;          // of a sample
 constexpr double patience_s = 10;
 constexpr double smooth_s = 2; // the place follows the fit in this time
-constexpr double jump = 0.25;  // of a sample: further off than this, the place is set anew
+constexpr double jump = 0.25;  // of a sample: further off than this, the place is set again
 
 } // namespace
 
@@ -30,7 +30,7 @@ void sample_clock::add(std::int64_t index, std::int64_t time_ns) {
     last_index_ = index;
     const drv_clock_verdict_t verdict =
         drv_clock_fit_add(&fit_, static_cast<std::uint64_t>(index * ticks_a_sample), time_ns);
-    if (verdict == DRV_CLOCK_HOST_STEP || verdict == DRV_CLOCK_RESTART) first_ns_ = time_ns; // it is learnt anew
+    if (verdict == DRV_CLOCK_HOST_STEP || verdict == DRV_CLOCK_RESTART) first_ns_ = time_ns; // it is learnt again
 }
 
 bool sample_clock::settled() const {
@@ -79,7 +79,7 @@ void free_node::on_missing(std::int64_t index, std::int64_t count) {
     for (std::int64_t i = first; i < known_; ++i) std::fill_n(&rows_[slot(i) * width_], width_, missing_sample);
 }
 
-/// Move on by one wanted sample. @return false: the place had to be set anew, signals are torn here
+/// Move on by one wanted sample. @return false: the place had to be set again, signals are torn here
 bool free_node::follow(std::int64_t time_ns, double period_s) {
     const double target = clock_.index_at(time_ns, &sigma_s_);
     const double before = place_ + period_s / clock_.period_s(), error = target - before;

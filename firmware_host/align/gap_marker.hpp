@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Runs of missing samples in rows that go out, told as gaps; and how many samples each channel has.
+// Runs of missing samples in rows that go out, reported as gaps; and how many samples each channel has.
 #pragma once
 #include "grid.hpp"
 
@@ -20,7 +20,7 @@ class gap_marker {
   public:
     explicit gap_marker(std::size_t channels) : first_(channels, -1), received_(channels, 0) {}
 
-    /// The next row, before it goes out: gaps that end here are told.
+    /// The next row, before it goes out: gaps that end here are reported.
     void row(const double* numbers, const cause_source& causes, grid_sink& sink) {
         for (std::size_t c = 0; c < first_.size(); ++c) {
             const bool missing = std::isnan(numbers[c]);
@@ -36,7 +36,7 @@ class gap_marker {
             if (first < 0) first = rows_;
         rows_ += count;
     }
-    /// The stream ends: gaps that are open are told.
+    /// The stream ends: gaps that are open are reported.
     void finish(const cause_source& causes, grid_sink& sink) {
         for (std::size_t c = 0; c < first_.size(); ++c) close(c, causes, sink);
     }

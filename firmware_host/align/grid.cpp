@@ -24,7 +24,7 @@ std::int64_t power_of_two(std::int64_t least) {
     return value;
 }
 
-constexpr double decision_s = 0.7;          // a frame that is late waits for so long before a loss is believed
+constexpr double decision_s = 0.7;          // a late frame waits this long before a loss is believed
 constexpr std::int64_t most_late = 400000;  // frames of all lanes that may wait behind a stall
 constexpr std::int64_t least_decision = 32; // and for so many periods
 

@@ -7,7 +7,7 @@
 // is unrelated, or that has none, is placed by the line of its earliest arrivals. The grid begins with the first sample
 // for which every lane has been heard, so a stream may be joined in the middle. A sample goes out when it is complete, or
 // when the newest nine frames of every lane that lacks it lie beyond it, or when the others are silence_patience_s ahead of
-// a lane that is silent: then that lane is gone, and nobody waits for it until it is heard again.
+// a lane that is silent: then that lane is gone, and the others do not wait for it until it is heard again.
 #pragma once
 #include "config/config.hpp"
 
@@ -45,7 +45,7 @@ class grid_sink {
     virtual void on_gap(const grid_gap& gap) = 0;
 };
 
-/// For so long a silent lane is waited for: an adapter, a sender or this computer may be late by so much, and nothing is
+/// A silent lane is waited for this long: an adapter, a sender or this computer may be late by as much, and nothing is
 /// lost. Less at high rates with many channels, for which there is no memory (most_rows_bytes).
 constexpr double silence_patience_s = 6;
 constexpr double most_rows_bytes = 64e6;
@@ -130,7 +130,7 @@ class grid {
         std::uint64_t counter = 0; ///< as last received
         std::int64_t last = 0;     ///< unwrapped place of the newest frame
         std::int64_t time_ns = 0;  ///< its stamp
-        std::uint8_t loss = 0;     ///< DRV_LOSS_… told by the bus since
+        std::uint8_t loss = 0;     ///< DRV_LOSS_… reported by the bus since
         // A counter far off is believed when a second frame agrees.
         bool suspected = false;
         std::int64_t suspect_age = 0; ///< frames that came in their places since

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  lanes whose frames have no counter: the next frame is the next sample, unless the stamps prove a loss
-// METHOD   an arrival is never early and may be late by anything: a burst, a sender or a reader that stalls and catches up.
-//          The line of least delays (drv_clock_fit, from the last frame of each burst) says when a frame was due. A frame
-//          that is late waits. If one behind it comes in time, the count is right and nothing was lost; if all that come
-//          within the decision time are later by a sample and more than those of the decision time before, and do not
-//          catch up, as many samples are missing as the least late of them is later by. Neither stamps nor data ever
-//          change the order of frames
+// METHOD   an arrival is never early and may be late by any amount: a burst, a sender or a reader that stalls and
+//          catches up. The line of least delays (drv_clock_fit, from the last frame of each burst) says when a frame
+//          was due. A late frame waits. If one behind it comes in time, the count is right and nothing was lost. If
+//          all frames within the decision time are at least a sample later than those of the decision time before,
+//          and do not catch up, samples are missing: as many as the least late frame is later by. The order of frames
+//          never changes
 #include "grid.hpp"
 
 #include "grid_bounds.hpp"
@@ -21,7 +21,7 @@ constexpr double least_early = 0.25;     // periods by which arrivals are taken 
 constexpr double remembers = 0.999;      // a frame, of how early the earliest was
 constexpr double longest_beat_s = 1;     // a lane that pauses longer has stalled
 constexpr double clock_set_ns = -1e9;    // so early is nothing but a clock that was set
-constexpr double told_periods = 20;      // a frame later than this tells nothing of the line
+constexpr double told_periods = 20;      // a frame later than this shows nothing of the line
 constexpr double rate_ppm = 300;         // by which a sensor may miss its nominal rate
 constexpr double same_burst = 0.5;       // periods between two frames that were handed over together
 constexpr double one_beat = 0.7;         // a silence of a period, give or take so much, held no loss
@@ -37,7 +37,7 @@ constexpr std::int64_t flicker_ends = 8; // frames: a flicker lasts until the sl
 constexpr double one_poll = 0.2;         // periods between two samples of one poll, at most
 constexpr double go_on = 0.25;           // of the pairs before the shift are as many behind it, at least
 constexpr double early_by_one = 0.35;    // periods by which arrivals that are a period early may differ
-constexpr double no_chance = 9.2;        // once in ten thousand times so by chance
+constexpr double no_chance = 9.2;        // -log of a chance of one in ten thousand
 constexpr double pairs_remembered = 1.0 / 65536; // a burst forgets so much of how often two came together
 constexpr double silent = 0.4;             // of the time a silent lane has: then its last burst is taken for cut off
 constexpr double most_known = 256;         // bursts that tell how late they are
@@ -68,7 +68,7 @@ void grid::begin_cadence(lane& l, double due_ns) {
     l.late.reserve(most_held_ + 1);
 }
 
-/// By how many periods a frame is late when `before` more stand between it and the newest one placed.
+/// Lateness of a frame in periods, when `before` more stand between it and the newest frame placed.
 double grid::lateness(const lane& l, const drv_frame_t& frame, std::size_t before) const {
     return (static_cast<double>(frame.time_ns) - l.phase_ns) / l.beat_ns - 1 - static_cast<double>(before);
 }
@@ -95,26 +95,26 @@ void grid::place_by_cadence(lane& l, const drv_frame_t& frame) {
     settle(l, held.time_ns, false);
 }
 
-/// Lanes whose frames have waited for long enough by another lane's time.
+/// Lanes whose frames have waited long enough, by the time of another lane.
 void grid::settle_overdue(std::int64_t now_ns) {
     if (late_lanes_ == 0) return;
     for (lane& l : lanes_)
         if (l.heard && !l.late.empty()) settle(l, now_ns, false);
 }
 
-/// Was this one of those that wait handed over together with the one before it?
+/// Was this waiting frame handed over together with the one before it?
 bool grid::together(const lane& l, std::size_t which) const {
     return static_cast<double>(l.late[which].time_ns - l.late[which - 1].time_ns) <= same_burst * period_ns_;
 }
 
-/// The last of those that wait that was handed over together with this one.
+/// The last waiting frame that was handed over together with this one.
 std::size_t grid::burst_end(const lane& l, std::size_t of) const {
     while (of + 1 < l.late.size() && together(l, of + 1)) ++of;
     return of;
 }
 
-/// How late the frames are that came since: up to the first one that is on time. Of a burst whose end
-/// is lost nobody knows how late it is: what follows tells.
+/// Lateness of the frames that came since, up to the first one on time. A burst whose end is lost has no known
+/// lateness: the frames behind it show it.
 void grid::look_at_late(lane& l) {
     for (; l.seen < l.late.size() && (l.seen == l.placed || l.least > l.on_time); ++l.seen) {
         const double late = lateness(l, l.late[l.seen], l.seen - l.placed);
@@ -126,7 +126,7 @@ void grid::look_at_late(lane& l) {
     }
 }
 
-/// So many frames that wait follow each other without a loss.
+/// The next `count` waiting frames follow each other without a loss.
 void grid::place_late(lane& l, std::size_t count) {
     for (const std::size_t end = l.placed + count; l.placed < end; ++l.placed) {
         beat(l, l.late[l.placed], 1);
@@ -135,7 +135,7 @@ void grid::place_late(lane& l, std::size_t count) {
     l.patience = static_cast<double>(hold_);
 }
 
-/// Place those that need not wait any longer.
+/// Place the frames that need not wait any longer.
 void grid::settle(lane& l, std::int64_t now_ns, bool all) {
     if (l.late.empty()) return;
     const double since = static_cast<double>(now_ns - l.late.back().time_ns) / period_ns_;
@@ -158,7 +158,7 @@ void grid::settle(lane& l, std::int64_t now_ns, bool all) {
     late_lanes_ -= l.late.empty();
 }
 
-/// All frames that wait are late.
+/// All waiting frames are late.
 void grid::judge_late(lane& l, bool ended) {
     const double waited = static_cast<double>(l.late.back().heard_ns - l.late[l.placed].heard_ns) / period_ns_;
     std::int64_t times = 0;
@@ -173,7 +173,7 @@ void grid::judge_late(lane& l, bool ended) {
         place_late(l, 1 + waiting / 4); // more than can wait came in less than the decision time: a stall made up for
 }
 
-/// They are late for long enough: it was they that were late, or polls slipped, or samples are missing, or more must come.
+/// They have been late long enough. Decide: only late, polls slipped, samples missing, or wait for more.
 void grid::judge_shift(lane& l, bool alike, std::int64_t times, double waited, bool ended) {
     const std::size_t first = l.which - l.placed + 1;
     const double look_again = waited + looks_again * static_cast<double>(hold_);
@@ -232,7 +232,7 @@ void grid::judge_shift(lane& l, bool alike, std::int64_t times, double waited, b
     place_late(l, first);
 }
 
-/// Before one that waits, periods.
+/// The silence before a waiting frame, periods.
 double grid::silence_before(const lane& l, std::size_t which) const {
     const std::int64_t before_ns = which > l.placed ? l.late[which - 1].time_ns : l.time_ns;
     return static_cast<double>(l.late[which].time_ns - before_ns) / period_ns_;
@@ -244,8 +244,8 @@ bool grid::on_raster(double silence) { return std::abs(silence - 1) < raster || 
 /// The burst at hand: two of one poll.
 bool grid::is_pair(const lane& l) { return l.in_burst == 2 && l.inside < one_poll && on_raster(l.silence); }
 
-/// A burst has ended. One sample a poll, and now two of them between polls on their raster: one poll was too early for its
-/// sample. If many such come and the polls have not slipped when they end, that is due to a loss meanwhile.
+/// A burst has ended. There is one sample a poll, and now two between polls on their raster: one poll was too early for
+/// its sample. If many such pairs come and the polls have not slipped when they end, there was a loss meanwhile.
 void grid::note_pair(lane& l, double silence_behind) {
     l.singles += 1 - pairs_remembered * l.singles;
     l.pairs -= pairs_remembered * l.pairs;
@@ -261,7 +261,7 @@ void grid::note_pair(lane& l, double silence_behind) {
     l.slips_before = l.slips;
 }
 
-/// Up to the newest frame placed there are more pairs than by chance.
+/// Up to the newest frame placed there were more pairs than chance gives.
 /// @param pairs  1 if the burst at hand is one that is not counted yet;  behind: how many a frame there are behind it
 bool grid::pairs_gather(const lane& l, double pairs, double behind) const {
     const double known = l.pairs + pairs;
@@ -280,9 +280,9 @@ bool grid::pairs_gather(const lane& l, double pairs, double behind) const {
     }
 }
 
-/// A sensor whose samples come ever later against the polls of an adapter is missed by a poll now and then, and ever more
-/// often, before every poll misses it: until then pairs of samples come, many more than usual. Before a loss there are none,
-/// and behind a loss they go on.
+/// A sensor that drifts against the polls of an adapter is missed by a poll now and then, and ever more often, until
+/// every poll misses it. Until then pairs of samples come, many more than usual. Before a loss there are none, and
+/// behind a loss they go on.
 bool grid::flickered(const lane& l) const {
     if (2 * l.frames >= 3 * l.bursts || told_of_loss(l, l.which)) return false;
     double behind = 0;
@@ -291,7 +291,7 @@ bool grid::flickered(const lane& l) const {
     return pairs_gather(l, is_pair(l), behind / static_cast<double>(l.late.size() - l.placed));
 }
 
-/// The line stays, the samples on it are others.
+/// The line stays; the samples on it move by `by` places.
 void grid::slip(lane& l, std::int64_t by) {
     l.slips += by;
     l.tail -= by;
@@ -300,9 +300,9 @@ void grid::slip(lane& l, std::int64_t by) {
     l.slip_at = by > 0 ? l.last : never;
 }
 
-/// `lost` samples are missing no later than before the first frame that is about as early as any. Where the bus told of a
-/// loss and the arrivals do not speak against it, they are missing there; else at a silence that is longer than that before
-/// the oldest that waits; else before that one, and how much later they may be missing goes along.
+/// `lost` samples are missing, at the latest before the first frame that is about as early as any. They are placed
+/// where the bus reported a loss and the arrivals allow it; else at a silence longer than that before the oldest
+/// waiting frame; else before that frame, together with how much later they may be missing.
 void grid::place_after_loss(lane& l, std::int64_t lost) {
     const std::size_t first = l.placed;
     const auto silence = [&](std::size_t i) { return silence_before(l, i); };
@@ -318,7 +318,7 @@ void grid::place_after_loss(lane& l, std::int64_t lost) {
         place = i;
     }
     place_late(l, place - first);
-    if (l.last - l.slip_at <= slip_apart) { // that was none
+    if (l.last - l.slip_at <= slip_apart) { // that was no slip but a loss
         ++lost;
         slip(l, -1);
     }
@@ -357,16 +357,16 @@ void grid::end_burst(lane& l, std::int64_t index) {
     l.in_burst = 0;
 }
 
-/// Bursts end anywhere between two samples. Where all of them end alike, nobody knows where: it is the part of a period
-/// that was never seen between the earliest and the latest end, uniform.
+/// Bursts end anywhere between two samples. Where all of them end alike, that place is not known: its deviation is that
+/// of a uniform law over the part of a period that was never seen between the earliest and the latest end.
 double grid::place_std_s(const lane& l) const {
     const bool alone = std::all_of(lanes_.begin(), lanes_.end(), [&](const lane& o) { return o.bus == l.bus; });
     if (alone || l.sequence || 2 * l.frames < 3 * l.bursts || l.bursts < 8) return 0;
     return std::max(0.0, 1 - l.early - l.spread) * 1e-9 * period_ns_ / std::sqrt(12.0);
 }
 
-/// Only the last frame of a burst tells the line. An arrival is never early: where arrivals are quantised (USB polls) their
-/// least delay goes slowly to and fro, and the earliest of late tell where it is now, and how far it goes.
+/// Only the last frame of a burst shows the line. An arrival is never early. Where arrivals are quantised (USB polls)
+/// their least delay drifts slowly to and fro; the earliest recent ones show where it is now, and how far it goes.
 void grid::follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, double late_ns) {
     const double silence = static_cast<double>(frame.time_ns - l.tail_ns) / period_ns_;
     if (silence > same_burst) {

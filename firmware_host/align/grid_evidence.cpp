@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  lanes whose frames have no counter: what the frames that wait tell of losses, slips of polls and busy computers
-// METHOD   how late each burst is, beside the line and beside those before: a loss makes all that follow later by the same, a
-//          computer that is busy makes them late by what changes, a poll that slips flickers before
+// PURPOSE  lanes whose frames have no counter: do the waiting frames show a loss, a slip of polls, or a busy computer?
+// METHOD   compare how late each burst is with the line, and with the bursts before. A loss makes all later frames
+//          late by the same; a busy computer makes them late by changing amounts; polls flicker before they slip
 #include "grid.hpp"
 
 #include "grid_bounds.hpp"
@@ -14,10 +14,10 @@
 namespace okid_host {
 namespace {
 
-constexpr double about_one = 1.1; // periods: less than a loss makes all later frames late by
+constexpr double about_one = 1.1; // periods: late by about one sample
 constexpr std::size_t least_floors = 16, few_floors = 8;
-constexpr double stands_out = 6;          // deviations
-constexpr double now_and_then = 1.0 / 16; // of the eighths
+constexpr double stands_out = 6;          // standard deviations
+constexpr double now_and_then = 1.0 / 16; // share of the eighths of a decision time
 constexpr double catching_up = 0.5;       // periods by which the newest frames are earlier than those before
 constexpr double most_lost = 0.125;       // of the samples of a quarter of those that wait
 constexpr std::int64_t many_steps = 8;    // bursts, each later than the one before
@@ -26,14 +26,14 @@ constexpr double full_later = 0.5;        // periods by which a full burst is la
 constexpr double one_step = 0.3;          // periods by which a sample and the step of lateness may differ
 constexpr double alike_late = 0.3;        // periods
 constexpr double least_spread = 0.15;     // periods
-constexpr double sure = 13.8;             // once in a million times so by chance
-constexpr double apart = 0.25;            // shares of two scatters that are alike
-constexpr double slack = 0.2;             // periods, between them
+constexpr double sure = 13.8;             // -log of a chance of one in a million
+constexpr double apart = 0.25;            // largest difference of shares between scatters that are alike
+constexpr double slack = 0.2;             // periods that two scatters may differ by
 
 } // namespace
 
-/// All are later than what came in time before, and that is no chance, for many of so few ever were; and the newest are
-/// steady: how late a busy computer is changes all the time, a sample that is missing does not come back.
+/// Are all waiting frames late by more than chance explains, given how few bursts were so late before, and are the
+/// newest steady? The lateness of a busy computer changes all the time; a missing sample does not come back.
 /// @param more   periods by which they are later;  times: how often something was handed over
 bool grid::shift_stays(const lane& l, double more, std::int64_t times, bool ended) const {
     const double known = l.known + 1;
@@ -53,7 +53,7 @@ bool grid::shift_stays(const lane& l, double more, std::int64_t times, bool ende
     return steady(l, begin, l.late.size(), ended);
 }
 
-/// Is how late these bursts are, each beside the least late that follow it, no more scattered than before?
+/// Is the lateness of these bursts, each beside the least late one behind it, no more scattered than before?
 bool grid::steady(const lane& l, std::size_t begin, std::size_t end, bool ended) const {
     std::array<double, edges.size()> below{};
     double count = 0, least = HUGE_VAL;
@@ -70,15 +70,15 @@ bool grid::steady(const lane& l, std::size_t begin, std::size_t end, bool ended)
     return true;
 }
 
-/// The oldest that wait are late by about a sample, and soon everything is later still: they were late, and what is missing
-/// is missing behind them.
+/// The oldest waiting frames are late by about a sample, and soon all are later still: the oldest were only late, and
+/// the loss is behind them.
 bool grid::only_late(const lane& l, bool ended) const {
     const std::int64_t begin_ns = l.late[l.placed].heard_ns, end_ns = l.late.back().heard_ns;
     const bool soon = ended || l.late[l.which].heard_ns < begin_ns + (end_ns - begin_ns) / 2;
     return soon && l.least < std::min(l.spread + least_spread, about_one);
 }
 
-/// How late those that wait are at least, in each quarter of their time.
+/// The least lateness of the waiting frames, in each quarter of their time.
 std::array<double, 4> grid::least_late(const lane& l) const {
     const std::int64_t begin_ns = l.late[l.placed].heard_ns, span_ns = l.late.back().heard_ns - begin_ns;
     std::array<double, 4> least{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL}; // of each quarter
@@ -91,7 +91,8 @@ std::array<double, 4> grid::least_late(const lane& l) const {
     return least;
 }
 
-/// One sample less late than at first: polls slipped past one among those that wait, and of the loss one may be hidden.
+/// The frames are one sample less late than at first: polls slipped past a sample meanwhile, which may hide one of the
+/// loss.
 bool grid::in_two_steps(const lane& l) const {
     const std::array<double, 4> least = least_late(l);
     double most = l.least;
@@ -99,16 +100,16 @@ bool grid::in_two_steps(const lane& l) const {
     return std::abs(most - l.least - 1) < one_step;
 }
 
-/// The last quarter is less late than all before it, or the quarters are less and less late behind a stall: whoever was held
-/// up is making up for it.
+/// The last quarter is less late than all before it, or lateness shrinks from quarter to quarter: the sender is making
+/// up for a stall.
 bool grid::catches_up(const lane& l) const {
     const std::array<double, 4> least = least_late(l);
     const bool less_and_less = least[3] < least[2] - catching_up && least[2] < least[1] - catching_up;
     return less_and_less || least[3] < std::min({least[0], least[1], least[2]}) - catching_up;
 }
 
-/// Less and less late, or later and later burst by burst, by more than a line loses: whoever sends is held up, or makes up for
-/// it. A loss is one step, however long, and hardly ever do losses stand before each of many bursts.
+/// Lateness shrinks, or grows burst by burst by more than a line loses: the sender makes up for a stall, or is held up.
+/// A loss is a single step, however long; losses before each of many bursts are rare.
 bool grid::on_the_move(const lane& l) const {
     const std::array<double, 4> least = least_late(l);
     const double quarter = static_cast<double>(l.late.back().heard_ns - l.late[l.placed].heard_ns) / (4 * period_ns_);
@@ -128,16 +129,16 @@ bool grid::on_the_move(const lane& l) const {
     return false;
 }
 
-/// How late the least late of a decision time was, of late: a clock that runs otherwise than the line makes all of them late
-/// little by little, a loss by a sample at once.
+/// The usual least lateness of a decision time. A clock that runs otherwise than the line delays all frames little by
+/// little, a loss by a sample at once.
 double grid::usually_late(const lane& l) const {
     const bool half = l.last - l.usual_from >= hold_ / 2 && l.usual[1] < HUGE_VAL;
     if (l.usual[0] < HUGE_VAL) return half ? std::max(l.usual[0], l.usual[1]) : l.usual[0];
     return half ? l.usual[1] : 0;
 }
 
-/// The last frame of a burst was late by l.tail_late. All are later by a sample than in the decision time before, and that is
-/// still on time: polls have slipped past a sample, or one is missing.
+/// The last frame of a burst was late by l.tail_late. If all are later by a sample than in the decision time before,
+/// though still on time, polls slipped past a sample or one is missing: uncertain.
 void grid::note_lateness(lane& l, std::int64_t index) {
     if (index - l.usual_from >= hold_) {
         l.uncertain += l.usual[1] < HUGE_VAL && l.usual[1] - l.usual[0] > a_sample;
@@ -153,8 +154,8 @@ void grid::note_lateness(lane& l, std::int64_t index) {
     l.floor_now = std::min(l.floor_now, l.tail_late);
 }
 
-/// Of late it happened again and again that for an eighth of the decision time nothing came in time, and of the newest eight
-/// not each had an arrival on the line.
+/// Busy: for whole eighths of the decision time nothing came in time, again and again, and not each of the newest eight
+/// eighths had an arrival on the line.
 bool grid::restless(const lane& l) const {
     const std::size_t known = std::min(l.floor_count, l.floors.size());
     bool calm = known >= few_floors; // now
@@ -167,7 +168,7 @@ bool grid::restless(const lane& l) const {
            (known < least_floors && l.share[3] * l.known < ends_alike * (l.known + 2));
 }
 
-/// A step between two stretches of numbers on one slope, least squares: over its own deviation. The newest are first.
+/// The step between two stretches of numbers with one slope (least squares), over its standard deviation. Newest first.
 double grid::step_over_sigma(const std::vector<double>& values, std::size_t behind, double& by) {
     const std::size_t begin[] = {0, behind, values.size()};
     double mean[2] = {}, at[2] = {}, sxx = 0, sxy = 0, left = 0;
@@ -192,10 +193,10 @@ double grid::step_over_sigma(const std::vector<double>& values, std::size_t behi
     return by / (1e-9 + std::sqrt(left / (a + b - 3) * (1 / a + 1 / b + between * between / sxx)));
 }
 
-/// On a computer that is late all the time nothing of single bursts is chance: late ones follow late ones, and the line itself
-/// is known badly. But how late the least late of some time is steps by a sample where one is missing. The step stands out of
-/// what is left of all of them beside a slope, however long the time of each.
-/// @param by  out: by how many periods they are later, and its deviation
+/// On a computer that is late all the time single bursts prove nothing: late ones follow late ones, and the line itself
+/// is known badly. But the least lateness over some time (a floor) steps by a sample where one is missing. True if such
+/// a step stands out of the residuals about a slope, for some length of that time.
+/// @param by  out: the step, periods;  sigma: its standard deviation
 bool grid::floors_apart(const lane& l, double& by, double& sigma) const {
     std::vector<double> floors, joined;
     const std::size_t known = std::min(l.floor_count, l.floors.size());
@@ -227,9 +228,9 @@ bool grid::floors_apart(const lane& l, double& by, double& sigma) const {
     return best > stands_out;
 }
 
-/// Did those that wait come in bursts that all end alike? Packets of so many samples are no polls: their first one after a
-/// loss is full, and later by what is missing.
-/// @param times  out: how often something was handed over
+/// Did the waiting frames come in bursts that all end alike? Packets of a fixed size are not polls: the first one after
+/// a loss is full, and later by what is missing.
+/// @param times  out: number of bursts
 bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
     std::size_t begin = l.placed, before = 0, first = 0;
     std::int64_t same = 0, ends = 0, several = 0;
@@ -254,16 +255,16 @@ bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
            std::abs(later) > full_later;
 }
 
-/// The bus told of a loss no later than before this frame.
+/// The bus reported a loss no later than before this frame.
 bool grid::told_of_loss(const lane& l, std::size_t last) const {
     return std::any_of(l.late.begin() + static_cast<std::ptrdiff_t>(l.placed),
                        l.late.begin() + static_cast<std::ptrdiff_t>(last) + 1,
                        [](const late_frame& each) { return each.loss != 0; });
 }
 
-/// Bursts that all end alike came a period later: polls have slipped past a sample by drift, or one sample is missing.
-/// Nothing that arrives differs. The first comes by itself again and again, but not again soon, and the second hardly ever,
-/// unless the bus tells of it or the lane loses frames.
+/// Bursts that all end alike came a period later: by drift polls slipped past a sample, or one sample is missing. The
+/// arrivals look the same. Slips recur, but not soon after each other. A loss is rare, unless the bus reports it or the
+/// lane has lost frames.
 bool grid::may_slip(const lane& l) const {
     if (told_of_loss(l, l.which)) return false;
     const std::int64_t silence = (l.late[l.placed].time_ns - l.time_ns) / std::llround(period_ns_);

@@ -73,7 +73,7 @@ bool lane_start::bursty() const {
 
 double grid::gather_ns() const { return std::max(1e9 * gather_s, gather_periods * period_ns_); }
 
-/// Before the grid begins frames wait until every lane was heard and has told its line, or until no more can wait.
+/// Before the grid begins frames wait until every lane was heard and its line is known, or until no more can wait.
 void grid::hold_until_anchored(lane& l, const drv_frame_t& frame) {
     held_.emplace_back(static_cast<int>(&l - lanes_.data()), frame);
     if (!l.waiting) {

@@ -99,7 +99,7 @@ bool grid::count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& s
     return true;
 }
 
-/// A counter far off: one damaged frame, or did frames get lost, or did the sender jump or start anew? Two frames that
+/// A counter far off: one damaged frame, or did frames get lost, or did the sender jump or restart? Two frames that
 /// agree decide, in whichever order they came.
 void grid::judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
     std::uint64_t before = 0;
@@ -154,7 +154,7 @@ void grid::end_suspicion(lane& l) {
     accept_jump(l, drv_frame_t(l.suspect));
 }
 
-/// The sender's counter began anew: beside lanes that did so already, else by time, at least one sample apart.
+/// The sender's counter restarted: beside lanes that did so already, else by time, at least one sample apart.
 std::int64_t grid::place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const {
     std::int64_t index = 0;
     if (kin_of(l, counter, index) && index > l.last + 1) return index;

@@ -35,7 +35,7 @@ class stream_check {
     /// Frames that came with the identifier of a channel.
     std::int64_t frames_of(std::size_t channel) const { return messages_[message_of_[channel]].frames; }
 
-    /// Code and text of everything that speaks against the configuration, for the warnings of the result.
+    /// Code and text of everything in the stream that contradicts the configuration, for the warnings of the result.
     remarks doubts() const;
 
   private:

@@ -8,7 +8,7 @@
 namespace okid_host {
 namespace {
 
-constexpr double edge_delay_s = 1; // an edge is told at most this long after the frames that follow it
+constexpr double edge_delay_s = 1; // an edge is reported at most this long after the frames that follow it
 
 } // namespace
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // When does identification begin? Until the trigger comes, samples wait here as far back as they may still be needed:
-// pretrigger_s, and for a GPIO line a second more, since an edge can be told after the frames that follow it.
+// pretrigger_s, and for a GPIO line a second more, since an edge can be reported after the frames that follow it.
 //
 // The trigger sample is the first one whose time stamp is not before the edge, or the one with which a channel crosses
 // the level (from below to the level or above, or the other way). That depends on the stream alone, not on how fast it

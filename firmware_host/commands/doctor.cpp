@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// okid doctor: what a live measurement needs of this machine, what is missing, and the command that mends it.
+// okid doctor: what a live measurement needs of this machine, what is missing, and the command that fixes it.
 #include "acquire/can_link.hpp"
 #include "acquire/reader.hpp"
 #include "acquire/serial_line.hpp"

@@ -15,7 +15,7 @@ class findings {
     void well(const std::string& what, const std::string& found) {
         text_ += fmt::format("ok       {:<22} {}\n", what, found);
     }
-    /// Worth knowing; what it costs to leave it is said, and how to mend it.
+    /// Worth knowing: what it costs to leave it, and how to fix it.
     void note(const std::string& what, const std::string& found, const std::string& remedy = "") {
         text_ += fmt::format("note     {:<22} {}\n", what, found);
         if (!remedy.empty()) text_ += fmt::format("         {:<22} -> {}\n", "", remedy);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  an okid.result/1 as JSON, whoever wrote it
+// PURPOSE  the keys of an okid.result/1 that was read as JSON
 // METHOD   the parser is asked to stop where nesting goes beyond what any result has
 #include "result_keys.hpp"
 

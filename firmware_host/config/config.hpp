@@ -86,7 +86,7 @@ struct identification_config {
     std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
     int decimate = 1;                              ///< auto looks at no higher rate than a so many-th
     int sigma_blocks = 20;                         ///< blocks left out for the standard deviations; 0 = none
-    bool analytic = true;                          ///< to first order where the method has a derivative, else anew
+    bool analytic = true;                          ///< by the method's derivative, where it has one
     bool restart_on_change = true; ///< window and forgetting: samples from before a change of the structure are dropped
     bool mkr = false;              ///< M, K and R with the final result
     double max_memory_mb = 8192;   ///< of the identification
@@ -118,7 +118,7 @@ struct hammer_config {
     bool enabled = false;
     std::size_t channel = 0; ///< the force, index in live_config::channels
     double level = 0;        ///< in its unit; negative: a hit is negative
-    int hits = 5;            ///< good ones wanted, at every point
+    int hits = 5;            ///< accepted hits wanted, at every point
     std::vector<int> points; ///< places struck one after the other (-3: at 3, reversed); empty: one that is not named
     double length_s = 2;     ///< of a hit's ring-down
     double pretrigger_s = 0; ///< at least; as long as the lags in any case
@@ -126,13 +126,13 @@ struct hammer_config {
     double spectrum_hz = 0;     ///< the force must reach so far
 
     int total() const { return hits * std::max(1, static_cast<int>(points.size())); }
-    int point_of(int hit) const { return points[static_cast<std::size_t>(hit / hits)]; } ///< of a good one, from 0
+    int point_of(int hit) const { return points[static_cast<std::size_t>(hit / hits)]; } ///< of an accepted hit, from 0
 };
 
 /// Lines that are active while …
 struct lamps_config {
     std::optional<gpio_place> armed; ///< … the trigger is waited for; without a trigger while okid runs
-    std::optional<gpio_place> go;    ///< … the modal table has come to rest
+    std::optional<gpio_place> go;    ///< … the modal table has settled
     std::optional<gpio_place> alarm; ///< … an alarm stands
 };
 
@@ -159,7 +159,7 @@ struct broker_address {
     net_address at;
     std::string user, password, prefix = "okid";
     std::string password_file; ///< read_password() finds it
-    bool discovery = false;    ///< Home Assistant is told what there is
+    bool discovery = false;    ///< announce the modes to Home Assistant
 };
 
 /// Where lines for InfluxDB go: a file, else by HTTP with a path, else by UDP.

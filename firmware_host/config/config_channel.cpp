@@ -139,7 +139,7 @@ void resolve_selectors(const config_place& place, const toml::node& node, const 
 }
 
 /// A DBC with one message of a parameter group means it of every sender; with more than one, their addresses tell them
-/// apart. 254 is nobody's address.
+/// apart. 254 is the address of no sender.
 std::optional<int> sender_in(const dbc_file& dbc, const dbc_message& message) {
     const std::uint32_t group = match_pgn(message.id >> 8 & 0x3FFFF, std::nullopt).id, sender = message.id & 0xFF;
     const auto alike = std::count_if(dbc.messages.begin(), dbc.messages.end(), [&](const dbc_message& each) {

@@ -230,7 +230,7 @@ void check_value(const config_place& place, const toml::node& node, const key_ru
 
 using table_entry = std::pair<std::string_view, const toml::node*>;
 
-/// The entries of a table in the order of the file, so that the first fault is the one told.
+/// The entries of a table in the order of the file, so that the first fault is the one reported.
 std::vector<table_entry> in_order(const toml::table& table) {
     std::vector<table_entry> out;
     for (const auto& [key, node] : table) out.emplace_back(key.str(), &node);

@@ -13,8 +13,8 @@ struct config_place {
     std::string section; ///< "[acquisition]", "[[channel]] \"force\""
 };
 
-/// "path: line 12, [[channel]] "a1", key "unit": <text>" with exit 2. `node`: what the key holds, of which the line is
-/// told; nullptr: the key is not in the file, what is wrong follows from others.
+/// "path: line 12, [[channel]] "a1", key "unit": <text>" with exit 2. `node`: what the key holds, for the line
+/// number; nullptr: the key is not in the file, what is wrong follows from others.
 [[noreturn]] void refuse_key(const config_place& place, const toml::node* node, std::string_view key,
                              const std::string& text);
 

@@ -318,7 +318,7 @@ void read_attribute(dbc_line& line, std::string_view keyword, dbc_file& file, fr
         if (message.extended && has_id(message, id)) message.j1939 = true;
 }
 
-/// Messages whose format is not told have that of the default.
+/// Messages without a format have the default one.
 void apply_default_format(const frame_formats& formats, dbc_file& file) {
     if (!formats.j1939_by_default) return;
     for (dbc_message& message : file.messages)

@@ -58,10 +58,10 @@ struct consensus_mode {
     int level = 0;                                        ///< the highest rate that sees it well
     double spacing_hz = 0;                                ///< to the nearest other vibration; infinite: none
     int parted = 0;                                       ///< runs that can tell it from that one
-    double resolved_hz = 0;                               ///< what stands closer to it, no three runs can tell from it
+    double resolved_hz = 0;                               ///< three runs cannot separate it from a closer mode
     std::vector<std::complex<double>> shape;
     std::vector<std::pair<int, int>> members; ///< run, track
-    std::vector<std::string> why;             ///< what speaks against it; empty: confident
+    std::vector<std::string> why;             ///< codes of why it is doubtful; empty: confident
     bool confident() const { return why.empty(); }
 };
 

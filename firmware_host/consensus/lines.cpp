@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  tell lines from modes
-// METHOD   the amplitude along the mode's shape at its frequency, block by block: that of a vibration driven by chance wanders
-//          (its spread is half its mean), that of a line stays. A record silent before its force has no line louder than that
-//          silence. A multiple of a stronger vibration moves in phase with the power
-//          of that vibration (Kim & Powers 1979, in the time domain). A line of the force, a harmonic of a drive say, is in the
-//          responses too: where the force has a narrow peak and the responses over the force have none, there is no mode
+// METHOD   the amplitude along the mode's shape at its frequency, block by block: that of a randomly driven vibration
+//          scatters (its spread is half its mean), that of a line stays. A record silent before its force has no line
+//          louder than that silence. A multiple of a stronger vibration moves in phase with the power of that vibration
+//          (Kim & Powers 1979, in the time domain). A line of the force, a harmonic of a drive say, is in the responses
+//          too: where the force has a narrow peak and the responses over the force have none, there is no mode
 #include "lines.hpp"
 
 #include "spectrum.hpp"
@@ -20,16 +20,15 @@ namespace {
 using complex = std::complex<double>;
 
 constexpr double steady = 0.25;          // spread over mean of an amplitude; 0.52 for noise in a narrow band
-constexpr std::size_t fewest_blocks = 8; // to speak of a spread
+constexpr std::size_t fewest_blocks = 8; // below that a spread means nothing
 constexpr std::size_t line_blocks = 64;
-constexpr double loudest_silence =
-    0.07;                      // half the amplitude of a line of 3 % of the spread in the tenth of a record after a hit
-constexpr double begun = 0.05; // of the largest force
-constexpr double quieter = 0.5;       // amplitude before the hits over that of the record
-constexpr double line_periods = 8;    // at least so many in a block
-constexpr double fewest_periods = 3;  // … where a fall is looked for
-constexpr double line_damping = 0.01; // a pole damped more is no line
-constexpr double unresolved = 2;      // decay times in the record below which nobody can tell
+constexpr double loudest_silence = 0.07; // a line stronger than this would be seen in the silence before the force
+constexpr double begun = 0.05;           // of the largest force
+constexpr double quieter = 0.5;          // amplitude before the hits over that of the record
+constexpr double line_periods = 8;       // at least so many in a block
+constexpr double fewest_periods = 3;     // … where a fall is looked for
+constexpr double line_damping = 0.01;    // a pole damped more is no line
+constexpr double unresolved = 2;         // decay times in the record; below that a decay and a line look the same
 constexpr double mains_tolerance = 0.003;
 constexpr double multiple_tolerance = 0.015;
 constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / sqrt(blocks)

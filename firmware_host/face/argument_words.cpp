@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  one text for each message, told to the user of the program and to the caller of the library
+// PURPOSE  one text for each message, for the user of the program and the caller of the library
 // METHOD   texts name options as the program has them; a known option becomes its argument, with "=" before a value
 #include "argument_words.hpp"
 

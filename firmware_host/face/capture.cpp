@@ -134,7 +134,7 @@ struct okid_host_capture_t final : private session_listener {
     bool live_, finished_ = false;
     face::waiting_rows waiting_;
     std::vector<double> scaled_;
-    std::mutex mutex_; ///< of events_: an update may be told by another thread
+    std::mutex mutex_; ///< of events_: another thread may report an update
     std::string events_, told_;
     std::vector<std::unique_ptr<face::pushed_bus>> buses_;
     std::unique_ptr<log_frames> log_;

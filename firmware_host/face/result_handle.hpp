@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  what stands behind an okid_host_result_t, whoever made it
+// PURPOSE  what an okid_host_result_t points to
 #pragma once
 #include "record/record.hpp"
 

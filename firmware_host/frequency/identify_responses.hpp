@@ -12,7 +12,7 @@ struct response_request {
     bool all_modes = false;
 };
 
-/// Throws `failure`: exit 2 for what cannot be meant, 3 when no mode can be told honestly.
+/// Throws `failure`: exit 2 for options that make no sense, 3 when there is no reliable mode.
 record_result identify_responses(const response_set& measured, const response_request& asked);
 
 } // namespace okid_host

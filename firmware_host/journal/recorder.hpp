@@ -26,7 +26,7 @@ struct recorder_options {
     std::vector<const watermark*> marks{}; ///< of each bus, for the order of frames; empty: they come in order
 };
 
-/// Something to be told: started, segment, lost, deleted, stopped, finished.
+/// Something to be reported: started, segment, lost, deleted, stopped, finished.
 struct recording_news {
     std::string kind, text;
 };

@@ -179,7 +179,7 @@ okid_status_t agreement::run(const mass_plan& mass) {
         record_set set = records();
         place_hits(set, mass);
         found_ = identify_records(std::move(set), options_, older_.get());
-        found_.context.x0.reset(); // of the samples of a stream nothing else is told than of its sums
+        found_.context.x0.reset(); // a stream's samples give no more of the result than its sums
         found_.context.simulation_percent.reset();
     } catch (const failure& why) {
         fault_ = why;

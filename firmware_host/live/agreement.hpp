@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Method auto of a stream: the samples of its memory, and what identify_records() finds in them.
 //
-// What makes lines, clipping and rest known is not in any sum: so the newest samples themselves are kept, those of the window, or of
-// a growing memory a fixed number, and of what came before them the sums. A result is then that of the same samples in a file.
-// Between two such decisions the modes are followed in sums (followed_modes.hpp).
+// Lines, clipping and rest are not visible in any sum. So the newest samples themselves are kept: those of the window,
+// or of a growing memory a fixed number, with sums of what came before. The result is that of the same samples in a
+// file. Between two such decisions the modes are followed in sums (followed_modes.hpp).
 #pragma once
 #include "error.hpp"
 #include "followed_modes.hpp"
@@ -48,15 +48,14 @@ class agreement {
     const okid_identified_t& model() const { return model_.view(); } ///< of the last run() or follow()
     const std::optional<deviations>& sigma() const { return sigma_; }
     [[noreturn]] void refuse() const { throw failure(*fault_); } ///< of the last run()
-    /// An eighth of all came since the last run(), a quarter once the oldest samples are in sums alone: the runs of a long
-    /// stream grow with the logarithm of its length. What came decides, not what was found: a stream is decided alike
-    /// whether it is late or in time.
+    /// Is an eighth of all samples new since the last run() (a quarter once the oldest are only in sums)? So the number
+    /// of runs grows with the logarithm of the stream's length. Counts of samples decide: a slow machine decides alike.
     bool due() const { return asked_ || due_after(came_ - run_at_); }
     bool due_after(std::int64_t samples) const {
         return (older_ && older_->samples() > 0 ? 4 : 8) * samples >= basis();
     }
     void ask() { asked_ = true; } ///< the next run() is due now
-    /// This decision is not made: the next one is due as if it had been, and nothing is followed until then.
+    /// Skip this decision: the next one is due as if it had been made, and no mode is followed until then.
     void pass() {
         run_at_ = came_;
         asked_ = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Has a tracked mode left its baseline? The baseline of a mode is the mean of its frequency over its first updates at rest,
-// each weighted by its variance. What a single update scatters is told by the jackknife, and by the updates themselves, of
+// each weighted by its variance. How much a single update scatters the jackknife shows, and the updates themselves, of
 // which neighbours share most of their samples: their scatter is scaled to what independent ones would show. A mode is away
 // when two updates in a row are more than k sigma off, sigma^2 = that of the baseline + that of the update; it is back
 // within k/2 sigma. One alarm stands as long as any mode is away.

@@ -52,7 +52,7 @@ class live_blocks {
     /// Sums that were merged into a growing whole: one more block.
     void take(owned_sums more) { given_.push_back(std::move(more)); }
 
-    /// Begin anew, as the whole does.
+    /// Start again, as the whole does.
     void reset();
 
     /// A window from slot `first` on, as one record from 1 on. Valid until the next call of this or of sigma().
@@ -93,7 +93,7 @@ class live_blocks {
     std::vector<std::int32_t> wide_codes_;
     std::unique_ptr<std::byte[]> linear_block_, anew_block_;
     okid_jackknife_t *linear_ = nullptr,
-                     *anew_ = nullptr;      ///< to first order (NULL: there is no derivative), identified anew
+                     *anew_ = nullptr;      ///< to first order (NULL: there is no derivative), identified again
     okid_jackknife_t* jackknife_ = nullptr; ///< the one in use
     double most_of_one_ = 0;                ///< largest share of the channels' power that one block had
     std::unique_ptr<replicate_statistics> modes_;

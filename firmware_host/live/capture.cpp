@@ -125,7 +125,7 @@ class pump {
         }
     }
 
-    /// Two seconds without a frame that is asked for: for one more second everything on its bus is heard, then told.
+    /// Two seconds without a frame that is asked for: for one more second all of its bus is heard, then reported.
     void look_for_unheard(double passed_s) {
         for (auto& listener : listeners_) listener->take(target_.check());
         if (listening_ == 0 && passed_s > 2) {
@@ -175,7 +175,7 @@ class pump {
     std::vector<bus_watch> watches_;
     std::vector<std::unique_ptr<sync_sender>> senders_;
     std::vector<std::unique_ptr<bus_listener>> listeners_;
-    int listening_ = 0; ///< 0 not yet, 1 at it, 2 told
+    int listening_ = 0; ///< 0 not yet, 1 listening, 2 reported
 };
 
 } // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  a structure that changed, told without an identification
-// METHOD   sums of a twentieth of a test at a time, each begun anew; what is missing shortens its block
+// PURPOSE  has the structure changed, without an identification
+// METHOD   sums of a twentieth of a test at a time, each from zero; what is missing shortens its block
 #include "change_test.hpp"
 
 #include "error.hpp"

@@ -28,7 +28,7 @@ class followed_modes {
     void add_missing(std::int64_t count); ///< 0: another record begins
     void reset();
 
-    /// These are the modes; their carriers say now where they stand.
+    /// Follow these modes; their carriers now define where they are.
     void begin(const record_result& found);
     void stop() { groups_.clear(); } ///< until the next begin()
     bool any() const { return !groups_.empty(); }

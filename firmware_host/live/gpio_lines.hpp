@@ -15,14 +15,14 @@ class gpio_lines {
   public:
     /// Takes every line of the config. Throws `failure` (exit 4) that says what is there and what to do.
     explicit gpio_lines(const live_config& config);
-    /// Lamps go out, lines go back.
+    /// Switches the lamps off and releases the lines.
     ~gpio_lines();
     gpio_lines(const gpio_lines&) = delete;
     gpio_lines& operator=(const gpio_lines&) = delete;
 
     /// To poll for edges, -1 without a trigger line.
     int fd() const { return trigger_ ? drv_gpio_fd(trigger_.get()) : -1; }
-    /// Edges that wait go to the session, its state to the lamps.
+    /// Hands waiting edges to the session and its state to the lamps.
     void serve(stream_target& live);
 
   private:
@@ -34,7 +34,7 @@ class gpio_lines {
     lamp_state shown_;
 };
 
-/// Can the line be had? "" or what was found; taken for a moment only. @param remedy  out: what to do
+/// Is the line free? "" or what was found; it is opened for a moment. @param remedy  out: what to do
 std::string gpio_fault(const gpio_place& place, bool output, drv_gpio_edge_t edge, std::string& remedy);
 
 } // namespace okid_host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The assistant of a hammer test: waits for a hit, keeps the samples from before it to the end of the ring-down, and
-// judges whether they are worth adding to the others.
+// accepts or rejects it.
 //
 // A hit begins where the force crosses `level`. Before it at least as many quiet samples are kept as the identification
 // has lags, so that all of it counts.
@@ -16,7 +16,7 @@
 
 namespace okid_host {
 
-/// What became of a hit.
+/// The verdict on a hit.
 struct hit_report : hit_verdict {
     int number = 0;             ///< of the hits heard, 1 = the first
     std::int64_t sample = 0;    ///< with which the force crossed the level
@@ -40,9 +40,9 @@ class hammer {
     template <class Visit> void each_row(Visit&& visit) const {
         for (std::size_t i = 0; i < rows(); ++i) visit(at(i));
     }
-    /// What is waited for, for people.
+    /// What the test waits for, in words.
     std::string awaited() const;
-    /// How many hits lack at the end, and what became of the others; "" when all are there.
+    /// How many hits are missing at the end, and the verdicts on the others; "" when all are there.
     std::string shortfall() const;
     int accepted() const { return accepted_; }
 
@@ -54,7 +54,7 @@ class hammer {
     void keep(const double* row);
     bool crosses(const double* row);
     void judge();
-    /// Where the next good one has to be struck; 0: no plan, or all are there.
+    /// Place of the next accepted hit; 0: no plan, or all are there.
     int next_point() const { return wanted_.points.empty() || left_ == 0 ? 0 : wanted_.point_of(accepted_); }
 
     hammer_config wanted_;

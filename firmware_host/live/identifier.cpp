@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  a stream of samples into sums, and out of them a model whenever it is asked for
 // METHOD   rows go to the accumulator as they come, one by one through a small buffer; a watch compares them with the last
-//          model at rest and tells of a change, from which on a memory that forgets begins anew
+//          model at rest and tells of a change, from which on a memory that forgets starts again
 #include "identifier.hpp"
 
 #include "error.hpp"

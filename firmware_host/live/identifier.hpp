@@ -33,7 +33,7 @@ class identifier {
     void reset();                         ///< forget all samples
 
     /// The sums as bytes (okid_accumulator_serialise()): any release reads them. Of a stream that refines its correlation sums
-    /// stand before them. Throws `failure` (exit 2) when no model has told yet how many lags these need.
+    /// stand before them. Throws `failure` (exit 2) when no model has shown yet how many lags these need.
     std::vector<std::byte> state();
     /// Go on where state() stood. Throws `failure` (exit 2) for bytes of another shape.
     void restore(const void* state, std::size_t bytes);
@@ -49,9 +49,9 @@ class identifier {
     bool decides() const { return !agreed_ || change_at_ || agreed_->due(); }
     /// Method auto of a stream, else none.
     const agreement* agreed() const { return agreed_.get(); }
-    /// Is an update worth its work? Of a named method always.
+    /// Is there something to update? With a named method always.
     bool due() const { return decides() || agreed_->follows(); }
-    /// Is the next one due when so many samples more are there?
+    /// Will the next one be due after so many more samples?
     bool due_after(std::int64_t samples) const {
         return agreed_ && decides() ? agreed_->due_after(samples) : samples > 0;
     }
@@ -73,9 +73,10 @@ class identifier {
                    ? blocks_->sigma(accumulator_, identify_, model_, plan, chooser_ ? chooser_->chosen().first : 0)
                    : std::nullopt;
     }
-    /// What of the window the model of the last run() rests on; none where that is not chosen.
+    /// The part of the window that the model of the last run() rests on; none where that is not chosen.
     const window_choice* window() const { return chooser_ ? &chooser_->chosen() : nullptr; }
-    /// Of each output 100 (1 - innovation / spread), both RMS: what the model of the last run() says of the next sample.
+    /// Of each output 100 (1 - innovation / spread), both RMS: how well the model of the last run() predicts the next
+    /// sample.
     std::vector<double> predicted_percent();
     const okid_identify_config_t& config() const { return identify_config_; }
     int most_modes() const { return most_order_ / 2; }

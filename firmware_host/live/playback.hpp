@@ -35,7 +35,7 @@ bool is_journal(const std::string& path);
 std::vector<std::string> interfaces_of(const std::string& log, const std::vector<std::string>& enough = {});
 
 /// Frames of a log or of a journal and the segments behind it, one after the other. Throws `failure` (exit 2) at a line
-/// that does not parse; what is damaged in a journal is told on stderr at its end.
+/// that does not parse; what is damaged in a journal is reported on stderr at its end.
 class log_frames {
   public:
     /// Every frame; of a journal with the bus it was recorded with, of a log as bus 0.

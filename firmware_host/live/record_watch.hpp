@@ -29,7 +29,7 @@ class record_watch : public stream_target, private grid_sink {
     bool done() const override;
     bool heard() const override { return first_ns_ != 0; }
     stream_check& check() override { return check_; }
-    /// What was recorded, for people. Throws `failure`: exit 3 when nothing was, exit 4 when the disk ended it.
+    /// What was recorded, in words. Throws `failure`: exit 3 when nothing was, exit 4 when the disk ended it.
     void finish() override;
 
   private:

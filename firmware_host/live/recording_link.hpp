@@ -19,7 +19,7 @@ class recording_link {
     /// NULL when nothing is recorded.
     recorder* get() { return recorder_.get(); }
 
-    /// Now and then.
+    /// Call this regularly.
     void serve(stream_target& target) {
         if (!recorder_) return;
         if (!triggered_ && target.triggered()) {

@@ -13,7 +13,7 @@ class relief {
     static constexpr double patience_s = 0.25, calm_s = 1;
     static constexpr int steps = 3;
 
-    /// Now and then, at least every second.
+    /// Call this at least once a second.
     /// @param now_s     by a clock that is never set
     /// @param caught_up  no frame waits that could be worked on
     /// @return how many steps stand: one more for each `patience_s` behind, one less for each `calm_s` caught up

@@ -220,7 +220,7 @@ void session::begin(std::int64_t until) {
     });
 }
 
-/// A hit was judged: a good one goes in as a record of its own.
+/// A hit was judged: an accepted one goes in as a record of its own.
 void session::strike() {
     const hit_report& hit = hammer_.report();
     ordered_json event{
@@ -369,7 +369,7 @@ result_context session::context() {
 }
 
 /// A rate_hz that is not that of the stamps scales every frequency. Not part of the result, which is the same for every
-/// speed a log is played at: it is told on stderr, and the stats carry the number.
+/// speed a log is played at: it is reported on stderr, and the stats carry the number.
 void session::remark_rate() const {
     constexpr double tolerance = 0.02;
     const double observed_hz = observed_rate_hz();
@@ -380,7 +380,7 @@ void session::remark_rate() const {
         observed_hz, config_.rate_hz, config_.path);
 }
 
-/// What does not fit the configuration is told as soon as it is known, and again where it is the likely reason for no
+/// What does not fit the configuration is reported at once when it is known, again where it is the likely reason for no
 /// model; a result has it among its warnings.
 void session::tell_remarks() {
     remarked_ = true;
@@ -485,7 +485,7 @@ void session::finish() {
     tell({{"type", "result"}, {"t", seconds(now_)}, {"result", result}});
     const std::string text = result.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
     const bool to_file = !options_.json.empty() && options_.json != "-";
-    if (to_file) write_whole_file(options_.json, text); // first: whoever reads the events may hold up the end of them
+    if (to_file) write_whole_file(options_.json, text); // first: a slow reader may hold up the end of the events
     publisher_.finish();
     if (!options_.json.empty() && !to_file) write_whole_file("-", text);
     if (options_.table && !publisher_.events_on_stdout() && options_.json != "-")

@@ -24,7 +24,7 @@
 
 namespace okid_host {
 
-/// Looks on beside the files and terminals: every sample and gap of the grid, every event as a line.
+/// An observer beside files and terminals: gets every sample and gap of the grid, every event as a line.
 class session_listener : public grid_sink {
   public:
     virtual void on_event(const std::string& line) = 0;
@@ -65,7 +65,8 @@ class session : public stream_target, private grid_sink {
     void ready() override;
     void alive(bool caught_up) override;
 
-    /// Final stats, then result and table. Throws `failure` (exit 3) when no model can be had: then there is no result.
+    /// Final stats, then result and table. Throws `failure` (exit 3) when no model is possible: then there is no
+    /// result.
     void finish() override;
 
   private:
@@ -121,7 +122,7 @@ class session : public stream_target, private grid_sink {
     std::int64_t stats_told_ = 0;
     std::uint64_t updates_made_ = 0, updates_skipped_ = 0, updates_given_up_ = 0;
     relief relief_;
-    std::array<bool, relief::steps> overloaded_{}; ///< told, by step
+    std::array<bool, relief::steps> overloaded_{}; ///< reported, by step
     bool started_ = false, settled_ = false, alarm_ = false, due_ = false, remarked_ = false;
     update_thread updates_; ///< the last: it ends before what it works on
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Updates of a session: handed over to the thread that makes them, told when they come back.
+// Updates of a session: handed over to the thread that makes them, reported when they come back.
 #include "session.hpp"
 
 #include "acquire/host_time.hpp"

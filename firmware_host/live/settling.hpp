@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Has the modal table come to rest? Yes when every tracked mode of the newest update stayed within 0.1 % in frequency and
+// Has the modal table settled? Yes when every tracked mode of the newest update stayed within 0.1 % in frequency and
 // 20 % in damping ratio over the last three. Modes that come and go are no tracks and do not count.
 #pragma once
 #include <okid/identify.h>
@@ -15,7 +15,7 @@ class settling {
   public:
     /// Take in an update.
     /// @param tracks  of its modes, 0 = none; sigma_hz: standard deviations of the frequencies, may be empty
-    /// @return the table has come to rest
+    /// @return the table has settled
     bool add(const okid_identified_t& model, const std::vector<int>& tracks, const std::vector<double>& sigma_hz) {
         update& to = last_[count_++ % last_.size()];
         const std::size_t modes = tracks.size();
@@ -33,7 +33,7 @@ class settling {
         }
         return any && all;
     }
-    /// Mode k of the newest update: at rest, or it moves no more than its standard deviation lets expect.
+    /// Mode k of the newest update is at rest, or moves no more than its standard deviation explains.
     bool at_rest(std::size_t k) const { return at_rest_[k]; }
     /// An update without a model.
     void reset() { count_ = 0; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  updates and results of a running stream, for the live program and for other languages
 // METHOD   an update identifies, gives the modes their tracks and looks whether they rest. A model at rest is watched, and a
-//          change of the structure is told with the next update; which updates may give that model depends on the samples
+//          change of the structure comes with the next update; which updates may give that model depends on the samples
 //          alone, and these are never left out, so that a slow machine comes to the same result
 #include "stream.hpp"
 

@@ -23,7 +23,7 @@ struct stream_update {
     okid_status_t status = OKID_ERR_TOO_SHORT;
     std::optional<deviations> sigma;          ///< of the modes
     const std::vector<int>* tracks = nullptr; ///< of each mode, 0 = none; only with a model
-    bool settled = false;                     ///< the modal table has come to rest
+    bool settled = false;                     ///< the modal table has settled
     std::int64_t since = 0;                   ///< sample at which it was decided which modes there are
 };
 
@@ -63,7 +63,7 @@ class stream {
     void restore(const void* state, std::size_t bytes);
     void merge(const void* state, std::size_t bytes);
 
-    /// Identify for a result. Throws `failure` (exit 3) when no model can be had.
+    /// Identify for a result. Throws `failure` (exit 3) when no model is possible.
     void identify();
     /// Throws `failure` (exit 3): why the last identification gave no model.
     [[noreturn]] void refuse(okid_status_t status, const result_context& about) const;
@@ -77,13 +77,13 @@ class stream {
     std::vector<mode_verdict> verdicts() const {
         return mode_verdicts(model(), identifier_.agreed() ? identifier_.agreed()->found().context : result_context{});
     }
-    /// Found by auto, but not signed: in the events, not in the table; no track, no alarm.
+    /// Found by auto, but doubtful: in the events, not in the table; no track, no alarm.
     bool doubtful(std::size_t mode) const {
         return identifier_.agreed() && !identifier_.agreed()->found().context.verdicts[mode].confident;
     }
     /// Outputs that the model of the last identify() hardly follows.
     void remark_fit(result_context& about);
-    /// M, K and R where they are wanted; what stands in their way is no reason to lose the modes.
+    /// M, K and R where they are wanted; if they fail, the modes stay.
     void add_mass(result_context& about) const;
     /// Standard deviations of modes and matrices.
     void add_sigma(result_context& about);

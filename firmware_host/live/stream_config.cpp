@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  from what is wanted of a stream to the configurations of the library
-// METHOD   one place decides the blocks of a window and of a fading memory, whoever feeds the samples
+// METHOD   one place decides the blocks of a window and of a fading memory, for every source of samples
 #include "stream_config.hpp"
 
 #include "result/method.hpp"

@@ -19,7 +19,7 @@ struct device_losses {
     std::uint64_t socket_overflow = 0, driver = 0;
 };
 
-/// What a CAN controller and the frames okid sends have to tell, for the stats.
+/// Counts of a CAN controller and of the frames that okid sends, for the stats.
 struct bus_health {
     drv_stats_t counts{};
     std::optional<sync_report> sync;
@@ -36,18 +36,18 @@ class stream_target {
     virtual void frame(const drv_frame_t& frame) = 0;
     virtual void set_losses(std::size_t bus, const device_losses& losses) = 0;
     virtual void set_health(std::size_t bus, const bus_health& health) = 0;
-    /// Something happened on a bus; told once the stream has begun.
+    /// Something happened on a bus; reported once the stream has begun.
     virtual void bus_event(std::size_t bus, const char* kind, const std::string& text) = 0;
     /// Something happened to the recording.
     virtual void record_event(const std::string& kind, const std::string& text) = 0;
-    /// An edge of the trigger line, host time (drv/host_clock.h). Nothing comes of it when none is waited for.
+    /// An edge of the trigger line, host time (drv/host_clock.h). Ignored when none is waited for.
     virtual void trigger_edge(std::int64_t time_ns) = 0;
     virtual bool triggered() const = 0;
     virtual std::int64_t trigger_ns() const = 0; ///< when, once it has come; 0 without a trigger
     virtual lamp_state lamps() const = 0;
     virtual bool done() const = 0;
     virtual bool heard() const = 0;    ///< the stream has begun
-    virtual stream_check& check() = 0; ///< what speaks against the configuration
+    virtual stream_check& check() = 0; ///< what contradicts the configuration
     /// Every device is open; and, from then on at least every second: the thread that reads is at work. For a service manager.
     virtual void ready() {}
     /// @param caught_up  no frame waits that could be worked on

@@ -2,10 +2,11 @@
 // Maximum likelihood in a stream of a named method: correlation sums beside the accumulator, of the same samples, and each
 // model refined from them (okid/refine.h).
 //
-// How many lags the sums need depends on the slowest mode, and noise that has a colour goes through a filter before it is
-// summed. So the first samples are kept, and refined as a record, until a model of so and so many of them, the same ones at
-// any speed of a replay, tells both; from then on there are only sums. A state that is put back or merged into a stream without
-// sums brings its lags and its filter along; streams can be merged that have both in common.
+// How many lags the sums need depends on the slowest mode, and noise that has a colour goes through a filter before it
+// is summed. So the first samples are kept and refined as a record, until a model of a fixed number of them gives both;
+// from then on there are only sums. The number does not depend on the speed of a replay. A state that is put back or
+// merged into a stream without sums brings its lags and its filter along; streams can be merged that have both in
+// common.
 #pragma once
 #include "record/record_refine.hpp"
 #include "stream_config.hpp"
@@ -49,7 +50,8 @@ class sum_refiner {
     void put_back(const void* state, std::size_t bytes);
     void merge(const void* state, std::size_t bytes);
 
-    /// Refine `model`, in place; it looks into this object then. Nothing where it is of no use: fault() says why.
+    /// Refine `model`, in place; it looks into this object then. Nothing where the refinement is rejected: fault() says
+    /// why.
     void refine(okid_identified_t& model);
     const std::optional<refinement>& refined() const { return found_.refined; } ///< of the last refine()
     const std::string& fault() const { return fault_; }

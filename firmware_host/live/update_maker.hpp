@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What an update of a session has to tell: identify, follow the modes, look for those that left their baseline. Nothing here
-// is told to anybody: a report says what is to be told, so that updates may be made on a thread of their own.
+// What an update of a session computes: identify, follow the modes, look for those that left their baseline. Nothing is
+// published here: a report says what to publish, so that updates may be made on a thread of their own.
 #pragma once
 #include "alarm.hpp"
 #include "change_test.hpp"
@@ -39,7 +39,7 @@ class update_maker {
         if (change_test_) change_test_->add_missing(count);
     }
 
-    /// How pressing it is to be done with an update.
+    /// How urgent it is to finish an update.
     struct haste {
         std::int64_t ahead = 0; ///< samples that wait behind it, up to the newest update
         bool hurry = false;     ///< only what is obliged

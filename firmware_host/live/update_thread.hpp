@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Mathematics beside the stream: rows of the grid and the places of the updates go into a queue, a thread sums and identifies
-// in the order of the stream, reports come back. Whoever reads, records, grids and publishes never waits for it.
+// in the order of the stream, reports come back. Threads that read, record, grid and publish never wait for it.
 //
 // An update that newer ones have caught up with is left out; one that the result depends on never (stream::obliged()). So
 // the sums, and with them the result, are those of the stream, however late the thread is. Rows wait as long as one update
@@ -33,11 +33,11 @@ class update_thread {
     void add(const double* row);
     void add_missing(std::int64_t count); ///< 0: another record begins
     void update(std::int64_t samples);
-    void hurry(bool on); ///< the machine is too slow, or nobody looks: only what the result depends on
+    void hurry(bool on); ///< too slow, or no output shows updates: only what the result depends on
 
     /// What was found since the last call. Throws what the sums threw.
     std::vector<update_report> take();
-    /// Be done with all that waits. The sums are the caller's from then on. Throws as take().
+    /// Finish all that waits. The sums are the caller's from then on. Throws as take().
     std::vector<update_report> finish();
 
   private:

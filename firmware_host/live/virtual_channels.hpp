@@ -17,7 +17,7 @@ class virtual_channels {
     std::size_t size() const { return shown_.size(); }
     /// As entries of `channels` in the event `start`.
     nlohmann::ordered_json described() const;
-    /// The sample `index` of the grid, nullptr = nobody has it; those before it that were not told are missing.
+    /// The sample `index` of the grid, nullptr = it is missing; those before it that were not given are missing too.
     /// @return size() values, then their standard deviations; valid until the next call
     const double* add(std::int64_t index, const double* row);
     /// So many missing samples in a row are bridged one by one.

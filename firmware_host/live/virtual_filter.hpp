@@ -14,7 +14,7 @@ class virtual_filter {
     explicit virtual_filter(virtual_model model);
 
     const virtual_model& model() const { return model_; }
-    /// Take means, noise and deviations from a record: rows [u; y], NaN = missing; begins anew. Throws `failure` (exit 2).
+    /// Means, noise and deviations from a record: rows [u; y], NaN = missing; starts again. Throws `failure` (exit 2).
     void learn(std::size_t count, const double* rows);
     /// What comes next begins at rest.
     void reset();

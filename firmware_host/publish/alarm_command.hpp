@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // [alarm] command: a program that is run at an alarm, with the alarm as JSON on its standard input. One at a time; it is
-// ended after a while; nobody waits for it.
+// ended after a while, and the run does not wait for it.
 #pragma once
 #include "publication.hpp"
 

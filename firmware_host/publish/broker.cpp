@@ -49,7 +49,7 @@ std::unique_ptr<event_sink> make_broker(const live_config&) {
 #else
 namespace {
 
-/// What Home Assistant is told of a mode: two sensors that read the topic of the modes, in a device of that rig.
+/// What is announced of a mode to Home Assistant: two sensors that read the topic of the modes, in a device of the rig.
 std::vector<std::pair<std::string, std::string>> discovery_of(const std::string& level, const std::string& modes_topic,
                                                               int track) {
     std::vector<std::pair<std::string, std::string>> out;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One page over HTTP/1.1, for those who come and ask: GET and HEAD, one answer a connection. On the thread of the publisher;
+// One page over HTTP/1.1, for any client: GET and HEAD, one answer a connection. On the thread of the publisher;
 // a peer that is slow, silent or hostile costs 4 KiB for five seconds.
 #pragma once
 #include "config/config.hpp"
@@ -17,7 +17,7 @@ class http_page {
   public:
     static constexpr std::size_t most = 16, most_request = 4096;
 
-    /// @param what  how messages name it; @param text  the page, made anew for each request
+    /// @param what  how messages name it; @param text  the page, made for each request
     /// Throws `failure` (exit 4) when the address cannot be listened on.
     http_page(const std::string& what, const net_address& at, std::string path, const char* type,
               std::function<std::string()> text);
@@ -26,7 +26,7 @@ class http_page {
     http_page& operator=(const http_page&) = delete;
 
     void add_polls(std::vector<pollfd>& polls) const;
-    /// Whatever can be done now.
+    /// Does what can be done now, without waiting.
     void serve();
 
   private:

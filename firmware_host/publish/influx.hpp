@@ -7,7 +7,7 @@
 namespace okid_host {
 
 /// @param live  a file loses lines rather than hold up a run; a replay waits
-/// Throws `failure` when the address (exit 4), the token or the file (exit 2) cannot be had.
+/// Throws `failure` when the address (exit 4), the token or the file (exit 2) is not available.
 std::unique_ptr<event_sink> make_influx(const live_config& config, bool live);
 
 } // namespace okid_host

@@ -77,7 +77,7 @@ void line_writer::run() {
     for (;;) {
         changed_.wait_for(lock, std::chrono::milliseconds(200), [&] { return !lines_.empty() || ending_; });
         if (lines_.empty() && ending_) return;
-        const std::uint64_t lost = lines_.empty() ? 0 : std::exchange(lost_, 0); // told with the next line
+        const std::uint64_t lost = lines_.empty() ? 0 : std::exchange(lost_, 0); // reported with the next line
         const std::shared_ptr<const std::string> line = lines_.empty() ? nullptr : lines_.front();
         if (line) {
             bytes_ -= line->size();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Lines to a file or to stdout by a thread of their own: a disk, pipe or terminal that blocks holds up nobody else.
+// Lines to a file or to stdout by a thread of their own: a disk, pipe or terminal that blocks holds up no other output.
 #pragma once
 #include <condition_variable>
 #include <cstdint>
@@ -15,7 +15,8 @@ class line_writer {
   public:
     /// @param what   how messages name it, such as "--events run.jsonl"
     /// @param path   a file, created or emptied (by a service: gone on with); "-" = stdout
-    /// @param patient  true: put() waits while the queue is full, and every line arrives; false: the oldest line gives way,
+    /// @param patient  true: put() waits while the queue is full, and every line arrives; false: the oldest line is
+    /// dropped,
     ///                 and so does one that cannot be written (the next one is tried again); a line
     ///                 {"type":"lost","count":n} stands in the place of those that did
     /// Throws `failure` (exit 2) when it cannot be opened.
@@ -47,7 +48,7 @@ class line_writer {
     std::size_t bytes_ = 0;
     std::uint64_t lost_ = 0;
     bool ending_ = false;
-    bool torn_ = false, told_ = false; ///< of the thread: a line was cut; the trouble was told
+    bool torn_ = false, told_ = false; ///< of the thread: a line was cut; the trouble was reported
     std::string error_;
     std::thread thread_;
 };

@@ -9,7 +9,7 @@
 
 namespace okid_host {
 
-/// What no event tells.
+/// What is in no event.
 struct publisher_figures {
     double update_s = 0, update_worst_s = 0;             ///< how long the newest update took, and the longest
     std::uint64_t updates = 0, skipped = 0, dropped = 0; ///< dropped: events that no sink could be given

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a session tells the world, and what takes it in.
+// What a session publishes, and the interface of what receives it.
 #pragma once
 #include <memory>
 #include <nlohmann/json.hpp>

@@ -197,7 +197,7 @@ void publisher::stop() {
 
 void publisher::finish() {
     stop();
-    sinks_.clear();   // whoever reads sees the end now, whatever a terminal still holds up
+    sinks_.clear();   // readers see the end now, whatever a terminal still holds up
     lines_ = nullptr; // its last lines are written
     if (events_) events_->finish();
 }

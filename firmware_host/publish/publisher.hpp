@@ -52,7 +52,7 @@ class publisher {
     /// Everything that is to arrive has arrived, or had its time. Throws as event().
     void finish();
     bool events_on_stdout() const { return options_.events == "-"; }
-    /// Does anything that is handed over come to anyone? stdout may be /dev/null.
+    /// Does anything that is handed over have a receiver? stdout may be /dev/null.
     bool watched() const { return events_ || lines_ || terminal_ || !sinks_.empty() || options_.listener; }
 
   private:

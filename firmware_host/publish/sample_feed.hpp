@@ -19,7 +19,7 @@ class sample_feed {
     /// One row of the grid, all channels as decoded, NaN = missing, nullptr = all are; then the extra ones, values and
     /// standard deviations. @return a line when a block is full, else nullptr
     json_line add(std::int64_t index, const double* row, const double* extra = nullptr);
-    /// Rows that nobody has: the block ends, the next begins behind them. @return the block that was begun, or nullptr
+    /// Missing rows: the block ends, the next begins behind them. @return the block that was begun, or nullptr
     json_line end_block();
 
   private:

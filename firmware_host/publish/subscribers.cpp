@@ -147,7 +147,7 @@ void subscribers::send_all() {
     std::array<char, 16384> unread{};
     for (auto each = all_.begin(); each != all_.end();) {
         (void)recv(each->fd, unread.data(), unread.size(), MSG_DONTWAIT); // it may say what it likes: to nobody
-        pollfd gone{each->fd, 0, 0}; // an idle one that hung up is told by poll alone
+        pollfd gone{each->fd, 0, 0};                                      // only poll shows that an idle one hung up
         if (send(*each) && !(poll(&gone, 1, 0) > 0 && (gone.revents & (POLLHUP | POLLERR)))) {
             ++each;
             continue;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Programs that listen on a unix socket: each gets the start event and then every event as a line. One that reads too slowly
-// loses whole lines and is told how many; what it sends is never looked at.
+// loses whole lines and gets their number; what it sends is never looked at.
 #pragma once
 #include "publication.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The modal table for people: redrawn in place on a terminal, one line an update elsewhere.
+// The modal table as text: redrawn in place on a terminal, one line an update elsewhere.
 #pragma once
 #include <cmath>
 #include <cstddef>
@@ -31,7 +31,7 @@ std::string table_line(const table_state& state);
 /// Draws on a terminal. Each draw asks how large the terminal is now.
 class terminal_table {
   public:
-    /// @param fd  of the terminal; it is opened anew, so that a write that does not wait is no one else's concern
+    /// @param fd  of the terminal; it is opened again, so that non-blocking writes do not affect other users of it
     explicit terminal_table(int fd);
     ~terminal_table();
     terminal_table(const terminal_table&) = delete;

@@ -193,7 +193,7 @@ std::size_t block_of(const product_search& s, const product& of) {
     return static_cast<std::size_t>(std::max(product_periods / slowest, resolved / closest) * s.fs_hz) + 1;
 }
 
-/// How much records follow a product of vibrations; 0 where that cannot be told.
+/// How much records follow a product of vibrations; 0 where that is not known.
 double following(product_search& s, const std::vector<series>& records, const product& of) {
     const std::size_t block = block_of(s, of);
     std::size_t count = 0;

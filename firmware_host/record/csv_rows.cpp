@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  rows of a CSV file into samples, with the place of every fault
 // METHOD   lines come in blocks of megabytes, cut into pieces whose lines are counted: so each piece has its place in the record
-//          and threads fill them side by side; the first fault in the order of the file is told. A plain number of up to 18
+//          and threads fill them side by side; the first fault of the file is reported. A plain number of up to 18
 //          digits and 2^53 is one whole number over a power of ten, both exact: their quotient is the nearest double.
 //          Longer ones and exponents take from_chars; anything else in a cell takes the slow way
 #include "csv_rows.hpp"

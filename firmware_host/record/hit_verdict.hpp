@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Is a hit worth adding to the others? One judge for a stream that waits for hits and for files that hold one each.
+// Is a hit accepted? One rule for a stream that waits for hits and for files that hold one each.
 //
 // It is refused, with the reason, when samples are missing, a channel was overloaded, the structure still moved, the force hardly
 // exceeds its noise, there was a second hit, the force ends too late, or its spectrum ends too early.

@@ -8,8 +8,8 @@
 
 namespace okid_host {
 
-/// Maximum likelihood of the modes in the model, where it serves: what it leaves of the outputs is nearly white (or the caller
-/// insists), and all modes stay who they are. @return the modes have changed
+/// Maximum likelihood of the modes in the model, where it applies: the residuals are nearly white (or the caller
+/// insists), and all modes keep their identity. @return the modes have changed
 bool refine_agreed(const record_options& options, std::vector<listed_mode>& listed, record_work& work);
 
 } // namespace okid_host

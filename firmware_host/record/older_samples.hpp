@@ -28,7 +28,7 @@ class older_samples {
     older_samples(const record_options& options, const std::string& where, const std::vector<std::byte>& state);
     static double bytes(std::size_t n_u, std::size_t n_y);
 
-    /// The first of the samples kept are kept no longer: they are screened, then summed.
+    /// The oldest of the samples kept are screened, then summed and dropped.
     /// @param newest  all that are kept. @return how many went: a quarter, or up to the end of the record that ends next
     std::size_t take(const record_set& newest);
     void merge(const older_samples& other); ///< as further records

@@ -26,14 +26,14 @@ struct record_options {
     std::string start =
         "moving"; ///< "rest": each record begins before the structure was struck, its silent past is used
     std::string refine =
-        "no";       ///< maximum likelihood after the identification: yes, no, or (method auto) where it serves
+        "no";       ///< maximum likelihood after the identification: yes, no, or (method auto) where it applies
     mass_plan mass; ///< where the channels stand, when M, K and R are wanted
     remarks said;   ///< known before the data are seen
     bool stabilization = false;                     ///< look at all orders and some horizons too
     int sigma_blocks = 20;                          ///< blocks left out in turn for the standard deviations; 0 = none
-    bool analytic = true;                           ///< to first order where the method has a derivative, else anew
+    bool analytic = true;                           ///< by the method's derivative, where it has one
     std::optional<std::pair<double, double>> band;  ///< Hz, of the modes wanted (auto)
-    int decimate = 1;                               ///< auto looks at no higher rate than a so many-th
+    int decimate = 1;                               ///< auto uses no rate above the record's divided by this
     int threads = 0;                                ///< of auto, at a time; 0: all processors
     bool all_modes = false;                         ///< auto lists also what few runs found
     bool modes_without_matrices = false;            ///< auto: what stands in the way of M, K, R is a remark
@@ -41,12 +41,13 @@ struct record_options {
     std::vector<int> sensing;                       ///< okid_sensing_t of each output; empty: all are accelerations
     bool judge_hits = false, keep_all_hits = false; ///< are bad hits sought; are they used nevertheless
     std::string hit_unit;                           ///< of their force
-    mass_plan placed;      ///< of hits: the places struck and those of the sensors, when these are told
-    std::vector<int> hits; ///< where each record was struck, from 1 (-3: at 3, reversed); empty: not told
-    std::function<void(const char* stage)> stage; ///< told what begins; may be empty
+    mass_plan placed;      ///< of hits: the places struck and those of the sensors, when these are given
+    std::vector<int> hits; ///< where each record was struck, from 1 (-3: at 3, reversed); empty: not given
+    std::function<void(const char* stage)> stage; ///< called with what begins; may be empty
 };
 
-/// Of auto: the model that carries a mode, as its rate sees it; what it says when the record has grown is where the mode is then.
+/// Of auto: the model that carries a mode at its rate. Made again when the record has grown, it shows where the mode
+/// is.
 struct mode_carrier {
     int level = -1;                  ///< of record_level; -1: none, or a zoomed band
     okid_identify_config_t config{}; ///< with its order
@@ -68,7 +69,7 @@ struct record_result {
     std::vector<mode_carrier> carriers;    ///< of auto, of each mode
     std::vector<double> scale;             ///< of auto, of each channel: its spread
 
-    /// Fits that nobody has asked for yet.
+    /// Fits that were not asked for yet.
     struct fits_to_come {
         record_set set;             ///< the records less their means
         std::vector<double> states; ///< initial ones, a record after the other
@@ -77,7 +78,7 @@ struct record_result {
     std::unique_ptr<fits_to_come> to_come;
 };
 
-/// Identify from all records together. Throws `failure`: exit 3 when no honest model can be had.
+/// Identify from all records together. Throws `failure`: exit 3 when no reliable model is possible.
 /// Fits of an n4sid model that surely explains its record may be left for finish_fits().
 /// @param before  of auto: what is known of samples before these
 record_result identify_records(record_set records, const record_options& options,

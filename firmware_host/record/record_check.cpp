@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  refuses records no honest model can come from, and says what looks wrong about the others
+// PURPOSE  refuses records that cannot give a reliable model, and reports what looks wrong about the others
 #include "record_check.hpp"
 
 #include "error.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Records no honest model can come from are refused before anything is computed, with the channel named (exit 3).
+// Records that cannot give a reliable model are refused before anything is computed, with the channel named (exit 3).
 #pragma once
 #include "record.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  standard deviations of what is identified from records in memory
-// METHOD   the model without each block, from the sums of lagged products: to first order or identified anew
+// METHOD   the model without each block, from the sums of lagged products: to first order or identified again
 //          (okid/uncertainty.h)
 #include "record_uncertainty.hpp"
 

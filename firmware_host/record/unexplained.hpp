@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rule of account: what the answer does not explain is told.
+// Peaks of power that no mode of the answer explains are reported.
 #pragma once
 #include "modal_model.hpp"
 #include "record_work.hpp"

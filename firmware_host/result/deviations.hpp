@@ -57,7 +57,7 @@ struct mode_shift {
     std::vector<std::complex<double>> shape;
 };
 
-/// The modes of a model, whoever found them; none where it has none.
+/// The modes of a model of any method; none where it has none.
 std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,
                                  int count, int n_y);
 std::vector<mode_shift> modes_in(const okid_model_t& model, double dt);

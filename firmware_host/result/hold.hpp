@@ -31,7 +31,7 @@ struct hold_fit {
 };
 hold_fit fit_hold(const okid_identified_t& model, const std::vector<int>& sensing, const std::string& hold);
 
-/// "zoh", "foh" or "band", told from the model and from whether the force's spectrum falls towards Nyquist.
+/// "zoh", "foh" or "band", found from the model and from whether the force's spectrum falls towards Nyquist.
 std::string tell_hold(const okid_identified_t& model, const std::vector<int>& sensing, bool falls);
 
 /// The same modes with B and D as a held force would have given them.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  the one table of what speaks against modes, and the judgement as okid.result/1 and the modal table hold it
+// PURPOSE  the one table of reasons to doubt a mode, and the judgement as okid.result/1 and the modal table hold it
 #include "mode_verdict.hpp"
 
 #include "json_number.hpp"

@@ -17,7 +17,7 @@ constexpr double doubtful_emac = 0.5; ///< below this a mode seldom belongs to t
 struct mode_verdict {
     bool confident = false;
     double found_in = NAN;        ///< share of the runs that could have seen it and did; NaN for a named method
-    std::vector<std::string> why; ///< codes of what speaks against it
+    std::vector<std::string> why; ///< codes of why it is doubtful
 };
 
 /// What a code of `why` says, as a part of a sentence.

@@ -138,7 +138,7 @@ std::string fit_text(const result_context& context) {
     return out;
 }
 
-/// "n/a" in the width of an indicator.
+/// An indicator with four digits; "-" where it is not known.
 std::string indicator(double value) { return std::isfinite(value) ? fmt::format("{:.4f}", value) : "-"; }
 
 constexpr double widest_damping = 1, widest_frequency = 0.05; // sigma over value, beyond which it is reported

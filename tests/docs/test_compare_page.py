@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""docs/howto/compare-two-tests.md names every key of okid.comparison/1, and nothing else."""
+"""docs/howto/compare-two-tests.md: its Python runs. docs/reference/check-and-bench.md has each key of a comparison."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from typing import Any
 import okid
 import pytest
 from command_help import ROOT
-from reference_tables import documented, keys_of
+from reference_tables import REFERENCE, documented, keys_of, sections
 
 PAGE = ROOT / "docs" / "howto" / "compare-two-tests.md"
+KEYS = sections(REFERENCE / "check-and-bench.md")["okid compare --json"]
 SOURCE = ROOT / "firmware_host" / "compare" / "comparison.cpp"
 
 
@@ -43,7 +44,7 @@ def test_keys_and_codes_both_ways() -> None:
     before, after = results()
     found = okid.compare(before, after).to_dict()
     assert found["pairs"] and found["only_a"] and found["only_b"] and found["warnings"]
-    described = documented(PAGE.read_text())
+    described = documented(KEYS)
     assert set(keys_of(found)) == set(described)
     codes = set(re.findall(r'remarks\.emplace_back\(\s*"(\w+)"', SOURCE.read_text()))
     assert len(codes) >= 3 and codes == set(re.findall(r"`(\w+)`", described["warnings[].code"]))

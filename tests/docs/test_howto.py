@@ -18,6 +18,8 @@ PAGES = {  # how many blocks of commands each has at least
     "long-term-monitoring.md": 3,
     "hammer-test.md": 2,
     "compare-two-tests.md": 3,
+    "arduino-without-force.md": 2,
+    "temperature.md": 0,  # a year of records: with OKID_SLOW=1
 }
 
 

@@ -2,13 +2,14 @@
 """Words of the field in everything a user reads: the odd ones that were found stay out, acronyms are explained.
 
 Read are the prose of all pages, the texts in quotes of the program, the package and the live page, and the comments of
-the public headers.
+the public headers. Of the comments of all sources DIALECT is read too.
 """
 
 from __future__ import annotations
 
 import re
 import subprocess
+import tokenize
 from collections.abc import Iterator
 from functools import cache
 
@@ -50,6 +51,18 @@ ODD = {  # pattern -> what to write
     r"\bit does not serve\b": "it cannot be used",
     r"\btells? nothing\b": "reports nothing",
     r"\bwanders\b": "scatters",
+}
+DIALECT = {  # in comments and docstrings; pattern -> what to write
+    r"\btold\b(?! apart)": "reported, known, given",
+    r"\bwhoever\b": "any reader, every source",
+    r"\banew\b": "again",
+    r"\bmend(?:s|ed)?\b": "fix",
+    r"\bno one's business\b|\bis nobody's\b": "undefined, discarded",
+    r"\bwho they are\b": "keep their identity",
+    r"\b(?:to be|cannot be|can be) had\b": "possible, available",
+    r"\bhonest\b": "reliable",
+    r"\bcomes? to rest\b": "settles",
+    r"\bspeaks? against\b": "why it is doubtful, contradicts",
 }
 ACRONYMS = {  # spelled out where a newcomer meets them first, on the pages they begin with
     "README.md": {
@@ -97,6 +110,34 @@ def of_headers() -> Iterator[tuple[str, str]]:
     for folder in ("lib/include", "drivers/include", "firmware_host/include"):
         for path in sorted((ROOT / folder).rglob("*.h")):
             yield str(path.relative_to(ROOT)), " ".join(re.findall(r"(?:///<?|^/?\s?\*+)(.*)", path.read_text(), re.M))
+
+
+@cache
+def comments() -> tuple[tuple[str, str], ...]:
+    """(where, text) of the comments of C and C++ and of the docstrings and comments of Python."""
+    listed = ["git", "ls-files", "firmware_host", "lib", "drivers", "tools/okid"]
+    out = []
+    for name in subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split():
+        path = ROOT / name
+        if path.suffix in (".c", ".h", ".cpp", ".hpp") and path.exists():
+            kept = re.findall(r"(?m)(?:^|[^:\"])//(.*)$|^\s*/?\*+ (.*)$", path.read_text())
+            out.append((name, "\n".join(a or b for a, b in kept)))
+        elif path.suffix == ".py" and path.exists():
+            with path.open("rb") as file:
+                tokens = list(tokenize.tokenize(file.readline))
+            strings = [token.string for token in tokens if token.type == tokenize.STRING and '"""' in token.string[:5]]
+            out.append((name, "\n".join([t.string for t in tokens if t.type == tokenize.COMMENT] + strings)))
+    return tuple(out)
+
+
+@pytest.mark.parametrize("pattern", DIALECT)
+def test_comments_are_plain(pattern: str) -> None:
+    found = [
+        f"{name}: …{text[max(0, hit.start() - 40) : hit.end() + 20]!r}"
+        for name, text in comments()
+        for hit in re.finditer(pattern, text, re.IGNORECASE)
+    ]
+    assert not found, f"write {DIALECT[pattern]!r}:\n" + "\n".join(found)
 
 
 @pytest.mark.parametrize("pattern", ODD)

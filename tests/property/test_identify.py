@@ -14,7 +14,7 @@ import pytest
 import reference
 import systems
 
-# docs/numerics.md, "Accuracy": frequency and damping, worst over all seeds, W1 p 40 r 80
+# Acceptance: frequency and damping, worst over all seeds, W1 p 40 r 80
 ACCEPTED = {1.0: (3.1e-5, 4.3e-3), 5.0: (1.6e-4, 3.0e-2)}
 
 

@@ -77,10 +77,12 @@ def stacked(browser: Any, page: Path, wanted: tuple[str, ...], name: str) -> str
 def reports() -> list[str]:
     runs.hammer()
     runs.frame()
+    runs.demo()
     runs.bridge()
     (runs.FOLDER / "geometry.toml").write_text(GEOMETRY)
     hammer = runs.report("hammer.json", "--record", "hits.csv", "--geometry", "geometry.toml")
     frame = runs.report("matrices.json", "--record", "frame.csv", "--geometry", "geometry.toml")
+    demo = runs.report("demo.json", "--record", "demo.csv")
     order = runs.report("order.json", "--record", "hits.csv")
     bridge = runs.report("bridge.json", "--events", "bridge.jsonl", "--config", "bridge.toml")
     with chromium() as browser:
@@ -99,6 +101,7 @@ def reports() -> list[str]:
                 },
             ),
             stacked(browser, frame, ("stabilization", "responses"), "report.png"),
+            stacked(browser, demo, ("modes", "responses"), "demo-report.png"),
             *sections(browser, order, {"singular-values": "singular-values.png"}),
             *sections(browser, frame, {"m-k-r": "recipe-matrices.png", "shapes": "recipe-arduino.png"}),
             *sections(browser, bridge, {"tracking": "recipe-bridge.png"}),

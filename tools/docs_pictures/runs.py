@@ -62,6 +62,16 @@ def frame() -> dict[str, Any]:
 
 
 @cache
+def demo() -> dict[str, Any]:
+    """What `make demo` identifies, with the same numbers."""
+    rig = str(ROOT / "tests" / "replay" / "demo_rig.toml")
+    okid("simulate", rig, "--log", "demo.log", "--config", "demo.toml", "--quiet")
+    okid("replay", "demo.log", "-c", "demo.toml", "--json", "demo.json")
+    okid("convert", "demo.log", "demo.csv", "-c", "demo.toml")
+    return read("demo.json")
+
+
+@cache
 def bridge() -> dict[str, Any]:
     """Three days of the bridge recipe."""
     okid("simulate", "bridge_rig.toml", "--log", "bridge.log", "--dbc", "bridge.dbc", "--quiet")

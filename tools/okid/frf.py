@@ -113,7 +113,7 @@ def _runs(data: Real) -> list[tuple[int, int]]:
 
 
 def _segments(data: Real, length: int, step: int) -> list[Real]:
-    """Pieces of `length` complete samples; a missing sample starts the search anew behind it."""
+    """Pieces of `length` complete samples; a missing sample starts the search again behind it."""
     return [data[k : k + length] for first, end in _runs(data) for k in range(first, end - length + 1, step)]
 
 

@@ -66,7 +66,7 @@ def _row(mode: Mode) -> dict[str, Any]:
 
 
 class LiveView(anywidget.AnyWidget):
-    """The picture of a session, drawn anew as that is fed. `seconds` of the newest samples are kept and drawn,
+    """The picture of a session, drawn again as that is fed. `seconds` of the newest samples are kept and drawn,
     `update_s` of stream between two identifications."""
 
     _esm = files("okid").joinpath("web", "notebook.js").read_text(encoding="utf-8")

@@ -43,7 +43,7 @@ class Session:
     it, as far as the structure stands still. `forgetting` fades by that factor a sample, neither keeps everything.
     `codes` 16, 24 or 32 takes ADC codes with `scale` and `offset` (value = scale code + offset, one for all channels or
     one each), 0 real numbers. `sigma`, `sigma_blocks`: ± as in okid.identify().
-    `restart_on_change`: once the modes have come to rest at three calls of modes() in a row, a change of the structure
+    `restart_on_change`: once the modes have settled at three calls of modes() in a row, a change of the structure
     makes a window or a fading memory forget what was before. `input_dofs`, `output_dofs`, `sensing`, `hold`: as in
     okid.identify(), for M, K and R.
     `refine`: maximum likelihood, "auto" of method "auto". Of a named method True or "auto" (where the search ends):
@@ -162,7 +162,7 @@ class Session:
 
     @property
     def settled(self) -> bool:
-        """Had the modes come to rest at the last call of modes(), as `okid run` tells it?"""
+        """Had the modes settled at the last call of modes(), as `okid run` reports it?"""
         return bool(self._stream.counts().settled)
 
     @property
@@ -226,7 +226,7 @@ class Session:
 
     def modes(self) -> list[Mode]:
         """The modes by now, with ± when there are enough blocks: an update of `okid run`. [] while there are too few
-        samples, or no model is to be had yet (identify() says why). Cost: one identification, a short one a block."""
+        samples, or no model is possible yet (identify() says why). Cost: one identification, a short one a block."""
         found = self._stream.update()
         about: dict[str, Any] = {"modes": [], "samples": 0} if found is None else found.about()
         self._basis = int(about["samples"])
@@ -235,14 +235,14 @@ class Session:
     def identify(self) -> Result:
         """Everything the samples tell by now: model, modes, M, K and R where degrees of freedom are given, warnings.
 
-        The record is not kept: model.x0 and the fits are None. Raises IdentificationError when no model is to be had.
+        The record is not kept: model.x0 and the fits are None. Raises IdentificationError when no model is possible.
         """
         return Result.of_host(self._stream.identify())
 
     def to_bytes(self) -> bytes:
         """The sums, for a file or another machine: what okid.Accumulator.to_bytes() gives, behind rate and channels and
         with a check sum over all; of method auto the samples. Without the blocks for ±.
-        With `refine` the correlation sums too; InputError while no model has told how far these look back."""
+        With `refine` the correlation sums too; InputError while no model has shown how far these look back."""
         return self._stream.state()
 
     def restore(self, state: bytes) -> None:

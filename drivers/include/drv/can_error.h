@@ -10,7 +10,7 @@
 extern "C" {
 #endif
 
-/// Book one error message under its classes; `counts->last_error` says in words what it told.
+/// Book one error message under its classes; `counts->last_error` has its meaning in words.
 /// @param data  8 bytes
 void drv_can_error_count(drv_stats_t* counts, uint32_t id, const uint8_t* data);
 

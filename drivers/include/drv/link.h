@@ -13,7 +13,7 @@ extern "C" {
 
 /// State of a CAN controller by its error counters; unknown for virtual interfaces.
 typedef enum drv_bus_state_t {
-    DRV_BUS_UNKNOWN, ///< not told
+    DRV_BUS_UNKNOWN, ///< not known
     DRV_BUS_ACTIVE,  ///< all well
     DRV_BUS_WARNING, ///< an error counter is above 95
     DRV_BUS_PASSIVE, ///< above 127: it no longer marks errors of others
@@ -34,12 +34,12 @@ typedef struct drv_link_t {
     uint8_t up;                 ///< 1 = administratively up
     uint8_t running;            ///< 1 = can carry frames now (0 after bus-off)
     uint8_t gone;               ///< 1 = this message says that the interface was removed
-    uint8_t has_can_data;       ///< 1 = the fields from `state` on were told by the driver
+    uint8_t has_can_data;       ///< 1 = the driver reported the fields from `state` on
     int32_t mtu;                ///< 16 classic, 72 FD
     uint32_t tx_queue;          ///< frames the send queue holds (txqueuelen)
     drv_bus_state_t state;      ///< of the controller
     uint8_t listen_only;        ///< 1 = sends nothing, not even acknowledgements
-    uint8_t has_error_counters; ///< 1 = the next two were told
+    uint8_t has_error_counters; ///< 1 = the driver reported the next two
     uint16_t tx_errors;         ///< error counter of the controller now
     uint16_t rx_errors;         ///< error counter of the controller now
     uint32_t bitrate;           ///< bit/s, 0 = not set
@@ -75,7 +75,7 @@ int drv_link_read(const char* interface, drv_link_t* out);
 /// A socket that becomes readable whenever an interface of this machine comes, goes or changes. @return fd or -errno
 int drv_link_watch(void);
 
-/// Empty such a socket. @return 1 when the interface named was told of (or messages were lost), with its newest state in
+/// Empty such a socket. @return 1 when it held news of the interface named (or lost messages), with its newest state in
 /// `out` (out->index = 0 when that is not known: read it), else 0
 int drv_link_changes(int fd, const char* interface, drv_link_t* out);
 

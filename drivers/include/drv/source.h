@@ -65,7 +65,7 @@ typedef struct drv_source_config_t {
 
 /// How frames were stamped, best last.
 typedef enum drv_stamp_t {
-    DRV_STAMP_NONE,    ///< not told
+    DRV_STAMP_NONE,    ///< not known
     DRV_STAMP_US,      ///< by the kernel, microseconds
     DRV_STAMP_NS,      ///< by the kernel, nanoseconds
     DRV_STAMP_HARDWARE ///< by the controller
@@ -99,7 +99,7 @@ typedef struct drv_stats_t {
     uint64_t line_overruns; ///< serial line: bytes lost in the hardware or the kernel, in lost_driver too
     uint64_t line_errors;   ///< serial line: bytes with a framing or parity error, as from a wrong baud rate
     drv_stamp_t stamp;      ///< how frames were stamped
-    drv_bus_state_t state;  ///< of the controller, as last told
+    drv_bus_state_t state;  ///< of the controller, as last reported
     uint32_t restart_ms;    ///< of the interface; 0 = it stays off after bus-off, or is virtual
     uint32_t bitrate;       ///< of the interface, bit/s; 0 = virtual
     /// socket: bound to this one now or last, "" = a source of another kind

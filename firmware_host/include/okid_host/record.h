@@ -15,7 +15,7 @@ extern "C" {
 /** A result, of a record or of a stream. It holds all its numbers itself. */
 typedef struct okid_host_result okid_host_result_t;
 
-/** Told what begins, in the thread of the call. */
+/** Called with the name of each stage that begins, in the thread of the call. */
 typedef void (*okid_host_stage_t)(void* context, const char* stage);
 
 /**

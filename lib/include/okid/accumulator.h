@@ -72,7 +72,7 @@ static inline okid_accumulator_config_t okid_accumulator_defaults(int32_t n_u, i
 /// Counts since create or reset.
 typedef struct okid_accumulator_stats_t {
     int64_t samples;   ///< samples absorbed, missing ones not counted
-    int64_t missing;   ///< samples missing (NaN, infinite, or told by okid_accumulator_gap)
+    int64_t missing;   ///< samples missing (NaN, infinite, or given by okid_accumulator_gap)
     int64_t gaps;      ///< runs of missing samples that broke a run
     int64_t saturated; ///< codes at full scale
     int64_t rows;      ///< regression rows now in the sums (window: of the window); each run gives its samples less p

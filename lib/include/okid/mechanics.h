@@ -94,7 +94,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_mechanics_c2d(const okid_model_t* con
                                                          size_t bytes);
 
 /// Continuous model of a discrete one, pole by pole: lambda = log(mu)/dt, the principal logarithm. C does not change.
-/// What was above half the sample rate when the samples were taken cannot be told from its alias below: the model
+/// What was above half the sample rate when the samples were taken looks like its alias below: the model
 /// returned is the one whose poles all have |Im lambda| < pi/dt. 30 n_z^3 flop.
 /// @param discrete  in, A, B, C, D (C may be NULL for the zero hold; K is not read)
 /// @param A, B, D   out, n_z x n_z, n_z x n_u, n_y x n_u

@@ -68,7 +68,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_replicates_create(okid_replicates_t**
 /// Restart from the model that everything is compared with: its modes, and its M, K, R where they are wanted.
 /// @param full  in, A, C, and for M, K, R also B, D (K is not read); n_u, n_y as configured, 1 <= n_z <= configured
 /// @param dt    s
-/// @return OKID_OK; OKID_WARN_MODEL: M, K, R of this model cannot be had, there will be no deviation of them;
+/// @return OKID_OK; OKID_WARN_MODEL: this model has no M, K, R, so they get no deviation;
 ///         OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_NUMERIC (no modes either: add() will only count)
 OKID_NODISCARD OKID_API okid_status_t okid_replicates_begin(okid_replicates_t* self, const okid_model_t* full,
                                                             double dt);

@@ -3,7 +3,7 @@
 // METHOD     samples less a constant c keep the shift structure: S_b - g_0 c^T - c g_b^T + N c c^T, edge Gram
 //            E - e c^T - c e^T, edge sums as they are. Codes: everything is counted in 2^-8 codes from then on, c is the
 //            mean rounded to that, so that nothing is rounded again
-// REFERENCE  docs/numerics.md, offsets without a second pass
+// REFERENCE  docs/numerics.md, central idea: offsets
 // NUMERICS   codes: exact; what is left of a mean is below 2^-9 code
 // WORKSPACE  none; O((m p)^2)
 #include "accumulator.h"

@@ -4,7 +4,7 @@
 //            stand in the upper triangle, the low ones in the lower. The lag-row sums g stand on the diagonal meanwhile; its own
 //            entries are walked last. Centring of codes: with c the mean rounded to a code and r = g - N c the small rest,
 //            G - g g^T/N = (G - N c c^T - r c^T - c r^T) - r r^T/N, the bracket in integers
-// REFERENCE  docs/numerics.md, shift structure and offsets
+// REFERENCE  docs/numerics.md, central idea
 // NUMERICS   codes: one rounding an entry; doubles: a few eps of the largest entry of the diagonal
 // WORKSPACE  none beside the caller's matrix
 #include "accumulator.h"

@@ -41,7 +41,7 @@ double okid_spectrum_energy(int32_t m, const int16_t* codes, int32_t count);
 typedef void okid_spectrum_absorb_fn(const spectrum_plan_t* plan, double* memory, const double* history,
                                      const int16_t* codes, const double* numbers, int32_t count);
 
-/// Bring out the sums S (m x m(p+1), row-major, as the direct kernel orders them) and begin anew: of codes written as exact
+/// Bring out the sums S (m x m(p+1), row-major, as the direct kernel has them), start over: of codes written as exact
 /// integers, else added to what stands there.
 typedef void okid_spectrum_flush_fn(const spectrum_plan_t* plan, double* memory, double* sums, int of_codes);
 

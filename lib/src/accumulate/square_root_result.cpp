@@ -2,7 +2,7 @@
 // PURPOSE    Gram matrix and triangular factor in engineering units from a square-root accumulator
 // METHOD     value = scale (sample + reference) + offset changes the first row of the factor only; the mean is removed by
 //            leaving that row out, or put in by Givens rotations; R^T R by panels of rows
-// REFERENCE  docs/numerics.md, offsets without a second pass
+// REFERENCE  docs/numerics.md, central idea: offsets
 // NUMERICS   a few eps of okid_real_t; products and units in double
 // WORKSPACE  9 n doubles in the block; 2/3 N^3 flop for the Gram matrix, O(N^2) for the factor
 #include "accumulate/square_root.hpp"

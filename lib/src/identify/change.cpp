@@ -8,7 +8,7 @@
 // REFERENCE  Basseville, Abdelghani, Benveniste (2000); Doehler, Mevel, Hille (2014), robustness to the excitation;
 //            Nel, van der Merwe (1986) with Krishnamoorthy, Yu (2004), the degrees of freedom
 // NUMERICS   channels are scaled to unit rms in the baseline; Gram matrices: condition squared, errors near 1e-8 of the space,
-//            far below the noise that any data have. First order in G: shifts of some 5 % are told too small or too large
+//            far below the noise that any data have. First order in G: shifts of some 5 % are too small or too large
 // WORKSPACE  (blocks + 2) (2 i m)^2 doubles; per test some (i m)^3 flop, and 4 (2 i m)^2 a block and mode
 #include "change.hpp"
 

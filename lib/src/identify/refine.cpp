@@ -281,7 +281,7 @@ bool advance(okid_refine& s, const okid::refine_records& records, double& mu) {
     return false;
 }
 
-/// Steps until nothing is to be had any more.
+/// Steps until there is no more gain.
 void improve(okid_refine& s, const okid::refine_records& records, okid_refined_t& out) {
     const int most = s.config.iterations > 0 ? s.config.iterations : 30;
     double mu = 0;

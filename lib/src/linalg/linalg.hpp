@@ -2,7 +2,7 @@
 // PURPOSE    the one seam between the library and its linear algebra; two backends of the same shape
 //            (linalg_lapacke.cpp for hosts, linalg_eigen.cpp for fixed memory without LAPACK)
 // RULES      column-major, caller's memory, no heap after warm_up(), no exceptions; int results: 0 ok, else the failure.
-//            Real is double or float, told by the pointers. Every build has all of it for okid_real_t, and what the
+//            Real is double or float, after the pointers. Every build has all of it for okid_real_t, and what the
 //            normal equations need (multiply, cholesky…) for double
 #pragma once
 #include <okid/types.h>
@@ -27,7 +27,8 @@ const char* name();
 /// Anything the backend allocates once (BLAS buffers, thread count 1) happens here, in create, not later.
 void warm_up();
 
-/// A (n x n, lower triangle) -> L with A = L L^T; what then stands above the diagonal is no one's business. @return 0, or the 1-based column whose pivot is not positive
+/// A (n x n, lower triangle) -> L with A = L L^T; then the upper triangle is undefined.
+/// @return 0, or the 1-based column whose pivot is not positive
 template <class Real> int cholesky(int n, Real* a, int lda);
 
 /// B <- A^-1 B with the factor of cholesky(); b is n x count.

@@ -36,7 +36,7 @@ def _local(workers: int, memory_mb: float, folder: str) -> Any:
     from distributed import LocalCluster
     from distributed.security import Security
 
-    # Whoever can speak to a scheduler runs code as its owner: other users of this computer have no certificate.
+    # Anyone who can speak to a scheduler runs code as its owner: other users of this computer have no certificate.
     security = Security.temporary()  # type: ignore[no-untyped-call]
     single = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
     with _deaf():
@@ -77,7 +77,7 @@ def connected(workers: int, address: str | None, memory_mb: float) -> Iterator[A
         "distributed.core",
         "distributed.comm",
     ):
-        logging.getLogger(noisy).setLevel(logging.CRITICAL)  # what happens to records is told by the campaign itself
+        logging.getLogger(noisy).setLevel(logging.CRITICAL)  # the campaign reports itself what happens to records
     with dask.config.set(settings):
         if address is not None:
             try:

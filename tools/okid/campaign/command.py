@@ -157,7 +157,7 @@ def _run(args: argparse.Namespace, written: str) -> int:
         folder=Path(args.out) if args.out else spec.folder,
     )  # fmt: skip
     if spec.identification.method != "auto":
-        make_identifier(spec)  # sizes the library does not take are told before any work
+        make_identifier(spec)  # sizes that the library refuses are reported before any work
     outcome = run_campaign(spec)
     tables = make_tables(spec, outcome)
     write_tables(spec.folder, tables)

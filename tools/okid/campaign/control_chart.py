@@ -119,7 +119,7 @@ class _Chart:
     def add(self, white: Real, far: Any = False) -> tuple[Real, Real]:
         """T^2 (...,) of groups in a row, of the mean.
 
-        A far group waits, and so does an unusual one behind it (with at most one between), until there are enough.
+        An outlying group waits, so does an unusual one behind it (with at most one between), until there are enough.
         """
         single = np.sum(white**2, axis=-1)
         far = far | (single > self._far)

@@ -80,7 +80,7 @@ def look_at_slice(spec: CampaignSpec, piece: Slice) -> SliceDone:
 
 
 def sum_slice(spec: CampaignSpec, piece: Slice) -> tuple[SliceDone, Collector]:
-    """Read every record of a slice once, one at a time; one that cannot be used is left out and told."""
+    """Read every record of a slice once, one at a time; one that cannot be used is left out and reported."""
     lags = make_identifier(spec).lags
     into, done, refining = Collector(spec, lags), SliceDone(GroupSums(piece.group, lags)), Refining(spec)
     for ref in piece.records:
@@ -103,7 +103,7 @@ def sum_slice(spec: CampaignSpec, piece: Slice) -> tuple[SliceDone, Collector]:
 
 
 def _keeps_parts(spec: CampaignSpec, sums: GroupSums, parts: Sequence[Accumulator]) -> bool:
-    """Are all parts worth their place on the disk? Their size is told by the first one, so that not all are packed."""
+    """Are all parts worth their place on the disk? The first one shows their size, so that not all are packed."""
     if spec.keep != "auto" or sums.merged:
         return spec.keep == "parts" or sums.merged
     return _KEPT * len(parts) * len(pack(parts[0])) <= sum(int(record["bytes"]) for record in sums.records)

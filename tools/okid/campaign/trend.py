@@ -21,7 +21,7 @@ WATCHED = 0.5  # share of the training groups it must be in to be watched
 BLURRED = 5.0  # times the usual sigma: such a value is not used
 _YEAR_S = 365.25 * 86400.0
 _NAMED = 5
-_SURE = 0.01  # probability without a change below which a change point is told
+_SURE = 0.01  # probability without a change below which a change point is reported
 _SPARE = 8  # training groups of a mode beyond the numbers that are fitted
 
 

@@ -98,7 +98,7 @@ def _filters(columns: Real, fs_hz: float, forces: int) -> tuple[Real, Real]:
 
 def _record(year: Year, columns: Real, number: int) -> Real:
     """One record (samples, 4): force at the first storey and accelerations, with noise; ambient: forces at all storeys,
-    of which the first is told."""
+    of which the first one is in the record."""
     from scipy.signal import lfilter  # takes a second to load, which every call of okid-campaign would pay
 
     forces = 3 if year.ambient else 1

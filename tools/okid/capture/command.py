@@ -37,6 +37,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signal.signal(number, handler)
     try:
         sys.stdout.flush()
-    except OSError:  # whoever read our lines has gone: nothing is flushed at the end either
+    except OSError:  # the reader of our lines has gone: nothing is flushed at the end either
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return code

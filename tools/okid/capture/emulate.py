@@ -20,7 +20,7 @@ from okid.capture.pacing import Pacer
 from okid.capture.sources import feed_messages
 from okid.capture.stream import Capture
 
-_FULL_S = 5.0  # a full queue is waited for so long
+_FULL_S = 5.0  # a full queue is waited for this long
 _PACKET_S = 5e-3
 _LONGEST = 1024 + 1024 // 254 + 2  # bytes of a packet on the wire
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The end of a run, whatever ended it: what is told, the exit code."""
+"""The end of a run, whatever ended it: what is printed, the exit code."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def make_capture(config: CaptureConfig, args: Any, live: bool) -> Capture:
 
 
 def end(capture: Capture, args: Any, lines: Callable[[], list[str]], fault: str | None) -> int:
-    """The result of what came; `fault` of the device is told last and decides the exit code. `lines`: the counts."""
+    """The result of what came; `fault` of the device is printed last and decides the exit code. `lines`: the counts."""
     code = EXIT_DONE
     try:
         capture.finish()
@@ -97,7 +97,7 @@ def end(capture: Capture, args: Any, lines: Callable[[], list[str]], fault: str 
     if not args.quiet and "-" not in (args.json, args.events):
         try:
             print("\n".join(lines()), flush=True)
-        except OSError:  # whoever read our lines has gone
+        except OSError:  # the reader of our lines has gone
             args.quiet = True
     if fault is not None:
         kept = "what came before is in the result" if code == EXIT_DONE else "what came before gives no model"

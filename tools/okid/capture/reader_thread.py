@@ -35,7 +35,7 @@ class ReaderThread(Generic[Item]):
                     return
             try:
                 item = self._read(0.0 if self._end.is_set() else self._poll_s)
-            except Exception as fault:  # whatever the device's library raises is told to the reader of the items
+            except Exception as fault:  # whatever the device's library raises is handed to the reader of the items
                 self._fault = fault
                 self._some.set()
                 return

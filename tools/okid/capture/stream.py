@@ -282,7 +282,7 @@ class Capture:
     def finish(self) -> dict[str, Any] | None:
         """The stream ends: the last samples can be taken. Returns okid.result/1, None without identification.
 
-        Raises IdentificationError when no model can be had.
+        Raises IdentificationError when no model is possible.
         """
         host.call("capture_finish", self._open())
         self._told = self.events()

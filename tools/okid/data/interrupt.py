@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ctrl-C at any time: one line, exit code 130, and nothing is written any more, whoever swallows the exception."""
+"""Ctrl-C at any time: one line, exit code 130, and nothing is written any more, even if the exception is swallowed."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 """An HDF5 file opened for reading that stands alone: nothing in it leads to another file, and its size is bounded.
 
 HDF5 can keep the numbers of a dataset in any file of the computer (external storage), link to objects of other files
-and make datasets of pieces of them (virtual datasets). Whoever gives away such a file chooses what is read here.
+and make datasets of pieces of them (virtual datasets). The author of such a file would choose what is read here.
 """
 
 from __future__ import annotations

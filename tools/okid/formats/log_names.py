@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which files are logs of CAN frames, told without python-can (which takes a second to load)."""
+"""Which files are logs of CAN frames, without python-can (which takes a second to load)."""
 
 from __future__ import annotations
 

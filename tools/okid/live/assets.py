@@ -35,7 +35,7 @@ class Asset(NamedTuple):
 
 
 class Assets:
-    """The page's own files, read anew for each request, and plotly.js of the installed package, packed once."""
+    """The page's own files, read again for each request, and plotly.js of the installed package, packed once."""
 
     def __init__(self) -> None:
         self._plotly: Asset | None = None

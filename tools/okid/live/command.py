@@ -85,7 +85,7 @@ def _run(args: argparse.Namespace, stop: threading.Event) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of okid-live; exit codes: 0 ended by Ctrl-C or SIGTERM, 2 wrong usage, 4 address not to be had."""
+    """Entry point of okid-live; exit codes: 0 ended by Ctrl-C or SIGTERM, 2 wrong usage, 4 address not available."""
     args = _parser().parse_args(arguments)
     stop = threading.Event()
 

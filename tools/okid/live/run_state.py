@@ -103,7 +103,7 @@ class RunState:
         return fresh
 
     def _moment(self, event: dict[str, Any]) -> float:
-        """When it happened, s: the sample where it names one, else when it was told."""
+        """When it happened, s: the sample where it names one, else when it was reported."""
         if self.rate_hz and isinstance(event.get("sample"), int):
             return float(event["sample"]) / self.rate_hz
         return float(event.get("t", self.t))

@@ -54,7 +54,7 @@ def host_of(header: str) -> str:
 
 
 class PageServer(ThreadingHTTPServer):
-    """Serves the page of one Session on an address. Raises OSError when the address cannot be had."""
+    """Serves the page of one Session on an address. Raises OSError when the address is not available."""
 
     daemon_threads = True
     block_on_close = False

@@ -12,7 +12,7 @@ class Tracks:
     """The last updates in full, older ones at ever larger steps: at most `most` updates.
 
     `updates`: {"n": number, "t": s, "settled": bool, "modes": [[track, f, std_f, zeta, std_zeta, alarm], ..]}, a
-    missing deviation is None. `generation` changes when older ones were thinned out: who copies begins anew then.
+    missing deviation is None. `generation` changes when older ones were thinned out: then copies are made again.
     """
 
     def __init__(self, most: int = MOST) -> None:

@@ -46,7 +46,7 @@ class VirtualSensors:
     one and the same: NaN.
 
     `force_std`: the inputs of the model are not measured but estimated (joint input-state): random forces of this
-    standard deviation (one or n_u) whose spectrum falls off above `force_hz`; as many as sensors at most can be told.
+    standard deviation (one or n_u) whose spectrum falls off above `force_hz`; no more than there are sensors.
 
     >>> import numpy as np, okid
     >>> force, y = okid.demo_record()

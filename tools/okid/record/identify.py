@@ -62,7 +62,7 @@ def identify(
     u (N, n_u) or (N,), y (N, n_y) or (N,) at `fs` Hz, or lists of such arrays: several records, merged exactly, each
     centred by itself. float64, float32, int16 and int32 are read where they stand, with any strides. Frames of pandas
     give the channels their names. NaN (or masked) = missing sample: the regression leaves it out and re-arms, nothing
-    is interpolated; the fits and model.x0 are those of the record less its own mean (or line) and start anew after
+    is interpolated; the fits and model.x0 are those of the record less its own mean (or line) and start again after
     missing inputs. The arrays are never modified.
     `method` "auto": the modes that several methods, horizons and rates agree on, each with mode.confident, .found_in
     and .why (docs/how-okid-decides.md); the doubtful ones are listed with them. Or one method: "okid-era",
@@ -86,12 +86,12 @@ def identify(
     (one a channel, inputs first). Every degree of freedom needs a force or a sensor, one needs both.
 
     `refine` True ("yes"): improve the model by maximum likelihood, with noise at the sensors to the Cramér-Rao bound
-    (result.refinement; a warning refine_failed when nothing was to be had). Needs u. Of a named method with degrees of
+    (result.refinement; a warning refine_failed when it was rejected). Needs u. Of a named method with degrees of
     freedom also the delay of every output (result.skew), which is taken out of M, K and R. "auto", the default of
-    method "auto": where the residuals are nearly white and all modes stay who they are. "no" (False): not.
+    method "auto": where the residuals are nearly white and all modes keep their identity. "no" (False): not.
 
     `sigma`: standard deviations, "analytic" (default: the derivative of the method along each of `sigma_blocks` blocks
-    of the record, 8 to 100, default 20), "jackknife" (identified anew without each block, 3 to 20 identifications;
+    of the record, 8 to 100, default 20), "jackknife" (identified again without each block, 3 to 20 identifications;
     also where a method has no derivative: docs/numerics.md) or "none". `sigma_blocks` alone: jackknife, 0 = none.
 
     Of "auto" and "plscf": `band` (low, high) in Hz where modes are sought; `modes` the numbers, from 1, of the listed
@@ -102,7 +102,7 @@ def identify(
     own, and shapes cover the places (result.shape_dofs), with `output_dofs` those of the sensors too. Bad hits (a
     double hit, an overload ..) are left out: result.hits; `keep_all` uses them. M, K, R where each place has a mode.
 
-    Raises InputError (a wrong argument) or IdentificationError (no honest model from these data).
+    Raises InputError (a wrong argument) or IdentificationError (no reliable model from these data).
 
     >>> import okid
     >>> force, acceleration = okid.demo_record()

@@ -21,7 +21,7 @@ from okid.identification import host_result
 from okid.result.comparison import text_and_name
 from okid.result.result import Result
 
-_said: list[str] = []  # old names that have told what replaces them
+_said: list[str] = []  # old names for which a replacement was named already
 
 
 def identify_setups(

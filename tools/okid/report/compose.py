@@ -100,7 +100,7 @@ def build(
     hammer test, by the names of the files; records that were merged. Without one the hits that the result names are
     read, where all their files are beside `source` or here. `events`: JSON lines of the run; `geometry`, `config`:
     CONFIG.toml; `compare`: the file of an earlier result; `source`: the file of the result, named in the provenance;
-    `written`: when and by what, None = not told.
+    `written`: when and by what, None = left out.
     Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
     """
     m = Material(result)

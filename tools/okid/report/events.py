@@ -30,7 +30,7 @@ class Events:
     """tracks: updates of each mode by its number. start, stats: the first and last event of their kind, or None.
 
     alarms (t of the beginning, t of the end or None, text); changes: t of each; gaps: missing samples by channel and
-    cause; bus: t, name, event and text of what the buses told; updates: how many.
+    cause; bus: t, name, event and text of what the buses reported; updates: how many.
     """
 
     source: str

@@ -56,7 +56,7 @@ class Measured:
     factor (n_y,): simulation over record, NaN = not comparable; converted: what was said of units that were made SI;
     simulated: the responses of the simulated outputs, estimated as frf is (of measured responses: synthesised); rows:
     None = no diagram; fit: None = that of the result stands; struck: of a hammer test in files; own_modes: what the
-    responses give by themselves, None = nobody has looked.
+    responses give by themselves, None = not computed.
     """
 
     frf: Frf | None
@@ -100,7 +100,7 @@ def channels_of(result: Loaded, record: Record, source: str, names: list[str] | 
 
 
 def _poles(result: Loaded, u: Real, y: Real, source: str) -> Stabilization:
-    """The poles over all orders, identified anew with the settings of the result, of "auto" by okid-era. Errors name
+    """The poles over all orders, identified again with the settings of the result, of "auto" by okid-era. Errors name
     `source` and channel."""
     raw = result.raw
     method = str(raw.get("method", "okid-era"))

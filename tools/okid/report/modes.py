@@ -64,7 +64,7 @@ def _table(modes: Sequence[dict[str, Any]], shown: Sequence[int], sure: bool) ->
 
 
 def against(mode: dict[str, Any]) -> str:
-    """The codes of what speaks against a mode, with their words."""
+    """The codes of why a mode is doubtful, with their words."""
     codes = [str(code) for code in mode.get("why") or ["noise_shape"]]
     texts = [str(text) for text in mode.get("why_text") or ()]
     return (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a file is that was given in the place of another: told by a look at its beginning, with what to do."""
+"""What a file is that was given in the place of another: by a look at its beginning, with what to do."""
 
 from __future__ import annotations
 

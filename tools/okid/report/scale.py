@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Is the record in the units of the model? Factors between the two, and known units made SI where that mends it."""
+"""Is the record in the units of the model? Factors between the two, and known units made SI where that fixes it."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ def _same(one: Path, other: Path) -> bool:
 
 
 def check_place(target: Place, option: str, kind: str = ".html") -> None:
-    """OSError when `target` is a folder, or its own is absent or shut: told before any work, with what to do.
+    """OSError when `target` is a folder, or its own is absent or shut: before any work, with what to do.
 
     `option`: by what the user names another place; `kind` as in check_target().
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The result in one line, what speaks against it in a second one, and in a third what was not looked at."""
+"""The result in one line, reasons to doubt it in a second one, and in a third what was not looked at."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _data_doubts(m: Material) -> list[str]:
 
 
 def _doubts(m: Material) -> str:
-    """Everything that speaks against the result, "" when nothing does."""
+    """Every reason to doubt the result, "" when nothing does."""
     first = [*foreign_doubts(m), rate_doubt(m)]
     if not m.result.raw["modes"]:
         first.append("the singular values and the record")
@@ -150,7 +150,7 @@ def _looked_at(m: Material) -> tuple[list[str], dict[str, list[str]]]:
 
 
 def verdict(m: Material) -> str:
-    """The result, what speaks against it, and what was not looked at."""
+    """The result, reasons to doubt it, and what was not looked at."""
     doubts, (seen, unseen) = _doubts(m), _looked_at(m)
     last = f"Look at: {doubts}." if doubts else f"No quality warning in what was checked: {', '.join(seen)}."
     text = f"<p>{escape(headline(m))}</p>\n<p>{escape(last)}</p>"

@@ -50,7 +50,7 @@ class Mode(NamedTuple):
     stood at a place that was struck. shape / sqrt(modal_mass) is mass-normalised.
 
     confident: an expert would sign it; found_in: share of the runs of "auto" that could have seen it and did; why:
-    codes of what speaks against it, why_text the same in words. None: not judged, or by EMAC alone (found_in of a
+    codes of why it is doubtful, why_text the same in words. None: not judged, or by EMAC alone (found_in of a
     named method). Entries of outputs that were left out (remark "screened") are NaN.
     """
 
@@ -122,7 +122,7 @@ class Fit(NamedTuple):
 
 
 class Warning(NamedTuple):
-    """What speaks against a valid result, or has to be known of it."""
+    """A reason to doubt a valid result, or a fact that its reader must know."""
 
     code: str
     text: str
