@@ -51,7 +51,8 @@ column_kind kind_of_column(const std::string& name) {
         if (small.find(word) != std::string::npos) return column_kind::force;
     const std::string begin = small.substr(0, small.find_last_not_of("0123456789 _xyz+-.") + 1);
     if (begin == "f") return column_kind::force;
-    for (const char* word : {"a", "acc", "accel", "acceleration", "v", "vel", "velocity", "disp", "displacement", "out"})
+    for (const char* word :
+         {"a", "acc", "accel", "acceleration", "v", "vel", "velocity", "disp", "displacement", "out"})
         if (begin == word) return column_kind::response;
     return column_kind::unknown;
 }
@@ -271,9 +272,10 @@ void add_identify(CLI::App& app) {
     auto given = std::make_shared<identify_arguments>();
     CLI::App* command = app.add_subcommand("identify", "Identify modes and a model from measured CSV records");
     command
-        ->add_option("records", given->records,
-                     "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4, "
-                     ".tdms, .h5, .parquet, .wav, .flac, .mcap, .lvm)")
+        ->add_option(
+            "records", given->records,
+            "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4, "
+            ".tdms, .h5, .parquet, .wav, .flac, .mcap, .lvm)")
         ->required()
         ->type_name("RECORD.csv");
     command->add_option("--inputs", given->inputs, "force columns, with commas between; none = ambient: modes only")
@@ -319,6 +321,12 @@ void add_identify(CLI::App& app) {
                       "the table also lists the doubtful modes, and why they are doubtful");
     command->add_option("--modes", given->wanted.modes, "only these modes, by their numbers in the table (auto, plscf)")
         ->type_name("1,3-5");
+    command
+        ->add_option(
+            "--picks", given->wanted.picks,
+            "only the modes nearest to these poles, picked by hand: frequencies in Hz, or a .json with modes, as "
+            "a report or an earlier result has them (auto)")
+        ->type_name("FILE.json|HZ,HZ");
     command->add_option("--detrend", given->wanted.detrend, "what is removed from every channel first (default mean)")
         ->type_name("none|mean|linear");
     command
@@ -357,8 +365,10 @@ void add_identify(CLI::App& app) {
         "improve the model by maximum likelihood: with noise at the sensors no unbiased estimate is more exact. "
         "Needs --inputs. --refine=auto, the default of method auto: if the noise is white and every mode keeps its "
         "identity; --refine=no");
-    command->add_flag("--stabilization", given->wanted.stabilization,
-                      "look at all orders and three horizons too, and list the stable modes (JSON: \"stabilization\")");
+    command->add_flag(
+        "--stabilization", given->wanted.stabilization,
+        "look at all orders and three horizons too, and list the stable modes (JSON: \"stabilization\"); with --method "
+        "auto: the poles of all its runs (JSON: \"agreement\")");
     command
         ->add_option("--sigma", given->wanted.sigma,
                      "standard deviations: analytic (default; the method's derivative along each block of the record), "

@@ -128,11 +128,6 @@ struct member {
     double rank; // best first
 };
 
-bool in_band(const consensus_run& run, double f) {
-    const double share = run.zoom().folded(f) / run.fs_hz;
-    return share < run.top && share >= run.bottom;
-}
-
 /// Every track of every run, those that can be seen first, the steady and long ones before the others.
 std::vector<member> ranked(const std::vector<consensus_run>& runs) {
     std::vector<member> out;
@@ -422,6 +417,11 @@ void link_tracks(consensus_run& run) {
             static_cast<double>(poles.size()) >= share_of_orders * static_cast<double>(possible))
             run.tracks.push_back(track_of(poles));
     }
+}
+
+bool in_band(const consensus_run& run, double frequency_hz) {
+    const double share = run.zoom().folded(frequency_hz) / run.fs_hz;
+    return share < run.top && share >= run.bottom;
 }
 
 bool can_see(const consensus_run& run, double frequency_hz) {

@@ -62,6 +62,7 @@ struct consensus_mode {
     std::vector<std::complex<double>> shape;
     std::vector<std::pair<int, int>> members; ///< run, track
     std::vector<std::string> why;             ///< codes of why it is doubtful; empty: confident
+    bool picked = false;                      ///< by hand
     bool confident() const { return why.empty(); }
 };
 
@@ -73,6 +74,9 @@ void collect_poles(okid_identify_t* identifier, okid_identified_t& model, consen
 
 /// Link the poles of a run over its orders.
 void link_tracks(consensus_run& run);
+
+/// Is the frequency inside the band of this run?
+bool in_band(const consensus_run& run, double frequency_hz);
 
 /// Can this run see a mode at f Hz: in its band, and with at least three quarters of a period in its horizon (of more than
 /// three outputs together: less)?

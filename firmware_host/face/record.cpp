@@ -33,6 +33,7 @@ asked read_record(const char* text) {
     places.texts.emplace_back("start", &out.request.start);
     places.texts.emplace_back("band", &out.request.band);
     places.texts.emplace_back("decimate", &out.request.decimate);
+    places.texts.emplace_back("picks", &out.request.picks);
     places.texts.emplace_back("modes", &out.request.modes);
     places.texts.emplace_back("threads", &out.request.threads);
     places.texts.emplace_back("hit_dofs", &out.request.hit_dofs);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  measured records in, one identified model out: detrending, exact merging, initial states, fit
 #pragma once
+#include "picks.hpp"
 #include "record_set.hpp"
 #include "result/kept_model.hpp"
 #include "result/result.hpp"
@@ -29,15 +30,17 @@ struct record_options {
         "no";       ///< maximum likelihood after the identification: yes, no, or (method auto) where it applies
     mass_plan mass; ///< where the channels stand, when M, K and R are wanted
     remarks said;   ///< known before the data are seen
-    bool stabilization = false;                     ///< look at all orders and some horizons too
-    int sigma_blocks = 20;                          ///< blocks left out in turn for the standard deviations; 0 = none
-    bool analytic = true;                           ///< by the method's derivative, where it has one
-    std::optional<std::pair<double, double>> band;  ///< Hz, of the modes wanted (auto)
-    int decimate = 1;                               ///< auto uses no rate above the record's divided by this
-    int threads = 0;                                ///< of auto, at a time; 0: all processors
-    bool all_modes = false;                         ///< auto lists also what few runs found
-    bool modes_without_matrices = false;            ///< auto: what stands in the way of M, K, R is a remark
-    std::vector<int> modes;                         ///< numbers of the modes picked by hand (auto); empty: all
+    bool stabilization = false;                    ///< look at all orders and some horizons too
+    int sigma_blocks = 20;                         ///< blocks left out in turn for the standard deviations; 0 = none
+    bool analytic = true;                          ///< by the method's derivative, where it has one
+    std::optional<std::pair<double, double>> band; ///< Hz, of the modes wanted (auto)
+    int decimate = 1;                              ///< auto uses no rate above the record's divided by this
+    int threads = 0;                               ///< of auto, at a time; 0: all processors
+    bool all_modes = false;                        ///< auto lists also what few runs found
+    bool modes_without_matrices = false;           ///< auto: what stands in the way of M, K, R is a remark
+    std::vector<int> modes;                        ///< numbers of the modes picked by hand (auto); empty: all
+    std::vector<picked_pole> picks;                ///< where modes were picked by hand (auto); empty: all
+    bool by_hand() const { return !modes.empty() || !picks.empty(); }
     std::vector<int> sensing;                       ///< okid_sensing_t of each output; empty: all are accelerations
     bool judge_hits = false, keep_all_hits = false; ///< are bad hits sought; are they used nevertheless
     std::string hit_unit;                           ///< of their force

@@ -128,15 +128,16 @@ std::vector<int> numbers_of(const std::string& option, const std::string& text) 
 void check_agreement(const record_request& given, record_options& options) {
     const bool agreed = options.method == "auto";
     const bool of_lags = options.method == lag_method;
-    for (const auto& [option, text] : {std::pair{"--decimate", &given.decimate}, std::pair{"--threads", &given.threads},
-                                       std::pair{"--band", &given.band}, std::pair{"--modes", &given.modes}})
+    for (const auto& [option, text] :
+         {std::pair{"--decimate", &given.decimate}, std::pair{"--threads", &given.threads},
+          std::pair{"--band", &given.band}, std::pair{"--modes", &given.modes}, std::pair{"--picks", &given.picks}})
         if (!agreed && !text->empty() && !(of_lags && (text == &given.band || text == &given.modes)))
             usage(fmt::format("{} belongs to --method auto, {} takes the record as it is", option, options.method));
     for (const auto& [option, there] :
          {std::pair{"--p", !given.p.empty()}, std::pair{"--rows", !given.rows.empty()},
           std::pair{"--order", given.order != "auto"}, std::pair{"--max-order", !given.max_order.empty()},
           std::pair{"--hankel", given.hankel != "system"}, std::pair{"--stabilization", given.stabilization}}) {
-        if (agreed && there)
+        if (agreed && there && option != std::string("--stabilization"))
             usage(
                 fmt::format("{} belongs to one method, --method auto agrees over many: leave one of them out", option));
         if (of_lags && there && option != std::string("--stabilization"))
@@ -159,6 +160,10 @@ void check_agreement(const record_request& given, record_options& options) {
         options.decimate = static_cast<int>(whole_number("--decimate", given.decimate, 1, 1000));
     if (!given.threads.empty()) options.threads = static_cast<int>(whole_number("--threads", given.threads, 1, 1024));
     if (!given.modes.empty()) options.modes = numbers_of("--modes", given.modes);
+    if (given.picks.empty()) return;
+    if (!given.modes.empty()) usage("--picks and --modes both say which modes are kept: leave one of them out");
+    if (given.set_ups) usage("--picks belongs to records, found with --setups");
+    options.picks = read_picks(given.picks);
 }
 
 } // namespace

@@ -14,9 +14,9 @@ struct record_request {
     std::string method, hankel = "system", order = "auto", hold, detrend = "mean", start = "moving";
     std::string sensing = "acceleration", input_dofs, output_dofs; ///< lists with commas between
     std::string fs, p, rows, max_order, sigma, sigma_blocks;
-    std::string band, decimate, modes, threads; ///< of method auto
-    std::string hit_dofs;                       ///< one number a record
-    std::string refine;                         ///< auto, yes or no; empty: auto under method auto, else no
+    std::string band, decimate, modes, picks, threads; ///< of method auto
+    std::string hit_dofs;                              ///< one number a record
+    std::string refine;                                ///< auto, yes or no; empty: auto under method auto, else no
     bool stabilization = false;
     bool keep_all = false; ///< of hits: bad ones too
     bool set_ups = false;  ///< sensors were moved between the records

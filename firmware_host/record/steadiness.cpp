@@ -89,9 +89,19 @@ struct steady_search {
     std::vector<double> spread; ///< of each output's residual
 };
 
-/// The correction of one pole over samples first … first + length - 1.
-block_frequency corrected(const steady_search& s, const answered_record& record, std::size_t k, std::size_t first,
-                          std::size_t length, double time) {
+/// Of each sample of a record, the power of all displacements.
+std::vector<double> motion_of(const steady_search& s, const answered_record& record) {
+    std::vector<double> out(record.count);
+    for (std::size_t i = 0; i < s.modes.size(); ++i) {
+        const double stiffness = std::pow(s.modes[i]->frequency_hz, 4);
+        for (std::size_t t = 0; t < record.count; ++t) out[t] += std::norm(record.states[i][t]) / stiffness;
+    }
+    return out;
+}
+
+/// The correction of one pole over samples first … first + length - 1. @param moved  motion_of() the record
+block_frequency corrected(const steady_search& s, const answered_record& record, const std::vector<double>& moved,
+                          std::size_t k, std::size_t first, std::size_t length, double time) {
     const complex mu = s.mu[k], turn = complex(0, 1) / s.fs_hz * mu;
     Eigen::Matrix4d N = Eigen::Matrix4d::Zero();
     Eigen::Vector4d h = Eigen::Vector4d::Zero();
@@ -109,8 +119,7 @@ block_frequency corrected(const steady_search& s, const answered_record& record,
         }
         const complex q = record.states[k][t];
         power += std::norm(q) / static_cast<double>(length);
-        for (std::size_t i = 0; i < s.modes.size(); ++i)
-            motion += std::norm(record.states[i][t]) / std::pow(s.modes[i]->frequency_hz, 4);
+        motion += moved[t];
         p = mu * p + turn * q;
         start *= mu;
     }
@@ -140,11 +149,12 @@ std::vector<std::vector<block_frequency>> with_force(steady_search& s, const rec
                 if (!std::isnan(record.left[i])) square += record.left[i] * record.left[i], ++n;
             if (n > 0) s.spread[o] = std::max(1e-300, std::sqrt(square / n));
         }
+        const std::vector<double> moved = motion_of(s, record);
         for (std::size_t k = 0; k < s.modes.size(); ++k) {
             const std::size_t length = block_length(*s.modes[k], s.fs_hz);
             for (std::size_t first = 0; first + length <= record.count; first += length)
-                out[k].push_back(
-                    corrected(s, record, k, first, length, seconds_before + static_cast<double>(first) / s.fs_hz));
+                out[k].push_back(corrected(s, record, moved, k, first, length,
+                                           seconds_before + static_cast<double>(first) / s.fs_hz));
         }
         seconds_before += static_cast<double>(record.count) / s.fs_hz;
     }

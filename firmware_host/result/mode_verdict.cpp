@@ -62,10 +62,12 @@ std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const re
 nlohmann::ordered_json verdict_json(const mode_verdict& verdict) {
     std::vector<std::string> texts;
     for (const std::string& code : verdict.why) texts.push_back(why_text(code));
-    return {{"confident", verdict.confident},
-            {"found_in", number_json(verdict.found_in)},
-            {"why", verdict.why},
-            {"why_text", std::move(texts)}};
+    nlohmann::ordered_json out{{"confident", verdict.confident},
+                               {"found_in", number_json(verdict.found_in)},
+                               {"why", verdict.why},
+                               {"why_text", std::move(texts)}};
+    if (verdict.picked) out["picked"] = true;
+    return out;
 }
 
 } // namespace okid_host

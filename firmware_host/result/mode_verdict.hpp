@@ -18,6 +18,7 @@ struct mode_verdict {
     bool confident = false;
     double found_in = NAN;        ///< share of the runs that could have seen it and did; NaN for a named method
     std::vector<std::string> why; ///< codes of why it is doubtful
+    bool picked = false;          ///< by hand
 };
 
 /// What a code of `why` says, as a part of a sentence.
@@ -32,7 +33,7 @@ bool judged_by_agreement(const result_context& context);
 /// Of every mode: those of the context, or by EMAC for a named method.
 std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const result_context& context);
 
-/// {"confident": …, "found_in": …, "why": […], "why_text": […]}.
+/// {"confident": …, "found_in": …, "why": […], "why_text": […]}, of a mode that was picked "picked": true.
 nlohmann::ordered_json verdict_json(const mode_verdict& verdict);
 
 } // namespace okid_host

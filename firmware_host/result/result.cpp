@@ -290,6 +290,7 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
     out["fit"]["simulation_percent"] = percent_json(context.simulation_percent, context.outputs);
     out["fit"]["prediction_percent"] = percent_json(context.prediction_percent, context.outputs);
     if (context.stable) out["stabilization"] = stabilization_json(*context.stable);
+    if (context.poles) out["agreement"] = pole_table_json(*context.poles);
     if (context.refined) out["refinement"] = refinement_json(*context.refined, context.outputs);
     if (context.skew) out["skew"] = skew_json(*context.skew, context.outputs);
     if (context.mass) put_mass_json(*context.mass, out);

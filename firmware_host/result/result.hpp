@@ -5,6 +5,7 @@
 #include "hit_table.hpp"
 #include "mode_verdict.hpp"
 #include "placed_shapes.hpp"
+#include "pole_table.hpp"
 #include "refinement.hpp"
 #include "stabilization.hpp"
 
@@ -48,6 +49,7 @@ struct result_context {
     bool all_modes = false;                                    ///< the table lists the doubtful modes of auto too
     std::vector<mode_verdict> verdicts;                        ///< of the modes, of method auto; else by EMAC
     std::optional<stabilization> stable;                       ///< where it was asked for
+    std::optional<pole_table> poles;                           ///< of method auto, where it was asked for
     std::optional<refinement> refined;                         ///< of a model that was refined
     std::optional<channel_skew> skew;                          ///< delays of the outputs, of a refined model
     std::vector<hit_line> hits;                                ///< of a hammer test in files

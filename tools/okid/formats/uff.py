@@ -74,6 +74,10 @@ class UffFile:
                     keys.append(key)
                     groups.append([])
                 groups[keys.index(key)].append(one)
+        if not groups and self.frfs:
+            raise InputError(
+                f"holds no time history but {len(self.frfs)} frequency responses: okid identify FILE --frf"
+            )
         return _record(_choose(groups, group))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from okid._errors import InputError
@@ -53,6 +54,8 @@ def identify(
     band: tuple[float, float] | None = None,
     decimate: int | None = None,
     modes: Sequence[int] | None = None,
+    picks: Sequence[float] | str | Path | None = None,
+    stabilization: bool = False,
     hit_dofs: Sequence[int] | None = None,
     keep_all: bool = False,
     threads: int | None = None,
@@ -95,8 +98,10 @@ def identify(
     also where a method has no derivative: docs/numerics.md) or "none". `sigma_blocks` alone: jackknife, 0 = none.
 
     Of "auto" and "plscf": `band` (low, high) in Hz where modes are sought; `modes` the numbers, from 1, of the listed
-    modes that are kept: picked by hand they count as confident. Of "auto": `decimate` the largest factor of the lower
-    rates; `threads` the processors used (default all; the result is the same for any number).
+    modes that are kept: picked by hand they count as confident. Of "auto": `picks` the same by frequencies in Hz or a
+    .json file with modes (those that stand nearest); `stabilization` the poles of all runs (result.agreement);
+    `decimate` the largest factor of the lower rates; `threads` the processors used (default all; the result is the same
+    for any number).
 
     `hit_dofs`: where each record was struck (roving hammer), one number a record: each place becomes an input of its
     own, and shapes cover the places (result.shape_dofs), with `output_dofs` those of the sensors too. Bad hits (a
@@ -122,6 +127,8 @@ def identify(
         "sensing": sensing, "refine": ("no", "yes")[refine] if isinstance(refine, bool) else refine,
         "sigma": sigma, "sigma_blocks": sigma_blocks, "units": units,
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
+        "picks": picks if picks is None or isinstance(picks, str) else str(picks) if isinstance(picks, Path)
+        else ",".join(map(repr, map(float, picks))) or ",", "stabilization": stabilization,
         "hit_dofs": hit_dofs, "keep_all": keep_all, "threads": threads,
     }  # fmt: skip
     said = {key: value for key, value in options.items() if value is not _UNSAID.get(key)}

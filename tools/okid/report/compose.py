@@ -24,6 +24,7 @@ from okid.report.modes import shape_sections, table_section
 from okid.report.operating import operating_section
 from okid.report.other_kinds import check_kind
 from okid.report.page import count_of
+from okid.report.picking import has_poles, picking_section
 from okid.report.places import hits_section, place_section, set_ups_section
 from okid.report.provenance import provenance_section, source_of
 from okid.report.responses import (
@@ -52,7 +53,7 @@ def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]
     yield hits_section(m)
     yield from mass_section(m)
     yield tracking_section(m)
-    yield stabilization_section(m)
+    yield picking_section(m) if has_poles(m) else stabilization_section(m)
     yield singular_section(m)
     pairs: list[tuple[int, int]] = []
     if m.result.inputs:

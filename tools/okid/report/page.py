@@ -104,6 +104,8 @@ def page(title: str, subtitle: str, sections: Iterable[Section], foot: str) -> s
     wanted = [("web", "shapes.js"), ("report", "player.js")] if "<canvas" in body else []
     if 'id="modes-data"' in body:
         wanted += [("web", "selection.js"), ("report", "selection_buttons.js")]
+    if 'id="poles-data"' in body:
+        wanted += [place for place in (("web", "selection.js"), ("report", "picker.js")) if place not in wanted]
     if wanted:
         code = "\n" + "".join(_asset(*place) for place in wanted)
         digest = base64.b64encode(hashlib.sha256(code.encode("utf-8")).digest()).decode("ascii")
@@ -114,7 +116,7 @@ def page(title: str, subtitle: str, sections: Iterable[Section], foot: str) -> s
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{escape(title)}</title>\n'
         f"<style>\n{_asset('report', 'page.css')}</style>\n"
-        "<noscript><style>.player, .pick, .save { display: none; } .still { display: block; }</style></noscript>\n"
+        "<noscript><style>.player, .pick, .picker, .save { display: none; } .still { display: block; }</style></noscript>\n"
         f"</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n"
         f'<p class="sub">{escape(subtitle)}</p>\n<nav aria-label="contents">\n{links}\n</nav>\n{body}\n'
         f"<footer>{escape(foot)}</footer>\n</main>\n{script}</body>\n</html>\n"

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+#include "picks.hpp"
+
+#include "error.hpp"
+#include "files/input_file.hpp"
+#include "files/nearest_name.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <set>
+
+namespace okid_host {
+namespace {
+
+constexpr double near_pick = 0.01;        // of its frequency
+constexpr double weight_of_damping = 0.1; // of a factor of e, beside near_pick
+constexpr double weight_of_runs = 0.1;    // of all of them
+constexpr std::size_t most_picks = 1000;
+
+[[noreturn]] void refuse_picks(const std::string& text) { throw failure(exit_usage, "--picks: " + text); }
+
+double number_of(const nlohmann::json& mode, const char* key) {
+    const auto at = mode.find(key);
+    return at != mode.end() && at->is_number() ? at->get<double>() : NAN;
+}
+
+std::vector<picked_pole> picks_of_file(const std::string& path) {
+    const auto file = nlohmann::json::parse(read_input(path, "a .json file with modes"), nullptr, false);
+    if (!file.is_object() || !file.contains("modes") || !file["modes"].is_array())
+        refuse_picks(fmt::format("{}: found no \"modes\", expected an okid.result/1 or "
+                                 "{{\"modes\": [{{\"frequency_hz\": 34.3}}]}}",
+                                 path));
+    const auto says = [&](const char* key) {
+        return
+            [key](const nlohmann::json& mode) { return mode.is_object() && mode.value(key, nlohmann::json()) == true; };
+    };
+    const auto& modes = file["modes"];
+    const char* which = nullptr;
+    for (const char* key : {"confident", "picked"})
+        if (std::any_of(modes.begin(), modes.end(), says(key))) which = key;
+    std::vector<picked_pole> out;
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        if (which && !says(which)(modes[k])) continue;
+        if (!modes[k].is_object() || !(number_of(modes[k], "frequency_hz") > 0))
+            refuse_picks(fmt::format("{}: mode {} has no \"frequency_hz\" above 0", path, k + 1));
+        out.push_back({number_of(modes[k], "frequency_hz"), number_of(modes[k], "damping_ratio")});
+    }
+    return out;
+}
+
+std::vector<picked_pole> picks_of_list(const std::string& list) {
+    std::vector<picked_pole> out;
+    for (std::size_t at = 0; at <= list.size();) {
+        const std::size_t comma = std::min(list.find(',', at), list.size());
+        const char *begin = list.data() + at, *end = list.data() + comma;
+        while (begin < end && *begin == ' ') ++begin;
+        double hz = 0;
+        const auto [stop, error] = std::from_chars(begin, end, hz);
+        if (error != std::errc{} || stop != end || !(hz > 0) || !std::isfinite(hz))
+            refuse_picks(fmt::format("found \"{}\", expected frequencies in Hz with commas between, or a .json file",
+                                     printable(list.substr(at, comma - at))));
+        out.push_back({hz, NAN});
+        at = comma + 1;
+    }
+    return out;
+}
+
+/// How far a pole stands from a pick; infinite: elsewhere.
+double distance(const picked_pole& pick, double frequency_hz, double damping_ratio) {
+    const double away = std::abs(frequency_hz / pick.frequency_hz - 1);
+    if (!(away <= near_pick)) return INFINITY;
+    const double ratio = std::log(damping_ratio / pick.damping_ratio);
+    return away / near_pick + (std::isfinite(ratio) ? weight_of_damping * std::abs(ratio) : 0);
+}
+
+consensus_mode mode_of_pole(const consensus_run& run, const run_pole& pole) {
+    consensus_mode out;
+    out.frequency_hz = pole.frequency_hz;
+    out.damping_ratio = pole.damping_ratio;
+    out.mpc = pole.mpc;
+    out.emac = pole.emac;
+    out.level = run.level;
+    out.shape = pole.shape;
+    return out;
+}
+
+/// The pole of a single model that stands nearest.
+consensus_mode lonely_pole(const picked_pole& pick, const std::vector<consensus_run>& runs) {
+    consensus_mode out;
+    double least = INFINITY, nearest_hz = INFINITY;
+    for (const consensus_run& run : runs)
+        for (const run_pole& pole : run.poles) {
+            if (std::abs(pole.frequency_hz - pick.frequency_hz) < std::abs(nearest_hz - pick.frequency_hz))
+                nearest_hz = pole.frequency_hz;
+            const double away = distance(pick, pole.frequency_hz, pole.damping_ratio);
+            if (!(pole.damping_ratio > 0) || away >= least) continue;
+            least = away;
+            out = mode_of_pole(run, pole);
+        }
+    if (least == INFINITY)
+        refuse_picks(fmt::format("no model has a pole within {:g} % of {:g} Hz, the nearest is at {:.5g} Hz",
+                                 100 * near_pick, pick.frequency_hz, nearest_hz));
+    return out;
+}
+
+} // namespace
+
+std::vector<picked_pole> read_picks(const std::string& given) {
+    const bool file = lower_case(std::filesystem::path(given).extension().string()) == ".json";
+    std::vector<picked_pole> out = file ? picks_of_file(given) : picks_of_list(given);
+    if (out.empty() || out.size() > most_picks)
+        refuse_picks(fmt::format("found {} modes, expected 1 to {}", out.size(), most_picks));
+    return out;
+}
+
+std::vector<consensus_mode> picked_modes(const std::vector<picked_pole>& picks, const std::vector<consensus_run>& runs,
+                                         const std::vector<consensus_mode>& modes) {
+    std::vector<consensus_mode> out;
+    std::set<std::size_t> taken;
+    for (const picked_pole& pick : picks) {
+        std::size_t best = modes.size();
+        double least = INFINITY;
+        for (std::size_t k = 0; k < modes.size(); ++k) {
+            const double away = distance(pick, modes[k].frequency_hz, modes[k].damping_ratio);
+            const double cost = away + weight_of_runs * (1 - modes[k].found_in);
+            if (cost < least) least = cost, best = k;
+        }
+        if (best == modes.size()) {
+            out.push_back(lonely_pole(pick, runs));
+        } else if (taken.insert(best).second) {
+            out.push_back(modes[best]);
+        }
+    }
+    for (consensus_mode& mode : out) {
+        mode.why.clear();
+        mode.picked = true;
+    }
+    std::sort(out.begin(), out.end(),
+              [](const consensus_mode& a, const consensus_mode& b) { return a.frequency_hz < b.frequency_hz; });
+    return out;
+}
+
+} // namespace okid_host

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// Modes picked by hand, in a diagram or from an earlier result: --picks.
+#pragma once
+#include "consensus/consensus.hpp"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace okid_host {
+
+/// Where a mode was picked.
+struct picked_pole {
+    double frequency_hz = 0;
+    double damping_ratio = NAN; ///< NaN: not said
+};
+
+/// "34.3,101" in Hz, or the name of a .json file with "modes", as okid.result/1 has them: those that were picked, else those that
+/// are confident, else all. Throws `failure` (exit 2).
+std::vector<picked_pole> read_picks(const std::string& given);
+
+/// For each pick the cluster that stands nearest, within 1 %, of two alike the one that more runs found; where there is none,
+/// the nearest pole of a single model. Ascending, each once, nothing speaks against them. Throws `failure` (exit 2).
+std::vector<consensus_mode> picked_modes(const std::vector<picked_pole>& picks, const std::vector<consensus_run>& runs,
+                                         const std::vector<consensus_mode>& modes);
+
+} // namespace okid_host
