@@ -86,17 +86,16 @@ def test_geometry_follows_the_numbers_of_the_channels(tmp_path: Path) -> None:
     path.write_text(NODES + 'dofs = [[2, "x"], [3, "-z"]]\nlines = [[1, 2]]\n', encoding="utf-8")
     by_order = read_geometry(path, {"outputs": ["a", "b"]})
     assert by_order is not None
-    assert by_order.dofs == [(2, "x"), (3, "-z")]
+    assert by_order.places == [(2, "x"), (3, "-z")]
     live = {"b": {"dof": 1}, "a": {"dof": -2}, "c": {"dof": None}}
     by_run = read_geometry(path, {"outputs": ["a", "b", "c"]}, live)
     assert by_run is not None
-    assert by_run.dofs == [(3, "z"), (2, "x"), None]
+    assert by_run.places == [(3, "z"), (2, "x"), None]
     path.write_text(path.read_text() + '[[channel]]\nname = "a"\ndof = 1\n', encoding="utf-8")
     by_config = read_geometry(path, {"outputs": ["a"]}, live)
     assert by_config is not None
-    assert by_config.dofs == [(2, "x")]
-    moved = by_config.displaced(np.array([1.0]), 0.1)
-    assert moved[1].tolist() == pytest.approx([0.1 * np.sqrt(2.0), 0.0, 1.0])
+    assert by_config.places == [(2, "x")]
+    assert by_config.moved(np.array([0.5j])).tolist() == [[0, 0, 0], [0.5j, 0, 0], [0, 0, 0]]
     path.write_text("[acquisition]\n", encoding="utf-8")
     assert read_geometry(path, {"outputs": ["a"]}) is None
 

@@ -63,7 +63,9 @@ def _parser() -> _Parser:
         "the hits that it names): adds measured responses, stabilization, residual",
     )  # fmt: skip
     parser.add_argument("--events", metavar="FILE.jsonl", help="events of the run: adds completeness, tracking, alarms")
-    parser.add_argument("--geometry", metavar="CONFIG.toml", help="its section [geometry]: adds moving mode shapes")
+    parser.add_argument(
+        "--geometry", metavar="FILE", help="[geometry] of a CONFIG.toml, a .csv or a .uff: adds moving mode shapes"
+    )
     parser.add_argument("--config", metavar="CONFIG.toml", help="its text goes into the report, its [geometry] too")
     parser.add_argument("--compare", metavar="EARLIER.json", help="an earlier result: shifts since then, MAC, CoMAC")
     parser.add_argument("--out", metavar="FILE.html|-", help="default: the result's name with .html; - is stdout")

@@ -15,7 +15,7 @@ from okid.report import page
 from okid.report.agreement import fit_section, history_section, residual_section
 from okid.report.comparison import Other, comparison_section
 from okid.report.events import read_events
-from okid.report.geometry import read_geometry
+from okid.report.geometry import TABLES, read_geometry
 from okid.report.given_records import Given, listed, take_records
 from okid.report.loaded import Loaded, load_result, loaded_from
 from okid.report.mass import mass_section
@@ -70,16 +70,17 @@ def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]
 
 
 def _placed(m: Material, geometry: Place | None, config: Place | None) -> None:
-    """Geometry and texts of the configurations: [geometry] of `geometry`, else of `config` when it has one."""
+    """Structure and texts of the configurations: of `geometry`, else [geometry] of `config` when it has one."""
     live = {} if m.events is None else m.events.channels
     if geometry is not None:
-        m.geometry = read_geometry(geometry, m.result.raw, live)
-        if m.geometry is None:
+        m.structure = read_geometry(geometry, m.result.raw, live)
+        if m.structure is None:
             raise InputError(f"{geometry}: no section [geometry], expected nodes, dofs and lines")
     elif config is not None:
-        m.geometry = read_geometry(config, m.result.raw, live)
+        m.structure = read_geometry(config, m.result.raw, live)
     for place in dict.fromkeys(str(one) for one in (config, geometry) if one is not None):
-        m.texts.append((place, read_toml(place)[1]))
+        if Path(place).suffix.lower() not in TABLES:
+            m.texts.append((place, read_toml(place)[1]))
 
 
 def build(
@@ -98,16 +99,17 @@ def build(
 
     `record`: a file, what read_csv (of a result of responses: read_frf) returns, or a list of them: every hit of a
     hammer test, by the names of the files; records that were merged. Without one the hits that the result names are
-    read, where all their files are beside `source` or here. `events`: JSON lines of the run; `geometry`, `config`:
-    CONFIG.toml; `compare`: the file of an earlier result; `source`: the file of the result, named in the provenance;
-    `written`: when and by what, None = not told.
+    read, where all their files are beside `source` or here. `events`: JSON lines of the run; `config`: CONFIG.toml;
+    `geometry`: that too, a .csv or a universal file; `compare`: the file of an earlier result; `source`: the file of
+    the result, named in the provenance; `written`: when and by what, None = not told.
     Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
     """
     m = Material(result)
     places = {"result": source, "events": events, "geometry": geometry, "config": config, "compare": compare}
     for kind, path in places.items():
         if path is not None:
-            check_kind(path, {"geometry": "config", "compare": "result"}.get(kind, kind))
+            if kind != "geometry" or Path(path).suffix.lower() not in TABLES:
+                check_kind(path, {"geometry": "config", "compare": "result"}.get(kind, kind))
             m.sources.append(source_of(kind, path))
     m.other = None if compare is None else Other(load_result(compare), Path(compare).name)
     m.events = None if events is None else read_events(events)

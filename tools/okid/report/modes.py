@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sections on modes: table, shapes as sticks or on a geometry, complexity, AutoMAC."""
+"""The sections on modes: table, shapes as sticks or on a structure, complexity, AutoMAC."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from okid import modal
 from okid.formats.uff import mode_sets, nodes_of, shape_places
-from okid.formats.uff_model import lines_text, nodes_text, units_text
+from okid.formats.uff_model import structure_text, units_text
 from okid.report import drawings, page
 from okid.report.material import Material
 from okid.result import figures
@@ -77,9 +77,9 @@ def against(mode: dict[str, Any]) -> str:
 def _save(m: Material) -> str:
     """Buttons that save the chosen modes, and what they save."""
     whole = {**m.result.whole, "markov": None, "singular_values": None}
-    geometry = m.geometry
-    places = shape_places(m.result.raw) if geometry is None else nodes_of(geometry.dofs)
-    head = units_text() + ("" if geometry is None else nodes_text(geometry.nodes) + lines_text(geometry.lines))
+    structure = m.structure
+    places = shape_places(m.result.raw) if structure is None else nodes_of(structure.places)
+    head = units_text() + ("" if structure is None else structure_text(structure.geometry))
     sets = mode_sets(m.result.raw, places)
     buttons = "".join(
         f'<button type="button" data-save="{kind}">{kind.upper()}</button>' for kind in ("csv", "json", "uff")
@@ -125,49 +125,69 @@ def _rounded(values: Any) -> list[float | None]:
 
 def _player(m: Material) -> list[str]:
     """Moving shapes on the screen, all modes; on paper a still picture of each."""
-    geometry, result = m.geometry, m.result
-    assert geometry is not None
-    chosen = _shown(m, len(result.shapes))
-    count = len(chosen)
+    structure, result = m.structure, m.result
+    assert structure is not None
+    geometry, chosen = structure.geometry, _shown(m, len(result.shapes))
+    names = [f"{k + 1}: {result.frequency_hz[k]:.2f} Hz" for k in chosen]
     buttons = "\n".join(
-        f'<button type="button" data-mode="{place}" aria-pressed="{"false" if place else "true"}">'
-        f"{k + 1}: {result.frequency_hz[k]:.2f} Hz</button>"
-        for place, k in enumerate(chosen)
+        f'<button type="button" data-mode="{place}" aria-pressed="{"false" if place else "true"}">{name}</button>'
+        for place, name in enumerate(names)
+    )
+    others = "".join(f'<option value="{place}">{name}</option>' for place, name in enumerate(names))
+    saves = "".join(
+        f'<button type="button" data-picture="{kind}">{kind.upper()}</button>' for kind in ("gif", "png", "svg")
     )
     payload = {
         "geometry": {
-            "nodes": geometry.nodes, "lines": geometry.lines, "dofs": geometry.dofs, "names": result.places,
+            "nodes": geometry.nodes, "lines": geometry.lines, "surfaces": geometry.surfaces, "fixed": structure.at_rest,
+            "dofs": structure.places, "names": result.places,
         },
         "shapes": [
-            {"re": _rounded(shape.real), "im": _rounded(shape.imag)}
-            for shape in result.shapes[chosen]
+            {"re": _rounded(shape.real), "im": _rounded(shape.imag), "name": name}
+            for shape, name in zip(result.shapes[chosen], names, strict=True)
         ],
     }  # fmt: skip
     live = (
         f'<div class="player"><div class="bar" role="group" aria-label="mode">\n'
         f'<button type="button" class="go">Pause</button>\n{buttons}</div>\n'
         '<canvas tabindex="0" role="img" aria-label="moving mode shape"></canvas>\n'
-        '<p class="note">Drag or arrow keys: turn, + and −: zoom, space: stop, Home: the first view.</p></div>\n'
-        + page.data("shapes-data", payload)
+        f'<div class="bar below"><label>beside it <select class="other"><option value="-1">nothing</option>{others}'
+        f"</select></label><span>Download:</span>{saves}</div>\n"
+        '<p class="note">Drag or arrow keys: turn; +, − and the wheel: zoom; space: stop; Home: the first view.</p>'
+        "</div>\n" + page.data("shapes-data", payload)
     )
-    columns = min(4, count)
-    bands = -(-count // columns)
-    drawing = figures.figure(2.4 * columns, 2.2 * bands)
+    columns = min(3, len(chosen))
+    bands = -(-len(chosen) // columns)
+    drawing = figures.figure(9.6 if columns > 1 else 5.0, 2.6 * bands)
     for place, k in enumerate(chosen, 1):
         ax = drawing.add_subplot(bands, columns, place)
-        drawings.draw_at_rest_and_moved(ax, geometry, result.shapes[k])
-        ax.set_title(f"{k + 1}: {result.frequency_hz[k]:.2f} Hz")
-    absent = [name for name, dof in zip(result.places, geometry.dofs, strict=True) if dof is None]
-    gaps = "" if np.all(np.isfinite(result.shapes[chosen])) else " A node that was not measured is not drawn."
-    words = f"Dashed: at rest.{gaps}" + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
-    return [live, m.pictures.inline(drawing, "still pictures of the mode shapes", "still"), page.note(words)]
+        drawings.draw_at_rest_and_moved(ax, structure, result.shapes[k])
+        ax.set_title(names[place - 1])
+    return [live, m.pictures.inline(drawing, "still pictures of the mode shapes", "still"), page.note(_moved(m))]
+
+
+def _moved(m: Material) -> str:
+    """What the picture of the structure shows, by the rule of okid.data.structure."""
+    structure, shapes = m.structure, m.result.shapes
+    assert structure is not None
+    words = "Dashed: at rest."
+    sensor = np.array([structure.measured(shape) for shape in shapes])
+    at_rest = np.zeros(sensor.shape[1], dtype=np.bool_)
+    at_rest[[node - 1 for node in structure.at_rest]] = True
+    follow = int(np.sum(~np.all(sensor, axis=0) & ~at_rest))
+    if follow:
+        words += (
+            f" {follow} of {sensor.shape[1]} nodes are not measured in every mode (rings): each follows its neighbours."
+        )
+    absent = [name for name, place in zip(m.result.places, structure.places, strict=True) if place is None]
+    return words + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
 
 
 def shape_sections(m: Material) -> list[page.Section]:
     """Nothing without modes."""
     if not len(m.result.shapes):
         return []
-    moving = _player(m) if m.geometry is not None else []
+    moving = _player(m) if m.structure is not None else []
     parts = [
         *moving,
         *([page.heading("By place" if m.result.raw.get("shape_dofs") else "By output")] if moving else []),

@@ -101,7 +101,11 @@ def page(title: str, subtitle: str, sections: Iterable[Section], foot: str) -> s
     body = "\n".join(one.body for one in listed)
     links = "\n".join(f'<a href="#{anchor(one.name)}">{escape(one.name)}</a>' for one in listed)
     script, shut = "", "script-src 'none'"
-    wanted = [("web", "shapes.js"), ("report", "player.js")] if "<canvas" in body else []
+    wanted = (
+        [("web", "structure.js"), ("web", "pens.js"), ("web", "shapes.js"), ("report", "player.js")]
+        if "<canvas" in body
+        else []
+    )
     if 'id="modes-data"' in body:
         wanted += [("web", "selection.js"), ("report", "selection_buttons.js")]
     if wanted:

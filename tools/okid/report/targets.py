@@ -17,7 +17,7 @@ _READ = {
     "result": "is a result to be read",
     "record": "is a record to be read",
     "events": "is an events file to be read",
-    "geometry": "is a configuration to be read",
+    "geometry": "is a geometry to be read",
     "config": "is a configuration to be read",
     "report": "is to be the report",
 }
