@@ -204,6 +204,11 @@ def check_narrow(page: Page, folder: Path) -> None:
     inside = "document.getElementById('modes-table').getBoundingClientRect().right <= "
     assert page.tab.evaluate(inside + "document.getElementById('modes').getBoundingClientRect().right")
     assert page.tab.evaluate(empty, "modes") < 40
+    cells = (
+        "[...document.querySelectorAll('#bus-table td')].map((e) => [e.dataset.label, e.getBoundingClientRect().right])"
+    )
+    seen = dict(page.tab.evaluate(cells))
+    assert {"received", "lost", "errors", "load"} <= set(seen) and max(seen.values()) <= 390
     page.tab.screenshot(path=folder / "narrow.png", full_page=True)
     page.tab.set_viewport_size(SIZE)
 

@@ -100,14 +100,17 @@ def _shown(m: Material, most: int) -> list[int]:
 def _sticks(m: Material) -> list[str]:
     shown = _shown(m, MOST_SHAPES)
     columns = min(4, len(shown)) if len(m.result.places) <= 12 else min(2, len(shown))
-    bands = -(-len(shown) // columns)
     letters = max(len(figures.short(name)) for name in m.result.places)
     height = 1.9 + (0.06 * letters if letters > 6 else 0.0)  # long names stand upright
-    drawing = figures.figure(9.6 if len(m.result.places) > 12 else min(9.6, 3.2 * columns), height * bands)
-    for place, k in enumerate(shown, 1):
-        damping = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
-        title = f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz, {damping:.2f} %"
-        figures.draw_shape(drawing.add_subplot(bands, columns, place), m.result.shapes[k], m.result.places, title)
+    pictures = []
+    for row in [shown[k : k + columns] for k in range(0, len(shown), columns)]:
+        drawing = figures.figure(9.6 if len(m.result.places) > 12 else min(9.6, 3.2 * columns), height)
+        for place, k in enumerate(row, 1):
+            damping = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
+            title = f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz, {damping:.2f} %"
+            figures.draw_shape(drawing.add_subplot(1, columns, place), m.result.shapes[k], m.result.places, title)
+        named = ", ".join(str(k + 1) for k in row)
+        pictures.append(m.pictures.inline(drawing, f"mode shapes against the outputs, modes {named}"))
     along = "the numbers are the places" if m.result.raw.get("shape_dofs") else "outputs in their order"
     words = f"Sign from the real part, largest entry 1, {along}."
     if not np.all(np.isfinite(m.result.shapes[shown])):
@@ -115,7 +118,7 @@ def _sticks(m: Material) -> list[str]:
     count = len(m.result.confident)
     if count > len(shown):
         words += f" The {len(shown)} of {count} confident modes with the highest EMAC are shown."
-    return [m.pictures.inline(drawing, "mode shapes against the outputs"), page.note(words)]
+    return [*pictures, page.note(words)]
 
 
 def _rounded(values: Any) -> list[float | None]:
@@ -156,14 +159,23 @@ def _player(m: Material) -> list[str]:
         '<p class="note">Drag or arrow keys: turn; +, − and the wheel: zoom; space: stop; Home: the first view.</p>'
         "</div>\n" + page.data("shapes-data", payload)
     )
-    columns = min(3, len(chosen))
-    bands = -(-len(chosen) // columns)
-    drawing = figures.figure(9.6 if columns > 1 else 5.0, 2.6 * bands)
-    for place, k in enumerate(chosen, 1):
-        ax = drawing.add_subplot(bands, columns, place)
-        drawings.draw_at_rest_and_moved(ax, structure, result.shapes[k])
-        ax.set_title(names[place - 1])
-    return [live, m.pictures.inline(drawing, "still pictures of the mode shapes", "still"), page.note(_moved(m))]
+    return [live, *_stills(m, chosen, names), page.note(_moved(m))]
+
+
+def _stills(m: Material, chosen: Sequence[int], names: Sequence[str]) -> list[str]:
+    """The structure in each mode, a row of pictures each."""
+    assert m.structure is not None
+    columns = min(3, len(chosen)) if len(chosen) != 4 else 2
+    out = []
+    for first in range(0, len(chosen), columns):
+        drawing = figures.figure(9.6 if columns > 1 else 5.0, 3.0 if columns > 1 else 3.6)
+        for place, k in enumerate(chosen[first : first + columns]):
+            ax = drawing.add_subplot(1, columns, place + 1)
+            drawings.draw_at_rest_and_moved(ax, m.structure, m.result.shapes[k])
+            ax.set_title(names[first + place])
+        shown = ", ".join(names[first : first + columns])
+        out.append(m.pictures.inline(drawing, f"still pictures of the mode shapes {shown}", "still"))
+    return out
 
 
 def _moved(m: Material) -> str:
@@ -214,6 +226,8 @@ def _complexity(m: Material) -> page.Section:
         "Every entry of a shape in the complex plane: proportionally damped structures lie on one line. MPD: mean "
         "deviation from that line; MCF = 1 − MPC; both 0 for a real mode."
     )
+    if len(m.result.confident) > len(shown):
+        words += f" Pictures: {len(shown)} of {len(m.result.confident)} confident modes, those with the highest EMAC."
     rows = [
         [str(k + 1), f"{m.result.frequency_hz[k]:.2f}", f"{modal.mpd(m.result.shapes[k]):.1f}",
          f"{modal.mcf(m.result.shapes[k]):.4f}"]
@@ -231,5 +245,13 @@ def _automac(m: Material) -> page.Section:
     labels = [f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz" for k in shown]
     figures.draw_mac(drawing.add_subplot(), m.result.shapes[shown], labels)
     words = "MAC of every pair of modes: full ink is 1 (the same shape), no ink 0. Off the diagonal it should be pale."
+    places = len(m.result.places)
+    if places < len(shown) or places < 3:
+        words = (
+            f"MAC of every pair of modes, seen at {places} places only: at most {places} shapes can be told apart with "
+            "so few sensors, so that a high value here does not say that two modes are one."
+        )
+    if len(m.result.confident) > len(shown):
+        words += f" Shown: {len(shown)} of {len(m.result.confident)} confident modes, those with the highest EMAC."
     picture = m.pictures.inline(drawing, "modal assurance criterion of every pair of modes")
     return page.section("AutoMAC", picture, page.note(words))

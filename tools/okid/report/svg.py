@@ -61,8 +61,9 @@ class Pictures:
         width = float(size.group(1).split()[2])
         label = escape(text, quote=True)
         top = f'<svg class="{kind}" role="img" aria-label="{label}" viewBox="{size.group(1)}"'
-        top += f' style="max-width:{width * 1.5:.0f}px">'
-        return re.sub(r"<svg[^>]*>", lambda _: top, body, count=1)
+        top += f' style="--w:{width:.0f}px">'
+        picture = re.sub(r"<svg[^>]*>", lambda _: top, body, count=1)
+        return f'<div class="picture {kind}">{picture}</div>'
 
 
 def _raw(drawing: Figure) -> str:

@@ -116,11 +116,12 @@ def draw_stabilization(
     chosen_hz: Sequence[float] = (),
     background: tuple[Real, Real] | None = None,
     order: int | None = None,
+    doubtful_hz: Sequence[float] = (),
 ) -> None:
     """Poles over frequency (up to `shown_hz`) and order; `background` (frequency, magnitude) behind in dB, no scale.
 
-    Lines: `chosen_hz`, the modes of the model, and its `order`. A band marks each cluster that holds, a ring the pole
-    nearest its medians.
+    Lines: `chosen_hz`, the modes of the model, dotted `doubtful_hz`, those it rejected, and its `order`. A band marks
+    each cluster that holds, a ring the pole nearest its medians.
     """
     behind_key: list[Any] = []
     if background is not None:
@@ -149,6 +150,8 @@ def draw_stabilization(
             points[kind].append((float(f), row.order))
     for k, f in enumerate(chosen_hz):
         ax.axvline(f, color=GREEN, lw=0.8, alpha=0.6, label=None if k else "mode of this model")
+    for k, f in enumerate(doubtful_hz):
+        ax.axvline(f, color=GREY, lw=0.9, ls=":", label=None if k else "doubtful: rejected")
     for kind, (label, colour, marker, size) in reversed(_MARKS.items()):
         if points[kind]:
             xy = np.array(points[kind])
@@ -291,11 +294,15 @@ def draw_comac(ax: Axes, names: Sequence[str], values: Sequence[float]) -> None:
 
 
 def draw_fit(
-    ax: Axes, names: Sequence[str], simulated: Sequence[float | None], predicted: Sequence[float | None]
+    ax: Axes,
+    names: Sequence[str],
+    simulated: Sequence[float | None],
+    predicted: Sequence[float | None],
+    labels: tuple[str, str] = ("simulation", "prediction"),
 ) -> None:
-    """Fit percentages as pairs of bars; a missing or negative one is written, not drawn."""
+    """Fit percentages as pairs of bars, `labels` in the key; a missing or negative one is written, not drawn."""
     index = np.arange(len(names))
-    groups = ((-0.2, simulated, BLUE, "simulation"), (0.2, predicted, ORANGE, "prediction"))
+    groups = ((-0.2, simulated, BLUE, labels[0]), (0.2, predicted, ORANGE, labels[1]))
     told = [group for group in groups if any(v is not None for v in group[1])]
     for place, values, colour, label in told:
         offset = place if len(told) == 2 else 0.0
