@@ -70,6 +70,7 @@ def _parser() -> _Parser:
     parser.add_argument("--compare", metavar="EARLIER.json", help="an earlier result: shifts since then, MAC, CoMAC")
     parser.add_argument("--out", metavar="FILE.html|-", help="default: the result's name with .html; - is stdout")
     parser.add_argument("--pdf", metavar="FILE.pdf", help="print the page too; needs Chromium or Chrome on PATH")
+    parser.add_argument("--figures", metavar="FOLDER", help="every picture as .svg, .png and .csv too")
     parser.add_argument("--title", metavar="TEXT", help="heading of the report")
     return parser
 
@@ -96,6 +97,7 @@ def _page(args: argparse.Namespace, written: str) -> str:
     return build(
         load_result(args.result), args.record or None, args.title, events=args.events, geometry=args.geometry,
         config=args.config, compare=args.compare, source=args.result, written=written,
+        figures_folder=args.figures,
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from okid.report import page
 from okid.report.agreement import fit_section, history_section, residual_section
 from okid.report.comparison import Other, comparison_section
 from okid.report.events import read_events
+from okid.report.expert import circle_section, indicator_section, modal_mass_section, spectrogram_section
 from okid.report.geometry import TABLES, read_geometry
 from okid.report.given_records import Given, listed, take_records
 from okid.report.loaded import Loaded, load_result, loaded_from
@@ -35,7 +36,8 @@ from okid.report.responses import (
     stabilization_section,
 )
 from okid.report.summary import summary_section
-from okid.report.targets import check_place, check_target, write_whole
+from okid.report.svg import Pictures
+from okid.report.targets import check_place, check_target, folder_for, write_whole
 from okid.report.tracking import tracking_section
 from okid.result import figures
 from okid.result.result import Result
@@ -50,19 +52,23 @@ def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]
     yield from shape_sections(m)
     yield comparison_section(m)
     yield hits_section(m)
+    yield modal_mass_section(m)
     yield from mass_section(m)
     yield tracking_section(m)
     yield stabilization_section(m)
+    yield indicator_section(m)
     yield singular_section(m)
     pairs: list[tuple[int, int]] = []
     if m.result.inputs:
         responses, pairs = (place_section if m.struck else frf_section)(m)
         yield responses
         yield check_section(m)
+        yield circle_section(m)
         yield markov_section(m, pairs)
     elif not m.result.raw.get("set_ups"):
         yield spectra_section(m)
         yield operating_section(m)
+    yield spectrogram_section(m)
     yield fit_section(m)
     yield history_section(m, pairs)
     yield residual_section(m)
@@ -94,6 +100,7 @@ def build(
     compare: Place | None = None,
     source: Place | None = None,
     written: str | None = None,
+    figures_folder: Place | None = None,
 ) -> str:
     """The report as one HTML string; the same arguments and files give the same string.
 
@@ -101,10 +108,11 @@ def build(
     hammer test, by the names of the files; records that were merged. Without one the hits that the result names are
     read, where all their files are beside `source` or here. `events`: JSON lines of the run; `config`: CONFIG.toml;
     `geometry`: that too, a .csv or a universal file; `compare`: the file of an earlier result; `source`: the file of
-    the result, named in the provenance; `written`: when and by what, None = not told.
+    the result, named in the provenance; `written`: when and by what, None = not told; `figures_folder`: every picture
+    goes there as .svg, .png and .csv (its numbers) too.
     Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
     """
-    m = Material(result)
+    m = Material(result, pictures=Pictures(folder_for(figures_folder)))
     places = {"result": source, "events": events, "geometry": geometry, "config": config, "compare": compare}
     for kind, path in places.items():
         if path is not None:
@@ -158,6 +166,7 @@ def write_report(
     config: Place | None = None,
     compare: Place | None = None,
     written: str | None = None,
+    figures_folder: Place | None = None,
 ) -> int:
     """Write the report of a Result (its to_dict(), or a result file) to `path` as one HTML file; returns its bytes.
 
@@ -175,7 +184,7 @@ def write_report(
     check_place(path, "path")
     text = build(
         _loaded(result), record, title, events=events, geometry=geometry, config=config, compare=compare, source=source,
-        written=written,
+        written=written, figures_folder=figures_folder,
     )  # fmt: skip
     write_whole(path, text)
     return len(text.encode("utf-8"))

@@ -51,6 +51,17 @@ def check_place(target: Place, option: str, kind: str = ".html") -> None:
         raise PermissionError(errno.EACCES, text, str(target))
 
 
+def folder_for(path: Place | None) -> Path | None:
+    """The folder of the figures, made when it is not there; InputError when it cannot be."""
+    if path is None:
+        return None
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise InputError(f"{path}: {fault.strerror or fault}: expected a folder for the figures") from None
+    return Path(path)
+
+
 def check_target(target: Place, inputs: Mapping[str, Place | Sequence[Place] | None], kind: str = ".html") -> None:
     """InputError when `target` is one of the files `inputs` (what for -> name), has the name of the other kind, or
     exists and is not of this kind.

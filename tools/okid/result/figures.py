@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from okid.frf import Frf
 from okid.modal import mac_matrix, mean_phase, normalised
+from okid.result.figure_numbers import state_numbers
 from okid.result.stabilization import Cluster, Stabilization
 
 Real = NDArray[np.float64]
@@ -244,6 +245,7 @@ def draw_shape(ax: Axes, shape: Complex, labels: Sequence[str], title: str) -> N
 def draw_compass(ax: Axes, shape: Complex, title: str) -> None:
     """The entries of one mode as arrows in the complex plane: a real mode lies on one line."""
     turned = normalised(shape)
+    state_numbers(ax, [("entry", float(one.real), float(one.imag), "") for one in turned])
     round_about = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 73))
     for radius, colour in ((0.5, GRID), (1.0, GRID), (1.08, EDGE)):
         ax.plot(radius * round_about.real, radius * round_about.imag, color=colour, lw=0.7)
@@ -264,6 +266,7 @@ def draw_mac(ax: Axes, shapes: Complex, labels: Sequence[str], other: Complex | 
     """MAC as squares, full ink = 1, with numbers up to 14 modes; `labels` "number  Hz" of each mode. `other`: shapes of
     the columns, else those of the rows again (AutoMAC)."""
     values = mac_matrix(shapes, other)
+    state_numbers(ax, [("MAC", j + 1, i + 1, float(value)) for (i, j), value in np.ndenumerate(values)])
     count = max(values.shape)
     for (i, j), value in np.ndenumerate(values):
         ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1.0, 1.0, facecolor=BLUE, alpha=round(float(value), 3), lw=0))
