@@ -12,7 +12,7 @@ import pyuff
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from okid.data.geometry import Geometry, read_geometry
-from okid.data.structure import Structure, edges_of
+from okid.data.structure_motion import StructureMotion, edges_of
 from okid.formats import read_uff, write_uff
 from okid.result.shape_places import places_of_shapes
 from sample_records import identified
@@ -22,7 +22,7 @@ CHAIN = [(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 4.0), (0.0, 0.0, 6.0)]
 
 def test_between_two_nodes_a_line_is_straight() -> None:
     """From the ground at 0 m to the sensor at 4 m; what is above has one neighbour and goes with it."""
-    one = Structure(Geometry(CHAIN, [(3, "-x")], [(1, 2), (2, 3), (3, 4)]), [(3, "-x")])
+    one = StructureMotion(Geometry(CHAIN, [(3, "-x")], [(1, 2), (2, 3), (3, 4)]), [(3, "-x")])
     moved = one.moved(np.array([2.0 - 1.0j]))
     np.testing.assert_allclose(moved[:, 0], np.array([0.0, 0.25, 1.0, 1.0]) * (-2.0 + 1.0j), atol=1e-14)
     assert not np.any(moved[:, 1:])
@@ -32,7 +32,7 @@ def test_between_two_nodes_a_line_is_straight() -> None:
 def test_every_axis_by_itself_and_islands_at_rest() -> None:
     nodes = [(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (2.0, 0.0, 1.0), (9.0, 0.0, 0.0)]
     geometry = Geometry(nodes, [(1, "z"), (3, "y"), (3, "z")], [(1, 2), (2, 3)], fixed=[])
-    one = Structure(geometry, [(1, "z"), (3, "y"), (3, "z"), (3, "z"), None])
+    one = StructureMotion(geometry, [(1, "z"), (3, "y"), (3, "z"), (3, "z"), None])
     moved = one.moved(np.array([1.0, 0.5, 3.0, 5.0, 7.0], dtype=complex)).real
     np.testing.assert_allclose(moved[:3], [[0, 0.5, 1.0], [0, 0.5, 2.5], [0, 0.5, 4.0]], atol=1e-14)
     assert not np.any(moved[3])
@@ -44,7 +44,7 @@ def test_edges_of_surfaces_join_nodes() -> None:
     square = [(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, 1.0), (0.0, 1.0, 1.0)]
     geometry = Geometry(square, [(1, "z")], [(2, 1)], surfaces=[(1, 2, 3, 4)], fixed=[3])
     assert edges_of(geometry) == [(0, 1), (0, 3), (1, 2), (2, 3)]
-    moved = Structure(geometry, [(1, "z")]).moved(np.array([1.0 + 0j])).real
+    moved = StructureMotion(geometry, [(1, "z")]).moved(np.array([1.0 + 0j])).real
     np.testing.assert_allclose(moved[:, 2], [1.0, 0.5, 0.0, 0.5], atol=1e-14)
 
 
@@ -59,7 +59,7 @@ def test_the_ground_is_at_rest_unless_it_is_measured_or_said() -> None:
 def test_the_edge_of_a_surface_is_ten_times_as_stiff() -> None:
     nodes = [(0.0, 0.0, 2.0), (1.0, 0.0, 2.0), (0.0, 1.0, 2.0), (1.0, 0.0, 1.0)]
     geometry = Geometry(nodes, [], [(2, 4)], surfaces=[(1, 2, 3)], fixed=[3, 4])
-    moved = Structure(geometry, [(1, "x")]).moved(np.array([1.0 + 0j])).real
+    moved = StructureMotion(geometry, [(1, "x")]).moved(np.array([1.0 + 0j])).real
     plate = 10.0 / np.sqrt(2.0)  # node 2 to node 3
     assert moved[1, 0] == pytest.approx(10.0 / (10.0 + plate + 1.0), rel=1e-12)
 
@@ -76,7 +76,7 @@ def test_a_free_node_is_the_mean_of_its_neighbours(data: st.DataObject) -> None:
     sensors = data.draw(st.lists(st.tuples(number, st.just("x")), min_size=1, max_size=4))
     geometry = Geometry(nodes, sensors, lines, fixed=data.draw(st.lists(number, max_size=2)))
     entries = np.array(data.draw(st.lists(st.floats(-1, 1), min_size=len(sensors), max_size=len(sensors))), complex)
-    one = Structure(geometry, sensors)
+    one = StructureMotion(geometry, sensors)
     x = one.moved(entries)[:, 0].real
     assert np.max(np.abs(x)) <= np.max(np.abs(entries)) + 1e-9
     held = {node - 1 for node, _ in sensors} | {node - 1 for node in one.at_rest}

@@ -89,7 +89,7 @@ def test_report_with_record(made: tuple[Path, Path], page: str) -> None:
 def test_report_without_record_says_what_is_missing(made: tuple[Path, Path]) -> None:
     html = report.build(report.load_result(made[0]))
     assert html.count("--record") == 3
-    assert len(pictures(html)) == 8
+    assert len(pictures(html)) == 10
 
 
 @pytest.mark.usefixtures("words_only")

@@ -40,7 +40,7 @@ class Circle(NamedTuple):
     @property
     def resonance(self) -> complex:
         """The point of the circle at the natural frequency, opposite to where other modes shift its begin."""
-        return self.centre + self.radius * np.exp(1j * self._angle)
+        return complex(self.centre + self.radius * np.exp(1j * self._angle))
 
     @property
     def _angle(self) -> float:

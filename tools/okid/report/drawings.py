@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from okid.data.structure import Structure, edges_of
+from okid.data.structure_motion import StructureMotion, edges_of
 from okid.frf import Frf, Spectra
 from okid.modal import normalised
 from okid.report.events import Events, Point
@@ -144,7 +144,7 @@ def _track_limits(f: Real, std: Real, settled: NDArray[np.bool_]) -> tuple[float
 SWING = 0.16  # largest displacement over the size of the structure
 
 
-def draw_at_rest_and_moved(ax: Axes, structure: Structure, shape: Complex) -> None:
+def draw_at_rest_and_moved(ax: Axes, structure: StructureMotion, shape: Complex) -> None:
     """One mode on the structure at its largest beside the structure at rest, seen from the corner (flat: the front).
 
     Dots: nodes with a sensor that the shape has a value of; rings: those that follow their neighbours.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from okid.data import geometry
-from okid.data.structure import Structure
+from okid.data.structure_motion import StructureMotion
 from okid.data.toml_file import read_toml
 from okid.result.shape_places import places_of_shapes
 
@@ -17,7 +17,7 @@ TABLES = (".csv", ".uff", ".unv")
 
 def read_geometry(
     path: str | Path, raw: Mapping[str, Any], live: Mapping[str, Mapping[str, Any]] | None = None
-) -> Structure | None:
+) -> StructureMotion | None:
     """The structure of a file for the shapes of an okid.result/1, None when a CONFIG.toml has no [geometry].
 
     dofs[k] of [geometry] is the place of degree of freedom k + 1. Which one an output is at says the `dof` of its
@@ -27,4 +27,4 @@ def read_geometry(
     """
     table = Path(path).suffix.lower() in TABLES
     given = geometry.read_geometry(path) if table else geometry.geometry_of(read_toml(path)[0], str(path))
-    return None if given is None else Structure(given, places_of_shapes(given, raw, live))
+    return None if given is None else StructureMotion(given, places_of_shapes(given, raw, live))

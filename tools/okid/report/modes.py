@@ -179,7 +179,7 @@ def _stills(m: Material, chosen: Sequence[int], names: Sequence[str]) -> list[st
 
 
 def _moved(m: Material) -> str:
-    """What the picture of the structure shows, by the rule of okid.data.structure."""
+    """What the picture of the structure shows, by the rule of okid.data.structure_motion."""
     structure, shapes = m.structure, m.result.shapes
     assert structure is not None
     words = "Dashed: at rest."

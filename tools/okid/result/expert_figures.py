@@ -70,7 +70,8 @@ def spectrogram_of(y: ArrayLike, fs: float) -> tuple[Real, Real, Real]:
         piece = data[first : first + length]
         power[:, k] = np.abs(np.fft.rfft((piece - piece.mean()) * window)) ** 2
     power *= 2.0 / (fs * float(np.sum(window**2)))
-    return (starts + length / 2.0) / fs, np.arange(len(power)) * fs / length, power
+    times = np.asarray((starts + length / 2.0) / fs, dtype=np.float64)
+    return times, np.arange(len(power), dtype=np.float64) * (fs / length), power
 
 
 def _coarser(values: Real, rows: int, columns: int) -> tuple[Real, Real, Real]:

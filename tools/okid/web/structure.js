@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How a structure moves of which some nodes carry sensors: the rule of tools/okid/data/structure.py, in the browser.
+// How a structure moves of which some nodes carry sensors: the rule of tools/okid/data/structure_motion.py, in the browser.
 //
 //   const motion = okidMotion({nodes, lines, surfaces, fixed, dofs});
 //   motion.edges        [[a, b], ...]  nodes from 0 that a line or the edge of a surface joins, each pair once

@@ -41,7 +41,7 @@ def edges_of(geometry: Geometry) -> list[tuple[int, int]]:
 
 
 @dataclass
-class Structure:
+class StructureMotion:
     """A geometry, and the place of each entry of a shape on it (None = nowhere)."""
 
     geometry: Geometry
