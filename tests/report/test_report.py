@@ -79,7 +79,7 @@ def test_report_with_record(made: tuple[Path, Path], page: str) -> None:
         assert f"<td>{mode['frequency_hz']:.4f}</td>" in html
         assert mode["frequency_std_hz"] is not None
     assert html.count("<th>± σ [Hz]</th><th>ζ [%]</th><th>± σ [%]</th>") == 1
-    assert html.count("<h2>") == 14
+    assert html.count("<h2>") == 17
     assert "No quality warning" in html
     for kind, path in (("result", made[0]), ("record", made[1])):
         digest = hashlib.sha256(path.read_bytes()).hexdigest()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from okid._errors import InputError
@@ -47,6 +48,9 @@ def uff_geometry(path: str | Path) -> Geometry:
     file = read_uff(path)
     if not file.nodes:
         raise InputError(f"{path}: no nodes (data set 15 or 2411), expected a universal file with a structure")
+    wild = next((number for number, node in file.nodes.items() if not all(map(math.isfinite, node))), None)
+    if wild is not None:
+        raise InputError(f"{path}: node {wild} is at {file.nodes[wild]}, expected finite coordinates")
     order = {number: k for k, number in enumerate(file.nodes, 1)}
     dofs = [(order[number], axis) for number in file.nodes for axis in AXES]
     names = {f"{number}{axis}": 3 * k + a + 1 for k, number in enumerate(file.nodes) for a, axis in enumerate(AXES)}

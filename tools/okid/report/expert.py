@@ -124,10 +124,10 @@ def circle_section(m: Material) -> page.Section | None:
         )
     for k, o, i, circle in found:
         zeta = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
-        rows.append([str(k + 1), f"{m.result.outputs[o]} / {m.result.inputs[i]}", str(len(circle.lines_hz)),
-                     f"{circle.frequency_hz:.4f}", f"{m.result.frequency_hz[k]:.4f}",
+        pair = f"{figures.short(m.result.outputs[o])} / {figures.short(m.result.inputs[i])}"
+        rows.append([str(k + 1), pair, str(len(circle.lines_hz)), f"{circle.frequency_hz:.4f}", f"{m.result.frequency_hz[k]:.4f}",
                      f"{100.0 * circle.damping_ratio:.3f}", f"{zeta:.3f}", f"{100.0 * circle.misfit:.1f}"])  # fmt: skip
-    head = ["mode", "pair", "lines", "f of the circle [Hz]", "f [Hz]", "ζ of the circle [%]", "ζ [%]", "misfit [%]"]
+    head = ["mode", "pair", "lines", "circle: f [Hz]", "f [Hz]", "circle: ζ [%]", "ζ [%]", "misfit [%]"]
     words = (
         "Mobility (response as velocity per force) of the strongest pair at the lines around each mode, grey, and the "
     )
@@ -151,8 +151,8 @@ def spectrogram_section(m: Material) -> page.Section | None:
     try:
         found = expert_figures.spectrogram_of(record.samples[:, places[o]], m.result.fs)
         expert_figures.draw_spectrogram(drawing.add_subplot(), *found, m.result.shown_hz)
-    except InputError:
-        return None
+    except InputError as fault:
+        return page.section("Spectrogram", page.absent(f"The picture is left out: {fault}."))
     name = m.result.outputs[o]
     words = f"Power density of {name}, the output with the largest variance. A mode is a level line; a line that ends, "
     words += "begins or slants is a machine or a change."

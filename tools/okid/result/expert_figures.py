@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
@@ -86,14 +87,17 @@ def draw_spectrogram(ax: Axes, time_s: Real, frequency_hz: Real, power: Real, sh
     """Power density (F, T) over time and frequency up to `shown_hz` in dB below its largest value."""
     seen = (frequency_hz > 0.0) & (frequency_hz <= shown_hz)
     small, down, across = _coarser(power[seen], STEPS_FREQUENCY, STEPS_TIME)
+    if min(small.shape) < 2 or not np.any(np.isfinite(small)):
+        raise InputError("the record has no stretch that is long enough and complete")
     level = 10.0 * np.log10(np.maximum(small, 1e-30) / max(float(np.nanmax(small)), 1e-30))
     low = float(np.clip(np.nanpercentile(level, 5.0), -90.0, -20.0))
     f = np.interp(down, np.arange(int(np.sum(seen))), frequency_hz[seen])
     t = np.interp(across, np.arange(len(time_s)), time_s)
-    if level.shape[0] < 2 or level.shape[1] < 2:
-        raise InputError("the record is too short for a spectrogram")
     steps = np.linspace(low, 0.0, LEVELS)
-    ax.contourf(t, f, np.ma.masked_invalid(np.clip(level, low, 0.0)), levels=steps, cmap="Blues")
+    inks = [
+        (*to_rgb(BLUE), float(share)) for share in np.linspace(0.06, 1.0, LEVELS - 1)
+    ]  # one ink, as the page has it
+    ax.contourf(t, f, np.ma.masked_invalid(np.clip(level, low, 0.0)), levels=steps, colors=inks)
     ax.set_xlabel("time [s]")
     ax.set_ylabel("frequency [Hz]")
     ax.grid(False)
