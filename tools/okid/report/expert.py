@@ -31,6 +31,12 @@ def _sensing(m: Material) -> list[str] | None:
     return None if m.result.raw.get("shape_quantity") else ["acceleration"] * len(found)
 
 
+def _axis_hz(m: Material) -> float:
+    """Upper end of the frequency axes: above the confident modes; a rejected one does not press them together."""
+    highest = 2.0 * float(np.max(m.result.frequency_hz[m.result.confident], initial=0.0))
+    return min(m.result.shown_hz, highest) if highest > 0.0 else m.result.shown_hz
+
+
 def modal_mass_section(m: Material) -> page.Section | None:
     """None without a drive point."""
     sensing = _sensing(m)
@@ -78,7 +84,7 @@ def indicator_section(m: Material) -> page.Section | None:
     ax = drawing.add_subplot()
     values = expert_figures.singular_values_over(matrices[1:])
     expert_figures.draw_singular_spectra(
-        ax, line[1:], values, min(m.result.shown_hz, float(line[-1])), [hz[k] for k in sure],
+        ax, line[1:], values, min(_axis_hz(m), float(line[-1])), [hz[k] for k in sure],
         [f for k, f in enumerate(hz) if k not in sure],
     )  # fmt: skip
     ax.set_ylabel(unit)
@@ -125,8 +131,9 @@ def circle_section(m: Material) -> page.Section | None:
     for k, o, i, circle in found:
         zeta = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
         pair = f"{figures.short(m.result.outputs[o])} / {figures.short(m.result.inputs[i])}"
-        rows.append([str(k + 1), pair, str(len(circle.lines_hz)), f"{circle.frequency_hz:.4f}", f"{m.result.frequency_hz[k]:.4f}",
-                     f"{100.0 * circle.damping_ratio:.3f}", f"{zeta:.3f}", f"{100.0 * circle.misfit:.1f}"])  # fmt: skip
+        rows.append([str(k + 1), pair, str(len(circle.lines_hz)), f"{circle.frequency_hz:.4f}",
+                     f"{m.result.frequency_hz[k]:.4f}", f"{100.0 * circle.damping_ratio:.3f}", f"{zeta:.3f}",
+                     f"{100.0 * circle.misfit:.1f}"])  # fmt: skip
     head = ["mode", "pair", "lines", "circle: f [Hz]", "f [Hz]", "circle: ζ [%]", "ζ [%]", "misfit [%]"]
     words = (
         "Mobility (response as velocity per force) of the strongest pair at the lines around each mode, grey, and the "
@@ -150,11 +157,11 @@ def spectrogram_section(m: Material) -> page.Section | None:
     drawing = figures.figure(9.6, 3.2)
     try:
         found = expert_figures.spectrogram_of(record.samples[:, places[o]], m.result.fs)
-        expert_figures.draw_spectrogram(drawing.add_subplot(), *found, m.result.shown_hz)
+        expert_figures.draw_spectrogram(drawing.add_subplot(), *found, _axis_hz(m))
     except InputError as fault:
         return page.section("Spectrogram", page.absent(f"The picture is left out: {fault}."))
     name = m.result.outputs[o]
-    words = f"Power density of {name}, the output with the largest variance. A mode is a level line; a line that ends, "
-    words += "begins or slants is a machine or a change."
+    words = f"Power density of {name}, the output with the largest variance. A mode and a steady machine are level "
+    words += "lines; a line that ends, begins or slants is a machine or a change."
     picture = m.pictures.inline(drawing, f"power density of {name} over time and frequency")
     return page.section("Spectrogram", picture, page.note(words))
