@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Mode shapes that move, on a canvas: no library, nothing from outside. Needs structure.js and pens.js.
+// Mode shapes that move, on a canvas. No library: three.js would add 700 kB to every report, and WebGL neither prints nor gives
+// an SVG; lines and flat surfaces need no more than this. Needs structure.js and pens.js.
 //
 //   const view = okidShapes(canvas, {nodes, lines, surfaces, fixed, dofs, names}, shapes);
 //
