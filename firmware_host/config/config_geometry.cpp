@@ -45,8 +45,7 @@ std::size_t check_entries(const config_place& place, const toml::table& table, c
     if (!list) return 0;
     for (std::size_t k = 0; k < list->size(); ++k) {
         const toml::node& entry = *list->get(k);
-        if (!good(entry))
-            refuse_key(place, &entry, key, fmt::format("entry {}: expected {}", k + 1, expected));
+        if (!good(entry)) refuse_key(place, &entry, key, fmt::format("entry {}: expected {}", k + 1, expected));
     }
     return list->size();
 }
@@ -86,8 +85,7 @@ void check_geometry(const toml::table& file, const live_config& config) {
     check_list(place, *table, "surfaces", surface.c_str(),
                [&](const toml::array& one) { return is_surface(one, nodes); });
     const std::string fixed = fmt::format("a node from 1 to {}", nodes);
-    check_entries(place, *table, "fixed", fixed.c_str(),
-                  [&](const toml::node& one) { return is_node(&one, nodes); });
+    check_entries(place, *table, "fixed", fixed.c_str(), [&](const toml::node& one) { return is_node(&one, nodes); });
     for (const channel_config& channel : config.channels)
         if (static_cast<std::size_t>(std::abs(channel.dof)) > dofs)
             refuse_key(place, table, "dofs",

@@ -140,8 +140,8 @@ std::string fit_text(const result_context& context) {
     }
     std::string out = fmt::format("\n{:<{}}  simulated [%]  predicted [%]\n", "output", width);
     for (std::size_t i = 0; i < context.outputs.size(); ++i)
-        out += fmt::format("{:<{}}  {:>13}  {:>13}\n", context.outputs[i], width, fit_cell(context.simulation_percent, i),
-                           fit_cell(context.prediction_percent, i));
+        out += fmt::format("{:<{}}  {:>13}  {:>13}\n", context.outputs[i], width,
+                           fit_cell(context.simulation_percent, i), fit_cell(context.prediction_percent, i));
     return out;
 }
 
