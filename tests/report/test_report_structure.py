@@ -108,6 +108,10 @@ def test_two_modes_beside_each_other_are_saved(
 ) -> None:
     with opened(browser, given[0], reduced_motion="reduce", accept_downloads=True) as page:
         one = page.evaluate("document.querySelector('.player canvas').toDataURL()")
+        page.check("input.arrows")
+        assert page.evaluate("document.querySelector('.player canvas').toDataURL()") != one
+        page.uncheck("input.arrows")
+        assert page.evaluate("document.querySelector('.player canvas').toDataURL()") == one
         page.select_option("select.other", "2")
         assert page.evaluate("document.querySelector('.player canvas').toDataURL()") != one
         assert "beside that of mode 3: " in page.get_attribute(".player canvas", "aria-label")

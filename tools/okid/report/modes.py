@@ -155,7 +155,8 @@ def _player(m: Material) -> list[str]:
         f'<button type="button" class="go">Pause</button>\n{buttons}</div>\n'
         '<canvas tabindex="0" role="img" aria-label="moving mode shape"></canvas>\n'
         f'<div class="bar below"><label>beside it <select class="other"><option value="-1">nothing</option>{others}'
-        f"</select></label><span>Download:</span>{saves}</div>\n"
+        '</select></label><label><input type="checkbox" class="arrows"> arrows</label>'
+        f"<span>Download:</span>{saves}</div>\n"
         '<p class="note">Drag or arrow keys: turn; +, − and the wheel: zoom; space: stop; Home: the first view.</p>'
         "</div>\n" + page.data("shapes-data", payload)
     )

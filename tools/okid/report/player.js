@@ -21,6 +21,8 @@
   canvas.addEventListener("okid-shapes", tell);
   modes.forEach((button, k) => button.addEventListener("click", () => view.show(k)));
   other.addEventListener("change", () => view.show(view.mode, Number(other.value)));
+  const arrows = box.querySelector("input.arrows");
+  arrows.addEventListener("change", () => { view.arrows = arrows.checked; });
   go.addEventListener("click", () => (view.playing ? view.pause() : view.play()));
   box.querySelectorAll("button[data-picture]").forEach((button) =>
     button.addEventListener("click", () => okidPens.save(view, canvas, button.dataset.picture, `mode-${parseInt(modes[view.mode].textContent, 10)}`)));

@@ -228,6 +228,7 @@ function showShapes() {
   if (!shape) {
     shape = window.okidShapes(by("shape-canvas"), place, shapes);
     shape.show(select.selectedIndex);
+    shape.arrows = by("shape-arrows").checked;
     playing();
   } else {
     shape.set(shapes, key === page.shapeKey ? undefined : place);
@@ -302,6 +303,7 @@ for (const button of document.querySelectorAll("#modes-save button")) {
 for (const id of ["shape-mode", "shape-other"]) {
   by(id).addEventListener("change", () => shape && shape.show(by("shape-mode").selectedIndex, by("shape-other").selectedIndex - 1));
 }
+by("shape-arrows").addEventListener("change", (event) => { if (shape) shape.arrows = event.target.checked; });
 for (const button of document.querySelectorAll("#shape-save button")) {
   button.addEventListener("click", () => shape && window.okidPens.save(shape, by("shape-canvas"), button.dataset.picture, `mode-${shape.mode + 1}`));
 }

@@ -16,6 +16,7 @@
 // view.show(k, other)   mode k, counted from 0, and beside it another one when `other` is given; outside of the list: at rest
 // view.play()           move (also the space bar on the canvas); view.pause() stops where it is
 // view.set(shapes, geometry)   new shapes of the same or of another geometry (live page); keeps the angle of view
+// view.arrows = true    arrows from rest to where each node is
 // view.playing, view.mode, view.other, view.motion(k)      what is on; displacements of a mode
 // view.paint(pen, width, height, phase)   one picture with any pen of pens.js
 //
@@ -30,7 +31,7 @@ function okidShapes(canvas, geometry, shapes) {
   const PERIOD_S = 1.6, SWING = 0.16; // one turn of the motion; largest displacement over the size of the structure
   const FIRST = { yaw: -0.6, pitch: 0.35, zoom: 1 };
   const context = canvas.getContext("2d");
-  let one, motion, known, mode = 0, other = -1, phase = 0, playing = false, before = 0, view = { ...FIRST };
+  let one, motion, known, mode = 0, other = -1, phase = 0, playing = false, arrows = false, before = 0, view = { ...FIRST };
   const held = new Map(); // fingers on the canvas
 
   function take(given) {
@@ -101,6 +102,14 @@ function okidShapes(canvas, geometry, shapes) {
     }
   }
 
+  // Shaft and head of an arrow as pairs of points; none where the node hardly moves.
+  function arrow(from, to) {
+    const [x, y] = [to[0] - from[0], to[1] - from[1]], long = Math.hypot(x, y);
+    if (long < 4) return [];
+    const head = Math.min(8, 0.5 * long) / long, barb = (side) => [to[0] - head * (x - side * 0.5 * y), to[1] - head * (y + side * 0.5 * x)];
+    return [[from, to], [to, barb(1)], [to, barb(-1)]];
+  }
+
   function paintPane(pen, k, pane, at, colour) {
     const found = moving(k), project = projection(found, pane), still = project(one.nodes), now = project(moved(found, at));
     const faces = one.surfaces.map((face) => face.map((node) => now[node - 1])).filter((face) => face.every(Boolean));
@@ -109,6 +118,7 @@ function okidShapes(canvas, geometry, shapes) {
     const joined = (points) => motion.edges.map(([a, b]) => [points[a], points[b]]);
     pen.lines(joined(still), colour.muted, 1, [4, 4]);
     pen.lines(joined(now), colour.accent, faces.length ? 1.6 : 2.5, []);
+    if (arrows) pen.lines(still.flatMap((from, n) => arrow(from, now[n])), colour.ink, 1.2, []);
     const radius = one.nodes.length > 60 ? 2 : 4, fixed = new Set(one.fixed || []);
     now.forEach((point, n) => {
       if (fixed.has(n + 1)) pen.dot(point, 0.6 * radius, colour.muted, colour.muted);
@@ -171,6 +181,8 @@ function okidShapes(canvas, geometry, shapes) {
     motion: (k) => moving(k),
     paint,
     period: PERIOD_S,
+    get arrows() { return arrows; },
+    set arrows(on) { arrows = Boolean(on); draw(); },
     get playing() { return playing; },
     get mode() { return mode; },
     get other() { return other; },
