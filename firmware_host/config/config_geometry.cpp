@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <optional>
+#include <set>
 
 namespace okid_host {
 namespace {
@@ -28,18 +29,35 @@ bool is_direction(const toml::node* node) {
     return value && std::find(directions.begin(), directions.end(), *value) != directions.end();
 }
 
-/// Every entry of a list must be an array that `good` takes. @return how many there are
+/// Nodes around a surface: three or more, none twice.
+bool is_surface(const toml::array& surface, std::size_t count) {
+    std::set<std::int64_t> seen;
+    for (const toml::node& node : surface)
+        if (!is_node(&node, count) || !seen.insert(*node.value_exact<std::int64_t>()).second) return false;
+    return surface.size() >= 3;
+}
+
+/// Every entry of a list must be one that `good` takes. @return how many there are
 template <class Test>
-std::size_t check_list(const config_place& place, const toml::table& table, const char* key, const char* expected,
-                       Test good) {
+std::size_t check_entries(const config_place& place, const toml::table& table, const char* key, const char* expected,
+                          Test good) {
     const toml::array* list = table[key].as_array();
     if (!list) return 0;
     for (std::size_t k = 0; k < list->size(); ++k) {
         const toml::node& entry = *list->get(k);
-        if (!entry.is_array() || !good(*entry.as_array()))
-            refuse_key(place, &entry, key, fmt::format("entry {}: expected {}", k + 1, expected));
+        if (!good(entry)) refuse_key(place, &entry, key, fmt::format("entry {}: expected {}", k + 1, expected));
     }
     return list->size();
+}
+
+/// The same for entries that are arrays.
+template <class Test>
+std::size_t check_list(const config_place& place, const toml::table& table, const char* key, const char* expected,
+                       Test good) {
+    return check_entries(place, table, key, expected, [&](const toml::node& entry) {
+        const toml::array* one = entry.as_array();
+        return one && good(*one);
+    });
 }
 
 } // namespace
@@ -63,6 +81,11 @@ void check_geometry(const toml::table& file, const live_config& config) {
     check_list(place, *table, "lines", line.c_str(), [&](const toml::array& one) {
         return one.size() == 2 && is_node(one.get(0), nodes) && is_node(one.get(1), nodes);
     });
+    const std::string surface = fmt::format("three different nodes or more from 1 to {}: [1, 2, 3]", nodes);
+    check_list(place, *table, "surfaces", surface.c_str(),
+               [&](const toml::array& one) { return is_surface(one, nodes); });
+    const std::string fixed = fmt::format("a node from 1 to {}", nodes);
+    check_entries(place, *table, "fixed", fixed.c_str(), [&](const toml::node& one) { return is_node(&one, nodes); });
     for (const channel_config& channel : config.channels)
         if (static_cast<std::size_t>(std::abs(channel.dof)) > dofs)
             refuse_key(place, table, "dofs",

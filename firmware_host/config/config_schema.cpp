@@ -166,7 +166,13 @@ const std::vector<section_rule> schema = {
       {"influx_token_file", kind::text}}},
     {"virtual", false, {{"model", kind::text}, {"channels", kind::array}}},
     {"realtime", false, {{"priority", kind::whole, 0, 99}, {"lock_memory", kind::flag}, {"cpus", kind::array}}},
-    {"geometry", false, {{"nodes", kind::array}, {"dofs", kind::array}, {"lines", kind::array}}}};
+    {"geometry",
+     false,
+     {{"nodes", kind::array},
+      {"dofs", kind::array},
+      {"lines", kind::array},
+      {"surfaces", kind::array},
+      {"fixed", kind::array}}}};
 
 void check_number(const config_place& place, const toml::node& node, const key_rule& rule) {
     const bool whole = rule.what == kind::whole;

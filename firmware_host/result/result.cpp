@@ -123,18 +123,25 @@ std::string note_text(const okid_identified_t& model, std::uint32_t bit) {
     }
 }
 
+std::string fit_cell(const std::optional<std::vector<double>>& values, std::size_t i) {
+    const bool known = values && i < values->size() && std::isfinite((*values)[i]);
+    return known ? fmt::format("{:.2f}", (*values)[i]) : "-";
+}
+
 std::string fit_text(const result_context& context) {
     if (!context.simulation_percent && !context.prediction_percent) return "";
     std::size_t width = 6;
     for (const auto& name : context.outputs) width = std::max(width, name.size());
+    if (context.responses && context.simulation_percent) {
+        std::string out = fmt::format("\n{:<{}}  explained [%]\n", "output", width);
+        for (std::size_t i = 0; i < context.outputs.size(); ++i)
+            out += fmt::format("{:<{}}  {:>13}\n", context.outputs[i], width, fit_cell(context.simulation_percent, i));
+        return out;
+    }
     std::string out = fmt::format("\n{:<{}}  simulated [%]  predicted [%]\n", "output", width);
-    const auto cell = [](const std::optional<std::vector<double>>& values, std::size_t i) {
-        return values && i < values->size() && std::isfinite((*values)[i]) ? fmt::format("{:.2f}", (*values)[i])
-                                                                           : std::string("-");
-    };
     for (std::size_t i = 0; i < context.outputs.size(); ++i)
-        out += fmt::format("{:<{}}  {:>13}  {:>13}\n", context.outputs[i], width, cell(context.simulation_percent, i),
-                           cell(context.prediction_percent, i));
+        out += fmt::format("{:<{}}  {:>13}  {:>13}\n", context.outputs[i], width,
+                           fit_cell(context.simulation_percent, i), fit_cell(context.prediction_percent, i));
     return out;
 }
 
@@ -184,6 +191,9 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
             fmt::format("   {}, listed with --all-modes: {}\n",
                         counted(static_cast<long long>(left_out.size()), "doubtful mode"), fmt::join(left_out, ", "));
     out += why_legend(verdicts);
+    if (model.n_y > most_shape_columns && !context.placed && model.mode_count > 0)
+        out += fmt::format("   shapes of {}: --json FILE has them, okid-report draws them\n",
+                           counted(model.n_y, "output"));
     if (!judged_by_agreement(context) && model.mode_count > 0)
         out += "   not judged by a named method: EMAC from 0.5 on, which noise reaches too; method auto judges\n";
     return out;
@@ -316,9 +326,10 @@ std::string result_table(const okid_identified_t& model, const result_context& c
                                  ? fmt::format("responses at {}", counted(context.samples, "line"))
                                  : fmt::format("{} at {:g} Hz ({:.4g} s)", counted(context.samples, "sample"),
                                                context.fs_hz, static_cast<double>(context.samples) / context.fs_hz);
-    std::string out =
-        fmt::format("{}: {} to {}, {}, {}", context.method, counted(model.n_u, "input"), counted(model.n_y, "output"),
-                    what, counted(context.records, merged || (fractions && context.records > 1) ? "set-up" : "record"));
+    std::string out = fmt::format("{}: {} to {}, {}", context.method, counted(model.n_u, "input"),
+                                  counted(model.n_y, "output"), what);
+    const bool set_ups = merged || (fractions && context.records > 1);
+    if (set_ups || !context.responses) out += ", " + counted(context.records, set_ups ? "set-up" : "record");
     if (context.gaps) out += ", " + counted(context.gaps, "gap");
     const std::string horizon = merged      ? "modes of the set-ups paired by frequency and shape"
                                 : fractions ? "agreement of several degrees, weights and normalisations"
@@ -329,7 +340,8 @@ std::string result_table(const okid_identified_t& model, const result_context& c
         out +=
             fmt::format("\nmodes sought between {:.3g} and {:.4g} Hz", context.band_hz->first, context.band_hz->second);
     if (!context.rates_hz.empty()) out += fmt::format(", at rates down to {:.4g} Hz", context.rates_hz.back());
-    out += fmt::format("\n{}, order {}, detrend {}\n\n", horizon, model.n_z, context.detrend);
+    out += fmt::format("\n{}, order {}", horizon, model.n_z);
+    out += context.responses ? "\n\n" : fmt::format(", detrend {}\n\n", context.detrend);
     out += mode_rows(model, context);
     if (context.placed) out += shapes_text(*context.placed, model.frequency_hz, shown_modes(model, context));
     out += fit_text(context);

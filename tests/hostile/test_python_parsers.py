@@ -19,6 +19,7 @@ from okid import Error
 from okid.campaign.spec import load_spec
 from okid.data.geometry import read_geometry
 from okid.formats import read_uff, write_result
+from okid.formats.uff_model import structure_text
 from okid.live.config import read_config
 from okid.live.session import Session
 from okid.report.command import main as report
@@ -29,6 +30,7 @@ from two_masses import rig_text, simulate_rig
 MORE = 30 if os.environ.get("OKID_SLOW") == "1" else 1
 EXAMPLES = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 GEOMETRY = '[geometry]\nnodes = [[0,0,0],[0,0,1],[0,0,2]]\nlines = [[1,2],[2,3]]\ndofs = [[2,"x"],[3,"x"]]\n'
+TABLE = "node,1,0,0,0\nnode,2,0,0,1.5\nnode,3,1,0,1.5\nline,1,2\nsurface,1,2,3\nsensor,a1,2,x\nfixed,1\n"
 SPEC = """[campaign]
 title = "bridge"
 [records]
@@ -60,6 +62,8 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
     okid("replay", folder / "a.log", "-c", folder / "b.toml", *options, status=0)
     (folder / "spec.toml").write_text(SPEC)
     write_result(folder / "r.uff", json.loads((folder / "r.json").read_text()))
+    (folder / "g.csv").write_text(TABLE)
+    (folder / "g.unv").write_text(structure_text(read_geometry(folder / "g.csv")))
     return folder
 
 
@@ -143,10 +147,11 @@ def test_events_of_a_socket(real: pathlib.Path, data: st.DataObject) -> None:
 
 @settings(EXAMPLES, max_examples=30 * MORE)
 @given(data=st.data())
-@pytest.mark.parametrize("name", ["a.toml", "spec.toml", "r.uff"])
+@pytest.mark.parametrize("name", ["a.toml", "spec.toml", "r.uff", "g.csv", "g.unv"])
 def test_files(real: pathlib.Path, tmp_path: pathlib.Path, name: str, data: st.DataObject) -> None:
     (tmp_path / name).write_bytes(damaged((real / name).read_bytes(), data))
-    readers = {"a.toml": (read_geometry, read_config), "spec.toml": (load_spec,), "r.uff": (read_uff,)}
+    readers = {"a.toml": (read_geometry, read_config), "spec.toml": (load_spec,), "r.uff": (read_uff,),
+               "g.csv": (read_geometry,), "g.unv": (read_geometry,)}  # fmt: skip
     for reader in readers[name]:
         try:
             reader(tmp_path / name)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from live_process import Live
 from okid_feed import WHOLE, OkidFeed, channel, mode, modes, samples, start
+from PIL import Image
 from program import PROGRAM
 from two_masses import rig_text, simulate_rig
 
@@ -165,6 +166,13 @@ def check_numbers(page: Page) -> None:
     page.tab.click("#shape-play")
     assert page.text("#shape-play") == "Play"
     page.tab.select_option("#shape-mode", index=1)
+    alone = page.tab.evaluate(moving)
+    page.tab.select_option("#shape-other", index=1)
+    assert page.tab.evaluate(moving) != alone
+    with page.tab.expect_download() as waiting:
+        page.tab.click("#shape-save button[data-picture='gif']")
+    assert waiting.value.suggested_filename == "mode-2.gif"
+    assert Image.open(waiting.value.path()).n_frames == 24
     assert page.tab.evaluate("okidLive.lanes.end * okidLive.lanes.seconds") == pytest.approx(20.0, abs=0.05)
 
 
@@ -196,6 +204,11 @@ def check_narrow(page: Page, folder: Path) -> None:
     inside = "document.getElementById('modes-table').getBoundingClientRect().right <= "
     assert page.tab.evaluate(inside + "document.getElementById('modes').getBoundingClientRect().right")
     assert page.tab.evaluate(empty, "modes") < 40
+    cells = (
+        "[...document.querySelectorAll('#bus-table td')].map((e) => [e.dataset.label, e.getBoundingClientRect().right])"
+    )
+    seen = dict(page.tab.evaluate(cells))
+    assert {"received", "lost", "errors", "load"} <= set(seen) and max(seen.values()) <= 390
     page.tab.screenshot(path=folder / "narrow.png", full_page=True)
     page.tab.set_viewport_size(SIZE)
 

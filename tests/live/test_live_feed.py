@@ -348,7 +348,13 @@ def test_a_config_that_is_right(tmp_path: Path) -> None:
     assert config.socket == tmp_path / "run/s" and not config.samples and config.hammer and config.hit_s == 1.5
     assert config.identification.window_s is None and config.identification.p == 12
     assert config.geometry is not None and config.geometry.dofs == [(2, "-z")]
-    assert set(Session(config)._facts()["geometry"]) == {"nodes", "lines", "dofs"}  # what shapes.js takes
+    assert set(Session(config)._facts()["geometry"]) == {
+        "nodes",
+        "lines",
+        "surfaces",
+        "fixed",
+        "dofs",
+    }  # what shapes.js takes
     assert read_config(tmp_path / "a.toml", "other").socket == Path("other")
 
 

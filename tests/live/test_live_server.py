@@ -45,7 +45,7 @@ def test_files_of_the_page(live: Live) -> None:
     policy = headers["content-security-policy"]
     assert policy.startswith("default-src 'self';") and "script" not in policy and "http" not in policy
     assert headers["x-content-type-options"] == "nosniff" and headers["cache-control"] == "no-store"
-    for name in ("live.js", "lanes.js", "plots.js", "tables.js", "shapes.js"):
+    for name in ("live.js", "lanes.js", "plots.js", "tables.js", "structure.js", "pens.js", "shapes.js"):
         status, headers, data = ask(live.port, f"/{name}")
         assert status == 200 and headers["content-type"].startswith("text/javascript"), name
         assert b"innerHTML" not in data and b"outerHTML" not in data and b"insertAdjacent" not in data

@@ -11,7 +11,7 @@ from two_masses import rig_text, simulate_rig
 
 GOOD = (
     "[geometry]\nnodes = [[0, 0, 0], [0.0, 0, 1.5], [0, 0, 3]]\n"
-    'dofs = [[2, "x"], [3, "-x"]]\nlines = [[1, 2], [2, 3]]\n'
+    'dofs = [[2, "x"], [3, "-x"]]\nlines = [[1, 2], [2, 3]]\nsurfaces = [[1, 2, 3]]\nfixed = [1]\n'
 )
 
 
@@ -43,6 +43,10 @@ def test_a_good_one_passes(rig: pathlib.Path) -> None:
         ('[3, "-x"]', '[3, "up"]', '"dofs": entry 2: expected a node from 1 to 3 and one of x y z'),
         ('[3, "-x"]', "3", '"dofs": entry 2'),
         ("[2, 3]]", "[2, 0]]", '"lines": entry 2: expected two nodes from 1 to 3'),
+        ("[[1, 2, 3]]", "[[1, 2, 4]]", '"surfaces": entry 1: expected three different nodes or more from 1 to 3'),
+        ("[[1, 2, 3]]", "[[1, 2, 3], [1, 2]]", '"surfaces": entry 2: expected three different nodes'),
+        ("[[1, 2, 3]]", "[[1, 2, 1]]", '"surfaces": entry 1: expected three different nodes'),
+        ("fixed = [1]", "fixed = [1, [2]]", '"fixed": entry 2: expected a node from 1 to 3'),
         (', [3, "-x"]', "", 'found 1 entries, but channel "acc2" measures degree of freedom 2'),
     ],
 )

@@ -180,3 +180,16 @@ def test_what_cannot_be_meant(tmp_path: Path, arguments: list[str], words: str) 
     )
     run = program("identify", tmp_path / "a.csv", "--frf", *arguments, status=2)
     assert words in run.stderr
+
+
+def test_the_table_speaks_of_responses(tmp_path: Path) -> None:
+    """Neither of records nor of what is done to samples; with many outputs it says where the shapes are."""
+    M, R, K = _structure(3, 8)
+    f = np.arange(1, 1201) * 0.25
+    for outputs in ([0, 1, 2], list(range(8))):
+        okid.write_frf(tmp_path / "h.uff", Frf.of(f, _responses(M, R, K, f, outputs, [0])))
+        done = program("identify", tmp_path / "h.uff", "--frf", status=0)
+        assert "responses at 1200 lines\n" in done.stdout and "explained [%]" in done.stdout
+        assert not any(word in done.stdout for word in ("record", "detrend", "predicted", "simulated"))
+        many = "   shapes of 8 outputs: --json FILE has them, okid-report draws them\n"
+        assert (many in done.stdout) == (len(outputs) > 6)

@@ -79,7 +79,7 @@ def test_report_with_record(made: tuple[Path, Path], page: str) -> None:
         assert f"<td>{mode['frequency_hz']:.4f}</td>" in html
         assert mode["frequency_std_hz"] is not None
     assert html.count("<th>± σ [Hz]</th><th>ζ [%]</th><th>± σ [%]</th>") == 1
-    assert html.count("<h2>") == 14
+    assert html.count("<h2>") == 17
     assert "No quality warning" in html
     for kind, path in (("result", made[0]), ("record", made[1])):
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -89,7 +89,7 @@ def test_report_with_record(made: tuple[Path, Path], page: str) -> None:
 def test_report_without_record_says_what_is_missing(made: tuple[Path, Path]) -> None:
     html = report.build(report.load_result(made[0]))
     assert html.count("--record") == 3
-    assert len(pictures(html)) == 7
+    assert len(pictures(html)) == 10
 
 
 @pytest.mark.usefixtures("words_only")

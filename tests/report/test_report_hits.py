@@ -28,6 +28,11 @@ def cells(page: str, section: str) -> list[list[str]]:
     return [[unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row)] for row in rows if "<td" in row]
 
 
+def cells_text(page: str, section: str) -> str:
+    text = page[page.index(f'<section id="{section}"') :]
+    return text[: text.index("</section>")]
+
+
 def without_time(page: str) -> str:
     return re.sub(r"<tr><th>Written.*?</tr>", "", page)
 
@@ -203,6 +208,9 @@ def test_responses_over_those_of_the_result(tmp_path: Path, capsys: pytest.Captu
         assert [row[0] for row in pairs] == ["1x", "2x", "3x"] and all(float(row[2]) > 70.0 for row in pairs)
         assert [len(row) for row in cells(page, "check")] == [4, 4, 4]
         assert re.search("[34] columns found", page) and "completeness" not in page
+        plain = re.sub(r"--record|<style.*?</style>|<script.*?</script>", "", page, flags=re.DOTALL)
+        assert not re.search(r"\b(records?|holds?|detrend|samples?|simulation)\b", plain, re.IGNORECASE)
+        assert "<td>responses</td>" in cells_text(page, "provenance") and ">of the modes<" in page
     okid.write_frf(tmp_path / "other.csv", measured._replace(outputs=("7x", "2x", "3x")))
     said = refusal(capsys, tmp_path / "r.json", "--record", tmp_path / "other.csv")
     assert "other.csv: has no response '1x'" in said

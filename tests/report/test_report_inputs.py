@@ -86,17 +86,16 @@ def test_geometry_follows_the_numbers_of_the_channels(tmp_path: Path) -> None:
     path.write_text(NODES + 'dofs = [[2, "x"], [3, "-z"]]\nlines = [[1, 2]]\n', encoding="utf-8")
     by_order = read_geometry(path, {"outputs": ["a", "b"]})
     assert by_order is not None
-    assert by_order.dofs == [(2, "x"), (3, "-z")]
+    assert by_order.places == [(2, "x"), (3, "-z")]
     live = {"b": {"dof": 1}, "a": {"dof": -2}, "c": {"dof": None}}
     by_run = read_geometry(path, {"outputs": ["a", "b", "c"]}, live)
     assert by_run is not None
-    assert by_run.dofs == [(3, "z"), (2, "x"), None]
+    assert by_run.places == [(3, "z"), (2, "x"), None]
     path.write_text(path.read_text() + '[[channel]]\nname = "a"\ndof = 1\n', encoding="utf-8")
     by_config = read_geometry(path, {"outputs": ["a"]}, live)
     assert by_config is not None
-    assert by_config.dofs == [(2, "x")]
-    moved = by_config.displaced(np.array([1.0]), 0.1)
-    assert moved[1].tolist() == pytest.approx([0.1 * np.sqrt(2.0), 0.0, 1.0])
+    assert by_config.places == [(2, "x")]
+    assert by_config.moved(np.array([0.5j])).tolist() == [[0, 0, 0], [0.5j, 0, 0], [0, 0, 0]]
     path.write_text("[acquisition]\n", encoding="utf-8")
     assert read_geometry(path, {"outputs": ["a"]}) is None
 
@@ -228,7 +227,8 @@ def test_the_stabilization_diagram_explains_itself(small: tuple[Path, Any, Any],
     words = " ".join(re.findall(r'<p class="note">(.*?)</p>', section))
     for text in (
         "How to read it: the record was identified again with orders from 2 to",
-        f"Blue dashed line: order {order}, that of the model of this report; green vertical lines: the {modes} modes",
+        f"Blue dashed line: order {order}, that of the model of this report; green vertical lines: the {modes} "
+        "confident modes of this report",
         "within 1 % in frequency, 5 % in damping and with the same shape (MAC ≥ 0.98)",
         "Green dot:", "Blue triangle:", "Orange diamond:", "Red cross:", "Grey point:", "ring: the pole nearest",
         f"Blue bands: {len(report.measured_from(loaded, record, 'r').rows.modes)} columns found by the program",
@@ -236,3 +236,43 @@ def test_the_stabilization_diagram_explains_itself(small: tuple[Path, Any, Any],
     ):  # fmt: skip
         assert text in words, text
     assert f"Blue: the {order} that this model keeps" in page
+
+
+def section_of(page: str, name: str) -> str:
+    text = page[page.index(f'<section id="{name}"') :]
+    return text[: text.index("</section>")]
+
+
+def test_a_rejected_mode_is_drawn_as_rejected(small: tuple[Path, Any, Any]) -> None:
+    path, u, y = small
+    raw = json.loads(path.read_text(encoding="utf-8"))
+    raw["modes"][1].update(confident=False, why=["tone"])
+    record = okid.Record(["u1", "y1", "y2", "y3"], np.hstack([u, y]), FS)
+    section = section_of(report.build(report.loaded_from(raw, "r"), record), "stabilization")
+    legend = re.findall(r"<text[^>]*>([^<]+)</text>", section)
+    assert legend.count("mode of this model") == legend.count("doubtful: rejected") == 1
+    assert "the 2 confident modes of this report" in section
+    assert "Grey dotted: the 1 doubtful mode, with the reason in Modes." in section
+
+
+@pytest.mark.usefixtures("words_only")
+def test_automac_of_few_sensors_says_so(small: tuple[Path, Any, Any]) -> None:
+    path, _, _ = small
+    raw = json.loads(path.read_text(encoding="utf-8"))
+    few = "seen at 2 places only: at most 2 shapes can be told apart"
+    assert few not in report.build(report.loaded_from(raw, "r"))
+    for mode in raw["modes"]:
+        mode.update(shape_re=mode["shape_re"][:2], shape_im=mode["shape_im"][:2])
+    raw["shape_dofs"] = [1, 2]
+    assert few in section_of(report.build(report.loaded_from(raw, "r")), "automac")
+
+
+@pytest.mark.usefixtures("words_only")
+def test_pictures_that_leave_modes_out_say_so(small: tuple[Path, Any, Any]) -> None:
+    path, _, _ = small
+    raw = json.loads(path.read_text(encoding="utf-8"))
+    raw["modes"] = [{**raw["modes"][0], "frequency_hz": 1.0 + k, "confident": True, "why": []} for k in range(70)]
+    page = report.build(report.loaded_from(raw, "r"))
+    assert "The 16 of 70 confident modes with the highest EMAC are shown." in section_of(page, "shapes")
+    assert "Pictures: 16 of 70 confident modes, those with the highest EMAC." in section_of(page, "complexity")
+    assert "Shown: 60 of 70 confident modes, those with the highest EMAC." in section_of(page, "automac")

@@ -53,7 +53,7 @@ def contents(folder: Path) -> dict[str, bytes]:
         (["--record", "r.csv", "--out", "link.html"], "link.html: is a record to be read"),
         (["--events", "e.jsonl", "--out", "e.jsonl"], "is an events file to be read"),
         (["--config", "c.toml", "--out", "c.toml"], "is a configuration to be read"),
-        (["--geometry", "c.toml", "--out", "c.toml"], "is a configuration to be read"),
+        (["--geometry", "c.toml", "--out", "c.toml"], "is a geometry to be read"),
         (["--pdf", "r.json"], "r.json: is a result to be read"),
         (["--pdf", "hard.pdf"], "hard.pdf: is a result to be read"),
         (["--out", "o.html", "--pdf", "o.html"], "o.html: is to be the report"),

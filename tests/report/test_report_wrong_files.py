@@ -152,7 +152,7 @@ LINES = "expected JSON lines as `okid run` or `okid replay` writes them with --e
         ("--config", "result.json", "is a result of okid, expected a CONFIG.toml"),
         ("--config", "events.jsonl", "expected a CONFIG.toml of okid: give it with --events"),
         ("--config", "frame.dbc", "is a DBC, expected a CONFIG.toml"),
-        ("--geometry", "run.csv", "is a table of samples (CSV), expected a CONFIG.toml of okid: give it with --rec"),
+        ("--geometry", "run.csv", 'run.csv: line 2: found \'"u1","y1","y2","y3"\', expected one of node,NUM'),
         ("--geometry", "dir", "is a folder, expected a CONFIG.toml"),
         ("--geometry", "rig.toml", "no section [geometry], expected nodes, dofs and lines"),
     ],

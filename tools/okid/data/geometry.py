@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the sensors sit: nodes, directions and lines of the [geometry] section of a CONFIG.toml."""
+"""Where the sensors sit: nodes, directions, lines and surfaces, as the [geometry] section of a CONFIG.toml has them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ Place = tuple[int, str]  # node and direction: "x", "-z" ..
 @dataclass(frozen=True)
 class Geometry:
     """nodes: coordinates (x, y, z), node k + 1 at index k. dofs: node and direction ("x", "-z" ..) of degree of freedom
-    k + 1. lines: pairs of nodes, from 1 on. channel_dofs: degree of freedom of each channel by name (negative: with
-    reversed polarity), where it is known. source: its file, for messages.
+    k + 1. lines: pairs of nodes, from 1 on; surfaces: three nodes or more in their order around. fixed: nodes that stay
+    at rest, None = not said (see at_rest()). channel_dofs: degree of freedom of each channel by name (negative: with
+    reversed polarity), where it is known. named: only names place a channel, as in a file without degrees of freedom.
+    source: its file, for messages.
     """
 
     nodes: list[tuple[float, float, float]]
@@ -28,6 +30,18 @@ class Geometry:
     lines: list[tuple[int, int]] = field(default_factory=list)
     channel_dofs: dict[str, int] = field(default_factory=dict)
     source: str = field(default="the geometry", compare=False)
+    surfaces: list[tuple[int, ...]] = field(default_factory=list)
+    fixed: list[int] | None = None
+    named: bool = False
+
+    def at_rest(self, places: Sequence[Place | None]) -> list[int]:
+        """Nodes that never move: `fixed`; where that is not said the lowest nodes, when no sensor is at any of them
+        (`places` of all sensors): what stands on the ground."""
+        if self.fixed is not None:
+            return self.fixed
+        low, high = min(node[2] for node in self.nodes), max(node[2] for node in self.nodes)
+        lowest = [k for k, node in enumerate(self.nodes, 1) if node[2] <= low + 1e-9 * (high - low)]
+        return [] if {place[0] for place in places if place is not None} & set(lowest) else lowest
 
     def places(
         self,
@@ -40,9 +54,17 @@ class Geometry:
         The degree of freedom is that of the [[channel]] of this name, else that in `numbers` (negative: reversed).
         Where neither knows any, the names count in their order. InputError names the first that does not fit.
         """
-        known = [None if noun == "place" else self.channel_dofs.get(name) for name in names]
-        known = [a if a is not None else b for a, b in zip(known, numbers or [None] * len(names), strict=True)]
+        if self.named:
+            known = [self.channel_dofs.get(name) for name in names]
+        else:
+            own = [None if noun == "place" else self.channel_dofs.get(name) for name in names]
+            known = [a if a is not None else b for a, b in zip(own, numbers or [None] * len(names), strict=True)]
         if all(number is None for number in known):
+            if self.named:
+                raise InputError(
+                    f"{self.source}: it places no {noun} {names[0]!r}, nor another {noun} of the result: a universal "
+                    'file places channels called by node and direction ("12z"), a CSV file those of its rows "sensor"'
+                )
             if self.channel_dofs:
                 raise InputError(
                     f"{self.source}: no [[channel]] has the name {names[0]!r}, nor that of another {noun} of the "
@@ -73,7 +95,7 @@ def axis_and_sign(direction: str) -> tuple[int, int]:
     return AXES.index(direction[-1]), -1 if direction.startswith("-") else 1
 
 
-def _direction(text: object) -> str | None:
+def direction_of(text: object) -> str | None:
     """As it is kept, without a plus sign; None = no direction."""
     plain = text.removeprefix("+") if isinstance(text, str) else ""
     return plain if plain.removeprefix("-") in AXES else None
@@ -109,7 +131,7 @@ def geometry_of(config: Mapping[str, Any], source: str) -> Geometry | None:
     count = len(nodes)
     dofs: list[tuple[int, str]] = []
     for k, row in enumerate(_rows(section, "dofs", source, True), 1):
-        direction = _direction(row[1]) if isinstance(row, list) and len(row) == 2 else None
+        direction = direction_of(row[1]) if isinstance(row, list) and len(row) == 2 else None
         if direction is None or not _is_node(row[0], count):
             raise InputError(
                 f"{source}: [geometry] dofs, entry {k}: found {row!r:.60}, expected a node from 1 to {count} and one "
@@ -124,17 +146,40 @@ def geometry_of(config: Mapping[str, Any], source: str) -> Geometry | None:
                 "in [1, 2]"
             )
         lines.append((row[0], row[1]))
+    surfaces: list[tuple[int, ...]] = []
+    for k, row in enumerate(_rows(section, "surfaces", source, False), 1):
+        known = isinstance(row, list) and all(_is_node(node, count) for node in row)
+        if not known or len(row) < 3 or len(set(row)) < len(row):
+            raise InputError(
+                f"{source}: [geometry] surfaces, entry {k}: found {row!r:.60}, expected three different nodes or more "
+                f"from 1 to {count}, as in [1, 2, 3]"
+            )
+        surfaces.append(tuple(row))
+    fixed = _rows(section, "fixed", source, False) if "fixed" in section else None
+    wrong = [node for node in fixed or () if not _is_node(node, count)]
+    if wrong:
+        raise InputError(f"{source}: [geometry] fixed: found {wrong[0]!r:.60}, expected nodes from 1 to {count}")
     channels = config.get("channel")
     numbers = {
         str(one["name"]): one["dof"]
         for one in (channels if isinstance(channels, list) else [])
         if isinstance(one, dict) and "name" in one and isinstance(one.get("dof"), int) and one["dof"] != 0
     }
-    return Geometry(nodes, dofs, lines, numbers, source)
+    return Geometry(nodes, dofs, lines, numbers, source, surfaces, fixed)
 
 
 def read_geometry(path: str | Path) -> Geometry:
-    """The [geometry] section and the dof of every [[channel]] of a CONFIG.toml. InputError when there is none."""
+    """The structure of a file: [geometry] and the dof of every [[channel]] of a CONFIG.toml, a .csv of rows node, line,
+    surface, sensor, fixed, or the data sets 15, 2411, 82 and 2412 of a .uff or .unv. InputError when it has none."""
+    kind = Path(path).suffix.lower()
+    if kind == ".csv":
+        from okid.data.geometry_csv import read_geometry_csv
+
+        return read_geometry_csv(path)
+    if kind in (".uff", ".unv"):
+        from okid.formats.uff_geometry import uff_geometry
+
+        return uff_geometry(path)
     found = geometry_of(read_toml(path)[0], str(path))
     if found is None:
         raise InputError(f"{path}: no [geometry] section, expected one with nodes and dofs")

@@ -179,7 +179,9 @@ def _parser() -> argparse.ArgumentParser:
         "--group", metavar="G", help="part of IN when it holds several rasters: its error message lists them"
     )
     parser.add_argument(
-        "--geometry", metavar="CONFIG.toml", help="its [geometry] gives a model's nodes and lines in .uff"
+        "--geometry",
+        metavar="FILE",
+        help="a structure (CONFIG.toml, .csv, .uff) gives a model's nodes and lines in .uff",
     )
     parser.add_argument(
         "--config", metavar="CONFIG.toml", help="decode a log of CAN frames into samples by this config"

@@ -24,14 +24,14 @@ from okid.formats.uff_function import FRF, ROLE_CODES, TIME, UffFunction, functi
 from okid.formats.uff_model import (
     UffMode,
     header_text,
-    lines_text,
     mode_text,
-    nodes_text,
+    read_elements,
     read_header,
     read_lines,
     read_mode,
     read_nodes,
     read_units,
+    structure_text,
     units_text,
 )
 from okid.result.left_out import kept_outputs, without_left_out
@@ -45,12 +45,14 @@ _SENSING = {"acceleration": (12, "m/s^2"), "velocity": (11, "m/s"), "displacemen
 
 @dataclass
 class UffFile:
-    """What a universal file holds. nodes: coordinates by number; lines: pairs of nodes; others: data sets left out."""
+    """What a universal file holds. nodes: coordinates by number; lines: pairs of nodes; elements: kind (descriptor of
+    the format) and nodes; others: data sets left out."""
 
     functions: list[UffFunction] = field(default_factory=list)
     modes: list[UffMode] = field(default_factory=list)
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     lines: list[tuple[int, int]] = field(default_factory=list)
+    elements: list[tuple[int, tuple[int, ...]]] = field(default_factory=list)
     header: dict[str, str] = field(default_factory=dict)
     others: list[int] = field(default_factory=list)
 
@@ -138,7 +140,8 @@ def _record(group: list[UffFunction]) -> Record:
 
 
 def read_uff(path: str | Path) -> UffFile:
-    """Read a universal file, ASCII or binary: data sets 15, 55, 58, 58b, 82, 151, 164 and 2411; the rest is counted.
+    """Read a universal file, ASCII or binary: data sets 15, 55, 58, 58b, 82, 151, 164, 2411 and
+    2412; the rest is counted.
 
     About 1 s for 10^6 samples in ASCII, far less in binary. InputError of one line names the file, the data set and
     the line that is wrong or cut off.
@@ -154,6 +157,8 @@ def read_uff(path: str | Path) -> UffFile:
                 out.nodes.update(read_nodes(block))
             elif block.kind == 82:
                 out.lines += read_lines(block)
+            elif block.kind == 2412:
+                out.elements += read_elements(block)
             elif block.kind == 151:
                 out.header = read_header(block)
             elif block.kind == 164:
@@ -293,8 +298,8 @@ def _frf_bytes(
 def _result_bytes(
     raw: dict[str, Any], geometry: Geometry | None, binary: bool, sensing: str, modes: Sequence[int] | None
 ) -> list[bytes]:
-    """Nodes and lines, modes, and the responses of the model."""
-    out = [] if geometry is None else [nodes_text(geometry.nodes).encode(), lines_text(geometry.lines).encode()]
+    """The structure, modes, and the responses of the model."""
+    out = [] if geometry is None else [structure_text(geometry).encode()]
     places, struck = shape_places(raw, geometry), bool(raw.get("shape_dofs"))
     if not struck:
         places = [one for one, stays in zip(places, kept_outputs(raw), strict=True) if stays]
@@ -319,7 +324,7 @@ def write_uff(
 
     Both begin with data sets 151 (header) and 164 (SI). Record: a time history (58) a channel; NaN stays NaN.
     Result: 55 for each mode, or those numbered in `modes` (from 1), with "confident .." or "doubtful: why" on its third
-    ID line; 58 for each modelled FRF, and 15 and 82 of `geometry`; outputs that were left out are not in it. binary:
+    ID line; 58 for each modelled FRF, and 15, 82, 2412 of `geometry`; outputs that were left out are not in it. binary:
     samples exact (58b), else ASCII with 12 digits. sensing: what the outputs of the result are. InputError when a name
     or unit is too long, the rate is not known, a channel has no place in the geometry, a number of `modes` is not
     there, or the file cannot be written.

@@ -2,7 +2,7 @@
 """Universal files as a row of data sets between lines of -1: fields by columns, numbers, binary parts.
 
 Layout: the universal file format of SDRC I-DEAS as the University of Cincinnati publishes it (data sets 15, 55, 58,
-58b, 82, 151, 164, 2411). Written here and not with pyuff, because that writes a missing sample as 0, the sample
+58b, 82, 151, 164, 2411, 2412). Written here and not with pyuff, because that writes a missing sample as 0, the sample
 interval with 6 digits, and reads the file again after each data set; pyuff is the judge in the tests.
 """
 

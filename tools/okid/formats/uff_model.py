@@ -10,9 +10,11 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from okid.data.geometry import Geometry
 from okid.formats.uff_blocks import CLOSING, Block, opening, short_number, text_line
 
 Real = NDArray[np.float64]
+_BEAMS = {11, 21, 22, 23, 24}  # elements with a line of their own orientation
 _UNITS_SI = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N", 9: "N"}
 _UNITS_MM = {8: "mm", 11: "mm/s", 12: "mm/s^2", 13: "mN", 9: "mN"}
 
@@ -102,6 +104,25 @@ def read_lines(block: Block) -> list[tuple[int, int]]:
     return [(a, b) for a, b in zip(nodes, nodes[1:], strict=False) if a and b]
 
 
+def read_elements(block: Block) -> list[tuple[int, tuple[int, ...]]]:
+    """Kind and nodes of each element of a data set 2412: two lines each and one more for beams, eight nodes a line."""
+    out, line = [], 0
+    while line < len(block.lines):
+        if not block.lines[line].strip():
+            line += 1
+            continue
+        _, kind, _, _, _, count = block.integers(line, (10,) * 6)
+        if count < 1:
+            raise block.fault(f"an element of {count} nodes, expected 1 or more", line)
+        line += 2 if kind in _BEAMS else 1
+        nodes: list[int] = []
+        while len(nodes) < count:
+            nodes += block.integers(line, (10,) * min(8, count - len(nodes)))
+            line += 1
+        out.append((kind, tuple(nodes)))
+    return out
+
+
 def read_header(block: Block) -> dict[str, str]:
     """model, description and program of a data set 151."""
     texts = [(line[:80].strip()) for line in block.lines[:6]] + [""] * 6
@@ -148,6 +169,25 @@ def lines_text(lines: Sequence[tuple[int, int]]) -> str:
         rows = "".join("".join(f"{n:10d}" for n in path[k : k + 8]) + "\n" for k in range(0, len(path), 8))
         out.append(opening(82) + f"{number:10d}{len(path):10d}{8:10d}\n" + text_line("lines", "name") + rows + CLOSING)
     return "".join(out)
+
+
+def surfaces_text(surfaces: Sequence[Sequence[int]]) -> str:
+    """A data set 2412 of linear shells; a surface of more than four nodes is parted into triangles. None: no text."""
+    flat: list[Sequence[int]] = []
+    for one in surfaces:
+        flat += [one] if len(one) <= 4 else [(one[0], a, b) for a, b in zip(one[1:], one[2:], strict=False)]
+    rows = [
+        f"{k:10d}{91 if len(one) == 3 else 94:10d}{1:10d}{1:10d}{8:10d}{len(one):10d}\n"
+        + "".join(f"{node:10d}" for node in one)
+        + "\n"
+        for k, one in enumerate(flat, 1)
+    ]
+    return opening(2412) + "".join(rows) + CLOSING if rows else ""
+
+
+def structure_text(geometry: Geometry) -> str:
+    """Data sets 15, 82 and 2412."""
+    return nodes_text(geometry.nodes) + lines_text(geometry.lines) + surfaces_text(geometry.surfaces)
 
 
 def mode_text(mode: UffMode, kind: int, remark: str) -> str:

@@ -19,6 +19,8 @@ FILES = {
     "/lanes.js": ("lanes.js", SCRIPT),
     "/plots.js": ("plots.js", SCRIPT),
     "/tables.js": ("tables.js", SCRIPT),
+    "/structure.js": ("structure.js", SCRIPT),
+    "/pens.js": ("pens.js", SCRIPT),
     "/shapes.js": ("shapes.js", SCRIPT),
     "/selection.js": ("selection.js", SCRIPT),
 }

@@ -208,7 +208,10 @@ class Session:
             "channels": [each.__dict__ for each in self.run.channels],
             "geometry": None
             if geometry is None
-            else {key: getattr(geometry, key) for key in ("nodes", "lines", "dofs")},
+            else {
+                **{key: getattr(geometry, key) for key in ("nodes", "lines", "surfaces", "dofs")},
+                "fixed": geometry.at_rest(geometry.dofs),
+            },
             "hammer": self.config.hammer,
             "method": wanted.method,
             "window_s": wanted.window_s,

@@ -39,10 +39,11 @@ def fit_section(m: Material) -> page.Section:
             words = "The result holds no fit (a live result keeps no record), nor does the record give one."
         return page.section("Fit", page.absent(words))
     drawing = figures.figure(max(4.0, min(9.6, 2.0 + 0.6 * len(names))), 3.0)
-    figures.draw_fit(drawing.add_subplot(), names, parts[0], parts[1])
+    names_of = ("of the modes", "prediction") if m.result.raw.get("responses") else ("simulation", "prediction")
+    figures.draw_fit(drawing.add_subplot(), names, parts[0], parts[1], names_of)
     words = "100 (1 − ‖y − ŷ‖ / ‖y − mean‖). Simulation: from input and initial state; prediction: one step ahead."
     if m.result.raw.get("responses"):
-        words = "100 (1 − ‖H − Ĥ‖ / ‖H‖) of the responses of each output over the band of the result."
+        words = "100 (1 − ‖H − Ĥ‖ / ‖H‖) of the responses of each output over the band of the result, Ĥ of its modes."
     title = "Fit, computed by this report" if origin else "Fit"
     picture = m.pictures.inline(drawing, "fit percentage of each output")
     return page.section(title, picture, page.note(words + origin), name="Fit")
@@ -63,10 +64,10 @@ def history_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Secti
         words = "The model gives no response to lay over the record (it is unstable, or no stretch is long enough)."
         return page.section(title, page.absent(words), name="Time histories")
     shown = _told(pairs, len(m.result.outputs))
-    drawing = figures.figure(9.6, 2.0 * len(shown) + 0.4)
-    cells = drawing.add_gridspec(2 * len(shown), 1, height_ratios=[2.4, 1.1] * len(shown))
+    pictures = []
     for place, out in enumerate(shown):
-        ax, error = (drawing.add_subplot(cells[2 * place + k]) for k in (0, 1))
+        drawing = figures.figure(9.6, 2.1 if 0 < place < len(shown) - 1 else 2.3)
+        ax, error = drawing.subplots(2, 1, height_ratios=[2.4, 1.1])
         drawings.draw_overlay(ax, error, excerpt, out)
         ax.set_ylabel(m.with_unit(m.result.outputs[out]))
         error.set_ylabel("error")
@@ -74,12 +75,12 @@ def history_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Secti
             ax.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
         if place == len(shown) - 1:
             error.set_xlabel("time [s]")
+        pictures.append(m.pictures.inline(drawing, f"measured and modelled {m.result.outputs[out]} over time"))
     kind = "simulated from the inputs alone" if excerpt.simulated else "predicted one sample ahead"
     where = "around the hardest hit" if excerpt.hit else "where the responses are largest"
     where += f" ({excerpt.file})" if excerpt.file else ""
     words = f"{len(excerpt.time_s)} samples {where}, {kind}. Shown: {len(shown)} of {len(m.result.outputs)} outputs."
-    picture = m.pictures.inline(drawing, "measured and modelled responses over time")
-    return page.section(title, picture, page.note(words), name="Time histories")
+    return page.section(title, *pictures, page.note(words), name="Time histories")
 
 
 def _white_rows(m: Material, white: Whiteness) -> list[list[str]]:
@@ -105,24 +106,30 @@ def _worst(white: Whiteness) -> list[int]:
     return sorted(int(k) for k in np.argsort(-largest, kind="stable")[:MOST_SHOWN])
 
 
-def _white_picture(m: Material, white: Whiteness) -> str:
+def _white_pictures(m: Material, white: Whiteness) -> list[str]:
+    """A row each."""
     shown, n_u = _worst(white), len(m.result.inputs)
     columns = 2 if n_u else min(2, len(shown))
-    bands = len(shown) if n_u else -(-len(shown) // columns)
-    drawing = figures.figure(9.6, 1.75 * bands + 0.2)
-    for place, out in enumerate(shown):
-        name = figures.short(m.result.outputs[out])
-        ax = drawing.add_subplot(bands, columns, (columns * place if n_u else place) + 1)
-        drawings.draw_autocorrelation(ax, white, out)
-        ax.set_title(f"residual of {name} with itself")
-        if n_u:
-            into = int(np.argmax(np.max(np.abs(white.cross[:, out]), axis=0)))
-            other = drawing.add_subplot(bands, columns, columns * place + 2)
-            drawings.draw_cross(other, white, out, into)
-            other.set_title("with the force" if m.struck else f"with input {figures.short(m.result.inputs[into])}")
-        for one in drawing.axes[-2:] if place >= len(shown) - (1 if n_u else columns) else ():
+    a_row = 1 if n_u else columns
+    rows = [shown[k : k + a_row] for k in range(0, len(shown), a_row)]
+    pictures = []
+    for row in rows:
+        drawing = figures.figure(9.6, 1.95 if row is rows[-1] else 1.75)
+        for place, out in enumerate(row):
+            name = figures.short(m.result.outputs[out])
+            ax = drawing.add_subplot(1, columns, place + 1)
+            drawings.draw_autocorrelation(ax, white, out)
+            ax.set_title(f"residual of {name} with itself")
+            if n_u:
+                into = int(np.argmax(np.max(np.abs(white.cross[:, out]), axis=0)))
+                other = drawing.add_subplot(1, columns, 2)
+                drawings.draw_cross(other, white, out, into)
+                other.set_title("with the force" if m.struck else f"with input {figures.short(m.result.inputs[into])}")
+        for one in drawing.axes if row is rows[-1] else ():
             one.set_xlabel("lag [samples]")
-    return m.pictures.inline(drawing, "correlations of the residual")
+        named = ", ".join(m.result.outputs[out] for out in row)
+        pictures.append(m.pictures.inline(drawing, f"correlations of the residual of {named}"))
+    return pictures
 
 
 def residual_section(m: Material) -> page.Section | None:
@@ -150,4 +157,4 @@ def residual_section(m: Material) -> page.Section | None:
     if len(m.result.outputs) > MOST_SHOWN:
         words += f" Pictures: the {MOST_SHOWN} outputs with the largest correlations."
     rows = page.table([*head, "verdict"], _white_rows(m, white), "words")
-    return page.section(title, rows, _white_picture(m, white), page.note(words), name="Residual")
+    return page.section(title, rows, *_white_pictures(m, white), page.note(words), name="Residual")

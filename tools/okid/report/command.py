@@ -63,11 +63,14 @@ def _parser() -> _Parser:
         "the hits that it names): adds measured responses, stabilization, residual",
     )  # fmt: skip
     parser.add_argument("--events", metavar="FILE.jsonl", help="events of the run: adds completeness, tracking, alarms")
-    parser.add_argument("--geometry", metavar="CONFIG.toml", help="its section [geometry]: adds moving mode shapes")
+    parser.add_argument(
+        "--geometry", metavar="FILE", help="[geometry] of a CONFIG.toml, a .csv or a .uff: adds moving mode shapes"
+    )
     parser.add_argument("--config", metavar="CONFIG.toml", help="its text goes into the report, its [geometry] too")
     parser.add_argument("--compare", metavar="EARLIER.json", help="an earlier result: shifts since then, MAC, CoMAC")
     parser.add_argument("--out", metavar="FILE.html|-", help="default: the result's name with .html; - is stdout")
     parser.add_argument("--pdf", metavar="FILE.pdf", help="print the page too; needs Chromium or Chrome on PATH")
+    parser.add_argument("--figures", metavar="FOLDER", help="every picture as .svg, .png and .csv too")
     parser.add_argument("--title", metavar="TEXT", help="heading of the report")
     return parser
 
@@ -94,6 +97,7 @@ def _page(args: argparse.Namespace, written: str) -> str:
     return build(
         load_result(args.result), args.record or None, args.title, events=args.events, geometry=args.geometry,
         config=args.config, compare=args.compare, source=args.result, written=written,
+        figures_folder=args.figures,
     )  # fmt: skip
 
 

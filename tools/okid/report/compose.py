@@ -15,7 +15,8 @@ from okid.report import page
 from okid.report.agreement import fit_section, history_section, residual_section
 from okid.report.comparison import Other, comparison_section
 from okid.report.events import read_events
-from okid.report.geometry import read_geometry
+from okid.report.expert import circle_section, indicator_section, modal_mass_section, spectrogram_section
+from okid.report.geometry import TABLES, read_geometry
 from okid.report.given_records import Given, listed, take_records
 from okid.report.loaded import Loaded, load_result, loaded_from
 from okid.report.mass import mass_section
@@ -36,7 +37,8 @@ from okid.report.responses import (
     stabilization_section,
 )
 from okid.report.summary import summary_section
-from okid.report.targets import check_place, check_target, write_whole
+from okid.report.svg import Pictures
+from okid.report.targets import check_place, check_target, folder_for, write_whole
 from okid.report.tracking import tracking_section
 from okid.result import figures
 from okid.result.result import Result
@@ -51,19 +53,23 @@ def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]
     yield from shape_sections(m)
     yield comparison_section(m)
     yield hits_section(m)
+    yield modal_mass_section(m)
     yield from mass_section(m)
     yield tracking_section(m)
     yield picking_section(m) if has_poles(m) else stabilization_section(m)
+    yield indicator_section(m)
     yield singular_section(m)
     pairs: list[tuple[int, int]] = []
     if m.result.inputs:
         responses, pairs = (place_section if m.struck else frf_section)(m)
         yield responses
         yield check_section(m)
+        yield circle_section(m)
         yield markov_section(m, pairs)
     elif not m.result.raw.get("set_ups"):
         yield spectra_section(m)
         yield operating_section(m)
+    yield spectrogram_section(m)
     yield fit_section(m)
     yield history_section(m, pairs)
     yield residual_section(m)
@@ -71,16 +77,17 @@ def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]
 
 
 def _placed(m: Material, geometry: Place | None, config: Place | None) -> None:
-    """Geometry and texts of the configurations: [geometry] of `geometry`, else of `config` when it has one."""
+    """Structure and texts of the configurations: of `geometry`, else [geometry] of `config` when it has one."""
     live = {} if m.events is None else m.events.channels
     if geometry is not None:
-        m.geometry = read_geometry(geometry, m.result.raw, live)
-        if m.geometry is None:
+        m.structure = read_geometry(geometry, m.result.raw, live)
+        if m.structure is None:
             raise InputError(f"{geometry}: no section [geometry], expected nodes, dofs and lines")
     elif config is not None:
-        m.geometry = read_geometry(config, m.result.raw, live)
+        m.structure = read_geometry(config, m.result.raw, live)
     for place in dict.fromkeys(str(one) for one in (config, geometry) if one is not None):
-        m.texts.append((place, read_toml(place)[1]))
+        if Path(place).suffix.lower() not in TABLES:
+            m.texts.append((place, read_toml(place)[1]))
 
 
 def build(
@@ -94,21 +101,24 @@ def build(
     compare: Place | None = None,
     source: Place | None = None,
     written: str | None = None,
+    figures_folder: Place | None = None,
 ) -> str:
     """The report as one HTML string; the same arguments and files give the same string.
 
     `record`: a file, what read_csv (of a result of responses: read_frf) returns, or a list of them: every hit of a
     hammer test, by the names of the files; records that were merged. Without one the hits that the result names are
-    read, where all their files are beside `source` or here. `events`: JSON lines of the run; `geometry`, `config`:
-    CONFIG.toml; `compare`: the file of an earlier result; `source`: the file of the result, named in the provenance;
-    `written`: when and by what, None = left out.
+    read, where all their files are beside `source` or here. `events`: JSON lines of the run; `config`: CONFIG.toml;
+    `geometry`: that too, a .csv or a universal file; `compare`: the file of an earlier result; `source`: the file of
+    the result, named in the provenance; `written`: when and by what, None = left out; `figures_folder`: every picture
+    goes there as .svg, .png and .csv (its numbers) too.
     Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
     """
-    m = Material(result)
+    m = Material(result, pictures=Pictures(folder_for(figures_folder)))
     places = {"result": source, "events": events, "geometry": geometry, "config": config, "compare": compare}
     for kind, path in places.items():
         if path is not None:
-            check_kind(path, {"geometry": "config", "compare": "result"}.get(kind, kind))
+            if kind != "geometry" or Path(path).suffix.lower() not in TABLES:
+                check_kind(path, {"geometry": "config", "compare": "result"}.get(kind, kind))
             m.sources.append(source_of(kind, path))
     m.other = None if compare is None else Other(load_result(compare), Path(compare).name)
     m.events = None if events is None else read_events(events)
@@ -157,6 +167,7 @@ def write_report(
     config: Place | None = None,
     compare: Place | None = None,
     written: str | None = None,
+    figures_folder: Place | None = None,
 ) -> int:
     """Write the report of a Result (its to_dict(), or a result file) to `path` as one HTML file; returns its bytes.
 
@@ -174,7 +185,7 @@ def write_report(
     check_place(path, "path")
     text = build(
         _loaded(result), record, title, events=events, geometry=geometry, config=config, compare=compare, source=source,
-        written=written,
+        written=written, figures_folder=figures_folder,
     )  # fmt: skip
     write_whole(path, text)
     return len(text.encode("utf-8"))

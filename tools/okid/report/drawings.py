@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from okid.data.structure_motion import StructureMotion, edges_of
 from okid.frf import Frf, Spectra
 from okid.modal import normalised
 from okid.report.events import Events, Point
-from okid.report.geometry import Geometry
 from okid.report.measured import Excerpt
 from okid.report.residual import BOUND_95, BOUND_99, Whiteness
-from okid.result.figures import BLUE, DARK, EDGE, FAINT, GREEN, GREY, ORANGE, RED, draw_frf, log_axis
+from okid.result.figures import BLUE, DARK, EDGE, FAINT, GREEN, GREY, ORANGE, PAPER, RED, draw_frf, log_axis
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -141,31 +141,46 @@ def _track_limits(f: Real, std: Real, settled: NDArray[np.bool_]) -> tuple[float
     return low - margin, high + margin
 
 
-def draw_at_rest_and_moved(ax: Axes, geometry: Geometry, shape: Complex) -> None:
-    """One mode on the geometry at its largest beside the structure at rest, seen from the corner (flat: the front)."""
+SWING = 0.16  # largest displacement over the size of the structure
+
+
+def draw_at_rest_and_moved(ax: Axes, structure: StructureMotion, shape: Complex) -> None:
+    """One mode on the structure at its largest beside the structure at rest, seen from the corner (flat: the front).
+
+    Dots: nodes with a sensor that the shape has a value of; rings: those that follow their neighbours.
+    """
     turned = np.nan_to_num(normalised(shape))
-    along = (turned * np.exp(-0.5j * np.angle(np.sum(turned**2)))).real
-    at_rest = _seen(np.array(geometry.nodes), geometry)
-    moved = _seen(geometry.displaced(along / max(float(np.max(np.abs(along))), 1e-300), 0.16), geometry)
-    without = geometry.unknown(shape)
+    angle = np.exp(-0.5j * np.angle(np.sum(turned**2)))
+    motion = (structure.moved(normalised(shape)) * angle).real
+    largest = max(float(np.max(np.linalg.norm(motion, axis=1))), 1e-300)
+    nodes = np.array(structure.geometry.nodes, dtype=np.float64)
+    at_rest = _seen(nodes, nodes)
+    moved = _seen(nodes + SWING * structure.size / largest * motion, nodes)
+    for one in structure.geometry.surfaces:
+        corners = moved[[node - 1 for node in one]]
+        ax.fill(corners[:, 0], corners[:, 1], facecolor=BLUE, alpha=0.14, lw=0)
     for points, colour, thick, dash in ((at_rest, FAINT, 0.8, "--"), (moved, BLUE, 1.6, "-")):
-        for a, b in geometry.lines:
-            if points is at_rest or not {a, b} & without:
-                ax.plot(points[[a - 1, b - 1], 0], points[[a - 1, b - 1], 1], color=colour, lw=thick, ls=dash)
-    seen = [k for k in range(len(moved)) if k + 1 not in without]
-    ax.plot(moved[seen, 0], moved[seen, 1], "o", color=DARK, ms=2.4)
+        for a, b in edges_of(structure.geometry):
+            ax.plot(points[[a, b], 0], points[[a, b], 1], color=colour, lw=thick, ls=dash)
+    sensor = structure.measured(shape)
+    ring = ~sensor
+    ring[[node - 1 for node in structure.at_rest]] = False
+    if np.any(ring) and len(sensor) <= 60:
+        ax.plot(*moved[ring].T, "o", color=BLUE, ms=2.2, mew=0.7, mfc=PAPER)
+    ax.plot(*moved[sensor].T, "o", color=DARK, ms=2.6)
     both = np.vstack([at_rest, moved])
-    centre = (both.min(axis=0) + both.max(axis=0)) / 2.0
-    reach = max(0.55 * float(np.max(np.ptp(both, axis=0))), 1e-12)
-    ax.set_xlim(centre[0] - reach, centre[0] + reach)
-    ax.set_ylim(centre[1] - reach, centre[1] + reach)
+    low, high = both.min(axis=0), both.max(axis=0)
+    margin = 0.06 * float(np.max(high - low)) + 1e-12
+    ax.set_xlim(low[0] - margin, high[0] + margin)
+    ax.set_ylim(low[1] - margin, high[1] + margin)
     ax.set_aspect("equal")
     ax.set_axis_off()
 
 
-def _seen(points: Real, geometry: Geometry) -> Real:
-    """Orthographic view (n, 2) as shapes.js begins: from the front when all y are the same, else from the corner."""
-    flat = float(np.ptp(np.array(geometry.nodes)[:, 1])) == 0.0
+def _seen(points: Real, nodes: Real) -> Real:
+    """Orthographic view (n, 2) as shapes.js begins: from the front when all y of `nodes` are the same, else from the
+    corner."""
+    flat = float(np.ptp(nodes[:, 1])) == 0.0
     yaw, pitch = (0.0, 0.0) if flat else (-0.6, 0.35)
     x, y, z = points.T
     depth = x * np.sin(yaw) + y * np.cos(yaw)

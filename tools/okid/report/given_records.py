@@ -49,15 +49,15 @@ def listed(record: Given | Sequence[Given] | None) -> list[Given]:
     return given
 
 
-def _sources(paths: Sequence[Path]) -> list[Source]:
-    """Each file; of many one entry, with the digest of the list of their digests."""
-    own = [source_of("record", path) for path in paths]
+def _sources(paths: Sequence[Path], kind: str) -> list[Source]:
+    """Each file; of many one entry, with the digest of the list of their digests. kind: "record", "responses"."""
+    own = [source_of(kind, path) for path in paths]
     if len(own) <= MOST_SOURCES:
         return own
     lines = "".join(f"{one.sha256}  {Path(one.name).name}\n" for one in own)
     digest = hashlib.sha256(lines.encode("utf-8")).hexdigest()
     name = f"{own[0].name} .. {own[-1].name}; SHA-256 of the output of sha256sum for them"
-    return [Source(f"{len(own)} records", name, digest, sum(one.size for one in own))]
+    return [Source(f"{len(own)} {kind.removesuffix('s')}s", name, digest, sum(one.size for one in own))]
 
 
 def _hits(result: Loaded, given: Sequence[Given]) -> Measured:
@@ -166,7 +166,7 @@ def take_records(result: Loaded, record: Given | Sequence[Given] | None, source:
     paths = [Path(one) for one in given if isinstance(one, str | Path)]
     for path in paths:
         check_kind(path, "record")
-    sources = _sources(paths)
+    sources = _sources(paths, "responses" if result.raw.get("responses") else "record")
     if result.raw.get("responses"):
         return Taken(_responses(result, given), sources)
     return Taken(_hits(result, given) if is_struck(result) else _several(result, given), sources)

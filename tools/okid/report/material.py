@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from okid.data.structure_motion import StructureMotion
 from okid.report.events import Events
-from okid.report.geometry import Geometry
 from okid.report.loaded import Loaded
 from okid.report.measured import Measured
 from okid.report.svg import Pictures
@@ -40,7 +40,7 @@ class Material:
     measured: Measured | None = None
     no_record: str = ""  # why the records that the result names are not here
     events: Events | None = None
-    geometry: Geometry | None = None
+    structure: StructureMotion | None = None
     other: Other | None = None
     sources: list[Source] = field(default_factory=list)
     texts: list[tuple[str, str]] = field(default_factory=list)

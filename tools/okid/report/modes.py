@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sections on modes: table, shapes as sticks or on a geometry, complexity, AutoMAC."""
+"""The sections on modes: table, shapes as sticks or on a structure, complexity, AutoMAC."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from okid import modal
 from okid.formats.uff import mode_sets, nodes_of, shape_places
-from okid.formats.uff_model import lines_text, nodes_text, units_text
+from okid.formats.uff_model import structure_text, units_text
 from okid.report import drawings, page
 from okid.report.material import Material
 from okid.result import figures
@@ -77,9 +77,9 @@ def against(mode: dict[str, Any]) -> str:
 def _save(m: Material) -> str:
     """Buttons that save the chosen modes, and what they save."""
     whole = {**m.result.whole, "markov": None, "singular_values": None}
-    geometry = m.geometry
-    places = shape_places(m.result.raw) if geometry is None else nodes_of(geometry.dofs)
-    head = units_text() + ("" if geometry is None else nodes_text(geometry.nodes) + lines_text(geometry.lines))
+    structure = m.structure
+    places = shape_places(m.result.raw) if structure is None else nodes_of(structure.places)
+    head = units_text() + ("" if structure is None else structure_text(structure.geometry))
     sets = mode_sets(m.result.raw, places)
     buttons = "".join(
         f'<button type="button" data-save="{kind}">{kind.upper()}</button>' for kind in ("csv", "json", "uff")
@@ -100,14 +100,17 @@ def _shown(m: Material, most: int) -> list[int]:
 def _sticks(m: Material) -> list[str]:
     shown = _shown(m, MOST_SHAPES)
     columns = min(4, len(shown)) if len(m.result.places) <= 12 else min(2, len(shown))
-    bands = -(-len(shown) // columns)
     letters = max(len(figures.short(name)) for name in m.result.places)
     height = 1.9 + (0.06 * letters if letters > 6 else 0.0)  # long names stand upright
-    drawing = figures.figure(9.6 if len(m.result.places) > 12 else min(9.6, 3.2 * columns), height * bands)
-    for place, k in enumerate(shown, 1):
-        damping = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
-        title = f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz, {damping:.2f} %"
-        figures.draw_shape(drawing.add_subplot(bands, columns, place), m.result.shapes[k], m.result.places, title)
+    pictures = []
+    for row in [shown[k : k + columns] for k in range(0, len(shown), columns)]:
+        drawing = figures.figure(9.6 if len(m.result.places) > 12 else min(9.6, 3.2 * columns), height)
+        for place, k in enumerate(row, 1):
+            damping = 100.0 * float(m.result.raw["modes"][k]["damping_ratio"])
+            title = f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz, {damping:.2f} %"
+            figures.draw_shape(drawing.add_subplot(1, columns, place), m.result.shapes[k], m.result.places, title)
+        named = ", ".join(str(k + 1) for k in row)
+        pictures.append(m.pictures.inline(drawing, f"mode shapes against the outputs, modes {named}"))
     along = "the numbers are the places" if m.result.raw.get("shape_dofs") else "outputs in their order"
     words = f"Sign from the real part, largest entry 1, {along}."
     if not np.all(np.isfinite(m.result.shapes[shown])):
@@ -115,7 +118,7 @@ def _sticks(m: Material) -> list[str]:
     count = len(m.result.confident)
     if count > len(shown):
         words += f" The {len(shown)} of {count} confident modes with the highest EMAC are shown."
-    return [m.pictures.inline(drawing, "mode shapes against the outputs"), page.note(words)]
+    return [*pictures, page.note(words)]
 
 
 def _rounded(values: Any) -> list[float | None]:
@@ -125,49 +128,79 @@ def _rounded(values: Any) -> list[float | None]:
 
 def _player(m: Material) -> list[str]:
     """Moving shapes on the screen, all modes; on paper a still picture of each."""
-    geometry, result = m.geometry, m.result
-    assert geometry is not None
-    chosen = _shown(m, len(result.shapes))
-    count = len(chosen)
+    structure, result = m.structure, m.result
+    assert structure is not None
+    geometry, chosen = structure.geometry, _shown(m, len(result.shapes))
+    names = [f"{k + 1}: {result.frequency_hz[k]:.2f} Hz" for k in chosen]
     buttons = "\n".join(
-        f'<button type="button" data-mode="{place}" aria-pressed="{"false" if place else "true"}">'
-        f"{k + 1}: {result.frequency_hz[k]:.2f} Hz</button>"
-        for place, k in enumerate(chosen)
+        f'<button type="button" data-mode="{place}" aria-pressed="{"false" if place else "true"}">{name}</button>'
+        for place, name in enumerate(names)
+    )
+    others = "".join(f'<option value="{place}">{name}</option>' for place, name in enumerate(names))
+    saves = "".join(
+        f'<button type="button" data-picture="{kind}">{kind.upper()}</button>' for kind in ("gif", "png", "svg")
     )
     payload = {
         "geometry": {
-            "nodes": geometry.nodes, "lines": geometry.lines, "dofs": geometry.dofs, "names": result.places,
+            "nodes": geometry.nodes, "lines": geometry.lines, "surfaces": geometry.surfaces, "fixed": structure.at_rest,
+            "dofs": structure.places, "names": result.places,
         },
         "shapes": [
-            {"re": _rounded(shape.real), "im": _rounded(shape.imag)}
-            for shape in result.shapes[chosen]
+            {"re": _rounded(shape.real), "im": _rounded(shape.imag), "name": name}
+            for shape, name in zip(result.shapes[chosen], names, strict=True)
         ],
     }  # fmt: skip
     live = (
         f'<div class="player"><div class="bar" role="group" aria-label="mode">\n'
         f'<button type="button" class="go">Pause</button>\n{buttons}</div>\n'
         '<canvas tabindex="0" role="img" aria-label="moving mode shape"></canvas>\n'
-        '<p class="note">Drag or arrow keys: turn, + and −: zoom, space: stop, Home: the first view.</p></div>\n'
-        + page.data("shapes-data", payload)
+        f'<div class="bar below"><label>beside it <select class="other"><option value="-1">nothing</option>{others}'
+        '</select></label><label><input type="checkbox" class="arrows"> arrows</label>'
+        f"<span>Download:</span>{saves}</div>\n"
+        '<p class="note">Drag or arrow keys: turn; +, − and the wheel: zoom; space: stop; Home: the first view.</p>'
+        "</div>\n" + page.data("shapes-data", payload)
     )
-    columns = min(4, count)
-    bands = -(-count // columns)
-    drawing = figures.figure(2.4 * columns, 2.2 * bands)
-    for place, k in enumerate(chosen, 1):
-        ax = drawing.add_subplot(bands, columns, place)
-        drawings.draw_at_rest_and_moved(ax, geometry, result.shapes[k])
-        ax.set_title(f"{k + 1}: {result.frequency_hz[k]:.2f} Hz")
-    absent = [name for name, dof in zip(result.places, geometry.dofs, strict=True) if dof is None]
-    gaps = "" if np.all(np.isfinite(result.shapes[chosen])) else " A node that was not measured is not drawn."
-    words = f"Dashed: at rest.{gaps}" + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
-    return [live, m.pictures.inline(drawing, "still pictures of the mode shapes", "still"), page.note(words)]
+    return [live, *_stills(m, chosen, names), page.note(_moved(m))]
+
+
+def _stills(m: Material, chosen: Sequence[int], names: Sequence[str]) -> list[str]:
+    """The structure in each mode, a row of pictures each."""
+    assert m.structure is not None
+    columns = min(3, len(chosen)) if len(chosen) != 4 else 2
+    out = []
+    for first in range(0, len(chosen), columns):
+        drawing = figures.figure(9.6 if columns > 1 else 5.0, 3.0 if columns > 1 else 3.6)
+        for place, k in enumerate(chosen[first : first + columns]):
+            ax = drawing.add_subplot(1, columns, place + 1)
+            drawings.draw_at_rest_and_moved(ax, m.structure, m.result.shapes[k])
+            ax.set_title(names[first + place])
+        shown = ", ".join(names[first : first + columns])
+        out.append(m.pictures.inline(drawing, f"still pictures of the mode shapes {shown}", "still"))
+    return out
+
+
+def _moved(m: Material) -> str:
+    """What the picture of the structure shows, by the rule of okid.data.structure_motion."""
+    structure, shapes = m.structure, m.result.shapes
+    assert structure is not None
+    words = "Dashed: at rest."
+    sensor = np.array([structure.measured(shape) for shape in shapes])
+    at_rest = np.zeros(sensor.shape[1], dtype=np.bool_)
+    at_rest[[node - 1 for node in structure.at_rest]] = True
+    follow = int(np.sum(~np.all(sensor, axis=0) & ~at_rest))
+    if follow:
+        words += (
+            f" {follow} of {sensor.shape[1]} nodes are not measured in every mode (rings): each follows its neighbours."
+        )
+    absent = [name for name, place in zip(m.result.places, structure.places, strict=True) if place is None]
+    return words + (f" Not on the geometry: {', '.join(absent)}." if absent else "")
 
 
 def shape_sections(m: Material) -> list[page.Section]:
     """Nothing without modes."""
     if not len(m.result.shapes):
         return []
-    moving = _player(m) if m.geometry is not None else []
+    moving = _player(m) if m.structure is not None else []
     parts = [
         *moving,
         *([page.heading("By place" if m.result.raw.get("shape_dofs") else "By output")] if moving else []),
@@ -194,6 +227,8 @@ def _complexity(m: Material) -> page.Section:
         "Every entry of a shape in the complex plane: proportionally damped structures lie on one line. MPD: mean "
         "deviation from that line; MCF = 1 − MPC; both 0 for a real mode."
     )
+    if len(m.result.confident) > len(shown):
+        words += f" Pictures: {len(shown)} of {len(m.result.confident)} confident modes, those with the highest EMAC."
     rows = [
         [str(k + 1), f"{m.result.frequency_hz[k]:.2f}", f"{modal.mpd(m.result.shapes[k]):.1f}",
          f"{modal.mcf(m.result.shapes[k]):.4f}"]
@@ -211,5 +246,13 @@ def _automac(m: Material) -> page.Section:
     labels = [f"{k + 1}: {m.result.frequency_hz[k]:.2f} Hz" for k in shown]
     figures.draw_mac(drawing.add_subplot(), m.result.shapes[shown], labels)
     words = "MAC of every pair of modes: full ink is 1 (the same shape), no ink 0. Off the diagonal it should be pale."
+    places = len(m.result.places)
+    if places < len(shown) or places < 3:
+        words = (
+            f"MAC of every pair of modes, seen at {places} places only: at most {places} shapes can be told apart with "
+            "so few sensors, so that a high value here does not say that two modes are one."
+        )
+    if len(m.result.confident) > len(shown):
+        words += f" Shown: {len(shown)} of {len(m.result.confident)} confident modes, those with the highest EMAC."
     picture = m.pictures.inline(drawing, "modal assurance criterion of every pair of modes")
     return page.section("AutoMAC", picture, page.note(words))

@@ -101,7 +101,11 @@ def page(title: str, subtitle: str, sections: Iterable[Section], foot: str) -> s
     body = "\n".join(one.body for one in listed)
     links = "\n".join(f'<a href="#{anchor(one.name)}">{escape(one.name)}</a>' for one in listed)
     script, shut = "", "script-src 'none'"
-    wanted = [("web", "shapes.js"), ("report", "player.js")] if "<canvas" in body else []
+    wanted = (
+        [("web", "structure.js"), ("web", "pens.js"), ("web", "shapes.js"), ("report", "player.js")]
+        if "<canvas" in body
+        else []
+    )
     if 'id="modes-data"' in body:
         wanted += [("web", "selection.js"), ("report", "selection_buttons.js")]
     if 'id="poles-data"' in body:
@@ -116,7 +120,8 @@ def page(title: str, subtitle: str, sections: Iterable[Section], foot: str) -> s
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{escape(title)}</title>\n'
         f"<style>\n{_asset('report', 'page.css')}</style>\n"
-        "<noscript><style>.player, .pick, .picker, .save { display: none; } .still { display: block; }</style></noscript>\n"
+        "<noscript><style>.player, .pick, .picker, .save { display: none; } .still { display: block; }"
+        "</style></noscript>\n"
         f"</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n"
         f'<p class="sub">{escape(subtitle)}</p>\n<nav aria-label="contents">\n{links}\n</nav>\n{body}\n'
         f"<footer>{escape(foot)}</footer>\n</main>\n{script}</body>\n</html>\n"

@@ -116,14 +116,12 @@ def _one(frf: Frf, coherence: Real, k: int) -> Frf:
 
 
 def _whole(m: Material, chosen: list[tuple[int, int, str]], frf: Frf, coherence: Real, line: Real, model: Any) -> str:
-    columns = min(2, len(chosen))
-    bands = -(-len(chosen) // columns)
     with_coherence = bool(np.any(np.isfinite(coherence)))
     heights = [3.0, 1.3, 0.9][: 3 if with_coherence else 2]
-    drawing = figures.figure(9.6, 3.7 * bands)
-    grid = drawing.add_gridspec(bands, columns)
-    for cell, (o, k, what) in enumerate(chosen):
-        cells = grid[divmod(cell, columns)].subgridspec(len(heights), 1, height_ratios=heights)
+    drawing = figures.figure(9.6, 3.7)
+    grid = drawing.add_gridspec(1, 2 if len(chosen) > 1 else 1)
+    for cell, (o, k, what) in enumerate(chosen[:2]):
+        cells = grid[0, cell].subgridspec(len(heights), 1, height_ratios=heights)
         axes: list[Any] = list(np.asarray(cells.subplots(sharex=True), dtype=object))
         drawings.draw_estimators(axes, _one(frf, coherence, k), line, model[:, :, [k]], o)
         place = f"place {_place(m.result.inputs[k])}"
@@ -135,7 +133,10 @@ def _whole(m: Material, chosen: list[tuple[int, int, str]], frf: Frf, coherence:
         if with_coherence:
             axes[2].set_ylabel("coher.")
         axes[-1].set_xlabel("frequency [Hz]")
-    return m.pictures.inline(drawing, "averaged frequency responses of the places, over those of the model")
+    text = "averaged frequency responses of the places over those of the model: "
+    text += ", ".join(f"{m.result.outputs[o]} / place {_place(m.result.inputs[k])}" for o, k, _ in chosen[:2])
+    rest = _whole(m, chosen[2:], frf, coherence, line, model) if len(chosen) > 2 else ""
+    return m.pictures.inline(drawing, text) + rest
 
 
 def _small(m: Material, places: list[int], o: int, frf: Frf, line: Real, model: Any) -> str:

@@ -30,6 +30,8 @@ def singular_section(m: Material) -> page.Section:
     """Singular values with the order; why there are none of method "auto"."""
     if len(m.result.singular_values) == 0:
         why = "This method compares many models: there is no one Hankel matrix. Its modes are those they agree on."
+        if m.result.raw.get("responses"):
+            why = "Modes of frequency responses come from matrix fractions: there is no Hankel matrix."
         return page.section("Singular values", page.absent(why))
     drawing = figures.figure(9.6, 3.0)
     figures.draw_singular_values(drawing.add_subplot(), m.result.singular_values, int(m.result.raw["order"]))
@@ -60,13 +62,15 @@ def _how_to_read(m: Material, rows: Stabilization) -> list[str]:
     line = f"Blue dashed line: order {order}, that of the model of this report; green"
     if m.struck or m.result.raw.get("responses"):
         again, two, line = "matrix fractions (pLSCF) were fitted to the measured responses, with degrees", "", "Green"
+    apart = len(m.result.frequency_hz) - len(m.result.confident)
+    rejected = f" Grey dotted: the {page.count_of(apart, 'doubtful mode')}, with the reason in Modes." if apart else ""
     words = [
         f"How to read it: {again} from {tried[0]} to {tried[-1]}{two}. A mark is a pole: a mode that the model of "
         "this order has at this frequency. Modes of the structure appear at every order and form a column of "
         "green dots; poles of noise scatter.",
-        f"{line} vertical lines: the {page.count_of(len(m.result.frequency_hz), 'mode')} of this report. A column "
-        "without a green line is a mode that the model lacks (try a higher order), a green line "
-        "without a column is a doubtful mode.",
+        f"{line} vertical lines: the {page.count_of(len(m.result.confident), 'confident mode')} of this report. A "
+        "column without a line is a mode that the model lacks (try a higher order), a green line without a column "
+        f"deserves a doubt.{rejected}",
         "Marks: a value is stable when the next lower order has a pole near it, within "
         f"{100.0 * limits.frequency:g} % in frequency, {100.0 * limits.damping:g} % in damping and with the same shape "
         f"(MAC ≥ {limits.mac:g}). Green dot: all three are stable. Blue triangle: frequency and shape, the damping "
@@ -94,9 +98,10 @@ def stabilization_section(m: Material) -> page.Section:
         drawing.add_subplot(),
         m.measured.rows,
         m.result.shown_hz,
-        m.result.frequency_hz.tolist(),
+        m.result.frequency_hz[m.result.confident].tolist(),
         behind,
         None if of_responses else int(m.result.raw["order"]),
+        [f for k, f in enumerate(m.result.frequency_hz.tolist()) if k not in m.result.confident],
     )
     picture = m.pictures.inline(drawing, "poles over frequency and model order")
     return page.section(title, picture, *map(page.note, _how_to_read(m, m.measured.rows)), name="Stabilization")
@@ -123,10 +128,10 @@ def choose_pairs(response: Complex, coherence: Real | None) -> list[tuple[int, i
     return sorted(chosen)
 
 
-def arranged(count: int) -> tuple[int, int]:
-    """Bands and columns of so many pictures."""
-    columns = count if count <= 3 else 2
-    return -(-count // columns), columns
+def in_rows(items: Sequence[Any]) -> list[Sequence[Any]]:
+    """Rows of pictures, each drawn by itself: a printed page breaks between them. Up to three a row, else two."""
+    columns = len(items) if len(items) <= 3 else 2
+    return [items[k : k + columns] for k in range(0, len(items), columns)]
 
 
 def _frf_title(m: Material, pair: tuple[int, int]) -> str:
@@ -161,26 +166,28 @@ def frf_section(m: Material) -> tuple[page.Section, list[tuple[int, int]]]:
     pairs = choose_pairs(model if data is None else data.response[1:], None if data is None else data.coherence[1:])
     with_coherence = data is not None and bool(np.any(np.isfinite(data.coherence)))
     heights = [3.0, 1.3, 0.9][: 3 if with_coherence else 2]
-    bands, columns = arranged(len(pairs))
-    drawing = figures.figure(9.6, 3.7 * bands)
-    grid = drawing.add_gridspec(bands, columns)
-    for place, pair in enumerate(pairs):
-        cells = grid[divmod(place, columns)].subgridspec(len(heights), 1, height_ratios=heights)
-        axes: list[Any] = list(np.asarray(cells.subplots(sharex=True), dtype=object))
-        figures.draw_frf(axes, data, line, model, pair)
-        axes[0].set_title(_frf_title(m, pair))
-        axes[0].set_ylabel("magnitude")
-        if data is not None:
-            axes[0].legend(loc="best")
-        axes[1].set_ylabel("phase [°]")
-        if with_coherence:
-            axes[2].set_ylabel("coher.")
-        axes[-1].set_xlabel("frequency [Hz]")
     title = "Frequency responses" if data is None else "Frequency responses, measured and synthesised"
-    text = "frequency responses of the model" + ("" if data is None else " and of the record")
-    picture = m.pictures.inline(drawing, text)
+    measured = "" if data is None else " and of the files" if m.result.raw.get("responses") else " and of the record"
+    pictures = []
+    for row in in_rows(pairs):
+        drawing = figures.figure(9.6, 3.7)
+        grid = drawing.add_gridspec(1, len(in_rows(pairs)[0]))
+        for place, pair in enumerate(row):
+            cells = grid[0, place].subgridspec(len(heights), 1, height_ratios=heights)
+            axes: list[Any] = list(np.asarray(cells.subplots(sharex=True), dtype=object))
+            figures.draw_frf(axes, data, line, model, pair)
+            axes[0].set_title(_frf_title(m, pair))
+            axes[0].set_ylabel("magnitude")
+            if data is not None:
+                axes[0].legend(loc="best")
+            axes[1].set_ylabel("phase [°]")
+            if with_coherence:
+                axes[2].set_ylabel("coher.")
+            axes[-1].set_xlabel("frequency [Hz]")
+        named = ", ".join(f"{m.result.outputs[o]} / {m.result.inputs[k]}" for o, k in row)
+        pictures.append(m.pictures.inline(drawing, f"frequency responses of the model{measured}: {named}"))
     words = page.note(_frf_words(m, len(pairs), with_coherence))
-    return page.section(title, picture, words, *_every_pair(m), name="Responses"), pairs
+    return page.section(title, *pictures, words, *_every_pair(m), name="Responses"), pairs
 
 
 def _every_pair(m: Material) -> list[str]:
@@ -274,35 +281,39 @@ def spectra_section(m: Material) -> page.Section:
     if usable and m.measured.innovation is not None:
         made = synthesise_spectra(model.A, model.K, model.C, m.measured.innovation, model.dt, line)
     shown = _strongest(data.power[1:])
-    bands, columns = arranged(len(shown))
-    drawing = figures.figure(9.6, 2.7 * bands)
-    for place, out in enumerate(shown, 1):
-        ax = drawing.add_subplot(bands, columns, place)
-        drawings.draw_spectra(ax, data, line, made, m.result.shown_hz, out)
-        ax.set_title(figures.short(m.result.outputs[out], 30))
-        ax.set_xlabel("frequency [Hz]")
-        unit = m.unit(m.result.outputs[out])
-        ax.set_ylabel(f"PSD [({unit})²/Hz]" if unit else "PSD [unit²/Hz]")
-        ax.legend(loc="best")
+    pictures = []
+    for row in in_rows(shown):
+        drawing = figures.figure(9.6, 2.7)
+        for place, out in enumerate(row, 1):
+            ax = drawing.add_subplot(1, len(in_rows(shown)[0]), place)
+            drawings.draw_spectra(ax, data, line, made, m.result.shown_hz, out)
+            ax.set_title(figures.short(m.result.outputs[out], 30))
+            ax.set_xlabel("frequency [Hz]")
+            unit = m.unit(m.result.outputs[out])
+            ax.set_ylabel(f"PSD [({unit})²/Hz]" if unit else "PSD [unit²/Hz]")
+            ax.legend(loc="best")
+        named = ", ".join(m.result.outputs[out] for out in row)
+        pictures.append(m.pictures.inline(drawing, f"spectra of the outputs of the record: {named}"))
     averages = page.count_of(data.averages, "average")
     words = f"Shown: {len(shown)} of {len(m.result.outputs)} outputs. Measured: Welch, {averages}."
     words += " Model: the innovations through the predictor of the result." if made is not None else ""
-    picture = m.pictures.inline(drawing, "spectra of the outputs of the record")
-    return page.section(title, picture, page.note(words), name="Spectra")
+    return page.section(title, *pictures, page.note(words), name="Spectra")
 
 
 def markov_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Section | None:
     """Markov parameters of the chosen pairs over time; None when the result has none."""
     if len(m.result.markov) < 2:
         return None
-    bands, columns = arranged(len(pairs))
-    drawing = figures.figure(9.6, 2.1 * bands)
-    for place, pair in enumerate(pairs, 1):
-        ax = drawing.add_subplot(bands, columns, place)
-        figures.draw_markov(ax, m.result.markov, 1.0 / m.result.fs, pair, _frf_title(m, pair))
-        ax.locator_params(axis="y", nbins=5)
-        ax.set_xlabel("time [s]")
-        ax.set_ylabel("Y")
+    pictures = []
+    for row in in_rows(pairs):
+        drawing = figures.figure(9.6, 2.1)
+        for place, pair in enumerate(row, 1):
+            ax = drawing.add_subplot(1, len(in_rows(pairs)[0]), place)
+            figures.draw_markov(ax, m.result.markov, 1.0 / m.result.fs, pair, _frf_title(m, pair))
+            ax.locator_params(axis="y", nbins=5)
+            ax.set_xlabel("time [s]")
+            ax.set_ylabel("Y")
+        named = ", ".join(f"{m.result.outputs[o]} / {m.result.inputs[k]}" for o, k in row)
+        pictures.append(m.pictures.inline(drawing, f"Markov parameters: {named}"))
     words = "Markov parameters over time; the dot is Y₀ = D, the direct feed-through."
-    picture = m.pictures.inline(drawing, "Markov parameters")
-    return page.section("Impulse response", picture, page.note(words))
+    return page.section("Impulse response", *pictures, page.note(words))

@@ -8,12 +8,15 @@ import re
 import warnings
 from html import escape
 from itertools import count
+from pathlib import Path
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from okid.report.layout import arrange
 from okid.result import figures
+from okid.result.figure_numbers import figure_csv
 
 INK = {
     figures.DARK: "--ink",
@@ -36,16 +39,21 @@ def _short(found: re.Match[str]) -> str:
 
 
 class Pictures:
-    """Makes the pictures of one page; every picture has its own names for clips and markers."""
+    """Makes the pictures of one page; every picture has its own names for clips and markers. folder: where each is also
+    written as .svg, .png and .csv (its numbers), by its number and the words of its description."""
 
-    def __init__(self) -> None:
-        self._numbers = count(1)
+    def __init__(self, folder: Path | None = None) -> None:
+        self._numbers, self._folder = count(1), folder
 
     def inline(self, drawing: Figure, text: str, kind: str = "fig") -> str:
         """The figure as <svg role="img"> with `text` for those who cannot see it; same numbers, same bytes."""
+        numbers = figure_csv(drawing) if self._folder is not None else ""
         raw = _raw(drawing)
         root = raw[raw.index("<svg") :]
-        mark = f"f{next(self._numbers)}-"
+        number = next(self._numbers)
+        if self._folder is not None:
+            _write(self._folder / f"{number:02d}-{_file_name(text)}", raw, drawing, numbers)
+        mark = f"f{number}-"
         used = set(re.findall(r"(?:url\(#|href=\"#)([^)\"]+)", root))
 
         def tag(found: re.Match[str]) -> str:
@@ -61,8 +69,22 @@ class Pictures:
         width = float(size.group(1).split()[2])
         label = escape(text, quote=True)
         top = f'<svg class="{kind}" role="img" aria-label="{label}" viewBox="{size.group(1)}"'
-        top += f' style="max-width:{width * 1.5:.0f}px">'
-        return re.sub(r"<svg[^>]*>", lambda _: top, body, count=1)
+        top += f' style="--w:{width:.0f}px">'
+        picture = re.sub(r"<svg[^>]*>", lambda _: top, body, count=1)
+        return f'<div class="picture {kind}">{picture}</div>'
+
+
+def _file_name(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:60].strip("-")
+
+
+def _write(place: Path, raw: str, drawing: Figure, numbers: str) -> None:
+    """The picture in three files; OSError where the folder takes none."""
+    place.with_suffix(".svg").write_text(raw, encoding="utf-8")
+    place.with_suffix(".csv").write_text(numbers, encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*missing from.*font")
+        FigureCanvasAgg(drawing).print_figure(place.with_suffix(".png"), dpi=200, facecolor="white")
 
 
 def _raw(drawing: Figure) -> str:

@@ -17,7 +17,7 @@ _READ = {
     "result": "is a result to be read",
     "record": "is a record to be read",
     "events": "is an events file to be read",
-    "geometry": "is a configuration to be read",
+    "geometry": "is a geometry to be read",
     "config": "is a configuration to be read",
     "report": "is to be the report",
 }
@@ -49,6 +49,17 @@ def check_place(target: Place, option: str, kind: str = ".html") -> None:
     if not goal.exists() and not os.access(folder, os.W_OK | os.X_OK):
         text = f"{os.strerror(errno.EACCES)}: the folder {folder} takes no new files: open it (chmod u+w), {other}"
         raise PermissionError(errno.EACCES, text, str(target))
+
+
+def folder_for(path: Place | None) -> Path | None:
+    """The folder of the figures, made when it is not there; InputError when it cannot be."""
+    if path is None:
+        return None
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise InputError(f"{path}: {fault.strerror or fault}: expected a folder for the figures") from None
+    return Path(path)
 
 
 def check_target(target: Place, inputs: Mapping[str, Place | Sequence[Place] | None], kind: str = ".html") -> None:

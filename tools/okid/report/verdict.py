@@ -75,8 +75,8 @@ def _model_doubts(m: Material) -> list[str]:
     out = _scale_doubts(m) + _order_doubts(m)
     fits = [value for value in _simulated(m) if value is not None]
     if fits and min(fits) < 80.0:
-        what = "the responses" if raw.get("responses") else "an output"
-        out.append(f"the simulation explains only {min(fits):.1f} % of {what}")
+        who, what = ("modes explain", "the responses") if raw.get("responses") else ("simulation explains", "an output")
+        out.append(f"the {who} only {min(fits):.1f} % of {what}")
     checks = (raw.get("mkr") or {}).get("checks") or {}
     bad = [x for x, key in (("M", "m_positive_definite"), ("K", "k_positive_definite")) if checks.get(key) is False]
     if bad:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from okid.frf import Frf
 from okid.modal import mac_matrix, mean_phase, normalised
+from okid.result.figure_numbers import state_numbers
 from okid.result.stabilization import Cluster, Stabilization
 
 Real = NDArray[np.float64]
@@ -116,11 +117,12 @@ def draw_stabilization(
     chosen_hz: Sequence[float] = (),
     background: tuple[Real, Real] | None = None,
     order: int | None = None,
+    doubtful_hz: Sequence[float] = (),
 ) -> None:
     """Poles over frequency (up to `shown_hz`) and order; `background` (frequency, magnitude) behind in dB, no scale.
 
-    Lines: `chosen_hz`, the modes of the model, and its `order`. A band marks each cluster that holds, a ring the pole
-    nearest its medians.
+    Lines: `chosen_hz`, the modes of the model, dotted `doubtful_hz`, those it rejected, and its `order`. A band marks
+    each cluster that holds, a ring the pole nearest its medians.
     """
     behind_key: list[Any] = []
     if background is not None:
@@ -149,6 +151,8 @@ def draw_stabilization(
             points[kind].append((float(f), row.order))
     for k, f in enumerate(chosen_hz):
         ax.axvline(f, color=GREEN, lw=0.8, alpha=0.6, label=None if k else "mode of this model")
+    for k, f in enumerate(doubtful_hz):
+        ax.axvline(f, color=GREY, lw=0.9, ls=":", label=None if k else "doubtful: rejected")
     for kind, (label, colour, marker, size) in reversed(_MARKS.items()):
         if points[kind]:
             xy = np.array(points[kind])
@@ -241,6 +245,7 @@ def draw_shape(ax: Axes, shape: Complex, labels: Sequence[str], title: str) -> N
 def draw_compass(ax: Axes, shape: Complex, title: str) -> None:
     """The entries of one mode as arrows in the complex plane: a real mode lies on one line."""
     turned = normalised(shape)
+    state_numbers(ax, [("entry", float(one.real), float(one.imag), "") for one in turned])
     round_about = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 73))
     for radius, colour in ((0.5, GRID), (1.0, GRID), (1.08, EDGE)):
         ax.plot(radius * round_about.real, radius * round_about.imag, color=colour, lw=0.7)
@@ -261,6 +266,7 @@ def draw_mac(ax: Axes, shapes: Complex, labels: Sequence[str], other: Complex | 
     """MAC as squares, full ink = 1, with numbers up to 14 modes; `labels` "number  Hz" of each mode. `other`: shapes of
     the columns, else those of the rows again (AutoMAC)."""
     values = mac_matrix(shapes, other)
+    state_numbers(ax, [("MAC", j + 1, i + 1, float(value)) for (i, j), value in np.ndenumerate(values)])
     count = max(values.shape)
     for (i, j), value in np.ndenumerate(values):
         ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1.0, 1.0, facecolor=BLUE, alpha=round(float(value), 3), lw=0))
@@ -291,11 +297,15 @@ def draw_comac(ax: Axes, names: Sequence[str], values: Sequence[float]) -> None:
 
 
 def draw_fit(
-    ax: Axes, names: Sequence[str], simulated: Sequence[float | None], predicted: Sequence[float | None]
+    ax: Axes,
+    names: Sequence[str],
+    simulated: Sequence[float | None],
+    predicted: Sequence[float | None],
+    labels: tuple[str, str] = ("simulation", "prediction"),
 ) -> None:
-    """Fit percentages as pairs of bars; a missing or negative one is written, not drawn."""
+    """Fit percentages as pairs of bars, `labels` in the key; a missing or negative one is written, not drawn."""
     index = np.arange(len(names))
-    groups = ((-0.2, simulated, BLUE, "simulation"), (0.2, predicted, ORANGE, "prediction"))
+    groups = ((-0.2, simulated, BLUE, labels[0]), (0.2, predicted, ORANGE, labels[1]))
     told = [group for group in groups if any(v is not None for v in group[1])]
     for place, values, colour, label in told:
         offset = place if len(told) == 2 else 0.0

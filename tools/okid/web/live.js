@@ -205,10 +205,10 @@ function geometry(names, struck) {
   const own = page.facts.geometry, channels = outputs();
   if (own && own.dofs.length) {
     const dofs = names.map((_, k) => own.dofs[((struck ? struck[k] : channels[k] && channels[k].dof) || k + 1) - 1] || null);
-    return { nodes: own.nodes, lines: own.lines, dofs, names };
+    return { ...own, dofs, names };
   }
   const nodes = names.map((_, k) => [0, 0, k + 1]);
-  return { nodes: [[0, 0, 0], ...nodes], lines: names.map((_, k) => [k + 1, k + 2]), dofs: names.map((_, k) => [k + 2, "x"]), names };
+  return { nodes: [[0, 0, 0], ...nodes], lines: names.map((_, k) => [k + 1, k + 2]), fixed: [1], dofs: names.map((_, k) => [k + 2, "x"]), names };
 }
 
 function showShapes() {
@@ -217,15 +217,18 @@ function showShapes() {
   document.querySelector("#shape .absent").textContent = list.length ? "" : "no modes yet";
   if (!list.length) return;
   const select = by("shape-mode"), chosen = Math.max(0, select.selectedIndex);
-  options(select, list.map((mode, k) => `${k + 1}: ${mode.frequency_hz.toPrecision(5)} Hz`));
+  const titles = list.map((mode, k) => `${k + 1}: ${mode.frequency_hz.toPrecision(5)} Hz`);
+  options(select, titles);
+  options(by("shape-other"), ["nothing", ...titles]);
   select.selectedIndex = Math.min(chosen, list.length - 1);
-  const shapes = list.map((mode) => ({ re: mode.shape_re, im: mode.shape_im }));
+  const shapes = list.map((mode, k) => ({ re: mode.shape_re, im: mode.shape_im, name: titles[k] }));
   const struck = source.shape_dofs;
   const names = struck ? struck.map(String) : outputs().length === shapes[0].re.length ? outputs().map((one) => one.name) : shapes[0].re.map((_, k) => String(k + 1));
   const place = geometry(names, struck), key = JSON.stringify([page.run, names]);
   if (!shape) {
     shape = window.okidShapes(by("shape-canvas"), place, shapes);
     shape.show(select.selectedIndex);
+    shape.arrows = by("shape-arrows").checked;
     playing();
   } else {
     shape.set(shapes, key === page.shapeKey ? undefined : place);
@@ -297,7 +300,13 @@ for (const button of document.querySelectorAll("#modes-save button")) {
     window.okidSelection.save(`modes.${kind}`, kind === "csv" ? "text/csv" : "application/json", window.okidSelection[kind](page.result, numbers));
   });
 }
-by("shape-mode").addEventListener("change", (event) => shape && shape.show(event.target.selectedIndex));
+for (const id of ["shape-mode", "shape-other"]) {
+  by(id).addEventListener("change", () => shape && shape.show(by("shape-mode").selectedIndex, by("shape-other").selectedIndex - 1));
+}
+by("shape-arrows").addEventListener("change", (event) => { if (shape) shape.arrows = event.target.checked; });
+for (const button of document.querySelectorAll("#shape-save button")) {
+  button.addEventListener("click", () => shape && window.okidPens.save(shape, by("shape-canvas"), button.dataset.picture, `mode-${shape.mode + 1}`));
+}
 by("shape-play").addEventListener("click", () => shape && (shape.playing ? shape.pause() : shape.play()));
 by("shape-canvas").addEventListener("okid-shapes", playing);
 document.addEventListener("click", (event) => {

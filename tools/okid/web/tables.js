@@ -22,6 +22,7 @@ function fill(table, head, rows) {
     (row.cells || row).forEach((cell, k) => {
       const [text, kind] = Array.isArray(cell) ? cell : [cell];
       line.append(element("td", text instanceof Node ? undefined : text, left[k] && "text", kind));
+      line.lastElementChild.dataset.label = left[k] ? head[k].slice(1) : head[k]; // where there is no room for a head
       if (text instanceof Node) line.lastElementChild.append(text);
     });
     return line;
