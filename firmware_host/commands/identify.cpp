@@ -274,8 +274,7 @@ void add_identify(CLI::App& app) {
     command
         ->add_option(
             "records", given->records,
-            "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4, "
-            ".tdms, .h5, .parquet, .wav, .flac, .mcap, .lvm)")
+            "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4 ...)")
         ->required()
         ->type_name("RECORD.csv");
     command->add_option("--inputs", given->inputs, "force columns, with commas between; none = ambient: modes only")
@@ -322,10 +321,8 @@ void add_identify(CLI::App& app) {
     command->add_option("--modes", given->wanted.modes, "only these modes, by their numbers in the table (auto, plscf)")
         ->type_name("1,3-5");
     command
-        ->add_option(
-            "--picks", given->wanted.picks,
-            "only the modes nearest to these poles, picked by hand: frequencies in Hz, or a .json with modes, as "
-            "a report or an earlier result has them (auto)")
+        ->add_option("--picks", given->wanted.picks,
+                     "only the modes nearest to these poles: frequencies in Hz, or a .json with modes (auto)")
         ->type_name("FILE.json|HZ,HZ");
     command->add_option("--detrend", given->wanted.detrend, "what is removed from every channel first (default mean)")
         ->type_name("none|mean|linear");
@@ -367,8 +364,8 @@ void add_identify(CLI::App& app) {
         "identity; --refine=no");
     command->add_flag(
         "--stabilization", given->wanted.stabilization,
-        "look at all orders and three horizons too, and list the stable modes (JSON: \"stabilization\"); with --method "
-        "auto: the poles of all its runs (JSON: \"agreement\")");
+        "look at all orders and three horizons too, and list the stable modes (JSON: \"stabilization\"); of auto the "
+        "poles of all runs (JSON: \"agreement\")");
     command
         ->add_option("--sigma", given->wanted.sigma,
                      "standard deviations: analytic (default; the method's derivative along each block of the record), "

@@ -56,7 +56,9 @@ def test_a_result_is_a_file_of_picks(record: Any, tmp_path: Path) -> None:
     first.save(tmp_path / "picked.json")
     again = okid.identify(*record, fs=FS, picks=tmp_path / "picked.json").to_dict()
     assert again["modes"] == first.to_dict()["modes"] and again["model"] == first.to_dict()["model"]
-    (tmp_path / "few.json").write_text('{"modes": [{"frequency_hz": 31.6, "damping_ratio": 0.006}, {"frequency_hz": 12}]}')
+    (tmp_path / "few.json").write_text(
+        '{"modes": [{"frequency_hz": 31.6, "damping_ratio": 0.006}, {"frequency_hz": 12}]}'
+    )
     assert [mode["frequency_hz"] for mode in picked(record, str(tmp_path / "few.json"))] == pytest.approx(
         [12.0, 31.6], rel=2e-3
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The section in which modes are picked by hand: the poles of all runs of method "auto", with the answer as a proposal."""
+"""Modes picked by hand: the poles of all runs of method "auto", with the answer as a proposal."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def picking_section(m: Material) -> page.Section:
     inputs = f" --inputs {shlex.quote(','.join(m.result.inputs))}" if m.result.inputs else ""
     command = f"okid identify RECORD.csv{inputs} --outputs {shlex.quote(','.join(m.result.outputs))} --picks picks.json"
     words = (
-        "Every dot is a pole of one model. Coloured dots belong to a mode of the result, dashed lines are the modes that "
-        "the runs agree on: a proposal. Click a dot to pick or drop it; drag over a band to look closer. The command "
-        "gives each pick its shape, standard deviation and place in the model."
+        "Every dot is a pole of one model. Coloured dots belong to a mode of the result, dashed lines are the "
+        "modes that the runs agree on: a proposal. Click a dot to pick or drop it; drag over a band to look closer. "
+        "The command gives each pick its shape, standard deviation and place in the model."
     )
     return page.section(
         "Pick modes", _PARTS, page.data("poles-data", {"runs": told["runs"], "poles": poles, "modes": modes,
