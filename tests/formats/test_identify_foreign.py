@@ -86,7 +86,7 @@ def test_columns_are_proposed_as_they_are_typed(folder: Path) -> None:
     inputs, outputs = '"Hammer, left [N]"', r"Acc 1 [m/s^2],b'\''s [m/s^2],a3 [m/s^2]"
     assert said.endswith(f"; by their names perhaps --inputs '{inputs}' --outputs '{outputs}'"), said
     command = f"{PROGRAM} identify {folder}/logger.csv {said.split('perhaps ')[1]} --json - --quiet"
-    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=600)
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0 and json.loads(done.stdout)["inputs"] == ["Hammer, left [N]"], done.stderr
     np.save(folder / "plain.npy", record.samples)
     assert okid("identify", folder / "plain.npy", status=2).stderr.strip().endswith("plain.npy has: c1, c2, c3, c4")
@@ -111,7 +111,7 @@ def test_a_name_is_no_option(folder: Path, monkeypatch: pytest.MonkeyPatch) -> N
     write_record(folder / "--force.mat", frame())
     monkeypatch.chdir(folder)
     done = subprocess.run(
-        [PROGRAM, "identify", *CHOSEN, "--json", "-", "--", "--force.mat"], capture_output=True, text=True, timeout=600
+        [PROGRAM, "identify", *CHOSEN, "--json", "-", "--", "--force.mat"], capture_output=True, text=True, timeout=1800
     )
     assert done.returncode == 0, done.stderr
 
@@ -125,7 +125,7 @@ def test_without_the_python_package(folder: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(folder)
     done = subprocess.run(
         [folder / "bare" / "okid", "identify", "frame.mat", *CHOSEN],
-        capture_output=True, text=True, timeout=600,
+        capture_output=True, text=True, timeout=1800,
         env={**os.environ, "PATH": ".:" + os.defpath.removeprefix(":")},
     )  # fmt: skip
     assert done.returncode == 2 and not (folder / "ran").exists()

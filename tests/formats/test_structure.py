@@ -11,9 +11,9 @@ import pytest
 import pyuff
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from okid.data.geometry import Geometry, read_geometry
+from okid.data.geometry import Geometry
 from okid.data.structure_motion import StructureMotion, edges_of
-from okid.formats import read_uff, write_uff
+from okid.formats import read_geometry, read_uff, write_uff
 from okid.result.shape_places import places_of_shapes
 from sample_records import identified
 

@@ -17,8 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from okid import Error
 from okid.campaign.spec import load_spec
-from okid.data.geometry import read_geometry
-from okid.formats import read_uff, write_result
+from okid.formats import read_geometry, read_uff, write_result
 from okid.formats.uff_model import structure_text
 from okid.live.config import read_config
 from okid.live.session import Session

@@ -16,9 +16,9 @@ import okid
 import pytest
 import scipy.linalg
 from okid import report
-from okid.circle import fit_circle, lines_around
 from okid.mechanics.modal_mass import modal_masses
 from okid.record.demo import demo_frame, demo_record
+from okid.result.circle import fit_circle, lines_around
 from okid.result.expert_figures import spectrogram_of
 from PIL import Image
 from scipy.signal import cont2discrete

@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike
 
 from okid import frf as responses
 from okid._errors import InputError
-from okid.circle import fit_circle, lines_around
 from okid.frf import Frf
 from okid.result import expert_figures, figures
+from okid.result.circle import fit_circle, lines_around
 from okid.result.figure_numbers import figure_csv
 from okid.result.figures import STYLE
 from okid.result.parts import Mode
@@ -243,7 +243,8 @@ def nyquist(
     sensing: str = "acceleration",
 ) -> Picture:
     """Nyquist circle of confident mode `mode` (from 0): lines of the measured response of `output` (default: where the
-    shape is largest) to `force`, as mobility, with the circle through them. InputError as okid.circle.fit_circle()."""
+    shape is largest) to `force`, as mobility, with the circle through them. InputError as fit_circle() of
+    okid.result.circle."""
     modes = _confident(result)
     if not 0 <= mode < len(modes):
         raise InputError(f"mode is {mode}, expected 0 to {len(modes) - 1}")

@@ -6,11 +6,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from okid._errors import InputError
-from okid.data.toml_file import read_toml
 
 AXES = ("x", "y", "z")
 Place = tuple[int, str]  # node and direction: "x", "-z" ..
@@ -166,21 +164,3 @@ def geometry_of(config: Mapping[str, Any], source: str) -> Geometry | None:
         if isinstance(one, dict) and "name" in one and isinstance(one.get("dof"), int) and one["dof"] != 0
     }
     return Geometry(nodes, dofs, lines, numbers, source, surfaces, fixed)
-
-
-def read_geometry(path: str | Path) -> Geometry:
-    """The structure of a file: [geometry] and the dof of every [[channel]] of a CONFIG.toml, a .csv of rows node, line,
-    surface, sensor, fixed, or the data sets 15, 2411, 82 and 2412 of a .uff or .unv. InputError when it has none."""
-    kind = Path(path).suffix.lower()
-    if kind == ".csv":
-        from okid.data.geometry_csv import read_geometry_csv
-
-        return read_geometry_csv(path)
-    if kind in (".uff", ".unv"):
-        from okid.formats.uff_geometry import uff_geometry
-
-        return uff_geometry(path)
-    found = geometry_of(read_toml(path)[0], str(path))
-    if found is None:
-        raise InputError(f"{path}: no [geometry] section, expected one with nodes and dofs")
-    return found

@@ -8,12 +8,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from okid.data.geometry import Geometry, read_geometry
+    from okid.data.geometry import Geometry
     from okid.data.records import Record, read_csv
     from okid.formats.by_name import read_record, write_record, write_result
     from okid.formats.can_log import convert_log, read_log, write_log
     from okid.formats.csv_file import write_csv
     from okid.formats.frf_file import read_frf, write_frf
+    from okid.formats.geometry_file import read_geometry
     from okid.formats.hdf5 import read_hdf5, write_hdf5
     from okid.formats.logger_text import read_logger
     from okid.formats.mat import read_mat, write_mat
@@ -66,6 +67,7 @@ _NAMES = {
     "okid.formats.csv_file": "write_csv",
     "okid.formats.can_log": "convert_log, read_log, write_log",
     "okid.formats.frf_file": "read_frf, write_frf",
+    "okid.formats.geometry_file": "read_geometry",
     "okid.formats.hdf5": "read_hdf5, write_hdf5",
     "okid.formats.logger_text": "read_logger",
     "okid.formats.mat": "read_mat, write_mat",
@@ -77,7 +79,7 @@ _NAMES = {
     "okid.formats.uff": "UffFile, read_uff, write_uff",
     "okid.formats.uff_function": "UffFunction",
     "okid.formats.uff_model": "UffMode",
-    "okid.data.geometry": "Geometry, read_geometry",
+    "okid.data.geometry": "Geometry",
     "okid.data.records": "Record, read_csv",
 }  # of the modules; they load when they are first used: some bring scipy or python-can with them
 

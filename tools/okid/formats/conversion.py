@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from okid._errors import Error, InputError
-from okid.data.geometry import read_geometry
 from okid.data.interrupt import EXIT_INTERRUPTED
 from okid.data.records import Record
 from okid.formats.by_name import (
@@ -25,6 +24,7 @@ from okid.formats.by_name import (
     write_record,
     write_result,
 )
+from okid.formats.geometry_file import read_geometry
 from okid.formats.log_names import LOG_EXTENSIONS, is_frame_csv
 from okid.formats.mcap_file import write_events_mcap, write_live_mcap
 from okid.formats.mdf4 import holds_frames

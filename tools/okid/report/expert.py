@@ -7,12 +7,12 @@ import numpy as np
 
 from okid._errors import InputError
 from okid.abi.host import unit as si_of
-from okid.circle import Circle, fit_circle, lines_around
 from okid.mechanics.modal_mass import modal_masses
 from okid.report import page
 from okid.report.material import Material
 from okid.report.modes import plain
 from okid.result import expert_figures, figures
+from okid.result.circle import Circle, fit_circle, lines_around
 
 MOST_CIRCLES, A_ROW = 6, 3
 OFF_PHASE = 20.0  # degrees beyond which a modal mass is doubtful

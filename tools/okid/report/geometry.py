@@ -10,6 +10,7 @@ from typing import Any
 from okid.data import geometry
 from okid.data.structure_motion import StructureMotion
 from okid.data.toml_file import read_toml
+from okid.formats import geometry_file
 from okid.result.shape_places import places_of_shapes
 
 TABLES = (".csv", ".uff", ".unv")
@@ -26,5 +27,5 @@ def read_geometry(
     and a universal file (.uff, .unv) place by name. InputError names file and key.
     """
     table = Path(path).suffix.lower() in TABLES
-    given = geometry.read_geometry(path) if table else geometry.geometry_of(read_toml(path)[0], str(path))
+    given = geometry_file.read_geometry(path) if table else geometry.geometry_of(read_toml(path)[0], str(path))
     return None if given is None else StructureMotion(given, places_of_shapes(given, raw, live))

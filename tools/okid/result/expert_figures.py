@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgb
 from numpy.typing import ArrayLike, NDArray
 
 from okid._errors import InputError
-from okid.circle import Circle
+from okid.result.circle import Circle
 from okid.result.figure_numbers import state_numbers
 from okid.result.figures import BLUE, DARK, EDGE, FAINT, GREEN, GREY, ORANGE, log_axis
 

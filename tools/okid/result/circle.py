@@ -2,7 +2,7 @@
 """Nyquist circle of a mode: near a resonance the mobility of one pair of places runs along a circle.
 
 >>> import numpy as np
->>> from okid.circle import fit_circle
+>>> from okid.result.circle import fit_circle
 >>> f = np.linspace(9.5, 10.5, 41)
 >>> mobility = 2j * np.pi * f / ((10.0**2 - f**2 + 2j * 0.01 * 10.0 * f) * (2.0 * np.pi) ** 2) + 0.3j
 >>> found = fit_circle(f, mobility, "velocity")
