@@ -20,7 +20,7 @@ struct picked_pole {
 std::vector<picked_pole> read_picks(const std::string& given);
 
 /// For each pick the cluster that stands nearest, within 1 %, of two alike the one that more runs found; where there is none,
-/// the nearest pole of a single model. Ascending, each once, nothing speaks against them. Throws `failure` (exit 2).
+/// the nearest pole of a single model. Ascending, each once, all confident. Throws `failure` (exit 2).
 std::vector<consensus_mode> picked_modes(const std::vector<picked_pole>& picks, const std::vector<consensus_run>& runs,
                                          const std::vector<consensus_mode>& modes);
 

@@ -48,6 +48,7 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
     long = package.identify(*systems.record(structure, 66_000, 2.0, 1), fs=structure.fs, sigma="none")
     agreed = okid("identify", rig / "a.csv", "--inputs", "force1", "--outputs", "acc1,acc2", "--json", "-")
     assert agreed.returncode == 0, agreed.stderr
+    picked = package.identify(u, y, fs=250.0, method="auto", picks=[17.3, 40.0], stabilization=True, sigma="none")
     hits = [beam.record(beam.Hit(place, 100.0, 0.0015), np.random.default_rng(place)) for place in (1, 2)]
     sides = [hit[:, :1] for hit in hits], [hit[:, 1:] for hit in hits]
     struck = package.identify(*sides, fs=beam.FS, hit_dofs=[1, 2], output_dofs=[1, 5])
@@ -55,6 +56,7 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
              for order, names in (([0, 1], ["a", "b"]), ([1, 0], ["b", "c"]))]  # fmt: skip
     return [
         json.loads(agreed.stdout),
+        picked.to_dict(),
         package.merge(parts).to_dict(),
         struck.to_dict(),
         package.identify_frf(package.frf.h1(u, y, 250.0, nperseg=1024)).to_dict(),
