@@ -51,7 +51,8 @@ column_kind kind_of_column(const std::string& name) {
         if (small.find(word) != std::string::npos) return column_kind::force;
     const std::string begin = small.substr(0, small.find_last_not_of("0123456789 _xyz+-.") + 1);
     if (begin == "f") return column_kind::force;
-    for (const char* word : {"a", "acc", "accel", "acceleration", "v", "vel", "velocity", "disp", "displacement", "out"})
+    for (const char* word :
+         {"a", "acc", "accel", "acceleration", "v", "vel", "velocity", "disp", "displacement", "out"})
         if (begin == word) return column_kind::response;
     return column_kind::unknown;
 }
@@ -271,9 +272,10 @@ void add_identify(CLI::App& app) {
     auto given = std::make_shared<identify_arguments>();
     CLI::App* command = app.add_subcommand("identify", "Identify modes and a model from measured CSV records");
     command
-        ->add_option("records", given->records,
-                     "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4, "
-                     ".tdms, .h5, .parquet, .wav, .flac, .mcap, .lvm)")
+        ->add_option(
+            "records", given->records,
+            "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4, "
+            ".tdms, .h5, .parquet, .wav, .flac, .mcap, .lvm)")
         ->required()
         ->type_name("RECORD.csv");
     command->add_option("--inputs", given->inputs, "force columns, with commas between; none = ambient: modes only")

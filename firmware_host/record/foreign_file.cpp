@@ -27,8 +27,8 @@ extern char** environ;
 namespace okid_host {
 namespace {
 
-constexpr std::array foreign_endings{".mat",     ".uff", ".unv",  ".mf4",  ".tdms", ".h5", ".hdf5",
-                                     ".parquet", ".wav", ".flac", ".mcap", ".lvm"};
+constexpr std::array foreign_endings{".mat",  ".uff",     ".unv", ".mf4",  ".tdms", ".h5",
+                                     ".hdf5", ".parquet", ".wav", ".flac", ".mcap", ".lvm"};
 constexpr const char* converter = "okid-convert";
 constexpr std::size_t longest_reason = 65536;
 
@@ -92,12 +92,14 @@ std::pair<int, std::string> run_program(const std::string& program, const std::v
     close(ends[1]);
     std::string said;
     std::array<char, 4096> block;
-    for (ssize_t n = 0; fault == 0 && ((n = read(ends[0], block.data(), block.size())) > 0 || (n < 0 && errno == EINTR));)
+    for (ssize_t n = 0;
+         fault == 0 && ((n = read(ends[0], block.data(), block.size())) > 0 || (n < 0 && errno == EINTR));)
         if (n > 0 && said.size() < longest_reason) said.append(block.data(), static_cast<std::size_t>(n));
     close(ends[0]);
     if (fault != 0) throw failure(exit_usage, fmt::format("{}: {}", program, std::strerror(fault)));
     int status = 0;
-    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {}
+    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
     return {WIFEXITED(status) ? WEXITSTATUS(status) : exit_interrupted, said};
 }
 

@@ -83,11 +83,10 @@ def test_columns_are_proposed_as_they_are_typed(folder: Path) -> None:
     record.names = ["Hammer, left [N]", "Acc 1 [m/s^2]", "b's", "a3"]
     write_csv(folder / "logger.csv", record)
     said = okid("identify", folder / "logger.csv", status=2).stderr.strip()
-    assert said.endswith(
-        """; by their names perhaps --inputs '"Hammer, left [N]"' --outputs 'Acc 1 [m/s^2],b'\\''s [m/s^2],a3 [m/s^2]'"""
-    ), said
+    inputs, outputs = '"Hammer, left [N]"', r"Acc 1 [m/s^2],b'\''s [m/s^2],a3 [m/s^2]"
+    assert said.endswith(f"; by their names perhaps --inputs '{inputs}' --outputs '{outputs}'"), said
     command = f"{PROGRAM} identify {folder}/logger.csv {said.split('perhaps ')[1]} --json - --quiet"
-    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=600)
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=1800)
     assert done.returncode == 0 and json.loads(done.stdout)["inputs"] == ["Hammer, left [N]"], done.stderr
     np.save(folder / "plain.npy", record.samples)
     assert okid("identify", folder / "plain.npy", status=2).stderr.strip().endswith("plain.npy has: c1, c2, c3, c4")
@@ -112,7 +111,7 @@ def test_a_name_is_no_option(folder: Path, monkeypatch: pytest.MonkeyPatch) -> N
     write_record(folder / "--force.mat", frame())
     monkeypatch.chdir(folder)
     done = subprocess.run(
-        [PROGRAM, "identify", *CHOSEN, "--json", "-", "--", "--force.mat"], capture_output=True, text=True, timeout=600
+        [PROGRAM, "identify", *CHOSEN, "--json", "-", "--", "--force.mat"], capture_output=True, text=True, timeout=1800
     )
     assert done.returncode == 0, done.stderr
 
@@ -126,7 +125,7 @@ def test_without_the_python_package(folder: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(folder)
     done = subprocess.run(
         [folder / "bare" / "okid", "identify", "frame.mat", *CHOSEN],
-        capture_output=True, text=True, timeout=600,
+        capture_output=True, text=True, timeout=1800,
         env={**os.environ, "PATH": ".:" + os.defpath.removeprefix(":")},
     )  # fmt: skip
     assert done.returncode == 2 and not (folder / "ran").exists()
@@ -147,7 +146,10 @@ def test_many_files_into_a_folder(folder: Path, capsys: pytest.CaptureFixture[st
     for arguments, reason in (
         ([*many, f"{folder}/tables/"], f"{folder}/tables/a.csv: is there already: give --force to replace it"),
         ([*many, f"{folder}/one.csv"], f"{folder}/one.csv: found 2 files for one OUT, expected a folder, as tables/"),
-        ([many[0], many[0], f"{folder}/two/"], f"{folder}/two/a.csv: {many[0]} and {many[0]} would both be written there"),
+        (
+            [many[0], many[0], f"{folder}/two/"],
+            f"{folder}/two/a.csv: {many[0]} and {many[0]} would both be written there",
+        ),
         ([many[0], f"{folder}/one.csv", "--to", "h5"], "--to h5 is for a folder OUT"),
     ):
         assert main(arguments) == 2
