@@ -191,5 +191,5 @@ def test_the_table_speaks_of_responses(tmp_path: Path) -> None:
         done = program("identify", tmp_path / "h.uff", "--frf", status=0)
         assert "responses at 1200 lines\n" in done.stdout and "explained [%]" in done.stdout
         assert not any(word in done.stdout for word in ("record", "detrend", "predicted", "simulated"))
-        many = "   shapes of 8 outputs: --json FILE has them, okid-report draws them\n"
+        many = "   shapes of 8 outputs: the JSON has them, okid-report draws them\n"
         assert (many in done.stdout) == (len(outputs) > 6)
