@@ -10,11 +10,11 @@
 #include "frequency/identify_responses.hpp"
 #include "frequency/response_file.hpp"
 #include "progress.hpp"
-#include "record/csv.hpp"
 #include "record/csv_header.hpp"
 #include "record/hit_files.hpp"
 #include "record/record.hpp"
 #include "record/request.hpp"
+#include "record_files.hpp"
 #include "result/mat_file.hpp"
 #include "result/method.hpp"
 
@@ -44,8 +44,8 @@ enum class column_kind { unknown, force, response };
 
 /// By its unit, else by its name.
 column_kind kind_of_column(const std::string& name) {
-    if (const unit_rule* rule = find_unit(unit_of_name(name)); rule && *rule->si)
-        return rule->si[0] == 'N' ? column_kind::force : column_kind::response;
+    if (const std::string role = role_of_unit(unit_of_name(name)); !role.empty())
+        return role == "force" ? column_kind::force : column_kind::response;
     const std::string small = lower_case(name);
     for (const char* word : {"force", "hammer", "shaker", "load"})
         if (small.find(word) != std::string::npos) return column_kind::force;
@@ -82,9 +82,9 @@ std::string proposed_columns(const std::vector<std::string>& columns) {
 }
 
 /// The names of the columns; says which there are when none were chosen.
-void choose_columns(identify_arguments& given) {
+void choose_columns(identify_arguments& given, record_files& files) {
     if (given.outputs.empty()) {
-        const std::vector<std::string> columns = read_csv_columns(given.records.front(), given.group);
+        const std::vector<std::string> columns = files.columns(given.records.front());
         usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}{}",
                           given.records.front(), list_names(columns), proposed_columns(columns)));
     }
@@ -126,13 +126,12 @@ void check_targets(const identify_arguments& given) {
 
 /// @param outputs  those of options.outputs that the records have
 /// @param units  becomes those of the first record
-record_set read_records(const identify_arguments& given, const std::vector<std::string>& outputs,
+record_set read_records(const identify_arguments& given, record_files& files, const std::vector<std::string>& outputs,
                         record_options& options, std::vector<std::string>& units, progress& display) {
     csv_request request;
     request.columns = options.inputs;
     request.columns.insert(request.columns.end(), outputs.begin(), outputs.end());
     if (!given.wanted.fs.empty()) request.fs_hz = check_rate(given.wanted.fs);
-    request.group = given.group;
     record_set set;
     set.n_u = options.inputs.size();
     set.n_y = outputs.size();
@@ -140,7 +139,7 @@ record_set read_records(const identify_arguments& given, const std::vector<std::
         request.progress = [&](double megabytes) {
             display.stage(fmt::format("reading {}, {:.0f} MB", path, megabytes));
         };
-        csv_record record = read_csv(path, request);
+        csv_record record = files.read(path, request);
         if (set.records.empty()) {
             options.fs_hz = record.fs_hz;
             units = record.units;
@@ -180,11 +179,12 @@ void keep_units(const std::vector<std::string>& outputs, const std::string& path
 }
 
 /// Every file a set-up with those of the outputs that it has.
-std::vector<set_up> read_each_set_up(const identify_arguments& given, record_options& options, progress& display) {
+std::vector<set_up> read_each_set_up(const identify_arguments& given, record_files& files, record_options& options,
+                                     progress& display) {
     std::vector<set_up> out;
     std::vector<std::string> left = options.outputs, units(options.inputs.size() + options.outputs.size());
     for (const std::string& path : given.records) {
-        const std::vector<std::string> columns = read_csv_columns(path, given.group);
+        const std::vector<std::string> columns = files.columns(path);
         set_up one;
         for (const std::string& name : options.outputs)
             if (has_column(columns, name)) {
@@ -197,7 +197,7 @@ std::vector<set_up> read_each_set_up(const identify_arguments& given, record_opt
         alone.records = {path};
         const double before = options.fs_hz;
         std::vector<std::string> own;
-        one.set = read_records(alone, one.outputs, options, own, display);
+        one.set = read_records(alone, files, one.outputs, options, own, display);
         keep_units(one.outputs, path, own, options, units);
         if (!out.empty() && std::abs(options.fs_hz - before) > 1e-6 * before)
             usage(fmt::format("{}: found a sample rate of {} Hz, expected {} Hz as in {}", path, options.fs_hz, before,
@@ -206,7 +206,7 @@ std::vector<set_up> read_each_set_up(const identify_arguments& given, record_opt
     }
     if (!left.empty())
         usage(fmt::format("--outputs: no file has {}; {} has: {}", list_names(left), given.records.front(),
-                          list_names(read_csv_columns(given.records.front(), given.group))));
+                          list_names(files.columns(given.records.front()))));
     take_record_units(units, options);
     return out;
 }
@@ -225,7 +225,8 @@ record_result identify_files_of_responses(const identify_arguments& given) {
 
 record_result identify_files_of_samples(identify_arguments given) {
     if (!given.exponential.empty()) usage("--exponential belongs to --frf: it is the window in frequency responses");
-    choose_columns(given);
+    record_files files(given.group);
+    choose_columns(given, files);
     if (!given.set_ups && !given.references.empty()) usage("--references belongs to --setups");
     const auto references =
         given.references.empty() ? std::vector<std::string>() : split_names("--references", given.references);
@@ -245,10 +246,10 @@ record_result identify_files_of_samples(identify_arguments given) {
     options.stage = [&](const char* stage) { display.stage(stage); };
     record_result result;
     if (given.set_ups) {
-        result = identify_set_ups(read_each_set_up(given, options, display), options, references);
+        result = identify_set_ups(read_each_set_up(given, files, options, display), options, references);
     } else {
         std::vector<std::string> units;
-        record_set records = read_records(given, options.outputs, options, units, display);
+        record_set records = read_records(given, files, options.outputs, options, units, display);
         take_record_units(units, options);
         result = identify_by_method(std::move(records), options);
     }

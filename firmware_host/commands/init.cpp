@@ -80,17 +80,6 @@ heard_frames listen(const init_arguments& given) {
     return out;
 }
 
-/// The role that a unit tells, "" = none of those that are identified.
-std::string role_of_unit(const std::string& unit) {
-    static const std::array<std::pair<const char*, const char*>, 5> roles{
-        {{"N", "force"}, {"Nm", "force"}, {"m/s^2", "acceleration"}, {"m/s", "velocity"}, {"m", "displacement"}}};
-    const unit_rule* rule = find_unit(unit);
-    if (rule == nullptr) return "";
-    for (const auto& [si, role] : roles)
-        if (rule->si == std::string(si)) return role;
-    return "";
-}
-
 bool counts_samples(const dbc_signal& signal) {
     const std::string name = lower_case(signal.name);
     const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };

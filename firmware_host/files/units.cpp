@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "units.hpp"
 
+#include <array>
+#include <utility>
+
 namespace okid_host {
 namespace {
 
@@ -34,6 +37,16 @@ const unit_rule* find_unit(const std::string& name) {
     for (const unit_rule& rule : rules)
         if (name == rule.name) return &rule;
     return nullptr;
+}
+
+std::string role_of_unit(const std::string& unit) {
+    static const std::array<std::pair<const char*, const char*>, 5> roles{
+        {{"N", "force"}, {"Nm", "force"}, {"m/s^2", "acceleration"}, {"m/s", "velocity"}, {"m", "displacement"}}};
+    const unit_rule* rule = find_unit(unit);
+    if (rule == nullptr) return "";
+    for (const auto& [si, role] : roles)
+        if (rule->si == std::string(si)) return role;
+    return "";
 }
 
 } // namespace okid_host

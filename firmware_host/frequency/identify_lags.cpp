@@ -256,7 +256,7 @@ void make_model(lag_work& work, const response_modes& found, record_work& to) {
         const consensus_mode& mode = found.modes[k];
         listed.push_back(
             {mode.frequency_hz, mode.damping_ratio, mode.mpc, NAN, found.shapes[k].shape, mode.confident()});
-        to.context.verdicts.push_back({mode.confident(), mode.found_in, mode.why});
+        to.context.verdicts.push_back(verdict_of(mode));
     }
     if (work.options.sigma_blocks > 0 && !found.sigma.shape_re.empty()) to.context.sigma = found.sigma;
     to.context.stable = found.stable;

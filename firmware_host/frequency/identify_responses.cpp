@@ -70,7 +70,8 @@ void check_options(const record_request& given) {
           std::pair{"--detrend", given.detrend != "mean"}, std::pair{"--start", given.start != "moving"},
           std::pair{"--decimate", !given.decimate.empty()}, std::pair{"--sigma", !given.sigma.empty()},
           std::pair{"--sigma-blocks", !given.sigma_blocks.empty()}, std::pair{"--threads", !given.threads.empty()},
-          std::pair{"--hit-dofs", !given.hit_dofs.empty()}, std::pair{"--refine", !given.refine.empty()}})
+          std::pair{"--hit-dofs", !given.hit_dofs.empty()}, std::pair{"--refine", !given.refine.empty()},
+          std::pair{"--picks", !given.picks.empty()}})
         if (there) throw failure(exit_usage, fmt::format("{} is an option of records, found with --frf", option));
 }
 
@@ -196,7 +197,7 @@ void make_result(const response_set& set, double constant_s, response_modes&& fo
         take_window_out(constant_s, "narrow", modes[k]);
         listed[k].frequency_hz = modes[k].frequency_hz;
         listed[k].damping_ratio = modes[k].damping_ratio;
-        work.context.verdicts.push_back({modes[k].confident(), modes[k].found_in, modes[k].why});
+        work.context.verdicts.push_back(verdict_of(modes[k]));
     }
     if (!(constant_s > 0)) return;
     std::vector<double> B = work.refined->B, D = work.refined->D; // they go with the windowed poles as well

@@ -324,6 +324,7 @@ void leave_out(const std::vector<double>& line, bool all, const std::vector<int>
             if (std::find(numbers.begin(), numbers.end(), static_cast<int>(k) + 1) != numbers.end()) {
                 picked.push_back(order[k]);
                 modes[order[k]].why.clear();
+                modes[order[k]].picked = true;
             }
         check_picked(numbers, order.size());
         order = std::move(picked);

@@ -7,7 +7,6 @@
 #include "csv_rows.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
-#include "foreign_file.hpp"
 #include "line_reader.hpp"
 #include "npy.hpp"
 
@@ -38,22 +37,10 @@ csv_header read_head(line_reader& reader, const std::string& path) {
                   fmt::format("{}: no line of column names, expected names and then rows of numbers", path));
 }
 
-/// The table that okid-convert makes of a file of another format; messages name the file.
-template <class Read> auto read_table(const std::string& path, const std::string& group, Read read) {
-    const std::string table = table_of(path, group);
-    try {
-        return read(table);
-    } catch (const failure& fault) {
-        throw failure(fault.code, about_file(fault.what(), path, table), fault.status);
-    }
-}
-
 } // namespace
 
-std::vector<std::string> read_csv_columns(const std::string& path, const std::string& group) {
+std::vector<std::string> read_csv_columns(const std::string& path) {
     if (is_npy(path)) return read_npy_columns(path);
-    if (is_foreign(path))
-        return read_table(path, group, [](const std::string& table) { return read_csv_columns(table); });
     line_reader reader(path);
     return read_head(reader, path).names;
 }
@@ -92,12 +79,6 @@ void check_columns(const std::string& path, const std::vector<std::string>& colu
 
 csv_record read_csv(const std::string& path, const csv_request& asked) {
     if (is_npy(path)) return read_npy(path, asked);
-    if (is_foreign(path)) {
-        csv_record out =
-            read_table(path, asked.group, [&asked](const std::string& table) { return read_csv(table, asked); });
-        out.path = path;
-        return out;
-    }
     line_reader reader(path);
     const csv_header header = read_head(reader, path);
     csv_request request = asked;

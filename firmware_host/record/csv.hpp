@@ -13,7 +13,6 @@ struct csv_request {
     std::vector<std::string> columns; ///< names, in the order wanted
     bool whole = false;               ///< instead: every column that has a name, empty ones and an unknown rate too
     std::optional<double> fs_hz;      ///< overrides what the file says
-    std::string group;                ///< part of a file of another format with several rasters
     std::function<void(double megabytes)> progress; ///< called now and then while reading; may be empty
 };
 
@@ -30,8 +29,7 @@ struct csv_record {
 };
 
 /// Read a record. Throws `failure` (exit 2) naming file, line, column, what was found and what was expected.
-/// Columns that were not asked for are skipped unread. A name that ends in .npy is an array (npy.hpp); other formats are
-/// read by okid-convert (foreign_file.hpp).
+/// Columns that were not asked for are skipped unread. A name that ends in .npy is an array (npy.hpp).
 csv_record read_csv(const std::string& path, const csv_request& request);
 
 /// Throws (exit 2) where one of the first `checked` columns of `count` rows is missing throughout.
@@ -39,6 +37,6 @@ void check_columns(const std::string& path, const std::vector<std::string>& colu
                    const double* rows, std::size_t count);
 
 /// Only the column names, for messages.
-std::vector<std::string> read_csv_columns(const std::string& path, const std::string& group = "");
+std::vector<std::string> read_csv_columns(const std::string& path);
 
 } // namespace okid_host

@@ -4,6 +4,7 @@
 //          by output error over the records (okid_subspace_output_error)
 #include "modal_model.hpp"
 
+#include "consensus/consensus.hpp"
 #include "record_fit.hpp"
 #include "record_refine.hpp"
 #include "result/deviations.hpp"
@@ -84,6 +85,10 @@ bool put_inputs(const std::vector<listed_mode>& modes, const mode_inputs& inputs
 }
 
 } // namespace
+
+mode_verdict verdict_of(const consensus_mode& mode) {
+    return {mode.confident(), mode.found_in, mode.why, mode.picked};
+}
 
 std::complex<double> discrete_pole(const listed_mode& mode, double dt) {
     return std::exp(continuous_pole(mode.frequency_hz, mode.damping_ratio) * dt);

@@ -8,6 +8,11 @@
 
 namespace okid_host {
 
+struct consensus_mode;
+
+/// What the result says of a mode.
+mode_verdict verdict_of(const consensus_mode& mode);
+
 /// A mode as it goes into a model and into the result.
 struct listed_mode {
     double frequency_hz, damping_ratio, mpc, emac;

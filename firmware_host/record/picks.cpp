@@ -4,6 +4,7 @@
 #include "error.hpp"
 #include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
+#include "result/method.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -19,6 +20,7 @@ constexpr double near_pick = 0.01;        // of its frequency
 constexpr double weight_of_damping = 0.1; // of a factor of e, beside near_pick
 constexpr double weight_of_runs = 0.1;    // of all of them
 constexpr std::size_t most_picks = 1000;
+constexpr double most_shown_damping = 0.2; // of poles in a diagram
 
 [[noreturn]] void refuse_picks(const std::string& text) { throw failure(exit_usage, "--picks: " + text); }
 
@@ -106,6 +108,27 @@ consensus_mode lonely_pole(const picked_pole& pick, const std::vector<consensus_
     return out;
 }
 
+/// The poles of a run in its band.
+std::vector<pole_table::pole> poles_in_band(const consensus_run& run, int number) {
+    std::vector<pole_table::pole> out;
+    for (const run_pole& pole : run.poles)
+        if (pole.damping_ratio > 0 && pole.damping_ratio < most_shown_damping && in_band(run, pole.frequency_hz))
+            out.push_back({number, pole.order, pole.frequency_hz, pole.damping_ratio, pole.mpc, pole.emac, 0});
+    return out;
+}
+
+/// Poles of a track become those of a mode: at each of its orders the nearest.
+void mark_track(const run_track& track, int mode, std::vector<pole_table::pole>& poles) {
+    for (const int order : track.orders) {
+        const auto away = [&](const pole_table::pole& pole) {
+            return pole.order == order ? std::abs(pole.frequency_hz - track.frequency_hz) : INFINITY;
+        };
+        const auto nearest = std::min_element(poles.begin(), poles.end(),
+                                              [&](const auto& a, const auto& b) { return away(a) < away(b); });
+        if (nearest != poles.end() && std::isfinite(away(*nearest))) nearest->mode = mode;
+    }
+}
+
 } // namespace
 
 std::vector<picked_pole> read_picks(const std::string& given) {
@@ -140,6 +163,22 @@ std::vector<consensus_mode> picked_modes(const std::vector<picked_pole>& picks, 
     }
     std::sort(out.begin(), out.end(),
               [](const consensus_mode& a, const consensus_mode& b) { return a.frequency_hz < b.frequency_hz; });
+    return out;
+}
+
+pole_table poles_of(const std::vector<consensus_run>& runs, const std::vector<consensus_mode>& modes) {
+    pole_table out;
+    std::vector<std::vector<pole_table::pole>> of_run;
+    for (const consensus_run& run : runs) {
+        of_run.push_back(poles_in_band(run, static_cast<int>(out.runs.size())));
+        out.runs.push_back({method_names()[static_cast<std::size_t>(run.method)], run.fs_hz, run.rows});
+    }
+    for (std::size_t k = 0; k < modes.size(); ++k)
+        for (const auto& [number, track] : modes[k].members) {
+            const auto r = static_cast<std::size_t>(number);
+            mark_track(runs[r].tracks[static_cast<std::size_t>(track)], static_cast<int>(k) + 1, of_run[r]);
+        }
+    for (const auto& poles : of_run) out.poles.insert(out.poles.end(), poles.begin(), poles.end());
     return out;
 }
 

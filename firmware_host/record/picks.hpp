@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Modes picked by hand, in a diagram or from an earlier result: --picks.
+// Modes picked by hand, in a diagram or from an earlier result (--picks), and the poles to pick from.
 #pragma once
 #include "consensus/consensus.hpp"
+#include "record.hpp"
+#include "result/pole_table.hpp"
 
-#include <cmath>
 #include <string>
 #include <vector>
 
 namespace okid_host {
-
-/// Where a mode was picked.
-struct picked_pole {
-    double frequency_hz = 0;
-    double damping_ratio = NAN; ///< NaN: not said
-};
 
 /// "34.3,101" in Hz, or the name of a .json file with "modes", as okid.result/1 has them: those that were picked, else those that
 /// are confident, else all. Throws `failure` (exit 2).
@@ -23,5 +18,8 @@ std::vector<picked_pole> read_picks(const std::string& given);
 /// the nearest pole of a single model. Ascending, each once, all confident. Throws `failure` (exit 2).
 std::vector<consensus_mode> picked_modes(const std::vector<picked_pole>& picks, const std::vector<consensus_run>& runs,
                                          const std::vector<consensus_mode>& modes);
+
+/// What a stabilization diagram shows: the poles of every run, and to which of the modes each belongs.
+pole_table poles_of(const std::vector<consensus_run>& runs, const std::vector<consensus_mode>& modes);
 
 } // namespace okid_host

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  measured records in, one identified model out: detrending, exact merging, initial states, fit
 #pragma once
-#include "picks.hpp"
 #include "record_set.hpp"
 #include "result/kept_model.hpp"
 #include "result/result.hpp"
@@ -16,6 +15,12 @@
 #include <vector>
 
 namespace okid_host {
+
+/// Where a mode was picked by hand.
+struct picked_pole {
+    double frequency_hz = 0;
+    double damping_ratio = NAN; ///< NaN: not said
+};
 
 struct record_options {
     std::vector<std::string> inputs, outputs;

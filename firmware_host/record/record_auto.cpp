@@ -15,6 +15,7 @@
 #include "modal_model.hpp"
 #include "modal_refine.hpp"
 #include "older_samples.hpp"
+#include "picks.hpp"
 #include "place_shapes.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
@@ -22,7 +23,6 @@
 #include "record_rest.hpp"
 #include "request.hpp"
 #include "result/hold.hpp"
-#include "result/method.hpp"
 #include "roving.hpp"
 #include "screening.hpp"
 #include "shape_quantity.hpp"
@@ -39,8 +39,7 @@ namespace {
 constexpr double doubtful_share = 0.5; // of the runs: fewer is not even doubtful
 constexpr double worth_listing = 0.25; // agreement, or share of the runs, below which a cluster is not even doubtful
 constexpr double widest_lonely = 0.5;  // sigma of damping over damping of one output without force
-constexpr double most_shown_damping = 0.2;   // of poles in a diagram
-constexpr double fewest_periods = 8;         // of a mode in the record: fewer are a trend
+constexpr double fewest_periods = 8;   // of a mode in the record: fewer are a trend
 constexpr double periods_of_horizon = 0.025; // 0.75 of a period in 30 samples
 
 using listed_pair = std::pair<consensus_mode, std::optional<carried_mode>>;
@@ -151,7 +150,7 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
         const std::size_t n_y = shape.size();
         modes.push_back(
             {mode.frequency_hz, mode.damping_ratio, mode.mpc, mode.emac, std::move(shape), mode.confident()});
-        context.verdicts.push_back({mode.confident(), mode.found_in, mode.why, mode.picked});
+        context.verdicts.push_back(verdict_of(mode));
         work.carriers.push_back(carried ? carried->by : mode_carrier());
         auto& shifts = work.shifts.emplace_back(carried ? carried->shifts : std::vector<mode_shift>());
         for (mode_shift& shift : shifts)
@@ -203,40 +202,10 @@ void keep_picked(const std::vector<int>& numbers, std::vector<listed_pair>& foun
     for (std::size_t i = 0; i < found.size(); ++i) {
         if (std::find(numbers.begin(), numbers.end(), static_cast<int>(i) + 1) == numbers.end()) continue;
         picked.push_back(std::move(found[i]));
-        picked.back().first.why.clear();
         picked.back().first.picked = true;
     }
     check_picked(numbers, found.size());
     found = std::move(picked);
-}
-
-/// What a stabilization diagram shows: the poles of every run in its band, and to which mode each belongs.
-pole_table poles_of(const std::vector<consensus_run>& runs, const std::vector<listed_pair>& found) {
-    pole_table out;
-    for (std::size_t r = 0; r < runs.size(); ++r) {
-        const consensus_run& run = runs[r];
-        out.runs.push_back({method_names()[static_cast<std::size_t>(run.method)], run.fs_hz, run.rows});
-        const std::size_t first = out.poles.size();
-        for (const run_pole& pole : run.poles)
-            if (pole.damping_ratio > 0 && pole.damping_ratio < most_shown_damping && in_band(run, pole.frequency_hz))
-                out.poles.push_back(
-                    {static_cast<int>(r), pole.order, pole.frequency_hz, pole.damping_ratio, pole.mpc, pole.emac, 0});
-        for (std::size_t k = 0; k < found.size(); ++k)
-            for (const auto& [of_run, track] : found[k].first.members) {
-                if (of_run != static_cast<int>(r)) continue;
-                const run_track& its = run.tracks[static_cast<std::size_t>(track)];
-                for (const int order : its.orders) { // of this order, the pole nearest to the track's
-                    pole_table::pole* nearest = nullptr;
-                    for (std::size_t i = first; i < out.poles.size(); ++i)
-                        if (out.poles[i].order == order &&
-                            (!nearest || std::abs(out.poles[i].frequency_hz - its.frequency_hz) <
-                                             std::abs(nearest->frequency_hz - its.frequency_hz)))
-                            nearest = &out.poles[i];
-                    if (nearest) nearest->mode = static_cast<int>(k) + 1;
-                }
-            }
-    }
-    return out;
 }
 
 /// Slow trends: a vibration that the record holds only a few times.
@@ -326,7 +295,11 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     keep_picked(options.modes, found);
     for (auto& [mode, carried] : found)
         if (mode.picked) mode.why.clear();
-    if (options.stabilization) work.context.poles = poles_of(runs, found);
+    if (options.stabilization) {
+        std::vector<consensus_mode> seen;
+        for (const listed_pair& one : found) seen.push_back(one.first);
+        work.context.poles = poles_of(runs, seen);
+    }
     if (std::none_of(found.begin(), found.end(), [](const listed_pair& one) { return one.first.confident(); }))
         throw_no_modes(found, runs.size());
     work.context.band_hz = {found.empty() ? 0.0 : lowest_hz, levels[0].top * levels[0].fs_hz};

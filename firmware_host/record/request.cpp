@@ -5,6 +5,7 @@
 
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "picks.hpp"
 #include "record_check.hpp"
 #include "result/method.hpp"
 #include "roving.hpp"
@@ -136,11 +137,11 @@ void check_agreement(const record_request& given, record_options& options) {
     for (const auto& [option, there] :
          {std::pair{"--p", !given.p.empty()}, std::pair{"--rows", !given.rows.empty()},
           std::pair{"--order", given.order != "auto"}, std::pair{"--max-order", !given.max_order.empty()},
-          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--stabilization", given.stabilization}}) {
-        if (agreed && there && option != std::string("--stabilization"))
+          std::pair{"--hankel", given.hankel != "system"}}) {
+        if (agreed && there)
             usage(
                 fmt::format("{} belongs to one method, --method auto agrees over many: leave one of them out", option));
-        if (of_lags && there && option != std::string("--stabilization"))
+        if (of_lags && there)
             usage(fmt::format("{} belongs to the okid and n4sid methods, plscf finds it itself: leave it out", option));
     }
     if (of_lags && (given.refine == "yes" || !given.sigma_blocks.empty()))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import subprocess
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 
 import pytest
@@ -130,23 +130,23 @@ def comments() -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
-@pytest.mark.parametrize("pattern", DIALECT)
-def test_comments_are_plain(pattern: str) -> None:
-    found = [
+def found_in(named: Iterable[tuple[str, str]], pattern: str) -> list[str]:
+    return [
         f"{name}: …{text[max(0, hit.start() - 40) : hit.end() + 20]!r}"
-        for name, text in comments()
+        for name, text in named
         for hit in re.finditer(pattern, text, re.IGNORECASE)
     ]
+
+
+@pytest.mark.parametrize("pattern", DIALECT)
+def test_comments_are_plain(pattern: str) -> None:
+    found = found_in(comments(), pattern)
     assert not found, f"write {DIALECT[pattern]!r}:\n" + "\n".join(found)
 
 
 @pytest.mark.parametrize("pattern", ODD)
 def test_odd_words_stay_out(pattern: str) -> None:
-    found = [
-        f"{name}: …{text[max(0, hit.start() - 40) : hit.end() + 20]!r}"
-        for name, text in texts()
-        for hit in re.finditer(pattern, text, re.IGNORECASE)
-    ]
+    found = found_in(texts(), pattern)
     assert not found, f"write {ODD[pattern]!r}:\n" + "\n".join(found)
 
 

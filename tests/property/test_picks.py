@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import okid
 import pytest
+from program import okid as okid_program
 from scipy.signal import cont2discrete, lfilter
 
 FS, HZ, ZETA = 500.0, (12.0, 31.0, 31.6, 77.0), (0.01, 0.006, 0.006, 0.012)
@@ -117,6 +118,20 @@ def test_picks_belong_to_method_auto(record: Any) -> None:
     for more in ({"method": "okid-era"}, {"modes": [1]}):
         with pytest.raises(okid.InputError, match="picks"):
             okid.identify(*record, fs=FS, picks=[12], **more)
+
+
+def test_picks_belong_to_records(tmp_path: Path) -> None:
+    rows = "".join(f"{f},{1 / (f - 30.5):.6f},0.1\n" for f in range(10, 60))
+    (tmp_path / "h.csv").write_text(f"frequency_hz,a/f:re,a/f:im\n{rows}")
+    said = okid_program("identify", tmp_path / "h.csv", "--frf", "--picks", "30", status=2).stderr
+    assert said == "okid: --picks is an option of records, found with --frf\n"
+
+
+def test_modes_by_number_are_picked_too(record: Any) -> None:
+    modes = okid.identify(*record, fs=FS, modes=[1]).to_dict()["modes"]
+    assert [mode.get("picked") for mode in modes] == [True]
+    modes = okid.identify(None, record[1], fs=FS, method="plscf", modes=[1]).to_dict()["modes"]
+    assert [mode.get("picked") for mode in modes] == [True]
 
 
 def test_the_words_of_a_result_are_json(whole: dict[str, Any]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -41,26 +41,30 @@ def _number(text: str) -> float:
     return value
 
 
-def _take_node(rows: _Rows, cells: list[str]) -> None:
+# Each takes the cells of a row and returns the nodes that it uses.
+def _take_node(rows: _Rows, cells: list[str]) -> Sequence[int]:
     number, x, y, z = cells
     if int(number) in rows.nodes:
         raise InputError(f"node {number} stands twice")
     rows.nodes[int(number)] = (_number(x), _number(y), _number(z))
+    return ()
 
 
-def _take_line(rows: _Rows, cells: list[str]) -> None:
+def _take_line(rows: _Rows, cells: list[str]) -> Sequence[int]:
     a, b = cells
     rows.lines.append((int(a), int(b)))
+    return rows.lines[-1]
 
 
-def _take_surface(rows: _Rows, cells: list[str]) -> None:
+def _take_surface(rows: _Rows, cells: list[str]) -> Sequence[int]:
     nodes = tuple(map(int, filter(None, cells)))
     if len(nodes) < 3 or len(set(nodes)) < len(nodes):
         raise ValueError
     rows.surfaces.append(nodes)
+    return nodes
 
 
-def _take_sensor(rows: _Rows, cells: list[str]) -> None:
+def _take_sensor(rows: _Rows, cells: list[str]) -> Sequence[int]:
     name, node, direction = cells
     kept = direction_of(direction)
     if kept is None or not name:
@@ -68,13 +72,17 @@ def _take_sensor(rows: _Rows, cells: list[str]) -> None:
     if name in rows.sensors:
         raise InputError(f"sensor {name!r} stands twice")
     rows.sensors[name] = (int(node), kept)
+    return (int(node),)
 
 
-def _take_fixed(rows: _Rows, cells: list[str]) -> None:
-    rows.fixed = (rows.fixed or []) + [int(one) for one in cells if one]
+def _take_fixed(rows: _Rows, cells: list[str]) -> Sequence[int]:
+    nodes = [int(one) for one in cells if one]
+    rows.fixed = rows.fixed or []
+    rows.fixed += nodes
+    return nodes
 
 
-_TAKES: dict[str, Callable[[_Rows, list[str]], None]] = {
+_TAKES: dict[str, Callable[[_Rows, list[str]], Sequence[int]]] = {
     "node": _take_node,
     "line": _take_line,
     "surface": _take_surface,
@@ -99,13 +107,12 @@ def _rows_of(path: str | Path, text: str) -> _Rows:
         if form is None:
             raise InputError(f"{path}: line {number}: found {line!r:.60}, expected one of {'; '.join(_FORMS.values())}")
         try:
-            _TAKES[kind](rows, cells[1:])
+            used = _TAKES[kind](rows, cells[1:])
         except InputError as fault:
             raise InputError(f"{path}: line {number}: {fault}") from None
         except ValueError:
             raise InputError(f"{path}: line {number}: found {line!r:.60}, expected {form}") from None
-        used = [*rows.lines[-1:], *rows.surfaces[-1:], *[(one[0],) for one in list(rows.sensors.values())[-1:]]]
-        for node in (*(node for one in used for node in one), *(rows.fixed or ())):
+        for node in used:
             rows.first_line.setdefault(node, number)
     return rows
 

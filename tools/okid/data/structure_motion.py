@@ -47,6 +47,7 @@ class StructureMotion:
     geometry: Geometry
     places: Sequence[Place | None]
     _laplacian: sparse.csr_matrix = field(init=False, repr=False)
+    _part: NDArray[np.int32] = field(init=False, repr=False)  # of each node: which nodes are joined to it
 
     def __post_init__(self) -> None:
         nodes = np.array(self.geometry.nodes, dtype=np.float64)
@@ -56,6 +57,7 @@ class StructureMotion:
         weight = np.where([one in plates for one in edges], PLATE, 1.0) / np.maximum(length, 1e-6 * self.size)
         joined = sparse.coo_matrix((weight, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
         joined = (joined + joined.T).tocsr()
+        _, self._part = sparse.csgraph.connected_components(joined, directed=False)
         self._laplacian = (sparse.diags(np.asarray(joined.sum(axis=1)).ravel()) - joined).tocsr()
 
     @property
@@ -96,8 +98,7 @@ class StructureMotion:
     def _extend(self, values: Complex, known: NDArray[np.bool_], still: NDArray[np.bool_]) -> None:
         """Give the nodes of one axis that are neither known nor still the mean of their neighbours, in place."""
         held = known | still
-        _, part = sparse.csgraph.connected_components(self._laplacian, directed=False)
-        free = ~held & np.isin(part, part[known])
+        free = ~held & np.isin(self._part, self._part[known])
         if not np.any(free):
             return
         lines = self._laplacian[free]

@@ -99,9 +99,9 @@ def identify(
 
     Of "auto" and "plscf": `band` (low, high) in Hz where modes are sought; `modes` the numbers, from 1, of the listed
     modes that are kept: picked by hand they count as confident. Of "auto": `picks` the same by frequencies in Hz or a
-    .json file with modes (those that stand nearest); `stabilization` the poles of all runs (result.agreement);
-    `decimate` the largest factor of the lower rates; `threads` the processors used (default all; the result is the same
-    for any number).
+    .json file with modes (those that stand nearest); `stabilization` the poles of all runs
+    (to_dict()["agreement"]); `decimate` the largest factor of the lower rates; `threads` the processors used (default
+    all; the result is the same for any number).
 
     `hit_dofs`: where each record was struck (roving hammer), one number a record: each place becomes an input of its
     own, and shapes cover the places (result.shape_dofs), with `output_dofs` those of the sensors too. Bad hits (a

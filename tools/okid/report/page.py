@@ -95,21 +95,22 @@ def _asset(*place: str) -> str:
     return files("okid").joinpath(*place).read_text(encoding="utf-8")
 
 
+_SAVE = ("web", "selection.js")
+_SHAPES = tuple(("web", f"{name}.js") for name in ("structure", "pens", "shapes"))
+_SCRIPTS = {  # of the page that holds these data, in their order
+    "shapes-data": (_SAVE, *_SHAPES, ("report", "player.js")),
+    "modes-data": (_SAVE, ("report", "selection_buttons.js")),
+    "poles-data": (_SAVE, ("report", "picker.js")),
+}
+
+
 def page(title: str, subtitle: str, sections: Iterable[Section], foot: str) -> str:
     """The whole file. Its policy forbids the browser every request and every script but the page's own."""
     listed = list(sections)
     body = "\n".join(one.body for one in listed)
     links = "\n".join(f'<a href="#{anchor(one.name)}">{escape(one.name)}</a>' for one in listed)
     script, shut = "", "script-src 'none'"
-    wanted = (
-        [("web", "structure.js"), ("web", "pens.js"), ("web", "shapes.js"), ("report", "player.js")]
-        if "<canvas" in body
-        else []
-    )
-    if 'id="modes-data"' in body:
-        wanted += [("web", "selection.js"), ("report", "selection_buttons.js")]
-    if 'id="poles-data"' in body:
-        wanted += [place for place in (("web", "selection.js"), ("report", "picker.js")) if place not in wanted]
+    wanted = list(dict.fromkeys(place for key, places in _SCRIPTS.items() if f'id="{key}"' in body for place in places))
     if wanted:
         code = "\n" + "".join(_asset(*place) for place in wanted)
         digest = base64.b64encode(hashlib.sha256(code.encode("utf-8")).digest()).decode("ascii")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Pens that shapes.js draws with, on a canvas or as SVG, and the pictures that are saved: GIF, PNG, SVG.
+// Pens that shapes.js draws with, on a canvas or as SVG, and the pictures that are saved: GIF, PNG, SVG. Needs selection.js.
 //
 //   okidPens.save(view, canvas, "gif", "shape")   the view of okidShapes() as it is turned now, into a file of the reader
 "use strict";
@@ -164,11 +164,7 @@ const okidPens = {
       }
       blob = new Blob([okidPens.gif(frames, Math.round((100 * view.period) / count))], { type: "image/gif" });
     }
-    const link = document.createElement("a"), place = URL.createObjectURL(blob);
-    link.href = place;
-    link.download = `${name}.${kind}`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(place), 1000);
+    okidSelection.save(`${name}.${kind}`, blob.type, blob);
   },
 };
 window.okidPens = okidPens;

@@ -23,8 +23,8 @@ const okidSelection = {
     return JSON.stringify({ ...result, modes, warnings: [...(result.warnings || []), { code: "modes_chosen", text }] }) + "\n";
   },
 
-  save(name, kind, text) {
-    const link = document.createElement("a"), place = URL.createObjectURL(new Blob([text], { type: kind }));
+  save(name, kind, content) { // text, or a Blob
+    const link = document.createElement("a"), place = URL.createObjectURL(new Blob([content], { type: kind }));
     link.href = place;
     link.download = name;
     link.click();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  records of other formats as tables
+// PURPOSE  records of any format that the Python package reads
 // METHOD   okid-convert is started, without a shell, from the folder of this program or from PATH; it writes into a folder that
 //          nobody else may enter
-#include "foreign_file.hpp"
+#include "record_files.hpp"
 
 #include "error.hpp"
 #include "files/nearest_name.hpp"
@@ -15,7 +15,6 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <fmt/format.h>
-#include <map>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -31,28 +30,6 @@ constexpr std::array foreign_endings{".mat",  ".uff",     ".unv", ".mf4",  ".tdm
                                      ".hdf5", ".parquet", ".wav", ".flac", ".mcap", ".lvm"};
 constexpr const char* converter = "okid-convert";
 constexpr std::size_t longest_reason = 65536;
-
-/// A folder of our own that goes with its content.
-class own_folder {
-  public:
-    own_folder() : path_((std::filesystem::temp_directory_path() / "okid-XXXXXX").string()) {
-        if (!mkdtemp(path_.data()))
-            throw failure(exit_usage, fmt::format("{}: {}: a folder for the table of a record is needed; TMPDIR names "
-                                                  "another place",
-                                                  path_, std::strerror(errno)));
-    }
-    ~own_folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    own_folder(const own_folder&) = delete;
-    own_folder& operator=(const own_folder&) = delete;
-
-    std::string table() const { return path_ + "/samples.csv"; }
-
-  private:
-    std::string path_;
-};
 
 /// Where it may stand: beside this program, in the .venv that `make build` makes beside its folder, in PATH.
 std::string find_converter() {
@@ -103,6 +80,13 @@ std::pair<int, std::string> run_program(const std::string& program, const std::v
     return {WIFEXITED(status) ? WEXITSTATUS(status) : exit_interrupted, said};
 }
 
+/// `text` with the name of the file in place of the table's.
+std::string about_file(std::string text, const std::string& path, const std::string& table) {
+    for (std::size_t at = text.find(table); at != std::string::npos; at = text.find(table, at + path.size()))
+        text.replace(at, table.size(), path);
+    return text;
+}
+
 void convert_file(const std::string& path, const std::string& group, const std::string& table) {
     if (access(path.c_str(), R_OK) != 0) throw failure(exit_usage, fmt::format("{}: {}", path, std::strerror(errno)));
     const std::string program = find_converter();
@@ -125,31 +109,48 @@ void convert_file(const std::string& path, const std::string& group, const std::
                   about_file(said.empty() ? fmt::format("{}: {} gave up", path, converter) : said, path, table));
 }
 
+/// A name that ends like a format of okid-convert.
+bool is_foreign(const std::string& path) {
+    const std::string own = lower_case(std::filesystem::path(path).extension().string());
+    return std::find(foreign_endings.begin(), foreign_endings.end(), own) != foreign_endings.end();
+}
+
 } // namespace
 
-bool is_foreign(const std::string& path) {
-    const std::string ending = lower_case(std::filesystem::path(path).extension().string());
-    return std::find(foreign_endings.begin(), foreign_endings.end(), ending) != foreign_endings.end();
+own_folder::own_folder() : path_((std::filesystem::temp_directory_path() / "okid-XXXXXX").string()) {
+    if (!mkdtemp(path_.data()))
+        throw failure(exit_usage, fmt::format("{}: {}: a folder for the table of a record is needed; TMPDIR names "
+                                              "another place",
+                                              path_, std::strerror(errno)));
 }
 
-std::string table_of(const std::string& path, const std::string& group) {
-    static std::map<std::pair<std::string, std::string>, own_folder> tables;
-    const auto key = std::pair(path, group);
-    if (const auto known = tables.find(key); known != tables.end()) return known->second.table();
-    own_folder& folder = tables[key];
+own_folder::~own_folder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+}
+
+std::string record_files::table_of(const std::string& path) {
+    const auto [at, fresh] = tables_.try_emplace(path);
+    if (fresh) convert_file(path, group_, at->second.table());
+    return at->second.table();
+}
+
+template <class Read> auto record_files::as_table(const std::string& path, Read reader) {
+    if (!is_foreign(path)) return reader(path);
+    const std::string table = table_of(path);
     try {
-        convert_file(path, group, folder.table());
-    } catch (...) {
-        tables.erase(key);
-        throw;
+        return reader(table);
+    } catch (const failure& fault) {
+        throw failure(fault.code, about_file(fault.what(), path, table), fault.status);
     }
-    return folder.table();
 }
 
-std::string about_file(std::string text, const std::string& path, const std::string& table) {
-    for (std::size_t at = text.find(table); at != std::string::npos; at = text.find(table, at + path.size()))
-        text.replace(at, table.size(), path);
-    return text;
+std::vector<std::string> record_files::columns(const std::string& path) { return as_table(path, read_csv_columns); }
+
+csv_record record_files::read(const std::string& path, const csv_request& request) {
+    csv_record out = as_table(path, [&request](const std::string& table) { return read_csv(table, request); });
+    out.path = path;
+    return out;
 }
 
 } // namespace okid_host
