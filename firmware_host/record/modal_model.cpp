@@ -86,9 +86,7 @@ bool put_inputs(const std::vector<listed_mode>& modes, const mode_inputs& inputs
 
 } // namespace
 
-mode_verdict verdict_of(const consensus_mode& mode) {
-    return {mode.confident(), mode.found_in, mode.why, mode.picked};
-}
+mode_verdict verdict_of(const consensus_mode& mode) { return {mode.confident(), mode.found_in, mode.why, mode.picked}; }
 
 std::complex<double> discrete_pole(const listed_mode& mode, double dt) {
     return std::exp(continuous_pole(mode.frequency_hz, mode.damping_ratio) * dt);

@@ -192,8 +192,8 @@ std::string mode_rows(const okid_identified_t& model, const result_context& cont
                         counted(static_cast<long long>(left_out.size()), "doubtful mode"), fmt::join(left_out, ", "));
     out += why_legend(verdicts);
     if (model.n_y > most_shape_columns && !context.placed && model.mode_count > 0)
-        out += fmt::format("   shapes of {}: the JSON has them, okid-report draws them\n",
-                           counted(model.n_y, "output"));
+        out +=
+            fmt::format("   shapes of {}: the JSON has them, okid-report draws them\n", counted(model.n_y, "output"));
     if (!judged_by_agreement(context) && model.mode_count > 0)
         out += "   not judged by a named method: EMAC from 0.5 on, which noise reaches too; method auto judges\n";
     return out;
