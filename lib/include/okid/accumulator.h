@@ -147,7 +147,7 @@ OKID_API void okid_accumulator_gap(okid_accumulator_t* self, int64_t count);
 
 /// Add all of `other` to `self` as further records (exact for codes). Both need edges = 1, slots = 0, the same n_u, n_y
 /// and sample type; of an `other` with more lags the first ones are taken. The open run of `self` ends; `other` keeps its content. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH (also: one of them
-/// centred, the other not), OKID_ERR_RANGE
+/// centred, the other not), OKID_ERR_RANGE (rows whose sums would leave their words, or more than OKID_MOST_SAMPLES)
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_t* other);
 
 /// Take `part` out of `self` again: the inverse of okid_accumulator_merge(), to the last bit for codes. What is left is the

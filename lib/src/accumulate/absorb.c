@@ -6,6 +6,7 @@
 // NUMERICS   codes: exact, bounds in the public header; doubles: plain sums
 // WORKSPACE  none; touches the open slot and x only
 #include "accumulator.h"
+#include "counts.h"
 #include "source.h"
 #include "wide.h"
 
@@ -16,11 +17,6 @@ static int64_t fold_rows(okid_sample_t sample) {
 #else
     return sample == OKID_SAMPLE_INT16 ? 1 << 22 : sample == OKID_SAMPLE_INT24 ? 1 << 7 : 1 << 20;
 #endif
-}
-
-/// Rows whose sums of codes fit 63 bits.
-static int64_t row_limit(okid_sample_t sample) {
-    return INT64_C(1) << (sample == OKID_SAMPLE_INT16 ? 48 : sample == OKID_SAMPLE_INT24 ? 40 : 32);
 }
 
 /// Move the sums of the kernel into the pairs of the open slot.

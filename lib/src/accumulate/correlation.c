@@ -6,6 +6,7 @@
 //            by one); doubles: plain sums in the order of the samples
 // WORKSPACE  none; 2 (m + n_u) n_u (L + 1) flop a sample, less by transforms (correlation_spectrum.c)
 #include "correlation.h"
+#include "counts.h"
 #include "kernel.h"
 #include "source.h"
 #include "spectrum.h"
@@ -312,7 +313,8 @@ okid_status_t okid_correlation_merge(okid_correlation_t* self, okid_correlation_
     okid_correlation_settle(other);
     okid_correlation_settle(self);
     const int32_t own = cor_pieces(self), theirs = cor_pieces(other);
-    if (own + theirs > self->ring) return OKID_ERR_RANGE;
+    if (own + theirs > self->ring || !counts_fit(&self->stats, &other->stats, row_limit(a->sample)))
+        return OKID_ERR_RANGE;
     okid_correlation_gap(self, 0);
     for (int32_t k = 0; k < theirs; ++k) {
         memcpy(cor_slot(self, self->closed), cor_slot(other, k), self->slot_numbers * sizeof(cor_number_t));

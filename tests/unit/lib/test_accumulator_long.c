@@ -87,6 +87,16 @@ static void a_billion_samples_add_up_exactly(void) {
             for (int i = 0; i < W * W; ++i) TEST_ASSERT_EQUAL_DOUBLE(ldexp(once[d][i], DOUBLINGS), gram[i]);
             TEST_ASSERT_TRUE(positive_definite(gram));
         }
+        okid_status_t status = OKID_OK; // and on, until the sums of full-scale codes would leave their words
+        while (status == OKID_OK) {
+            memcpy(other, block, bytes);
+            status = okid_accumulator_merge(a, b);
+        }
+        TEST_ASSERT_EQUAL(OKID_ERR_RANGE, status);
+        const int64_t limit = INT64_C(1) << (kinds[k].bits == 16 ? 48 : kinds[k].bits == 24 ? 40 : 32);
+        TEST_ASSERT_TRUE(okid_accumulator_rows(a) <= limit && okid_accumulator_rows(a) > limit / 2);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, OKID_DETREND_NONE, gram, NULL));
+        TEST_ASSERT_TRUE(positive_definite(gram));
         free(block);
         free(other);
     }

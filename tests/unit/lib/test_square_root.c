@@ -215,6 +215,27 @@ static void merging_stacks_records(void) {
     TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_square_root_merge(a, NULL));
 }
 
+/// Doubled until the counts are full: refused then, and what was there stays.
+static void merging_counts_to_the_end(void) {
+    okid_square_root_t *a = filled(samples, 1000), *b = filled(samples, 1000);
+    okid_square_root_gap(b, OKID_MOST_SAMPLES); // as many as are counted at all
+    TEST_ASSERT_EQUAL(OKID_ERR_RANGE, okid_square_root_merge(a, b));
+    TEST_ASSERT_EQUAL_INT64(1000 - P, okid_square_root_rows(a));
+    b = filled(samples, 1000);
+    okid_square_root_t *pair[2] = {a, b}, *grown = NULL;
+    okid_status_t status = OKID_OK;
+    int64_t rows = 0;
+    for (int n = 0; status == OKID_OK; ++n) { // as Fibonacci's numbers
+        TEST_ASSERT_TRUE(n < 100);
+        grown = pair[n % 2];
+        rows = okid_square_root_rows(grown);
+        status = okid_square_root_merge(grown, pair[1 - n % 2]);
+    }
+    TEST_ASSERT_EQUAL(OKID_ERR_RANGE, status);
+    TEST_ASSERT_EQUAL_INT64(rows, okid_square_root_rows(grown));
+    TEST_ASSERT_TRUE(rows > INT64_C(1) << 60);
+}
+
 /// Window with gaps, and forgetting: the numbers of the other kernel after every block.
 static void both_kernels_agree(void) {
     for (int n = 0; n < N; n += 331) samples[n * RIG_M + n % RIG_M] = NAN;
@@ -460,6 +481,7 @@ int main(void) {
     RUN_TEST(all_kinds_of_numbers_give_the_same_bits);
     RUN_TEST(bad_samples_never_poison);
     RUN_TEST(merging_stacks_records);
+    RUN_TEST(merging_counts_to_the_end);
     RUN_TEST(both_kernels_agree);
     RUN_TEST(units_and_offsets);
     RUN_TEST(a_copy_of_the_block_goes_on_alike);
