@@ -53,9 +53,13 @@ std::size_t symmetric_work(int n, int k);
 int symmetric(int n, double* a, int k, double* values, double* vectors, double* work);
 
 /// Eigenvalues of a general real n x n matrix (destroyed), and right eigenvectors unless vectors is nullptr: a complex
-/// pair k, k+1 has eigenvector vectors(:,k) +- i vectors(:,k+1). work: eigen_work(n) numbers; eigen_work(n, false) do where
-/// vectors is nullptr.
+/// pair k, k+1 has eigenvector vectors(:,k) +- i vectors(:,k+1). With `wanted` only pairs for whose first eigenvalue
+/// (im > 0) it is true have vectors; the other columns are undefined. work: eigen_work(n) numbers; eigen_work(n, false) do
+/// where vectors is nullptr.
+template <class Real> using wanted_eigenvalue = bool (*)(Real re, Real im);
 template <class Real = okid_real_t> std::size_t eigen_work(int n, bool with_vectors = true);
-template <class Real> int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work);
+template <class Real>
+int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work,
+          as_is<wanted_eigenvalue<Real>> wanted = nullptr);
 
 } // namespace okid::linalg

@@ -408,7 +408,8 @@ template <class Real> void back_substitute(const schur<Real>& s, int k, Real re,
 
 } // namespace
 
-template <class Real> int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work) {
+template <class Real>
+int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work, as_is<wanted_eigenvalue<Real>> wanted) {
     Real *z = vectors != nullptr ? work : nullptr,
          *x = vectors != nullptr ? work + static_cast<size_t>(n) * static_cast<size_t>(n) : work, *y = x + n;
     if (z != nullptr) view(z, n, n, n).setIdentity();
@@ -429,8 +430,9 @@ template <class Real> int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*>
     }
     if (vectors == nullptr) return 0;
     for (int k = 0; k < n; ++k) {
-        back_substitute(s, k, re[k], im[k], x, y);
         const bool pair = im[k] > 0;
+        if (wanted != nullptr && !(pair && wanted(re[k], im[k]))) continue;
+        back_substitute(s, k, re[k], im[k], x, y);
         Real* column = vectors + static_cast<size_t>(k) * static_cast<size_t>(n);
         multiply(false, false, n, 1, n, 1, z, n, x, n, 0, column, n);
         if (pair) multiply(false, false, n, 1, n, 1, z, n, y, n, 0, column + n, n);
@@ -452,7 +454,8 @@ template void multiply(bool, bool, int, int, int, double, const double*, int, co
 template size_t svd_work<okid_real_t>(int, int);
 template int svd(int, int, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*);
 template size_t eigen_work<okid_real_t>(int, bool);
-template int eigen(int, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*);
+template int eigen(int, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*, okid_real_t*,
+                   wanted_eigenvalue<okid_real_t>);
 
 // Where okid_real_t is float the first four exist for it too.
 #define OKID_IS_float 1

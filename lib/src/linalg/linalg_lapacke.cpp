@@ -6,6 +6,8 @@
 
 #include "cholesky.h"
 #include "condition.hpp"
+#include "francis.hpp"
+#include "inverse_iteration.hpp"
 #include "tridiagonal.h"
 
 #include <algorithm>
@@ -64,6 +66,27 @@ lapack_int geev(char vectors, int n, float* a, float* re, float* im, float* righ
     return LAPACKE_sgeev_work(layout, 'N', vectors, n, a, n, re, im, nullptr, 1, right, n, work, size);
 }
 
+lapack_int gebal(int n, double* a, lapack_int* low, lapack_int* high, double* scale) {
+    return LAPACKE_dgebal_work(layout, 'B', n, a, n, low, high, scale);
+}
+lapack_int gebal(int n, float* a, lapack_int* low, lapack_int* high, float* scale) {
+    return LAPACKE_sgebal_work(layout, 'B', n, a, n, low, high, scale);
+}
+
+lapack_int gebak(int n, lapack_int low, lapack_int high, const double* scale, double* pair) {
+    return LAPACKE_dgebak_work(layout, 'B', 'R', n, low, high, scale, 2, pair, n);
+}
+lapack_int gebak(int n, lapack_int low, lapack_int high, const float* scale, float* pair) {
+    return LAPACKE_sgebak_work(layout, 'B', 'R', n, low, high, scale, 2, pair, n);
+}
+
+lapack_int gehrd(int n, lapack_int low, lapack_int high, double* a, double* tau, double* work, lapack_int size) {
+    return LAPACKE_dgehrd_work(layout, n, low, high, a, n, tau, work, size);
+}
+lapack_int gehrd(int n, lapack_int low, lapack_int high, float* a, float* tau, float* work, lapack_int size) {
+    return LAPACKE_sgehrd_work(layout, n, low, high, a, n, tau, work, size);
+}
+
 /// LAPACK answers a query in Real: above 2^24 a float may be rounded down, the next one is enough.
 template <class Real> lapack_int whole(Real wanted) {
     return static_cast<lapack_int>(std::nextafter(wanted, std::numeric_limits<Real>::infinity()));
@@ -99,6 +122,67 @@ template <class Real> lapack_int eigen_query(int n) {
         geev('V', n, &none, &none, &none, &none, &wanted, -1);
         return whole(wanted);
     });
+}
+
+/// Does another eigenvalue stand so near that both have one vector to half the digits?
+template <class Real> bool crowded(int n, int k, const Real* re, const Real* im, Real near) {
+    for (int j = 0; j < n; ++j)
+        if (j != k && std::abs(re[j] - re[k]) + std::abs(im[j] - im[k]) < near) return true;
+    return false;
+}
+
+/// A pair of columns as geev leaves it: of unit length, its largest entry real.
+template <class Real> void scale_pair(int n, Real* x, Real* y) {
+    Real sum = 0, largest = 0;
+    int at = 0;
+    for (int i = 0; i < n; ++i) {
+        const Real square = x[i] * x[i] + y[i] * y[i];
+        sum += square;
+        if (square > largest) largest = square, at = i;
+    }
+    if (!(largest > 0)) return;
+    const Real size = std::sqrt(sum) * std::sqrt(largest), c = x[at] / size, s = y[at] / size;
+    for (int i = 0; i < n; ++i) {
+        const Real p = x[i];
+        x[i] = p * c + y[i] * s;
+        y[i] = y[i] * c - p * s;
+    }
+    y[at] = 0;
+}
+
+/// How a matrix was balanced and brought to Hessenberg form; the reflectors stand below the form.
+template <class Real> struct hessenberg_form {
+    Real *scale, *tau; // n each
+    lapack_int low, high;
+
+    bool reduce(int n, Real* a, Real* work, lapack_int size) {
+        return gebal(n, a, &low, &high, scale) == 0 && gehrd(n, low, high, a, tau, work, size) == 0;
+    }
+};
+
+/// All eigenvalues, and the vectors of the pairs that are wanted, by inverse iteration: half the work of all vectors where
+/// half of them are wanted. @return false: that cannot be done here, and a stands as it was
+template <class Real>
+bool wanted_pairs(int n, const Real* a, Real* re, Real* im, Real* vectors, Real* work, wanted_eigenvalue<Real> wanted) {
+    const auto length = static_cast<size_t>(n), square = length * length;
+    Real *reduced = work, *h = reduced + square, *inverse = h + square,
+         *rest = inverse + inverse_iteration<Real>::work(n);
+    hessenberg_form<Real> form{rest, rest + length, 1, n};
+    std::copy(a, a + square, reduced);
+    if (!form.reduce(n, reduced, rest + 2 * length, eigen_query<Real>(n))) return false;
+    std::copy(reduced, reduced + square, h);
+    if (!francis<Real>(n, h).find(re, im)) return false;
+    const inverse_iteration<Real> by(n, reduced, inverse);
+    const Real near = std::sqrt(std::numeric_limits<Real>::epsilon()) * by.norm();
+    for (int k = 0; k < n; ++k) {
+        if (!(im[k] > 0) || !wanted(re[k], im[k])) continue;
+        Real* pair = vectors + static_cast<size_t>(k) * length;
+        if (crowded(n, k, re, im, near) || !by.find(re[k], im[k], pair, pair + n)) return false;
+        turn_back(n, reduced, form.tau, pair);
+        if (gebak(n, form.low, form.high, form.scale, pair) != 0) return false;
+        scale_pair(n, pair, pair + n);
+    }
+    return true;
 }
 
 /// Up to here each of k vectors of n by inverse iteration costs less than all of them by divide and conquer.
@@ -281,10 +365,22 @@ int symmetric(int n, double* a, int k, double* values, double* vectors, double* 
     return 0;
 }
 
-template <class Real> size_t eigen_work(int n, bool) { return static_cast<size_t>(eigen_query<Real>(n)); }
+template <class Real> size_t eigen_work(int n, bool with_vectors) {
+    const auto size = static_cast<size_t>(n);
+    return (with_vectors ? 2 * size * size + inverse_iteration<Real>::work(n) : 0) + 2 * size +
+           static_cast<size_t>(eigen_query<Real>(n));
+}
 
-template <class Real> int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work) {
-    return geev(vectors != nullptr ? 'V' : 'N', n, a, re, im, vectors, work, eigen_query<Real>(n));
+template <class Real>
+int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work, as_is<wanted_eigenvalue<Real>> wanted) {
+    const lapack_int size = eigen_query<Real>(n);
+    if (vectors != nullptr) {
+        if (wanted != nullptr && wanted_pairs<Real>(n, a, re, im, vectors, work, wanted)) return 0;
+        return geev('V', n, a, re, im, vectors, work, size);
+    }
+    hessenberg_form<Real> form{work, work + n, 1, n};
+    if (!form.reduce(n, a, work + 2 * n, size)) return 1;
+    return francis<Real>(n, a).find(re, im) ? 0 : 1;
 }
 
 template int cholesky(int, double*, int);
@@ -294,7 +390,7 @@ template void multiply(bool, bool, int, int, int, double, const double*, int, co
 template size_t svd_work<double>(int, int);
 template int svd(int, int, double*, double*, double*, double*, double*);
 template size_t eigen_work<double>(int, bool);
-template int eigen(int, double*, double*, double*, double*, double*);
+template int eigen(int, double*, double*, double*, double*, double*, wanted_eigenvalue<double>);
 
 template int cholesky(int, float*, int);
 template void cholesky_solve(int, const float*, int, float*, int, int);
@@ -303,7 +399,7 @@ template void multiply(bool, bool, int, int, int, float, const float*, int, cons
 template size_t svd_work<float>(int, int);
 template int svd(int, int, float*, float*, float*, float*, float*);
 template size_t eigen_work<float>(int, bool);
-template int eigen(int, float*, float*, float*, float*, float*);
+template int eigen(int, float*, float*, float*, float*, float*, wanted_eigenvalue<float>);
 
 } // namespace okid::linalg
 

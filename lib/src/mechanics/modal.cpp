@@ -67,6 +67,12 @@ okid_real_t collinearity(int n, const okid_real_t* re, const okid_real_t* im) {
     return sum > 0 ? ((xx - yy) * (xx - yy) + 4 * xy * xy) / (sum * sum) : 0;
 }
 
+/// May a pole of the upper half plane be a mode: damped, and below Nyquist?
+bool is_candidate(okid_real_t re, okid_real_t im) {
+    const double a = re, b = im, size = std::hypot(a, b), angle = std::atan2(b, a);
+    return b > 0 && size < 1 && angle <= nyquist_margin * pi && std::hypot(std::log(size), angle) <= pi;
+}
+
 void put(okid_real_t* array, int i, double value) {
     if (array != nullptr) array[i] = static_cast<okid_real_t>(value);
 }
@@ -95,17 +101,14 @@ okid_status_t okid_modal_analyse(const okid_model_t* model, double dt, okid_mode
     lay_out(n_z, memory, &w);
     const auto n = static_cast<size_t>(n_z), ny = static_cast<size_t>(n_y);
     std::copy(A, A + n * n, w.a);
-    if (okid::linalg::eigen(n_z, w.a, w.re, w.im, w.vectors, w.eigen) != 0) return OKID_ERR_NUMERIC;
+    if (okid::linalg::eigen(n_z, w.a, w.re, w.im, w.vectors, w.eigen, is_candidate) != 0) return OKID_ERR_NUMERIC;
     double largest = 0;
     int found = 0;
     for (int k = 0; k < n_z; ++k) {
         const double re = w.re[k], im = w.im[k], size = std::hypot(re, im);
         largest = std::max(largest, size);
-        if (!(im > 0) || !(size < 1) || !(size > 0)) continue;
-        const double angle = std::atan2(im, re);
-        const double omega = std::hypot(std::log(size), angle) / dt;
-        if (angle > nyquist_margin * pi || omega * dt > pi) continue;
-        w.sorted[k] = omega;
+        if (!is_candidate(w.re[k], w.im[k])) continue;
+        w.sorted[k] = std::hypot(std::log(size), std::atan2(im, re)) / dt;
         w.order[found++] = k;
     }
     for (int i = 1; i < found; ++i) // insertion: std::sort calls itself, and a stack has a bound here

@@ -197,15 +197,20 @@ void test_symmetric_degenerate() {
     }
 }
 
-void check_eigen(int n, const vec<real>& original) {
+bool upper_half(real, real im) { return im > 0; }
+bool nearly_undamped(real re, real im) { return im > 0 && std::hypot(re, im) < 1; }
+
+/// Every vector fits its eigenvalue and has unit length; vectors that were not asked for are left out.
+void check_pairs(int n, const vec<real>& original, la::wanted_eigenvalue<real> wanted) {
     vec<real> a = original, re(static_cast<size_t>(n)), im(static_cast<size_t>(n)), v(static_cast<size_t>(n * n)),
               work(la::eigen_work(n));
-    TEST_ASSERT_EQUAL(0, la::eigen(n, a.data(), re.data(), im.data(), v.data(), work.data()));
+    TEST_ASSERT_EQUAL(0, la::eigen(n, a.data(), re.data(), im.data(), v.data(), work.data(), wanted));
     double scale = 1e-300;
     for (double x : original) scale = std::max(scale, std::abs(x));
     for (int k = 0; k < n; ++k) {
         const bool pair = im[static_cast<size_t>(k)] > 0;
         const std::complex<double> mu(re[static_cast<size_t>(k)], im[static_cast<size_t>(k)]);
+        if (wanted != nullptr && !wanted(re[static_cast<size_t>(k)], im[static_cast<size_t>(k)])) continue;
         double size = 0;
         for (int i = 0; i < n; ++i) {
             std::complex<double> sum = 0, x(at(v, n, i, k), pair ? at(v, n, i, k + 1) : 0);
@@ -219,7 +224,82 @@ void check_eigen(int n, const vec<real>& original) {
     }
 }
 
+void check_eigen(int n, const vec<real>& original) {
+    for (const la::wanted_eigenvalue<real> wanted :
+         {la::wanted_eigenvalue<real>(nullptr), la::wanted_eigenvalue<real>(upper_half),
+          la::wanted_eigenvalue<real>(nearly_undamped)})
+        check_pairs(n, original, wanted);
+}
+
+/// Decaying oscillations in coordinates that are far from upright: a model as identification gives it.
+vec<real> model_of(int n, bool repeated, std::uint64_t seed) {
+    const auto place = [n](int i, int j) { return static_cast<size_t>(j * n + i); };
+    vec<double> a(static_cast<size_t>(n * n), 0);
+    for (int k = 0; k + 1 < n; k += 2) {
+        const int same = repeated ? k / 4 : k / 2;
+        const double angle = 3.0 * (same + 1) / (n + 1), size = 1 - 0.001 * (same + 1);
+        a[place(k, k)] = a[place(k + 1, k + 1)] = size * std::cos(angle);
+        a[place(k + 1, k)] = size * std::sin(angle);
+        a[place(k, k + 1)] = -a[place(k + 1, k)];
+    }
+    for (int turn = 0; turn < 3; ++turn) { // (I + u v') a (I - u v' / (1 + v' u))
+        const vec<double> u = random_matrix<double>(n, 1, 2 * seed + 10 * static_cast<std::uint64_t>(turn)),
+                          v = random_matrix<double>(n, 1, 2 * seed + 10 * static_cast<std::uint64_t>(turn) + 1);
+        double inner = 1;
+        for (int i = 0; i < n; ++i) inner += u[place(i, 0)] * v[place(i, 0)];
+        for (int j = 0; j < n; ++j) {
+            double sum = 0;
+            for (int i = 0; i < n; ++i) sum += v[place(i, 0)] * a[place(i, j)];
+            for (int i = 0; i < n; ++i) a[place(i, j)] += u[place(i, 0)] * sum;
+        }
+        for (int i = 0; i < n; ++i) {
+            double sum = 0;
+            for (int j = 0; j < n; ++j) sum += a[place(i, j)] * u[place(j, 0)];
+            for (int j = 0; j < n; ++j) a[place(i, j)] -= sum / inner * v[place(j, 0)];
+        }
+    }
+    return {a.begin(), a.end()};
+}
+
+/// Eigenvalues found without vectors are the same ones, in another order.
+void check_alone(int n, const vec<real>& original, double limit) {
+    vec<real> a = original, re(static_cast<size_t>(n)), im(re), alone_re(re), alone_im(re),
+              v(static_cast<size_t>(n * n)), work(la::eigen_work(n));
+    TEST_ASSERT_EQUAL(0, la::eigen(n, a.data(), re.data(), im.data(), v.data(), work.data()));
+    a = original;
+    TEST_ASSERT_EQUAL(0, la::eigen(n, a.data(), alone_re.data(), alone_im.data(), nullptr, work.data()));
+    for (size_t k = 0; k < re.size(); ++k) {
+        double nearest = 1e300;
+        for (size_t j = 0; j < re.size(); ++j)
+            nearest = std::min(nearest, std::hypot(static_cast<double>(re[j] - alone_re[k]),
+                                                   static_cast<double>(im[j] - alone_im[k])));
+        TEST_ASSERT_DOUBLE_WITHIN(limit, 0, nearest);
+    }
+}
+
+/// Eigenvalues that are there twice: their vectors span two planes, not one.
+void check_repeated() {
+    constexpr int n = 12;
+    const vec<real> original = model_of(n, true, 5);
+    vec<real> a = original, re(n), im(n), v(n * n), work(la::eigen_work(n));
+    TEST_ASSERT_EQUAL(0, la::eigen(n, a.data(), re.data(), im.data(), v.data(), work.data(), upper_half));
+    for (int k = 0; k < n; ++k)
+        for (int j = 0; j < k && im[static_cast<size_t>(k)] > 0; ++j) {
+            if (!(im[static_cast<size_t>(j)] > 0)) continue;
+            std::complex<double> product = 0;
+            for (int i = 0; i < n; ++i)
+                product += std::conj(std::complex<double>(at(v, n, i, k), at(v, n, i, k + 1))) *
+                           std::complex<double>(at(v, n, i, j), at(v, n, i, j + 1));
+            TEST_ASSERT_TRUE(std::abs(product) < 0.999);
+        }
+}
+
 void test_eigen() {
+    for (int n : {2, 4, 20, 61, 90}) check_eigen(n, model_of(n, false, static_cast<std::uint64_t>(n)));
+    check_repeated();
+    for (int n : {1, 2, 3, 5, 24, 60, 128})
+        check_alone(n, random_matrix<real>(n, n, static_cast<std::uint64_t>(n) + 7), 3 * n * limits<real>::eigenpair);
+    for (int n : {20, 60}) check_alone(n, model_of(n, false, 3), 3 * n * limits<real>::eigenpair);
     for (int n : {1, 2, 3, 6, 25, 60}) check_eigen(n, random_matrix<real>(n, n, static_cast<std::uint64_t>(n)));
     check_eigen(4, {0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 0, 0, 0}); // a cyclic permutation
     check_eigen(3, {1, 0, 0, 0, 1, 0, 0, 0, 1});
