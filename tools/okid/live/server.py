@@ -32,7 +32,7 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-REQUEST_S, STALLED_S, HEARTBEAT_S = 10.0, 20.0, 5.0
+REQUEST_S, ANSWER_S, STALLED_S, HEARTBEAT_S = 10.0, 120.0, 20.0, 5.0
 MOST_VISITORS = 48  # connections at a time: 16 pages and what they fetch
 MOST_SPECTRA = 8
 MOST_ASKED = 1 << 20  # bytes of a wish that is no file
@@ -133,11 +133,11 @@ class PageServer(ThreadingHTTPServer):
             for visitor in [one for one, until in self._visitors.items() if until < now]:
                 self._end(visitor)
 
-    def stays(self, visitor: socket.socket) -> None:
-        """It opened a page: its time is not over until it goes."""
+    def stays(self, visitor: socket.socket, seconds: float = math.inf) -> None:
+        """It has asked, and has so long from now on; a page stays until it goes."""
         with self._door:
             if visitor in self._visitors:
-                self._visitors[visitor] = math.inf
+                self._visitors[visitor] = time.monotonic() + seconds
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that goes away in the middle is no news."""
@@ -204,6 +204,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not self._meant_for_us():
             self._answer(HTTPStatus.FORBIDDEN, b"this name does not belong to okid-live\n", "text/plain")
             return
+        self.server.stays(self.connection, ANSWER_S)  # packing plotly.js takes long where others compute
         asked = urlsplit(self.path)
         if asked.path == "/events" and self.command == "HEAD":
             self._answer(HTTPStatus.OK, b"", "text/event-stream")
