@@ -280,9 +280,10 @@ class _Handler(BaseHTTPRequestHandler):
             self.server.stays(self.connection)
             self.connection.settimeout(STALLED_S)
             self.wfile.write(b"retry: 1000\n\n")
-            while not outbox.closed:
-                waiting = outbox.take(HEARTBEAT_S)
-                for data in waiting or [b": here\n\n"]:
+            closed = False
+            while not closed:
+                closed = outbox.closed  # what waits then still goes
+                for data in outbox.take(HEARTBEAT_S) or [b": here\n\n"]:
                     self.wfile.write(data)
         except OSError:
             pass  # the browser has gone, or took nothing for STALLED_S

@@ -85,9 +85,12 @@ class Session:
         self._pace.start()
 
     def stop(self) -> None:
-        """End all threads and pages."""
+        """End all threads and pages, which get what is new first."""
         self._stop.set()
         self._awake.set()
+        with self._lock:
+            for one in self._frames(0) if len(self.hub) else ():
+                self.hub.send(one)
         self.hub.close()
         self._maker.stop()
         if self._source is not None:
