@@ -246,8 +246,8 @@ def test_a_file_named_like_an_option(rig: Path, tmp_path: Path, okid_live: Calla
     assert status == 200 and str(odd) in made["command"] and sorted(p.name for p in tmp_path.iterdir()) == [odd.name]
     seen = until_over(live)
     assert seen["facts"]["config"] == odd.name and seen["facts"]["start"] is True
-    private = Path(f"/proc/{live.process.pid}/root/tmp")
-    assert live.end() == (0, "") and not [p for p in private.parent.glob("okid-live-*") if p.is_dir()]
+    dropped = Path(json.loads(post(live, "/upload?name=a.csv", b"1")[1])["path"])
+    assert dropped.exists() and live.end() == (0, "") and not dropped.parent.parent.exists()
 
 
 # -- the start page's words -------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import glob
 import hmac
+import itertools
 import json
 import re
 import secrets
@@ -130,7 +131,8 @@ class Desk:
         if start:
             self._works |= {"/look": self.look, "/identify": self.identify, "/open": self.open}
         self._reporter, self._reporting, self._changing = Child(), threading.Lock(), threading.Lock()
-        self._uploaded = self._jobs = self._uploads = 0
+        self._uploaded = self._uploads = 0
+        self._jobs = itertools.count(1)
 
     def knows(self, token: str) -> bool:
         """Is it the token of this session?"""
@@ -152,8 +154,7 @@ class Desk:
 
     def _job(self) -> Path:
         """A folder for one work."""
-        self._jobs += 1
-        place = self.folder / f"job-{self._jobs}"
+        place = self.folder / f"job-{next(self._jobs)}"
         place.mkdir(mode=0o700)
         return place
 
