@@ -33,12 +33,13 @@ class Failed(InputError):
 
 
 class Child:
-    """One program at a time. run() may be called again and again from one thread, stop() from any other."""
+    """One program at a time; `stopped`: stop() was called. run() may be called again and again from one thread, stop()
+    from any other."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
         self._lock = threading.Lock()
-        self._stopped = False
+        self.stopped = False
 
     def run(
         self, command: Sequence[str], on_stage: Callable[[str], None],
@@ -65,7 +66,7 @@ class Child:
                 process.kill()
                 raise
         reader.join()
-        if self._stopped:
+        if self.stopped:
             raise Failed("it was stopped")
         if process.returncode != 0:
             raise Failed(said[-1] if said else f"{Path(command[0]).name} ended with {process.returncode}")
@@ -74,7 +75,7 @@ class Child:
         beside = str(Path(sys.executable).parent)  # okid-convert of this installation, for files of other programs
         path = os.pathsep.join([beside, os.environ.get("PATH", os.defpath)])
         with self._lock:
-            if self._stopped:
+            if self.stopped:
                 raise Failed("it was stopped")
             self._process = subprocess.Popen(
                 list(command), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE if piped else subprocess.DEVNULL,
@@ -86,7 +87,7 @@ class Child:
     def stop(self) -> None:
         """End what runs; nothing can be run any more."""
         with self._lock:
-            self._stopped, process = True, self._process
+            self.stopped, process = True, self._process
         if process is None or process.poll() is not None:
             return
         process.terminate()

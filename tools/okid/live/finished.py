@@ -142,6 +142,8 @@ class Worker:
         try:
             self.work()
         except (Error, OSError, MemoryError) as fault:
+            if self.child.stopped:
+                return
             text = str(fault) or type(fault).__name__
             self.session.failed(text)
             self.on_failure(text)

@@ -79,6 +79,7 @@ export class Plot {
       const button = document.createElement("button");
       Object.assign(button, { type: "button", textContent: kind.toUpperCase() });
       button.dataset.picture = kind;
+      button.className = "save";
       button.addEventListener("click", () => this.save(kind));
       tools.append(button);
     }
