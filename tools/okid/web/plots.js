@@ -201,9 +201,9 @@ export function frf(found, units) {
   if (response.model) data.push(line(response.model, "model", model, "y3"), line(response.model_phase, "", model, "y2", { showlegend: false }));
   return { data, layout: layout({
     xaxis: axis("frequency [Hz]", { range: [0, top], anchor: "y" }),
-    yaxis: axis("coh.", { domain: [0, 0.15], range: [0, 1.05], tickvals: [0, 1] }),
-    yaxis2: axis("phase [°]", { domain: [0.2, 0.4], range: [-190, 190], tickvals: [-180, 0, 180] }),
-    yaxis3: logarithmic(`|H| [${printed(units)}]`, [tail(response.magnitude)], { domain: [0.45, 1] }),
+    yaxis: axis("coh.", { domain: [0, 0.14], range: [0, 1.05], tickvals: [0, 1] }),
+    yaxis2: axis("phase [°]", { domain: [0.22, 0.42], range: [-190, 190], tickvals: [-180, 0, 180] }),
+    yaxis3: logarithmic(`|H| [${printed(units)}]`, [tail(response.magnitude)], { domain: [0.47, 1] }),
     uirevision: `${response.output}/${response.input}` }) };
 }
 
