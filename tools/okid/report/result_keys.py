@@ -34,10 +34,10 @@ _HIT = {
 _SET_UP = {"name": "text", "outputs": "names"}
 _FIT = {"simulation_percent": "by name?", "prediction_percent": "by name?"}
 _MKR = {
-    "M": "matrix", "K": "matrix", "R": "matrix", "R_normal_modes": "matrix", "checks": "object",
+    "checks": "object", **{name: "loose matrix" for name in ("M", "K", "R", "R_normal_modes")},  # null: not determined
     **{f"{name}_std": "loose matrix?" for name in ("M", "K", "R", "R_normal_modes")},
 }  # fmt: skip
-_PDC = {"alpha": "number", "beta": "number", "R": "matrix", "alpha_std": "number?", "beta_std": "number?"}
+_PDC = {"alpha": "number", "beta": "number", "R": "loose matrix", "alpha_std": "number?", "beta_std": "number?"}
 _CHECKS = {
     "m_positive_definite": "flag?", "k_positive_definite": "flag?", "r_positive_definite": "flag?",
     "ww_residual": "number?", "feedthrough_misfit": "number?", "feedthrough_gain": "number?",
