@@ -6,6 +6,7 @@
 //            by one); doubles: plain sums in the order of the samples
 // WORKSPACE  none; 2 (m + n_u) n_u (L + 1) flop a sample, less by transforms (correlation_spectrum.c)
 #include "correlation.h"
+#include "counts.h"
 #include "kernel.h"
 #include "source.h"
 #include "spectrum.h"
@@ -199,7 +200,7 @@ static void close_slot(okid_correlation_t* s) {
 
 void okid_correlation_gap(okid_correlation_t* self, int64_t count) {
     if (!self || count < 0) return;
-    if (count > OKID_MOST_SAMPLES - self->clock) count = OKID_MOST_SAMPLES - self->clock;
+    count = gap_within(count, self->clock);
     if (self->have > 0 || !self->in_gap) {
         close_slot(self);
         self->have = 0;
@@ -309,6 +310,7 @@ okid_status_t okid_correlation_merge(okid_correlation_t* self, okid_correlation_
     if (self == other || a->block > 0 || b->block > 0 || a->n_u != b->n_u || a->n_y != b->n_y || a->lags != b->lags ||
         a->own_lags != b->own_lags || a->sample != b->sample)
         return OKID_ERR_MISMATCH;
+    if (!counts_fit(&self->stats, &other->stats, self->clock, other->clock)) return OKID_ERR_MISMATCH;
     okid_correlation_settle(other);
     okid_correlation_settle(self);
     const int32_t own = cor_pieces(self), theirs = cor_pieces(other);

@@ -7,6 +7,7 @@
 // NUMERICS   codes: exact (wide.h); doubles: one addition a slot
 // WORKSPACE  none; (p m)^2 flop a run
 #include "accumulator.h"
+#include "counts.h"
 #include "wide.h"
 
 #include <math.h>
@@ -208,7 +209,7 @@ okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_
         return OKID_ERR_MISMATCH;
     const int empty = self->stats.rows == 0 && self->stats.samples == 0;
     if (self->centred != other->centred && !empty && other->stats.rows > 0) return OKID_ERR_MISMATCH;
-    if (self->stats.rows > INT64_MAX / 2 - other->stats.rows) return OKID_ERR_RANGE;
+    if (!counts_fit(&self->stats, &other->stats, self->clock, other->clock)) return OKID_ERR_RANGE;
     if (empty) self->centred = other->centred;
     end_run(self);
     add_all(self, other, 1);

@@ -8,13 +8,12 @@ import contextlib
 import errno
 import signal
 import socket
-import sys
 import threading
 import webbrowser
 from collections.abc import Sequence
 from types import FrameType
 
-from okid._errors import InputError
+from okid._errors import InputError, complain, say
 from okid.live.config import read_config
 from okid.live.server import PageServer, is_loopback
 from okid.live.session import Session
@@ -39,7 +38,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _fail(text: str, code: int) -> int:
-    print(f"okid-live: {text}", file=sys.stderr)
+    complain("okid-live", text)
     return code
 
 
@@ -47,7 +46,7 @@ def _serve(server: PageServer, session: Session, stop: threading.Event, browse: 
     """Until `stop` is set."""
     threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.5}, daemon=True).start()
     session.start()
-    print(f"okid-live: {server.url}   (Ctrl-C ends it)", flush=True)
+    say(f"okid-live: {server.url}   (Ctrl-C ends it)", flush=True)
     if browse:
         threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
     stop.wait()
