@@ -12,6 +12,7 @@
 
 #include <okid_host/stream.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -295,7 +296,7 @@ int32_t okid_host_stream_add(okid_host_stream_t* self, int32_t kind, const void*
 int32_t okid_host_stream_gap(okid_host_stream_t* self, int64_t count) {
     return face::guard([&] {
         face::given(self);
-        const std::int64_t most = OKID_MOST_SAMPLES - self->now();
+        const std::int64_t most = std::max<std::int64_t>(OKID_MOST_SAMPLES - self->now(), 0);
         if (count < 0 || count > most)
             throw failure(exit_usage, fmt::format("count: found {}, expected 0 to {}", count, most));
         self->stream.sums().add_missing(count);

@@ -290,3 +290,14 @@ def test_halves_of_letters_in_options() -> None:
     with pytest.raises(InputError, match="half of a letter"):
         okid.Session(1, 1, fs=100.0, method="\ud800")
     assert okid.Session(["\U0001f600"], ["\\ud800"], fs=100.0).inputs == ["\U0001f600"]
+
+
+def test_a_result_of_very_many_modes(tmp_path: Path, good: dict[str, Any]) -> None:
+    """The work grows with the cube of their number."""
+    (tmp_path / "a.json").write_text(json.dumps(good))
+    (tmp_path / "b.json").write_text(json.dumps({**good, "modes": good["modes"][:1] * 5001}))
+    for command in (("compare",), ("merge", "--json", tmp_path / "m.json")):
+        one_line(
+            measured(*command, tmp_path / "a.json", tmp_path / "b.json", within_s=1800),
+            "found 5001, expected at most 5000",
+        )
