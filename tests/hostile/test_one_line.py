@@ -301,3 +301,33 @@ def test_a_result_of_very_many_modes(tmp_path: Path, good: dict[str, Any]) -> No
             measured(*command, tmp_path / "a.json", tmp_path / "b.json", within_s=1800),
             "found 5001, expected at most 5000",
         )
+
+
+POLES = dict.fromkeys(("run", "order", "frequency_hz", "damping_ratio", "mpc", "mode"), [0])
+WRONG_AGREEMENTS: list[Any] = [
+    [], {}, "x", {"runs": 3, "poles": {}}, {"runs": [{}], "poles": POLES},
+    {"runs": [], "poles": POLES}, {"runs": [{"method": "a", "fs_hz": 1, "rows": 1}], "poles": {**POLES, "mpc": [1, 2]}},
+    {"runs": [{"method": "a", "fs_hz": 1, "rows": 1}], "poles": {**POLES, "frequency_hz": ["</script>"]}},
+    {"runs": [{"method": "a", "fs_hz": 1, "rows": 1}], "poles": {**POLES, "run": [0.5]}},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("value", WRONG_AGREEMENTS)
+def test_poles_of_a_result(
+    tmp_path: Path, good: dict[str, Any], value: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "r.json").write_text(json.dumps({**good, "agreement": value}))
+    assert report([str(tmp_path / "r.json"), "--out", str(tmp_path / "r.html")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "agreement" in said, said
+
+
+@pytest.mark.parametrize("far", [1e300, -5e9])
+def test_nodes_beyond_the_moon(tmp_path: Path, far: float) -> None:
+    (tmp_path / "g.csv").write_text(f"node,1,0,0,0\nnode,2,0,{far},0\nsensor,a,1,z\n")
+    (tmp_path / "g.toml").write_text(f'[geometry]\nnodes = [[0, 0, 0], [0, {far}, 0]]\ndofs = [[1, "x"]]\n')
+    numbers = "".join(f"{k:>10}{0:>10}{0:>10}{11:>10}{x:>13}{0.0:>13}{0.0:>13}\n" for k, x in ((1, 0.0), (2, far)))
+    (tmp_path / "g.uff").write_text(f"    -1\n    15\n{numbers}    -1\n")
+    for name in ("g.csv", "g.toml", "g.uff"):
+        with pytest.raises(InputError, match=f"{name}: node 2 is at .* expected coordinates of at most 1e"):
+            read_geometry(tmp_path / name)
