@@ -9,14 +9,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from okid.formats.command import main as convert
 from program import PROGRAM
+from waiting import until
 
 PATIENCE = 1800.0
 TABLE = "time_s,f,a\n" + "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(50))
@@ -59,14 +58,6 @@ def bench(tmp_path: Path) -> Bench:
     return Bench(tmp_path)
 
 
-def wait_until(there: Callable[[], bool], run: subprocess.Popen[str] | None = None) -> None:
-    for _ in range(int(PATIENCE / 0.02)):
-        if there() or (run is not None and run.poll() is not None):
-            return
-        time.sleep(0.02)
-    raise AssertionError
-
-
 def gone(pid: int) -> bool:
     try:
         os.kill(pid, 0)
@@ -81,14 +72,14 @@ def test_a_conversion_that_is_stopped(bench: Bench, number: signal.Signals) -> N
     note = f"{bench.folder}/started"
     bench.converter(f'echo part >"$3.part"; echo $$ >{note}.new; mv {note}.new {note}; exec sleep 1800')
     run = bench.start()
-    wait_until((bench.folder / "started").exists, run)
+    until((bench.folder / "started").exists, run)
     assert list(bench.temporary.iterdir())
     run.send_signal(number)
     text = run.communicate(timeout=PATIENCE)[1]
     assert run.returncode == 130 and text == "okid: interrupted; no file is left half-written\n"
     assert list(bench.temporary.iterdir()) == []
     pid = int((bench.folder / "started").read_text())
-    wait_until(lambda: gone(pid))
+    until(lambda: gone(pid))
 
 
 def test_the_table_has_no_name(bench: Bench) -> None:
@@ -142,7 +133,7 @@ def test_names_on_their_way_to_a_terminal(tmp_path: Path, capsys: pytest.Capture
 
 
 SLOW = """
-import sys, time
+import signal, sys
 from okid.data.whole_file import safe_part
 from okid.formats import command, conversion
 
@@ -150,7 +141,7 @@ def slow(args, source, target):
     with safe_part(target) as part:
         part.write_text("half")
         print("there", flush=True)
-        time.sleep(1800)
+        signal.pause()
 
 conversion._run = slow
 sys.exit(command.main())
