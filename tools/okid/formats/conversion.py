@@ -8,12 +8,11 @@ import contextlib
 import hashlib
 import signal
 import socket
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from okid._errors import Error, InputError
+from okid._errors import Error, InputError, complain, say
 from okid.data.interrupt import EXIT_INTERRUPTED
 from okid.data.records import Record
 from okid.formats.by_name import (
@@ -155,7 +154,7 @@ def _live_lines(path: Path) -> Iterator[bytes]:
 
 def _note(remarks: Sequence[str]) -> None:
     for remark in remarks:
-        print(f"okid-convert: note: {remark}", file=sys.stderr)
+        complain("okid-convert", f"note: {remark}")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -237,14 +236,14 @@ def convert(arguments: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(arguments)
     try:
         for source, target in _pairs(args):
-            print(_run(args, source, target))
+            say(_run(args, source, target))
     except Error as fault:
-        print(f"okid-convert: {fault}", file=sys.stderr)
+        complain("okid-convert", fault)
         return EXIT_USAGE
     except OSError as fault:
-        print(f"okid-convert: {fault.filename or args.target}: {fault.strerror or fault}", file=sys.stderr)
+        complain("okid-convert", f"{fault.filename or args.target}: {fault.strerror or fault}")
         return EXIT_USAGE
     except KeyboardInterrupt:
-        print("okid-convert: interrupted, the file in work was not written", file=sys.stderr)
+        complain("okid-convert", "interrupted, the file in work was not written")
         return EXIT_INTERRUPTED
     return EXIT_DONE

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NamedTuple
 
-from okid._errors import InputError
+from okid._errors import InputError, complain, say
 from okid.abi.program import run_program
 from okid.live.config import PageConfig, ReportFiles, read_config
 from okid.live.desk import Desk, page_of_log
@@ -60,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _fail(text: str, code: int) -> int:
-    print(f"okid-live: {text}", file=sys.stderr)
+    complain("okid-live", text)
     return code
 
 
@@ -76,7 +76,7 @@ def _serve(server: PageServer, desk: Desk, stop: threading.Event, browse: bool) 
     threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.5}, daemon=True).start()
     server.session.start()
     address = f"{server.url}#{desk.token}"
-    print(f"okid-live: {address}   (Ctrl-C ends it)", flush=True)
+    say(f"okid-live: {address}   (Ctrl-C ends it)", flush=True)
     if browse:
         threading.Thread(target=_browse, args=(address, desk.folder), daemon=True).start()
     stop.wait()
