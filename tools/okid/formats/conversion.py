@@ -14,6 +14,7 @@ from pathlib import Path
 
 from okid._errors import Error, InputError, complain, say
 from okid.data.interrupt import EXIT_INTERRUPTED
+from okid.data.line_splitter import LineSplitter
 from okid.data.records import Record
 from okid.formats.by_name import (
     EXTENSIONS,
@@ -29,7 +30,6 @@ from okid.formats.mcap_file import write_events_mcap, write_live_mcap
 from okid.formats.mdf4 import holds_frames
 from okid.formats.result_tree import load_result
 from okid.formats.uff import uff_losses
-from okid.live.feed import LineSplitter
 
 EXIT_DONE, EXIT_USAGE = 0, 2
 _FRAMES_ONLY = (".log", ".asc", ".blf", ".trc", ".db")
