@@ -56,4 +56,4 @@ def test_a_machine_is_no_mode_of_plscf() -> None:
         except okid.IdentificationError as told:
             assert "(tone" in str(told)
             continue
-        assert [mode.frequency_hz for mode in found if abs(mode.frequency_hz / 3.1 % 1 - 0.5) > 0.45] == []
+        assert [mode.frequency_hz for mode in found if mode.frequency_hz < 40] == []  # multiples above are folded
