@@ -78,6 +78,7 @@ int explain(CLI::App& app, const CLI::ParseError& error, int argc, char** argv) 
 int main(int argc, char** argv) {
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
+    if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN); // nohup
     std::signal(SIGXFSZ, SIG_IGN); // a file beyond the limit of its size is a write that fails, with a message
     CLI::App app{"okid: from a cable of sensor frames to natural frequencies, damping ratios and mode shapes", "okid"};
     app.set_version_flag("--version",
@@ -118,7 +119,7 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return error.get_exit_code() == 0 ? app.exit(error) : explain(app, error, argc, argv);
     } catch (const okid_host::failure& error) {
-        if (*error.what()) okid_host::say("okid: {}\n", error.what());
+        if (*error.what()) okid_host::say("okid: {}\n", okid_host::one_line(error.what()));
         return error.code;
     } catch (const std::bad_alloc&) {
         std::fprintf(stderr, "okid: out of memory\n");

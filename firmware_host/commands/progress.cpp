@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "progress.hpp"
 
+#include "files/shown_text.hpp"
+#include "files/signals_wait.hpp"
+
 #include <chrono>
 #include <cstdio>
 #include <unistd.h>
@@ -8,6 +11,7 @@
 namespace okid_host {
 
 progress::progress(bool wanted) {
+    const signals_wait the_main_thread_takes_them;
     if (wanted && isatty(STDERR_FILENO)) thread_ = std::thread([this] { show(); });
 }
 
@@ -24,7 +28,7 @@ progress::~progress() {
 
 void progress::stage(const std::string& text) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    text_ = text;
+    text_ = one_line(text);
 }
 
 void progress::show() {

@@ -1,21 +1,26 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  records of any format that the Python package reads
 // METHOD   okid-convert is started, without a shell, from the folder of this program or from PATH; it writes into a folder that
-//          nobody else may enter
+//          nobody else may enter and that is gone when it ends: the table lives on without a name. A signal to stop ends it first
 #include "record_files.hpp"
 
+#include "acquire/stop_signal.hpp"
 #include "error.hpp"
+#include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
 #include <fmt/format.h>
+#include <poll.h>
 #include <spawn.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <utility>
@@ -31,14 +36,20 @@ constexpr std::array foreign_endings{".mat",  ".uff",     ".unv", ".mf4",  ".tdm
 constexpr const char* converter = "okid-convert";
 constexpr std::size_t longest_reason = 65536;
 
+/// Of the owner of this program, of root or of this user: a program in a folder for all has strangers beside it.
+bool of_a_known_owner(const std::filesystem::path& path) {
+    struct stat here{}, own{};
+    return lstat(path.c_str(), &here) == 0 && stat("/proc/self/exe", &own) == 0 &&
+           (here.st_uid == 0 || here.st_uid == geteuid() || here.st_uid == own.st_uid);
+}
+
 /// Where it may stand: beside this program, in the .venv that `make build` makes beside its folder, in PATH.
 std::string find_converter() {
     std::error_code fault;
     std::vector<std::filesystem::path> folders;
-    if (const auto program = std::filesystem::read_symlink("/proc/self/exe", fault); !fault) {
-        folders.push_back(program.parent_path());
-        folders.push_back(program.parent_path().parent_path() / ".venv/bin");
-    }
+    if (const auto program = std::filesystem::read_symlink("/proc/self/exe", fault); !fault)
+        for (const auto& folder : {program.parent_path(), program.parent_path().parent_path() / ".venv/bin"})
+            if (of_a_known_owner(folder) && of_a_known_owner(folder / converter)) folders.push_back(folder);
     const char* set = std::getenv("PATH");
     const std::string list = set ? set : "";
     for (std::size_t at = 0; at <= list.size();) {
@@ -51,7 +62,28 @@ std::string find_converter() {
     return "";
 }
 
-/// Exit code of a program that was waited for, and what it wrote to stderr.
+/// While it lives, a signal that asks to stop is noted: a program and a folder have to go first.
+class stop_waits {
+  public:
+    stop_waits() {
+        for (std::size_t i = 0; i < signals.size(); ++i) sigaction(signals[i], nullptr, &before_[i]);
+        catch_stop_signals();
+        struct sigaction stop{};
+        sigaction(SIGINT, nullptr, &stop);
+        if (before_[0].sa_handler != SIG_IGN) sigaction(SIGHUP, &stop, nullptr);
+    }
+    ~stop_waits() {
+        for (std::size_t i = 0; i < signals.size(); ++i) sigaction(signals[i], &before_[i], nullptr);
+    }
+    stop_waits(const stop_waits&) = delete;
+    stop_waits& operator=(const stop_waits&) = delete;
+
+  private:
+    static constexpr std::array signals{SIGHUP, SIGINT, SIGTERM, SIGPIPE, SIGCHLD};
+    std::array<struct sigaction, signals.size()> before_{};
+};
+
+/// Exit code of a program that was waited for, and what it wrote to stderr. It is killed when a stop is asked for.
 std::pair<int, std::string> run_program(const std::string& program, const std::vector<std::string>& arguments) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) throw failure(exit_usage, fmt::format("{}: {}", program, std::strerror(errno)));
@@ -69,9 +101,16 @@ std::pair<int, std::string> run_program(const std::string& program, const std::v
     close(ends[1]);
     std::string said;
     std::array<char, 4096> block;
-    for (ssize_t n = 0;
-         fault == 0 && ((n = read(ends[0], block.data(), block.size())) > 0 || (n < 0 && errno == EINTR));)
+    for (ssize_t n = 1; fault == 0 && n != 0;) {
+        std::array<pollfd, 2> waiting{{{ends[0], POLLIN, 0}, {stop_fd(), POLLIN, 0}}};
+        if (poll(waiting.data(), waiting.size(), -1) < 0 && errno != EINTR) break;
+        if (stop_requested()) {
+            kill(child, SIGKILL);
+            break;
+        }
+        n = waiting[0].revents ? read(ends[0], block.data(), block.size()) : -1;
         if (n > 0 && said.size() < longest_reason) said.append(block.data(), static_cast<std::size_t>(n));
+    }
     close(ends[0]);
     if (fault != 0) throw failure(exit_usage, fmt::format("{}: {}", program, std::strerror(fault)));
     int status = 0;
@@ -98,6 +137,7 @@ void convert_file(const std::string& path, const std::string& group, const std::
     if (!group.empty()) arguments = {"--group=" + group};
     arguments.insert(arguments.end(), {"--", path, table});
     auto [code, said] = run_program(program, arguments);
+    if (stop_requested()) throw failure(exit_interrupted, "interrupted; no file is left half-written");
     const std::string begin = std::string(converter) + ": ";
     if (code == exit_ok) {
         if (!said.empty()) say("{}", said);
@@ -109,6 +149,28 @@ void convert_file(const std::string& path, const std::string& group, const std::
                   about_file(said.empty() ? fmt::format("{}: {} gave up", path, converter) : said, path, table));
 }
 
+/// A folder of our own that goes with its content.
+class own_folder {
+  public:
+    own_folder() : path_((std::filesystem::temp_directory_path() / "okid-XXXXXX").string()) {
+        if (!mkdtemp(path_.data()))
+            throw failure(exit_usage, fmt::format("{}: {}: a folder for the table of a record is needed; TMPDIR names "
+                                                  "another place",
+                                                  path_, std::strerror(errno)));
+    }
+    ~own_folder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    own_folder(const own_folder&) = delete;
+    own_folder& operator=(const own_folder&) = delete;
+
+    std::string table() const { return path_ + "/samples.csv"; }
+
+  private:
+    std::string path_;
+};
+
 /// A name that ends like a format of okid-convert.
 bool is_foreign(const std::string& path) {
     const std::string own = lower_case(std::filesystem::path(path).extension().string());
@@ -117,22 +179,21 @@ bool is_foreign(const std::string& path) {
 
 } // namespace
 
-own_folder::own_folder() : path_((std::filesystem::temp_directory_path() / "okid-XXXXXX").string()) {
-    if (!mkdtemp(path_.data()))
-        throw failure(exit_usage, fmt::format("{}: {}: a folder for the table of a record is needed; TMPDIR names "
-                                              "another place",
-                                              path_, std::strerror(errno)));
+nameless_table::nameless_table(const std::string& path, const std::string& group) {
+    const stop_waits until_it_has_no_name;
+    const own_folder folder;
+    convert_file(path, group, folder.table());
+    fd_ = open_input(folder.table(), "a table");
 }
 
-own_folder::~own_folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-}
+nameless_table::~nameless_table() { close(fd_); }
+
+std::string nameless_table::path() const { return fmt::format("/proc/self/fd/{}", fd_); }
 
 std::string record_files::table_of(const std::string& path) {
-    const auto [at, fresh] = tables_.try_emplace(path);
-    if (fresh) convert_file(path, group_, at->second.table());
-    return at->second.table();
+    auto& table = tables_[path];
+    if (!table) table = std::make_unique<nameless_table>(path, group_);
+    return table->path();
 }
 
 template <class Read> auto record_files::as_table(const std::string& path, Read reader) {

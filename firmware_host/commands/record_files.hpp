@@ -4,23 +4,24 @@
 #include "record/csv.hpp"
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace okid_host {
 
-/// A folder of our own that goes with its content.
-class own_folder {
+/// What okid-convert makes of a file. It has no name, so it ends with this process, however that ends.
+class nameless_table {
   public:
-    own_folder(); ///< throws `failure` (exit 2)
-    ~own_folder();
-    own_folder(const own_folder&) = delete;
-    own_folder& operator=(const own_folder&) = delete;
+    nameless_table(const std::string& path, const std::string& group); ///< throws `failure` (exit 2 or 130)
+    ~nameless_table();
+    nameless_table(const nameless_table&) = delete;
+    nameless_table& operator=(const nameless_table&) = delete;
 
-    std::string table() const { return path_ + "/samples.csv"; }
+    std::string path() const; ///< of its descriptor
 
   private:
-    std::string path_;
+    int fd_ = -1;
 };
 
 /// Reads them; of another format than CSV and .npy the table that okid-convert makes, once for each file. What it remarks goes to
@@ -39,7 +40,7 @@ class record_files {
     std::string table_of(const std::string& path);
 
     std::string group_;
-    std::map<std::string, own_folder> tables_;
+    std::map<std::string, std::unique_ptr<nameless_table>> tables_;
 };
 
 } // namespace okid_host

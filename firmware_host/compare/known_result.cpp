@@ -19,6 +19,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t largest_result = std::size_t{256} << 20; // bytes; as the Python package reads
+constexpr std::size_t most_modes = 5000;                       // pairing two such results takes some seconds
 
 /// Numbers of a list of so many, NaN for null.
 std::vector<double> numbers_in(const keys_of& from, const char* key, std::size_t count) {
@@ -112,6 +113,8 @@ known_result take_known_result(const json& raw, const std::string& name) {
     out.outputs = names_in(top, "outputs", "a list of names");
     out.places = places_in(top, out.outputs);
     const json& modes = top.list("modes", "a list of modes");
+    if (modes.size() > most_modes)
+        top.refuse("modes", std::to_string(modes.size()), fmt::format("at most {}", most_modes));
     for (std::size_t k = 0; k < modes.size(); ++k) {
         const std::string where = fmt::format("modes[{}].", k);
         if (!modes[k].is_object()) top.refuse_value(fmt::format("modes[{}]", k), modes[k], "an object");

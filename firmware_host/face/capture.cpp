@@ -309,6 +309,7 @@ void okid_host_capture_t::finish() {
 }
 
 void okid_host_capture_defaults(okid_host_capture_options_t* options) {
+    if (!options) return;
     *options = {};
     options->size = sizeof *options;
     options->identify = 1;
@@ -316,14 +317,19 @@ void okid_host_capture_defaults(okid_host_capture_options_t* options) {
 
 int okid_host_capture_create(const okid_host_config_t* config, const okid_host_capture_options_t* options,
                              okid_host_capture_t** out) {
-    *out = nullptr;
-    return face::guard([&] { *out = new okid_host_capture_t(*config, *options); });
+    if (out) *out = nullptr;
+    return face::guard([&] {
+        face::given(out, config, options);
+        *out = new okid_host_capture_t(*config, *options);
+    });
 }
 
 void okid_host_capture_delete(okid_host_capture_t* self) { delete self; }
 
 int okid_host_capture_frames(okid_host_capture_t* self, const drv_frame_t* frames, size_t count) {
     return face::guard([&] {
+        face::given(self);
+        face::given_where(count > 0, frames);
         const session& stream = self->stream();
         for (size_t i = 0; i < count && !stream.done(); ++i) self->push(frames[i]);
         self->serve();
@@ -333,6 +339,8 @@ int okid_host_capture_frames(okid_host_capture_t* self, const drv_frame_t* frame
 int okid_host_capture_bytes(okid_host_capture_t* self, size_t bus, const uint8_t* bytes, size_t count,
                             int64_t time_ns) {
     return face::guard([&] {
+        face::given(self);
+        face::given_where(count > 0, bytes);
         (void)self->stream();
         self->push_bytes(bus, bytes, count, time_ns);
         self->serve();
@@ -341,6 +349,7 @@ int okid_host_capture_bytes(okid_host_capture_t* self, size_t bus, const uint8_t
 
 int okid_host_capture_link(okid_host_capture_t* self, size_t bus, int32_t up) {
     return face::guard([&] {
+        face::given(self);
         (void)self->stream();
         self->link(bus, up != 0);
     });
@@ -348,51 +357,69 @@ int okid_host_capture_link(okid_host_capture_t* self, size_t bus, int32_t up) {
 
 int okid_host_capture_lost(okid_host_capture_t* self, size_t bus, uint64_t socket_overflow, uint64_t driver) {
     return face::guard([&] {
+        face::given(self);
         (void)self->stream();
         self->lost(bus, {socket_overflow, driver});
     });
 }
 
 int okid_host_capture_edge(okid_host_capture_t* self, int64_t time_ns) {
-    return face::guard([&] { self->stream().trigger_edge(time_ns); });
+    return face::guard([&] {
+        face::given(self);
+        self->stream().trigger_edge(time_ns);
+    });
 }
 
 int okid_host_capture_serve(okid_host_capture_t* self) {
     return face::guard([&] {
+        face::given(self);
         (void)self->stream();
         self->serve();
     });
 }
 
 int okid_host_capture_open(okid_host_capture_t* self, const char* log) {
-    return face::guard([&] { self->open(log); });
+    return face::guard([&] {
+        face::given(self, log);
+        self->open(log);
+    });
 }
 
 int okid_host_capture_play(okid_host_capture_t* self, size_t frames, size_t* played) {
-    *played = 0;
+    if (played) *played = 0;
     return face::guard([&] {
+        face::given(played, self);
         (void)self->stream();
         *played = self->play(frames);
     });
 }
 
-int32_t okid_host_capture_done(const okid_host_capture_t* self) { return self->done() ? 1 : 0; }
+int32_t okid_host_capture_done(const okid_host_capture_t* self) { return self && self->done() ? 1 : 0; }
 
 int okid_host_capture_rows(okid_host_capture_t* self, int32_t raw, okid_host_rows_t* out) {
-    *out = {};
-    return face::guard([&] { *out = self->rows(raw != 0); });
+    if (out) *out = {};
+    return face::guard([&] {
+        face::given(out, self);
+        *out = self->rows(raw != 0);
+    });
 }
 
-const char* okid_host_capture_events(okid_host_capture_t* self) { return self->take_events(); }
+const char* okid_host_capture_events(okid_host_capture_t* self) { return self ? self->take_events() : ""; }
 
 const char* okid_host_capture_stats(okid_host_capture_t* self) {
     const char* out = nullptr;
-    (void)face::guard([&] { out = self->keep(self->state().stats_event().dump() + "\n"); });
+    (void)face::guard([&] {
+        face::given(self);
+        out = self->keep(self->state().stats_event().dump() + "\n");
+    });
     return out;
 }
 
 int okid_host_capture_finish(okid_host_capture_t* self) {
-    return face::guard([&] { self->finish(); });
+    return face::guard([&] {
+        face::given(self);
+        self->finish();
+    });
 }
 
 size_t okid_host_packet_encode(int32_t format, size_t channels, size_t samples, uint32_t sequence, uint32_t time_us,
@@ -401,7 +428,7 @@ size_t okid_host_packet_encode(int32_t format, size_t channels, size_t samples, 
                       samples > 0 && samples < 256;
     const drv_stream_header_t header{static_cast<drv_stream_format_t>(fits ? format : 0),
                                      static_cast<uint8_t>(channels), static_cast<uint8_t>(samples), sequence, time_us};
-    if (!fits || drv_stream_bytes(&header) == 0) return 0;
+    if (!fits || !values || !out || drv_stream_bytes(&header) == 0) return 0;
     size_t written = 0;
     (void)face::guard([&] {
         const double* const end = values + channels * samples;

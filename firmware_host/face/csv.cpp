@@ -19,8 +19,9 @@ struct okid_host_csv {
 using namespace okid_host;
 
 int32_t okid_host_csv_read(const char* path, okid_host_csv_t** out) {
-    *out = nullptr;
+    if (out) *out = nullptr;
     return face::guard([&] {
+        face::given(out, path);
         auto made = std::make_unique<okid_host_csv_t>();
         csv_request request;
         request.whole = true;
@@ -36,28 +37,34 @@ int32_t okid_host_csv_read(const char* path, okid_host_csv_t** out) {
     });
 }
 
-const char* okid_host_csv_json(const okid_host_csv_t* self) { return self->json.c_str(); }
+const char* okid_host_csv_json(const okid_host_csv_t* self) { return self ? self->json.c_str() : nullptr; }
 
 const double* okid_host_csv_samples(const okid_host_csv_t* self, size_t* rows, size_t* columns) {
-    *rows = self->record.count;
-    *columns = self->record.columns.size();
-    return self->record.samples.data();
+    if (rows) *rows = self ? self->record.count : 0;
+    if (columns) *columns = self ? self->record.columns.size() : 0;
+    return self ? self->record.samples.data() : nullptr;
 }
 
 void okid_host_csv_delete(okid_host_csv_t* self) { delete self; }
 
 size_t okid_host_unit_of_name(const char* name, char* unit, size_t size) {
     std::string found;
-    (void)face::guard([&] { found = unit_of_name(name); });
-    if (size > 0) unit[found.copy(unit, size - 1)] = '\0';
+    (void)face::guard([&] {
+        face::given(name);
+        found = unit_of_name(name);
+    });
+    if (size > 0 && unit) unit[found.copy(unit, size - 1)] = '\0';
     return found.size();
 }
 
 int32_t okid_host_unit(const char* unit, double* factor, const char** si) {
     const unit_rule* rule = nullptr;
-    (void)face::guard([&] { rule = find_unit(unit); });
+    (void)face::guard([&] {
+        face::given(unit);
+        rule = find_unit(unit);
+    });
     if (!rule) return 0;
-    *factor = rule->factor;
-    *si = rule->si;
+    if (factor) *factor = rule->factor;
+    if (si) *si = rule->si;
     return 1;
 }

@@ -13,8 +13,9 @@
 using namespace okid_host;
 
 int32_t okid_host_config_load(const char* path, const char* text, okid_host_config_t** out) {
-    *out = nullptr;
+    if (out) *out = nullptr;
     return face::guard([&] {
+        face::given(out, path);
         auto made = std::make_unique<okid_host_config>();
         made->config = text ? load_config_text(path, text) : load_config(path);
         made->json = config_json(made->config).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
@@ -22,6 +23,6 @@ int32_t okid_host_config_load(const char* path, const char* text, okid_host_conf
     });
 }
 
-const char* okid_host_config_json(const okid_host_config_t* self) { return self->json.c_str(); }
+const char* okid_host_config_json(const okid_host_config_t* self) { return self ? self->json.c_str() : nullptr; }
 
 void okid_host_config_delete(okid_host_config_t* self) { delete self; }

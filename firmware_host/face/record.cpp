@@ -153,6 +153,8 @@ void add_sides(const okid_host_columns_t& u, const okid_host_columns_t& y, std::
     if (u.channels != set.n_u || y.channels != set.n_y)
         throw failure(exit_usage, fmt::format("{}: {} inputs and {} outputs, expected {} and {}", name, u.channels,
                                               y.channels, set.n_u, set.n_y));
+    for (const auto* side : {&u, &y})
+        if (count > 0 && side->channels > 0) given(static_cast<const char*>(side->data));
     const bool first = set.records.size() < 2;
     set.complete = append_rows(u, y, count, set) && (first || set.complete);
     if (set.complete) return;
@@ -169,6 +171,7 @@ std::vector<set_up> read_set_ups(const std::vector<std::string>& names, int32_t 
     std::size_t at = 0;
     for (int32_t i = 0; i < count; ++i) {
         set_up one;
+        given(paths[i]);
         for (std::size_t k = 0; k < outputs[i].channels; ++k, ++at)
             one.outputs.push_back(at < names.size() ? names[at] : std::string());
         one.set.n_u = inputs[i].channels;
@@ -194,7 +197,7 @@ okid_host_result_t* identify(const char* options, int32_t records, const size_t*
     set.n_u = wanted.inputs.size();
     set.n_y = wanted.outputs.size();
     std::size_t total = 0;
-    for (int32_t i = 0; i < records; ++i) total += counts[i];
+    for (int32_t i = 0; i < records; ++i) given(names[i]), total += counts[i];
     set.samples.reserve(total * set.channels());
     std::vector<std::string> columns = wanted.inputs;
     columns.insert(columns.end(), wanted.outputs.begin(), wanted.outputs.end());
@@ -216,9 +219,12 @@ using namespace okid_host;
 int32_t okid_host_identify(const char* options, int32_t records, const double* const* samples, const size_t* counts,
                            const char* const* names, okid_host_stage_t stage, void* context,
                            okid_host_result_t** result) {
-    *result = nullptr;
+    if (result) *result = nullptr;
     return face::guard([&] {
+        face::given(result, options);
+        face::given_where(records > 0, samples, counts, names);
         *result = face::identify(options, records, counts, names, stage, context, [&](int32_t i, record_set& set) {
+            face::given_where(counts[i] > 0, samples[i]);
             set.samples.insert(set.samples.end(), samples[i], samples[i] + counts[i] * set.channels());
         });
     });
@@ -227,8 +233,10 @@ int32_t okid_host_identify(const char* options, int32_t records, const double* c
 int32_t okid_host_identify_columns(const char* options, int32_t records, const okid_host_columns_t* inputs,
                                    const okid_host_columns_t* outputs, const size_t* counts, const char* const* names,
                                    okid_host_stage_t stage, void* context, okid_host_result_t** result) {
-    *result = nullptr;
+    if (result) *result = nullptr;
     return face::guard([&] {
+        face::given(result, options);
+        face::given_where(records > 0, inputs, outputs, counts, names);
         *result = face::identify(options, records, counts, names, stage, context, [&](int32_t i, record_set& set) {
             face::add_sides(inputs[i], outputs[i], counts[i], names[i], records > 1 ? fmt::format("[{}]", i) : "", set);
         });
@@ -238,8 +246,10 @@ int32_t okid_host_identify_columns(const char* options, int32_t records, const o
 int32_t okid_host_identify_set_ups(const char* options, int32_t count, const okid_host_columns_t* inputs,
                                    const okid_host_columns_t* outputs, const size_t* counts, const char* const* names,
                                    okid_host_result_t** result) {
-    *result = nullptr;
+    if (result) *result = nullptr;
     return face::guard([&] {
+        face::given(result, options);
+        face::given_where(count > 0, inputs, outputs, counts, names);
         face::asked given = face::read_record(options);
         auto set_ups = face::read_set_ups(given.request.outputs, count, inputs, outputs, counts, names);
         std::vector<std::string> all;

@@ -21,8 +21,10 @@ using namespace okid_host;
 
 int32_t okid_host_identify_responses(const char* options, size_t lines, const double* frequency_hz,
                                      const double* response, okid_host_result_t** result) {
-    *result = nullptr;
+    if (result) *result = nullptr;
     return face::guard([&] {
+        face::given(result, options);
+        face::given_where(lines > 0, frequency_hz, response);
         response_request asked;
         record_request& wanted = asked.wanted;
         std::string set_ups;
@@ -49,9 +51,12 @@ int32_t okid_host_identify_responses(const char* options, size_t lines, const do
 }
 
 int32_t okid_host_responses_read(const char* const* paths, int32_t count, okid_host_responses_t** out) {
-    *out = nullptr;
+    if (out) *out = nullptr;
     return face::guard([&] {
+        face::given(out);
+        face::given_where(count > 0, paths);
         auto made = std::make_unique<okid_host_responses_t>();
+        for (int32_t i = 0; i < count; ++i) face::given(paths[i]);
         made->set = read_set_ups(std::vector<std::string>(paths, paths + count));
         for (Eigen::Index l = 0; l < made->set.lines(); ++l)
             for (Eigen::Index c = 0; c < made->set.H.cols(); ++c) made->values.push_back(made->set.H(l, c));
@@ -62,13 +67,13 @@ int32_t okid_host_responses_read(const char* const* paths, int32_t count, okid_h
     });
 }
 
-const char* okid_host_responses_json(const okid_host_responses_t* self) { return self->json.c_str(); }
+const char* okid_host_responses_json(const okid_host_responses_t* self) { return self ? self->json.c_str() : nullptr; }
 
 size_t okid_host_responses_data(const okid_host_responses_t* self, const double** frequency_hz,
                                 const double** response) {
-    *frequency_hz = self->set.frequency_hz.data();
-    *response = reinterpret_cast<const double*>(self->values.data());
-    return self->set.frequency_hz.size();
+    if (frequency_hz) *frequency_hz = self ? self->set.frequency_hz.data() : nullptr;
+    if (response) *response = self ? reinterpret_cast<const double*>(self->values.data()) : nullptr;
+    return self ? self->set.frequency_hz.size() : 0;
 }
 
 void okid_host_responses_delete(okid_host_responses_t* self) { delete self; }

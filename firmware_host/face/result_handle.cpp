@@ -152,19 +152,19 @@ okid_host_result_t* make_result(const okid_identified_t& model, result_context c
 using namespace okid_host;
 
 const char* okid_host_result_json(okid_host_result_t* self) {
-    return face::made_once(self->json, [&] { return face::text_of(*self, true); });
+    return !self ? nullptr : face::made_once(self->json, [&] { return face::text_of(*self, true); });
 }
 
 const char* okid_host_result_summary(okid_host_result_t* self) {
-    return face::made_once(self->summary, [&] { return face::text_of(*self, false); });
+    return !self ? nullptr : face::made_once(self->summary, [&] { return face::text_of(*self, false); });
 }
 
 const char* okid_host_result_brief(okid_host_result_t* self) {
-    return face::made_once(self->brief, [&] { return face::brief_of(*self); });
+    return !self ? nullptr : face::made_once(self->brief, [&] { return face::brief_of(*self); });
 }
 
 const char* okid_host_result_table(okid_host_result_t* self) {
-    return face::made_once(self->table, [&] {
+    return !self ? nullptr : face::made_once(self->table, [&] {
         finish_fits(self->found);
         return face::argument_words(result_table(self->found.model.view(), self->found.context));
     });
@@ -173,6 +173,7 @@ const char* okid_host_result_table(okid_host_result_t* self) {
 int32_t okid_host_result_array(okid_host_result_t* self, const char* name, okid_host_array_t* out) {
     int32_t there = 0;
     (void)face::guard([&] {
+        face::given(self, name, out);
         if (std::strncmp(name, "fit.", 4) == 0) finish_fits(self->found);
         for (const auto& one : face::arrays_of(*self))
             if (std::strcmp(one.name, name) == 0 && one.array.data != nullptr) *out = one.array, there = 1;
@@ -181,6 +182,8 @@ int32_t okid_host_result_array(okid_host_result_t* self, const char* name, okid_
 }
 
 int32_t okid_host_result_decomposition(okid_host_result_t* self, okid_host_decomposition_t* out) {
+    if (out) *out = {};
+    if (!self || !out) return 0;
     *out = {self->found.identifier, &self->found.config, &self->found.realised};
     return self->found.identifier ? 1 : 0;
 }

@@ -12,6 +12,7 @@
 
 #include <okid_host/stream.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -272,34 +273,43 @@ okid_host_result_t* result_of(stream& from, result_context about) {
 using namespace okid_host;
 
 int32_t okid_host_stream_create(const char* options, const okid_host_config_t* config, okid_host_stream_t** out) {
-    *out = nullptr;
+    if (out) *out = nullptr;
     return face::guard([&] {
+        face::given(out, options);
         const stream_config wanted = face::read_stream(options, config ? &config->config : nullptr);
         *out = new okid_host_stream(wanted, face::stream_json(wanted));
     });
 }
 
-const char* okid_host_stream_json(const okid_host_stream_t* self) { return self->json.c_str(); }
+const char* okid_host_stream_json(const okid_host_stream_t* self) { return self ? self->json.c_str() : nullptr; }
 
 int32_t okid_host_stream_add(okid_host_stream_t* self, int32_t kind, const void* rows, size_t count) {
     okid_status_t status = OKID_OK;
-    const int code = face::guard([&] { status = face::add_rows(self->stream.sums(), kind, rows, count); });
+    const int code = face::guard([&] {
+        face::given(self);
+        face::given_where(count > 0, rows);
+        status = face::add_rows(self->stream.sums(), kind, rows, count);
+    });
     return code == 0 ? status : -code;
 }
 
 int32_t okid_host_stream_gap(okid_host_stream_t* self, int64_t count) {
     return face::guard([&] {
-        const std::int64_t most = OKID_MOST_SAMPLES - self->now();
+        face::given(self);
+        const std::int64_t most = std::max<std::int64_t>(OKID_MOST_SAMPLES - self->now(), 0);
         if (count < 0 || count > most)
             throw failure(exit_usage, fmt::format("count: found {}, expected 0 to {}", count, most));
         self->stream.sums().add_missing(count);
     });
 }
 
-void okid_host_stream_reset(okid_host_stream_t* self) { self->stream.reset(); }
+void okid_host_stream_reset(okid_host_stream_t* self) {
+    if (self) self->stream.reset();
+}
 
 int32_t okid_host_stream_stats(okid_host_stream_t* self, okid_host_stream_counts_t* out) {
     return face::guard([&] {
+        face::given(self, out);
         identifier& sums = self->stream.sums();
         const okid_accumulator_stats_t counts = sums.stats();
         *out = {counts.samples, counts.missing, counts.gaps,     counts.saturated,
@@ -309,8 +319,9 @@ int32_t okid_host_stream_stats(okid_host_stream_t* self, okid_host_stream_counts
 }
 
 int32_t okid_host_stream_update(okid_host_stream_t* self, okid_host_result_t** result) {
-    *result = nullptr;
+    if (result) *result = nullptr;
     return face::guard([&] {
+        face::given(result, self);
         stream_update found = self->stream.update(self->now());
         if (!found.tracks) return;
         result_context about = self->stream.context();
@@ -320,8 +331,9 @@ int32_t okid_host_stream_update(okid_host_stream_t* self, okid_host_result_t** r
 }
 
 int32_t okid_host_stream_identify(okid_host_stream_t* self, okid_host_result_t** result) {
-    *result = nullptr;
+    if (result) *result = nullptr;
     return face::guard([&] {
+        face::given(result, self);
         stream& from = self->stream;
         from.identify();
         result_context about = from.context();
@@ -334,6 +346,7 @@ int32_t okid_host_stream_identify(okid_host_stream_t* self, okid_host_result_t**
 
 int32_t okid_host_stream_state(okid_host_stream_t* self, const void** state, size_t* bytes) {
     return face::guard([&] {
+        face::given(self, state, bytes);
         self->state = self->stream.state();
         *state = self->state.data();
         *bytes = self->state.size();
@@ -341,11 +354,19 @@ int32_t okid_host_stream_state(okid_host_stream_t* self, const void** state, siz
 }
 
 int32_t okid_host_stream_restore(okid_host_stream_t* self, const void* state, size_t bytes) {
-    return face::guard([&] { self->stream.restore(state, bytes); });
+    return face::guard([&] {
+        face::given(self);
+        face::given_where(bytes > 0, state);
+        self->stream.restore(state, bytes);
+    });
 }
 
 int32_t okid_host_stream_merge(okid_host_stream_t* self, const void* state, size_t bytes) {
-    return face::guard([&] { self->stream.merge(state, bytes); });
+    return face::guard([&] {
+        face::given(self);
+        face::given_where(bytes > 0, state);
+        self->stream.merge(state, bytes);
+    });
 }
 
 void okid_host_stream_delete(okid_host_stream_t* self) { delete self; }

@@ -16,20 +16,26 @@ struct okid_host_virtual {
 using namespace okid_host;
 
 int32_t okid_host_virtual_create(const char* json, okid_host_virtual_t** out) {
-    *out = nullptr;
+    if (out) *out = nullptr;
     return face::guard([&] {
+        face::given(out, json);
         const auto about = nlohmann::json::parse(json, nullptr, false);
         *out = new okid_host_virtual{virtual_filter(virtual_model_of(about)), {}};
     });
 }
 
 int32_t okid_host_virtual_copy(const okid_host_virtual_t* self, okid_host_virtual_t** out) {
-    *out = nullptr;
-    return face::guard([&] { *out = new okid_host_virtual{self->filter, {}}; });
+    if (out) *out = nullptr;
+    return face::guard([&] {
+        face::given(out, self);
+        *out = new okid_host_virtual{self->filter, {}};
+    });
 }
 
 int32_t okid_host_virtual_learn(okid_host_virtual_t* self, size_t count, const double* rows) {
     return face::guard([&] {
+        face::given(self);
+        face::given_where(count > 0, rows);
         virtual_filter learnt = self->filter;
         learnt.learn(count, rows);
         self->filter = std::move(learnt);
@@ -39,6 +45,8 @@ int32_t okid_host_virtual_learn(okid_host_virtual_t* self, size_t count, const d
 int32_t okid_host_virtual_run(okid_host_virtual_t* self, size_t count, const double* rows, double* y, double* y_std,
                               double* force, double* force_std) {
     return face::guard([&] {
+        face::given(self);
+        face::given_where(count > 0, rows, y, y_std, force, force_std);
         const virtual_model& model = self->filter.model();
         const auto width = static_cast<std::size_t>(model.n_u() + model.n_y());
         for (std::size_t k = 0; k < count; ++k) {
@@ -50,9 +58,12 @@ int32_t okid_host_virtual_run(okid_host_virtual_t* self, size_t count, const dou
     });
 }
 
-void okid_host_virtual_reset(okid_host_virtual_t* self) { self->filter.reset(); }
+void okid_host_virtual_reset(okid_host_virtual_t* self) {
+    if (self) self->filter.reset();
+}
 
 const char* okid_host_virtual_json(okid_host_virtual_t* self) {
+    if (!self) return nullptr;
     self->json =
         virtual_model_json(self->filter.model()).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
     return self->json.c_str();

@@ -50,4 +50,10 @@ std::string shown(std::string_view text) {
     return out;
 }
 
+std::string one_line(std::string_view text) {
+    std::string out = shown(text);
+    for (std::size_t at = 0; (at = out.find('\n', at)) != std::string::npos; at += 2) out.replace(at, 1, "\\n");
+    return out;
+}
+
 } // namespace okid_host

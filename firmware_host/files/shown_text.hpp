@@ -11,4 +11,7 @@ namespace okid_host {
 /// New lines and tabs stay.
 std::string shown(std::string_view text);
 
+/// New lines are written as \n too: the name of a file makes no second message.
+std::string one_line(std::string_view text);
+
 } // namespace okid_host

@@ -6,6 +6,7 @@
 //          B and D by output error, the gain of its innovations
 #include "identify_lags.hpp"
 
+#include "consensus/lines.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "lag_responses.hpp"
@@ -15,6 +16,7 @@
 #include "record/modal_model.hpp"
 #include "record/record_check.hpp"
 #include "record/record_fit.hpp"
+#include "record/record_rest.hpp"
 #include "record/roving.hpp"
 #include "response_modes.hpp"
 #include "result/method.hpp"
@@ -229,6 +231,43 @@ void find_deviations(lag_work& work, std::size_t lags, response_modes& found) {
     if (all.size() > 1) put_spread(all, (n - 1) / n, found);
 }
 
+/// The modes that are lines of machines in this set-up, by the rule of the default; their codes.
+std::vector<consensus_mode> lines_in(const lag_work& work, const set_up& one, const response_modes& found) {
+    const record_set& set = one.set;
+    std::vector<sample_rows> rows;
+    bool at_rest = struck(work);
+    for (const record_data& record : set.records) {
+        rows.emplace_back(set.rows(record), set.rows(record) + record.count * set.channels());
+        at_rest = at_rest && begins_at_rest(set, record);
+    }
+    std::vector<double> scale;
+    const auto levels = make_levels(std::move(rows), set.n_u, set.n_y, work.options.fs_hz, at_rest, 1, scale);
+    std::vector<consensus_mode> out = found.modes;
+    for (std::size_t k = 0; k < out.size(); ++k) {
+        out[k].why.clear();
+        out[k].shape.assign(set.n_y, 0);
+        for (std::size_t o = 0; o < set.n_y; ++o) {
+            const auto place = static_cast<std::size_t>(place_in(work.options.outputs, one.outputs[o]));
+            const std::complex<double> entry = found.shapes[k].shape[place] / scale[set.n_u + o];
+            if (std::isfinite(entry.real()) && std::isfinite(entry.imag())) out[k].shape[o] = entry;
+        }
+    }
+    mark_lines(levels, set.n_u, set.n_y, at_rest, out);
+    return out;
+}
+
+/// A line in every set-up is no mode, unless it was picked by hand.
+void mark_lines_of_machines(const lag_work& work, response_modes& found) {
+    if (!work.options.modes.empty()) return;
+    std::vector<std::size_t> times(found.modes.size());
+    for (const set_up& one : work.set_ups) {
+        const auto here = lines_in(work, one, found);
+        for (std::size_t k = 0; k < here.size(); ++k)
+            if (!here[k].why.empty() && ++times[k] == work.set_ups.size() && found.modes[k].confident())
+                found.modes[k].why.push_back(here[k].why.front());
+    }
+}
+
 /// The window makes noise look like modes of its own decay; without a part of the sums they lie elsewhere.
 void mark_unsteady(const lag_work& work, response_modes& found) {
     const double top = work.joint.sets.front().frequency_hz.back();
@@ -330,6 +369,7 @@ record_result identify_set_ups_together(std::vector<set_up> set_ups, const recor
     if (options.stage) options.stage("leaving out one part after the other");
     find_deviations(work, lags, found);
     take_window_out(work.constant_s, found);
+    mark_lines_of_machines(work, found);
     mark_unsteady(work, found);
     to.context.band_hz = {work.joint.sets.front().frequency_hz.front(), work.joint.sets.front().frequency_hz.back()};
     make_model(work, found, to);

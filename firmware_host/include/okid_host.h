@@ -12,6 +12,9 @@
  * 4 device, memory or disk. okid_host_error() then gives the sentence the program would print. Nothing is changed by a call
  * that fails, unless its description says so. No exception leaves the library.
  *
+ * NULL where a pointer is expected is an error and never a fault: 2, or NULL or 0 from what gives no such code. Arrays of no
+ * elements may be NULL.
+ *
  * Objects are opaque handles: made by ..._create() or handed out by a call, ended by ..._delete(), which takes NULL too.
  * Memory: the library's own (malloc); arrays that go in are read during the call only; pointers that come out belong to the
  * object they were asked of and stay valid until that object is changed or deleted.

@@ -14,7 +14,7 @@ const char* okid_status_text(okid_status_t status) {
     case OKID_ERR_DIM: return "a size is outside its range";
     case OKID_ERR_MEMORY: return "the memory block is too small";
     case OKID_ERR_MISMATCH: return "the objects do not fit each other";
-    case OKID_ERR_RANGE: return "an exact sum would leave its range";
+    case OKID_ERR_RANGE: return "a sum or a count would leave its range";
     case OKID_ERR_TOO_SHORT: return "fewer usable samples than unknowns";
     case OKID_ERR_INPUT: return "an input is constant";
     case OKID_ERR_OUTPUT: return "an output is constant";

@@ -40,7 +40,7 @@ def test_the_reading_of_help_finds_what_a_person_finds() -> None:
     names = {name for option in options_of("okid identify") for name in option.names}
     assert {"records", "--inputs", "--sigma-blocks", "--model"} <= names and len(names) >= 22
     for command in commands():
-        told = set(re.findall(r"(?m)^ {2}(?:-\w, ?)?(--[\w-]+)", help_text(command))) - {"--help"}
+        told = set(re.findall(r"(?m)^ {2}(?:-\w(?: [\w.]+)?, ?)?(--[\w-]+)", help_text(command))) - {"--help"}
         assert told == {name for option in options_of(command) for name in option.names if name.startswith("--")}
 
 

@@ -117,7 +117,7 @@ def test_sqlite_views_and_programs(tmp_path: Path) -> None:
     path = tmp_path / "x.db"
     refused(base(path, ENDLESS), tmp_path / "x.log", "messages is a view")
     generated = TABLE + "dlc INTEGER, data BLOB AS (zeroblob(900000000)))"
-    refused(base(path, generated), tmp_path / "x.log", "messages has the columns")
+    refused(base(path, generated), tmp_path / "x.log", "of messages is computed")
     refused(base(path, "CREATE VIRTUAL TABLE messages USING fts5(ts)"), tmp_path / "x.log", "of something else")
     refused(base(path, "CREATE TABLE other (a)"), tmp_path / "x.log", "no table messages")
 

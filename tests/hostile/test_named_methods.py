@@ -44,3 +44,16 @@ def test_a_named_method_says_that_it_does_not_judge() -> None:
     assert live.to_dict()["judged_by"] == "emac" and words in str(live.table())
     auto = okid.identify(u[:6000], y[:6000], fs=1000.0)
     assert auto.to_dict()["judged_by"] == "agreement" and words not in str(auto.table())
+
+
+def test_a_machine_is_no_mode_of_plscf() -> None:
+    """It gave seven confident modes of a square wave, and one of a sine, judged by "agreement"."""
+    time = np.arange(6000) / FS
+    wave = np.sin(2 * np.pi * 3.1 * time)
+    for y in (wave[:, None] + 0.01 * NOISE[:, :1], np.sign(wave)[:, None] * [1.0, 0.5] + 0.01 * NOISE[:, :2]):
+        try:
+            found = okid.identify(None, y, fs=FS, method="plscf").confident_modes
+        except okid.IdentificationError as told:
+            assert "(tone" in str(told)
+            continue
+        assert [mode.frequency_hz for mode in found if mode.frequency_hz < 40] == []  # multiples above are folded

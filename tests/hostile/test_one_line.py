@@ -22,6 +22,7 @@ from okid.campaign.record_list import list_records
 from okid.campaign.spec import load_spec
 from okid.campaign.sums_file import HEAD, GroupSums
 from okid.data.input_file import parse_json, parse_toml
+from okid.formats import read_geometry
 from okid.report.command import main as report
 from program import PROGRAM
 
@@ -100,6 +101,13 @@ def test_the_track_of_a_mode(
 def test_numbers_of_5000_digits_in_toml(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ValueError, match="."):
         parse_toml(f"a = {DIGITS}")
+    for number in ("0x" + "f" * 1000, "9" * 400, str(2**63), str(-(2**63) - 1)):  # tomllib takes them
+        with pytest.raises(ValueError, match="64 bits"):
+            parse_toml(f"a = [{{b = {number}}}]")
+        (tmp_path / "g.toml").write_text(f"[geometry]\nnodes = [[0, 0, {number}]]\ndofs = [[1, 'x']]\n")
+        with pytest.raises(InputError, match="64 bits"):
+            read_geometry(tmp_path / "g.toml")
+    assert parse_toml(f"a = {2**63 - 1}\nb = {-(2**63)}")["b"] == -(2**63)
     (tmp_path / "c.toml").write_text(CONFIG + f"[identification]\np = {DIGITS}\n")
     one_line(measured("check", tmp_path / "c.toml", within_s=60), "c.toml: line 13")
     (tmp_path / "SPEC.toml").write_text(SPEC.format(more="") + f"band_c = {DIGITS}\n")
@@ -265,3 +273,61 @@ def test_frequency_responses_of_one_part(tmp_path: Path, part: str) -> None:
     (tmp_path / "x.csv").write_text(f'frequency_hz,"a/f:{part}"\n' + rows)
     done = measured("identify", "--frf", tmp_path / "x.csv", within_s=120)
     one_line(done, "a/f has not both of its two parts", "OUT/IN:re and OUT/IN:im")
+
+
+@pytest.mark.parametrize("picks", [["x"], [10**400], [None], 5, {"a": 1}, Path("a\0.json"), "a\0.json", object()])
+def test_picks_that_are_none(picks: Any) -> None:
+    u, y = okid.demo_record()
+    with pytest.raises(InputError, match="^picks is "):
+        okid.identify(u, y, fs=1000.0, picks=picks)
+
+
+def test_halves_of_letters_in_options() -> None:
+    u, y = okid.demo_record()
+    for option in ({"method": "\ud800"}, {"input_names": ["\udfff"]}, {"picks": "\ud800.json"}):
+        with pytest.raises(InputError, match="half of a letter"):
+            okid.identify(u, y, fs=1000.0, **option)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="half of a letter"):
+        okid.Session(1, 1, fs=100.0, method="\ud800")
+    assert okid.Session(["\U0001f600"], ["\\ud800"], fs=100.0).inputs == ["\U0001f600"]
+
+
+def test_a_result_of_very_many_modes(tmp_path: Path, good: dict[str, Any]) -> None:
+    """The work grows with the cube of their number."""
+    (tmp_path / "a.json").write_text(json.dumps(good))
+    (tmp_path / "b.json").write_text(json.dumps({**good, "modes": good["modes"][:1] * 5001}))
+    for command in (("compare",), ("merge", "--json", tmp_path / "m.json")):
+        one_line(
+            measured(*command, tmp_path / "a.json", tmp_path / "b.json", within_s=1800),
+            "found 5001, expected at most 5000",
+        )
+
+
+POLES = dict.fromkeys(("run", "order", "frequency_hz", "damping_ratio", "mpc", "mode"), [0])
+WRONG_AGREEMENTS: list[Any] = [
+    [], {}, "x", {"runs": 3, "poles": {}}, {"runs": [{}], "poles": POLES},
+    {"runs": [], "poles": POLES}, {"runs": [{"method": "a", "fs_hz": 1, "rows": 1}], "poles": {**POLES, "mpc": [1, 2]}},
+    {"runs": [{"method": "a", "fs_hz": 1, "rows": 1}], "poles": {**POLES, "frequency_hz": ["</script>"]}},
+    {"runs": [{"method": "a", "fs_hz": 1, "rows": 1}], "poles": {**POLES, "run": [0.5]}},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("value", WRONG_AGREEMENTS)
+def test_poles_of_a_result(
+    tmp_path: Path, good: dict[str, Any], value: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "r.json").write_text(json.dumps({**good, "agreement": value}))
+    assert report([str(tmp_path / "r.json"), "--out", str(tmp_path / "r.html")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "agreement" in said, said
+
+
+@pytest.mark.parametrize("far", [1e300, -5e9])
+def test_nodes_beyond_the_moon(tmp_path: Path, far: float) -> None:
+    (tmp_path / "g.csv").write_text(f"node,1,0,0,0\nnode,2,0,{far},0\nsensor,a,1,z\n")
+    (tmp_path / "g.toml").write_text(f'[geometry]\nnodes = [[0, 0, 0], [0, {far}, 0]]\ndofs = [[1, "x"]]\n')
+    numbers = "".join(f"{k:>10}{0:>10}{0:>10}{11:>10}{x:>13}{0.0:>13}{0.0:>13}\n" for k, x in ((1, 0.0), (2, far)))
+    (tmp_path / "g.uff").write_text(f"    -1\n    15\n{numbers}    -1\n")
+    for name in ("g.csv", "g.toml", "g.uff"):
+        with pytest.raises(InputError, match=f"{name}: node 2 is at .* expected coordinates of at most 1e"):
+            read_geometry(tmp_path / name)

@@ -11,7 +11,9 @@ import pytest
 from okid import InputError
 from okid.data.whole_file import safe_part, whole_file
 from okid.formats.mcap_file import write_live_mcap
+from okid.report.svg import Pictures
 from okid.report.targets import write_whole
+from okid.result.figures import figure
 from program import okid
 
 CONFIG = """rate_hz = 100.0
@@ -44,6 +46,19 @@ def test_names_that_could_be_guessed(victim: pathlib.Path, tmp_path: pathlib.Pat
     with whole_file(folder / "report.html") as part:
         part.write_text("page")
     assert victim.read_text() == "mine" and (folder / "report.html").read_text() == "page"
+
+
+def test_figures_are_not_written_through_links(victim: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    folder = tmp_path / "open"
+    for ending in ("svg", "csv", "png"):
+        (folder / f"01-a-line.{ending}").symlink_to(victim)
+    drawing = figure(2.0, 1.0)
+    drawing.add_subplot().plot([1, 2], [3, 4])
+    Pictures(folder).inline(drawing, "a line")
+    assert victim.read_text() == "mine"
+    assert {path.name: path.is_symlink() for path in folder.iterdir()} == {
+        f"01-a-line.{ending}": False for ending in ("svg", "csv", "png")
+    }
 
 
 def test_a_link_of_the_name_itself_is_replaced(victim: pathlib.Path, tmp_path: pathlib.Path) -> None:

@@ -4,6 +4,7 @@ took 100 of 100 flipped bits, and gave 500 Hz as 1000."""
 
 from __future__ import annotations
 
+import contextlib
 import re
 import struct
 import zlib
@@ -120,3 +121,43 @@ def test_forged_samples() -> None:
     refused(one, head(ABOUT, mark + struct.pack("<4q", 1, 1, 0, 0)), "is of 1 inputs and 1 outputs")
     refused(one, head(ABOUT, mark + struct.pack("<6q", 1, 2, 2, 1, 2, 1) + bytes(24)), "not in order")
     refused(one, head(ABOUT.replace(b"500.0", b"1e999")), "head cannot be read|of a stream of inf")
+
+
+@pytest.mark.parametrize("kind", [okid.Accumulator, okid.SquareRoot])
+def test_counts_do_not_leave_their_range_by_merging(kind: Any) -> None:
+    """Release 0.2: -9223372036854775808 missing samples."""
+    one, two = kind(1, 2, 5), kind(1, 2, 5)
+    for sums in (one, two):
+        sums.add(ROWS)
+        sums.gap(2**62)
+    before = one.stats
+    with pytest.raises(okid.InputError, match="would leave its range"):
+        one.merge(two)
+    assert one.stats == before
+    one.add(ROWS)  # the clock is beyond the end: a gap has no room, and takes nothing back
+    one.gap(3)
+    assert one.stats.missing == before.missing and one.stats.samples == 2 * len(ROWS)
+    three = kind(1, 2, 5)
+    for _ in range(200):  # doubles each time
+        three.add(ROWS)
+        four = kind(1, 2, 5)
+        four.merge(three)
+        try:
+            three.merge(four)
+        except okid.InputError:
+            break
+    assert 2**61 <= three.stats.samples <= 2**62 and 0 < three.rows <= three.stats.samples
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_counts_of_streams(kind: dict[str, Any]) -> None:
+    one, two = fed(kind), fed(kind)
+    for stream in (one, two):
+        stream.gap(2**62 - 100)
+    before, after = one.stats, None
+    with contextlib.suppress(okid.InputError):
+        one.merge(two.to_bytes())
+        after = one.stats
+    assert one.stats == before if after is None else min(after) >= 0 and after.samples == 2 * len(ROWS)
+    with pytest.raises(okid.InputError, match=r"count: found 5000, expected 0 to \d+$"):
+        one.gap(5000)

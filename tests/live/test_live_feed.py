@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 from okid._errors import InputError
+from okid.data.line_splitter import LineSplitter
 from okid.live.config import read_config
-from okid.live.feed import LineSplitter
 from okid.live.hub import Outbox
 from okid.live.session import Session
 from okid_feed import WHOLE, OkidFeed, channel, modes, samples, start

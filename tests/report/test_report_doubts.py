@@ -188,3 +188,12 @@ def test_damaged_values_are_named(whole: dict[str, Any], key: str, value: Any, w
     assert str(told.value).startswith(f"r.json: {words}")
     assert "\n" not in str(told.value)
     assert len(report.loaded_from(whole, "r.json").shapes) == len(whole["modes"])
+
+
+def test_matrices_that_are_not_determined_are_said_so(whole: dict[str, Any]) -> None:
+    """As `okid identify` writes them with the warning mkr_undetermined: every number is null."""
+    raw = json.loads(json.dumps(whole))
+    for name in ("M", "K", "R", "R_normal_modes"):
+        raw["mkr"][name] = raw["mkr"][f"{name}_std"] = [[None] * 3] * 3
+    raw["pdc"]["R"] = [[None] * 3] * 3
+    assert report.build(report.loaded_from(raw, "r.json")).count("Not determined") == 5

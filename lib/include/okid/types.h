@@ -55,7 +55,7 @@ typedef enum okid_status_t {
     OKID_ERR_DIM = -2,        ///< a size is outside its documented range
     OKID_ERR_MEMORY = -3,     ///< the caller's block is smaller than X_memsize()
     OKID_ERR_MISMATCH = -4,   ///< two objects, or an object and a call, do not fit each other
-    OKID_ERR_RANGE = -5,      ///< an exact sum would leave its proven range
+    OKID_ERR_RANGE = -5,      ///< a sum or count would leave its range
     OKID_ERR_TOO_SHORT = -6,  ///< fewer usable rows than unknowns
     OKID_ERR_INPUT = -7,      ///< an input is constant: it excites nothing
     OKID_ERR_OUTPUT = -8,     ///< an output is constant: it measures nothing

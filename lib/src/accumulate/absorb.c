@@ -197,7 +197,7 @@ void okid_accumulator_settle(okid_accumulator_t* self) {
 
 void okid_accumulator_gap(okid_accumulator_t* self, int64_t count) {
     if (!self || count < 0) return;
-    if (count > OKID_MOST_SAMPLES - self->clock) count = OKID_MOST_SAMPLES - self->clock;
+    count = gap_within(count, self->clock);
     if (self->have > 0 || self->in_gap == 0) {
         okid_accumulator_close_slot(self, 0);
         self->have = 0;

@@ -200,7 +200,7 @@ static void close_slot(okid_correlation_t* s) {
 
 void okid_correlation_gap(okid_correlation_t* self, int64_t count) {
     if (!self || count < 0) return;
-    if (count > OKID_MOST_SAMPLES - self->clock) count = OKID_MOST_SAMPLES - self->clock;
+    count = gap_within(count, self->clock);
     if (self->have > 0 || !self->in_gap) {
         close_slot(self);
         self->have = 0;
@@ -313,7 +313,8 @@ okid_status_t okid_correlation_merge(okid_correlation_t* self, okid_correlation_
     okid_correlation_settle(other);
     okid_correlation_settle(self);
     const int32_t own = cor_pieces(self), theirs = cor_pieces(other);
-    if (own + theirs > self->ring || !counts_fit(&self->stats, &other->stats, row_limit(a->sample)))
+    if (own + theirs > self->ring ||
+        !counts_fit(&self->stats, &other->stats, row_limit(a->sample), self->clock, other->clock))
         return OKID_ERR_RANGE;
     okid_correlation_gap(self, 0);
     for (int32_t k = 0; k < theirs; ++k) {

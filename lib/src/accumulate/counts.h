@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE    how far counts may grow: what a kernel absorbs, and what two of them merge to
+// PURPOSE    how far counts may grow: what a kernel absorbs, and what two of them merge to, whatever a state from a file says
 #ifndef OKID_COUNTS_H
 #define OKID_COUNTS_H
 
@@ -15,10 +15,19 @@ static inline int64_t row_limit(okid_sample_t sample) {
     }
 }
 
-/// Do the counts of both, together, stay within `rows` rows and OKID_MOST_SAMPLES samples, the missing ones included?
-static inline int counts_fit(const okid_accumulator_stats_t* a, const okid_accumulator_stats_t* b, int64_t rows) {
-    const int64_t most = OKID_MOST_SAMPLES; // each of the four is at most this, so that no difference overflows
-    return a->rows <= rows - b->rows && a->samples <= most - b->samples &&
-           a->samples + b->samples <= most - a->missing && a->samples + b->samples + a->missing <= most - b->missing;
+static inline int count_fits(int64_t a, int64_t b) { return a <= OKID_MOST_SAMPLES - b; }
+
+/// Of two that are not negative each: are there at most `rows` rows together, and of all else at most OKID_MOST_SAMPLES?
+static inline int counts_fit(const okid_accumulator_stats_t* a, const okid_accumulator_stats_t* b, int64_t rows,
+                             int64_t clock, int64_t other_clock) {
+    return a->rows <= rows - b->rows && count_fits(a->samples, b->samples) && count_fits(a->missing, b->missing) &&
+           count_fits(a->gaps, b->gaps) && count_fits(a->saturated, b->saturated) &&
+           count_fits(a->dropped, b->dropped) && count_fits(clock, other_clock);
+}
+
+/// Of `count` missing samples those that are still counted.
+static inline int64_t gap_within(int64_t count, int64_t clock) {
+    const int64_t left = clock < OKID_MOST_SAMPLES ? OKID_MOST_SAMPLES - clock : 0;
+    return count < left ? count : left;
 }
 #endif

@@ -209,7 +209,8 @@ okid_status_t okid_accumulator_merge(okid_accumulator_t* self, okid_accumulator_
         return OKID_ERR_MISMATCH;
     const int empty = self->stats.rows == 0 && self->stats.samples == 0;
     if (self->centred != other->centred && !empty && other->stats.rows > 0) return OKID_ERR_MISMATCH;
-    if (!counts_fit(&self->stats, &other->stats, row_limit(a->sample))) return OKID_ERR_RANGE;
+    if (!counts_fit(&self->stats, &other->stats, row_limit(a->sample), self->clock, other->clock))
+        return OKID_ERR_RANGE;
     if (empty) self->centred = other->centred;
     end_run(self);
     add_all(self, other, 1);

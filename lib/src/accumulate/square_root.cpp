@@ -326,7 +326,7 @@ okid_status_t okid_square_root_add_i32(okid_square_root_t* self, const int32_t* 
 
 void okid_square_root_gap(okid_square_root_t* self, int64_t count) {
     if (self == nullptr || count < 0) return;
-    if (count > OKID_MOST_SAMPLES - self->clock) count = OKID_MOST_SAMPLES - self->clock;
+    count = gap_within(count, self->clock);
     if (self->have > 0 || self->in_gap == 0) {
         close_slot(*self);
         self->have = 0;
@@ -344,7 +344,7 @@ okid_status_t okid_square_root_merge(okid_square_root_t* self, okid_square_root_
     if (a.n_u != b.n_u || a.n_y != b.n_y || a.lags != b.lags || self->slot_count != 1 || other->slot_count != 1 ||
         self == other)
         return OKID_ERR_MISMATCH;
-    if (!counts_fit(&self->stats, &other->stats, OKID_MOST_SAMPLES)) return OKID_ERR_RANGE;
+    if (!counts_fit(&self->stats, &other->stats, OKID_MOST_SAMPLES, self->clock, other->clock)) return OKID_ERR_RANGE;
     close_slot(*self);
     self->have = 0;
     self->in_gap = 1;

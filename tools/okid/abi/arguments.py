@@ -46,10 +46,14 @@ def whole(name: str, value: object, smallest: int, largest: int | None = None) -
 
 def positive(name: str, value: object, what: str) -> float:
     """A finite number > 0; `what` it is: "a sample rate in Hz"."""
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not number or not math.isfinite(float(value)) or not float(value) > 0.0:  # type: ignore[arg-type]
-        raise InputError(f"{name} is {value!r}, expected {what} > 0")
-    return float(value)  # type: ignore[arg-type]
+    known = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    try:
+        number = float(value) if known else math.nan  # type: ignore[arg-type]
+    except (OverflowError, TypeError):  # a whole number of hundreds of digits; complex
+        number = math.nan
+    if not 0.0 < number < math.inf:
+        raise InputError(f"{name} is {value!r:.80}, expected {what} > 0")
+    return number
 
 
 def names(given: Sequence[str] | None, letter: str, count: int) -> list[str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from okid._errors import Error, IdentificationError, InputError
+from okid._errors import Error, IdentificationError, InputError, complain, say
 from okid.campaign.grouping import group_records
 from okid.campaign.pieces import make_identifier
 from okid.campaign.record_list import list_records
@@ -30,7 +30,7 @@ _SHOWN = 10
 
 def _complain(text: object) -> None:
     """One line on stderr."""
-    print(f"okid-campaign: {text}", file=sys.stderr, flush=True)
+    complain("okid-campaign", text)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -120,14 +120,14 @@ def _check(args: argparse.Namespace) -> int:
     records, bad = list_records(spec)
     groups, keyless = group_records(spec, records)
     size = sum(ref.size for ref in records)
-    print(
+    say(
         f"{spec.path}: {len(records)} records, {size / 1e6:.1f} MB, "
         f"{len(groups)} groups by {', '.join(spec.by) or 'nothing'}"
     )
     sizes = sorted(len(group.records) for group in groups)
     if sizes:
-        print(f"records a group: {sizes[0]} to {sizes[-1]}; {method}; series: "
-              f"{', '.join(sorted({group.series for group in groups})[:_SHOWN])}")  # fmt: skip
+        say(f"records a group: {sizes[0]} to {sizes[-1]}; {method}; series: "
+            f"{', '.join(sorted({group.series for group in groups})[:_SHOWN])}")  # fmt: skip
     for one in [*bad, *keyless][:_SHOWN]:
         _complain(f"{one.name}: {one.reason}: it would be left out")
     if not groups:
@@ -171,11 +171,11 @@ def _run(args: argparse.Namespace, written: str) -> int:
     with_modes = int((tables["groups"]["modes"] > 0).sum()) if len(tables["groups"]) else 0
     if not args.quiet:
         summed = int((tables["records"]["status"] == "summed").sum()) if len(tables["records"]) else 0
-        print(f"{summed} records summed ({outcome.read} read now), {len(outcome.skipped)} left out; "
-              f"{with_modes} of {len(outcome.groups)} groups with modes")  # fmt: skip
+        say(f"{summed} records summed ({outcome.read} read now), {len(outcome.skipped)} left out; "
+            f"{with_modes} of {len(outcome.groups)} groups with modes")  # fmt: skip
         for line in [*lines, *outcome.remarks[:_SHOWN]]:
-            print(line)
-        print(f"{spec.folder}/report.html, records.parquet, groups.parquet, modes.parquet")
+            say(line)
+        say(f"{spec.folder}/report.html, records.parquet, groups.parquet, modes.parquet")
     if with_modes == 0:
         faults = [fault for fault in tables["groups"]["fault"].dropna().tolist()] if len(tables["groups"]) else []
         raise IdentificationError(f"no group gives a model: {faults[0] if faults else 'there is none'}")
@@ -198,8 +198,8 @@ def _report(args: argparse.Namespace, written: str) -> int:
     about, trend = _load_about(folder)
     target = Path(args.html) if args.html else folder / "report.html"
     for line in _page(target, read_tables(folder), about, trend, written):
-        print(line)
-    print(f"{target}: {target.stat().st_size // 1024} KiB")
+        say(line)
+    say(f"{target}: {target.stat().st_size // 1024} KiB")
     return EXIT_DONE
 
 
@@ -214,7 +214,7 @@ def _simulate(args: argparse.Namespace) -> int:
             print(f"\r\x1b[K{done}/{year.records} records", end=end, file=sys.stderr, flush=True)
 
     simulate_year(folder, year, told)
-    print(f"{folder}/SPEC.toml: {year.records} records; okid-campaign run {folder}/SPEC.toml")
+    say(f"{folder}/SPEC.toml: {year.records} records; okid-campaign run {folder}/SPEC.toml")
     return EXIT_DONE
 
 

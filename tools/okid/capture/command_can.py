@@ -13,7 +13,7 @@ from importlib import import_module
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from okid._errors import InputError
+from okid._errors import InputError, say
 from okid.capture.config import BusConfig, CaptureConfig
 from okid.capture.dbc import read_dbc
 from okid.capture.outcome import (
@@ -223,7 +223,7 @@ def _record(
     except OSError as full:
         complain(f"{full.filename or args.out}: {full.strerror or full}")
         return EXIT_USAGE
-    print(summary.text())
+    say(summary.text())
     if summary.fault is not None:
         complain(f"{args.channel}: {summary.fault}; what came before is in {args.out}")
         return EXIT_DEVICE

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import can
 
-from okid._errors import InputError
+from okid._errors import InputError, say
 from okid.capture.command_can import open_bus
 from okid.capture.command_serial import open_port
 from okid.capture.config import CaptureConfig, load_config
@@ -58,7 +58,7 @@ def run_sync(args: argparse.Namespace, stop: threading.Event) -> int:
         )  # fmt: skip
     finally:
         bus.shutdown()
-    print(report.text())
+    say(report.text())
     return _ended(args.channel, report.fault)
 
 
@@ -141,5 +141,5 @@ def _on_bus(
 
 
 def _tell(where: str, done: Playback, what: str) -> int:
-    print(done.text(what))
+    say(done.text(what))
     return _ended(where, done.fault)

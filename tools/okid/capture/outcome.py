@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import os
-import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from okid import _errors
 from okid._errors import Error, IdentificationError, InputError
 from okid.capture.config import CaptureConfig, load_config
 from okid.capture.stream import Capture
@@ -19,7 +19,7 @@ EXIT_DONE, EXIT_USAGE, EXIT_NO_MODEL, EXIT_DEVICE = 0, 2, 3, 4
 
 def complain(text: object) -> None:
     """One line on stderr."""
-    print(f"okid-capture: {text}", file=sys.stderr, flush=True)
+    _errors.complain("okid-capture", text)
 
 
 class Tap:
@@ -96,7 +96,7 @@ def end(capture: Capture, args: Any, lines: Callable[[], list[str]], fault: str 
         code = EXIT_DEVICE
     if not args.quiet and "-" not in (args.json, args.events):
         try:
-            print("\n".join(lines()), flush=True)
+            _errors.say("\n".join(lines()), flush=True)
         except OSError:  # the reader of our lines has gone
             args.quiet = True
     if fault is not None:

@@ -11,6 +11,7 @@ from typing import Any
 from okid._errors import InputError
 
 AXES = ("x", "y", "z")
+FARTHEST = 1e9  # m
 Place = tuple[int, str]  # node and direction: "x", "-z" ..
 
 
@@ -31,6 +32,13 @@ class Geometry:
     surfaces: list[tuple[int, ...]] = field(default_factory=list)
     fixed: list[int] | None = None
     named: bool = False
+
+    def __post_init__(self) -> None:
+        far = next((k for k, node in enumerate(self.nodes, 1) if not all(abs(x) <= FARTHEST for x in node)), None)
+        if far is not None:
+            raise InputError(
+                f"{self.source}: node {far} is at {self.nodes[far - 1]}, expected coordinates of at most {FARTHEST:g} m"
+            )
 
     def at_rest(self, places: Sequence[Place | None]) -> list[int]:
         """Nodes that never move: `fixed`; where that is not said the lowest nodes, when no sensor is at any of them

@@ -138,13 +138,28 @@ def _toml_too_deep(text: str) -> bool:
     return False
 
 
+_LONG_TOML = re.compile(r"[0-9a-fA-F_]{16}")  # a whole number that may need more than 64 bits
+
+
+def _check_whole_numbers(value: Any) -> None:
+    """As the definition of TOML has them; nesting is bounded."""
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise tomllib.TOMLDecodeError("a whole number of more than 64 bits")
+    if isinstance(value, dict | list):
+        for inner in value.values() if isinstance(value, dict) else value:
+            _check_whole_numbers(inner)
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """tomllib.loads() with bounded nesting. tomllib.TOMLDecodeError also where the nesting is deeper than DEEPEST, and
-    where a number has thousands of digits."""
+    where a whole number needs more than 64 bits."""
     if _toml_too_deep(text):
         raise tomllib.TOMLDecodeError(f"nested deeper than {DEEPEST} levels")
     try:
-        return tomllib.loads(text)
+        value = tomllib.loads(text)
+        if _LONG_TOML.search(text):
+            _check_whole_numbers(value)
+        return value
     except tomllib.TOMLDecodeError:
         raise
     except ValueError as fault:  # of int(), which has a limit

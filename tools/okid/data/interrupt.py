@@ -48,6 +48,8 @@ def guarded(program: str, module: str, arguments: Sequence[str] | None) -> int:
         if ours:
             sys.unraisablehook = _silent
             signal.signal(signal.SIGINT, _note)
+            if arguments is None:
+                signal.signal(signal.SIGTERM, _note)
         return int(import_module(module).main(arguments))
     except BaseException as fault:  # an import that was interrupted ends in ImportError or SystemError as well
         if not _seen.is_set() and not isinstance(fault, KeyboardInterrupt):

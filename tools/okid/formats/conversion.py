@@ -8,13 +8,13 @@ import contextlib
 import hashlib
 import signal
 import socket
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from okid._errors import Error, InputError
+from okid._errors import Error, InputError, complain, say
 from okid.data.interrupt import EXIT_INTERRUPTED
+from okid.data.line_splitter import LineSplitter
 from okid.data.records import Record
 from okid.formats.by_name import (
     EXTENSIONS,
@@ -30,7 +30,6 @@ from okid.formats.mcap_file import write_events_mcap, write_live_mcap
 from okid.formats.mdf4 import holds_frames
 from okid.formats.result_tree import load_result
 from okid.formats.uff import uff_losses
-from okid.live.feed import LineSplitter
 
 EXIT_DONE, EXIT_USAGE = 0, 2
 _FRAMES_ONLY = (".log", ".asc", ".blf", ".trc", ".db")
@@ -155,7 +154,7 @@ def _live_lines(path: Path) -> Iterator[bytes]:
 
 def _note(remarks: Sequence[str]) -> None:
     for remark in remarks:
-        print(f"okid-convert: note: {remark}", file=sys.stderr)
+        complain("okid-convert", f"note: {remark}")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -237,14 +236,14 @@ def convert(arguments: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(arguments)
     try:
         for source, target in _pairs(args):
-            print(_run(args, source, target))
+            say(_run(args, source, target))
     except Error as fault:
-        print(f"okid-convert: {fault}", file=sys.stderr)
+        complain("okid-convert", fault)
         return EXIT_USAGE
     except OSError as fault:
-        print(f"okid-convert: {fault.filename or args.target}: {fault.strerror or fault}", file=sys.stderr)
+        complain("okid-convert", f"{fault.filename or args.target}: {fault.strerror or fault}")
         return EXIT_USAGE
     except KeyboardInterrupt:
-        print("okid-convert: interrupted, the file in work was not written", file=sys.stderr)
+        complain("okid-convert", "interrupted, the file in work was not written")
         return EXIT_INTERRUPTED
     return EXIT_DONE

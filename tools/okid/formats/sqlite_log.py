@@ -30,7 +30,10 @@ def _check_table(base: sqlite3.Connection) -> None:
     if len(found) != 1 or found[0][0] != "table" or str(found[0][1]).upper().startswith("CREATE VIRTUAL"):
         raise InputError(f"messages is a {found[0][0]} of something else, expected a table of frames")
     columns = base.execute("PRAGMA table_xinfo(messages)").fetchall()
-    if tuple(one[1] for one in columns) != _COLUMNS or any(one[6] for one in columns):
+    computed = next((one[1] for one in columns if one[6]), None)
+    if computed is not None:
+        raise InputError(f"the column {computed[:20]} of messages is computed, expected a table of frames")
+    if tuple(one[1] for one in columns) != _COLUMNS:
         names = ", ".join(str(one[1])[:20] for one in columns[:10])
         raise InputError(f"messages has the columns {names}, expected {', '.join(_COLUMNS)}")
 

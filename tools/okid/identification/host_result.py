@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid import abi
-from okid._errors import Error
+from okid._errors import Error, InputError
 from okid.abi import host
 from okid.abi.turns import Turn, in_turn
 from okid.identification.identifier import Identifier
@@ -43,9 +43,15 @@ def options_text(options: Mapping[str, Any]) -> bytes:
     """For the library; None is as if not given."""
     given = {key: value for key, value in options.items() if value is not None}
     try:
-        return _encode(given).encode()
+        text = _encode(given)
     except (TypeError, ValueError):
-        return json.dumps(_plain(given)).encode()
+        text = json.dumps(_plain(given))
+    if "\\ud" in text:
+        try:
+            json.dumps(json.loads(text), ensure_ascii=False).encode()
+        except UnicodeEncodeError:
+            raise InputError("an option or a name has half of a letter (a lone surrogate)") from None
+    return text.encode()
 
 
 class HostResult:

@@ -16,6 +16,7 @@ FILES = {
     "/plots.css": ("plots.css", STYLE),
     "/icon.svg": ("icon.svg", "image/svg+xml"),
     "/live.js": ("live.js", SCRIPT),
+    "/start.js": ("start.js", SCRIPT),
     "/lanes.js": ("lanes.js", SCRIPT),
     "/plots.js": ("plots.js", SCRIPT),
     "/tables.js": ("tables.js", SCRIPT),

@@ -108,7 +108,8 @@ class DiagramMaker:
         self, material: Callable[[], Material | None], wanted: Identification,
         publish: Callable[[dict[str, Any]], None], pause_s: float = PAUSE_S,
     ) -> None:  # fmt: skip
-        self._material, self._identification, self._publish, self._pause_s = material, wanted, publish, pause_s
+        self._material, self._publish, self._pause_s = material, publish, pause_s
+        self.identification = wanted  # of what material() gives next
         self._awake, self._stop = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="okid-live diagram", daemon=True)
 
@@ -138,7 +139,7 @@ class DiagramMaker:
             begun = time.thread_time()
             material = self._material()
             if material is not None:
-                self._publish(draw(material, self._identification))
+                self._publish(draw(material, self.identification))
             used = time.thread_time() - begun
             if self._stop.wait(max(self._pause_s if material is not None else 0.5, used * (1.0 / SHARE - 1.0))):
                 return

@@ -19,6 +19,7 @@ from okid.live.run_state import Channel
 
 Real = NDArray[np.float64]
 KEPT_S, KEPT_BYTES = 60.0, 64 << 20
+MOST_COLUMNS, COLUMNS_PER_S = 400_000, 100.0  # columns of all lanes together that go to a page at once
 MOST_HIT_SAMPLES, MOST_HITS = 16384, 40
 TRIES = 8  # segments of which one at least must be whole
 MOST_CHANNELS, CROSS_BYTES = 4096, 256 << 20  # what a `start` event may ask for; sums for response functions
@@ -27,8 +28,9 @@ MOST_CHANNELS, CROSS_BYTES = 4096, 256 << 20  # what a `start` event may ask for
 class Measured:
     """Channels in the order of the samples: n_u forces, n_y responses, then aux channels.
 
-    Memory: 8 bytes a sample of the last 60 s (of the window where that is longer), at most 64 MB, and the averages, of
-    which response functions take at most 256 MB: shorter segments, or spectra alone. InputError above 4096 channels.
+    Memory: 8 bytes a sample of the last 60 s (of the window or of the whole, `config.length_s`, where that is longer),
+    at most 64 MB, and the averages, of which response functions take at most 256 MB: shorter segments, or
+    spectra alone. InputError above 4096 channels.
     """
 
     def __init__(self, channels: list[Channel], rate_hz: float, config: PageConfig) -> None:
@@ -39,9 +41,11 @@ class Measured:
         self.n_u = sum(each.role == "force" for each in channels)
         self.n_y = sum(each.role not in ("force", "aux") for each in channels)
         window = config.identification.window_s
-        seconds = max(KEPT_S, (window or 0.0) + 2.0)
+        whole = config.length_s or 0.0
+        seconds = max(KEPT_S, (window or 0.0) + 2.0, whole + 1.0)
         self.recent = Recent(m, int(max(1024, min(seconds * rate_hz, KEPT_BYTES / (8 * m)))))
-        self.envelope = Envelope(m, rate_hz)
+        columns = min(COLUMNS_PER_S, MOST_COLUMNS / (m * max(KEPT_S, whole)))
+        self.envelope = Envelope(m, rate_hz, max(KEPT_S, whole), COLUMNS_PER_S if whole <= KEPT_S else columns)
         self._window = None if window is None else max(1, round(window * rate_hz))
         self._hammer = config.hammer
         self._before = round(config.hit_before_s * rate_hz)

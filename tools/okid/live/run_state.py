@@ -40,7 +40,7 @@ class RunState:
     """Events go in by take(); what the page shows comes out as plain JSON values."""
 
     def __init__(self) -> None:
-        self.link = "waiting"  # "live", "ended"
+        self.link = "waiting"  # "live", "ended", "working", "failed"
         self.link_text = "waiting for okid"
         self._begin({})
 
@@ -53,6 +53,7 @@ class RunState:
         self.modes: dict[str, Any] | None = None
         self.stats: dict[str, Any] | None = None
         self.result: dict[str, Any] | None = None
+        self.whole: dict[str, Any] | None = None
         self.model: dict[str, Any] | None = None
         self.alarm: dict[str, Any] | None = None
         self.tracks = Tracks()
@@ -71,6 +72,19 @@ class RunState:
             again = bool(self.start)
             self.link = "waiting"
             self.link_text = "okid ended without a result; waiting for it" if again else "waiting for okid"
+
+    def working(self, text: str) -> None:
+        """What is being done for the page."""
+        self.link, self.link_text = "working", text
+
+    def ended(self, text: str) -> None:
+        """Nothing more comes."""
+        self.link, self.link_text = "ended", text
+
+    def failed(self, text: str) -> None:
+        """It came to nothing, and why."""
+        self.link, self.link_text = "failed", "failed"
+        self.note(text, "bad")
 
     def take(self, event: dict[str, Any]) -> bool:
         """Take an event in; True when it is the start of another run than the one before.
@@ -111,7 +125,7 @@ class RunState:
     def _keep_result(self, event: dict[str, Any]) -> None:
         result = event["result"]
         self.result = {"t": event["t"], **{key: result[key] for key in RESULT_PARTS if key in result}}
-        self.model = result.get("model")
+        self.whole, self.model = result, result.get("model")
         self.link, self.link_text = "ended", "ended: result"
 
     def say(self, event: dict[str, Any]) -> None:

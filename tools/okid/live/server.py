@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The web server of the page: a fixed list of files, the stream of events, the spectra; nothing can be sent to it."""
+"""The web server of the page: a fixed list of files, the stream of events, the spectra; and what a desk takes of those
+who know its token."""
 
 from __future__ import annotations
 
@@ -17,6 +18,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from okid._errors import Error
 from okid.live.assets import Assets
+from okid.live.desk import Busy, Desk
 from okid.live.session import Session
 
 # Styles in the page and data: pictures are plotly.js's own; nothing that came from okid ever becomes markup.
@@ -30,9 +32,11 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-REQUEST_S, STALLED_S, HEARTBEAT_S = 10.0, 20.0, 5.0
+REQUEST_S, ANSWER_S, STALLED_S, HEARTBEAT_S = 10.0, 120.0, 20.0, 5.0
 MOST_VISITORS = 48  # connections at a time: 16 pages and what they fetch
 MOST_SPECTRA = 8
+MOST_ASKED = 1 << 20  # bytes of a wish that is no file
+TOKEN = "X-Okid-Token"
 
 
 def is_loopback(host: str) -> bool:
@@ -54,14 +58,15 @@ def host_of(header: str) -> str:
 
 
 class PageServer(ThreadingHTTPServer):
-    """Serves the page of one Session on an address. Raises OSError when the address is not available."""
+    """Serves the page of one Session on an address; nothing can be sent to it without a desk. Raises OSError when the
+    address is not available."""
 
     daemon_threads = True
     block_on_close = False
     request_queue_size = 32
 
-    def __init__(self, session: Session, host: str, port: int) -> None:
-        self.session, self.host, self.assets = session, host, Assets()
+    def __init__(self, session: Session, host: str, port: int, desk: Desk | None = None) -> None:
+        self.session, self.host, self.assets, self.desk = session, host, Assets(), desk
         family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
         self.address_family = family
         self.allowed = {"127.0.0.1", "localhost", "::1", host.lower()}
@@ -128,11 +133,11 @@ class PageServer(ThreadingHTTPServer):
             for visitor in [one for one, until in self._visitors.items() if until < now]:
                 self._end(visitor)
 
-    def stays(self, visitor: socket.socket) -> None:
-        """It opened a page: its time is not over until it goes."""
+    def stays(self, visitor: socket.socket, seconds: float = math.inf) -> None:
+        """It has asked, and has so long from now on; a page stays until it goes."""
         with self._door:
             if visitor in self._visitors:
-                self._visitors[visitor] = math.inf
+                self._visitors[visitor] = time.monotonic() + seconds
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that goes away in the middle is no news."""
@@ -149,17 +154,57 @@ class _Handler(BaseHTTPRequestHandler):
     def _refuse(self) -> None:
         self._answer(HTTPStatus.METHOD_NOT_ALLOWED, b"only GET and HEAD\n", "text/plain", {"Allow": "GET, HEAD"})
 
-    do_POST = do_PUT = do_DELETE = do_PATCH = do_OPTIONS = do_TRACE = do_CONNECT = _refuse
+    def do_POST(self) -> None:
+        """What the desk takes: a JSON object, or a file. Without its token nothing of the body is read."""
+        desk, asked = self.server.desk, urlsplit(self.path)
+        self.close_connection = True
+        if not self._meant_for_us():
+            self._answer(HTTPStatus.FORBIDDEN, b"this name does not belong to okid-live\n", "text/plain")
+        elif desk is None or not desk.takes(asked.path):
+            self._refuse()
+        elif not desk.knows(self.headers.get(TOKEN, "")):
+            self._say(HTTPStatus.FORBIDDEN, "open the page by the address that okid-live printed: it holds the key")
+        else:
+            self.server.stays(self.connection)
+            self.connection.settimeout(STALLED_S)
+            self._serve_wish(desk, asked.path, asked.query)
+
+    def _serve_wish(self, desk: Desk, path: str, query: str) -> None:
+        try:
+            length = int(self.headers.get("Content-Length", ""))
+            if length < 0 or (length > MOST_ASKED and path != "/upload"):
+                raise ValueError(f"{length} bytes")
+            if path == "/upload":
+                found: Any = desk.upload("".join(parse_qs(query[:2000]).get("name", [])), length, self.rfile)
+            else:
+                found = desk.do(path, json.loads(self.rfile.read(length)))
+        except Busy as fault:
+            self._say(HTTPStatus.CONFLICT, str(fault))
+        except Error as fault:
+            self._say(HTTPStatus.UNPROCESSABLE_ENTITY, str(fault))
+        except (ValueError, RecursionError, OSError, MemoryError) as fault:
+            self._say(HTTPStatus.BAD_REQUEST, f"{type(fault).__name__}: {fault}")
+        else:
+            if isinstance(found, bytes):
+                self._answer(HTTPStatus.OK, found, "application/octet-stream")
+            else:
+                self._answer(HTTPStatus.OK, json.dumps(found).encode(), "application/json")
+
+    def _say(self, status: HTTPStatus, text: str) -> None:
+        self._answer(status, f"{text}\n".encode(), "text/plain; charset=utf-8")
+
+    do_PUT = do_DELETE = do_PATCH = do_OPTIONS = do_TRACE = do_CONNECT = _refuse
 
     def do_HEAD(self) -> None:
         """What do_GET() would send, without its body; a stream of events has none."""
         self.do_GET()
 
     def do_GET(self) -> None:
-        """Files, /events, /spectra."""
+        """Files, /events, /spectra, /modes."""
         if not self._meant_for_us():
             self._answer(HTTPStatus.FORBIDDEN, b"this name does not belong to okid-live\n", "text/plain")
             return
+        self.server.stays(self.connection, ANSWER_S)  # packing plotly.js takes long where others compute
         asked = urlsplit(self.path)
         if asked.path == "/events" and self.command == "HEAD":
             self._answer(HTTPStatus.OK, b"", "text/event-stream")
@@ -167,6 +212,8 @@ class _Handler(BaseHTTPRequestHandler):
             self._send_events()
         elif asked.path == "/spectra":
             self._send_spectra(asked.query)
+        elif asked.path == "/modes":
+            self._send_modes(asked.query)
         else:
             self._send_file(asked.path)
 
@@ -206,9 +253,18 @@ class _Handler(BaseHTTPRequestHandler):
             first = {key: (numbers[key] or [0])[0] for key in ("output", "input")}
             found = self.server.session.spectra(numbers["channels"][:MOST_SPECTRA], first["output"], first["input"])
         except (Error, ValueError) as fault:
-            self._answer(HTTPStatus.BAD_REQUEST, f"{fault}\n".encode(), "text/plain; charset=utf-8")
+            self._say(HTTPStatus.BAD_REQUEST, str(fault))
             return
         self._answer(HTTPStatus.OK, json.dumps(found, allow_nan=False).encode(), "application/json")
+
+    def _send_modes(self, query: str) -> None:
+        try:
+            t = float("".join(parse_qs(query[:200]).get("t", [])))
+        except ValueError:
+            self._say(HTTPStatus.BAD_REQUEST, "expected /modes?t=SECONDS")
+            return
+        found = json.dumps(self.server.session.modes_at(t), allow_nan=False)
+        self._answer(HTTPStatus.OK, found.encode(), "application/json")
 
     def _send_events(self) -> None:
         session = self.server.session
@@ -224,9 +280,10 @@ class _Handler(BaseHTTPRequestHandler):
             self.server.stays(self.connection)
             self.connection.settimeout(STALLED_S)
             self.wfile.write(b"retry: 1000\n\n")
-            while not outbox.closed:
-                waiting = outbox.take(HEARTBEAT_S)
-                for data in waiting or [b": here\n\n"]:
+            closed = False
+            while not closed:
+                closed = outbox.closed  # what waits then still goes
+                for data in outbox.take(HEARTBEAT_S) or [b": here\n\n"]:
                     self.wfile.write(data)
         except OSError:
             pass  # the browser has gone, or took nothing for STALLED_S

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One okid watched for all pages: lines of its socket in, frames for the browsers out."""
+"""One run, replay or record watched for all pages: events and samples in, frames for the browsers out."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import json
 import threading
 import time
 from collections import deque
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from okid._errors import Error
 from okid.frf import synthesise
@@ -21,6 +23,8 @@ from okid.live.hub import Frame, Hub, Outbox, frame
 from okid.live.measured import Measured
 from okid.live.run_state import RunState
 
+Real = NDArray[np.float64]
+
 TICK_S, SLOW_TICKS, SPECTRA_TICKS = 0.1, 5, 10  # lanes ten times a second, tables twice, spectra once
 ASLEEP_BYTES = 32 << 20
 LOG_AT_A_TIME, WAKE_LINES = 100, 20
@@ -31,14 +35,27 @@ def _no_number(text: str) -> float:
     raise ValueError(f"found {text}, expected a number or null")
 
 
-class Session:
-    """Reads okid's socket, keeps what a page shows, and sends it to every open page.
+class Source(Protocol):
+    """Where events and samples come from, in a thread of its own between start() and stop()."""
 
-    While no page is open the samples are only kept as text, at most 32 MB, and nothing is computed.
+    def start(self) -> None:
+        """Begin."""
+
+    def stop(self) -> None:
+        """End; returns when nothing more comes and no process that it started is left."""
+
+
+class Session:
+    """Takes what a source gives, keeps what a page shows, and sends it to every open page.
+
+    `source`: makes the source for this session, None = okid's socket ([publish] socket of the config), or nothing where
+    there is none. While no page is open the samples of a socket are only kept as text, at most 32 MB, and nothing is
+    computed.
     """
 
-    def __init__(self, config: PageConfig) -> None:
+    def __init__(self, config: PageConfig, source: Callable[[Session], Source] | None = None) -> None:
         self.config = config
+        self.takes_files = False  # a start page: it may be asked for another subject
         self.hub = Hub(self._pages_changed)
         self.run = RunState()
         self.measured: Measured | None = None
@@ -52,25 +69,51 @@ class Session:
         self._samples_seen = False
         self._awake, self._stop = threading.Event(), threading.Event()
         self._sent: dict[str, Any] = {}
-        self._feed = Feed(config.socket, self.line, self.linked)
+        self._source: Source | None = None
+        if source is not None:
+            self._source = source(self)
+        elif config.socket is not None:
+            self._source = Feed(config.socket, self.line, self.linked)
         self._maker = DiagramMaker(self._material, config.identification, self._show_diagram)
         self._pace = threading.Thread(target=self._run_pace, name="okid-live pace", daemon=True)
 
     def start(self) -> None:
         """Begin to listen."""
-        self._feed.start()
+        if self._source is not None:
+            self._source.start()
         self._maker.start()
         self._pace.start()
 
     def stop(self) -> None:
-        """End all threads and pages."""
+        """End all threads and pages, which get what is new first."""
         self._stop.set()
         self._awake.set()
+        with self._lock:
+            for one in self._frames(0) if len(self.hub) else ():
+                self.hub.send(one)
         self.hub.close()
         self._maker.stop()
-        self._feed.stop()
+        if self._source is not None:
+            self._source.stop()
         if self._pace.is_alive():
             self._pace.join(5.0)
+
+    def show(self, config: PageConfig, source: Callable[[Session], Source]) -> None:
+        """Another subject from here on: the source before is stopped, and nothing of it is shown any more."""
+        if self._source is not None:
+            self._source.stop()
+        with self._lock:
+            self.config, self.run = config, RunState()
+            self._maker.identification = config.identification
+            self._begin()
+        self._source = source(self)
+        self._source.start()
+
+    def describe(self, config: PageConfig) -> None:
+        """What became known of the subject since; a `start` event that follows brings it to the pages."""
+        with self._lock:
+            self.config = config
+            self._maker.identification = config.identification
 
     # -- from okid ------------------------------------------------------------------------------------------------
 
@@ -78,6 +121,33 @@ class Session:
         """okid came or went."""
         with self._lock:
             self.run.linked(there)
+
+    def working(self, text: str) -> None:
+        """What is being done now, for the badge."""
+        with self._lock:
+            self.run.working(text)
+
+    def failed(self, text: str) -> None:
+        """It came to nothing, and why."""
+        with self._lock:
+            self.run.failed(text)
+
+    def ended(self, text: str) -> None:
+        """Nothing more comes."""
+        with self._lock:
+            self.run.ended(text)
+
+    def event(self, event: dict[str, Any]) -> None:
+        """An event built as docs/reference/events.md has it; else KeyError or TypeError."""
+        with self._lock:
+            self._take_event(event)
+
+    def samples(self, first: int, values: Real) -> None:
+        """Samples first .. of all channels (m, count), NaN = missing; a `start` event named the channels before.
+        InputError for another m."""
+        with self._lock:
+            if self.measured is not None:
+                self._place(first, values, (first + values.shape[1]) / self.measured.rate_hz)
 
     def line(self, line: bytes) -> None:
         """One line of okid's socket. A damaged one is counted and left out."""
@@ -115,10 +185,14 @@ class Session:
         first = event["first"]
         if not isinstance(first, int) or first < 0:
             raise TypeError(f"first is {first!r}")
+        self._place(first, values, float(event["t"]))
+
+    def _place(self, first: int, values: Real, t: float) -> None:
+        assert self.measured is not None
         values[~np.isfinite(values)] = np.nan
         self.measured.add(first, values)
         self._samples_seen = True
-        self.run.t = max(self.run.t, float(event["t"]))
+        self.run.t = max(self.run.t, t)
 
     def _take_event(self, event: dict[str, Any]) -> None:
         if self.run.take(event):
@@ -206,6 +280,9 @@ class Session:
             "wall_time": start.get("wall_time"),
             "rate_hz": self.run.rate_hz,
             "channels": [each.__dict__ for each in self.run.channels],
+            "start": self.takes_files,
+            "absent": self.config.absent,
+            "length_s": self.config.length_s,
             "geometry": None
             if geometry is None
             else {
@@ -318,6 +395,16 @@ class Session:
             if self._drawn_run == self._runs:
                 self.diagram = diagram
                 self.hub.send(frame("diagram", diagram))
+
+    def modes_at(self, t: float) -> dict[str, Any] | None:
+        """The `modes` event at stream time t in s, or the last one that is kept before it; None before the first."""
+        with self._lock:
+            return self.run.tracks.at(t)
+
+    def result(self) -> dict[str, Any] | None:
+        """The whole okid.result/1, None while there is none."""
+        with self._lock:
+            return self.run.whole
 
     def spectra(self, channels: list[int], output: int, given: int) -> dict[str, Any]:
         """Spectra of those channels and the response of an output to an input (all counted from 0), with the model's

@@ -60,7 +60,8 @@ def describe(event: dict[str, Any]) -> tuple[str, str] | None:
     if kind in words:
         return words[kind](event)
     if kind == "start":
-        return "plain", f"start of {event.get('config')}, {event.get('wall_time')}"
+        when = f", {event['wall_time']}" if event.get("wall_time") else ""
+        return "plain", f"start of {event.get('config')}{when}"
     if kind == "trigger":
         return "plain", f"trigger ({event.get('source')}) at sample {event.get('sample')}"
     if kind == "alarm_over":

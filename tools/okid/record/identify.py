@@ -28,6 +28,17 @@ def _rooms() -> tuple[Any, ...]:
     return channel_names, sides, host_result, Result.of_host
 
 
+def _picks_text(picks: Sequence[float] | str | Path | None) -> str | None:
+    """As --picks has it."""
+    try:
+        text = str(picks) if isinstance(picks, str | Path) else ",".join(map(repr, map(float, picks or ()))) or ","
+    except (TypeError, ValueError, OverflowError):
+        text = "\0"
+    if "\0" in text:
+        raise InputError(f"picks is {picks!r:.80}, expected frequencies in Hz or the name of a .json file")
+    return None if picks is None else text
+
+
 def identify(
     u: ArrayLike | Sequence[ArrayLike] | None,
     y: ArrayLike | Sequence[ArrayLike],
@@ -127,8 +138,7 @@ def identify(
         "sensing": sensing, "refine": ("no", "yes")[refine] if isinstance(refine, bool) else refine,
         "sigma": sigma, "sigma_blocks": sigma_blocks, "units": units,
         "band": None if band is None else ":".join(map(str, band)), "decimate": decimate, "modes": modes,
-        "picks": picks if picks is None or isinstance(picks, str) else str(picks) if isinstance(picks, Path)
-        else ",".join(map(repr, map(float, picks))) or ",", "stabilization": stabilization,
+        "picks": _picks_text(picks), "stabilization": stabilization,
         "hit_dofs": hit_dofs, "keep_all": keep_all, "threads": threads,
     }  # fmt: skip
     said = {key: value for key, value in options.items() if value is not _UNSAID.get(key)}

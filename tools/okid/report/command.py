@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from okid._errors import Error, InputError
+from okid._errors import Error, InputError, complain, say, shown
 from okid.data.interrupt import halt_if_interrupted
 from okid.report.other_kinds import MADE_BY, check_kind
 from okid.report.pdf import browser, print_pdf
@@ -125,10 +125,10 @@ def _run(args: argparse.Namespace, target: Path | None, written: str) -> None:
         sys.stdout.flush()
     else:
         write_whole(target, text)
-        print(f"{target}: {len(text.encode('utf-8')) // 1024} KiB")
+        say(f"{target}: {len(text.encode('utf-8')) // 1024} KiB")
     if args.pdf:
         _print(program, target, text, args.pdf)
-        print(f"{args.pdf}: {Path(args.pdf).stat().st_size // 1024} KiB", file=told)
+        print(shown(f"{args.pdf}: {Path(args.pdf).stat().st_size // 1024} KiB"), file=told)
 
 
 def _system_words(fault: OSError, target: Path | None) -> str:
@@ -150,11 +150,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _run(args, target, written_line("okid-report", given))
     except Error as fault:
-        print(f"okid-report: {fault}", file=sys.stderr)
+        complain("okid-report", fault)
         return 2
     except BrokenPipeError:  # the reader of stdout has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as fault:
-        print(f"okid-report: {_system_words(fault, target)}", file=sys.stderr)
+        complain("okid-report", _system_words(fault, target))
         return 2
     return 0

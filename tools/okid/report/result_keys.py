@@ -16,7 +16,7 @@ _TOP = {
     "fs_hz": "rate", "samples": "count", "records": "count?", "gaps": "count?", "inputs": "names", "outputs": "names",
     "judged_samples": "count?", "p": "count?", "rows": "count?", "order": "count", "method": "text?", "hold": "text?",
     "shape_dofs": "numbers?", "hits": "objects?", "input_dofs": "numbers?", "output_dofs": "numbers?",
-    "set_ups": "objects?",
+    "set_ups": "objects?", "agreement": "object?",
     "detrend": "text?", "start": "text?", "version": "text?", "singular_values": "numbers?", "model": "object",
     "markov": "object?", "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
 }  # fmt: skip
@@ -34,10 +34,13 @@ _HIT = {
 _SET_UP = {"name": "text", "outputs": "names"}
 _FIT = {"simulation_percent": "by name?", "prediction_percent": "by name?"}
 _MKR = {
-    "M": "matrix", "K": "matrix", "R": "matrix", "R_normal_modes": "matrix", "checks": "object",
+    "checks": "object", **{name: "loose matrix" for name in ("M", "K", "R", "R_normal_modes")},  # null: not determined
     **{f"{name}_std": "loose matrix?" for name in ("M", "K", "R", "R_normal_modes")},
 }  # fmt: skip
-_PDC = {"alpha": "number", "beta": "number", "R": "matrix", "alpha_std": "number?", "beta_std": "number?"}
+_PDC = {"alpha": "number", "beta": "number", "R": "loose matrix", "alpha_std": "number?", "beta_std": "number?"}
+_AGREEMENT = {"runs": "objects", "poles": "object"}
+_RUN = {"method": "text", "fs_hz": "rate", "rows": "count"}
+_POLES = dict.fromkeys(("run", "order", "frequency_hz", "damping_ratio", "mpc", "mode"), "numbers")
 _CHECKS = {
     "m_positive_definite": "flag?", "k_positive_definite": "flag?", "r_positive_definite": "flag?",
     "ww_residual": "number?", "feedthrough_misfit": "number?", "feedthrough_gain": "number?",
@@ -90,6 +93,22 @@ def _check(given: dict[str, Any], kinds: dict[str, str], where: str, source: str
             raise InputError(f"{source}: {where}{key} is {value!r:.60}, expected {_WORDS[kind.rstrip('?')]}")
 
 
+def _check_agreement(given: dict[str, Any], source: str) -> None:
+    """Poles of all runs: columns of one length, each in one of the runs."""
+    _check(given, _AGREEMENT, "agreement.", source)
+    for number, run in enumerate(given["runs"]):
+        _check(run, _RUN, f"agreement.runs[{number}].", source)
+    poles, runs = given["poles"], len(given["runs"])
+    _check(poles, _POLES, "agreement.poles.", source)
+    for key in _POLES:
+        if len(poles[key]) != len(poles["run"]):
+            text = f"has {len(poles[key])} numbers, expected {len(poles['run'])}, one for each pole"
+            raise InputError(f"{source}: agreement.poles.{key} {text}")
+    wrong = next((one for one in poles["run"] if one not in range(runs)), None)
+    if wrong is not None:
+        raise InputError(f"{source}: agreement.poles.run has {wrong!r:.60}, expected a place in runs, from 0")
+
+
 def check_keys(raw: Any, source: str) -> None:
     """InputError names `source`, the key, what was found and what was expected. Keys that are not known are free."""
     schema = raw.get("schema") if isinstance(raw, dict) else None
@@ -125,6 +144,8 @@ def check_keys(raw: Any, source: str) -> None:
                 f"{source}: {key} has {len(raw[key])} numbers, expected {len(raw[of])}, one for each of {of}"
             )
     _check(raw.get("fit") or {}, _FIT, "fit.", source)
+    if raw.get("agreement") is not None:
+        _check_agreement(raw["agreement"], source)
     if raw.get("mkr") and raw.get("pdc"):
         _check(raw["mkr"], _MKR, "mkr.", source)
         _check(raw["mkr"]["checks"], _CHECKS, "mkr.checks.", source)

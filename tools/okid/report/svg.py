@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from okid.data.whole_file import safe_part
 from okid.report.layout import arrange
 from okid.result import figures
 from okid.result.figure_numbers import figure_csv
@@ -80,11 +81,12 @@ def _file_name(text: str) -> str:
 
 def _write(place: Path, raw: str, drawing: Figure, numbers: str) -> None:
     """The picture in three files; OSError where the folder takes none."""
-    place.with_suffix(".svg").write_text(raw, encoding="utf-8")
-    place.with_suffix(".csv").write_text(numbers, encoding="utf-8")
-    with warnings.catch_warnings():
+    for ending, text in ((".svg", raw), (".csv", numbers)):
+        with safe_part(place.with_suffix(ending)) as part:
+            part.write_text(text, encoding="utf-8")
+    with warnings.catch_warnings(), safe_part(place.with_suffix(".png")) as part:
         warnings.filterwarnings("ignore", message=".*missing from.*font")
-        FigureCanvasAgg(drawing).print_figure(place.with_suffix(".png"), dpi=200, facecolor="white")
+        FigureCanvasAgg(drawing).print_figure(part, dpi=200, facecolor="white")
 
 
 def _raw(drawing: Figure) -> str:

@@ -4,6 +4,7 @@
 
 const LABEL = 172, FOOT = 22, LEAST = 34; // px: names at the left, time axis below, height of a lane
 const MISSING = 1, NOT_SENT = 2;
+const STEPS = [1, 2, 5, 10, 20, 60, 120, 300, 600, 1800, 3600, 7200, 21600]; // s between two numbers of the time axis
 
 export function numbers(text, Kind = Float32Array) {
   const raw = atob(text), bytes = new Uint8Array(raw.length);
@@ -16,7 +17,8 @@ export class Lanes {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.span = 10;
-    this.held = false;
+    this.held = this.whole = false;
+    this.heldAt = null;
     this.draws = 0;
     this.reset([], 1, 1);
     canvas.addEventListener("wheel", (event) => this.scroll(event), { passive: false });
@@ -40,6 +42,8 @@ export class Lanes {
     this.scale = channels.map(() => null);
     this.gaps = new Map();
     this.begin = this.end = 0;
+    this.held = false;
+    this.heldAt = null;
     this.top = 0;
     this.shown = channels.map((_, k) => k);
     this.want();
@@ -77,6 +81,14 @@ export class Lanes {
 
   hold(on) {
     this.held = on;
+    this.heldAt = null;
+    this.want();
+  }
+
+  // The right edge at stream time t in s; null: the newest.
+  goTo(t) {
+    this.held = t !== null;
+    this.heldAt = t === null ? null : Math.min(this.end, Math.round(t / this.seconds));
     this.want();
   }
 
@@ -128,7 +140,7 @@ export class Lanes {
     if (count === 0) return;
     this.top = Math.max(0, Math.min(this.shown.length - count, this.top));
     const tall = (height - FOOT) / count, end = this.held ? this.heldAt ?? (this.heldAt = this.end) : this.end;
-    if (!this.held) this.heldAt = null;
+    if (this.whole) this.span = Math.max(1, end * this.seconds);
     const view = { end, first: end - Math.round(this.span / this.seconds), left: LABEL, wide: width - LABEL - 4 };
     this.axis(view, height - FOOT);
     for (let k = 0; k < count; k++) this.lane(this.shown[this.top + k], k * tall, tall, view);
@@ -143,7 +155,7 @@ export class Lanes {
   }
 
   axis(view, y) {
-    const { context, colour } = this, step = this.span > 20 ? 10 : 1;
+    const { context, colour } = this, step = STEPS.find((s) => this.span <= 10 * s) || 86400;
     const from = view.first * this.seconds, to = view.end * this.seconds;
     context.font = "11.5px system-ui, sans-serif";
     context.textBaseline = "top";
@@ -164,7 +176,7 @@ export class Lanes {
     const wide = Math.max(1, Math.floor(view.wide)), columns = view.end - view.first;
     const low = new Float32Array(wide).fill(NaN), high = new Float32Array(wide).fill(NaN), marks = new Uint8Array(wide);
     const from = Math.max(view.first, this.begin, this.end - this.columns);
-    for (let k = from; k < view.end; k++) {
+    for (let k = from; k < Math.min(view.end, this.end); k++) {
       const at = k % this.columns, x = Math.min(wide - 1, Math.floor(((k - view.first) * wide) / columns));
       const a = this.low[channel][at], b = this.high[channel][at], mark = this.marks[channel][at];
       if (!(low[x] <= a)) low[x] = a === a ? a : low[x];

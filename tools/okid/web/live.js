@@ -1,29 +1,32 @@
 // SPDX-License-Identifier: MIT
-// The live page: what okid-live sends goes to lanes, plots, tables and the picture of the shape. It only listens.
+// The page: what okid-live sends goes to lanes, plots, tables and the picture of the shape. What it asks for is in start.js.
 
 import { Lanes, numbers } from "./lanes.js";
-import { Plot, diagram, frf, spectra, tracking } from "./plots.js";
+import { Plot, diagram, frf, saveCanvas, spectra, tracking } from "./plots.js";
+import { offerReport, offerStart } from "./start.js";
 import { Log, pickedModes, showHits, showModes, showResult, showStats } from "./tables.js";
 
 const by = (id) => document.getElementById(id);
 const MOST_SPECTRA = 8, MOST_UPDATES = 1000;
-const ADD_SAMPLES = "okid does not send the signals: add samples = true to [publish] of the config and start okid again";
-const page = { run: null, facts: null, state: null, modes: null, result: null, diagram: null, spectra: null, generation: 0, updates: [] };
+const page = { run: null, facts: null, state: null, modes: null, result: null, diagram: null, spectra: null, generation: 0, updates: [], at: null, then: null };
 const lanes = new Lanes(by("lanes")), log = new Log(by("log"));
 let shape = null;
 
 const plots = {
-  tracking: new Plot("tracking", () => tracking(page.updates, page.state.marks, by("tracking-kind").value)),
+  tracking: new Plot("tracking", () => tracking(page.updates, page.state.marks, by("tracking-kind").value, page.at)),
   frf: new Plot("frf", makeFrf),
   spectra: new Plot("spectra", makeSpectra),
   diagram: new Plot("diagram", () => (page.diagram ? diagram(page.diagram, topFrequency()) : waiting())),
 };
 
+// What modes and shapes are shown of: at a time in the past of the update then, else of the result, else of the newest update.
+const inPast = () => page.at !== null && page.updates.length > 0;
+const shownModes = () => (inPast() ? page.then : page.result || page.modes);
 const inputs = () => page.facts.channels.filter((one) => one.role === "force");
 const outputs = () => page.facts.channels.filter((one) => one.role !== "force" && one.role !== "aux");
 
 function waiting() {
-  if (!page.state || page.state.samples === "off") return ADD_SAMPLES;
+  if (!page.state || page.state.samples === "off") return page.facts ? page.facts.absent : "";
   return page.facts.hammer ? "waiting for a hit" : "waiting for samples";
 }
 
@@ -71,11 +74,13 @@ function showHello(hello) {
 
 function begin() {
   const { facts, state } = page, measured = state.measured;
-  Object.assign(page, { spectra: null, updates: [] });
+  Object.assign(page, { spectra: null, updates: [], at: null, then: null });
+  offerStart(facts.start);
+  document.body.classList.toggle("empty", facts.start && !facts.channels.length);
   document.title = facts.title ? `${facts.title} – okid live` : "okid live";
   by("title").textContent = facts.title || "okid live";
-  by("facts").textContent = [facts.config, facts.rate_hz ? `${facts.rate_hz} Hz` : "", `${facts.channels.length} channels`, facts.method,
-    facts.window_s ? `window ${facts.window_s} s` : facts.forgetting ? `forgetting ${facts.forgetting}` : "all samples"].filter(Boolean).join(" · ");
+  by("facts").textContent = !facts.channels.length ? facts.config : [facts.config, facts.rate_hz ? `${facts.rate_hz} Hz` : "",
+    `${facts.channels.length} channels`, facts.method, facts.window_s ? `window ${facts.window_s} s` : facts.forgetting ? `forgetting ${facts.forgetting}` : "all samples"].filter(Boolean).join(" · ");
   lanes.reset(facts.channels, measured ? measured.columns : 1, measured ? measured.column_s : 1);
   lanes.rate = facts.rate_hz;
   log.reset();
@@ -92,16 +97,16 @@ function begin() {
 
 function showState(state) {
   page.state = state;
-  const badge = by("link"), kind = { live: "good", ended: "", waiting: "warn" }[state.link];
+  const badge = by("link"), kind = { live: "good", ended: "", waiting: "warn", working: "warn", failed: "bad" }[state.link];
   badge.textContent = state.text;
   badge.className = `badge ${kind}`;
-  by("clock").textContent = `t = ${state.t.toFixed(1)} s`;
+  showMoment();
   by("alarm").hidden = !state.alarm;
   const off = state.samples !== "live" && !(state.measured && lanes.end > 0);
   by("lanes").hidden = off;
   const text = document.querySelector("#signals .absent");
   text.hidden = !off;
-  text.textContent = state.samples === "off" ? ADD_SAMPLES : "waiting for samples";
+  text.textContent = state.samples === "off" ? page.facts.absent : "waiting for samples";
   if (!plots.tracking.stale) markTracks();
 }
 
@@ -113,7 +118,7 @@ function markTracks() {
 
 function takeModes(event) {
   page.modes = event;
-  showModes(event, page.result);
+  showModes(inPast() ? page.then : event, inPast() ? null : page.result);
   const badge = by("settled");
   badge.hidden = !event || Boolean(page.result);
   if (event) {
@@ -146,6 +151,7 @@ function takeHits(hits) {
 function takeResult(result) {
   page.result = result;
   by("result").hidden = !result;
+  offerReport(result);
   if (!result) return;
   showResult(result);
   takeModes(page.modes);
@@ -197,6 +203,36 @@ function takeSpectra(found) {
   plots.frf.want();
 }
 
+// -- a time in the past -------------------------------------------------------------------------------------------------
+
+// The slider: signals, modes and shape at another time than the newest.
+function showMoment() {
+  const slider = by("when"), end = page.state.t, at = page.at;
+  by("moment").hidden = !(end > 0 && (lanes.end > 0 || page.updates.length > 1));
+  slider.max = end.toFixed(2);
+  if (at === null) slider.value = slider.max;
+  by("clock").textContent = `t = ${(at === null ? end : at).toFixed(1)} s`;
+  by("newest").hidden = at === null;
+}
+
+let newestWish = 0;
+async function goTo(t) {
+  const own = ++newestWish;
+  page.at = t;
+  lanes.goTo(t);
+  by("lanes-pause").setAttribute("aria-pressed", String(lanes.held));
+  showMoment();
+  if (inPast()) {
+    const reply = await fetch(`modes?t=${t}`).catch(() => null);
+    if (own !== newestWish || !reply || !reply.ok) return;
+    page.then = await reply.json();
+  }
+  plots.tracking.want();
+  takeModes(page.modes);
+}
+by("when").addEventListener("input", (event) => goTo(event.target.value === event.target.max ? null : Number(event.target.value)));
+by("newest").addEventListener("click", () => goTo(null));
+
 // -- the picture of the shape -------------------------------------------------------------------------------------------
 
 // Place of every entry of a shape: on the geometry of the config, else on a stick of one node an entry. `struck`: the numbers
@@ -212,7 +248,7 @@ function geometry(names, struck) {
 }
 
 function showShapes() {
-  const source = page.result || page.modes, list = source ? source.modes.filter((mode) => Array.isArray(mode.shape_re)) : [];
+  const source = shownModes(), list = source ? source.modes.filter((mode) => Array.isArray(mode.shape_re)) : [];
   by("shape-canvas").hidden = !list.length;
   document.querySelector("#shape .absent").textContent = list.length ? "" : "no modes yet";
   if (!list.length) return;
@@ -284,14 +320,17 @@ function choices() {
 }
 
 by("lanes-span").addEventListener("change", (event) => {
-  lanes.span = Number(event.target.value);
+  lanes.whole = event.target.value === "all";
+  lanes.span = Number(event.target.value) || 10;
   lanes.scale = lanes.scale.map(() => null);
   lanes.want();
 });
 by("lanes-pause").addEventListener("click", (event) => {
+  if (page.at !== null) return void goTo(null);
   lanes.hold(!lanes.held);
   event.target.setAttribute("aria-pressed", String(lanes.held));
 });
+by("lanes-save").addEventListener("click", () => lanes.draws && saveCanvas(lanes.canvas, lanes.canvas.clientWidth, lanes.canvas.clientHeight, "signals.png"));
 by("tracking-kind").addEventListener("change", () => plots.tracking.want());
 for (const id of ["frf-output", "frf-input"]) by(id).addEventListener("change", fetchSpectra);
 for (const button of document.querySelectorAll("#modes-save button")) {
@@ -327,7 +366,10 @@ document.addEventListener("visibilitychange", () => {
 
 const takes = {
   hello: showHello, state: showState, modes: takeModes, stats: showStats, tracks: takeTracks, log: takeLog, hits: takeHits, result: takeResult,
-  lanes: (frame) => lanes.channels.length && lanes.add(frame),
+  lanes: (frame) => {
+    if (lanes.channels.length) lanes.add(frame);
+    if (by("moment").hidden) showMoment();
+  },
   spectra: fetchSpectra,
   diagram: (found) => {
     page.diagram = found;

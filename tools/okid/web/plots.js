@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The slower plots of the live page, by plotly.js: frequencies over time, response functions, spectra, stabilization.
 
-const variable = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export const variable = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const colours = () => [1, 2, 3, 4, 5, 6, 7, 8].map((k) => variable(`c${k}`));
 const KINDS = [["new", "x", "muted", 5], ["f", "circle-open", "muted", 5], ["f, ζ", "circle-open", "warn", 6],
   ["f, shape", "diamond-open", "accent", 6], ["stable", "circle", "good", 6]];
@@ -43,6 +43,15 @@ export const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g,
 export const printed = (unit) => plain(unit).replace(/\^2/g, "²").replace(/\^3/g, "³");
 const cut = (text, most = 22) => (text.length > most ? `${text.slice(0, most - 1)}…` : text);
 
+// A picture or canvas as PNG, twice as fine, on the colour of the panel.
+export function saveCanvas(picture, width, height, name) {
+  const sheet = Object.assign(document.createElement("canvas"), { width: 2 * width, height: 2 * height }), pen = sheet.getContext("2d");
+  pen.fillStyle = variable("panel");
+  pen.fillRect(0, 0, sheet.width, sheet.height);
+  pen.drawImage(picture, 0, 0, sheet.width, sheet.height);
+  sheet.toBlob((blob) => window.okidSelection.save(name, "image/png", blob));
+}
+
 // One panel's plot: drawn once wherever it stands, then when it is on the screen, at most once a second, and again when the
 // colours change.
 export class Plot {
@@ -54,11 +63,38 @@ export class Plot {
     this.draws = 0;
     this.last = 0;
     this.visible = false;
+    this.offer();
     new IntersectionObserver((entries) => {
       this.visible = entries[entries.length - 1].isIntersecting;
       if (this.visible && this.stale) this.want();
     }, { rootMargin: "120px" }).observe(this.panel);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.want());
+  }
+
+  // Buttons that save the picture as it is shown.
+  offer() {
+    const head = this.panel.querySelector(".head"), tools = head.querySelector(".tools") || head.appendChild(document.createElement("div"));
+    tools.classList.add("tools");
+    for (const kind of ["svg", "png"]) {
+      const button = document.createElement("button");
+      Object.assign(button, { type: "button", textContent: kind.toUpperCase() });
+      button.dataset.picture = kind;
+      button.className = "save";
+      button.addEventListener("click", () => this.save(kind));
+      tools.append(button);
+    }
+  }
+
+  async save(kind) {
+    if (this.box.hidden || !this.draws) return;
+    const width = this.box.clientWidth, height = this.box.clientHeight, name = `${this.panel.id}.${kind}`;
+    const drawn = await window.Plotly.toImage(this.box, { format: "svg", width, height, imageDataOnly: true });
+    const text = drawn.replace(/<svg[^>]*>/, (head) => `${head}<rect width="100%" height="100%" fill="${variable("panel")}"/>`);
+    if (kind === "svg") return void window.okidSelection.save(name, "image/svg+xml", text);
+    const picture = new Image(width, height);
+    picture.src = `data:image/svg+xml,${encodeURIComponent(text)}`;
+    await picture.decode();
+    saveCanvas(picture, width, height, name);
   }
 
   // Why there is no plot; "" = there is one.
@@ -123,7 +159,8 @@ function trackLines(updates) {
   return lines;
 }
 
-export function tracking(updates, list, kind) {
+// at: a time that is looked at, null = the newest
+export function tracking(updates, list, kind, at) {
   const lines = trackLines(updates);
   if (!lines.size) return "no mode has been followed yet";
   const palette = colours(), data = [];
@@ -148,6 +185,7 @@ export function tracking(updates, list, kind) {
       hovertemplate: "t %{x:.1f} s<br>f %{customdata[0]:.6g} Hz<br>ζ %{customdata[1]:.4g} %<extra></extra>" });
   });
   const { shapes, legend } = marks(list), room = 0.08 * (high - low || Math.abs(high) || 1);
+  if (at !== null) shapes.push({ type: "line", x0: at, x1: at, yref: "paper", y0: 0, y1: 1, line: { color: variable("ink"), width: 1.5 } });
   const title = { change: "change of f [%]", hz: "f [Hz]", damping: "ζ [%]" }[kind];
   const more = Number.isFinite(low) ? { range: [low - room, high + room] } : {};
   return { data: [...data, ...legend], layout: layout({ xaxis: axis("stream time t [s]"), yaxis: axis(title, more), shapes, uirevision: kind }) };
@@ -163,9 +201,9 @@ export function frf(found, units) {
   if (response.model) data.push(line(response.model, "model", model, "y3"), line(response.model_phase, "", model, "y2", { showlegend: false }));
   return { data, layout: layout({
     xaxis: axis("frequency [Hz]", { range: [0, top], anchor: "y" }),
-    yaxis: axis("coh.", { domain: [0, 0.15], range: [0, 1.05], tickvals: [0, 1] }),
-    yaxis2: axis("phase [°]", { domain: [0.2, 0.4], range: [-190, 190], tickvals: [-180, 0, 180] }),
-    yaxis3: logarithmic(`|H| [${printed(units)}]`, [tail(response.magnitude)], { domain: [0.45, 1] }),
+    yaxis: axis("coh.", { domain: [0, 0.14], range: [0, 1.05], tickvals: [0, 1] }),
+    yaxis2: axis("phase [°]", { domain: [0.22, 0.42], range: [-190, 190], tickvals: [-180, 0, 180] }),
+    yaxis3: logarithmic(`|H| [${printed(units)}]`, [tail(response.magnitude)], { domain: [0.47, 1] }),
     uirevision: `${response.output}/${response.input}` }) };
 }
 

@@ -5,7 +5,7 @@ import { short } from "./lanes.js";
 
 const MOST_LINES = 400;
 
-function element(kind, text, ...classes) {
+export function element(kind, text, ...classes) {
   const out = document.createElement(kind);
   if (text !== undefined) out.textContent = text;
   out.classList.add(...classes.filter(Boolean));
@@ -13,7 +13,7 @@ function element(kind, text, ...classes) {
 }
 
 // head: names, a leading "<" for a column of text; rows: {cells, away} or cells; a cell is a text, an element or [either, class]
-function fill(table, head, rows) {
+export function fill(table, head, rows) {
   const left = head.map((name) => name.startsWith("<"));
   const top = element("tr");
   head.forEach((name, k) => top.append(element("th", left[k] ? name.slice(1) : name, left[k] && "text")));

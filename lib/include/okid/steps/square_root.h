@@ -87,7 +87,7 @@ OKID_API void okid_square_root_gap(okid_square_root_t* self, int64_t count);
 
 /// Stack the factor of `other` under that of `self`, as further records. Both need slots = 0, forgetting = 1, the same n_u,
 /// n_y and lags; the references may differ. The open run of `self` ends; `other` keeps its content. Cost 2/3 N^3 flop.
-/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_RANGE (more than OKID_MOST_SAMPLES in all)
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_RANGE (a count beyond OKID_MOST_SAMPLES)
 OKID_NODISCARD OKID_API okid_status_t okid_square_root_merge(okid_square_root_t* self, okid_square_root_t* other);
 
 /// Counts since create or reset. @param out  out

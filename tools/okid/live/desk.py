@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: MIT
+"""What a page may ask for beside looking on: a report, and on the start page files, channels and identifications.
+
+Only who knows the token may ask: it is in the address that okid-live prints, and a page sends it as a header.
+"""
+
+from __future__ import annotations
+
+import csv
+import glob
+import hmac
+import itertools
+import json
+import re
+import secrets
+import shlex
+import sys
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from io import BufferedIOBase
+from pathlib import Path
+from typing import Any
+
+from okid._errors import InputError
+from okid.abi.program import run_program
+from okid.data.memory import max_memory_mb
+from okid.live.child import Child
+from okid.live.config import PageConfig, ReportFiles, config_of_log
+from okid.live.finished import Finished, Identified, over
+from okid.live.replayed import Replayed
+from okid.live.session import Session
+from okid.report.measured import open_record
+from okid.report.other_kinds import kind_of
+
+MOST_NAMES, MOST_FILES, MOST_UPLOADS, MOST_TEXT = 4096, 1000, 100, 4096
+UPLOAD_SHARE = 0.25  # of max_memory_mb, for all files together: what reading a record may take
+PIECE = 1 << 20
+LIVE_BUS = re.compile(r"(?:v|sl)?can\d{1,3}|/dev/tty[\w.-]+|/dev/serial/by-id/[\w.:+-]+")
+CHOICES = {"fs": "--fs", "method": "--method", "input_dofs": "--input-dofs", "output_dofs": "--output-dofs",
+           "sensing": "--sensing"}  # fmt: skip
+
+
+class Busy(InputError):
+    """The same work goes on already."""
+
+
+def _text(fields: Mapping[str, Any], key: str) -> str:
+    found = fields.get(key) or ""
+    if not isinstance(found, str) or len(found) > MOST_TEXT or "\0" in found:
+        raise InputError(f"{key} is {found!r:.60}, expected a text of at most {MOST_TEXT} characters")
+    return found.strip()
+
+
+def _texts(fields: Mapping[str, Any], key: str, most: int) -> list[str]:
+    found = fields.get(key) or []
+    if not isinstance(found, list) or len(found) > most:
+        raise InputError(f"{key} is {found!r:.60}, expected a list of at most {most} texts")
+    return [_text({key: one}, key) for one in found]
+
+
+def named_file(text: str) -> Path:
+    """A file or folder that was typed, absolute. InputError when there is none."""
+    if not text:
+        raise InputError("no file was named, expected a record, a log, a journal or a result")
+    try:
+        path = Path(text).expanduser().absolute()
+        there = path.exists()
+    except (OSError, RuntimeError, ValueError):
+        there = False
+    if not there:
+        raise InputError(f"{text}: no such file or folder")
+    return path
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names as `okid identify` takes them."""
+    return ",".join(f'"{name}"' if "," in name else name for name in names)
+
+
+def proposed(file: Path) -> dict[str, str]:
+    """Which columns are forces and which responses, by the rule of `okid identify`: names and units. {} = not known."""
+    try:
+        run_program("identify", file)
+    except InputError as fault:
+        _, _, options = str(fault).rpartition("; by their names perhaps")
+        try:
+            words = shlex.split(options)
+        except ValueError:
+            return {}
+        pairs = list(zip(words[::2], words[1::2], strict=False))
+        return {name: option.lstrip("-") for option, list_ in pairs for name in next(csv.reader([list_]), [])}
+    return {}
+
+
+def identify_options(fields: Mapping[str, Any]) -> list[str]:
+    """The options of `okid identify` that were chosen on the page, each in one word."""
+    options = []
+    for option, names in (("--inputs", _texts(fields, "inputs", MOST_NAMES)),
+                          ("--outputs", _texts(fields, "outputs", MOST_NAMES))):  # fmt: skip
+        if names:
+            options.append(f"{option}={_listed(names)}")
+    return options + [f"{option}={_text(fields, key)}" for key, option in CHOICES.items() if _text(fields, key)]
+
+
+def _quoted(names: Iterable[str]) -> str:
+    return json.dumps(list(names), ensure_ascii=False)
+
+
+def spec_of(fields: Mapping[str, Any], files: Sequence[Path], fs_hz: float | None) -> str:
+    """SPEC.toml of `okid-campaign` that identifies the same: several files as one."""
+    rate = _text(fields, "fs") or ("" if fs_hz is None else repr(fs_hz))
+    lines = ["[records]", f"files = {_quoted(glob.escape(str(file)) for file in files)}", "[channels]",
+             f"inputs = {_quoted(_texts(fields, 'inputs', MOST_NAMES))}",
+             f"outputs = {_quoted(_texts(fields, 'outputs', MOST_NAMES))}", f"fs_hz = {rate}"]  # fmt: skip
+    if method := _text(fields, "method"):
+        lines += ["[identification]", f"method = {_quoted([method])[1:-1]}"]
+    return "\n".join([*lines, *(["[group]", "by = []"] if len(files) > 1 else []), ""])
+
+
+class Desk:
+    """Takes the wishes of pages for one session. `folder`: private, for uploads, results and reports. `start`: a start
+    page, which may name files; otherwise a page may only ask for a report."""
+
+    def __init__(self, session: Session, folder: Path, start: bool) -> None:
+        self.session, self.folder, self.start = session, folder, start
+        session.takes_files = start
+        if start:
+            session.ended("ready")
+        self.token = secrets.token_urlsafe(24)
+        self._works: dict[str, Callable[[Mapping[str, Any]], Any]] = {"/report": self.report}
+        if start:
+            self._works |= {"/look": self.look, "/identify": self.identify, "/open": self.open}
+        self._reporter, self._reporting, self._changing = Child(), threading.Lock(), threading.Lock()
+        self._uploaded = self._uploads = 0
+        self._jobs = itertools.count(1)
+
+    def knows(self, token: str) -> bool:
+        """Is it the token of this session?"""
+        return hmac.compare_digest(token.encode(), self.token.encode())
+
+    def takes(self, path: str) -> bool:
+        """Is there something to ask for under this path?"""
+        return path in self._works or (self.start and path == "/upload")
+
+    def do(self, path: str, fields: Any) -> Any:
+        """What was asked for: bytes of a page, or content for JSON. InputError says why not, Busy to come later."""
+        if not isinstance(fields, dict):
+            raise InputError(f"found {fields!r:.60}, expected an object")
+        return self._works[path](fields)
+
+    def stop(self) -> None:
+        """End the report that is being written."""
+        self._reporter.stop()
+
+    def _job(self) -> Path:
+        """A folder for one work."""
+        place = self.folder / f"job-{next(self._jobs)}"
+        place.mkdir(mode=0o700)
+        return place
+
+    def report(self, _fields: Mapping[str, Any]) -> bytes:
+        """The report of the result on the page, by `okid-report` with the files that belong to it."""
+        raw, files = self.session.result(), self.session.config.report
+        if raw is None:
+            raise InputError("there is no result yet, expected a run that has ended")
+        if not self._reporting.acquire(blocking=False):
+            raise Busy("a report is being written, try again when it is there")
+        try:
+            place = self._job()
+            result, page = files.result or place / "result.json", place / "report.html"
+            if files.result is None:
+                result.write_text(json.dumps(raw), encoding="utf-8")
+            command = [sys.executable, "-P", "-m", "okid.report", str(result), *files.options(), "--out", str(page)]
+            self._reporter.run(command, lambda _stage: None)
+            return page.read_bytes()
+        finally:
+            self._reporting.release()
+
+    def upload(self, name: str, length: int, source: BufferedIOBase) -> dict[str, str]:
+        """Keep `length` bytes of `source` under that name in the private folder. InputError above the bound."""
+        shown = re.sub(r"[^\w.() +-]", "_", name.replace("\\", "/").rpartition("/")[2]).lstrip("-. ")[-120:]
+        bound = int(max_memory_mb() * 1e6 * UPLOAD_SHARE)
+        with self._changing:
+            self._uploads += 1
+            if self._uploads > MOST_UPLOADS or self._uploaded + length > bound:
+                raise InputError(
+                    f"{shown}: {length} bytes; dropped files may have {bound} bytes together and be {MOST_UPLOADS}: "
+                    "name the file instead, it is then read where it is"
+                )
+            self._uploaded += length
+            place = self._job() / (shown or "record.csv")
+        with place.open("xb") as target:
+            left = length
+            while left:
+                piece = source.read(min(left, PIECE))
+                if not piece:
+                    raise InputError(f"{shown}: {length - left} of {length} bytes came")
+                target.write(piece)
+                left -= len(piece)
+        return {"path": str(place)}
+
+    def look(self, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """What a name that was typed is: `kind` and what a page needs to go on."""
+        text = _text(fields, "path")
+        if LIVE_BUS.fullmatch(text):
+            where = f"--device {text}" if text.startswith("/dev/") else f"--interface {text} --listen 5"
+            return {"kind": "bus", "text": "a bus needs a config first", "command": "\n".join([
+                f"okid init lab.toml {where}", "okid-live lab.toml --open", "okid run lab.toml"])}  # fmt: skip
+        path = named_file(text)
+        found = kind_of(path)
+        kind = "record" if found is None or found.key in ("table", "binary") else found.key
+        if kind == "folder":
+            names = sorted(one.name for one in path.iterdir() if one.is_file() and not one.name.startswith("."))
+            return {"kind": kind, "path": str(path), "files": names[:MOST_FILES]}
+        if kind == "config":
+            where = shlex.quote(str(path))
+            return {"kind": kind, "path": str(path), "text": "a config: it goes with a log; a run is started by",
+                    "command": f"okid-live {where} --open\nokid run {where}"}  # fmt: skip
+        if kind in ("journal", "log", "result"):
+            return {"kind": kind, "path": str(path)}
+        if kind != "record":
+            raise InputError(f"{path}: is {found and found.words}, expected a record, a log, a journal or a result")
+        record, side = open_record(path), proposed(path)
+        channels = [
+            {"name": name, "unit": unit, "side": {"force": "inputs", None: side.get(name, "")}.get(role, "outputs")}
+            for name, unit, role in zip(record.names, record.units, record.roles, strict=True)
+        ]
+        return {"kind": kind, "path": str(path), "channels": channels, "fs_hz": record.fs_hz,
+                "samples": len(record.samples)}  # fmt: skip
+
+    def identify(self, fields: Mapping[str, Any]) -> dict[str, str]:
+        """Begin to identify the files that are named; the command and the TOML that do the same."""
+        files = [named_file(one) for one in _texts(fields, "files", MOST_FILES)]
+        if not files:
+            raise InputError("no record was named, expected one file or several")
+        options = identify_options(fields)
+        if not _texts(fields, "outputs", MOST_NAMES):
+            raise InputError("no outputs were chosen, expected the responses that were measured")
+        fs_hz = fields.get("fs_hz")
+        toml = spec_of(fields, files, fs_hz if isinstance(fs_hz, int | float) else None)
+        given = ReportFiles(record=tuple(files))
+        begin = PageConfig(files[0], None, True, "", length_s=0.0)
+        with self._changing:
+            place = self._job()
+            self.session.show(begin, lambda session: Identified(session, given, options, place))
+        words = ["okid", "identify", *map(str, files), *options, "--json=result.json"]
+        return {"command": shlex.join(words), "toml": toml}
+
+    def open(self, fields: Mapping[str, Any]) -> dict[str, str]:
+        """Show a result, or replay a journal, or a log with its config."""
+        path = named_file(_text(fields, "path"))
+        found = kind_of(path)
+        with self._changing:
+            place = self._job()
+            if found is not None and found.key == "result":
+                records = tuple(named_file(one) for one in _texts(fields, "records", MOST_FILES))
+                ready = over(path, ReportFiles(record=records))
+                self.session.show(ready.config, lambda session: Finished(session, ready))
+                more = ["--record", *map(str, records)] if records else []
+                return {"command": shlex.join(["okid-live", str(path), *more])}
+            config = _text(fields, "config")
+            show_log(self.session, path, named_file(config) if config else None, [], place)
+        return {"command": shlex.join(["okid-live", str(path), *(["-c", config] if config else [])])}
+
+
+def page_of_log(path: Path, config: Path | None) -> PageConfig:
+    """What the page of a log or a journal knows before it is read. InputError where the config is missing or wrong."""
+    found = kind_of(path)
+    if found is not None and found.key == "journal":
+        if config is not None:
+            raise InputError(f"{path}: a journal holds its own config, found -c {config}: leave it out")
+        return PageConfig(path, None, True, "", length_s=0.0)
+    if config is None:
+        raise InputError(f"{path}: a log needs the config it was measured with: -c CONFIG.toml")
+    return config_of_log(path, config)
+
+
+def show_log(session: Session, path: Path, config: Path | None, options: Sequence[str], folder: Path) -> None:
+    """Replay it in the session."""
+    page = page_of_log(path, config)
+    session.show(page, lambda own: Replayed(own, path, config, options, folder))

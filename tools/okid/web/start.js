@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+// What a page may ask for: a report, and on a start page files, channels and an identification. Each wish carries the key
+// that stands behind the # of the address okid-live printed; without it the page only looks on.
+
+import { element, fill } from "./tables.js";
+
+const by = (id) => document.getElementById(id);
+const key = location.hash.slice(1);
+const SIDES = [["", "not used"], ["inputs", "force"], ["outputs", "response"]];
+const files = []; // that are identified together
+let found = null, busy = false;
+
+async function post(path, body) {
+  const reply = await fetch(path, { method: "POST", headers: { "X-Okid-Token": key }, body });
+  if (!reply.ok) throw new Error((await reply.text()).trim());
+  return reply;
+}
+const ask = async (path, content) => (await post(path, JSON.stringify(content))).json();
+
+function say(text, bad = false) {
+  by("start-note").textContent = text;
+  by("start-note").classList.toggle("bad", bad);
+}
+
+// One wish at a time; why it was not granted is said where `where` says it.
+async function wish(work, where = say) {
+  if (busy) return;
+  busy = true;
+  try {
+    await work();
+  } catch (fault) {
+    where(fault.message || String(fault), true);
+  }
+  busy = false;
+}
+
+function button(text, press) {
+  const out = element("button", text);
+  out.type = "button";
+  out.addEventListener("click", press);
+  return out;
+}
+
+// -- the report -------------------------------------------------------------------------------------------------------
+
+export function offerReport(result) {
+  by("report").hidden = !(result && key);
+}
+
+by("report").addEventListener("click", () => {
+  const own = by("report"), tell = (text) => { own.title = own.textContent = text; };
+  own.disabled = true;
+  tell("writing the report");
+  wish(async () => {
+    const page = await (await post("report", "{}")).arrayBuffer();
+    window.okidSelection.save("report.html", "text/html", page);
+    tell("Report");
+  }, tell).finally(() => { own.disabled = false; });
+});
+
+// -- the start page ---------------------------------------------------------------------------------------------------
+
+export function offerStart(wanted) {
+  by("start").hidden = !wanted;
+  if (wanted && !key) say("open the page by the address that okid-live printed: it holds the key", true);
+}
+
+function showList() {
+  by("start-list").replaceChildren(...files.map((file) => {
+    const item = element("li", `${file} `);
+    item.append(button("remove", () => {
+      files.splice(files.indexOf(file), 1);
+      showList();
+    }));
+    return item;
+  }));
+  by("start-go").hidden = !files.length;
+}
+
+function showFolder({ path, files: names }) {
+  by("start-list").replaceChildren(...names.map((name) => {
+    const item = element("li");
+    item.append(button(name, () => look(`${path}/${name}`)));
+    return item;
+  }));
+  say(names.length ? `${names.length} files in ${path}: choose one` : `${path}: no files`);
+}
+
+function showChannels() {
+  const rows = found.channels.map((channel) => {
+    const side = element("select"), dof = element("input");
+    side.append(...SIDES.map(([value, text]) => Object.assign(element("option", text), { value })));
+    side.value = channel.side;
+    side.setAttribute("aria-label", `${channel.name} is`);
+    Object.assign(dof, { type: "number", size: 4 });
+    dof.setAttribute("aria-label", `degree of freedom of ${channel.name}`);
+    Object.assign(channel, { select: side, dof });
+    return [channel.name, channel.unit, side, dof];
+  });
+  fill(by("start-channels"), ["<channel", "<unit", "<is", "<degree of freedom (for M, K, R)"], rows);
+  by("start-fs").value = found.fs_hz || "";
+  say(`${found.samples} samples of ${rows.length} channels${found.fs_hz ? "" : ": no sampling rate in the file, name it"}`);
+}
+
+function showCommand(command, toml) {
+  by("start-command").textContent = [command, toml && `\n# SPEC.toml, for okid-campaign run SPEC.toml\n${toml}`].filter(Boolean).join("\n");
+}
+
+async function openFile(content) {
+  showCommand((await ask("open", content)).command);
+  say(`opened ${content.path}`);
+}
+
+// A log waits for its config, a result may get its record: both are named next.
+let waiting = null;
+const look = (text) => wish(async () => {
+  const seen = await ask("look", { path: text });
+  if (waiting && waiting.kind === "log" && seen.kind === "config") {
+    const log = waiting.path;
+    waiting = null;
+    return openFile({ path: log, config: seen.path });
+  }
+  waiting = null;
+  if (seen.command) showCommand(seen.command);
+  if (seen.kind === "folder") return showFolder(seen);
+  if (seen.kind === "log") {
+    waiting = seen;
+    return say(`${seen.path}: now name the CONFIG.toml it was measured with`);
+  }
+  if (seen.kind === "journal") return openFile({ path: seen.path });
+  if (seen.kind === "result") return openFile({ path: seen.path, records: files });
+  if (seen.kind !== "record") return say(`${text}: ${seen.text}`);
+  if (!files.includes(seen.path)) files.push(seen.path);
+  found = seen;
+  showList();
+  showChannels();
+});
+
+async function drop(list) {
+  for (const file of list) {
+    say(`copying ${file.name}`);
+    let path = "";
+    await wish(async () => { path = (await (await post(`upload?name=${encodeURIComponent(file.name)}`, file)).json()).path; });
+    if (path) await look(path);
+  }
+}
+
+function identify() {
+  const of = (side) => found.channels.filter((channel) => channel.select.value === side);
+  const dofs = (side) => (of(side).some((channel) => channel.dof.value) ? of(side).map((channel) => channel.dof.value).join(",") : "");
+  wish(async () => {
+    const made = await ask("identify", {
+      files, inputs: of("inputs").map((one) => one.name), outputs: of("outputs").map((one) => one.name), fs_hz: found.fs_hz,
+      fs: Number(by("start-fs").value) === found.fs_hz ? "" : by("start-fs").value, method: by("start-method").value,
+      sensing: by("start-sensing").value, input_dofs: dofs("inputs"), output_dofs: dofs("outputs"),
+    });
+    showCommand(made.command, made.toml);
+    say("identifying: the panels below show it");
+  });
+}
+
+by("start-look").addEventListener("click", () => look(by("start-path").value));
+by("start-path").addEventListener("keydown", (event) => { if (event.key === "Enter") look(by("start-path").value); });
+by("start-identify").addEventListener("click", identify);
+by("start-files").addEventListener("change", (event) => drop([...event.target.files]));
+for (const kind of ["dragover", "drop"]) {
+  by("start").addEventListener(kind, (event) => {
+    event.preventDefault();
+    if (kind === "drop") drop([...event.dataTransfer.files]);
+  });
+}
