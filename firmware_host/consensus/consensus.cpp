@@ -24,10 +24,11 @@ constexpr double same_shape_run = 0.9;  // MAC from one order to the next
 constexpr double same_shape = 0.8;      // MAC between runs
 constexpr int fewest_orders = 4;        // a track shorter than this is chance
 constexpr double share_of_orders = 0.4; // of the orders from its first on
-constexpr int order_reach = 8;          // a pole may be missing for this many states
-constexpr double periods_seen = 0.75;   // of a mode within the horizon
-constexpr double periods_well = 1.5;    // where its damping is sharp
-constexpr double periods_least = 0.3;   // where several outputs together have periods_seen
+constexpr double as_near = 1e-4; // distances from a median, in thousandths of f and 2 % of the damping, that are one
+constexpr int order_reach = 8;   // a pole may be missing for this many states
+constexpr double periods_seen = 0.75; // of a mode within the horizon
+constexpr double periods_well = 1.5;  // where its damping is sharp
+constexpr double periods_least = 0.3; // where several outputs together have periods_seen
 constexpr double beats_seen = 0.75; // of a mode and its neighbour within the horizon: fewer, and a run sees one of both
 constexpr std::size_t fewest_voters = 6; // those with the longest horizons vote in any case
 constexpr double one_half = 0.5;         // votes and agreement
@@ -113,7 +114,8 @@ run_track track_of(const chain& poles) {
         out.orders.push_back(p->order);
         const double d = std::abs(p->frequency_hz / out.frequency_hz - 1) / 1e-3 +
                          std::abs(p->damping_ratio / out.damping_ratio - 1) / 2e-2;
-        if (d < nearest) nearest = d, best = p;
+        // of an even number the two in the middle are as near: the lower order then, not what rounding says
+        if (d < nearest - as_near) nearest = d, best = p;
     }
     out.frequency_spread = relative_spread(f, out.frequency_hz);
     out.damping_spread = relative_spread(z, out.damping_ratio);

@@ -334,6 +334,24 @@ static void values_come_from_runs_that_are_sharp() {
 }
 
 /// Two states a mode fill three quarters of them. A mode that only half of the runs find counts, one of noise does not.
+/// Of four poles the two in the middle are as near to the medians: which one gives the shape is not left to rounding.
+static void the_shape_of_a_track_does_not_hang_on_rounding() {
+    const auto second_entry = [](int orders, double moved) {
+        consensus_run run;
+        run.fs_hz = 100;
+        for (int k = 0; k < orders; ++k) {
+            run.orders.push_back(4 + 2 * k);
+            const double by = k == 2 ? 1 + moved : 1, f = (10 + 0.004 * k) * by, zeta = (0.01 + 0.0001 * k) * by;
+            run.poles.push_back({run.orders.back(), f, zeta, 1, 1, {1.0, 0.1 * k}});
+        }
+        link_tracks(run);
+        TEST_ASSERT_EQUAL(1, run.tracks.size());
+        return run.tracks.front().shape[1].real();
+    };
+    for (const double moved : {-1e-9, -1e-13, 0.0, 1e-13, 1e-9}) TEST_ASSERT_EQUAL_DOUBLE(0.1, second_entry(4, moved));
+    TEST_ASSERT_EQUAL_DOUBLE(0.2, second_entry(5, 0));
+}
+
 static void runs_are_full_of_modes() {
     TEST_ASSERT_FALSE(are_full(24, 9));
     TEST_ASSERT_TRUE(are_full(24, 10));
@@ -378,6 +396,7 @@ int main() {
     RUN_TEST(only_a_stronger_confident_mode_splits);
     RUN_TEST(two_outputs_split_nothing);
     RUN_TEST(values_come_from_runs_that_are_sharp);
+    RUN_TEST(the_shape_of_a_track_does_not_hang_on_rounding);
     RUN_TEST(runs_are_full_of_modes);
     RUN_TEST(level_and_scatter_are_those_of_the_highest_rate);
     return UNITY_END();
