@@ -82,18 +82,18 @@ def test_a_session_is_closed_while_others_feed(make: Callable[[], Any]) -> None:
 
 @pytest.mark.parametrize("kind", [okid.Accumulator, okid.SquareRoot])
 def test_accumulators(kind: Any) -> None:
+    sums, other = kind(1, 2, 5), kind(1, 2, 5)
+
     def work(one: Any, two: Any) -> None:
-        for _ in range(ROUNDS // 3):  # two that take each other in grow as the numbers of Fibonacci
+        for _ in range(ROUNDS):
             one.add(BLOCK)
             one.gap()
             one.merge(two)
             assert one.rows > 0
-            if one.rows > 1 << 20:  # each adds the other: as many as Fibonacci's numbers, were it to go on
+            if one.rows > 1 << 20:  # two that add each other grow as Fibonacci's numbers
                 one.reset()
 
-    for _ in range(3):
-        sums, other = kind(1, 2, 5), kind(1, 2, 5)
-        assert together(lambda: work(sums, other), lambda: work(other, sums)) == []  # noqa: B023
+    assert together(lambda: work(sums, other), lambda: work(other, sums)) == []
 
     def use() -> None:
         while True:

@@ -26,14 +26,23 @@ template <class Real> complex_number<Real> quotient(complex_number<Real> a, comp
     return {(a.re * r + a.im) / d, (a.im * r - a.re) / d};
 }
 
-/// Sum of the products of two complex arrays, in eight parts that a compiler keeps side by side.
+/// A sum is kept in so many parts, which a compiler keeps side by side.
+constexpr int sum_parts = 8;
+
+/// All parts together, in pairs.
+template <class Real> Real total(Real (&part)[sum_parts]) {
+    for (int width = sum_parts / 2; width > 0; width /= 2)
+        for (int k = 0; k < width; ++k) part[k] += part[k + width];
+    return part[0];
+}
+
+/// Sum of the products of two complex arrays.
 template <class Real>
 complex_number<Real> product_of(int count, const Real* a, const Real* b, const Real* x, const Real* y) {
-    constexpr int parts = 8;
-    Real re[parts] = {}, im[parts] = {};
+    Real re[sum_parts] = {}, im[sum_parts] = {};
     int j = 0;
-    for (; j + parts <= count; j += parts)
-        for (int k = 0; k < parts; ++k) {
+    for (; j + sum_parts <= count; j += sum_parts)
+        for (int k = 0; k < sum_parts; ++k) {
             re[k] += a[j + k] * x[j + k] - b[j + k] * y[j + k];
             im[k] += a[j + k] * y[j + k] + b[j + k] * x[j + k];
         }
@@ -41,12 +50,7 @@ complex_number<Real> product_of(int count, const Real* a, const Real* b, const R
         re[0] += a[j] * x[j] - b[j] * y[j];
         im[0] += a[j] * y[j] + b[j] * x[j];
     }
-    for (int width = parts / 2; width > 0; width /= 2)
-        for (int k = 0; k < width; ++k) {
-            re[k] += re[k + width];
-            im[k] += im[k + width];
-        }
-    return {re[0], im[0]};
+    return {total(re), total(im)};
 }
 
 template <class Real> class inverse_iteration {
@@ -162,15 +166,12 @@ template <class Real> void turn_back(int n, const Real* reduced, const Real* tau
     for (int k = n - 3; k >= 0; --k) {
         const Real* v = reduced + static_cast<std::size_t>(k) * static_cast<std::size_t>(n);
         for (Real* column = x; column <= x + n; column += n) {
-            constexpr int parts = 8;
-            Real sum[parts] = {column[k + 1]};
+            Real sum[sum_parts] = {column[k + 1]};
             int i = k + 2;
-            for (; i + parts <= n; i += parts)
-                for (int l = 0; l < parts; ++l) sum[l] += v[i + l] * column[i + l];
+            for (; i + sum_parts <= n; i += sum_parts)
+                for (int l = 0; l < sum_parts; ++l) sum[l] += v[i + l] * column[i + l];
             for (; i < n; ++i) sum[0] += v[i] * column[i];
-            for (int width = parts / 2; width > 0; width /= 2)
-                for (int l = 0; l < width; ++l) sum[l] += sum[l + width];
-            const Real w = tau[k] * sum[0];
+            const Real w = tau[k] * total(sum);
             column[k + 1] -= w;
             for (int j = k + 2; j < n; ++j) column[j] -= w * v[j];
         }

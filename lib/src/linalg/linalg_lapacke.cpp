@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    linear algebra on the host: LAPACKE (its _work calls only: no heap of its own) on OpenBLAS, one thread
-// METHOD     LAPACK's d and s routines under one overloaded name each, below templates of linalg.hpp
+// METHOD     LAPACK's d and s routines under one overloaded name each, below templates of linalg.hpp; eigenvalues alone by
+//            francis.hpp, single eigenvectors by inverse_iteration.hpp
 // NUMERICS   LAPACK's; workspace sizes are asked from LAPACK itself
 #include "linalg.hpp"
 
@@ -59,11 +60,11 @@ lapack_int gesdd(int rows, int cols, float* a, float* s, float* u, float* vt, in
     return LAPACKE_sgesdd_work(layout, 'S', rows, cols, a, rows, s, u, rows, vt, k, work, size, integers);
 }
 
-lapack_int geev(char vectors, int n, double* a, double* re, double* im, double* right, double* work, lapack_int size) {
-    return LAPACKE_dgeev_work(layout, 'N', vectors, n, a, n, re, im, nullptr, 1, right, n, work, size);
+lapack_int geev(int n, double* a, double* re, double* im, double* right, double* work, lapack_int size) {
+    return LAPACKE_dgeev_work(layout, 'N', 'V', n, a, n, re, im, nullptr, 1, right, n, work, size);
 }
-lapack_int geev(char vectors, int n, float* a, float* re, float* im, float* right, float* work, lapack_int size) {
-    return LAPACKE_sgeev_work(layout, 'N', vectors, n, a, n, re, im, nullptr, 1, right, n, work, size);
+lapack_int geev(int n, float* a, float* re, float* im, float* right, float* work, lapack_int size) {
+    return LAPACKE_sgeev_work(layout, 'N', 'V', n, a, n, re, im, nullptr, 1, right, n, work, size);
 }
 
 lapack_int gebal(int n, double* a, lapack_int* low, lapack_int* high, double* scale) {
@@ -119,7 +120,7 @@ template <class Real> lapack_int svd_query(int rows, int cols) {
 template <class Real> lapack_int eigen_query(int n) {
     return remembered(n, 0, [&] {
         Real wanted = 0, none = 0;
-        geev('V', n, &none, &none, &none, &none, &wanted, -1);
+        geev(n, &none, &none, &none, &none, &wanted, -1);
         return whole(wanted);
     });
 }
@@ -376,7 +377,7 @@ int eigen(int n, Real* a, Real* re, Real* im, as_is<Real*> vectors, Real* work, 
     const lapack_int size = eigen_query<Real>(n);
     if (vectors != nullptr) {
         if (wanted != nullptr && wanted_pairs<Real>(n, a, re, im, vectors, work, wanted)) return 0;
-        return geev('V', n, a, re, im, vectors, work, size);
+        return geev(n, a, re, im, vectors, work, size);
     }
     hessenberg_form<Real> form{work, work + n, 1, n};
     if (!form.reduce(n, a, work + 2 * n, size)) return 1;

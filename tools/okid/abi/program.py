@@ -22,11 +22,17 @@ def find_program() -> str | None:
     return next((str(one) for one in (built, beside) if os.access(one, os.X_OK)), None) or shutil.which("okid")
 
 
-def run_program(*arguments: str | Path) -> str:
-    """Standard output of `okid ARGUMENTS`. Raises InputError with its own message, or when there is no program."""
+def needed_program() -> str:
+    """find_program(). Raises InputError where there is none."""
     program = find_program()
     if program is None:
         raise InputError("the program `okid` is needed and was not found: put it on the path, or set OKID_PROGRAM")
+    return program
+
+
+def run_program(*arguments: str | Path) -> str:
+    """Standard output of `okid ARGUMENTS`. Raises InputError with its own message, or when there is no program."""
+    program = needed_program()
     try:
         done = subprocess.run(
             [program, *map(str, arguments)], capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False

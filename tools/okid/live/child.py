@@ -13,19 +13,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from okid._errors import InputError
-from okid.abi.program import find_program
 
 ENDS_S = 5.0  # from SIGTERM to SIGKILL
 MOST_SAID = 200  # lines of a program's messages that are kept
 _STAGE = re.compile(r"okid: (.*?)\s+(\d+) s$")
-
-
-def program() -> str:
-    """The program `okid`. InputError where there is none."""
-    found = find_program()
-    if found is None:
-        raise InputError("the program `okid` is needed and was not found: put it on the path, or set OKID_PROGRAM")
-    return str(Path(found).absolute())
 
 
 class Failed(InputError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a page may ask for beside looking on: a report, and on the start page files, channels and identifications.
+"""What a page may ask for: a report, and on the start page files, channels and identifications.
 
 Only who knows the token may ask: it is in the address that okid-live prints, and a page sends it as a header.
 """

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from okid._errors import Error
+from okid.abi.program import needed_program
 from okid.data.geometry import Geometry
 from okid.data.records import Record
 from okid.formats.geometry_file import read_geometry
-from okid.live.child import Child, program
+from okid.live.child import Child
 from okid.live.config import Identification, PageConfig, ReportFiles
 from okid.live.session import Session
 from okid.report.loaded import Loaded, load_result
@@ -171,7 +172,7 @@ class Identified(Worker):
         names = ", ".join(file.name for file in self._files.record[:3])
         self.session.working(f"identifying {names}")
         target = self._folder / "result.json"
-        command = [program(), "identify", *map(str, self._files.record), *self._options, f"--json={target}"]
+        command = [needed_program(), "identify", *map(str, self._files.record), *self._options, f"--json={target}"]
         self.child.run(command, lambda stage: self.session.working(f"identifying: {stage}"))
         self.session.working(f"reading {names}")
         try:

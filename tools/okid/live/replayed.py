@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from okid._errors import InputError
+from okid.abi.program import needed_program
 from okid.data.records import Record, read_csv
-from okid.live.child import program
 from okid.live.finished import Worker, feed_samples
 from okid.live.session import Session
 
@@ -38,7 +38,7 @@ class Replayed(Worker):
         self._length_s = 0.0
 
     def work(self) -> None:
-        page, okid, journal = self.session.config, program(), self._log
+        page, okid, journal = self.session.config, needed_program(), self._log
         if self._config is not None:
             journal = self._folder / "log.okj"
             self._step([okid, "convert", str(self._log), str(journal), f"--config={self._config}"], "reading")

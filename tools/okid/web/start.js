@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a page may ask for: a report, and on a start page files, channels and an identification. Each wish carries the key
-// that stands behind the # of the address okid-live printed; without it the page only looks on.
+// that stands behind the # of the address okid-live printed; without it the page is read-only.
 
 import { element, fill } from "./tables.js";
 
