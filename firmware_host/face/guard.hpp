@@ -31,7 +31,7 @@ template <class Work> int guard(Work&& work) noexcept {
 
 /// Throws `failure` (exit 2) when one is NULL.
 template <class... Pointers> void given(const Pointers*... pointers) {
-    if (((pointers == nullptr) || ...)) throw failure(exit_usage, "found NULL, expected an object, a text or an array");
+    if ((!pointers || ...)) throw failure(exit_usage, "found NULL, expected an object, a text or an array");
 }
 
 /// The same of what is read only when something is `there`.
