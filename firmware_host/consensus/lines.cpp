@@ -228,14 +228,17 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     return !decays(falling, rate * static_cast<double>(step) / level.fs_hz);
 }
 
-/// A line that the converter makes: at a simple part of the record's rate, in one output alone.
+/// A line that the converter makes: at a simple part of the record's rate, in one output alone. Of one that is narrow the
+/// runs may disagree by more than its width: it is then as near as they tell.
 bool is_of_the_rate(double fs_hz, const consensus_mode& mode) {
     double all = 0, most = 0;
     for (const complex& x : mode.shape) all += std::norm(x), most = std::max(most, std::norm(x));
     if (mode.shape.size() < 2 || most < alone * all) return false;
+    const bool narrow = mode.damping_ratio < line_damping;
+    const double near_hz = std::max(on_the_rate * mode.frequency_hz, narrow ? mode.frequency_scatter_hz : 0);
     for (int parts = 3; parts <= rate_parts; ++parts)
         for (int k = 1; 2 * k < parts; ++k)
-            if (std::abs(mode.frequency_hz / (fs_hz * k / parts) - 1) < on_the_rate) return true;
+            if (std::abs(mode.frequency_hz - fs_hz * k / parts) < near_hz) return true;
     return false;
 }
 

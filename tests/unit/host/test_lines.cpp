@@ -168,6 +168,11 @@ static void a_part_of_the_rate_in_one_output_is_pickup() {
     TEST_ASSERT_EQUAL_STRING("pickup", code(fs / 5, 0.01)[0].c_str());
     TEST_ASSERT_EQUAL_UINT64(0, code(fs / 5, -0.5).size());
     TEST_ASSERT_EQUAL_UINT64(0, code(1.01 * fs / 5, 0.01).size());
+    // its frequency, as the runs know it: a narrow one that they place here and there is not off the rate
+    consensus_mode wandering = pole(1.002 * fs / 5, 5e-4, 0.01), wide = pole(1.002 * fs / 5, 0.02, 0.01);
+    wandering.frequency_scatter_hz = wide.frequency_scatter_hz = 0.003 * fs / 5;
+    TEST_ASSERT_EQUAL_STRING("pickup", listed(level, false, {wandering})[0].why[0].c_str());
+    TEST_ASSERT_EQUAL_UINT64(0, listed(level, false, {wide})[0].why.size());
 }
 
 int main() {
