@@ -90,9 +90,13 @@ void virtual_filter::find_gains() {
     const MatrixXd to_state = from(Eigen::all, seen_), to_y = whole(Eigen::all, seen_),
                    to_force = CP.transpose()(Eigen::seqN(n_, forces_), seen_);
     const Eigen::LDLT<MatrixXd> inverse(whole(seen_, seen_));
-    gain_ = inverse.solve(to_state.transpose()).transpose();
-    to_y_ = inverse.solve(to_y.transpose()).transpose();
-    to_force_ = inverse.solve(to_force.transpose()).transpose();
+    const auto times_inverse = [&inverse](const MatrixXd& m) -> MatrixXd {
+        if (m.size() == 0) return m; // no force is sought, or no sensor is there
+        return inverse.solve(m.transpose()).transpose();
+    };
+    gain_ = times_inverse(to_state);
+    to_y_ = times_inverse(to_y);
+    to_force_ = times_inverse(to_force);
     now_.y_std = (whole.diagonal() - to_y_.cwiseProduct(to_y).rowwise().sum()).cwiseMax(0).cwiseSqrt();
     now_.y_std.array() *= model_.widen.array();
     for (const Index i : seen_) now_.y_std[i] = 0;
