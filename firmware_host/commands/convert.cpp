@@ -7,6 +7,7 @@
 #include "config/config.hpp"
 #include "error.hpp"
 #include "files/decimal_text.hpp"
+#include "files/progress.hpp"
 #include "files/whole_file.hpp"
 #include "journal/journal_header.hpp"
 #include "live/playback.hpp"
@@ -32,6 +33,33 @@ namespace {
 
 struct convert_arguments {
     std::string from, to, config;
+    bool quiet = false;
+};
+
+/// What was written, unless it was asked to be quiet.
+template <class... Words> void told(const convert_arguments& given, Words&&... words) {
+    if (!given.quiet) say(std::forward<Words>(words)...);
+}
+
+/// The frames of a log, with the progress of reading them.
+class shown_frames {
+  public:
+    template <class... Wanted>
+    explicit shown_frames(const convert_arguments& given, const Wanted&... wanted)
+        : frames_(given.from, wanted...), display_(std::make_unique<progress>(!given.quiet)) {
+        display_->stage("reading " + given.from);
+    }
+    const drv_frame_t* next() {
+        if (display_ && count_++ % 256 == 0) display_->share(frames_.share());
+        const drv_frame_t* frame = frames_.next();
+        if (!frame) display_.reset();
+        return frame;
+    }
+
+  private:
+    log_frames frames_;
+    std::unique_ptr<progress> display_;
+    std::uint64_t count_ = 0;
 };
 
 /// Rows of the grid as lines of text, in the units that the identification uses.
@@ -98,7 +126,7 @@ class csv_writer : public grid_sink {
 };
 
 void frames_to_csv(const convert_arguments& given, const live_config& config) {
-    log_frames frames(given.from, config);
+    shown_frames frames(given, config);
     whole_file out(given.to);
     csv_writer table(config, out);
     aligner samples(config, table);
@@ -111,8 +139,8 @@ void frames_to_csv(const convert_arguments& given, const live_config& config) {
         say("okid: channel \"{}\" has no frame in {}: its column is all nan\n", config.channels[index].name,
             given.from);
     out.commit();
-    say("{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(), config.channels.size(),
-        table.missing());
+    told(given, "{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(), config.channels.size(),
+         table.missing());
 }
 
 /// What the comment lines of the table say about its rate must agree with the config.
@@ -132,15 +160,22 @@ void csv_to_log(const convert_arguments& given, const live_config& config) {
     csv_request request;
     for (const channel_config& channel : config.channels) request.columns.push_back(channel.name);
     request.fs_hz = config.rate_hz;
+    std::optional<progress> display(!given.quiet);
+    display->stage("reading " + given.from);
+    request.progress = [&display](double share) { display->share(share); };
     const csv_record record = read_csv(given.from, request);
     frame_maker maker(config);
     std::string text;
-    for (std::size_t n = 0; n < record.count; ++n)
+    display->stage("writing " + given.to);
+    for (std::size_t n = 0; n < record.count; ++n) {
+        if (n % 256 == 0) display->share(static_cast<double>(n) / static_cast<double>(record.count));
         maker.append_sample(static_cast<std::int64_t>(n), record.samples.data() + n * request.columns.size(), text);
+    }
     write_whole_file(given.to, text);
+    display.reset();
     if (maker.saturated() > 0)
         say("okid: {} values did not fit their signal and stand at its limit\n", maker.saturated());
-    say("{}: {} frames of {} samples\n", given.to, maker.frames(), record.count);
+    told(given, "{}: {} frames of {} samples\n", given.to, maker.frames(), record.count);
 }
 
 /// Name of a bus of a journal as a log can have it.
@@ -153,7 +188,7 @@ std::string log_name(const journal_header& header, std::size_t bus) {
 
 void journal_to_log(const convert_arguments& given) {
     const journal_header header = read_journal_header(given.from);
-    log_frames frames(given.from);
+    shown_frames frames(given);
     whole_file out(given.to);
     std::vector<std::string> names;
     for (std::size_t i = 0; i < DRV_MAX_BUSES; ++i) names.push_back(log_name(header, i));
@@ -169,7 +204,7 @@ void journal_to_log(const convert_arguments& given) {
         losses += frame->loss != 0;
     }
     out.commit();
-    say("{}: {} frames\n", given.to, count);
+    told(given, "{}: {} frames\n", given.to, count);
     if (stamps + losses > 0)
         say("okid: a log has no place for the stamps of the devices ({}), for marks of losses ({}) and for "
             "times below a microsecond; the journal keeps them\n",
@@ -237,8 +272,8 @@ void log_to_journal(const convert_arguments& given, const std::optional<live_con
     }
     std::vector<std::string> interfaces;
     for (const journal_header::bus& bus : header.buses) interfaces.push_back(bus.interface);
-    const auto frames = config ? std::make_unique<log_frames>(given.from, *config)
-                               : std::make_unique<log_frames>(given.from, interfaces);
+    const auto frames =
+        config ? std::make_unique<shown_frames>(given, *config) : std::make_unique<shown_frames>(given, interfaces);
     whole_file out(given.to);
     journal_text journal(out);
     long long count = 0;
@@ -251,7 +286,7 @@ void log_to_journal(const convert_arguments& given, const std::optional<live_con
                                                  config ? fmt::format(" of the buses of {}", config->path) : ""));
     journal.end();
     out.commit();
-    say("{}: {} frames{}\n", given.to, count, config ? "" : "; without -c it holds no config");
+    told(given, "{}: {} frames{}\n", given.to, count, config ? "" : "; without -c it holds no config");
 }
 
 /// The config given, or that of the journal; none where it is not needed.
@@ -300,6 +335,7 @@ void add_convert(CLI::App& app) {
     command->add_option("out", given->to, "the file to write")->required()->type_name("OUT.csv|OUT.log|OUT.okj");
     command->add_option("-c,--config", given->config, "which bits are which channel; a journal holds its own")
         ->type_name("CONFIG.toml");
+    command->add_flag("--quiet", given->quiet, "no summary, no progress");
     command->footer(
         "Files of other programs (MDF4, UFF, HDF5, .mat, BLF, ASC): okid-convert, of the Python package.\n\n"
         "Examples:\n  okid convert frame.log frame.csv -c frame.toml\n  okid convert "

@@ -5,13 +5,13 @@
 #include "compare/set_ups.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
-#include "files/units.hpp"
+#include "files/progress.hpp"
 #include "files/whole_file.hpp"
 #include "frequency/identify_responses.hpp"
 #include "frequency/response_file.hpp"
-#include "progress.hpp"
 #include "record/csv_header.hpp"
 #include "record/hit_files.hpp"
+#include "record/proposal.hpp"
 #include "record/record.hpp"
 #include "record/request.hpp"
 #include "record_files.hpp"
@@ -26,8 +26,6 @@
 namespace okid_host {
 namespace {
 
-constexpr std::size_t most_proposed = 64; ///< columns in a message
-
 /// The command line as it was typed.
 struct identify_arguments {
     record_request wanted;
@@ -40,53 +38,14 @@ struct identify_arguments {
 
 [[noreturn]] void usage(const std::string& text) { throw failure(exit_usage, text); }
 
-enum class column_kind { unknown, force, response };
-
-/// By its unit, else by its name.
-column_kind kind_of_column(const std::string& name) {
-    if (const std::string role = role_of_unit(unit_of_name(name)); !role.empty())
-        return role == "force" ? column_kind::force : column_kind::response;
-    const std::string small = lower_case(name);
-    for (const char* word : {"force", "hammer", "shaker", "load"})
-        if (small.find(word) != std::string::npos) return column_kind::force;
-    const std::string begin = small.substr(0, small.find_last_not_of("0123456789 _xyz+-.") + 1);
-    if (begin == "f") return column_kind::force;
-    for (const char* word :
-         {"a", "acc", "accel", "acceleration", "v", "vel", "velocity", "disp", "displacement", "out"})
-        if (begin == word) return column_kind::response;
-    return column_kind::unknown;
-}
-
-/// A list of names as it is typed, "" without names.
-std::string typed_names(const char* option, const std::vector<std::string>& names) {
-    if (names.empty()) return "";
-    std::string list;
-    for (const std::string& name : names)
-        list += (list.empty() ? "" : ",") + (name.find(',') == std::string::npos ? name : '"' + name + '"');
-    const bool plain = list.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.,-") ==
-                       std::string::npos;
-    for (std::size_t at = 0; (at = list.find('\'', at)) != std::string::npos; at += 4) list.replace(at, 1, "'\\''");
-    return fmt::format(" {} {}", option, plain ? list : "'" + list + "'");
-}
-
-/// The options that name these columns, as far as units and names tell which are forces; "" = they do not.
-std::string proposed_columns(const std::vector<std::string>& columns) {
-    std::vector<std::string> forces, responses;
-    for (const std::string& name : columns) {
-        const column_kind kind = kind_of_column(name);
-        if (kind != column_kind::unknown) (kind == column_kind::force ? forces : responses).push_back(name);
-    }
-    if (responses.empty() || forces.size() + responses.size() > most_proposed) return "";
-    return fmt::format("; by their names perhaps{}{}", typed_names("--inputs", forces),
-                       typed_names("--outputs", responses));
-}
-
 /// The names of the columns; says which there are when none were chosen.
 void choose_columns(identify_arguments& given, record_files& files) {
     if (given.outputs.empty()) {
         const std::vector<std::string> columns = files.columns(given.records.front());
-        usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}{}",
-                          given.records.front(), list_names(columns), proposed_columns(columns)));
+        const std::string proposed = proposed_options(columns);
+        usage(fmt::format("--outputs is missing, expected the names of the response columns; {} has: {}{}{}",
+                          given.records.front(), list_names(columns),
+                          proposed.empty() ? "" : "; by their names perhaps", proposed));
     }
     if (!given.inputs.empty()) given.wanted.inputs = split_names("--inputs", given.inputs);
     given.wanted.outputs = split_names("--outputs", given.outputs);
@@ -132,13 +91,12 @@ record_set read_records(const identify_arguments& given, record_files& files, co
     request.columns = options.inputs;
     request.columns.insert(request.columns.end(), outputs.begin(), outputs.end());
     if (!given.wanted.fs.empty()) request.fs_hz = check_rate(given.wanted.fs);
+    request.progress = [&](double share) { display.share(share); };
     record_set set;
     set.n_u = options.inputs.size();
     set.n_y = outputs.size();
     for (const std::string& path : given.records) {
-        request.progress = [&](double megabytes) {
-            display.stage(fmt::format("reading {}, {:.0f} MB", path, megabytes));
-        };
+        display.stage("reading " + path);
         csv_record record = files.read(path, request);
         if (set.records.empty()) {
             options.fs_hz = record.fs_hz;
@@ -220,11 +178,15 @@ record_result identify_files_of_responses(const identify_arguments& given) {
     if (!given.inputs.empty()) asked.wanted.inputs = split_names("--inputs", given.inputs);
     if (!given.outputs.empty()) asked.wanted.outputs = split_names("--outputs", given.outputs);
     check_targets(given);
+    progress display(!given.quiet);
+    display.stage("identifying the frequency responses of " + given.records.front());
     return identify_responses(read_set_ups(given.records), asked);
 }
 
 record_result identify_files_of_samples(identify_arguments given) {
     if (!given.exponential.empty()) usage("--exponential belongs to --frf: it is the window in frequency responses");
+    progress display(!given.quiet);
+    display.stage("reading " + given.records.front());
     record_files files(given.group);
     choose_columns(given, files);
     if (!given.set_ups && !given.references.empty()) usage("--references belongs to --setups");
@@ -242,7 +204,6 @@ record_result identify_files_of_samples(identify_arguments given) {
     record_options options = check_request(given.wanted);
     check_targets(given);
     options.all_modes = given.all_modes;
-    progress display(!given.quiet);
     options.stage = [&](const char* stage) { display.stage(stage); };
     record_result result;
     if (given.set_ups) {

@@ -133,8 +133,8 @@ void convert_file(const std::string& path, const std::string& group, const std::
         throw failure(exit_usage, fmt::format("{}: {}, which reads this format, is neither beside okid nor in PATH: "
                                               "pip install okid",
                                               path, converter));
-    std::vector<std::string> arguments;
-    if (!group.empty()) arguments = {"--group=" + group};
+    std::vector<std::string> arguments{"--quiet"};
+    if (!group.empty()) arguments.push_back("--group=" + group);
     arguments.insert(arguments.end(), {"--", path, table});
     auto [code, said] = run_program(program, arguments);
     if (stop_requested()) throw failure(exit_interrupted, "interrupted; no file is left half-written");

@@ -3,12 +3,14 @@
 #include "acquire/stop_signal.hpp"
 #include "commands.hpp"
 #include "error.hpp"
+#include "files/progress.hpp"
 #include "live/playback.hpp"
 #include "live/session.hpp"
 #include "live_options.hpp"
 
 #include <fmt/format.h>
 #include <memory>
+#include <unistd.h>
 
 namespace okid_host {
 namespace {
@@ -38,7 +40,10 @@ void replay(const replay_arguments& given) {
                 exit_usage,
                 "--to plays the log onto a bus and identifies nothing: leave -c, --events, --json, --duration and "
                 "--trigger-at out");
-        play_onto_bus(given.log, given.to, given.speed.empty() ? std::optional<double>(1.0) : speed);
+        progress display(!given.quiet);
+        display.stage("playing " + given.log);
+        play_onto_bus(given.log, given.to, given.speed.empty() ? std::optional<double>(1.0) : speed,
+                      [&display](double share) { display.share(share); });
         return;
     }
     std::optional<journal_header> header;
@@ -56,7 +61,13 @@ void replay(const replay_arguments& given) {
     require_edge_time(config, options.trigger_ns.has_value());
     catch_stop_signals();
     session played(config, options);
-    play_through(given.log, config, played, speed, std::nullopt);
+    const bool beside_a_table = isatty(STDOUT_FILENO) && isatty(STDERR_FILENO);
+    {
+        progress display(!given.quiet && !beside_a_table);
+        display.stage("replaying " + given.log);
+        play_through(given.log, config, played, speed, std::nullopt,
+                     [&display](double share) { display.share(share); });
+    }
     played.finish();
 }
 
@@ -85,6 +96,7 @@ void add_replay(CLI::App& app) {
                      "when the GPIO edge came, in the log's time (time_s of the trigger event of the live run)")
         ->type_name("SECONDS");
     add_output_options(*command, *given);
+    command->get_option("--quiet")->description("no modes, no table, no progress");
     command->footer("The result is the same at every speed, and that of the run a journal was recorded by.\n\n"
                     "Examples:\n  okid replay runs/frame-20261121T120000Z-0001.okj\n  okid replay frame.log -c "
                     "frame.toml --json result.json\n  okid replay frame.log --to "

@@ -5,6 +5,7 @@
 #include "files/units.hpp"
 #include "record/csv.hpp"
 #include "record/csv_header.hpp"
+#include "record/proposal.hpp"
 
 #include <algorithm>
 #include <memory>
@@ -55,6 +56,15 @@ size_t okid_host_unit_of_name(const char* name, char* unit, size_t size) {
     });
     if (size > 0 && unit) unit[found.copy(unit, size - 1)] = '\0';
     return found.size();
+}
+
+const char* okid_host_side_of_column(const char* name) {
+    std::string found;
+    (void)face::guard([&] {
+        face::given(name);
+        found = proposed_sides({name}).front();
+    });
+    return found == "inputs" ? "inputs" : found == "outputs" ? "outputs" : "";
 }
 
 int32_t okid_host_unit(const char* unit, double* factor, const char** si) {

@@ -12,16 +12,36 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <drv/journal.h>
+#include <drv/source.h>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
+#include <numeric>
 #include <string_view>
+#include <unistd.h>
 #include <utility>
 
 namespace okid_host {
 namespace {
 
+constexpr std::size_t most_segments = 9999;
+
 int stop_asked(void*) { return stop_requested(); }
+
+/// `tell` is called so often: what it costs is not seen.
+class teller {
+  public:
+    teller(const log_frames& frames, const played_share& tell) : frames_(frames), tell_(tell) {}
+    void played() {
+        if (tell_ && count_++ % 256 == 0) tell_(frames_.share());
+    }
+
+  private:
+    const log_frames& frames_;
+    const played_share& tell_;
+    std::uint64_t count_ = 0;
+};
 
 /// Which bus of a config each bus of a journal feeds, -1 = none.
 std::vector<int> map_journal(const std::string& path, const live_config& config) {
@@ -125,6 +145,30 @@ void log_frames::open(const std::vector<std::string>& interfaces) {
         config.interfaces[i] = interfaces[i].c_str();
     config.interface_count = static_cast<std::int32_t>(std::min<std::size_t>(interfaces.size(), DRV_MAX_BUSES));
     if (source_.ops->open(&source_, &config) != 0) throw failure(exit_usage, source_.error);
+    measure();
+}
+
+/// The sizes of a log, or of a journal and the segments behind it.
+void log_frames::measure() {
+    char next[4096];
+    std::error_code fault;
+    for (std::string path = path_; sizes_.size() < most_segments; path = next) {
+        const auto bytes = std::filesystem::file_size(path, fault);
+        if (fault) return;
+        sizes_.push_back(static_cast<double>(bytes));
+        if (!is_journal(path) || !drv_journal_next_name(path.c_str(), next, sizeof next)) return;
+    }
+}
+
+double log_frames::share() const {
+    const int fd = source_.ops->fd(&source_);
+    const off_t at = fd < 0 ? -1 : lseek(fd, 0, SEEK_CUR);
+    const double all = std::accumulate(sizes_.begin(), sizes_.end(), 0.0);
+    if (at < 0 || !(all > 0)) return -1;
+    const int file = is_journal(path_) ? drv_source_journal_segments(&source_) - 1 : 0;
+    const auto behind =
+        sizes_.begin() + std::clamp<std::ptrdiff_t>(file, 0, std::distance(sizes_.begin(), sizes_.end()));
+    return std::min(1.0, std::accumulate(sizes_.begin(), behind, static_cast<double>(at)) / all);
 }
 
 log_frames::~log_frames() { source_.ops->close(&source_); }
@@ -188,12 +232,14 @@ void require_edge_time(const live_config& config, bool given) {
 }
 
 void play_through(const std::string& log, const live_config& config, stream_target& target, std::optional<double> speed,
-                  const std::optional<recorder_options>& recording) {
+                  const std::optional<recorder_options>& recording, const played_share& tell) {
     log_frames frames(log, config);
+    teller told(frames, tell);
     recording_link recorded(config, recording);
     pacer pace(speed);
     while (const drv_frame_t* frame = frames.next()) {
         if (!pace.wait_for(frame->time_ns)) break;
+        told.played();
         if (recorded.get()) recorded.get()->feed(*frame);
         target.frame(*frame);
         recorded.serve(target);
@@ -202,13 +248,16 @@ void play_through(const std::string& log, const live_config& config, stream_targ
     recorded.finish(target);
 }
 
-void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed) {
+void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed,
+                   const played_share& tell) {
     log_frames frames(log);
+    teller told(frames, tell);
     frame_target sink(interface);
     catch_stop_signals();
     pacer pace(speed);
     while (const drv_frame_t* frame = frames.next()) {
         if (!pace.wait_for(frame->time_ns)) break;
+        told.played();
         sink.write(*frame);
     }
     if (stop_requested()) throw failure(exit_interrupted, fmt::format("interrupted after {} frames", sink.sent()));

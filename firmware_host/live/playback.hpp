@@ -6,6 +6,7 @@
 
 #include <drv/pacer.h>
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -50,12 +51,16 @@ class log_frames {
     log_frames& operator=(const log_frames&) = delete;
     /// The next frame, NULL at the end.
     const drv_frame_t* next();
+    /// How much of the files was read, 0 to 1; below 0 = not known (a pipe).
+    double share() const;
 
   private:
     void open(const std::vector<std::string>& interfaces);
+    void measure();
     void tell_damage();
 
     std::string path_;
+    std::vector<double> sizes_; ///< bytes of each file
     drv_source_t source_{};
     bool told_ = false;
     std::vector<int> bus_of_; ///< of each bus of a journal, -1 = not wanted; empty = as it was
@@ -66,11 +71,15 @@ class log_frames {
 /// A log holds no edges of a GPIO line: throws `failure` (exit 2) when the config waits for one and none is given.
 void require_edge_time(const live_config& config, bool given);
 
+/// Called now and then with the share of a log that was played, 0 to 1; below 0 = not known.
+using played_share = std::function<void(double share)>;
+
 /// Play a log through a target; finishing it is the caller's. Signals are caught already. Throws `failure`.
 void play_through(const std::string& log, const live_config& config, stream_target& target, std::optional<double> speed,
-                  const std::optional<recorder_options>& recording);
+                  const std::optional<recorder_options>& recording, const played_share& tell = {});
 
 /// Play every frame of a log onto an interface. Throws `failure`: exit 2 for the log, exit 4 for the interface.
-void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed);
+void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed,
+                   const played_share& tell = {});
 
 } // namespace okid_host

@@ -13,7 +13,7 @@ struct csv_request {
     std::vector<std::string> columns; ///< names, in the order wanted
     bool whole = false;               ///< instead: every column that has a name, empty ones and an unknown rate too
     std::optional<double> fs_hz;      ///< overrides what the file says
-    std::function<void(double megabytes)> progress; ///< called now and then while reading; may be empty
+    std::function<void(double share)> progress; ///< called now and then while reading, 0 to 1; may be empty
 };
 
 struct csv_record {

@@ -295,7 +295,8 @@ void row_parser::read(line_reader& reader, const csv_request& request) {
         line = cut(block, line);
         parse_pieces();
         collect();
-        if (request.progress) request.progress(static_cast<double>(reader.bytes()) / 1e6);
+        if (request.progress && reader.size())
+            request.progress(static_cast<double>(reader.bytes()) / static_cast<double>(reader.size()));
     }
     out_.samples.resize(out_.count * width_); // without empty lines at the end
     if (time_column_ >= 0) times_.resize(out_.count);

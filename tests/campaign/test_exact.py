@@ -17,7 +17,6 @@ import pytest
 from distributed import Client, LocalCluster
 from okid.campaign.cluster import connected
 from okid.campaign.pieces import make_identifier
-from okid.campaign.progress_line import ProgressLine
 from okid.campaign.run import run_campaign
 from okid.campaign.spec import CampaignSpec
 from rig_records import SMALL, campaign, facts
@@ -84,14 +83,13 @@ def test_two_workers_give_the_same(spec: CampaignSpec, truth: dict[str, Any], tw
     assert facts(run_campaign(replace(spec, folder=spec.base / "two"), two)) == truth
 
 
-class _Killer(ProgressLine):
+class _Killer:
     """Ends a worker process (kill -9) after so many steps of the run."""
 
     def __init__(self, client: Any, after: int) -> None:
-        super().__init__(1, 1)
         self._client, self._left, self.killed = client, after, 0
 
-    def show(self, records: int, groups: int, last: bool = False) -> None:
+    def __call__(self, *_counts: int) -> None:
         self._left -= 1
         if not self.killed and self._left < 0:
             self.killed = min(self._client.run(os.getpid).values())

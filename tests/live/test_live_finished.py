@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import csv
 import http.client
 import json
 import os
+import re
+import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,12 +19,12 @@ import pytest
 from event_source import Listener, ask
 from live_process import Live
 from okid.data.records import read_csv
+from okid.formats.geometry_file import read_geometry
 from okid.live import desk as desks
 from okid.live import main
 from okid.live.child import Child, Failed
 from okid.live.config import PageConfig
 from okid.live.desk import Desk, identify_options, proposed, spec_of
-from okid.live.replayed import remaining
 from okid.live.session import Session
 from okid.live.tracks import Tracks
 from program import okid
@@ -84,6 +87,33 @@ def test_a_result_with_its_record(rig: Path, okid_live: Callable[..., Live]) -> 
     status, page = post(live, "/report", {})
     assert status == 200 and page.startswith(b"<!DOCTYPE html>") and b"t.csv" in page
     assert live.end() == (0, "")
+
+
+GEOMETRY = "node,1,0,0,2\nnode,2,0,0,1\nnode,7,0,0,0\nline,1,2\nline,2,7\nsensor,acc2,1,x\nsensor,acc1,2,-x\nfixed,7\n"
+
+
+def test_a_geometry_is_drawn_from_a_table(rig: Path, tmp_path: Path, okid_live: Callable[..., Live]) -> None:
+    """Typed on the page of a finished result; the TOML that is answered gives the same structure."""
+    live = okid_live(rig / "r.json", "--record", rig / "t.csv")
+    assert until_over(live)["facts"]["geometry"] is None
+    for table in ("", 3, "node,1,0,0", "node,1,0,0,0\nsensor,other,1,x", "node,1,0,0,0\nline,1,2"):
+        status, said = post(live, "/geometry", {"table": table})
+        assert status == 422 and said.count(b"\n") == 1 and b"table" in said and b"/" not in said
+    status, said = post(live, "/geometry", {"table": GEOMETRY})
+    assert status == 200, said
+    shown = until_over(live)["facts"]["geometry"]
+    assert shown["nodes"] == [[0, 0, 2], [0, 0, 1], [0, 0, 0]] and shown["lines"] == [[1, 2], [2, 3]]
+    assert shown["dofs"] == [[2, "-x"], [1, "x"]] and shown["fixed"] == [3]  # of acc1, of acc2
+    toml = json.loads(said)["toml"]
+    channels = re.findall(r'# \[\[channel\]\] "(\w+)": dof = (-?\d+)', toml)
+    toml += "".join(f'\n[[channel]]\nname = "{name}"\ndof = {dof}\n' for name, dof in channels)
+    (tmp_path / "g.toml").write_text(toml)
+    (tmp_path / "g.csv").write_text(GEOMETRY)
+    one, other = read_geometry(tmp_path / "g.toml"), read_geometry(tmp_path / "g.csv")
+    names = ["acc1", "acc2"]
+    assert (one.nodes, one.lines, one.fixed) == (other.nodes, other.lines, other.fixed)
+    assert one.places(names) == other.places(names) == [(2, "-x"), (1, "x")]
+    assert b"geometry.csv" in post(live, "/report", {})[1] and live.end() == (0, "")
 
 
 def test_records_are_identified_by_the_program(rig: Path, okid_live: Callable[..., Live]) -> None:
@@ -166,7 +196,7 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     assert live.end() == (0, "")
 
 
-WISHES = ("/report", "/look", "/identify", "/open", "/upload?name=a.csv")
+WISHES = ("/report", "/geometry", "/look", "/identify", "/open", "/upload?name=a.csv")
 
 
 @pytest.mark.parametrize("path", WISHES)
@@ -278,12 +308,12 @@ def test_what_was_named_is_said(desk: Desk, rig: Path, tmp_path: Path) -> None:
 
 def test_command_and_toml_do_the_same(rig: Path, tmp_path: Path) -> None:
     fields = {"inputs": ["force1"], "outputs": ["acc1", "acc2"], "method": "okid-era", "fs": "500"}
-    assert proposed(rig / "t.csv") == {"force1": "inputs", "acc1": "outputs", "acc2": "outputs"}
     options = identify_options({**fields, "input_dofs": "-1", "output_dofs": "1,2"})
     assert options == ["--inputs=force1", "--outputs=acc1,acc2", "--fs=500", "--method=okid-era", "--input-dofs=-1",
                        "--output-dofs=1,2"]  # fmt: skip
     assert identify_options({"outputs": ["a,b"]}) == ['--outputs="a,b"']
     record = read_csv(rig / "t.csv")
+    assert proposed(record) == ["inputs", "outputs", "outputs"]
     odd = tmp_path / "a [1].csv"
     odd.write_bytes((rig / "t.csv").read_bytes())
     (tmp_path / "s.toml").write_text(spec_of(fields, [odd], record.fs_hz), encoding="utf-8")
@@ -309,11 +339,11 @@ def test_a_program_is_watched_and_ended(tmp_path: Path) -> None:
     stages: list[str] = []
     lines: list[str] = []
     script = tmp_path / "tells"
-    stage = "printf '\\rokid: reading a, 5 MB         2 s\\r' >&2"
+    stage = "printf '\\rokid: 2 s, reading a, 40 %%, 3 s left   \\r' >&2"
     script.write_text(f"#!/bin/sh\n{stage}\necho line\necho 'okid: bad' >&2\nexit $1\n")
     script.chmod(0o755)
     Child().run([str(script), "0"], stages.append, lines.append)
-    assert stages == ["reading a, 5 MB, 2 s"] and lines == ["line\n"]
+    assert stages == ["reading a, 40 %, 3 s left"] and lines == ["line\n"]
     with pytest.raises(Failed, match="bad"):
         Child().run([str(script), "2"], stages.append)
     with pytest.raises(Failed, match="cannot be run"):
@@ -327,9 +357,17 @@ def test_a_program_is_watched_and_ended(tmp_path: Path) -> None:
         waits.run([str(script), "0"], stages.append)
 
 
-def test_remaining_time() -> None:
-    assert remaining(0.01, 5.0) == "1 %" and remaining(0.25, 5.0) == "25 %, 15 s left"
-    assert remaining(1.2, 5.0) == "100 %" and remaining(0.99, 1.0) == "99 %"
+@pytest.mark.parametrize("names", [["Last [N]", "a1", "f2", "x", "T [degC]", "b [g]"], ["f1", "F'2", "acc,3", "out"]])
+def test_what_is_proposed_is_what_okid_identify_says(tmp_path: Path, names: list[str]) -> None:
+    """The page has it as data, the program in a sentence."""
+    table = tmp_path / "n.csv"
+    head = ",".join(f'"{name}"' for name in names)
+    table.write_text(f"# fs_hz: 10\n{head}\n" + "1,2,3,4,5,6\n"[: 2 * len(names) - 1] + "\n", encoding="utf-8")
+    sides = dict(zip(names, proposed(read_csv(table)), strict=True))
+    said = okid("identify", table, status=2).stderr.rpartition("; by their names perhaps ")[2]
+    typed = dict(zip(*[iter(shlex.split(said))] * 2, strict=True))
+    for side in ("inputs", "outputs"):
+        assert next(csv.reader([typed[f"--{side}"]])) == [name for name, own in sides.items() if own == side]
 
 
 def test_modes_of_any_time_stay_within_bounds() -> None:

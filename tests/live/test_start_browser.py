@@ -140,3 +140,28 @@ def test_the_slider_goes_to_any_time_and_pictures_are_saved(
         assert name == "signals.png" and picture.width > 2000
     tab.check_quiet()
     assert live.end() == (0, "")
+
+
+def test_a_geometry_typed_as_a_table(rig: Path, tmp_path: Path, browser: Any, okid_live: Callable[..., Live]) -> None:
+    """Pasted from a spreadsheet on a phone; what is wrong is said beside it, the key is asked for."""
+    result = tmp_path / "r.json"
+    columns = ("--inputs", "force1", "--outputs", "acc1,acc2", "--p", "20")
+    okid("identify", rig / "t.csv", *columns, "--json", result, status=0)
+    live = okid_live(result)
+    tab = Tab(browser, live)
+    page = tab.page
+    page.set_viewport_size({"width": 390, "height": 800})
+    tab.wait("() => okidLive.page.result && !document.getElementById('geometry').hidden")
+    page.click("#geometry summary")
+    page.fill("#geometry-table", "node,1,0,0")
+    page.click("#geometry-draw")
+    tab.wait("() => document.querySelector('#geometry-note.bad')?.textContent.includes('the table')")
+    page.fill(
+        "#geometry-table", "node\t1\t0\t0\t2\nnode\t2\t0\t0\t1\nline\t1\t2\nsensor\tacc1\t1\tx\nsensor\tacc2\t2\tx"
+    )
+    page.click("#geometry-draw")
+    tab.wait("() => document.getElementById('geometry-toml').textContent.startsWith('[geometry]')")
+    tab.wait("() => okidLive.page.result && okidLive.page.facts.geometry?.nodes.length === 2")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    tab.check_quiet()
+    assert not Tab(browser, live, live.url).page.is_visible("#geometry")

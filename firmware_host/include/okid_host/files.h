@@ -55,6 +55,12 @@ OKID_HOST_API void okid_host_csv_delete(okid_host_csv_t* self);
 OKID_HOST_API size_t okid_host_unit_of_name(const char* name, char* unit, size_t size);
 
 /**
+ * What a column probably is, by the unit in its name, else by the name: what `okid identify` proposes.
+ * @return "inputs" (a force), "outputs" (a response) or "" (not known)
+ */
+OKID_HOST_API const char* okid_host_side_of_column(const char* name);
+
+/**
  * What makes a unit SI: 1 unit = factor si.
  * @return 1; 0: the unit is not known
  */

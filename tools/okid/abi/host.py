@@ -82,6 +82,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_host_csv_samples": (ctypes.POINTER(ctypes.c_double), [_handle, _sizes, _sizes]),
     "okid_host_csv_delete": (None, [_handle]),
     "okid_host_unit_of_name": (_size, [_text, _handle, _size]),
+    "okid_host_side_of_column": (_text, [_text]),
     "okid_host_unit": (_status, [_text, ctypes.POINTER(ctypes.c_double), ctypes.POINTER(_text)]),
     "okid_host_config_load": (_status, [_text, _text, ctypes.POINTER(_handle)]),
     "okid_host_config_json": (_text, [_handle]),
@@ -188,6 +189,12 @@ def unit_of_name(name: str) -> str:
     text = ctypes.create_string_buffer(len(encoded) + 1)
     library().okid_host_unit_of_name(encoded, text, len(text))
     return text.value.decode()
+
+
+def side_of_column(name: str) -> str:
+    """ "inputs", "outputs" or "": what `okid identify` proposes for a column of that name."""
+    found: bytes = library().okid_host_side_of_column(name.encode("utf-8", "replace"))
+    return found.decode()
 
 
 def unit(name: str) -> tuple[float, str] | None:

@@ -7,7 +7,7 @@ import argparse
 import json
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
@@ -21,6 +21,7 @@ from okid.campaign.record_list import list_records
 from okid.campaign.spec import CampaignSpec, Trend, load_spec
 from okid.campaign.virtual_year import Year, simulate_year
 from okid.data.input_file import parse_json, read_input
+from okid.data.progress import Progress
 from okid.data.whole_file import whole_file
 from okid.report.written_line import written_line
 
@@ -158,12 +159,15 @@ def _run(args: argparse.Namespace, written: str) -> int:
     )  # fmt: skip
     if spec.identification.method != "auto":
         make_identifier(spec)  # sizes that the library refuses are reported before any work
-    outcome = run_campaign(spec)
-    tables = make_tables(spec, outcome)
-    write_tables(spec.folder, tables)
-    about = _about(spec, outcome.remarks)
-    _save_about(spec.folder, about)
-    lines = _page(spec.folder / "report.html", tables, about, spec.trend, written)
+    with Progress("okid-campaign", not args.quiet) as shown:
+        shown.stage(f"listing the records of {spec.path}")
+        outcome = run_campaign(spec, told=_counted(shown))
+        shown.stage("writing the tables and the report")
+        tables = make_tables(spec, outcome)
+        write_tables(spec.folder, tables)
+        about = _about(spec, outcome.remarks)
+        _save_about(spec.folder, about)
+        lines = _page(spec.folder / "report.html", tables, about, spec.trend, written)
     for one in outcome.skipped[:_SHOWN]:
         _complain(f"left out: {one.name}: {one.reason}")
     if len(outcome.skipped) > _SHOWN:
@@ -180,6 +184,16 @@ def _run(args: argparse.Namespace, written: str) -> int:
         faults = [fault for fault in tables["groups"]["fault"].dropna().tolist()] if len(tables["groups"]) else []
         raise IdentificationError(f"no group gives a model: {faults[0] if faults else 'there is none'}")
     return EXIT_DONE
+
+
+def _counted(shown: Progress) -> Callable[[int, int, int, int], None]:
+    """What a run tells after every step, for the line of its progress."""
+
+    def told(records: int, of_records: int, groups: int, of_groups: int) -> None:
+        share = (records + groups) / max(1, of_records + of_groups)
+        shown.stage("identifying", share, f"{records}/{of_records} records, {groups}/{of_groups} groups")
+
+    return told
 
 
 def _page(path: Path, tables: dict[str, Any], about: dict[str, Any], trend: Trend, written: str) -> list[str]:
@@ -206,14 +220,9 @@ def _report(args: argparse.Namespace, written: str) -> int:
 def _simulate(args: argparse.Namespace) -> int:
     fields = Year.__dataclass_fields__
     year = Year(**{name: getattr(args, name) for name in fields})
-    folder, shown = Path(args.folder), sys.stderr.isatty()
-
-    def told(done: int) -> None:
-        if shown and (done % 50 == 0 or done == year.records):
-            end = "\n" if done == year.records else ""
-            print(f"\r\x1b[K{done}/{year.records} records", end=end, file=sys.stderr, flush=True)
-
-    simulate_year(folder, year, told)
+    folder = Path(args.folder)
+    with Progress("okid-campaign") as shown:
+        simulate_year(folder, year, lambda done: shown.stage("simulating", done / max(1, year.records)))
     say(f"{folder}/SPEC.toml: {year.records} records; okid-campaign run {folder}/SPEC.toml")
     return EXIT_DONE
 

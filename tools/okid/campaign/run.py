@@ -14,7 +14,6 @@ from okid._errors import InputError
 from okid.campaign.cluster import connected
 from okid.campaign.grouping import Group, group_records
 from okid.campaign.plan import GroupPlan, batches_of, slices_of
-from okid.campaign.progress_line import ProgressLine
 from okid.campaign.record_list import Skipped, list_records
 from okid.campaign.refinement import plan_of
 from okid.campaign.spec import CampaignSpec
@@ -24,6 +23,7 @@ from okid.campaign.tasks import Slice, finish_group, hash_records, merge_batch, 
 from okid.shown.notebook_html import own_fields
 
 FAN_IN = 8
+Steps = Callable[[int, int, int, int], None]  # records in sums of all, groups finished of all: after every step
 _HASHED_AT_ONCE = 64
 
 
@@ -76,7 +76,7 @@ class _Tree:
         return (parent, children) if all(child in self.nodes for child in children) else None
 
 
-def run_campaign(spec: CampaignSpec, client: Any = None, progress: ProgressLine | None = None) -> Outcome:
+def run_campaign(spec: CampaignSpec, client: Any = None, told: Steps | None = None) -> Outcome:
     """Do what is still to be done of a campaign; `client` a dask.distributed.Client, else the cluster of the spec.
 
     Records that were finished by an earlier run are not read again. Raises InputError when the records cannot be
@@ -90,7 +90,7 @@ def run_campaign(spec: CampaignSpec, client: Any = None, progress: ProgressLine 
         def connect() -> Any:
             return client or stack.enter_context(connected(spec.workers, spec.address, spec.memory_mb))
 
-        return _Run(spec, connect, state, groups, [*bad, *keyless], progress).run()
+        return _Run(spec, connect, state, groups, [*bad, *keyless], told).run()
 
 
 class _Run:
@@ -98,7 +98,7 @@ class _Run:
 
     def __init__(
         self, spec: CampaignSpec, connect: Callable[[], Any], state: StateFolder, groups: list[Group],
-        bad: list[Skipped], progress: ProgressLine | None,
+        bad: list[Skipped], told: Steps | None,
     ) -> None:  # fmt: skip
         self.spec, self.state = spec, state
         self._connect = connect
@@ -111,7 +111,8 @@ class _Run:
         self.suspects: list[Slice] = []  # records that were with a worker when it died
         self.under_way: dict[Any, tuple[Any, ...]] = {}
         self.inside = 0  # records in sums
-        self.progress = progress or ProgressLine(sum(len(group.records) for group in groups), len(groups))
+        self.told = told
+        self.all = sum(len(group.records) for group in groups)
 
     @property
     def client(self) -> Any:
@@ -135,11 +136,12 @@ class _Run:
                     self.submit_batch([self.suspects.pop()], alone=True)
                 future = next(self._queue)
                 self.arrived(future, self.under_way.pop(future))
-                self.progress.show(self.inside, len(self.out.done) + len(self.out.faults))
+                if self.told is not None:
+                    groups = len(self.out.done) + len(self.out.faults)
+                    self.told(self.inside, self.all, groups, len(self.out.groups))
         finally:
             for future in self.under_way:
                 future.cancel()
-        self.progress.show(self.inside, len(self.out.done) + len(self.out.faults), last=True)
         self.tell()
         return self.out
 

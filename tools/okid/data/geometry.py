@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -172,3 +173,15 @@ def geometry_of(config: Mapping[str, Any], source: str) -> Geometry | None:
         if isinstance(one, dict) and "name" in one and isinstance(one.get("dof"), int) and one["dof"] != 0
     }
     return Geometry(nodes, dofs, lines, numbers, source, surfaces, fixed)
+
+
+def geometry_toml(geometry: Geometry) -> str:
+    """[geometry] of a CONFIG.toml that is the same structure; the dof of each channel as remarks."""
+    lines = ["[geometry]"]
+    for key in ("nodes", "lines", "surfaces", "fixed"):
+        rows = getattr(geometry, key)
+        if rows:
+            lines.append(f"{key} = {json.dumps(rows)}")
+    lines.append(f"dofs = {json.dumps(geometry.dofs)}")
+    lines += [f"# [[channel]] {json.dumps(name)}: dof = {dof}" for name, dof in geometry.channel_dofs.items()]
+    return "\n".join(lines) + "\n"

@@ -15,6 +15,7 @@ from pathlib import Path
 from okid._errors import Error, InputError, complain, say
 from okid.data.interrupt import EXIT_INTERRUPTED
 from okid.data.line_splitter import LineSplitter
+from okid.data.progress import Progress
 from okid.data.records import Record
 from okid.formats.by_name import (
     EXTENSIONS,
@@ -186,6 +187,7 @@ def _parser() -> argparse.ArgumentParser:
         "--config", metavar="CONFIG.toml", help="decode a log of CAN frames into samples by this config"
     )
     parser.add_argument("--force", action="store_true", help="replace OUT when it is there")
+    parser.add_argument("--quiet", action="store_true", help="no summary, no progress")
     return parser
 
 
@@ -234,9 +236,13 @@ def _run(args: argparse.Namespace, source: Path, target: Path) -> str:
 def convert(arguments: Sequence[str] | None = None) -> int:
     """The command with its arguments (None = those of the process); exit code 0, 2 or 130 (interrupted)."""
     args = _parser().parse_args(arguments)
+    told: list[str] = []
     try:
-        for source, target in _pairs(args):
-            say(_run(args, source, target))
+        pairs = _pairs(args)
+        with Progress("okid-convert", not args.quiet) as shown:
+            for k, (source, target) in enumerate(pairs):
+                shown.stage("converting", k / len(pairs) if len(pairs) > 1 else None, str(source))
+                told.append(_run(args, source, target))
     except Error as fault:
         complain("okid-convert", fault)
         return EXIT_USAGE
@@ -246,4 +252,7 @@ def convert(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         complain("okid-convert", "interrupted, the file in work was not written")
         return EXIT_INTERRUPTED
+    finally:
+        for line in told if not args.quiet else []:
+            say(line)
     return EXIT_DONE

@@ -7,7 +7,7 @@ import ctypes
 import json
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -134,10 +134,22 @@ def _records(inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]], wh
     return len(outputs), _columns(inputs), _columns(outputs), counts, _names(what, len(outputs))
 
 
-def identify(options: Mapping[str, Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]]) -> HostResult:
-    """`options` by the arguments of okid.identify(); of each record (N, n_u) and (N, n_y), one of TYPES."""
+_stage_t = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p)  # okid_host_stage_t
+
+
+def _calls(on_stage: Callable[[str], None]) -> Any:
+    return _stage_t(lambda _context, text: on_stage(text.decode("utf-8", "replace")))
+
+
+def identify(
+    options: Mapping[str, Any], inputs: Sequence[NDArray[Any]], outputs: Sequence[NDArray[Any]],
+    on_stage: Callable[[str], None] | None = None,
+) -> HostResult:  # fmt: skip
+    """`options` by the arguments of okid.identify(); of each record (N, n_u) and (N, n_y), one of TYPES. `on_stage` is
+    called with what begins."""
     handle, arguments = ctypes.c_void_p(), _records(inputs, outputs, "record")
-    host.call("identify_columns", options_text(options), *arguments, None, None, ctypes.byref(handle))
+    told = None if on_stage is None else _calls(on_stage)
+    host.call("identify_columns", options_text(options), *arguments, told, None, ctypes.byref(handle))
     return HostResult(handle)
 
 

@@ -16,7 +16,7 @@ from okid._errors import InputError
 
 ENDS_S = 5.0  # from SIGTERM to SIGKILL
 MOST_SAID = 200  # lines of a program's messages that are kept
-_STAGE = re.compile(r"okid: (.*?)\s+(\d+) s$")
+_STAGE = re.compile(r"okid[\w-]*: \d+ s, (.*)$")  # as Progress and files/progress.cpp write it
 
 
 class Failed(InputError):
@@ -36,8 +36,8 @@ class Child:
         self, command: Sequence[str], on_stage: Callable[[str], None],
         on_line: Callable[[str], None] | None = None,
     ) -> None:  # fmt: skip
-        """Run to the end. `on_stage(text)`: what the program does now and for how long; `on_line(text)`: every line of
-        its standard output, which waits meanwhile. Raises Failed with what it said; after stop() at once."""
+        """Run to the end. `on_stage(text)`: what the program does now and how long it goes on; `on_line(text)`: every
+        line of its standard output, which waits meanwhile. Raises Failed with what it said; after stop() at once."""
         shown, inside = os.openpty()  # programs report their progress to a terminal
         said: list[str] = []
         try:
@@ -96,7 +96,7 @@ def _follow(shown: int, said: list[str], on_stage: Callable[[str], None]) -> Non
             said += [line for line in whole if line.strip() and not _STAGE.match(line.strip())]
             newest = next((m for line in (rest, *reversed(whole)) if (m := _STAGE.match(line.strip()))), None)
             if newest is not None:
-                on_stage(f"{newest[1]}, {newest[2]} s")
+                on_stage(newest[1])
             del said[:-MOST_SAID]
     if rest.strip() and not _STAGE.match(rest.strip()):
         said.append(rest)

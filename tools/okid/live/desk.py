@@ -6,7 +6,6 @@ Only who knows the token may ask: it is in the address that okid-live prints, an
 
 from __future__ import annotations
 
-import csv
 import glob
 import hmac
 import itertools
@@ -17,13 +16,17 @@ import shlex
 import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from io import BufferedIOBase
 from pathlib import Path
 from typing import Any
 
 from okid._errors import InputError
-from okid.abi.program import run_program
+from okid.abi.host import side_of_column
+from okid.data.geometry import geometry_toml
 from okid.data.memory import max_memory_mb
+from okid.data.records import Record
+from okid.formats.geometry_file import read_geometry
 from okid.live.child import Child
 from okid.live.config import PageConfig, ReportFiles, config_of_log
 from okid.live.finished import Finished, Identified, over
@@ -77,19 +80,13 @@ def _listed(names: Sequence[str]) -> str:
     return ",".join(f'"{name}"' if "," in name else name for name in names)
 
 
-def proposed(file: Path) -> dict[str, str]:
-    """Which columns are forces and which responses, by the rule of `okid identify`: names and units. {} = not known."""
-    try:
-        run_program("identify", file)
-    except InputError as fault:
-        _, _, options = str(fault).rpartition("; by their names perhaps")
-        try:
-            words = shlex.split(options)
-        except ValueError:
-            return {}
-        pairs = list(zip(words[::2], words[1::2], strict=False))
-        return {name: option.lstrip("-") for option, list_ in pairs for name in next(csv.reader([list_]), [])}
-    return {}
+def proposed(record: Record) -> list[str]:
+    """ "inputs", "outputs" or "" for each channel: what the file says of it, else the rule of `okid identify`."""
+    sides = {"force": "inputs", "aux": ""}
+    return [
+        sides.get(role, "outputs") if role else side_of_column(name)
+        for name, role in zip(record.names, record.roles, strict=True)
+    ]
 
 
 def identify_options(fields: Mapping[str, Any]) -> list[str]:
@@ -127,7 +124,10 @@ class Desk:
         if start:
             session.ended("ready")
         self.token = secrets.token_urlsafe(24)
-        self._works: dict[str, Callable[[Mapping[str, Any]], Any]] = {"/report": self.report}
+        self._works: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+            "/report": self.report,
+            "/geometry": self.geometry,
+        }
         if start:
             self._works |= {"/look": self.look, "/identify": self.identify, "/open": self.open}
         self._reporter, self._reporting, self._changing = Child(), threading.Lock(), threading.Lock()
@@ -176,6 +176,24 @@ class Desk:
         finally:
             self._reporting.release()
 
+    def geometry(self, fields: Mapping[str, Any]) -> dict[str, str]:
+        """Show the finished result on the structure of a table that was typed; its [geometry] as TOML."""
+        files, table = self.session.config.report, fields.get("table")
+        if files.result is None or self.session.result() is None:
+            raise InputError("there is no finished result, expected a result or records that were identified")
+        if not isinstance(table, str) or not table.strip():
+            raise InputError("the table is empty, expected rows such as node,1,0,0,3 and sensor,acc1,1,x")
+        with self._changing:
+            place = self._job() / "geometry.csv"
+            place.write_text(table, encoding="utf-8")
+            try:
+                toml = geometry_toml(read_geometry(place))
+                ready = over(files.result, replace(files, geometry=place))
+            except InputError as fault:
+                raise InputError(str(fault).replace(str(place), "the table")) from None
+            self.session.show(replace(ready.config, path=self.session.config.path), lambda own: Finished(own, ready))
+        return {"toml": toml}
+
     def upload(self, name: str, length: int, source: BufferedIOBase) -> dict[str, str]:
         """Keep `length` bytes of `source` under that name in the private folder. InputError above the bound."""
         shown = re.sub(r"[^\w.() +-]", "_", name.replace("\\", "/").rpartition("/")[2]).lstrip("-. ")[-120:]
@@ -220,10 +238,10 @@ class Desk:
             return {"kind": kind, "path": str(path)}
         if kind != "record":
             raise InputError(f"{path}: is {found and found.words}, expected a record, a log, a journal or a result")
-        record, side = open_record(path), proposed(path)
+        record = open_record(path)
         channels = [
-            {"name": name, "unit": unit, "side": {"force": "inputs", None: side.get(name, "")}.get(role, "outputs")}
-            for name, unit, role in zip(record.names, record.units, record.roles, strict=True)
+            {"name": name, "unit": unit, "side": side}
+            for name, unit, side in zip(record.names, record.units, proposed(record), strict=True)
         ]
         return {"kind": kind, "path": str(path), "channels": channels, "fs_hz": record.fs_hz,
                 "samples": len(record.samples)}  # fmt: skip

@@ -173,7 +173,7 @@ class Identified(Worker):
         self.session.working(f"identifying {names}")
         target = self._folder / "result.json"
         command = [needed_program(), "identify", *map(str, self._files.record), *self._options, f"--json={target}"]
-        self.child.run(command, lambda stage: self.session.working(f"identifying: {stage}"))
+        self.child.run(command, self.session.working)
         self.session.working(f"reading {names}")
         try:
             found = over(target, self._files)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,13 +15,6 @@ from okid.abi.program import needed_program
 from okid.data.records import Record, read_csv
 from okid.live.finished import Worker, feed_samples
 from okid.live.session import Session
-
-
-def remaining(share: float, elapsed_s: float) -> str:
-    """How far a work is and how long it goes on at the same speed: "40 %, 12 s left". share 0 to 1."""
-    share = min(max(share, 0.0), 1.0)
-    left_s = elapsed_s * (1.0 - share) / share if share > 0.05 else 0.0
-    return f"{100.0 * share:.0f} %" + (f", {left_s:.0f} s left" if left_s >= 1.0 else "")
 
 
 class Replayed(Worker):
@@ -56,10 +48,9 @@ class Replayed(Worker):
 
     def _step(self, command: list[str], word: str) -> None:
         self.session.working(f"{word} {self._log.name}")
-        self.child.run(command, lambda stage: self.session.working(f"{word}: {stage}"))
+        self.child.run(command, self.session.working)
 
     def _replay(self, command: list[str], events: Path) -> None:
-        begun = time.monotonic()
         with events.open("w", encoding="utf-8") as kept:
 
             def take(line: str) -> None:
@@ -69,13 +60,11 @@ class Replayed(Worker):
                     self._start(event)
                     return
                 self.session.line(line.encode())
-                if event["type"] != "result" and self._length_s:
-                    how = remaining(event.get("t", 0.0) / self._length_s, time.monotonic() - begun)
-                    self.session.working(f"replaying: {how}")
 
-            self.child.run(command, lambda _stage: None, take)
-        if self.session.result() is None:
-            self.session.ended("ended without a result")
+            self.session.working(f"replaying {self._log.name}")
+            self.child.run(command, self.session.working, take)
+        there = self.session.result() is not None
+        self.session.ended("ended: result" if there else "ended without a result")
 
     def _start(self, event: dict[str, object]) -> None:
         """The `start` event with the channels that are in the log, then their samples."""

@@ -282,6 +282,7 @@ class Session:
             "channels": [each.__dict__ for each in self.run.channels],
             "start": self.takes_files,
             "absent": self.config.absent,
+            "finished": self.config.report.result is not None,
             "length_s": self.config.length_s,
             "geometry": None
             if geometry is None

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -142,7 +143,12 @@ def identify(
         "hit_dofs": hit_dofs, "keep_all": keep_all, "threads": threads,
     }  # fmt: skip
     said = {key: value for key, value in options.items() if value is not _UNSAID.get(key)}
-    return of_host(host_result.identify(said, inputs, outputs))  # type: ignore[no-any-return]
+    if "ipykernel" not in sys.modules:
+        return of_host(host_result.identify(said, inputs, outputs))  # type: ignore[no-any-return]
+    from okid.data.notebook_progress import cell_progress
+
+    with cell_progress() as shown:
+        return of_host(host_result.identify(said, inputs, outputs, shown.stage))  # type: ignore[no-any-return]
 
 
 _UNSAID: dict[str, Any] = identify.__kwdefaults__ or {}  # what the library takes where nothing is said

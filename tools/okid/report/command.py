@@ -15,6 +15,7 @@ from typing import NoReturn
 
 from okid._errors import Error, InputError, complain, say, shown
 from okid.data.interrupt import halt_if_interrupted
+from okid.data.progress import Progress
 from okid.report.other_kinds import MADE_BY, check_kind
 from okid.report.pdf import browser, print_pdf
 from okid.report.targets import check_place, check_target, write_whole
@@ -72,6 +73,7 @@ def _parser() -> _Parser:
     parser.add_argument("--pdf", metavar="FILE.pdf", help="print the page too; needs Chromium or Chrome on PATH")
     parser.add_argument("--figures", metavar="FOLDER", help="every picture as .svg, .png and .csv too")
     parser.add_argument("--title", metavar="TEXT", help="heading of the report")
+    parser.add_argument("--quiet", action="store_true", help="no summary, no progress")
     return parser
 
 
@@ -89,7 +91,7 @@ def _check_targets(args: argparse.Namespace, target: Path | None) -> None:
         check_place(args.pdf, "--pdf", ".pdf")
 
 
-def _page(args: argparse.Namespace, written: str) -> str:
+def _page(args: argparse.Namespace, written: str, shown: Progress) -> str:
     """The HTML; matplotlib and scipy load here, after all that can be refused without them."""
     from okid.report.compose import build
     from okid.report.loaded import load_result
@@ -97,7 +99,7 @@ def _page(args: argparse.Namespace, written: str) -> str:
     return build(
         load_result(args.result), args.record or None, args.title, events=args.events, geometry=args.geometry,
         config=args.config, compare=args.compare, source=args.result, written=written,
-        figures_folder=args.figures,
+        figures_folder=args.figures, progress=lambda share: shown.stage("drawing", share),
     )  # fmt: skip
 
 
@@ -116,7 +118,9 @@ def _run(args: argparse.Namespace, target: Path | None, written: str) -> None:
     check_kind(args.result, "result")
     _check_targets(args, target)
     program = browser() if args.pdf else ""
-    text = _page(args, written)
+    with Progress("okid-report", not args.quiet) as progress:
+        progress.stage("reading")
+        text = _page(args, written, progress)
     halt_if_interrupted()
     told = sys.stdout
     if target is None:
@@ -125,9 +129,13 @@ def _run(args: argparse.Namespace, target: Path | None, written: str) -> None:
         sys.stdout.flush()
     else:
         write_whole(target, text)
-        say(f"{target}: {len(text.encode('utf-8')) // 1024} KiB")
+        if not args.quiet:
+            say(f"{target}: {len(text.encode('utf-8')) // 1024} KiB")
     if args.pdf:
-        _print(program, target, text, args.pdf)
+        with Progress("okid-report", not args.quiet) as progress:
+            progress.stage("printing the PDF")
+            _print(program, target, text, args.pdf)
+    if args.pdf and not args.quiet:
         print(shown(f"{args.pdf}: {Path(args.pdf).stat().st_size // 1024} KiB"), file=told)
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -44,6 +44,7 @@ from okid.result import figures
 from okid.result.result import Result
 
 Place = str | Path
+SECTIONS = 31  # that _sections() comes to when nothing is missing
 
 
 def _sections(m: Material, written: str | None) -> Iterator[page.Section | None]:
@@ -102,6 +103,7 @@ def build(
     source: Place | None = None,
     written: str | None = None,
     figures_folder: Place | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> str:
     """The report as one HTML string; the same arguments and files give the same string.
 
@@ -110,7 +112,7 @@ def build(
     read, where all their files are beside `source` or here. `events`: JSON lines of the run; `config`: CONFIG.toml;
     `geometry`: that too, a .csv or a universal file; `compare`: the file of an earlier result; `source`: the file of
     the result, named in the provenance; `written`: when and by what, None = left out; `figures_folder`: every picture
-    goes there as .svg, .png and .csv (its numbers) too.
+    goes there as .svg, .png and .csv (its numbers) too; `progress`: called with the share that is drawn.
     Raises InputError or IdentificationError when a file cannot be read or does not belong to the result.
     """
     m = Material(result, pictures=Pictures(folder_for(figures_folder)))
@@ -127,7 +129,11 @@ def build(
     m.measured, m.no_record = taken.measured, taken.absent
     m.sources[1 if source is not None else 0 : 1 if source is not None else 0] = taken.sources
     with matplotlib.rc_context(cast(Any, figures.STYLE)):
-        sections = [one for one in _sections(m, written) if one is not None]
+        sections: list[page.Section] = []
+        for k, one in enumerate(_sections(m, written), 1):
+            sections += [one] if one is not None else []
+            if progress is not None:
+                progress(min(k / SECTIONS, 0.99))
     raw = result.raw
     forces = f"hits at {count_of(len(result.inputs), 'place')}" if m.struck else count_of(len(result.inputs), "input")
     if result.raw.get("set_ups"):

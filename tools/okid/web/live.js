@@ -3,7 +3,7 @@
 
 import { Lanes, numbers } from "./lanes.js";
 import { Plot, diagram, frf, saveCanvas, spectra, tracking } from "./plots.js";
-import { offerReport, offerStart } from "./start.js";
+import { offerGeometry, offerReport, offerStart } from "./start.js";
 import { Log, pickedModes, showHits, showModes, showResult, showStats } from "./tables.js";
 
 const by = (id) => document.getElementById(id);
@@ -152,6 +152,7 @@ function takeResult(result) {
   page.result = result;
   by("result").hidden = !result;
   offerReport(result);
+  offerGeometry(result && page.facts.finished);
   if (!result) return;
   showResult(result);
   takeModes(page.modes);

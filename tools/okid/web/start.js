@@ -47,6 +47,24 @@ export function offerReport(result) {
   by("report").hidden = !(result && key);
 }
 
+// -- the geometry of a finished result --------------------------------------------------------------------------------
+
+export function offerGeometry(wanted) {
+  by("geometry").hidden = !(wanted && key);
+}
+
+by("geometry-draw").addEventListener("click", () => {
+  const tell = (text, bad = false) => {
+    by("geometry-note").textContent = text;
+    by("geometry-note").classList.toggle("bad", bad);
+  };
+  wish(async () => {
+    const rows = by("geometry-table").value.replaceAll("\t", ","); // as a spreadsheet pastes them
+    by("geometry-toml").textContent = (await ask("geometry", { table: rows })).toml;
+    tell("the same in a CONFIG.toml:");
+  }, tell);
+});
+
 by("report").addEventListener("click", () => {
   const own = by("report"), tell = (text) => { own.title = own.textContent = text; };
   own.disabled = true;
