@@ -21,6 +21,7 @@ MARKS = (
 
 sys.path.insert(0, str(Path(__file__).resolve().parent / "support"))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before anything imports NumPy, and for what tests start
+os.environ["OKID_PROGRESS"] = "0"  # a busy machine would have lines of progress on stderr
 
 # Under nohup, or behind an & of a script, these are ignored, and what the tests start would inherit that.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -17,6 +19,12 @@ constexpr std::size_t width = 78;
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// OKID_PROGRESS=0: as with --quiet, for whatever this process starts too.
+bool asked_for() {
+    const char* set = std::getenv("OKID_PROGRESS");
+    return set == nullptr || std::strcmp(set, "0") != 0;
 }
 
 bool inside_a_letter(char c) { return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U; }
@@ -41,7 +49,7 @@ std::string progress_text(const std::string& stage, double share, double seconds
 
 progress::progress(bool wanted) : terminal_(isatty(STDERR_FILENO) == 1) {
     const signals_wait the_main_thread_takes_them;
-    if (wanted) thread_ = std::thread([this] { show(); });
+    if (wanted && asked_for()) thread_ = std::thread([this] { show(); });
 }
 
 progress::~progress() {

@@ -10,19 +10,25 @@ import pty
 import re
 import subprocess
 import sys
-import time
+import threading
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import okid as okid_package
 import pytest
-from okid.data import progress
+from okid.data import notebook_progress, progress
 from okid.data.progress import Progress, progress_text
 from program import PROGRAM, okid
 from two_masses import rig_text, simulate_rig
 
 LINE = re.compile(r"okid: (\d+) s, replaying \S+a\.log, (\d+) %(?:, (\d+) s left)?\s*")
+
+
+@pytest.fixture(autouse=True)
+def wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other tests are without."""
+    monkeypatch.delenv("OKID_PROGRESS")
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +52,7 @@ def on_terminal(command: list[str], folder: Path) -> tuple[int, str, str]:
     return process.returncode, (folder / "out").read_text(), said.decode()
 
 
+@pytest.mark.realtime
 def test_a_replay_off_a_terminal_says_one_line_every_ten_seconds(rig: Path) -> None:
     """A log of 14 s at its own speed: one line, at 10 s, with a time that is left; stdout has none of it."""
     slow = [rig / "a.log", "-c", rig / "a.toml", "--speed", "1", "--json", rig / "slow.json"]
@@ -58,6 +65,7 @@ def test_a_replay_off_a_terminal_says_one_line_every_ten_seconds(rig: Path) -> N
     assert done.stdout == fast.stdout and (rig / "slow.json").read_bytes() == (rig / "fast.json").read_bytes()
 
 
+@pytest.mark.realtime
 def test_a_terminal_has_one_line_that_goes_away_again(rig: Path, tmp_path: Path) -> None:
     command = [PROGRAM, "replay", str(rig / "a.log"), "-c", str(rig / "a.toml"), "--speed", "3"]
     code, out, said = on_terminal(command, tmp_path)
@@ -69,6 +77,7 @@ def test_a_terminal_has_one_line_that_goes_away_again(rig: Path, tmp_path: Path)
     assert code == 0 and said == ""
 
 
+@pytest.mark.realtime
 def test_python_says_the_same(tmp_path: Path) -> None:
     """okid-convert of several files, on a terminal: which one, how many are done."""
     for k in range(3):
@@ -91,30 +100,51 @@ def test_python_says_the_same(tmp_path: Path) -> None:
         assert bool(told) == (out.count("samples x") == 3) == (not quiet) and set(told) <= {"0", "33", "67"}
 
 
-class _Terminal(io.StringIO):
+class _Out(io.StringIO):
+    """A terminal, or none, that can be waited for."""
+
+    def __init__(self, terminal: bool) -> None:
+        super().__init__()
+        self._terminal, self._more = terminal, threading.Condition()
+
     def isatty(self) -> bool:
-        return True
+        return self._terminal
+
+    def write(self, text: str) -> int:
+        with self._more:
+            self._more.notify_all()
+            return super().write(text)
+
+    def wait_until(self, text: str) -> None:
+        with self._more:
+            assert self._more.wait_for(lambda: text in self.getvalue(), 1800), self.getvalue()
 
 
 @pytest.mark.parametrize("terminal", [True, False])
 def test_stage_share_and_time(terminal: bool) -> None:
-    out = _Terminal() if terminal else io.StringIO()
+    out = _Out(terminal)
     with Progress("okid-x", out=out, hurry=100.0) as shown:
         shown.stage("reading a\x1b.csv")
-        time.sleep(0.3)
+        out.wait_until("reading a\\x1b.csv")
         shown.stage("adding", 0.5, "5/10 records")
-        time.sleep(0.3)
+        out.wait_until("adding 5/10 records, 50 %")
         shown.stage("adding", 0.75, "7/10 records")
-        time.sleep(0.3)
+        out.wait_until("adding 7/10 records, 75 %")
     said = out.getvalue()
-    assert "okid-x: 0 s, reading a\\x1b.csv" in said and "adding 7/10 records, 75 %" in said
+    assert said.startswith("\rokid-x: " if terminal else "okid-x: ")
     assert said.count("\n") == (0 if terminal else len(said.splitlines())) and (not terminal or said.endswith("\r"))
-    silent = io.StringIO()
-    with Progress("okid-x", wanted=False, out=silent, hurry=1000.0):
-        time.sleep(0.1)
-    with Progress("okid-x", out=silent):  # over before it is worth a line
+
+
+@pytest.mark.parametrize("by", ["argument", "environment"])
+def test_nobody_who_does_not_want_it_has_it(by: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if by == "environment":
+        monkeypatch.setenv("OKID_PROGRESS", "0")
+    with Progress("okid-x", wanted=by != "argument", out=_Out(False), hurry=1000.0):
+        assert all(thread.name != "okid progress" for thread in threading.enumerate())
+    out = _Out(False)
+    with Progress("okid-x", out=out):  # over before it is worth a line
         pass
-    assert silent.getvalue() == ""
+    assert out.getvalue() == ""
 
 
 def test_time_that_is_left() -> None:
@@ -125,22 +155,43 @@ def test_time_that_is_left() -> None:
 
 
 def test_a_notebook_has_it_below_the_cell(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the names of the stages; nothing of it is left at the end, and no kernel: no line."""
+    """Nothing of it is left at the end; where there is no kernel, there is no line."""
     shown: list[str] = []
+    first = threading.Event()
 
     def display(content: dict[str, str], raw: bool, display_id: bool) -> Any:
         assert raw and display_id
         shown.append(content["text/plain"])
+        first.set()
         return SimpleNamespace(update=lambda content, raw: shown.append(content["text/plain"]))
 
     for name in ("FIRST_S", "REDRAW_S"):
         monkeypatch.setattr(progress, name, 0.001)
-    u, y = okid_package.demo_record()
-    okid_package.identify(u, y, fs=1000.0)
-    assert shown == []
+    assert not notebook_progress.in_notebook()
     kernel = SimpleNamespace(get_ipython=lambda: SimpleNamespace(kernel=True))
     for module, content in (("ipykernel", SimpleNamespace()), ("IPython", kernel)):
         monkeypatch.setitem(sys.modules, module, content)
     monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=display))
+    with notebook_progress.cell_progress() as line:
+        line.stage("looking")
+        assert first.wait(1800)
+    assert shown[0].startswith("okid: 0 s, ") and shown[-1] == ""
+
+
+def test_identify_names_its_stages(monkeypatch: pytest.MonkeyPatch) -> None:
+    stages: list[str] = []
+
+    class Line:
+        def __enter__(self) -> Any:
+            return SimpleNamespace(stage=stages.append)
+
+        def __exit__(self, *_fault: object) -> None:
+            pass
+
+    monkeypatch.setattr(notebook_progress, "cell_progress", Line)
+    u, y = okid_package.demo_record()
     okid_package.identify(u, y, fs=1000.0)
-    assert any("looking with several methods" in line for line in shown) and shown[-1] == ""
+    assert stages == []  # no notebook
+    monkeypatch.setitem(sys.modules, "ipykernel", SimpleNamespace())
+    okid_package.identify(u, y, fs=1000.0)
+    assert any("looking with several methods" in stage for stage in stages)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 from pathlib import Path
 
@@ -13,8 +12,7 @@ PROGRAM = str(Path(os.environ.get("OKID_PROGRAM") or ROOT / "build" / "okid").ab
 
 
 def okid(*arguments: object, status: int | None = None) -> subprocess.CompletedProcess[str]:
-    """`okid ARGUMENTS` without a terminal; whatever its exit code is, or with the one that is asked for. The lines of
-    its progress, one every 10 s on a busy machine, are left out."""
+    """`okid ARGUMENTS` without a terminal; whatever its exit code is, or with the one that is asked for."""
     done = subprocess.run(
         [PROGRAM, *map(str, arguments)],
         capture_output=True,
@@ -23,7 +21,6 @@ def okid(*arguments: object, status: int | None = None) -> subprocess.CompletedP
         stdin=subprocess.DEVNULL,
         check=False,
     )
-    done.stderr = re.sub(r"(?m)^okid: \d+ s, .*\n", "", done.stderr)
     if status is not None:
         assert (
             done.returncode == status

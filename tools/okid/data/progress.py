@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What a long command does and how long it goes on, on stderr; nothing for what takes less than 2 s. The same as
-files/progress.cpp of the program."""
+"""What a long command does and how long it goes on, on stderr; nothing for what takes less than 2 s, nor where
+OKID_PROGRESS is 0. The same as files/progress.cpp of the program."""
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 import time
@@ -35,7 +36,8 @@ class Progress:
     stage that reports nothing for a minute is seen to go on."""
 
     def __init__(self, program: str, wanted: bool = True, out: TextIO | None = None, hurry: float = 1.0) -> None:
-        self._program, self._wanted, self._out = program, wanted, out or sys.stderr
+        self._program, self._out = program, out or sys.stderr
+        self._wanted = wanted and os.environ.get("OKID_PROGRESS") != "0"
         self._terminal, self._hurry = self._out.isatty(), hurry
         self._lock, self._end, self._shown = threading.Lock(), threading.Event(), False
         self._stage, self._detail, self._begun_at = "working", "", 0.0
