@@ -187,6 +187,7 @@ def amalgamate(folder: Path) -> None:
 PLACES = {  # what packaging/ has, and where it stands in the library that all of them share
     "arduino/library.json": "library.json",
     "arduino/library.properties": "library.properties",
+    "boards/README.md": "README.md",
     "arduino/stream_node": "examples/stream_node",
     "arduino/modes_node": "examples/modes_node",
     "cmsis/okid.okid.pdsc": "okid.okid.pdsc",

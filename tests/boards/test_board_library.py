@@ -45,6 +45,14 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return it
 
 
+def test_readme_names_what_the_folder_has(library: Path) -> None:
+    text = (library / "README.md").read_text("utf-8")
+    assert "@VERSION@" not in text
+    for name in ("src/okid_core.c", "src/okid_modes.cpp", "examples/", "samples/"):
+        assert f"`{name}`" in text
+        assert (library / name).exists()
+
+
 def sketch(library: Path, name: str, *more: object) -> bytes:
     """What a sketch sends over the record."""
     objects = [library / "src" / f"{part}.o" for part in ("okid_core", "board_host")]
