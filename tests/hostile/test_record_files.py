@@ -70,7 +70,7 @@ def gone(pid: int) -> bool:
 def test_a_conversion_that_is_stopped(bench: Bench, number: signal.Signals) -> None:
     """Release 0.2 left the folder, and the converter at work."""
     note = f"{bench.folder}/started"
-    bench.converter(f'echo part >"$3.part"; echo $$ >{note}.new; mv {note}.new {note}; exec sleep 1800')
+    bench.converter(f'echo part >"$4.part"; echo $$ >{note}.new; mv {note}.new {note}; exec sleep 1800')
     run = bench.start()
     until((bench.folder / "started").exists, run)
     assert list(bench.temporary.iterdir())
@@ -85,14 +85,14 @@ def test_a_conversion_that_is_stopped(bench: Bench, number: signal.Signals) -> N
 def test_the_table_has_no_name(bench: Bench) -> None:
     """Nothing is left however the program ends, and messages name the file of the user."""
     (bench.folder / "t.csv").write_text(TABLE)
-    bench.converter(f'cp {bench.folder}/t.csv "$3"')
+    bench.converter(f'cp {bench.folder}/t.csv "$4"')
     text = bench.said()
     assert text.startswith(f"okid: {bench.record}") and 'no column "b"' in text and "/proc/" not in text, text
 
 
 def test_who_started_the_program_does_not_wait_for_children(bench: Bench) -> None:
     """Then a child leaves no exit code: it was taken for a success."""
-    bench.converter('echo "okid-convert: $2: is torn" >&2\nexit 2')
+    bench.converter('echo "okid-convert: $3: is torn" >&2\nexit 2')
     text = bench.said(preexec_fn=lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN))
     assert text == f"okid: {bench.record}: is torn\n"
 
@@ -100,7 +100,7 @@ def test_who_started_the_program_does_not_wait_for_children(bench: Bench) -> Non
 def test_a_message_stays_one_line(bench: Bench) -> None:
     bench.record = bench.folder / "a\nokid: all is well \x1b[31m.mat"
     bench.record.write_bytes(b"x")
-    bench.converter('echo "okid-convert: $2: is torn" >&2\nexit 2')
+    bench.converter('echo "okid-convert: $3: is torn" >&2\nexit 2')
     text = bench.said()
     assert text == f"okid: {bench.folder}/a\\nokid: all is well \\x1b[31m.mat: is torn\n"
     bench.record = bench.folder / "no\nfile.csv"
