@@ -48,9 +48,9 @@ class shown_frames {
     explicit shown_frames(const convert_arguments& given, const Wanted&... wanted)
         : frames_(given.from, wanted...), display_(std::make_unique<progress>(!given.quiet)) {
         display_->stage("reading " + given.from);
+        frames_.on_share([this](double share) { display_->share(share); });
     }
     const drv_frame_t* next() {
-        if (display_ && count_++ % 256 == 0) display_->share(frames_.share());
         const drv_frame_t* frame = frames_.next();
         if (!frame) display_.reset();
         return frame;
@@ -59,7 +59,6 @@ class shown_frames {
   private:
     log_frames frames_;
     std::unique_ptr<progress> display_;
-    std::uint64_t count_ = 0;
 };
 
 /// Rows of the grid as lines of text, in the units that the identification uses.

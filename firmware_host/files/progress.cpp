@@ -38,14 +38,15 @@ std::string fitted(const std::string& text, std::size_t room) {
     return text.substr(0, head) + ".." + text.substr(tail);
 }
 
-} // namespace
-
-std::string progress_text(const std::string& stage, double share, double seconds) {
-    if (!(share >= 0)) return stage;
+/// ", 40 %, 12 s left" after so many seconds of a stage; "": the share is not known.
+std::string share_text(double share, double seconds) {
+    if (!(share >= 0)) return "";
     share = std::min(share, 1.0);
     const double left = share > 0.05 ? seconds * (1 - share) / share : 0;
-    return fmt::format("{}, {:.0f} %{}", stage, 100 * share, left >= 1 ? fmt::format(", {:.0f} s left", left) : "");
+    return fmt::format(", {:.0f} %{}", 100 * share, left >= 1 ? fmt::format(", {:.0f} s left", left) : "");
 }
+
+} // namespace
 
 progress::progress(bool wanted) : terminal_(isatty(STDERR_FILENO) == 1) {
     const signals_wait the_main_thread_takes_them;
@@ -81,7 +82,7 @@ void progress::show() {
     auto next = start + (terminal_ ? shown_after : line_after);
     while (!wake_.wait_until(lock, next, [this] { return done_; })) {
         const std::string head = fmt::format("okid: {:.0f} s, ", seconds_since(start));
-        const std::string tail = progress_text("", share_, seconds_since(since_));
+        const std::string tail = share_text(share_, seconds_since(since_));
         if (terminal_)
             std::fprintf(stderr, "\r%-*s", static_cast<int>(width),
                          (head + fitted(text_, width - head.size() - tail.size()) + tail).c_str());

@@ -11,9 +11,6 @@
 
 namespace okid_host {
 
-/// "reading a.csv, 40 %, 12 s left": the share that is done (0 to 1, below 0 = not known) after so many seconds of the stage.
-std::string progress_text(const std::string& stage, double share, double seconds);
-
 class progress {
   public:
     explicit progress(bool wanted);

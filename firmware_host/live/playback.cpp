@@ -29,20 +29,6 @@ constexpr std::size_t most_segments = 9999;
 
 int stop_asked(void*) { return stop_requested(); }
 
-/// `tell` is called so often: what it costs is not seen.
-class teller {
-  public:
-    teller(const log_frames& frames, const played_share& tell) : frames_(frames), tell_(tell) {}
-    void played() {
-        if (tell_ && count_++ % 256 == 0) tell_(frames_.share());
-    }
-
-  private:
-    const log_frames& frames_;
-    const played_share& tell_;
-    std::uint64_t count_ = 0;
-};
-
 /// Which bus of a config each bus of a journal feeds, -1 = none.
 std::vector<int> map_journal(const std::string& path, const live_config& config) {
     const std::vector<journal_header::bus> there = read_journal_header(path).buses, wanted = journal_buses(config);
@@ -213,6 +199,7 @@ const drv_frame_t* log_frames::next() {
                 count_ = 0;
                 return nullptr;
             }
+            if (on_share_) on_share_(share());
         }
         drv_frame_t& frame = batch_[static_cast<std::size_t>(at_++)];
         if (bus_of_.empty()) return &frame;
@@ -232,14 +219,13 @@ void require_edge_time(const live_config& config, bool given) {
 }
 
 void play_through(const std::string& log, const live_config& config, stream_target& target, std::optional<double> speed,
-                  const std::optional<recorder_options>& recording, const played_share& tell) {
+                  const std::optional<recorder_options>& recording, const read_share& on_share) {
     log_frames frames(log, config);
-    teller told(frames, tell);
+    frames.on_share(on_share);
     recording_link recorded(config, recording);
     pacer pace(speed);
     while (const drv_frame_t* frame = frames.next()) {
         if (!pace.wait_for(frame->time_ns)) break;
-        told.played();
         if (recorded.get()) recorded.get()->feed(*frame);
         target.frame(*frame);
         recorded.serve(target);
@@ -249,15 +235,14 @@ void play_through(const std::string& log, const live_config& config, stream_targ
 }
 
 void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed,
-                   const played_share& tell) {
+                   const read_share& on_share) {
     log_frames frames(log);
-    teller told(frames, tell);
+    frames.on_share(on_share);
     frame_target sink(interface);
     catch_stop_signals();
     pacer pace(speed);
     while (const drv_frame_t* frame = frames.next()) {
         if (!pace.wait_for(frame->time_ns)) break;
-        told.played();
         sink.write(*frame);
     }
     if (stop_requested()) throw failure(exit_interrupted, fmt::format("interrupted after {} frames", sink.sent()));

@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace okid_host {
 
@@ -35,6 +36,9 @@ bool is_journal(const std::string& path);
 /// @param enough  the first of these is the last that is looked for
 std::vector<std::string> interfaces_of(const std::string& log, const std::vector<std::string>& enough = {});
 
+/// Called now and then with how much of a log was read, 0 to 1; below 0 = not known (a pipe).
+using read_share = std::function<void(double share)>;
+
 /// Frames of a log or of a journal and the segments behind it, one after the other. Throws `failure` (exit 2) at a line
 /// that does not parse; what is damaged in a journal is reported on stderr at its end.
 class log_frames {
@@ -51,15 +55,17 @@ class log_frames {
     log_frames& operator=(const log_frames&) = delete;
     /// The next frame, NULL at the end.
     const drv_frame_t* next();
-    /// How much of the files was read, 0 to 1; below 0 = not known (a pipe).
-    double share() const;
+    /// Who is called after every batch that was read.
+    void on_share(read_share call) { on_share_ = std::move(call); }
 
   private:
     void open(const std::vector<std::string>& interfaces);
     void measure();
     void tell_damage();
+    double share() const;
 
     std::string path_;
+    read_share on_share_;
     std::vector<double> sizes_; ///< bytes of each file
     drv_source_t source_{};
     bool told_ = false;
@@ -71,15 +77,12 @@ class log_frames {
 /// A log holds no edges of a GPIO line: throws `failure` (exit 2) when the config waits for one and none is given.
 void require_edge_time(const live_config& config, bool given);
 
-/// Called now and then with the share of a log that was played, 0 to 1; below 0 = not known.
-using played_share = std::function<void(double share)>;
-
 /// Play a log through a target; finishing it is the caller's. Signals are caught already. Throws `failure`.
 void play_through(const std::string& log, const live_config& config, stream_target& target, std::optional<double> speed,
-                  const std::optional<recorder_options>& recording, const played_share& tell = {});
+                  const std::optional<recorder_options>& recording, const read_share& on_share = {});
 
 /// Play every frame of a log onto an interface. Throws `failure`: exit 2 for the log, exit 4 for the interface.
 void play_onto_bus(const std::string& log, const std::string& interface, std::optional<double> speed,
-                   const played_share& tell = {});
+                   const read_share& on_share = {});
 
 } // namespace okid_host

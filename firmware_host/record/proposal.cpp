@@ -5,27 +5,12 @@
 #include "files/nearest_name.hpp"
 #include "files/units.hpp"
 
-#include <algorithm>
 #include <fmt/format.h>
 
 namespace okid_host {
 namespace {
 
 constexpr std::size_t most_proposed = 64; ///< columns in a message
-
-std::string side_of(const std::string& name) {
-    if (const std::string role = role_of_unit(unit_of_name(name)); !role.empty())
-        return role == "force" ? "inputs" : "outputs";
-    const std::string small = lower_case(name);
-    for (const char* word : {"force", "hammer", "shaker", "load"})
-        if (small.find(word) != std::string::npos) return "inputs";
-    const std::string begin = small.substr(0, small.find_last_not_of("0123456789 _xyz+-.") + 1);
-    if (begin == "f") return "inputs";
-    for (const char* word :
-         {"a", "acc", "accel", "acceleration", "v", "vel", "velocity", "disp", "displacement", "out"})
-        if (begin == word) return "outputs";
-    return "";
-}
 
 /// A list of names as it is typed, "" without names.
 std::string typed_names(const std::string& side, const std::vector<std::string>& names) {
@@ -41,21 +26,25 @@ std::string typed_names(const std::string& side, const std::vector<std::string>&
 
 } // namespace
 
-std::vector<std::string> proposed_sides(const std::vector<std::string>& columns) {
-    std::vector<std::string> out(columns.size());
-    std::transform(columns.begin(), columns.end(), out.begin(), side_of);
-    return out;
+const char* proposed_side(const std::string& column) {
+    if (const std::string role = role_of_unit(unit_of_name(column)); !role.empty())
+        return role == "force" ? "inputs" : "outputs";
+    const std::string small = lower_case(column);
+    for (const char* word : {"force", "hammer", "shaker", "load"})
+        if (small.find(word) != std::string::npos) return "inputs";
+    const std::string begin = small.substr(0, small.find_last_not_of("0123456789 _xyz+-.") + 1);
+    if (begin == "f") return "inputs";
+    for (const char* word :
+         {"a", "acc", "accel", "acceleration", "v", "vel", "velocity", "disp", "displacement", "out"})
+        if (begin == word) return "outputs";
+    return "";
 }
 
 std::string proposed_options(const std::vector<std::string>& columns) {
-    const std::vector<std::string> sides = proposed_sides(columns);
-    const auto of = [&](const char* side) {
-        std::vector<std::string> names;
-        for (std::size_t k = 0; k < columns.size(); ++k)
-            if (sides[k] == side) names.push_back(columns[k]);
-        return names;
-    };
-    const std::vector<std::string> forces = of("inputs"), responses = of("outputs");
+    std::vector<std::string> forces, responses;
+    for (const std::string& name : columns)
+        if (const std::string side = proposed_side(name); !side.empty())
+            (side == "inputs" ? forces : responses).push_back(name);
     if (responses.empty() || forces.size() + responses.size() > most_proposed) return "";
     return typed_names("inputs", forces) + typed_names("outputs", responses);
 }

@@ -6,8 +6,8 @@
 
 namespace okid_host {
 
-/// "inputs" or "outputs" for each column, "" = its name does not tell.
-std::vector<std::string> proposed_sides(const std::vector<std::string>& columns);
+/// "inputs" or "outputs", "" = the name of the column does not tell.
+const char* proposed_side(const std::string& column);
 
 /// The same as a message has it, in options of `okid identify`; "" without a response, and for more columns than a message
 /// can name.

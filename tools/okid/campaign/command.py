@@ -161,7 +161,7 @@ def _run(args: argparse.Namespace, written: str) -> int:
         make_identifier(spec)  # sizes that the library refuses are reported before any work
     with Progress("okid-campaign", not args.quiet) as shown:
         shown.stage(f"listing the records of {spec.path}")
-        outcome = run_campaign(spec, told=_counted(shown))
+        outcome = run_campaign(spec, on_step=_counted(shown))
         shown.stage("writing the tables and the report")
         tables = make_tables(spec, outcome)
         write_tables(spec.folder, tables)
@@ -187,13 +187,13 @@ def _run(args: argparse.Namespace, written: str) -> int:
 
 
 def _counted(shown: Progress) -> Callable[[int, int, int, int], None]:
-    """What a run tells after every step, for the line of its progress."""
+    """What is called after every step of a run: the line of its progress."""
 
-    def told(records: int, of_records: int, groups: int, of_groups: int) -> None:
+    def on_step(records: int, of_records: int, groups: int, of_groups: int) -> None:
         share = (records + groups) / max(1, of_records + of_groups)
         shown.stage("identifying", share, f"{records}/{of_records} records, {groups}/{of_groups} groups")
 
-    return told
+    return on_step
 
 
 def _page(path: Path, tables: dict[str, Any], about: dict[str, Any], trend: Trend, written: str) -> list[str]:

@@ -76,7 +76,7 @@ class _Tree:
         return (parent, children) if all(child in self.nodes for child in children) else None
 
 
-def run_campaign(spec: CampaignSpec, client: Any = None, told: Steps | None = None) -> Outcome:
+def run_campaign(spec: CampaignSpec, client: Any = None, on_step: Steps | None = None) -> Outcome:
     """Do what is still to be done of a campaign; `client` a dask.distributed.Client, else the cluster of the spec.
 
     Records that were finished by an earlier run are not read again. Raises InputError when the records cannot be
@@ -90,7 +90,7 @@ def run_campaign(spec: CampaignSpec, client: Any = None, told: Steps | None = No
         def connect() -> Any:
             return client or stack.enter_context(connected(spec.workers, spec.address, spec.memory_mb))
 
-        return _Run(spec, connect, state, groups, [*bad, *keyless], told).run()
+        return _Run(spec, connect, state, groups, [*bad, *keyless], on_step).run()
 
 
 class _Run:
@@ -98,7 +98,7 @@ class _Run:
 
     def __init__(
         self, spec: CampaignSpec, connect: Callable[[], Any], state: StateFolder, groups: list[Group],
-        bad: list[Skipped], told: Steps | None,
+        bad: list[Skipped], on_step: Steps | None,
     ) -> None:  # fmt: skip
         self.spec, self.state = spec, state
         self._connect = connect
@@ -111,7 +111,7 @@ class _Run:
         self.suspects: list[Slice] = []  # records that were with a worker when it died
         self.under_way: dict[Any, tuple[Any, ...]] = {}
         self.inside = 0  # records in sums
-        self.told = told
+        self.on_step = on_step
         self.all = sum(len(group.records) for group in groups)
 
     @property
@@ -136,9 +136,9 @@ class _Run:
                     self.submit_batch([self.suspects.pop()], alone=True)
                 future = next(self._queue)
                 self.arrived(future, self.under_way.pop(future))
-                if self.told is not None:
+                if self.on_step is not None:
                     groups = len(self.out.done) + len(self.out.faults)
-                    self.told(self.inside, self.all, groups, len(self.out.groups))
+                    self.on_step(self.inside, self.all, groups, len(self.out.groups))
         finally:
             for future in self.under_way:
                 future.cancel()

@@ -27,23 +27,22 @@ class Replayed(Worker):
         super().__init__(session)
         self._log, self._config, self._options, self._folder = log, config, list(options), folder
         self._record: Record | None = None
-        self._length_s = 0.0
 
     def work(self) -> None:
         page, okid, journal = self.session.config, needed_program(), self._log
         if self._config is not None:
             journal = self._folder / "log.okj"
             self._step([okid, "convert", str(self._log), str(journal), f"--config={self._config}"], "reading")
-        table = self._folder / "samples.csv"
+        table, length_s = self._folder / "samples.csv", 0.0
         self._step([okid, "convert", str(journal), str(table)], "decoding")
         try:
             self._record = read_csv(table)
-            self._length_s = len(self._record.samples) / (self._record.fs_hz or 1.0)
+            length_s = len(self._record.samples) / (self._record.fs_hz or 1.0)
         except InputError as fault:
             page = replace(page, samples=False, absent=f"no signals: {fault}")
         table.unlink()
         events = self._folder / "events.jsonl"
-        self.session.describe(replace(page, length_s=self._length_s, report=replace(page.report, events=events)))
+        self.session.describe(replace(page, length_s=length_s, report=replace(page.report, events=events)))
         self._replay([okid, "replay", str(journal), *self._options, "--events=-"], events)
 
     def _step(self, command: list[str], word: str) -> None:
