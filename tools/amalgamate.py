@@ -9,6 +9,7 @@ usage: amalgamate.py FOLDER
 URL: where the library is published, for its manifests. What goes in is what the lists say that the build itself uses:
 OKID_CORE_C and OKID_CORE_CXX of lib/CMakeLists.txt and DRV_NODE_SOURCES of drivers/node_sources.cmake. Every file is
 taken as it is, its includes put in their place; a private name that two files have gets the name of its file before it.
+The headers declare what these sources define: other functions of okid are left out.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ TOKEN = re.compile(
 )
 PRIVATE = re.compile(r"^(?!okid|OKID|drv|DRV)[A-Za-z_]\w*$")
 WORDS = "static inline const constexpr void int double char unsigned struct enum typedef using namespace template class"
+
+FUNCTION = re.compile(r"\b((?:okid|drv)_\w+)\s*\(")
+PROTOTYPE = re.compile(r"^(?:OKID_NODISCARD )?OKID_API\b[^;{]*?\b(\w+)\s*\([^;{]*\)[^;{]*;[^\n]*\n", re.M)
 
 FAST = ("kernel_integer.c",)  # runs per sample: made for speed where everything else is made for size
 GCC = "defined(__GNUC__) && !defined(__clang__)"
@@ -89,6 +93,25 @@ def private_names(text: str) -> set[str]:
     return {name for name in names if PRIVATE.match(name)} - set(WORDS.split())
 
 
+def functions(text: str) -> set[str]:
+    """The public functions that a source defines."""
+    found = (FUNCTION.search(head) for head, body in statements(text) if body.startswith("{"))
+    return {one[1] for one in found if one}
+
+
+def pruned(header: str, defined: set[str]) -> str:
+    """Without functions that are not defined and their comments; a comment that several share stays with the last."""
+    paragraphs = []
+    for paragraph in header.split("\n\n"):
+        kept = PROTOTYPE.sub(lambda m: m[0] if m[1] in defined else "", paragraph + "\n")
+        gone = kept != paragraph + "\n" and not PROTOTYPE.search(kept)
+        if gone:
+            kept = re.sub(r"^///[^\n]*\n", "", kept, flags=re.M)
+        if kept.strip():
+            paragraphs.append(kept.rstrip("\n"))
+    return "\n\n".join(paragraphs) + "\n"
+
+
 def renamed(text: str, names: dict[str, str]) -> str:
     """The text with these identifiers replaced, where they are no members and stand in no comment or string."""
     return TOKEN.sub(lambda m: names.get(m[0], m[0]), text)
@@ -129,8 +152,8 @@ class Pair:
                 lines.append(self.text(places[0]))
         return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"
 
-    def write(self, folder: Path, sources: list[Path], first: str, above: str) -> None:
-        """Both files. first: C of the source before everything; above: include of the header."""
+    def write(self, folder: Path, sources: list[Path], first: str, above: str, defined: set[str]) -> None:
+        """Both files. first: C of the source before all; above: include of the header; defined: all functions."""
         files = [*sources, *(LIB / "src").rglob("*.h")]
         shared = Counter(name for path in files for name in private_names(path.read_text("utf-8")))
         body = ""
@@ -142,6 +165,7 @@ class Pair:
                 part += f"#if {GCC}\n#pragma GCC pop_options\n#endif\n"
             macros = re.findall(r"^#define (\w+)", path.read_text("utf-8"), re.M)
             body += part + "".join(f"#undef {name}\n" for name in dict.fromkeys(macros)) + "\n"
+        self.public = pruned(self.public, defined)
         in_header = [name for name in self.system if name in ("stddef.h", "stdint.h")]
         top = f"// okid, made by tools/amalgamate.py of {len(sources)} sources: change those, not this file.\n//\n"
         top += "".join(f"// {line}".rstrip() + "\n" for line in (ROOT / "LICENSE").read_text("utf-8").splitlines())
@@ -174,12 +198,13 @@ def amalgamate(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     lib = LIB / "CMakeLists.txt"
     core = Pair("okid_core", "okid_core.c")
-    sources = listed(lib, "OKID_CORE_C") + listed(DRIVERS / "node_sources.cmake", "DRV_NODE_SOURCES")
-    core.write(folder, sources, CORE_FIRST, "")
+    of_core = listed(lib, "OKID_CORE_C") + listed(DRIVERS / "node_sources.cmake", "DRV_NODE_SOURCES")
+    of_modes = listed(lib, "OKID_CORE_CXX") + listed(lib, "OKID_LINALG_eigen")
+    defined = {name for path in of_core + of_modes for name in functions(path.read_text("utf-8"))}
+    core.write(folder, of_core, CORE_FIRST, "", defined)
     public = {path for path in core.known if "include" in path.parts}
     modes = Pair("okid_modes", "okid_modes.cpp", known=public)
-    sources = listed(lib, "OKID_CORE_CXX") + listed(lib, "OKID_LINALG_eigen")
-    modes.write(folder, sources, MODES_FIRST, '#include "okid_core.h"\n')
+    modes.write(folder, of_modes, MODES_FIRST, '#include "okid_core.h"\n', defined)
     with (folder / modes.source).open("a", encoding="utf-8") as end:
         end.write("#endif\n")
 

@@ -3,6 +3,7 @@
 // Times are those of the thread's own clock: what other programs take of the processor is not in them.
 #include "bench_identify.hpp"
 
+#include "files/order_statistics.hpp"
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -156,12 +157,6 @@ void take_turns(bench_contenders& all, int least, int most, double budget) {
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 double smallest(const std::vector<double>& v) { return v.empty() ? nothing : *std::min_element(v.begin(), v.end()); }
-
-double median(std::vector<double> v) {
-    if (v.empty()) return nothing;
-    std::sort(v.begin(), v.end());
-    return v[v.size() / 2];
-}
 
 nlohmann::ordered_json describe(const bench_size& size, double noise, const bench_contender& c) {
     return {{"name", "identify"},

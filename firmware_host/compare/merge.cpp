@@ -11,6 +11,7 @@
 #include "consensus/quantity.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "files/order_statistics.hpp"
 #include "record/modal_model.hpp"
 
 #include <algorithm>
@@ -291,10 +292,7 @@ class merger {
         std::vector<double> known;
         for (const known_mode* one : mode.of)
             if (one && std::isfinite(one->emac)) known.push_back(one->emac);
-        if (known.empty()) return NAN;
-        const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-        std::nth_element(known.begin(), middle, known.end());
-        return *middle;
+        return upper_median(known);
     }
 
     void describe_set_ups(result_context& to) const {

@@ -7,6 +7,7 @@
 
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "files/order_statistics.hpp"
 #include "merge.hpp"
 #include "record/drive_mass.hpp"
 #include "record/modal_model.hpp"
@@ -129,9 +130,8 @@ std::vector<std::size_t> dead_outputs(const std::vector<output_spread>& about, c
         std::vector<double> of_kind;
         for (std::size_t other = 0; other < spreads.size(); ++other)
             if (sensing.empty() || sensing[other] == sensing[o]) of_kind.push_back(spreads[other]);
-        const auto middle = of_kind.begin() + static_cast<std::ptrdiff_t>(of_kind.size() / 2);
-        std::nth_element(of_kind.begin(), middle, of_kind.end());
-        if (of_kind.size() >= 3 && spreads[o] < dead_spread * *middle && !((*explained)[o] >= dead_percent))
+        if (of_kind.size() >= 3 && spreads[o] < dead_spread * upper_median(of_kind) &&
+            !((*explained)[o] >= dead_percent))
             out.push_back(o);
     }
     return out;

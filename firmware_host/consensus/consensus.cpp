@@ -5,6 +5,7 @@
 //          agreement = found_in x EMAC x (1 + MPC)/2 / (1 + (scatter of damping / 0.6)^2): a mode is believed from one half on
 #include "consensus.hpp"
 
+#include "files/order_statistics.hpp"
 #include "quantity.hpp"
 #include "result/method.hpp"
 
@@ -36,15 +37,6 @@ constexpr double scatter_scale = 0.6;    // relative scatter of damping over the
 constexpr int fewest_runs = 3;
 constexpr double clear_vibration = 0.8; // agreement of a mode that all runs find
 constexpr double most_filled = 0.75;    // of a run's states, by two for each mode: above, weak ones find no room
-
-double median(std::vector<double> values) {
-    if (values.empty()) return NAN;
-    const std::size_t n = values.size(), k = n / 2;
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
-    const double high = values[k];
-    if (n % 2) return high;
-    return (high + *std::max_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k))) / 2;
-}
 
 template <class Item, class Of> double median_of(const std::vector<Item>& items, Of of) {
     std::vector<double> values;

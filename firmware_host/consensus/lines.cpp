@@ -7,6 +7,7 @@
 //          too: where the force has a narrow peak and the responses over the force have none, there is no mode
 #include "lines.hpp"
 
+#include "demodulation.hpp"
 #include "spectrum.hpp"
 
 #include <algorithm>
@@ -35,9 +36,7 @@ constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / s
 constexpr double stronger = 10; // amplitude of the vibration over that of its multiple
 constexpr double coupled_periods = 6;
 constexpr int most_multiple = 5;
-constexpr double lasting =
-    0.5;                    // (sum of amplitudes)^2 over blocks times sum of squares: chance gives 0.79, a decay less
-constexpr double falls = 3; // deviations of a slope: from here on an amplitude falls
+constexpr double falls = 3;     // deviations of a slope: from here on an amplitude falls
 constexpr double as_damped = 2; // factor between the fall of an amplitude and that of the mode's own damping
 constexpr int rate_parts = 8;   // fs / 8, 2 fs / 8 ..: where a converter and its clock leave lines
 constexpr double on_the_rate = 3e-4;
@@ -47,25 +46,17 @@ constexpr double resonant = 2;        // power of the responses over that of the
 constexpr std::size_t averaged = 4;   // segments of a spectrum, at least
 constexpr std::size_t shortest = 128; // samples of a segment
 
-/// Amplitudes at a frequency, block by block under a Hann window, of channels with these weights from the first on; one record.
+/// Amplitudes at a frequency, block by block, of channels with these weights from the first on; one record, whole blocks.
 std::vector<complex> amplitudes(const sample_rows& rows, double fs_hz, std::size_t m, std::size_t first_channel,
                                 const std::vector<complex>& weights, double frequency_hz, std::size_t block) {
     std::vector<complex> out;
-    const complex turn = std::polar(1.0, -2 * M_PI * frequency_hz / fs_hz);
-    const std::size_t count = rows.size() / m;
-    complex phase = 1;
-    for (std::size_t first = 0; first + block <= count; first += block) {
+    const auto along = [&](std::size_t t) {
         complex sum = 0;
-        for (std::size_t i = 0; i < block; ++i, phase *= turn) {
-            const double hann = 1 - std::cos(2 * M_PI * static_cast<double>(i) / static_cast<double>(block));
-            complex along = 0;
-            for (std::size_t c = 0; c < weights.size(); ++c)
-                along += weights[c] * rows[(first + i) * m + first_channel + c];
-            sum += hann * along * phase;
-        }
-        phase /= std::abs(phase);
-        if (!std::isnan(sum.real())) out.push_back(sum / static_cast<double>(block));
-    }
+        for (std::size_t c = 0; c < weights.size(); ++c) sum += weights[c] * rows[t * m + first_channel + c];
+        return sum;
+    };
+    demodulate(rows.size() / m, frequency_hz / fs_hz, block, along, out);
+    out.erase(std::remove_if(out.begin(), out.end(), [](const complex& a) { return std::isnan(a.real()); }), out.end());
     return out;
 }
 
@@ -102,13 +93,6 @@ std::size_t largest(const std::vector<complex>& shape) {
 bool near_multiple(double frequency_hz, double base, double tolerance) {
     const double n = std::round(frequency_hz / base);
     return n >= 1 && std::abs(frequency_hz - n * base) < tolerance * base;
-}
-
-/// Does a vibration last, or does the record hold a single decay?
-bool lasts(const std::vector<complex>& a) {
-    double sum = 0, squares = 0;
-    for (const complex& x : a) sum += std::abs(x), squares += std::norm(x);
-    return sum * sum >= lasting * static_cast<double>(a.size()) * squares;
 }
 
 /// Does the response at n f follow the n-th power of that at f?

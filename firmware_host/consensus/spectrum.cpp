@@ -3,6 +3,7 @@
 // METHOD   Welch (1967) with Eigen's FFT
 #include "spectrum.hpp"
 
+#include "files/order_statistics.hpp"
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -53,10 +54,7 @@ double mean_power(const std::vector<double>& power, double low, double high) {
 
 double median_power(const std::vector<double>& power, double low, double high) {
     std::vector<double> band = between(power, low, high);
-    if (band.empty()) return 0;
-    const auto middle = band.begin() + static_cast<std::ptrdiff_t>(band.size() / 2);
-    std::nth_element(band.begin(), middle, band.end());
-    return *middle;
+    return band.empty() ? 0 : upper_median(band);
 }
 
 } // namespace okid_host

@@ -9,6 +9,7 @@
 #include "error.hpp"
 #include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
+#include "files/order_statistics.hpp"
 #include "record/csv.hpp"
 
 #include <algorithm>
@@ -26,6 +27,7 @@ using complex = std::complex<double>;
 constexpr std::size_t largest_file = std::size_t{1} << 30;
 constexpr int response_function = 4, coherence_function = 6;
 constexpr double least_coherence = 0.4; // of the better quarter of the responses: of noise alone, one over the averages
+constexpr double upper_quarter = 0.75;
 constexpr std::size_t coherent_around = 4; // lines to either side that are judged together
 constexpr std::size_t header_lines = 11;
 
@@ -37,13 +39,6 @@ struct response {
     std::vector<double> coherence; ///< empty: the file has none
 };
 
-/// The value a quarter of the numbers is above.
-double upper_quarter(std::vector<double> values) {
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(3 * (values.size() - 1) / 4);
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-}
-
 /// Lines at which even the better responses have no coherence become NaN.
 void strike_incoherent(const std::vector<response>& all, Eigen::MatrixXcd& H) {
     const auto lines = static_cast<std::size_t>(H.rows());
@@ -52,10 +47,11 @@ void strike_incoherent(const std::vector<response>& all, Eigen::MatrixXcd& H) {
         for (const response& one : all) {
             if (one.coherence.size() != lines) continue;
             const std::size_t first = l - std::min(l, coherent_around), last = std::min(lines, l + coherent_around + 1);
-            seen.push_back(upper_quarter({one.coherence.begin() + static_cast<std::ptrdiff_t>(first),
-                                          one.coherence.begin() + static_cast<std::ptrdiff_t>(last)}));
+            const std::vector<double> around(one.coherence.begin() + static_cast<std::ptrdiff_t>(first),
+                                             one.coherence.begin() + static_cast<std::ptrdiff_t>(last));
+            seen.push_back(quantile(around, upper_quarter));
         }
-        if (!seen.empty() && !(upper_quarter(std::move(seen)) >= least_coherence))
+        if (!seen.empty() && !(quantile(std::move(seen), upper_quarter) >= least_coherence))
             H.row(static_cast<Eigen::Index>(l)).setConstant(complex(NAN, NAN));
     }
 }

@@ -3,6 +3,7 @@
 #include "response_set.hpp"
 
 #include "error.hpp"
+#include "files/order_statistics.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,10 +21,7 @@ constexpr double least_over_noise = 3; // power of a line over that of its noise
 
 /// The value that this share of the numbers is below.
 double share_of(const Eigen::VectorXd& from, double share) {
-    std::vector<double> values(from.data(), from.data() + from.size());
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
+    return quantile(std::vector<double>(from.data(), from.data() + from.size()), share);
 }
 
 response_set chosen_lines(const response_set& from, const std::vector<Index>& kept) {

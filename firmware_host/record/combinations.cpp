@@ -7,6 +7,7 @@
 #include "combinations.hpp"
 
 #include "consensus/consensus.hpp"
+#include "consensus/demodulation.hpp"
 #include "consensus/spectrum.hpp"
 #include "modal_answer.hpp"
 
@@ -46,7 +47,6 @@ constexpr double next_to = 0.1;               ///< of a mode of the model its ow
 constexpr double resonance_peak = 2;          ///< power at a mode over that beside it
 constexpr double left_alone = 0.8;            ///< of the power there: the force has no part in it
 constexpr double undriven = 0.5;              ///< of the power there, where the structure is known not to be linear
-constexpr double lasting = 0.5;               ///< blocks that carry the vibration, of all: a single decay has fewer
 constexpr std::size_t shortest_spectrum = 64; ///< samples of a spectrum
 
 /// One mode along its shape: all of it, and what the forces do not explain.
@@ -72,20 +72,7 @@ struct product_search {
 
 std::vector<complex> demodulated(const std::vector<series>& records, double cycles, std::size_t block) {
     std::vector<complex> out;
-    const complex turn = std::polar(1.0, -2 * M_PI * cycles),
-                  step = std::polar(1.0, 2 * M_PI / static_cast<double>(block));
-    std::vector<double> hann;
-    complex at = 1;
-    for (std::size_t i = 0; i < block; ++i, at *= step) hann.push_back((1 - at.real()) / static_cast<double>(block));
-    for (const series& x : records) {
-        complex phase = 1;
-        for (std::size_t first = 0; first + block <= x.size(); first += block) {
-            complex sum = 0;
-            for (std::size_t i = 0; i < block; ++i, phase *= turn) sum += hann[i] * x[first + i] * phase;
-            phase /= std::abs(phase);
-            out.push_back(sum);
-        }
-    }
+    for (const series& x : records) demodulate(x.size(), cycles, block, [&](std::size_t t) { return x[t]; }, out);
     return out;
 }
 
@@ -132,14 +119,6 @@ void each_product(const std::vector<std::size_t>& bases, const std::function<voi
     } while (next());
     for (const std::size_t base : bases)
         for (int multiple = most_factors + 1; multiple <= most_multiple; ++multiple) see({{base, multiple}});
-}
-
-/// Does the vibration last, or does the record hold a single decay?
-bool lasts(const std::vector<complex>& a) {
-    double sum = 0, squares = 0;
-    for (const complex& x : a)
-        if (const double size = std::abs(x); !std::isnan(size)) sum += size, squares += size * size;
-    return sum * sum >= lasting * static_cast<double>(a.size()) * squares;
 }
 
 std::string words_of(const product& of, const std::vector<listed_mode>& modes) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hit_verdict.hpp"
 
+#include "files/order_statistics.hpp"
 #include <algorithm>
 #include <complex>
 #include <fmt/format.h>
@@ -249,16 +250,13 @@ hit_span find_hit(const double* force, std::size_t count, std::size_t stride) {
     for (std::size_t i = 0; i < count; ++i)
         if (!std::isnan(force[i * stride])) about.push_back(force[i * stride]);
     if (about.empty()) return out;
-    const auto middle = about.begin() + static_cast<std::ptrdiff_t>(about.size() / 2);
-    std::nth_element(about.begin(), middle, about.end());
-    const double base = *middle;
+    const double base = upper_median(about);
     double peak = 0;
     for (double& x : about) {
         if (std::abs(x - base) > std::abs(peak)) peak = x - base;
         x = std::abs(x - base);
     }
-    std::nth_element(about.begin(), middle, about.end());
-    const double noise = 1.4826 * *middle, largest = std::abs(peak);
+    const double noise = 1.4826 * upper_median(about), largest = std::abs(peak);
     out.sign = peak < 0 ? -1 : 1;
     if (!(largest > least_peak * noise)) { // no hit to be seen: where it would be
         while (force[out.begin * stride] - base != peak) ++out.begin;

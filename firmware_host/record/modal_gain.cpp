@@ -71,13 +71,12 @@ struct gain_search {
         std::vector<double> left = residuals(work.set, model);
         const Index n_y = C.rows();
         for (std::size_t i = 0; i < left.size(); ++i) left[i] /= unit[static_cast<Index>(i) % n_y];
-        std::vector<MatrixXd> found = covariances(left, n_y, gain_lags);
-        const double now = found[0].diagonal().array().log().sum();
+        const double now = covariances(left, n_y, 0)[0].diagonal().array().log().sum();
         if (!(now < cost)) return false;
         cost = now;
         K = gain;
-        C0 = found[0];
-        C_of = std::move(found);
+        C_of = covariances(left, n_y, gain_lags);
+        C0 = C_of[0];
         return true;
     }
 

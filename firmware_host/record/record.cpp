@@ -293,6 +293,31 @@ void check_fit(result_context& context) {
     if (percent) remark_low_fit(*percent, simulated, context);
 }
 
+/// What is asked and missing is checked, means and trends go, the method gets its sizes.
+/// @return the means of each record were removed by itself
+bool prepare(record_set records, const record_options& options, record_work& work) {
+    work.set = std::move(records);
+    work.at_rest = options.start == "rest";
+    const missing_count missing = count_missing(work.set);
+    work.set.complete = missing.samples == 0;
+    work.context = describe_records(work.set, options, missing);
+    remark_repeated(work.set, work.context.warnings);
+    check_moving(work.set, options);
+    check_different_outputs(work.set, options);
+    std::vector<input_moments> about = moments_of(work.set);
+    check_different_inputs(about, options);
+    if (options.detrend == "linear") detrend_linear(work.set, options);
+    // Several records are each centred first, so that an offset that moved between them does no harm.
+    const bool own_means_first = options.detrend == "mean" && (work.set.records.size() > 1 || work.at_rest);
+    if (own_means_first) remove_means(work.set);
+    configure(options, missing, work);
+    if (options.detrend == "linear" || own_means_first) about = moments_of(work.set);
+    if (!work.at_rest)
+        remark_early_hit(work.set, about, is_subspace(work.config.method) ? work.config.rows : work.config.p,
+                         work.context);
+    return own_means_first;
+}
+
 } // namespace
 
 void detrend_linear(record_set& set, const record_options& options) {
@@ -354,26 +379,7 @@ record_result identify_records(record_set records, const record_options& options
         return identify_records(one_column_a_place(records, options.hits), other);
     }
     record_work work;
-    work.set = std::move(records);
-    work.at_rest = options.start == "rest";
-    const missing_count missing = count_missing(work.set);
-    work.set.complete = missing.samples == 0;
-    work.context = describe_records(work.set, options, missing);
-    remark_repeated(work.set, work.context.warnings);
-    check_moving(work.set, options);
-    check_different_outputs(work.set, options);
-    std::vector<input_moments> about = moments_of(work.set);
-    check_different_inputs(about, options);
-    if (options.detrend == "linear") detrend_linear(work.set, options);
-    // Several records are each centred first, so that an offset that moved between them does no harm.
-    const bool own_means_first = options.detrend == "mean" && (work.set.records.size() > 1 || work.at_rest);
-    if (own_means_first) remove_means(work.set);
-    configure(options, missing, work);
-    if (options.detrend == "linear" || own_means_first) about = moments_of(work.set);
-    if (!work.at_rest)
-        remark_early_hit(work.set, about, is_subspace(work.config.method) ? work.config.rows : work.config.p,
-                         work.context);
-
+    const bool own_means_first = prepare(std::move(records), options, work);
     okid_accumulator_t* accumulator = nullptr;
     std::unique_ptr<std::byte[]> sums;
     const long long rows = find_model(options, accumulator, sums, work);

@@ -3,6 +3,7 @@
 #include "record_check.hpp"
 
 #include "error.hpp"
+#include "files/order_statistics.hpp"
 #include "files/units.hpp"
 
 #include <Eigen/Dense>
@@ -301,10 +302,9 @@ void remark_noisy_output(result_context& context) {
     std::vector<double> left;
     for (std::size_t k = 0; k < context.simulation_percent->size(); ++k) left.push_back(left_of(k));
     if (std::any_of(left.begin(), left.end(), [](double x) { return std::isnan(x); })) return;
-    const auto middle = left.begin() + static_cast<std::ptrdiff_t>((left.size() - 1) / 2);
-    std::nth_element(left.begin(), middle, left.end());
+    const double middle = in_order(left, (left.size() - 1) / 2);
     for (std::size_t k = 0; k < left.size() && k < context.outputs.size(); ++k)
-        if (left_of(k) > least_left && left_of(k) > times_more * *middle)
+        if (left_of(k) > least_left && left_of(k) > times_more * middle)
             context.warnings.emplace_back(
                 "noisy_output",
                 fmt::format("output \"{}\" is much noisier than the rest: the model leaves {:.0f} % of it, "
@@ -342,9 +342,7 @@ void remark_early_hit(const record_set& set, const std::vector<input_moments>& a
             for (std::size_t i = 0; i < record.count; ++i)
                 if (!std::isnan(u[i * set.channels()])) values.push_back(u[i * set.channels()]);
             if (values.empty()) continue;
-            const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-            std::nth_element(values.begin(), middle, values.end());
-            const double quiet = *middle;
+            const double quiet = upper_median(values);
             for (std::size_t i = 0; i < record.count; ++i) {
                 const double x = u[i * set.channels()] - quiet;
                 if (std::isnan(x)) continue;

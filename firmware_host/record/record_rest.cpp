@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "record_rest.hpp"
 
+#include "files/order_statistics.hpp"
 #include <algorithm>
 #include <cmath>
 
@@ -26,10 +27,7 @@ double middle_of(const record_set& set, const record_data& record, std::size_t c
     const double* rows = set.rows(record);
     for (std::size_t i = 0; i < record.count; ++i)
         if (const double x = rows[i * set.channels() + channel]; !std::isnan(x)) values.push_back(x);
-    if (values.empty()) return 0;
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
+    return values.empty() ? 0 : upper_median(values);
 }
 
 /// The sample at which the force of a record sets in.

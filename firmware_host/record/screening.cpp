@@ -5,6 +5,7 @@
 //          beyond all neighbours
 #include "screening.hpp"
 
+#include "files/order_statistics.hpp"
 #include "record_check.hpp"
 
 #include <algorithm>
@@ -106,9 +107,7 @@ void find_frozen(const output_view& y, const std::vector<stretch_of_equal>& runs
     std::vector<std::size_t> lengths;
     for (const stretch_of_equal& run : runs) lengths.push_back(run.count);
     if (lengths.empty()) return;
-    const auto rare = lengths.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(lengths.size() - 1));
-    std::nth_element(lengths.begin(), rare, lengths.end());
-    const double long_run = usual_runs * static_cast<double>(*rare);
+    const double long_run = usual_runs * static_cast<double>(quantile(lengths, 0.99));
     for (const stretch_of_equal& run : runs) {
         const bool zero = run.value == 0;
         const bool extreme = run.value == low || run.value == high;
@@ -150,12 +149,9 @@ void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& f
     for (std::size_t i = 0; i < y.size(); ++i)
         if (!std::isnan(y.at(i))) values.push_back(y.at(i));
     if (values.size() < 100) return;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    const double centre = *middle;
+    const double centre = upper_median(values);
     for (double& v : values) v = std::abs(v - centre);
-    std::nth_element(values.begin(), middle, values.end());
-    const double spread = 1.4826 * *middle;
+    const double spread = 1.4826 * upper_median(values);
     if (!(spread > 0)) return;
     for (std::size_t i = spike_reach; i + spike_reach < y.size(); ++i) {
         const double here = std::abs(y.at(i) - centre);

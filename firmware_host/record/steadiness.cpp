@@ -6,6 +6,7 @@
 //          depend on the envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line
 #include "steadiness.hpp"
 
+#include "files/order_statistics.hpp"
 #include "modal_answer.hpp"
 
 #include <Eigen/Dense>
@@ -38,12 +39,6 @@ struct slopes {
     double level = 0, level_ratio = 0, drift = 0, drift_ratio = 0; ///< relative changes, each over its deviation
 };
 
-double percentile(std::vector<double> values, double share) {
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-}
-
 /// Weighted line over a power and time; changes from the quietest to the loudest tenth, and from begin to end.
 slopes slopes_of(const std::vector<block_frequency>& over, double block_frequency::* level) {
     slopes out;
@@ -74,8 +69,8 @@ slopes slopes_of(const std::vector<block_frequency>& over, double block_frequenc
     }
     scatter /= static_cast<double>(over.size() - 3);
     if (!inverse.allFinite() || !(scatter > 0)) return out;
-    out.level = slope[1] * (percentile(powers, 0.9) - percentile(powers, 0.1));
-    out.drift = slope[2] * (percentile(times, 1) - percentile(times, 0));
+    out.level = slope[1] * (quantile(powers, 0.9) - quantile(powers, 0.1));
+    out.drift = slope[2] * (quantile(times, 1) - quantile(times, 0));
     out.level_ratio = std::abs(slope[1]) / std::sqrt(scatter * inverse(1, 1));
     out.drift_ratio = std::abs(slope[2]) / std::sqrt(scatter * inverse(2, 2));
     return out;

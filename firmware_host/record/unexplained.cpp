@@ -6,6 +6,7 @@
 #include "unexplained.hpp"
 
 #include "consensus/spectrum.hpp"
+#include "files/order_statistics.hpp"
 #include "modal_answer.hpp"
 
 #include <algorithm>
@@ -43,9 +44,7 @@ bool is_peak(const std::vector<double>& power, std::size_t k) {
     const std::size_t first = k > beside ? k - beside : 0, last = std::min(power.size() - 1, k + beside);
     std::vector<double> near(power.begin() + static_cast<std::ptrdiff_t>(first),
                              power.begin() + static_cast<std::ptrdiff_t>(last + 1));
-    const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
-    std::nth_element(near.begin(), middle, near.end());
-    return power[k] > above * *middle;
+    return power[k] > above * upper_median(near);
 }
 
 /// Samples x n_y of one record, as rows.

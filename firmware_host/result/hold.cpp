@@ -7,6 +7,7 @@
 #include "hold.hpp"
 
 #include "deviations.hpp"
+#include "files/order_statistics.hpp"
 
 #include <okid/mechanics.h>
 #include <okid/modal.h>
@@ -147,9 +148,7 @@ hold_fit fit_of(const response& r, int n_y, const std::vector<int>& sensing, con
         const VectorXcd turned = residues.row(k).transpose() * complex(0, 1);
         phases.push_back(turned.imag().norm() / std::max(turned.norm(), 1e-300));
     }
-    const auto middle = phases.begin() + static_cast<std::ptrdiff_t>(phases.size() / 2);
-    std::nth_element(phases.begin(), middle, phases.end());
-    out.phase = *middle;
+    out.phase = upper_median(phases);
     return out;
 }
 

@@ -53,6 +53,23 @@ def test_readme_names_what_the_folder_has(library: Path) -> None:
         assert (library / name).exists()
 
 
+def test_every_declared_function_links(library: Path) -> None:
+    """Those of both headers, as the compiler lists them, from one program with both sources."""
+    src = library / "src"
+    (src / "seen.c").write_text('#include "okid_core.h"\n#include "okid_modes.h"\n')
+    run("gcc", "-aux-info", "seen.txt", "-fsyntax-only", "seen.c", cwd=src)
+    listed = re.findall(r"^/\* okid_\w+\.h:\S+ \*/ extern .*?\b(\w+) \(", (src / "seen.txt").read_text(), re.M)
+    named = {re.sub(r"_\d+_double$", "", name) for name in listed}
+    assert {"okid_accumulator_add", "drv_stream_encode_floats", "okid_modal_analyse"} < named and len(named) > 60
+    assert not any(name.startswith(("okid_identify_", "okid_square_root_", "okid_subspace_")) for name in named)
+    includes = '#include "okid_core.h"\n#include "okid_modes.h"\n'
+    addresses = ", ".join(f"(void *){name}" for name in sorted(named))
+    (src / "all.c").write_text(f"{includes}void *all[] = {{{addresses}}};\nint main(void) {{ return all[0] == 0; }}\n")
+    run("gcc", "-c", "all.c", cwd=src)
+    run("g++", "-std=c++17", "-w", "-O0", "-I/usr/include/eigen3", "-c", "okid_modes.cpp", cwd=src)
+    run("g++", "all.o", "okid_core.o", "okid_modes.o", "-lm", "-o", "all", cwd=src)
+
+
 def sketch(library: Path, name: str, *more: object) -> bytes:
     """What a sketch sends over the record."""
     objects = [library / "src" / f"{part}.o" for part in ("okid_core", "board_host")]

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// The amplitude of a vibration over time: at one frequency, block by block.
+#pragma once
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <vector>
+
+namespace okid_host {
+
+/// Adds to `out` the complex amplitude at a frequency, in shares of the rate, of every whole block of at(0) .. at(count - 1)
+/// under a Hann window of mean 1; NaN where a sample is missing.
+template <class At>
+void demodulate(std::size_t count, double share, std::size_t block, const At& at,
+                std::vector<std::complex<double>>& out) {
+    std::vector<double> hann;
+    for (std::size_t i = 0; i < block; ++i)
+        hann.push_back((1 - std::cos(2 * M_PI * static_cast<double>(i) / static_cast<double>(block))) /
+                       static_cast<double>(block));
+    const std::complex<double> turn = std::polar(1.0, -2 * M_PI * share);
+    std::complex<double> phase = 1;
+    for (std::size_t first = 0; first + block <= count; first += block) {
+        std::complex<double> sum = 0;
+        for (std::size_t i = 0; i < block; ++i, phase *= turn) sum += hann[i] * at(first + i) * phase;
+        phase /= std::abs(phase);
+        out.push_back(sum);
+    }
+}
+
+/// Does a vibration last, or does the record hold a single decay? (Sum of amplitudes)^2 over blocks times sum of squares:
+/// chance gives 0.79, a decay less than a half. Blocks with a missing sample add nothing.
+inline bool lasts(const std::vector<std::complex<double>>& amplitudes) {
+    double sum = 0, squares = 0;
+    for (const auto& x : amplitudes)
+        if (const double size = std::abs(x); !std::isnan(size)) sum += size, squares += size * size;
+    return sum * sum >= static_cast<double>(amplitudes.size()) * squares / 2;
+}
+
+} // namespace okid_host
