@@ -12,7 +12,7 @@
 namespace okid_host {
 namespace {
 
-constexpr double default_mb = 8192, most_mb = 1e6, share = 4;
+constexpr double default_mb = 8192, most_mb = 1e6, samples_of_it = 4; // one part in four
 constexpr const char* variable = "OKID_MAX_MEMORY_MB";
 
 double max_memory_mb() {
@@ -30,7 +30,7 @@ double max_memory_mb() {
 } // namespace
 
 bool samples_fit(std::size_t rows, std::size_t columns) {
-    return 8e-6 * static_cast<double>(rows) * static_cast<double>(columns) <= max_memory_mb() / share;
+    return 8e-6 * static_cast<double>(rows) * static_cast<double>(columns) <= max_memory_mb() / samples_of_it;
 }
 
 void require_samples(const std::string& path, std::size_t rows, std::size_t columns) {

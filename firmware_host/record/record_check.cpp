@@ -309,7 +309,7 @@ void remark_noisy_output(result_context& context) {
                 "noisy_output",
                 fmt::format("output \"{}\" is much noisier than the rest: the model leaves {:.0f} % of it, "
                             "{:.1f} % of the middle one. Look at its sensor, range and cable",
-                            context.outputs[k], 100 * left_of(k), 100 * *middle));
+                            context.outputs[k], 100 * left_of(k), 100 * middle));
 }
 
 void remark_exchanged(const std::vector<std::string>& units, const record_options& options, remarks& said) {
