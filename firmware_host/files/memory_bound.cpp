@@ -39,7 +39,7 @@ void require_samples(const std::string& path, std::size_t rows, std::size_t colu
     const double limit = max_memory_mb();
     throw failure(exit_usage, fmt::format("{}: {} samples of {} channels take {:.0f} MB, at most {:.0f} MB are read (a "
                                           "quarter of max_memory_mb = {:g}; {} sets it)",
-                                          path, rows, columns, wanted, limit / share, limit, variable));
+                                          path, rows, columns, wanted, limit / samples_of_it, limit, variable));
 }
 
 } // namespace okid_host
