@@ -25,6 +25,7 @@
 #include <optional>
 #include <poll.h>
 #include <set>
+#include <sys/un.h>
 
 namespace okid_host {
 namespace {
@@ -198,9 +199,14 @@ std::string text_of(const init_arguments& given, const proposal& found) {
     if (found.forces > 0)
         out += "# hold = \"foh\"            # the force is a load cell's; default: determined from the record\n"
                "# mkr = true              # mass, stiffness, damping: a force or sensor at every dof, both at one\n";
-    return out + "# window_s = 20.0          # for a structure that changes; default: everything since the start\n\n"
-                 "# [record]                 # raw frames onto the disk\n# directory = \"runs\"\n\n"
-                 "# [publish]                # for okid-live\n# socket = \"okid.sock\"\n# samples = true\n";
+    const std::filesystem::path socket = std::filesystem::path(given.config).filename().replace_extension(".sock");
+    const std::size_t bytes = std::filesystem::absolute(given.config).replace_filename(socket).string().size();
+    const char* const off = bytes < sizeof(sockaddr_un::sun_path) ? "" : "# "; // too long a name for a socket
+    return out +
+           "# window_s = 20.0          # for a structure that changes; default: everything since the start\n\n"
+           "# [record]                 # raw frames onto the disk\n# directory = \"runs\"\n\n" +
+           fmt::format("{0}[publish]                  # for okid-live\n{0}socket = {1}\n{0}samples = true\n", off,
+                       quoted_toml(socket.string()));
 }
 
 void init(const init_arguments& given) {

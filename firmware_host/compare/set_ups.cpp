@@ -9,7 +9,7 @@
 #include "files/nearest_name.hpp"
 #include "files/order_statistics.hpp"
 #include "merge.hpp"
-#include "record/drive_mass.hpp"
+#include "result/drive_mass.hpp"
 #include "record/modal_model.hpp"
 #include "record/record_check.hpp"
 #include "result/hold.hpp"

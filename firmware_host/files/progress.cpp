@@ -71,6 +71,11 @@ void progress::stage(const std::string& text) {
     share_ = -1;
 }
 
+void progress::reword(const std::string& text) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    text_ = one_line(text);
+}
+
 void progress::share(double done) {
     const std::lock_guard<std::mutex> lock(mutex_);
     share_ = done;

@@ -20,6 +20,8 @@ class progress {
 
     /// The work that begins now.
     void stage(const std::string& text);
+    /// The same work, in other words.
+    void reword(const std::string& text);
     /// How much of it is done, 0 to 1; below 0 = not known.
     void share(double done);
 

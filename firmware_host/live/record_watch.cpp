@@ -21,7 +21,8 @@ constexpr double patience_s = 2; // beyond the duration, when the channels do no
 
 record_watch::record_watch(const live_config& config, const std::optional<double>& duration_s)
     : config_(config), duration_s_(duration_s), grid_(config, *this), check_(config), trigger_(config),
-      losses_(config.buses.size()), terminal_(isatty(STDERR_FILENO) == 1) {
+      losses_(config.buses.size()) {
+    if (duration_s || isatty(STDERR_FILENO) == 1) progress_.emplace(true);
     if (!duration_s) return;
     limit_ = std::max<std::int64_t>(1, std::llround(*duration_s * config.rate_hz));
     grid_.set_limit(limit_);
@@ -35,15 +36,15 @@ void record_watch::frame(const drv_frame_t& frame) {
     ++frames_;
     check_.add(stamped);
     grid_.push(stamped);
-    if (terminal_ && frames_ % 64 == 0) show_progress();
+    if (progress_ && frames_ % 64 == 0) show();
 }
 
-void record_watch::show_progress() {
+void record_watch::show() {
     const double now = steady_s();
     if (now - shown_at_ < redraw_s) return;
     shown_at_ = now;
-    say("\r{}{:.1f} s, {} frames ", trigger_.waiting() ? "armed, " : "",
-        static_cast<double>(last_ns_ - first_ns_) * 1e-9, frames_);
+    progress_->reword(fmt::format("{}, {} frames", trigger_.waiting() ? "armed" : "recording", frames_));
+    if (duration_s_) progress_->share(static_cast<double>(last_ns_ - first_ns_) * 1e-9 / *duration_s_);
 }
 
 void record_watch::on_sample(std::int64_t index, const double* row) {
@@ -74,7 +75,7 @@ bool record_watch::done() const {
 }
 
 void record_watch::finish() {
-    if (terminal_ && shown_at_ > 0) say("\n");
+    progress_.reset();
     if (stopped_) throw failure(exit_device, ""); // said when it happened
     if (!heard())
         throw failure(exit_no_model, fmt::format("no frame was received: are the sensors on, and are the buses of {} "

@@ -4,6 +4,7 @@
 #include "align/aligner.hpp"
 #include "align/trigger.hpp"
 #include "config/config.hpp"
+#include "files/progress.hpp"
 #include "stream_target.hpp"
 
 #include <cstdint>
@@ -36,7 +37,7 @@ class record_watch : public stream_target, private grid_sink {
     void on_sample(std::int64_t index, const double* row) override;
     void on_missing(std::int64_t index, std::int64_t count) override;
     void on_gap(const grid_gap&) override {}
-    void show_progress();
+    void show();
 
     const live_config& config_;
     std::optional<double> duration_s_;
@@ -46,8 +47,9 @@ class record_watch : public stream_target, private grid_sink {
     std::vector<device_losses> losses_;
     std::int64_t limit_ = 0, first_ns_ = 0, last_ns_ = 0;
     std::uint64_t frames_ = 0;
-    bool terminal_, stopped_ = false;
+    bool stopped_ = false;
     double shown_at_ = 0;
+    std::optional<progress> progress_; ///< none off a terminal of what has no end: a service
 };
 
 } // namespace okid_host

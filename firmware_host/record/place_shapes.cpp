@@ -7,7 +7,7 @@
 #include "place_shapes.hpp"
 
 #include "consensus/quantity.hpp"
-#include "drive_mass.hpp"
+#include "result/drive_mass.hpp"
 #include "roving.hpp"
 
 #include <algorithm>
@@ -122,26 +122,33 @@ class placer {
         refined_arrays& arrays = *work_.refined;
         arrays.mpc[k] = shape_collinearity(shape, {});
         arrays.cmi[k] = arrays.mpc[k] * arrays.emac[k];
-        shapes_.modal_mass.push_back(modal_mass(k, c, most.value));
+        add_modal_mass(k, c, most);
     }
 
-    /// Of a shape divided by `largest`, from the residues at the drive points. NaN: there is none, or they contradict.
-    double modal_mass(std::size_t k, const std::vector<complex>& c, complex largest) {
+    /// Of a shape divided by `largest`, from the residues at the drive points. NaN: there is none, or they contradict. The mass
+    /// is b / (turn c largest^2), and its relative deviation the mean of those of the points by their weight.
+    void add_modal_mass(std::size_t k, const std::vector<complex>& c, const place_entry& largest) {
         const complex lambda = pole_of(modes_[k]);
         const complex turn = drive_factor(lambda, dt_, work_.context.hold) / 2.0; // b is of two real states
         drive_mass mass;
+        double deviation = 0;
         bool clear = true;
         for (const drive_point& point : points_) {
             const complex b = own_.b(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(point.place));
-            const complex psi = b / largest;
+            const complex psi = b / largest.value;
             const complex r = turn * c[point.output] * b * outputs_[point.output].si / inputs_[point.place].si;
             mass.add(psi, r);
+            const double own =
+                own_.std(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(point.place)) / std::abs(b);
+            const double other = b == largest.value ? 0 : 2 * largest.std / std::abs(largest.value);
+            deviation += std::norm(psi * psi) * std::hypot(own, other) / M_SQRT2;
             if (!(std::abs(psi) >= near_node)) continue;
             const double cosine = (std::conj(psi * psi) * r).real() / std::abs(psi * psi * r);
             clear = clear && cosine > drive_cosine;
             if (modes_[k].in_model) cosines_[point.output].emplace_back(cosine, modes_[k].frequency_hz);
         }
-        return clear ? mass.kg() : NAN;
+        shapes_.modal_mass.push_back(clear ? mass.kg() : NAN);
+        shapes_.modal_mass_std.push_back(shapes_.modal_mass.back() * deviation / mass.power);
     }
 
     /// At a drive point every mode moves with the force.

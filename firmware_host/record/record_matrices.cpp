@@ -52,6 +52,7 @@ void find_matrices_agreed(const record_options& options, record_work& work) {
     if (options.hold == "auto" && work.set.n_u == 0) work.context.hold = "zoh";
     plan.hold = work.context.hold;
     if (!options.mass.wanted()) return;
+    work.context.modal_masses = modal_masses_of(work.model, plan, plan.hold);
     try {
         work.context.mass = find_mass_matrices(work.model, plan, said);
     } catch (const failure& why) {
@@ -65,7 +66,7 @@ void find_matrices_agreed(const record_options& options, record_work& work) {
 void find_matrix_deviations(const std::vector<listed_mode>& listed, const record_options& options, record_work& work) {
     std::size_t blocks = 0;
     for (const auto& shifts : work.shifts) blocks = std::max(blocks, shifts.size());
-    if (!work.context.mass || blocks < std::size_t{fewest_blocks} || work.force_is_older) return;
+    if (!options.mass.wanted() || blocks < std::size_t{fewest_blocks} || work.force_is_older) return;
     mass_plan plan = options.mass;
     const bool band = work.context.hold == "band";
     plan.hold = band ? "zoh" : work.context.hold;
@@ -75,6 +76,8 @@ void find_matrix_deviations(const std::vector<listed_mode>& listed, const record
         return model_view(band && as_if_held(model, sensing, held) ? held.view : model);
     };
     replicate_statistics statistics(work.model.n_u, work.model.n_y, work.model.n_z, plan, work.model.dt);
+    modal_mass_statistics masses(plan, work.context.hold, work.model.dt);
+    masses.begin(work.model);
     held_model held;
     statistics.begin(as_taken(work.model, held));
     record_work part;
@@ -89,8 +92,10 @@ void find_matrix_deviations(const std::vector<listed_mode>& listed, const record
         held_model other;
         const okid_model_t view = as_taken(part.model, other);
         statistics.add(&view, 1.0 / static_cast<double>(blocks));
+        masses.add(model_view(part.model), 1.0 / static_cast<double>(blocks));
     }
-    add_deviations(statistics.finish(), *work.context.mass, work.context.warnings);
+    work.context.modal_masses = masses.finish();
+    if (work.context.mass) add_deviations(statistics.finish(), *work.context.mass, work.context.warnings);
 }
 
 } // namespace okid_host

@@ -22,6 +22,7 @@ void put_shape_json(const placed_shapes& shapes, std::size_t mode, nlohmann::ord
         for (std::size_t i = 0; i < n; ++i) list.push_back(number_json((*values)[mode * n + i]));
     }
     to["modal_mass"] = number_json(shapes.modal_mass[mode]);
+    to["modal_mass_std"] = number_json(mode < shapes.modal_mass_std.size() ? shapes.modal_mass_std[mode] : NAN);
 }
 
 std::string shapes_text(const placed_shapes& shapes, const double* frequency_hz, const std::vector<bool>& shown) {

@@ -13,6 +13,7 @@ struct placed_shapes {
     std::vector<int> dofs;                      ///< the places, ascending
     std::vector<double> re, im, re_std, im_std; ///< place by place, mode after mode
     std::vector<double> modal_mass;             ///< kg, of each mode's shape as it stands here
+    std::vector<double> modal_mass_std;         ///< empty: not known
 };
 
 /// What an entry of "modes" has of them.

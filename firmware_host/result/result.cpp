@@ -287,6 +287,8 @@ nlohmann::ordered_json result_json(const okid_identified_t& model, const result_
                                                                          : ordered_json(nullptr);
     out["modes"] =
         modes_json(model, context.sigma ? &*context.sigma : nullptr, context.placed ? &*context.placed : nullptr);
+    for (std::size_t k = 0; k < context.modal_masses.size(); ++k)
+        put_modal_mass_json(context.modal_masses[k], out["modes"][k]);
     if (context.placed) out["shape_dofs"] = context.placed->dofs;
     if (!context.shape_quantity.empty()) out["shape_quantity"] = context.shape_quantity;
     if (agreed) {

@@ -3,6 +3,7 @@
 #pragma once
 #include "deviations.hpp"
 #include "hit_table.hpp"
+#include "modal_masses.hpp"
 #include "mode_verdict.hpp"
 #include "placed_shapes.hpp"
 #include "pole_table.hpp"
@@ -55,6 +56,7 @@ struct result_context {
     std::vector<hit_line> hits;                                ///< of a hammer test in files
     std::optional<placed_shapes> placed;                       ///< of a hammer that roves: shapes over its places
     std::optional<mass_matrices> mass;                         ///< M, K, R where the channels have degrees of freedom
+    std::vector<modal_mass> modal_masses;                      ///< of each mode; empty: no drive point is known
     std::vector<std::pair<std::string, std::string>> warnings; ///< further (code, text)
 };
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import beam
 import numpy as np
 import pytest
 from event_source import Listener, ask
@@ -86,6 +87,31 @@ def test_a_result_with_its_record(rig: Path, okid_live: Callable[..., Live]) -> 
     assert spectra["averages"] > 3 and "model" in spectra["response"]
     status, page = post(live, "/report", {})
     assert status == 200 and page.startswith(b"<!DOCTYPE html>") and b"t.csv" in page
+    assert live.end() == (0, "")
+
+
+def test_hits_of_a_roving_hammer_show_their_signals(tmp_path: Path, okid_live: Callable[..., Live]) -> None:
+    """The force moves from place to place: it is a lane, and there is no response to it."""
+    rng = np.random.default_rng(7)
+    hits = {f"P{place}_1.csv": beam.record(beam.Hit(place, 100.0, 0.0015), rng, 0.002) for place in (1, 2, 3)}
+    files = beam.write(tmp_path, hits)
+    names = ("--inputs", "Hammer", "--outputs", "Acc1,Acc2", "--places", r"P(\d+)_", "--json", tmp_path / "r.json")
+    okid("identify", *files, *names, status=0)
+    live = okid_live(tmp_path / "r.json", "--record", *files)
+    page, columns = Listener(live.port), 0
+    for kind, content in page.events():
+        if kind == "hello":
+            channels = content["facts"]["channels"]
+        elif kind == "lanes":
+            columns = max(columns, content["first"] + content["count"])
+        if columns > 2 * beam.SECONDS * 100:
+            break
+    page.close()
+    assert [(one["name"], one["role"], one["dof"]) for one in channels] == [
+        ("Hammer", "aux", None), ("Acc1", "response", None), ("Acc2", "response", None),
+    ]  # fmt: skip
+    spectra = json.loads(ask(live.port, "/spectra?channels=0,1")[2])
+    assert spectra["averages"] > 1 and not spectra.get("response")
     assert live.end() == (0, "")
 
 
@@ -196,7 +222,7 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     assert live.end() == (0, "")
 
 
-WISHES = ("/report", "/geometry", "/look", "/identify", "/open", "/upload?name=a.csv")
+WISHES = ("/report", "/geometry", "/look", "/identify", "/open", "/propose", "/run", "/end", "/upload?name=a.csv")
 
 
 @pytest.mark.parametrize("path", WISHES)
@@ -215,7 +241,7 @@ def test_nobody_without_the_key_is_heard(start: Live, path: str) -> None:
 def test_keys_differ_and_a_page_of_a_run_takes_no_files(start: Live, rig: Path, okid_live: Callable[..., Live]) -> None:
     live = okid_live(rig / "r.json")
     assert live.token != start.token
-    for path in ("/look", "/identify", "/open", "/upload?name=a.csv"):
+    for path in WISHES[2:]:
         assert post(live, path, {"path": str(rig / "t.csv")})[0] == 405
 
 
@@ -225,7 +251,7 @@ def test_keys_differ_and_a_page_of_a_run_takes_no_files(start: Live, rig: Path, 
      b'{"files": ["\\u0000"]}', b"[" * 5000, b'{"outputs": [' + b'"a",' * 5000 + b'"a"]}', b"\xff"],
 )  # fmt: skip
 def test_damaged_wishes_are_refused(start: Live, body: bytes) -> None:
-    for path in ("/identify", "/look", "/open"):
+    for path in ("/identify", "/look", "/open", "/propose", "/run", "/end"):
         status, said = post(start, path, body)
         assert status in (400, 422) and said.count(b"\n") == 1, said
 
@@ -299,8 +325,8 @@ def test_what_was_named_is_said(desk: Desk, rig: Path, tmp_path: Path) -> None:
     ]  # fmt: skip
     kinds = {name: desk.look({"path": str(rig / name)})["kind"] for name in ("a.log", "a.okj", "r.json", "a.toml")}
     assert kinds == {"a.log": "log", "a.okj": "journal", "r.json": "result", "a.toml": "config"}
-    for bus, word in (("can0", "--interface can0"), ("/dev/ttyACM0", "--device /dev/ttyACM0")):
-        assert word in desk.look({"path": bus})["command"]
+    for bus, serial in (("can0", False), ("/dev/ttyACM0", True)):
+        assert desk.look({"path": bus}) == {"kind": "bus", "path": bus, "serial": serial}
     for wrong, said in (("", "no file was named"), ("/no/such", "no such file"), (str(rig / "a.dbc"), "is a DBC")):
         with pytest.raises(desks.InputError, match=said):
             desk.look({"path": wrong})

@@ -17,6 +17,7 @@ from typing import Any
 
 import okid as okid_package
 import pytest
+from lines import line, node_config, packet
 from okid.data import notebook_progress, progress
 from okid.data.progress import Progress, progress_text
 from program import PROGRAM, okid
@@ -98,6 +99,29 @@ def test_python_says_the_same(tmp_path: Path) -> None:
         assert len(list(target.iterdir())) == 3
         told = re.findall(r"okid-convert: \d+ s, converting \S+\.csv, (\d+) %", said)
         assert bool(told) == (out.count("samples x") == 3) == (not quiet) and set(told) <= {"0", "33", "67"}
+
+
+@pytest.mark.realtime
+def test_a_recording_says_how_many_frames_came(tmp_path: Path) -> None:
+    """On a terminal, of a node that sends a packet of one sample a hundredth of a second."""
+    config = node_config(tmp_path, f'[record]\ndirectory = "{tmp_path}"\n')
+    with line(tmp_path / "tty") as ours:
+        over = threading.Event()
+
+        def send() -> None:
+            sequence = 0
+            while not over.wait(0.01):
+                ours.write(packet(sequence, [[sequence % 100, 1]], time_us=10000 * sequence))
+                sequence += 1
+
+        sender = threading.Thread(target=send)
+        sender.start()
+        code, _, said = on_terminal([PROGRAM, "record", str(config), "--duration", "5"], tmp_path)
+        over.set()
+        sender.join()
+    told = re.findall(r"okid: \d+ s, recording, (\d+) frames, (\d+) %", said)
+    assert code == 0 and len(told) >= 2, said
+    assert [int(frames) for frames, _ in told] == sorted(int(frames) for frames, _ in told) and int(told[-1][1]) <= 100
 
 
 class _Out(io.StringIO):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lines import line
 from live_process import Live
 from PIL import Image
 from program import okid
@@ -165,3 +166,39 @@ def test_a_geometry_typed_as_a_table(rig: Path, tmp_path: Path, browser: Any, ok
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     tab.check_quiet()
     assert not Tab(browser, live, live.url).page.is_visible("#geometry")
+
+
+def test_a_run_begins_and_ends_on_the_page(
+    rig: Path, tmp_path: Path, browser: Any, okid_live: Callable[..., Live]
+) -> None:
+    """A serial line is named, its config proposed and changed; the run goes on while no page is open."""
+    rows = [row for row in (rig / "t.csv").read_text().splitlines() if row[:1] in "-0123456789"]
+    live, device, config = okid_live(), tmp_path / "tty", tmp_path / "lab.toml"
+    tab = Tab(browser, live)
+    page = tab.page
+    with line(device) as ours:
+        page.fill("#start-path", str(device))
+        page.click("#start-look")
+        tab.wait("() => !document.getElementById('start-bus').hidden")
+        assert page.is_visible("#bus-fields") and not page.is_visible("#bus-dbc")
+        page.fill("#bus-config", str(config))
+        page.fill("#bus-fields", "force,a1,a2")
+        page.fill("#bus-rate", "500")
+        page.click("#bus-propose")
+        tab.wait("() => document.getElementById('run-toml').value.includes('name = \"a2\"')")
+        toml = page.input_value("#run-toml").replace("# counter_field = 0", "counter_field = 0")
+        for field in (2, 1, 0):  # the number of a line came to be the first
+            toml = toml.replace(f"\nfield = {field}", f"\nfield = {field + 1}")
+        page.fill("#run-toml", toml)
+        page.click("#run-start")
+        tab.wait("() => document.getElementById('link').textContent === 'live'")
+        page.close()
+        for n, row in enumerate(rows):
+            ours.write(f"{n},{row}\n".encode())
+        again = Tab(browser, live)
+        again.wait("() => document.querySelectorAll('#modes-table tbody tr').length >= 2")
+        again.page.click("#run-end")
+        again.wait("() => okidLive.page.result && document.getElementById('link').textContent === 'ended: result'")
+        again.check_quiet()
+    tab.check_quiet()
+    assert live.end() == (0, "")

@@ -58,6 +58,7 @@ def test_modes_and_shapes_over_all_places(tmp_path: Path) -> None:
             within.append(abs(mode["damping_ratio"] - beam.DAMPING[k]) < 2 * mode["damping_ratio_std"])
             assert beam.mac(shape_of(mode), beam.shapes()[:, k]) > 0.999
             assert mode["modal_mass"] == pytest.approx(beam.modal_mass()[k], rel=0.03)
+            assert abs(mode["modal_mass"] - beam.modal_mass()[k]) < 4 * mode["modal_mass_std"] < 0.1
         assert result["shape_dofs"] == list(range(1, 13))
         left = {hit["file"]: hit["reason"] for hit in result["hits"] if not hit["accepted"]}
         assert left == {"P04_2.csv": "double_hit", "P09_1.csv": "overload"}

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -16,12 +15,10 @@ import okid
 import pytest
 import scipy.linalg
 from okid import report
-from okid.mechanics.modal_mass import modal_masses
 from okid.record.demo import demo_frame, demo_record
 from okid.result.circle import fit_circle, lines_around
 from okid.result.expert_figures import spectrogram_of
 from PIL import Image
-from scipy.signal import cont2discrete
 
 FS = 1000.0
 
@@ -49,60 +46,6 @@ def section_of(page: str, name: str) -> str:
 def cells(section: str) -> list[list[str]]:
     rows = re.findall(r"<tr>(.*?)</tr>", section)
     return [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in rows if "<td" in row]
-
-
-def exact(hold: str, sensing: str, force: int, dofs: list[int]) -> dict[str, Any]:
-    """A result of the frame without noise: its model discretised here, its modes by their definition."""
-    frame = demo_frame()
-    m, k, r = (np.asarray(one, dtype=float) for one in (frame.M, frame.K, frame.R))
-    flexible = np.linalg.inv(m)
-    a = np.block([[np.zeros((3, 3)), np.eye(3)], [-flexible @ k, -flexible @ r]])
-    b = np.vstack([np.zeros((3, 1)), flexible[:, [abs(force) - 1]]]) * np.sign(force)
-    whole = np.eye(6)
-    rows = {"displacement": whole[:3], "velocity": whole[3:], "acceleration": a[3:]}[sensing]
-    turn = np.array([[np.sign(one)] for one in dofs])
-    c = turn * rows[[abs(one) - 1 for one in dofs]]
-    if hold == "band":
-        ad, bd = scipy.linalg.expm(a / FS), scipy.linalg.expm(a / FS) @ b / FS
-        cd = c
-    else:
-        ad, bd, cd, _, _ = cont2discrete((a, b, c, np.zeros((len(c), 1))), 1.0 / FS, hold)
-    poles, v = np.linalg.eig(a)
-    modes = []
-    for p, shape in sorted(((p, c @ v[:, n]) for n, p in enumerate(poles) if p.imag > 0), key=lambda one: abs(one[0])):
-        shape = shape / shape[np.argmax(np.abs(shape))]
-        modes.append({"frequency_hz": abs(p) / (2 * np.pi), "damping_ratio": -p.real / abs(p),
-                      "shape_re": shape.real.tolist(), "shape_im": shape.imag.tolist()})  # fmt: skip
-    return {"inputs": ["u"], "outputs": [f"y{n}" for n in range(len(dofs))], "input_dofs": [force], "output_dofs": dofs,
-            "hold": hold, "fs_hz": FS, "modes": modes,
-            "model": {"A": ad.tolist(), "B": bd.tolist(), "C": cd.tolist()}}  # fmt: skip
-
-
-@pytest.mark.parametrize("hold", ["zoh", "foh", "band"])
-@pytest.mark.parametrize("sensing", ["acceleration", "velocity", "displacement"])
-@pytest.mark.parametrize(("force", "dofs"), [(1, [1, 2, 3]), (-2, [3, 2, 1]), (3, [-3, 1, 2])])
-def test_masses_of_the_exact_model(hold: str, sensing: str, force: int, dofs: list[int]) -> None:
-    """Whatever held the force, whatever is sensed, whichever way the sensor faces: psi^T M psi."""
-    found = modal_masses(exact(hold, sensing, force, dofs), sensing)
-    hz, masses = truth()
-    for one, f, mass in zip(found, hz, masses, strict=True):
-        assert one is not None and abs(one.phase_deg) < 1.0
-        assert one.mass_kg == pytest.approx(mass, rel=2e-3)
-        assert one.stiffness_n_m == pytest.approx(mass * (2 * np.pi * f) ** 2, rel=4e-3)
-
-
-def test_masses_need_a_drive_point() -> None:
-    assert modal_masses(exact("zoh", "acceleration", 1, [2, 3])) == []
-    roving = {"inputs": ["u@1"], "outputs": ["a"], "modes": [
-        {"modal_mass": 2.0, "frequency_hz": 10.0, "damping_ratio": 0.01},
-        {"modal_mass": None, "frequency_hz": 20.0, "damping_ratio": 0.01},
-    ]}  # fmt: skip
-    first, second = modal_masses(roving)
-    assert first is not None and second is None
-    assert first.stiffness_n_m == pytest.approx(2.0 * (20.0 * np.pi) ** 2)
-    assert first.damping_n_s_m == pytest.approx(0.02 * 2.0 * 20.0 * np.pi)
-    with pytest.raises(okid.InputError, match="sensing is 'force', expected acceleration"):
-        modal_masses(exact("zoh", "acceleration", 1, [1, 2, 3]), "force")
 
 
 @pytest.mark.parametrize("sensing", ["acceleration", "velocity", "displacement"])
@@ -154,14 +97,14 @@ def test_sections_of_a_forced_record(forced: tuple[Any, Any, Any]) -> None:
     page = report.build(report.loaded_from(result.to_dict(), "r"), record)
     rows = cells(section_of(page, "modal-mass"))
     assert [float(row[2]) for row in rows] == pytest.approx(truth()[1], rel=0.02)
-    assert [float(row[5]) for row in rows] == pytest.approx(1.0 / np.sqrt(truth()[1]), rel=0.02)
+    assert [float(row[8]) for row in rows] == pytest.approx(1.0 / np.sqrt(truth()[1]), rel=0.02)
+    assert all(row[3] == "–" for row in rows)  # sigma_blocks=0
     assert "Units: if the force" not in page and 'aria-label="singular values of the measured responses' in page
     circles = cells(section_of(page, "nyquist-circles"))
     assert [float(row[3]) for row in circles] == pytest.approx(truth()[0], rel=0.02)
     assert "Power density of a1" in section_of(page, "spectrogram") and 'id="fdd"' not in page
-    other = json.loads(json.dumps(result.to_dict()))
-    other["input_dofs"] = [9]
-    assert 'id="modal-mass"' not in report.build(report.loaded_from(other, "r"), record)
+    elsewhere = okid.identify(u, y, fs=FS, p=25, sigma_blocks=0)
+    assert 'id="modal-mass"' not in report.build(report.loaded_from(elsewhere.to_dict(), "r"))
 
 
 @pytest.mark.usefixtures("words_only")

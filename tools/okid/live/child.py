@@ -75,6 +75,12 @@ class Child:
             )  # fmt: skip
             return self._process
 
+    def finish(self) -> None:
+        """Ask what runs to end by itself (SIGTERM)."""
+        with self._lock:
+            if self._process is not None:
+                self._process.terminate()
+
     def stop(self) -> None:
         """End what runs; nothing can be run any more."""
         with self._lock:

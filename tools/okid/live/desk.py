@@ -15,6 +15,7 @@ import secrets
 import shlex
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from io import BufferedIOBase
@@ -23,14 +24,16 @@ from typing import Any
 
 from okid._errors import InputError
 from okid.abi.host import side_of_column
+from okid.abi.program import needed_program
 from okid.data.geometry import geometry_toml
 from okid.data.memory import max_memory_mb
 from okid.data.records import Record
 from okid.formats.geometry_file import read_geometry
 from okid.live.child import Child
-from okid.live.config import PageConfig, ReportFiles, config_of_log
+from okid.live.config import PageConfig, ReportFiles, config_of_log, read_config
 from okid.live.finished import Finished, Identified, over
 from okid.live.replayed import Replayed
+from okid.live.running import Running
 from okid.live.session import Session
 from okid.report.measured import open_record
 from okid.report.other_kinds import kind_of
@@ -39,6 +42,8 @@ MOST_NAMES, MOST_FILES, MOST_UPLOADS, MOST_TEXT = 4096, 1000, 100, 4096
 UPLOAD_SHARE = 0.25  # of max_memory_mb, for all files together: what reading a record may take
 PIECE = 1 << 20
 LIVE_BUS = re.compile(r"(?:v|sl)?can\d{1,3}|/dev/tty[\w.-]+|/dev/serial/by-id/[\w.:+-]+")
+LISTEN_S = 5  # to a bus, for the messages and the rate there are
+OF_A_BUS = {"fields": "--fields", "baud": "--baud", "dbc": "--dbc", "rate": "--rate"}
 CHOICES = {"fs": "--fs", "method": "--method", "input_dofs": "--input-dofs", "output_dofs": "--output-dofs",
            "sensing": "--sensing"}  # fmt: skip
 
@@ -73,6 +78,20 @@ def named_file(text: str) -> Path:
     if not there:
         raise InputError(f"{text}: no such file or folder")
     return path
+
+
+def is_bus(text: str) -> bool:
+    """Is it a CAN interface or a serial line, by its name or by what is there?"""
+    return bool(LIVE_BUS.fullmatch(text)) or (text.startswith("/") and Path(text).is_char_device())
+
+
+def init_options(fields: Mapping[str, Any]) -> list[str]:
+    """The options of `okid init` for the bus that was named and what was said of it. InputError for no bus."""
+    bus = _text(fields, "path")
+    if not is_bus(bus):
+        raise InputError(f"{bus}: is no bus, expected a CAN interface (can0) or a serial line (/dev/ttyACM0)")
+    where = [f"--device={bus}"] if bus.startswith("/") else [f"--interface={bus}", f"--listen={LISTEN_S}"]
+    return where + [f"{option}={_text(fields, key)}" for key, option in OF_A_BUS.items() if _text(fields, key)]
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -129,10 +148,13 @@ class Desk:
             "/geometry": self.geometry,
         }
         if start:
-            self._works |= {"/look": self.look, "/identify": self.identify, "/open": self.open}
+            self._works |= {"/look": self.look, "/identify": self.identify, "/open": self.open,
+                            "/propose": self.propose, "/run": self.run, "/end": self.end}  # fmt: skip
         self._reporter, self._reporting, self._changing = Child(), threading.Lock(), threading.Lock()
         self._uploaded = self._uploads = 0
         self._jobs = itertools.count(1)
+        self._proposed: set[Path] = set()  # configs that were written here and may still be changed
+        self._running: Running | None = None
 
     def knows(self, token: str) -> bool:
         """Is it the token of this session?"""
@@ -220,10 +242,8 @@ class Desk:
     def look(self, fields: Mapping[str, Any]) -> dict[str, Any]:
         """What a name that was typed is: `kind` and what a page needs to go on."""
         text = _text(fields, "path")
-        if LIVE_BUS.fullmatch(text):
-            where = f"--device {text}" if text.startswith("/dev/") else f"--interface {text} --listen 5"
-            return {"kind": "bus", "text": "a bus needs a config first", "command": "\n".join([
-                f"okid init lab.toml {where}", "okid-live lab.toml --open", "okid run lab.toml"])}  # fmt: skip
+        if is_bus(text):
+            return {"kind": "bus", "path": text, "serial": text.startswith("/")}
         path = named_file(text)
         found = kind_of(path)
         kind = "record" if found is None or found.key in ("table", "binary") else found.key
@@ -231,9 +251,7 @@ class Desk:
             names = sorted(one.name for one in path.iterdir() if one.is_file() and not one.name.startswith("."))
             return {"kind": kind, "path": str(path), "files": names[:MOST_FILES]}
         if kind == "config":
-            where = shlex.quote(str(path))
-            return {"kind": kind, "path": str(path), "text": "a config: it goes with a log; a run is started by",
-                    "command": f"okid-live {where} --open\nokid run {where}"}  # fmt: skip
+            return {"kind": kind, "path": str(path)}
         if kind in ("journal", "log", "result"):
             return {"kind": kind, "path": str(path)}
         if kind != "record":
@@ -245,6 +263,47 @@ class Desk:
         ]
         return {"kind": kind, "path": str(path), "channels": channels, "fs_hz": record.fs_hz,
                 "samples": len(record.samples)}  # fmt: skip
+
+    def propose(self, fields: Mapping[str, Any]) -> dict[str, str]:
+        """Write the config that `okid init` proposes for a bus; its text, and the command that does the same."""
+        options, name = init_options(fields), _text(fields, "config")
+        if not name.endswith(".toml"):
+            raise InputError(f"the config file is {name!r}, expected a new name that ends with .toml")
+        config = Path(name).expanduser().absolute()
+        child = Child()
+        child.run([needed_program(), "init", str(config), *options], lambda _stage: None)
+        self._proposed.add(config)
+        return {"path": str(config), "toml": config.read_text(encoding="utf-8"),
+                "command": shlex.join(["okid", "init", str(config), *options])}  # fmt: skip
+
+    def run(self, fields: Mapping[str, Any]) -> dict[str, str]:
+        """Begin `okid run` of a config; `toml`: how one that was proposed here reads by now."""
+        config, toml = named_file(_text(fields, "path")), fields.get("toml")
+        with self._changing:
+            self._require_rest()
+            if config in self._proposed and isinstance(toml, str):
+                config.write_text(toml, encoding="utf-8")
+            page = read_config(config)
+            result = config.with_name(f"{config.stem}-{time.strftime('%Y%m%d-%H%M%S')}.json")
+
+            def begin(session: Session) -> Running:
+                self._running = Running(session, config, result)
+                return self._running
+
+            self.session.show(page, begin)
+        watch = shlex.join(["okid-live", str(config), "--open"])
+        return {"command": f"{watch}\n{shlex.join(['okid', 'run', str(config), f'--json={result}'])}"}
+
+    def end(self, _fields: Mapping[str, Any]) -> dict[str, str]:
+        """Ask the run to end with its result."""
+        if self._running is None or not self._running.goes_on:
+            raise InputError("no run goes on")
+        self._running.finish()
+        return {}
+
+    def _require_rest(self) -> None:
+        if self._running is not None and self._running.goes_on:
+            raise Busy("a run goes on: end it first")
 
     def identify(self, fields: Mapping[str, Any]) -> dict[str, str]:
         """Begin to identify the files that are named; the command and the TOML that do the same."""
@@ -259,6 +318,7 @@ class Desk:
         given = ReportFiles(record=tuple(files))
         begin = PageConfig(files[0], None, True, "", length_s=0.0)
         with self._changing:
+            self._require_rest()
             place = self._job()
             self.session.show(begin, lambda session: Identified(session, given, options, place))
         words = ["okid", "identify", *map(str, files), *options, "--json=result.json"]
@@ -269,6 +329,7 @@ class Desk:
         path = named_file(_text(fields, "path"))
         found = kind_of(path)
         with self._changing:
+            self._require_rest()
             place = self._job()
             if found is not None and found.key == "result":
                 records = tuple(named_file(one) for one in _texts(fields, "records", MOST_FILES))

@@ -23,12 +23,12 @@ from okid.live.session import Session
 from okid.report.loaded import Loaded, load_result
 from okid.report.measured import channels_of, open_record
 from okid.report.other_kinds import check_kind
-from okid.result.shape_places import places_of_shapes
+from okid.result.shape_places import places_of_shapes, struck_at
 
 Real = NDArray[np.float64]
 CHUNK = 1 << 18  # numbers that go to the session at once: pages are served in between
 NO_RECORD = "no record was given: okid-live RESULT.json --record FILE shows its signals"
-OTHERS = {"hits": "hits of a roving hammer", "responses": "frequency responses", "set_ups": "set-ups"}
+OTHERS = {"responses": "frequency responses", "set_ups": "set-ups"}
 
 
 class Over(NamedTuple):
@@ -46,9 +46,16 @@ def feed_samples(session: Session, samples: Real) -> None:
         session.samples(first, np.array(samples[first : first + step].T))
 
 
+def _forces(raw: dict[str, Any]) -> list[str]:
+    """The columns of the forces; of a roving hammer "force@1", "force@2" are one."""
+    struck = [struck_at(name) if raw.get("shape_dofs") else None for name in raw["inputs"]]
+    return list(dict.fromkeys(name if at is None else at[0] for name, at in zip(raw["inputs"], struck, strict=True)))
+
+
 def _joined(result: Loaded, files: Sequence[Path]) -> Record:
     """The channels of the result in all records, one missing sample between two of them."""
-    parts = [channels_of(result, open_record(file), str(file)) for file in files]
+    names = _forces(result.raw) + result.outputs
+    parts = [channels_of(result, open_record(file), str(file), names) for file in files]
     gap = np.full((1, len(parts[0].names)), np.nan)
     rows = np.vstack([block for part in parts for block in (part.samples, gap)][:-1])
     first = parts[0]
@@ -93,11 +100,13 @@ def over(path: Path, files: ReportFiles) -> Over:
 
 def _channels(found: Over) -> list[dict[str, Any]]:
     raw, record = found.result.raw, found.channels
-    n_u, out = len(raw["inputs"]), []
-    for k, name in enumerate([*raw["inputs"], *raw["outputs"]]):
-        role = "force" if k < n_u else (record.roles[k] if record is not None else None) or "response"
-        unit = "" if record is None else record.units[k]
-        out.append({"name": name, "role": role, "unit": unit, "dof": None if k < n_u else k - n_u + 1})
+    forces, roves, out = _forces(raw), bool(raw.get("shape_dofs")), []
+    for k, name in enumerate([*forces, *raw["outputs"]]):
+        place, unit = k - len(forces) + 1, "" if record is None else record.units[k]
+        role = "aux" if roves else "force"  # there is no response to a force that moves about
+        if place > 0:
+            role = (record.roles[k] if record is not None else None) or "response"
+        out.append({"name": name, "role": role, "unit": unit, "dof": None if place < 1 or roves else place})
     return out
 
 

@@ -46,8 +46,8 @@ class Observer(NamedTuple):
 
 class Mode(NamedTuple):
     """One vibration mode. shape (n_y,) complex, largest entry 1; mpc and emac 0..1; std: 1 sigma, None = not known.
-    Of a roving hammer shape has an entry a place (Result.shape_dofs); modal_mass: kg of this shape, where a sensor
-    stood at a place that was struck. shape / sqrt(modal_mass) is mass-normalised.
+    Of a roving hammer shape has an entry a place (Result.shape_dofs); modal_mass: kg of this shape, where a force and a
+    sensor share a place. shape / sqrt(modal_mass) is mass-normalised.
 
     confident: an expert would sign it; found_in: share of the runs of "auto" that could have seen it and did; why:
     codes of why it is doubtful, why_text the same in words. None: not judged, or by EMAC alone (found_in of a
@@ -68,6 +68,7 @@ class Mode(NamedTuple):
     why: tuple[str, ...] = ()
     why_text: tuple[str, ...] = ()
     modal_mass: float | None = None
+    modal_mass_std: float | None = None
 
     @property
     def doubtful(self) -> bool:
@@ -100,6 +101,7 @@ class Mode(NamedTuple):
             why,
             texts,
             known(one.get("modal_mass")),
+            known(one.get("modal_mass_std")),
         )
 
     def _repr_html_(self) -> str:

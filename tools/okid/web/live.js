@@ -3,7 +3,7 @@
 
 import { Lanes, numbers } from "./lanes.js";
 import { Plot, diagram, frf, saveCanvas, spectra, tracking } from "./plots.js";
-import { offerGeometry, offerReport, offerStart } from "./start.js";
+import { offerEnd, offerGeometry, offerReport, offerStart } from "./start.js";
 import { Log, pickedModes, showHits, showModes, showResult, showStats } from "./tables.js";
 
 const by = (id) => document.getElementById(id);
@@ -100,6 +100,7 @@ function showState(state) {
   const badge = by("link"), kind = { live: "good", ended: "", waiting: "warn", working: "warn", failed: "bad" }[state.link];
   badge.textContent = state.text;
   badge.className = `badge ${kind}`;
+  offerEnd(page.facts.start && state.link === "live"); // only a run that was begun here is live on a start page
   showMoment();
   by("alarm").hidden = !state.alarm;
   const off = state.samples !== "live" && !(state.measured && lanes.end > 0);

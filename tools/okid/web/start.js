@@ -129,6 +129,46 @@ async function openFile(content) {
   say(`opened ${content.path}`);
 }
 
+// -- a run ------------------------------------------------------------------------------------------------------------
+
+let bus = "", config = ""; // that are looked at
+
+export function offerEnd(goesOn) {
+  by("run-end").hidden = !(goesOn && key);
+}
+
+// `toml`: a config that was proposed here and may be changed; null for one of the user's own
+function showRun(path, toml) {
+  config = path;
+  by("run-toml").value = toml || "";
+  by("run-toml").hidden = toml === null;
+  by("start-run").hidden = false;
+  say(toml === null ? `${path}: a config; it goes with a log, or starts a run` : `wrote ${path}: read every line, change what is wrong`);
+}
+
+function showBus({ path, serial }) {
+  bus = path;
+  by("start-bus").hidden = false;
+  for (const label of document.querySelectorAll("#start-bus [data-of]")) label.hidden = (label.dataset.of === "serial") !== serial;
+  say(serial ? `${path}: name the numbers of its lines (- is none), then propose a config` : `${path}: name its DBC, then propose a config; that listens for some seconds`);
+}
+
+by("bus-propose").addEventListener("click", () => wish(async () => {
+  say(`asking okid init for a config of ${bus}`);
+  const of = (name) => by(`bus-${name}`).value;
+  const made = await ask("propose", { path: bus, config: of("config"), fields: of("fields"), baud: of("baud"), dbc: of("dbc"), rate: of("rate") });
+  showCommand(made.command);
+  showRun(made.path, made.toml);
+}));
+by("run-start").addEventListener("click", () => wish(async () => {
+  showCommand((await ask("run", { path: config, toml: by("run-toml").hidden ? null : by("run-toml").value })).command);
+  say("the run goes on, also when this page is closed; okid-live ends it when it ends");
+}));
+by("run-end").addEventListener("click", () => wish(async () => {
+  await ask("end", {});
+  say("the run ends with its result");
+}));
+
 // A log waits for its config, a result may get its record: both are named next.
 let waiting = null;
 const look = (text) => wish(async () => {
@@ -139,7 +179,9 @@ const look = (text) => wish(async () => {
     return openFile({ path: log, config: seen.path });
   }
   waiting = null;
-  if (seen.command) showCommand(seen.command);
+  by("start-bus").hidden = by("start-run").hidden = true;
+  if (seen.kind === "bus") return showBus(seen);
+  if (seen.kind === "config") return showRun(seen.path, null);
   if (seen.kind === "folder") return showFolder(seen);
   if (seen.kind === "log") {
     waiting = seen;
@@ -147,7 +189,6 @@ const look = (text) => wish(async () => {
   }
   if (seen.kind === "journal") return openFile({ path: seen.path });
   if (seen.kind === "result") return openFile({ path: seen.path, records: files });
-  if (seen.kind !== "record") return say(`${text}: ${seen.text}`);
   if (!files.includes(seen.path)) files.push(seen.path);
   found = seen;
   showList();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The modal mass of a shape, from what a force does where a sensor stands beside it (a drive point).
 #pragma once
-#include "result/hold.hpp"
+#include "hold.hpp"
 
 #include <cmath>
 #include <complex>
