@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -45,14 +46,6 @@ def feed(socket: OkidFeed, over: threading.Event) -> None:
         if k % 10 == 0:
             socket.send(modes(t, [10.0 + 3.0 * n for n in range(8)]))
         k += 1
-
-
-def memory_mb(process: int) -> float:
-    """Proportional memory of a process and all its children."""
-    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
-    rollup = Path(f"/proc/{process}/smaps_rollup").read_text()
-    own = next(float(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:")) / 1000.0
-    return own + sum(memory_mb(int(child)) for child in children)
 
 
 def live_figures(browser: Any, seconds: float, folder: Path) -> dict[str, float]:
@@ -120,7 +113,8 @@ def main() -> None:
     parser.add_argument("--gigabytes", type=float, default=1.0)
     args = parser.parse_args()
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as name:
-        browser = playwright.chromium.launch(args=["--enable-precise-memory-info"])
+        options = ["--no-sandbox", "--disable-dev-shm-usage", "--enable-precise-memory-info"]
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=options)
         found = live_figures(browser, args.seconds, Path(name)) | finished_figures(browser, args.gigabytes, Path(name))
         browser.close()
     for key, value in found.items():
