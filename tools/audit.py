@@ -43,9 +43,9 @@ def holes(index: str, name: str, version: str) -> list[str] | None:
         found = newest if newest and newest["info"]["version"] == version else None
     if found is None or "vulnerabilities" not in found:
         return None
-    told = [one for one in found["vulnerabilities"] if not one.get("withdrawn")]
+    open_ones = [one for one in found["vulnerabilities"] if not one.get("withdrawn")]
     lines = []
-    for one in told:
+    for one in open_ones:
         names, fixed = ", ".join([one["id"], *one.get("aliases", [])]), ", ".join(one.get("fixed_in") or ["no release"])
         summary = " ".join((one.get("summary") or one["details"]).split())[:120]
         lines.append(f"{names}: {summary} (fixed in {fixed})")

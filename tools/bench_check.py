@@ -3,7 +3,7 @@
 usage: bench_check.py FILE.json [--sizes]
 
 Ratios within one run, never times: machines differ and are shared. --sizes: of a short run beside other work. What
-depends on memory alone is judged, a speed that falls short is told, what `make bench-quick` leaves out may be missing.
+depends on memory alone is judged, a slow speed is reported, what `make bench-quick` leaves out may be missing.
 """
 
 from __future__ import annotations

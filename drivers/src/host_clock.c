@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  time stamps that nobody can set
+// PURPOSE  time stamps of a clock that is never set
 // METHOD   CLOCK_REALTIME runs beside CLOCK_BOOTTIME but for the times it is set (slewing by NTP moves both alike): a pair
 //          whose bracket does not hold the distance known is such a time
 #include <drv/host_clock.h>

@@ -26,7 +26,7 @@ int drv_input_open(const char* path) {
     struct stat status;
     int code = stat(path, &status) == 0 ? kind_fault(&status, path) : errno;
     if (code) return -code;
-    const int wait = S_ISFIFO(status.st_mode) ? 0 : O_NONBLOCK; // a file that was changed for a pipe holds up nobody
+    const int wait = S_ISFIFO(status.st_mode) ? 0 : O_NONBLOCK; // if a pipe has replaced the file, this does not wait
     const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | wait);
     if (fd < 0) return -errno;
     code = fstat(fd, &status) == 0 ? kind_fault(&status, path) : errno;

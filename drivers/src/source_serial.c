@@ -83,7 +83,7 @@ static void unwrap_time(serial_t* state, const drv_packet_t* packet) {
     state->device_seen_ns = state->arrived_ns;
 }
 
-/// Host time of the sample at hand. Bytes that nobody stamped (a file of them) begin at 1 s.
+/// Host time of the sample at hand. Bytes without a stamp (a file of them) begin at 1 s.
 static int64_t stamp(const serial_t* state, const drv_packet_t* packet) {
     const unsigned behind = packet->samples - 1U - state->sample;
     if (state->arrived_ns != 0) {

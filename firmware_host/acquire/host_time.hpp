@@ -10,7 +10,7 @@ namespace okid_host {
 std::string utc_compact(std::int64_t time_ns);
 std::string utc_text(std::int64_t time_ns);
 
-/// Seconds of a clock that nobody sets.
+/// Seconds of a clock that is never set.
 double steady_s();
 
 } // namespace okid_host

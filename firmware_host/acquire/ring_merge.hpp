@@ -21,7 +21,7 @@ class ring_merge {
     /// @param patience_ns  so old a frame may become by the host's clock while it waits for other buses
     explicit ring_merge(std::int64_t patience_ns = for_ever) : patience_ns_(patience_ns) {}
     /// @param most  frames that may wait in the ring for the other buses
-    /// @param mark  of the bus, must outlive this; NULL = nobody waits for it
+    /// @param mark  of the bus, must outlive this; NULL = the merge does not wait for it
     void add(drv_ring_t* ring, std::size_t most, const watermark* mark);
     /// The next frames; those of one ring stay in their order. No heap. @return 0 when no frame may go on now
     std::size_t take(drv_frame_t* frames, std::size_t capacity);

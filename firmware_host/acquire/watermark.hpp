@@ -3,7 +3,7 @@
 //
 // A read that leaves the queue empty has brought all that was stamped before it began. While the reader sleeps for want of
 // anything to read, a look at the queue by the asker moves the mark on, so a bus that is silent, down or gone holds
-// nobody up. A stamp may be older than the read that misses it (a driver that defers, a packet of several samples): by as
+// up no other. A stamp may be older than the read that misses it (a driver that defers, a packet of several samples): by as
 // much as was ever seen, at most longest_delay_ns.
 #pragma once
 #include <drv/host_clock.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  records of any format that the Python package reads
 // METHOD   okid-convert is started, without a shell, from the folder of this program or from PATH; it writes into a folder that
-//          nobody else may enter and that is gone when it ends: the table lives on without a name. A signal to stop ends it first
+//          no other user may enter and that is gone when it ends: the table lives on without a name. A signal to stop ends it first
 #include "record_files.hpp"
 
 #include "acquire/stop_signal.hpp"

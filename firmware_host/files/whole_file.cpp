@@ -130,7 +130,7 @@ void whole_file::give_up(int reason) {
 void whole_file::flush() {
     for (std::size_t at = 0; at < buffer_.size();) {
         const ssize_t wrote = write(fd_, buffer_.data() + at, buffer_.size() - at);
-        if (wrote < 0 && errno == EPIPE && path_ == "-") break; // nobody reads it any more
+        if (wrote < 0 && errno == EPIPE && path_ == "-") break; // its reader is gone
         if (wrote < 0 && errno != EINTR) give_up(errno);
         if (wrote > 0) at += static_cast<std::size_t>(wrote);
     }

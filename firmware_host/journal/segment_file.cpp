@@ -60,7 +60,7 @@ bool is_ours(const std::string& path) {
     return ours;
 }
 
-/// Is nobody writing to it?
+/// Is no program writing to it?
 bool is_idle(const std::string& path) {
     const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (fd < 0) return false;

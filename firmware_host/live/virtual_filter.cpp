@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE   virtual sensors: outputs that are not measured, gaps and forces, with standard deviations
 // METHOD    Kalman filter of the innovation form: state noise K e, correlated with the noise e of the outputs. What is not
-//           measured leaves the update; a measured input that is missing is white noise of its own strength. Forces that
-//           nobody measures are states (joint input-state estimation)
+//           measured leaves the update; a measured input that is missing is white noise of its own strength. Forces without a
+//           sensor are states (joint input-state estimation)
 // REFERENCE Lourens et al. (2012), augmented Kalman filter; Anderson, Moore, Optimal Filtering, 5.5
 // NUMERICS  gains of a pattern of sensors stay once the covariance moves by less than 1e-8 of its largest entry a sample
 #include "virtual_filter.hpp"

@@ -11,7 +11,7 @@ datagrams::datagrams(const net_address& to) : fd_(open_datagrams("[publish] udp"
 
 datagrams::~datagrams() { close(fd_); }
 
-/// Nobody there, or no room: the next update comes soon.
+/// No receiver, or no room: the next update comes soon.
 void datagrams::take(const publication& one) {
     numbers_.take(one);
     if (one.type != "modes") return;

@@ -73,7 +73,7 @@ void http_page::welcome() {
         fresh.until = clock::now() + patience;
     }
     full_ = errno != EAGAIN &&
-            errno != EWOULDBLOCK; // out of descriptors: the next tick looks again, nobody spins meanwhile
+            errno != EWOULDBLOCK; // out of descriptors: the next tick looks again, without a busy loop until then
 }
 
 /// A page of another site whose name was turned to this address (DNS rebinding) sends that name: an address is not one.

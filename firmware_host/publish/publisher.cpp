@@ -50,7 +50,7 @@ void publisher::open_sinks(const live_config& config) {
     if (wanted.prometheus) sinks_.push_back(make_metrics(*wanted.prometheus, [this] { return figures(); }));
     if (wanted.influx) sinks_.push_back(make_influx(config, options_.live));
     if (wanted.mqtt) sinks_.push_back(make_broker(config));
-    if (!options_.live) return; // a log that is replayed calls nobody out of bed
+    if (!options_.live) return; // the alarms of a replayed log are in the past: no command is run
     if ((config.alarm.enabled || config.alarm.test_s > 0) && !config.alarm.command.empty())
         sinks_.push_back(std::make_unique<alarm_command>(config.alarm.command));
     if (service_notice::wanted()) sinks_.push_back(std::make_unique<service_notice>(beats_));
@@ -115,7 +115,7 @@ void publisher::table(const table_state& state) {
     if (lines_) try {
             lines_->put(std::make_shared<const std::string>(table_line(state)));
         } catch (const failure&) {
-            lines_ = nullptr; // nobody looks any more: no reason to end a measurement
+            lines_ = nullptr; // its reader is gone: no reason to end a measurement
         }
     if (!terminal_) return;
     {

@@ -146,7 +146,7 @@ bool subscribers::send(subscriber& to) {
 void subscribers::send_all() {
     std::array<char, 16384> unread{};
     for (auto each = all_.begin(); each != all_.end();) {
-        (void)recv(each->fd, unread.data(), unread.size(), MSG_DONTWAIT); // it may say what it likes: to nobody
+        (void)recv(each->fd, unread.data(), unread.size(), MSG_DONTWAIT); // what it sends is discarded
         pollfd gone{each->fd, 0, 0};                                      // only poll shows that an idle one hung up
         if (send(*each) && !(poll(&gone, 1, 0) > 0 && (gone.revents & (POLLHUP | POLLERR)))) {
             ++each;

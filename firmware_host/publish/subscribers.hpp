@@ -14,7 +14,7 @@ class subscribers : public event_sink {
   public:
     static constexpr std::size_t most = 16, most_lines = 1024, most_bytes = 4u << 20; ///< the last two for each
 
-    /// A socket file that nobody listens on is replaced. Throws `failure`: exit 2 when the path cannot be a socket, exit 4
+    /// A socket file that no program listens on is replaced. Throws `failure`: exit 2 when the path cannot be a socket, exit 4
     /// when another program listens there.
     explicit subscribers(const std::string& path);
     ~subscribers() override;

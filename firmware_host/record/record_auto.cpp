@@ -221,7 +221,7 @@ void mark_slow(const record_work& work, double fs_hz, std::vector<consensus_mode
         if (mode.frequency_hz * seconds < fewest_periods || mode.could == 0) mode.why.emplace_back("band_edge");
 }
 
-/// Two groups of outputs stand at 90 degrees in all modes: velocities beside accelerations, say, and nobody said so.
+/// Two groups of outputs stand at 90 degrees in all modes: velocities beside accelerations, say, whose units are not given.
 void remark_mixed(const std::vector<bool>& turned, const record_options& options, result_context& context) {
     std::vector<std::string> groups[2];
     for (std::size_t i = 0; i < turned.size(); ++i) groups[turned[i]].push_back(options.outputs[i]);

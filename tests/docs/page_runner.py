@@ -5,6 +5,7 @@ Fenced blocks in the order of the page, with what a comment line above a block s
 
     <!-- file: NAME -->     the block is this file; it is written before what follows is run
     <!-- hardware -->       the commands need a device: only their syntax and their options are checked
+    <!-- elsewhere: NAME -->    run by these tests or this goal of make; here their syntax and options are checked
     <!-- slow -->           run with OKID_SLOW=1 alone; else its syntax and options are checked
     <!-- exit: N -->        the last command ends with N (0 when it is not said)
     <!-- fragment -->       the block is not complete by itself: left alone
@@ -128,7 +129,9 @@ class Reader:
                 path = self.folder / block.notes["file"]
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(block.text)
-            elif "hardware" in block.notes or ("slow" in block.notes and os.environ.get("OKID_SLOW") != "1"):
+            elif block.notes.keys() & {"hardware", "elsewhere"} or (
+                "slow" in block.notes and os.environ.get("OKID_SLOW") != "1"
+            ):
                 check_commands(block)
                 shown = None
             elif block.kind == "toml":

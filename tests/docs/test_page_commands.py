@@ -18,9 +18,10 @@ import numpy as np
 import okid
 import pytest
 from command_help import ROOT
-from markdown_pages import blocks
+from markdown_pages import name_of, pages
 from page_runner import Block, Reader, blocks_of, compare
 from test_command_lines import SHELL, command_lines
+from test_howto import PAGES as HOWTO
 
 SLOW = os.environ.get("OKID_SLOW") == "1"
 PAGES = [
@@ -105,7 +106,8 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def commands(page: str) -> list[str]:
-    shell = [block.text for block in blocks(ROOT / "docs" / page) if block.language in SHELL]
+    own = [block for block in blocks_of(ROOT / "docs" / page) if "elsewhere" not in block.notes]
+    shell = [block.text for block in own if block.kind in SHELL]
     lines = [" ".join([program, *words]) for text in shell for program, words in command_lines(text)]
     return [reduce(lambda line, place: line.replace(*place), PLACES.items(), line) for line in lines]
 
@@ -126,6 +128,23 @@ def test_commands_run(page: str, prepared: Path, tmp_path: Path) -> None:
         run.run(Block(page, 0, "sh", line + lacking))
         count += 1
     assert count >= 2
+
+
+def is_run(page: Path, block: Block) -> bool:
+    """From top to bottom with its page, in this file by its commands, or where its mark says."""
+    where = block.notes.get("elsewhere", "")
+    if where:
+        return (ROOT / where).exists() or f"\n{where.removeprefix('make ')}:" in (ROOT / "Makefile").read_text()
+    followed = page.name in HOWTO or page.name == "tutorial.md" or page.parent.name == "recipes"
+    if "hardware" in block.notes or "slow" in block.notes or (followed and "fragment" not in block.notes):
+        return True
+    return name_of(page).removeprefix("docs/") in PAGES and bool(command_lines(block.text))
+
+
+def test_every_shell_block_is_run_or_says_why_not() -> None:
+    shell = [(page, block) for page in pages() for block in blocks_of(page) if block.kind == "sh"]
+    left = [f"{name_of(page)}:{block.line}" for page, block in shell if not is_run(page, block)]
+    assert len(shell) > 100 and left == []
 
 
 if SLOW:

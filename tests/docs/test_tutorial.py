@@ -41,7 +41,7 @@ def test_no_step_writes_over_the_files_of_another() -> None:
     """What round one left can still be looked at after round two."""
     written: list[str] = []
     for block in blocks_of(PAGE):
-        if block.kind == "sh" and not block.notes.keys() & {"hardware", "fragment"}:
+        if block.kind == "sh" and not block.notes.keys() & {"hardware", "elsewhere"}:
             text = re.sub(r"(okid-report .*?)--events +\S+", r"\1", block.text)  # it reads them
             written += re.findall(r"(?:--(?:json|events|truth|log|out)|(?<![0-9])>) +([\w.-]+)", text)
             written += re.findall(r"okid simulate .*?--config +([\w.-]+)", text)

@@ -32,7 +32,7 @@ def test_the_view_tells_what_the_session_finds() -> None:
     assert view.signals["to_s"] - view.signals["from_s"] == pytest.approx(2.0)
     assert any(one["stable"] and one["f"] == pytest.approx(10.96, abs=0.05) for one in view.poles)
     json.dumps([view.signals, view.modes, view.poles], allow_nan=False)
-    assert "a1" not in view.told and view.told.startswith(f"{view.session.samples} samples")
+    assert "a1" not in view.status and view.status.startswith(f"{view.session.samples} samples")
 
 
 def test_a_session_shows_itself_as_it_is_fed() -> None:
@@ -43,7 +43,7 @@ def test_a_session_shows_itself_as_it_is_fed() -> None:
     (view,) = session._views
     assert "application/vnd.jupyter.widget-view+json" in shown[0] and shown[0] == session._repr_mimebundle_()[0]
     session.feed(rows[:3000])
-    assert view.told.startswith("3000 samples") and len(view.modes) == len(session.modes()) > 0
+    assert view.status.startswith("3000 samples") and len(view.modes) == len(session.modes()) > 0
     masked = np.ma.masked_array(rows[3000:4000], mask=False)
     masked.mask[:, 2] = True
     view.feed(masked)
@@ -78,7 +78,7 @@ window.model = {values: %s, heard: {}, saved: 0,
 
 def test_a_browser_draws_it_and_picks(browser: Any) -> None:
     view = fed(p=20)
-    values = {key: getattr(view, key) for key in ("signals", "modes", "poles", "picked", "told")}
+    values = {key: getattr(view, key) for key in ("signals", "modes", "poles", "picked", "status")}
     values["modes"][0]["frequency_std_hz"] = None
     module = str(LiveView._esm).replace("export default", "window.widget =")
     page = browser.new_page()

@@ -6,12 +6,15 @@ The widths that arrange() assumes are not used here: the judge is the extent of 
 
 from __future__ import annotations
 
+import io
 from typing import Any, cast
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 from okid.report.layout import arrange
 from okid.result import figures
@@ -87,3 +90,17 @@ def test_upright_names_a_key_above_and_axes_one_above_the_other() -> None:
         heights = [ax.get_position().height for ax in drawing.axes[:3]]
         assert heights[0] / heights[2] == pytest.approx(3.0 / 0.9, rel=0.01)
         assert len(drawing.axes[0].get_xticks()) == 0  # the texts stand for the marks
+
+
+def test_a_year_and_a_power_of_ten_stand_once() -> None:
+    with matplotlib.rc_context({**cast(Any, figures.STYLE), "svg.fonttype": "none"}):
+        drawing = figures.figure(9.6, 3.0)
+        ax = drawing.add_subplot()
+        ax.plot(19800.5 + np.arange(250), 1e-7 * np.arange(250))  # days since 1970: within 2024
+        locator = AutoDateLocator()
+        ax.xaxis.set_major_locator(locator)
+        ax.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+        canvas, out = FigureCanvasSVG(drawing), io.StringIO()
+        arrange(drawing)
+        canvas.print_svg(out)
+    assert out.getvalue().count(">2024</text>") == 1 and out.getvalue().count("1e−5</text>") == 1

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`make docs-pictures`: every picture of docs/images, from real runs of the program that stands in build/.
 
-`python -m docs_pictures [GROUP ...]` with PYTHONPATH=tools makes some of them: report, live, plots, drawings.
+`python -m docs_pictures [GROUP ...]` with PYTHONPATH=tools makes those of the groups below.
 """
 
 from __future__ import annotations
@@ -13,7 +13,13 @@ from docs_pictures import browser, drawings, plots, runs
 
 
 def main(wanted: list[str]) -> int:
-    groups = {"drawings": drawings.make, "plots": plots.make, "report": browser.reports, "live": browser.live}
+    groups = {
+        "drawings": drawings.make,
+        "plots": plots.make,
+        "report": browser.reports,
+        "live": browser.live,
+        "campaign": browser.campaign,
+    }
     unknown = [name for name in wanted if name not in groups]
     if unknown:
         print(f"docs-pictures: no group {unknown[0]}; there are {', '.join(groups)}", file=sys.stderr)

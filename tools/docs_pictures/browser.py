@@ -108,6 +108,20 @@ def reports() -> list[str]:
         ]
 
 
+def campaign() -> list[str]:
+    """The report of a year: the verdict, frequencies and control charts, without damping and temperature."""
+    hide = """([first, next]) => { let hidden = false;
+      for (const one of document.getElementById("frame").children) {
+        if ([first, next].includes(one.textContent)) hidden = one.textContent === first;
+        if (hidden) one.style.display = "none";
+      } }"""
+    with chromium() as browser:
+        tab = browser.new_page(viewport={"width": 1000, "height": 1000}, device_scale_factor=1.5)
+        tab.goto(runs.campaign().as_uri())
+        tab.evaluate(hide, ["Damping over time", "Control charts"])
+        return [keep("campaign.png", tab.locator("main").screenshot())]
+
+
 def live() -> list[str]:
     """The page while a log plays, wide and on a phone."""
     runs.frame()

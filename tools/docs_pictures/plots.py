@@ -214,7 +214,7 @@ def latency() -> str:
         for name, label, colour in (
             ("bare", "a bare reader", GREY),
             ("handed_over", "sample handed over", BLUE),
-            ("modes", "modes told", ORANGE),
+            ("modes", "modes reported", ORANGE),
         ):
             begin, count = np.array(row["histograms_ms"][name]).T
             axis.step(begin, 100 * count / count.sum(), where="post", color=colour, label=label)

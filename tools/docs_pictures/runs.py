@@ -79,6 +79,14 @@ def bridge() -> dict[str, Any]:
     return read("bridge.json")
 
 
+@cache
+def campaign() -> Path:
+    """The report of the year that the page about campaigns simulates."""
+    for words in (("simulate", "year"), ("run", "year/SPEC.toml", "--quiet")):
+        subprocess.run([sys.executable, "-m", "okid.campaign", *words], cwd=FOLDER, check=True)
+    return FOLDER / "year" / "out" / "report.html"
+
+
 def read(name: str) -> dict[str, Any]:
     out: dict[str, Any] = json.loads((FOLDER / name).read_text())
     return out

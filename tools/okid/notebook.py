@@ -74,7 +74,7 @@ class LiveView(anywidget.AnyWidget):
     modes: Any = traitlets.List().tag(sync=True)
     poles: Any = traitlets.List().tag(sync=True)
     picked: Any = traitlets.List().tag(sync=True)
-    told = traitlets.Unicode().tag(sync=True)
+    status = traitlets.Unicode().tag(sync=True)
 
     def __init__(self, session: Session, seconds: float = 10.0, update_s: float = 1.0) -> None:
         if not (seconds > 0.0 and update_s > 0.0):
@@ -115,7 +115,7 @@ class LiveView(anywidget.AnyWidget):
         self._draw()
         self.modes = [_row(mode) for mode in self.session.modes() if not mode.doubtful]
         settled = "settled" if self.session.settled else "not settled yet"
-        self.told = f"{self.session.samples} samples, {settled}"
+        self.status = f"{self.session.samples} samples, {settled}"
         self.poles = self._diagram()
 
     def _diagram(self) -> list[dict[str, Any]]:

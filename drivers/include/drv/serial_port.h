@@ -15,7 +15,7 @@ enum { DRV_PATH_BYTES = 256 };
 
 /// What the line's hardware refused, since it was opened.
 typedef struct drv_serial_errors_t {
-    uint32_t overrun; ///< bytes lost because nobody fetched them in time, in the hardware or in the kernel
+    uint32_t overrun; ///< bytes lost because they were not read in time, in the hardware or in the kernel
     uint32_t frame;   ///< bytes without a stop bit: a wrong baud rate, or a break
     uint32_t parity;  ///< bytes with a wrong parity
 } drv_serial_errors_t;

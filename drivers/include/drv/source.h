@@ -79,7 +79,7 @@ typedef struct drv_stats_t {
     uint64_t error_frames;  ///< error messages of the controller; the next seven count those of one class
     uint64_t bus_off;       ///< entered bus-off
     uint64_t restarts;      ///< after bus-off
-    uint64_t no_ack;        ///< sent, and nobody acknowledged
+    uint64_t no_ack;        ///< frames sent that no node acknowledged
     uint64_t tx_timeouts;   ///< sending gave up
     uint64_t rx_overflows;  ///< the controller's receive queue overran
     uint64_t error_passive; ///< entered the error-passive state

@@ -56,7 +56,7 @@ struct okid_identify {
     double *head, *tail, *sum; ///< of one run
     okid_real_t *theta, *innovation, *markov, *gain;
     int follow;                   ///< order of replicate(), 0: a full identification
-    bool poles_only;              ///< nobody asks for more than poles of orders up to max_order
+    bool poles_only;              ///< the caller needs only poles of orders up to max_order
     okid::followed_era* followed; ///< ERA of replicate() near a known model, or nullptr
     int width;                    ///< columns of a block of the Hankel matrix
     okid_real_t* sequence;        ///< blocks 0 .. markov_last of the Hankel matrix, n_y x width; block 0 is not used
@@ -116,7 +116,7 @@ okid_status_t decompose_subspace_factor(okid_identify& s, okid_square_root_t* sq
 /// Y_0 .. of the n4sid model.
 void model_markov(const okid_identify& s, int order);
 
-/// A model of one order from sums, nothing but A, B, C and D: s.follow says that nobody asks for more.
+/// A model of one order from sums, nothing but A, B, C and D, which is all that is needed where s.follow is set.
 okid_status_t replicate(okid_identify& s, okid_accumulator_t* accumulator, int order, okid_identified_t* out);
 okid_status_t realise_model(okid_identify& s, int order);
 

@@ -23,9 +23,9 @@ struct output_error {
     int n_u, n_y, n_z, unknowns;
     double *equations, *right; // of [B; D]: n_z n_u modal numbers of B, then D
     double *own, *found;       // of one run: [Hxx, Hxt, gx]; scale of the equations
-    double *back, *each;       // Hxx^-1 [Hxt, gx] of a run that nobody asks for; of the first run of each record
-    long long used = 0;        // samples
-    bool settles = false;      // the filters do
+    double *back, *each;  // Hxx^-1 [Hxt, gx] of a run whose result is not returned; of the first run of each record
+    long long used = 0;   // samples
+    bool settles = false; // the filters do
 
     output_error(int inputs, int outputs, int states, int records, arena& memory)
         : filters(inputs, outputs, states, memory), n_u(inputs), n_y(outputs), n_z(states),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Identifies on the board: sums 1 force (A0) and 3 accelerations (A1 to A3) at 1 kHz and prints three modes every 3,000
-// samples. 60 KiB of RAM in double; C++17 and the library Eigen. While it identifies it takes no samples; then it sums anew.
+// samples. 60 KiB of RAM in double; C++17 and the library Eigen. While it identifies it takes no samples; then it starts new sums.
 #include <Eigen/Core> // so that the build finds that library
 #include <okid_modes.h>
 

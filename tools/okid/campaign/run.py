@@ -289,16 +289,16 @@ class _Run:
             return
         piece, died = slices[0], type(fault).__name__ == "KilledWorker"
         if len(piece.records) > 1 and self.spec.identification.method == "auto":
-            told = "a worker ended over it: too large for its memory?" if died else reason
-            self.out.faults[piece.group] = f"its records could not be identified, run again: {told}"
+            why = "a worker ended over it: too large for its memory?" if died else reason
+            self.out.faults[piece.group] = f"its records could not be identified, run again: {why}"
         elif len(piece.records) > 1:
             self.split(piece)
         elif died and not what[2]:
             self.suspects.append(piece)
         else:
-            told = "a worker ended over it, alone: too large for its memory?" if died else reason
+            why = "a worker ended over it, alone: too large for its memory?" if died else reason
             piece = Slice(piece.group, piece.records, False, piece.folded)
-            self.slice_done(piece, GroupSums(piece.group, 0), [Skipped(piece.records[0].name, told)])
+            self.slice_done(piece, GroupSums(piece.group, 0), [Skipped(piece.records[0].name, why)])
 
     def split(self, piece: Slice) -> None:
         """Read each record of a slice by itself; together they are the leaf that the slice would have been."""

@@ -61,15 +61,15 @@ def _group_row(out: Outcome, group: Group, reasons: dict[str, str]) -> dict[str,
     done = out.done.get(group.ident)
     facts = {} if done is None else {str(record["name"]): record for record in done.records}
     used = [ref for ref in group.records if ref.name in facts]
-    told = used or group.records
+    shown = used or group.records
     temperatures = [
         ref.temperature_c if ref.temperature_c is not None else facts.get(ref.name, {}).get("temperature_c")
-        for ref in told
+        for ref in shown
     ]
     result = (None if done is None else done.result) or {}
     return {
         "group": group.label, **{f"key_{name}": value for name, value in group.key.items() if name != "record"},
-        "series": group.series, "time": _when(_mean([ref.time_s for ref in told])),
+        "series": group.series, "time": _when(_mean([ref.time_s for ref in shown])),
         "temperature_c": _mean(temperatures), "records": len(used),
         "skipped": sum(ref.name in reasons for ref in group.records if ref.name not in facts),
         "samples": sum(record["samples"] - record["missing"] for record in facts.values()),

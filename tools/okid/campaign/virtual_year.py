@@ -121,7 +121,7 @@ SCALE = (1.5e-4, 6e-4, 6e-4, 6e-4)  # N, m/s^2 a code: full scale 4.9 N and 20 m
 BEGIN = datetime(2025, 1, 1, tzinfo=UTC)
 
 
-def simulate_year(folder: Path, year: Year, told: Callable[[int], None] | None = None) -> None:
+def simulate_year(folder: Path, year: Year, on_record: Callable[[int], None] | None = None) -> None:
     """Write records/*.npy (int16), index.csv (path, time, temperature_c), SPEC.toml and truth.json into a folder.
 
     Raises InputError when something is out of range, or the folder cannot be written.
@@ -137,8 +137,8 @@ def simulate_year(folder: Path, year: Year, told: Callable[[int], None] | None =
         for k, one in enumerate(columns):
             codes = np.rint(_record(year, one, k) / np.array(SCALE))
             np.save(place / names[k], np.clip(codes, -32767, 32767).astype(np.int16))
-            if told is not None:
-                told(k + 1)
+            if on_record is not None:
+                on_record(k + 1)
         rows = [f"records/{name},{BEGIN + timedelta(seconds=round(t)):%Y-%m-%dT%H:%M:%SZ},{c:.2f}"
                 for name, t, c in zip(names, times.tolist(), celsius.tolist(), strict=True)]  # fmt: skip
         _put(folder / "index.csv", "path,time,temperature_c\n" + "\n".join(rows) + "\n")

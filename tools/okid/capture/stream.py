@@ -136,7 +136,7 @@ class Capture:
         options.trigger_ns = 0 if trigger_at is None else round(trigger_at * 1e6) * 1000
         self._handle: ctypes.c_void_p | None = None
         self._turn = Turn()
-        self._told: list[dict[str, Any]] = []
+        self._kept: list[dict[str, Any]] = []
         read, made = ctypes.c_void_p(), ctypes.c_void_p()
         host.call("config_load", os.fsencode(self.config.path), None, ctypes.byref(read))
         try:
@@ -167,7 +167,7 @@ class Capture:
         self.close()
 
     def __del__(self) -> None:
-        if getattr(self, "_handle", None) is not None:  # without its turn: nobody else knows of it any more
+        if getattr(self, "_handle", None) is not None:  # without its turn: no other reference to it is left
             host.library().okid_host_capture_delete(self._handle)
 
     def use_bus(self, bus: BusConfig) -> None:
@@ -258,8 +258,8 @@ class Capture:
     def events(self) -> list[dict[str, Any]]:
         """Events since the last call, as `okid run --events` writes them."""
         lines = host.library().okid_host_capture_events(self._open()).decode()
-        told, self._told = self._told, []
-        return told + [text_of_json.loads(line) for line in lines.splitlines()]
+        kept, self._kept = self._kept, []
+        return kept + [text_of_json.loads(line) for line in lines.splitlines()]
 
     @in_turn
     def stats(self) -> dict[str, Any]:
@@ -285,5 +285,5 @@ class Capture:
         Raises IdentificationError when no model is possible.
         """
         host.call("capture_finish", self._open())
-        self._told = self.events()
-        return next((event["result"] for event in self._told[-1:] if event["type"] == "result"), None)
+        self._kept = self.events()
+        return next((event["result"] for event in self._kept[-1:] if event["type"] == "result"), None)

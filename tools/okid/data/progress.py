@@ -69,7 +69,7 @@ class Progress:
         try:
             self._out.write(text)
             self._out.flush()
-        except (OSError, ValueError):  # nobody reads it any more
+        except (OSError, ValueError):  # its reader is gone
             self._end.set()
 
     def _show(self) -> None:

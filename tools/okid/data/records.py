@@ -33,7 +33,7 @@ def _one(values: ArrayLike, what: str, types: tuple[str, ...]) -> NDArray[Any]:
         real = real[:, None]
     if real.ndim != 2 or real.shape[1] == 0:
         raise InputError(f"{what} has shape {given.shape}, expected (samples, channels)")
-    return real  # perhaps the caller's own: nobody may modify it
+    return real  # perhaps the caller's own: must not be modified
 
 
 def _check_finite(real: Real, what: str) -> None:
@@ -57,7 +57,7 @@ def sides(
 ) -> tuple[list[NDArray[Any]], list[NDArray[Any]]]:
     """Records as two lists of arrays (N, n_u) and (N, n_y) of matching lengths, to be read only; u None = no inputs.
 
-    Other numbers than `types` become float64. Nobody has looked for infinite ones.
+    Other numbers than `types` become float64. Infinite ones are not looked for.
 
     A list or tuple of NumPy arrays or pandas frames is several records; everything else is one. InputError names what
     does not fit.
@@ -302,8 +302,8 @@ def read_csv(path: str | Path) -> Record:
     """
     about, samples = host.csv(path)
     names, comments = about["names"], about["comments"]
-    told = about["rate_remark"]
-    remarks = [f"time_s gives no sample rate: {told}"] if told else []
+    rate_remark = about["rate_remark"]
+    remarks = [f"time_s gives no sample rate: {rate_remark}"] if rate_remark else []
     stated = _stated(comments, names)
     try:
         if stated:

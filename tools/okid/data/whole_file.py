@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files that are there whole or not at all, and that nobody else can put a hand on while they are made."""
+"""Files that are there whole or not at all, and that no other user can touch while they are made."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _mode_of(target: Path) -> int:
 def safe_part(path: str | Path) -> Iterator[Path]:
     """The name of `path` in a folder beside it that was made for this alone (random name, mode 0700).
 
-    A library may open it as it likes: nobody else can have put a link or a file there. When the block ends well it is
+    A library may open it as it likes: no other user can have put a link or a file there. When the block ends well it is
     on the disk under `path`; a link of that name is replaced, not followed. Otherwise `path` stays what it was. OSError
     when the system refuses.
     """

@@ -189,8 +189,8 @@ def read_log(path: str | Path, remarks: list[str] | None = None) -> Iterator[can
         if extension == ".csv" and not is_frame_csv(path):
             raise InputError(f"is no table of frames of python-can, expected the header {FRAME_CSV_HEAD}")
         count = 0
-        told = remarks if remarks is not None else []
-        for frame in _candump(path, told) if extension == ".log" else _library_frames(path, extension):
+        found = remarks if remarks is not None else []
+        for frame in _candump(path, found) if extension == ".log" else _library_frames(path, extension):
             count += 1
             frame.channel = _bus_name(extension, frame.channel)
             yield _whole(frame, count)

@@ -236,13 +236,13 @@ def _run(args: argparse.Namespace, source: Path, target: Path) -> str:
 def convert(arguments: Sequence[str] | None = None) -> int:
     """The command with its arguments (None = those of the process); exit code 0, 2 or 130 (interrupted)."""
     args = _parser().parse_args(arguments)
-    told: list[str] = []
+    done: list[str] = []
     try:
         pairs = _pairs(args)
         with Progress("okid-convert", not args.quiet) as shown:
             for k, (source, target) in enumerate(pairs):
                 shown.stage("converting", k / len(pairs) if len(pairs) > 1 else None, str(source))
-                told.append(_run(args, source, target))
+                done.append(_run(args, source, target))
     except Error as fault:
         complain("okid-convert", fault)
         return EXIT_USAGE
@@ -253,6 +253,6 @@ def convert(arguments: Sequence[str] | None = None) -> int:
         complain("okid-convert", "interrupted, the file in work was not written")
         return EXIT_INTERRUPTED
     finally:
-        for line in told if not args.quiet else []:
+        for line in done if not args.quiet else []:
             say(line)
     return EXIT_DONE

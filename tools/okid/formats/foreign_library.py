@@ -79,7 +79,7 @@ class Complaints(logging.Handler):
 
 @contextlib.contextmanager
 def listening(name: str) -> Iterator[Complaints]:
-    """What goes to the log `name` meanwhile, which nobody else hears."""
+    """What goes to the log `name` meanwhile; it reaches no other handler."""
     log, ear = logging.getLogger(name), Complaints()
     spread = log.propagate
     log.addHandler(ear)

@@ -66,11 +66,11 @@ def _labels(value: Any, count: int, *path: str) -> list[str]:
 
 
 def _unique(names: list[str], instead: Callable[[int], str]) -> list[str]:
-    """The names, those that stand twice with what tells them apart."""
+    """The names, those that stand twice with what distinguishes them."""
     count = Counter(names)
-    told = [name if count[name] == 1 else instead(k) for k, name in enumerate(names)]
-    count = Counter(told)
-    return [name if count[name] == 1 else f"{name} {k + 1}" for k, name in enumerate(told)]
+    unique = [name if count[name] == 1 else instead(k) for k, name in enumerate(names)]
+    count = Counter(unique)
+    return [name if count[name] == 1 else f"{name} {k + 1}" for k, name in enumerate(unique)]
 
 
 # Testlab

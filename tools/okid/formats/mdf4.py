@@ -118,7 +118,7 @@ def _record(file: Any, group: int | str | None) -> Record:
 def quiet_asammdf() -> Iterator[None]:
     """What asammdf prints over a damaged file stays unprinted: the InputError says it.
 
-    A reader that fails while it opens a file also fails in its finalizer, which nobody can catch.
+    A reader that fails while it opens a file also fails in its finalizer, where no caller can catch it.
     """
     before, log = sys.unraisablehook, logging.getLogger("asammdf")
     level = log.level

@@ -340,8 +340,8 @@ def write_uff(
         else:
             parts += _result_bytes(result_dict(what), geometry, binary, sensing, modes)
     except InputError as fault:
-        told = geometry is not None and str(fault).startswith(geometry.source)
-        raise fault if told else InputError(f"{path}: {fault}") from None
+        named = geometry is not None and str(fault).startswith(geometry.source)
+        raise fault if named else InputError(f"{path}: {fault}") from None
     with whole_file(path) as part, part.open("wb") as out:
         out.writelines(parts)
 

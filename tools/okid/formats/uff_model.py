@@ -55,8 +55,8 @@ def read_mode(block: Block) -> UffMode | None:
         frequency, damping = size / (2.0 * np.pi), -values[0] / size if size > 0.0 else 0.0
     nodes, shape = _shape(block, width, data == 5)
     title = block.lines[0][:80].strip()
-    told = block.lines[2][:80].strip()
-    judged = told if told.startswith(("confident", "doubtful")) else ""
+    remark = block.lines[2][:80].strip()
+    judged = remark if remark.startswith(("confident", "doubtful")) else ""
     return UffMode(number, frequency, damping, nodes, shape, "" if title.upper() == "NONE" else title, mass, judged)
 
 

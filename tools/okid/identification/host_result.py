@@ -148,8 +148,8 @@ def identify(
     """`options` by the arguments of okid.identify(); of each record (N, n_u) and (N, n_y), one of TYPES. `on_stage` is
     called with what begins."""
     handle, arguments = ctypes.c_void_p(), _records(inputs, outputs, "record")
-    told = None if on_stage is None else _calls(on_stage)
-    host.call("identify_columns", options_text(options), *arguments, told, None, ctypes.byref(handle))
+    report = None if on_stage is None else _calls(on_stage)
+    host.call("identify_columns", options_text(options), *arguments, report, None, ctypes.byref(handle))
     return HostResult(handle)
 
 

@@ -223,7 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = {number: signal.signal(number, ask_to_stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         folder = tempfile.TemporaryDirectory(prefix="okid-live-")
-        with contextlib.suppress(BrokenPipeError), folder:  # nobody reads what is said
+        with contextlib.suppress(BrokenPipeError), folder:  # the reader of the messages is gone
             return _run(args, stop, Path(folder.name))
         return EXIT_DONE
     finally:

@@ -62,7 +62,7 @@ class Feed:
         wire = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             wire.connect(str(self._path))
-        except OSError:  # not there, nobody listens, no right to it: all of them may change
+        except OSError:  # not there, no program listens, no right to it: all of them may change
             wire.close()
             return None
         self._wire = wire

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What waits for each browser: bounded, so that a slow one loses old frames and holds up nobody."""
+"""What waits for each browser: bounded, so that a slow one loses old frames and holds up no other."""
 
 from __future__ import annotations
 

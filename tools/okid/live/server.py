@@ -87,7 +87,7 @@ class PageServer(ThreadingHTTPServer):
         return f"http://{f'[{self.host}]' if ':' in self.host else self.host}:{self.server_port}/"
 
     def get_request(self) -> tuple[socket.socket, Any]:
-        """Who waits at the door; without a descriptor for him he waits on, and nobody spins meanwhile."""
+        """The next connection. Without a descriptor it waits in the queue, and a pause keeps this from a busy loop."""
         try:
             return super().get_request()
         except OSError:

@@ -63,9 +63,9 @@ def identify_setups(
     (['a', 'b', 'c'], ['11', '32', '46'])
     """
     if len(y) < 2 or len(output_names) != len(y) or (u is not None and len(u) != len(y)):
-        told = "" if u is None else f", {len(u)} in u"
+        forces = "" if u is None else f", {len(u)} in u"
         raise InputError(
-            f"{len(y)} set-ups in y, {len(output_names)} lists in output_names{told}, expected two or more"
+            f"{len(y)} set-ups in y, {len(output_names)} lists in output_names{forces}, expected two or more"
         )
     inputs, outputs = [], []
     for k, one in enumerate(y):

@@ -23,11 +23,11 @@ def fit_section(m: Material) -> page.Section:
     origin = ""
     if m.measured is not None and m.measured.fit is not None:
         made, kind = m.measured.fit, 0 if m.result.inputs else 1
-        told = [value for value in parts[kind] if value is not None]
+        known = [value for value in parts[kind] if value is not None]
         parts = [[part[name] for name in names] for part in (made.simulation_percent, made.prediction_percent)]
         own = ": the result itself has none"
-        if told:
-            ends = dict.fromkeys(f"{value:.1f}" for value in (min(told), max(told)))
+        if known:
+            ends = dict.fromkeys(f"{value:.1f}" for value in (min(known), max(known)))
             own = f"; the result itself says {' to '.join(ends)} %"
         origin = f" Computed by this report from {m.measured.source}{own}."
     if all(value is None for part in parts for value in part):
@@ -49,7 +49,7 @@ def fit_section(m: Material) -> page.Section:
     return page.section(title, picture, page.note(words + origin), name="Fit")
 
 
-def _told(pairs: Sequence[tuple[int, int]], count: int) -> list[int]:
+def _listed(pairs: Sequence[tuple[int, int]], count: int) -> list[int]:
     """Outputs of the chosen responses first, up to four."""
     order = [out for out, _ in pairs] + list(range(count))
     return sorted(list(dict.fromkeys(order))[:MOST_SHOWN])
@@ -63,7 +63,7 @@ def history_section(m: Material, pairs: Sequence[tuple[int, int]]) -> page.Secti
     if excerpt is None:
         words = "The model gives no response to lay over the record (it is unstable, or no stretch is long enough)."
         return page.section(title, page.absent(words), name="Time histories")
-    shown = _told(pairs, len(m.result.outputs))
+    shown = _listed(pairs, len(m.result.outputs))
     pictures = []
     for place, out in enumerate(shown):
         drawing = figures.figure(9.6, 2.1 if 0 < place < len(shown) - 1 else 2.3)
@@ -90,13 +90,14 @@ def _white_rows(m: Material, white: Whiteness) -> list[list[str]]:
         within = 100.0 * float(np.mean(np.abs(white.auto[1:, k]) <= BOUND_95 / np.sqrt(float(white.used[k]))))
         row = [name, f"{white.rms[k]:.3g}", f"{white.auto[lag, k]:+.3f} at {lag}", f"{within:.0f} %"]
         row.append("< 0.0001" if white.p_value[k] < 1e-4 else f"{white.p_value[k]:.2g}")
-        told = white.verdict(k)
+        verdict = white.verdict(k)
         past = [white.beyond(k, into) for into in range(white.cross.shape[2])]
         if past:
             most = max(hits for hits, _ in past)
             row.append(f"{most} of {white.lags + 1}")
-            told += "; inputs left in it" if any(hits > allowed for hits, allowed in past) else "; no input left in it"
-        rows.append([*row, told])
+            left = "inputs" if any(hits > allowed for hits, allowed in past) else "no input"
+            verdict += f"; {left} left in it"
+        rows.append([*row, verdict])
     return rows
 
 

@@ -122,9 +122,9 @@ def _run(args: argparse.Namespace, target: Path | None, written: str) -> None:
         progress.stage("reading")
         text = _page(args, written, progress)
     halt_if_interrupted()
-    told = sys.stdout
+    messages = sys.stdout
     if target is None:
-        told = sys.stderr
+        messages = sys.stderr
         sys.stdout.write(text)
         sys.stdout.flush()
     else:
@@ -136,7 +136,7 @@ def _run(args: argparse.Namespace, target: Path | None, written: str) -> None:
             progress.stage("printing the PDF")
             _print(program, target, text, args.pdf)
     if args.pdf and not args.quiet:
-        print(shown(f"{args.pdf}: {Path(args.pdf).stat().st_size // 1024} KiB"), file=told)
+        print(shown(f"{args.pdf}: {Path(args.pdf).stat().st_size // 1024} KiB"), file=messages)
 
 
 def _system_words(fault: OSError, target: Path | None) -> str:

@@ -181,3 +181,4 @@ def arrange(drawing: Figure) -> None:
     for ax in placed:  # at the end: axes that share one share its places
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_locator(NullLocator())
+            axis.get_offset_text().set_visible(False)  # of dates it stays without marks, too

@@ -121,7 +121,7 @@
     return best;
   }
 
-  function told(k) {
+  function textOf(k) {
     if (k < 0) return "";
     const run = runs[poles.run[k]], mode = modes[poles.mode[k] - 1];
     const std = mode && mode.frequency_std_hz ? ` (mode ${poles.mode[k]}: ${Number(mode.frequency_hz.toPrecision(7))} ± ` +
@@ -138,7 +138,7 @@
   canvas.addEventListener("pointermove", (event) => {
     if (drag) drag.to = from(event);
     hovered = drag ? -1 : nearest(event);
-    part("hover").textContent = told(hovered);
+    part("hover").textContent = textOf(hovered);
     draw();
   });
   canvas.addEventListener("pointerup", (event) => {

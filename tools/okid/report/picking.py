@@ -32,8 +32,8 @@ def has_poles(m: Material) -> bool:
 
 def picking_section(m: Material) -> page.Section:
     """Poles of all runs to pick from; what is picked is reproduced by `okid identify --picks`."""
-    told: dict[str, Any] = m.result.raw["agreement"]
-    poles = {key: told["poles"][key] for key in ("run", "order", "frequency_hz", "damping_ratio", "mpc", "mode")}
+    agreement: dict[str, Any] = m.result.raw["agreement"]
+    poles = {key: agreement["poles"][key] for key in ("run", "order", "frequency_hz", "damping_ratio", "mpc", "mode")}
     for key, digits in (("frequency_hz", 9), ("damping_ratio", 5), ("mpc", 3)):
         poles[key] = [float(f"{value:.{digits}g}") for value in poles[key]]
     modes = [
@@ -50,6 +50,6 @@ def picking_section(m: Material) -> page.Section:
         "The command gives each pick its shape, standard deviation and place in the model."
     )
     return page.section(
-        "Pick modes", _PARTS, page.data("poles-data", {"runs": told["runs"], "poles": poles, "modes": modes,
+        "Pick modes", _PARTS, page.data("poles-data", {"runs": agreement["runs"], "poles": poles, "modes": modes,
                                                        "command": command}), page.note(words), name="Picking",
     )  # fmt: skip

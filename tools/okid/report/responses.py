@@ -241,11 +241,11 @@ def check_section(m: Material) -> page.Section | None:
         there = [one for one in own if len(one.shape) == len(m.result.places)]
         close = [one for one in there if abs(one.frequency_hz / f - 1.0) < max(0.02, 2.0 * zeta)]
         best = max(close, key=lambda one: mac(one.shape, m.result.shapes[k]), default=None)
-        told = ["–"] * 3
+        cells = ["–"] * 3
         if best is not None:
-            told = [f"{best.frequency_hz:.4f}", f"{100.0 * best.damping_ratio:.3f}",
+            cells = [f"{best.frequency_hz:.4f}", f"{100.0 * best.damping_ratio:.3f}",
                     f"{mac(best.shape, m.result.shapes[k]):.3f}"]  # fmt: skip
-        rows.append([*row, *told])
+        rows.append([*row, *cells])
     if own is None:
         words = "Explained: 100 (1 − ‖H − Ĥ‖/‖H‖) over two half-power widths around the mode, Ĥ of the result."
         words += " A window makes a measured resonance wider; the damping of the result is without it."

@@ -6,7 +6,7 @@
   const holder = document.getElementById("modes-data");
   if (!holder) return;
   const { result, uff } = JSON.parse(holder.textContent);
-  const boxes = [...document.querySelectorAll("input[data-mode]")], told = document.querySelector(".save .chosen");
+  const boxes = [...document.querySelectorAll("input[data-mode]")], count = document.querySelector(".save .chosen");
   const numbers = () => boxes.filter((box) => box.checked).map((box) => Number(box.dataset.mode)).sort((a, b) => a - b);
   const makers = {
     csv: ["text/csv", (list) => okidSelection.csv(result, list)],
@@ -16,7 +16,7 @@
 
   function tell() {
     const list = numbers();
-    told.textContent = list.length ? `${list.length} of ${boxes.length} modes selected` : "no mode selected";
+    count.textContent = list.length ? `${list.length} of ${boxes.length} modes selected` : "no mode selected";
     for (const button of document.querySelectorAll("button[data-save]")) button.disabled = !list.length;
   }
 

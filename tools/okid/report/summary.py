@@ -86,7 +86,7 @@ def _facts(m: Material) -> list[tuple[str, str]]:
 
 def summary_section(m: Material) -> page.Section:
     """Verdict, facts, completeness, warnings."""
-    facts, complete, told = page.facts(_facts(m)), complete_table(m), warning_list(m)
+    facts, complete, warnings = page.facts(_facts(m)), complete_table(m), warning_list(m)
     if len(completeness(m)) <= 12:
-        return page.section("Summary", verdict(m), page.beside(facts, complete), losses(m), told)
-    return page.section("Summary", verdict(m), facts, told, complete, losses(m))
+        return page.section("Summary", verdict(m), page.beside(facts, complete), losses(m), warnings)
+    return page.section("Summary", verdict(m), facts, warnings, complete, losses(m))

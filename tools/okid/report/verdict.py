@@ -50,8 +50,8 @@ def _simulated(m: Material) -> list[float | None]:
 def _scale_doubts(m: Material) -> list[str]:
     if m.measured is None or m.measured.factor is None:
         return []
-    told = scale.doubts(m.measured.factor, m.result.outputs)
-    return [*told[:1], f"so are {len(told) - 1} more outputs"] if len(told) > 2 else told
+    doubts = scale.doubts(m.measured.factor, m.result.outputs)
+    return [*doubts[:1], f"so are {len(doubts) - 1} more outputs"] if len(doubts) > 2 else doubts
 
 
 def _order_doubts(m: Material) -> list[str]:

@@ -124,31 +124,8 @@ def draw_stabilization(
     Lines: `chosen_hz`, the modes of the model, dotted `doubtful_hz`, those it rejected, and its `order`. A band marks
     each cluster that holds, a ring the pole nearest its medians.
     """
-    behind_key: list[Any] = []
-    if background is not None:
-        seen = background[0] <= shown_hz
-        line, magnitude = background[0][seen], background[1][seen]
-        behind = ax.twinx()
-        level = 20.0 * np.log10(np.maximum(magnitude, np.max(magnitude) * 1e-6))
-        behind_key = behind.plot(line, level, color=FAINT, lw=0.9)
-        behind.set_yticks([])
-        behind.grid(False)
-        behind.spines["right"].set_visible(False)
-        behind.set_zorder(0)
-        ax.set_zorder(1)
-        ax.patch.set_visible(False)
-    points: dict[str, list[tuple[float, int]]] = {name: [] for name in _MARKS}
-    for row in rows:
-        for k, f in enumerate(row.frequency_hz):
-            if row.stable[k]:
-                kind = "stable"
-            elif row.stable_shape[k]:
-                kind = "shape"
-            elif row.stable_damping[k]:
-                kind = "damping"
-            else:
-                kind = "frequency" if row.stable_frequency[k] else "new"
-            points[kind].append((float(f), row.order))
+    behind_key = _draw_behind(ax, *background, shown_hz) if background is not None else []
+    points = _poles_by_mark(rows)
     for k, f in enumerate(chosen_hz):
         ax.axvline(f, color=GREEN, lw=0.8, alpha=0.6, label=None if k else "mode of this model")
     for k, f in enumerate(doubtful_hz):
@@ -173,8 +150,45 @@ def draw_stabilization(
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("model order")
     ax.grid(False)
+    _draw_key(ax, behind_key)
+
+
+def _draw_behind(ax: Axes, line: Real, magnitude: Real, shown_hz: float) -> list[Any]:
+    """A magnitude in dB behind the axes, without a scale. Its entry of the legend."""
+    seen = line <= shown_hz
+    behind = ax.twinx()
+    level = 20.0 * np.log10(np.maximum(magnitude[seen], np.max(magnitude[seen]) * 1e-6))
+    key = behind.plot(line[seen], level, color=FAINT, lw=0.9)
+    behind.set_yticks([])
+    behind.grid(False)
+    behind.spines["right"].set_visible(False)
+    behind.set_zorder(0)
+    ax.set_zorder(1)
+    ax.patch.set_visible(False)
+    return key
+
+
+def _poles_by_mark(rows: Stabilization) -> dict[str, list[tuple[float, int]]]:
+    """Frequency and order of every pole, under the mark that says what of it is stable."""
+    points: dict[str, list[tuple[float, int]]] = {name: [] for name in _MARKS}
+    for row in rows:
+        for k, f in enumerate(row.frequency_hz):
+            if row.stable[k]:
+                kind = "stable"
+            elif row.stable_shape[k]:
+                kind = "shape"
+            elif row.stable_damping[k]:
+                kind = "damping"
+            else:
+                kind = "frequency" if row.stable_frequency[k] else "new"
+            points[kind].append((float(f), row.order))
+    return points
+
+
+def _draw_key(ax: Axes, behind_key: list[Any]) -> None:
+    """The legend: marks first, then what is drawn around them, then what is behind."""
     key = {text: handle for handle, text in zip(*ax.get_legend_handles_labels(), strict=True)}
-    rank = [mark[0] for mark in _MARKS.values()]  # marks first, then what is drawn around them
+    rank = [mark[0] for mark in _MARKS.values()]
     texts = sorted(key, key=lambda text: rank.index(text) if text in rank else len(rank))
     handles, texts = [key[text] for text in texts] + behind_key, texts + ["measured, dB"] * len(behind_key)
     ax.legend(handles, texts, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
@@ -306,9 +320,9 @@ def draw_fit(
     """Fit percentages as pairs of bars, `labels` in the key; a missing or negative one is written, not drawn."""
     index = np.arange(len(names))
     groups = ((-0.2, simulated, BLUE, labels[0]), (0.2, predicted, ORANGE, labels[1]))
-    told = [group for group in groups if any(v is not None for v in group[1])]
-    for place, values, colour, label in told:
-        offset = place if len(told) == 2 else 0.0
+    known = [group for group in groups if any(v is not None for v in group[1])]
+    for place, values, colour, label in known:
+        offset = place if len(known) == 2 else 0.0
         height = [max(0.0, v) if v is not None else 0.0 for v in values]
         ax.bar(index + offset, height, 0.38, color=colour, label=label)
         for x, v in zip(index, values, strict=True):

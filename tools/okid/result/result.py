@@ -133,7 +133,7 @@ class Result:
             raise InputError(f"not a complete okid.result/1: {type(fault).__name__}: {fault}") from None
 
     def __getattr__(self, name: str) -> Any:
-        """A field that nobody has asked for yet, made with those that come of the same work."""
+        """A field at its first use, made with those that come of the same work."""
         if name not in type(self).__dataclass_fields__ or name == "_source":
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         if name in ("fit", "warnings"):

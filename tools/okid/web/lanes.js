@@ -71,7 +71,7 @@ export class Lanes {
     this.marks[channel][at] = mark;
   }
 
-  // A gap that okid told of: samples first .. last of a channel by name.
+  // A gap that okid reported: samples first .. last of a channel by name.
   gap(name, first, last) {
     if (!this.gaps.has(name)) this.gaps.set(name, []);
     const own = this.gaps.get(name);
@@ -210,7 +210,7 @@ export class Lanes {
     for (let x = Math.max(0, start); x < marks.length; x++) if (marks[x] === NOT_SENT) context.fillRect(view.left + x, y + 1, step, tall - 3);
     context.fillStyle = colour.bad;
     for (let x = 0; x < marks.length; x++) if (marks[x] === MISSING) context.fillRect(view.left + x, y + 1, Math.max(step, 1), tall - 3);
-    this.told(channel, y, tall, view);
+    this.drawGaps(channel, y, tall, view);
     if (!range) return;
     const place = (value) => y + 2 + (tall - 5) * (1 - (value - range[0]) / (range[1] - range[0]));
     context.fillStyle = colour.accent;
@@ -255,7 +255,7 @@ export class Lanes {
     return Math.max(x, from + 1);
   }
 
-  told(channel, y, tall, view) {
+  drawGaps(channel, y, tall, view) {
     const own = this.gaps.get(this.channels[channel].name);
     if (!own || !this.rate) return;
     const scale = view.wide / (view.end - view.first), perColumn = this.seconds * this.rate;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  the picture of okid.notebook.LiveView: lanes, table of modes, moving shape, stabilization diagram to pick from
-// METHOD   an ESM of anywidget; every part is drawn anew when its trait changes; all text goes in as text
+// METHOD   an ESM of anywidget; every part is drawn again when its trait changes; all text goes in as text
 const COLOURS = { line: "#1f5fa8", pole: "#2a8c4a", weak: "#8b959f", picked: "#b8292f", text: "#56616c" };
 
 function part(tag, parent, text, look) {
@@ -96,13 +96,13 @@ function drawDiagram(target, poles, picked) {
 }
 
 function render({ model, el }) {
-  const told = part("div", el, "", { color: COLOURS.text, fontSize: "12px" });
+  const status = part("div", el, "", { color: COLOURS.text, fontSize: "12px" });
   const signals = canvas(el, "okid-signals", 700, 60);
   const row = part("div", el, undefined, { display: "flex", gap: "1em", flexWrap: "wrap" });
   const table = part("table", row), shape = canvas(row, "okid-shape", 260, 150), diagram = canvas(el, "okid-poles", 700, 220);
   let chosen = 0, places = [], frame = 0;
   const show = {
-    told: () => (told.textContent = model.get("told")),
+    status: () => (status.textContent = model.get("status")),
     signals: () => drawSignals(signals, model.get("signals")),
     modes: () => drawTable(table, model.get("modes"), chosen, (k) => ((chosen = k), show.modes())),
     poles: () => {

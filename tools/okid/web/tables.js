@@ -77,8 +77,8 @@ export function showModes(event, result) {
     const [z, dz] = measured(100 * mode.damping_ratio, percent);
     const name = known(mode.track) ? String(mode.track) : "new";
     const mpc = known(mode.mpc) ? mode.mpc.toFixed(4) : "–";
-    const told = mode.alarm ? "alarm" : mode.confident === false ? `doubtful: ${(mode.why_text || mode.why || []).join("; ")}` : "";
-    return { away: mode.alarm, doubtful: mode.confident === false, cells: [all ? box(picked, k + 1) : name, f, df, z, dz, mpc, told] };
+    const remark = mode.alarm ? "alarm" : mode.confident === false ? `doubtful: ${(mode.why_text || mode.why || []).join("; ")}` : "";
+    return { away: mode.alarm, doubtful: mode.confident === false, cells: [all ? box(picked, k + 1) : name, f, df, z, dz, mpc, remark] };
   });
   rows.sort((a, b) => Boolean(a.doubtful) - Boolean(b.doubtful)); // stable: the doubtful ones last
   fill(table, [all ? "#" : "track", "f [Hz]", "± σ", "ζ [%]", "± σ", "MPC", "<"], rows);

@@ -31,7 +31,7 @@ int main(void) {
         int32_t codes[CHANNELS * EACH];
         for (int n = 0; n < EACH; ++n) {
             const uint32_t due = k_timer_status_sync(&every); // above 1: a tick was missed
-            if (n > 0 && due > 1) { // the packet would hide it: begin anew, the numbers tell the gap
+            if (n > 0 && due > 1) { // the packet would hide it: begin again, the sample numbers show the gap
                 header.sequence += (uint32_t)n + due - 1;
                 n = 0;
             } else if (due > 1) {
