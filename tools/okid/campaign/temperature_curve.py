@@ -31,11 +31,10 @@ class Curve(NamedTuple):
 
     def regressors(self, temperature: Real | None, count: int) -> Real:
         """(count, k): 1, the temperature about `centre_c`, and that above each bend; in units of 10 °C."""
-        ones = np.ones(count)
         if self.bends is None or temperature is None:
-            return ones[:, None]
+            return np.ones((count, 1))
         above = [np.maximum(temperature - bend, 0.0) for bend in self.bends]
-        return np.column_stack([ones, *((one / 10.0) for one in (temperature - self.centre_c, *above))])
+        return np.column_stack([np.ones(count), *((one / 10.0) for one in (temperature - self.centre_c, *above))])
 
 
 def slopes(model: Regression) -> tuple[Real, Real]:

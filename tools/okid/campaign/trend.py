@@ -139,7 +139,7 @@ def _choose(series: SeriesTrend, spec: Trend) -> tuple[Real, Real, Real] | None:
         return None
     spread = 0.0 if t is None else float(np.ptp(t[training]))
     order = spec.temperature_order if spread > 0.0 else 0
-    need, there = 2 + LEAST * (1 if order == "auto" else max(order, 1)), int(np.sum(training))
+    need, there = 2 + LEAST * (1 if order == "auto" else max(int(order), 1)), int(np.sum(training))
     if there < need:
         series.not_watched(f"{there} training groups, {need} are needed")
         return None
