@@ -15,7 +15,7 @@ from okid.campaign.trend import analyse, series_of
 from okid.campaign.virtual_year import COLUMNS, Year, frequencies
 from rig_records import campaign
 
-WITH_TEST = {"temperature_order = 2": "temperature_order = 1\nchange_test = true"}
+WITH_TEST = {"[trend]": "[trend]\nchange_test = true"}
 DAMAGED = Year(records=60, samples=2048, days=60.0, damage=0.02, damage_day=45.0, seed=3)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from okid.campaign import change_point, control_chart, trend, trend_page
 from okid.campaign.spec import Trend
+from okid.campaign.temperature_curve import slopes
 from okid.campaign.trend import SeriesTrend, Track, analyse
 
 SLOW = os.environ.get("OKID_SLOW") == "1"  # the long tier
@@ -35,8 +36,9 @@ def test_regression_finds_what_temperature_does() -> None:
     one = series(1)
     analyse(one, Trend(training_share=0.5))
     assert one.regression is not None and one.watched == [1, 2, 3]
-    slope = one.regression.coefficients[1] / 10.0
-    assert np.all(np.abs(slope - SLOPE * F0) < 4.0 * one.regression.deviations[1] / 10.0)
+    assert one.curve.bends == ()
+    (slope,), (std,) = slopes(one.regression)
+    assert np.all(np.abs(slope - SLOPE * F0) < 4.0 * std)
     np.testing.assert_allclose(np.sqrt(one.regression.variance), SIGMA, rtol=0.25)
     assert one.limits is not None and one.limits.per_year == 122
     assert not one.alarms and one.change is None

@@ -102,7 +102,7 @@ class Trend:
     max_damping: float = 0.2
     series: tuple[str, ...] | None = None
     seed: int = 1
-    temperature_order: int = 1
+    temperature_order: int | str = "auto"
     change_test: bool = False
 
 

@@ -49,7 +49,7 @@ KEYS: dict[str, dict[str, Any]] = {
         "training_until": TEXT, "training_share": Number(0.05, 1.0), "false_alarm_per_year": Number(1e-4, 0.5),
         "min_mpc": Number(0, 1), "max_damping": Number(0, 1, above=True), "series": NAMES,
         "seed": Number(0, 2**31, whole=True),
-        "temperature_order": Number(0, 3, whole=True), "change_test": FLAG,
+        "temperature_order": ("auto", Number(0, 3, whole=True)), "change_test": FLAG,
     },
     "cluster": {"workers": Number(1, 4096, whole=True), "address": TEXT, "memory_mb": Number(100, 1e7)},
     "output": {"folder": TEXT, "keep": ("auto", "parts", "sums"), "batch_mb": Number(1, 4096)},

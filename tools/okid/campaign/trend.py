@@ -13,7 +13,8 @@ from okid.campaign import trend_model
 from okid.campaign.change_point import ChangePoint, find_change
 from okid.campaign.control_chart import Charts, Limits, Ranks, bounded, charts, groups_needed, limits
 from okid.campaign.spec import Trend
-from okid.campaign.trend_model import Flags, Regression, design
+from okid.campaign.temperature_curve import LEAST, Curve, find_curve
+from okid.campaign.trend_model import Flags, Regression
 
 Real = NDArray[np.float64]
 SEEN = 0.5  # share of the groups a mode must be in to be drawn
@@ -22,7 +23,6 @@ BLURRED = 5.0  # times the usual sigma: such a value is not used
 _YEAR_S = 365.25 * 86400.0
 _NAMED = 5
 _SURE = 0.01  # probability without a change below which a change point is reported
-_SPARE = 8  # training groups of a mode beyond the numbers that are fitted
 
 
 @dataclass
@@ -52,6 +52,7 @@ class SeriesTrend:
     watched: list[int] = field(default_factory=list)
     rows: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     training: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    curve: Curve = Curve(0.0, None)
     regression: Regression | None = None
     charts: Charts | None = None
     limits: Limits | None = None
@@ -73,9 +74,7 @@ class SeriesTrend:
         """Frequencies (n, d) of the watched tracks that the regression expects, NaN without a temperature."""
         if self.regression is None:
             return None
-        k = len(self.regression.coefficients)
-        X = design(self.temperature_c, self.regression.centre_c, k - 1, len(self.time_s))
-        return np.asarray(X @ self.regression.coefficients)
+        return np.asarray(self.curve.regressors(self.temperature_c, len(self.time_s)) @ self.regression.coefficients)
 
 
 def series_of(tables: dict[str, Any]) -> list[SeriesTrend]:
@@ -140,7 +139,7 @@ def _choose(series: SeriesTrend, spec: Trend) -> tuple[Real, Real, Real] | None:
         return None
     spread = 0.0 if t is None else float(np.ptp(t[training]))
     order = spec.temperature_order if spread > 0.0 else 0
-    need, there = order + 1 + _SPARE, int(np.sum(training))
+    need, there = 2 + LEAST * (1 if order == "auto" else max(int(order), 1)), int(np.sum(training))
     if there < need:
         series.not_watched(f"{there} training groups, {need} are needed")
         return None
@@ -158,10 +157,26 @@ def _choose(series: SeriesTrend, spec: Trend) -> tuple[Real, Real, Real] | None:
     series.rows = np.flatnonzero(warm & np.any(weight > 0, axis=1))
     series.training = first[series.rows]
     _tell_missing(series, n, weight, {t.number: seen[t.number] for t in series.tracks if t not in chosen}, there)
-    centre = 0.0 if t is None else float(np.mean(t[series.rows][series.training]))
-    X = design(t[series.rows] if t is not None and order else None, centre, order, len(series.rows))
-    y = np.column_stack([track.frequency_hz for track in chosen])
-    return y[series.rows], weight[series.rows], X
+    y, weight = np.column_stack([track.frequency_hz for track in chosen])[series.rows], weight[series.rows]
+    if t is None or order == 0:
+        return y, weight, series.curve.regressors(None, len(y))
+    _find_curve(series, order, y[series.training], t[series.rows][series.training], weight[series.training])
+    return y, weight, series.curve.regressors(t[series.rows], len(y))
+
+
+def _find_curve(series: SeriesTrend, order: int | str, y: Real, temperature: Real, weight: Real) -> None:
+    """The curve over temperature of the training; a remark when a line, or the order that is asked for, fits badly."""
+    series.curve, gain = best, _ = find_curve(y, temperature, weight)
+    used = "used"
+    if order != "auto":
+        series.curve = find_curve(y, temperature, weight, int(order) - 1)[0]
+        used = 'taken with temperature_order = "auto"'
+    if len(best.bends or ()) > (0 if order == "auto" else len(series.curve.bends or ())):
+        places = " and ".join(f"{bend:.1f}" for bend in best.bends or ())
+        series.remarks.append(
+            f"lack of fit: about a line over temperature the scatter is {gain:.1f} times as large as about one with "
+            f"bends at {places} °C, which is {used}"
+        )
 
 
 def _tell_missing(series: SeriesTrend, n: int, weight: Real, others: dict[int, int], there: int) -> None:
@@ -210,10 +225,9 @@ def analyse(series: SeriesTrend, spec: Trend) -> None:
     if found is None:
         return
     y, weight, X = found
-    flags, t = series.training, series.temperature_c
+    flags = series.training
     usual, wrong = _clean(series, y, X, weight)
-    centre = 0.0 if t is None else float(np.mean(t[series.rows][flags]))
-    model = trend_model.fit(y[flags], X[flags], centre, weight[flags])
+    model = trend_model.fit(y[flags], X[flags], weight[flags])
     series.regression = model
     if np.any(model.variance <= 0.0):
         series.not_watched("a mode does not move at all in the training")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frequencies over temperature: a least-squares line (or parabola) of a training period, and what is left.
+"""Frequencies over temperature: least squares of a training period, and what is left.
 
 Every mode has its own rows and weights: a mode that a group does not show (weight 0) takes nothing from the others.
 """
@@ -23,14 +23,12 @@ FAR = 8.0  # robust standard deviations: such a row of the training is an accide
 class Regression(NamedTuple):
     """Fit of d columns on k regressors by n training rows, each with its weight.
 
-    coefficients (k, d) about `centre_c`, and their standard deviations; variance (d,) of the residuals of weight 1 with
-    freedom (d,) degrees of freedom, correlation (d, d) shrunk to none; inverse (d, k, k) of X'WX; persistence (d,):
-    lag-1 correlation of the residuals, 0 .. 0.95; tails: degrees of freedom of their Student's t, inf = Gaussian.
+    coefficients (k, d); variance (d,) of the residuals of weight 1 with freedom (d,) degrees of freedom, correlation
+    (d, d) shrunk to none; inverse (d, k, k) of X'WX; persistence (d,): lag-1 correlation of the residuals, 0 .. 0.95;
+    tails: degrees of freedom of their Student's t, inf = Gaussian.
     """
 
     coefficients: Real
-    deviations: Real
-    centre_c: float
     variance: Real
     correlation: Real
     inverse: Real
@@ -38,13 +36,6 @@ class Regression(NamedTuple):
     persistence: Real
     lag1: Real
     tails: float
-
-
-def design(temperature: Real | None, centre_c: float, order: int, count: int) -> Real:
-    """Regressors (count, k): 1 and powers of the temperature about `centre_c`, in units of 10 °C."""
-    if temperature is None:
-        return np.ones((count, 1))
-    return np.column_stack([((temperature - centre_c) / 10.0) ** power for power in range(order + 1)])
 
 
 def inverses(X: Real, weight: Real) -> Real:
@@ -69,7 +60,7 @@ def spread_of(residual: Real, weight: Real, k: int) -> tuple[Real, Real]:
     return moments[..., np.arange(d), np.arange(d)] / freedom, R
 
 
-def fit(y: Real, X: Real, centre_c: float, weight: Real) -> Regression:
+def fit(y: Real, X: Real, weight: Real) -> Regression:
     """Weighted least squares of y (n, d) on X (n, k); the lag-1 correlation is freed of its bias in small samples."""
     k, seen = X.shape[1], weight > 0
     inverse = inverses(X, weight)
@@ -81,12 +72,9 @@ def fit(y: Real, X: Real, centre_c: float, weight: Real) -> Regression:
     lag1 = np.sum(residual[1:] * residual[:-1], axis=0) / np.where(power > 0.0, power, 1.0)
     n = seen.sum(axis=0)
     persistence = np.clip(lag1 + (k + 3.0 * lag1) / n, 0.0, 0.95)
-    deviations = np.sqrt(np.einsum("dkk->kd", inverse) * variance)
     fresh = residual[1:] - persistence * residual[:-1]
     tails = tails_of([fresh[seen[1:, j] & seen[:-1, j], j] for j in range(y.shape[1])])
-    return Regression(
-        coefficients, deviations, centre_c, variance, correlation, inverse, n - k, persistence, lag1, tails
-    )
+    return Regression(coefficients, variance, correlation, inverse, n - k, persistence, lag1, tails)
 
 
 def tails_of(columns: list[Real]) -> float:

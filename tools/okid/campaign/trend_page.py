@@ -13,6 +13,7 @@ import matplotlib as mpl
 import numpy as np
 
 from okid.campaign.spec import Trend
+from okid.campaign.temperature_curve import slopes
 from okid.campaign.trend import SEEN, SeriesTrend, analyse, series_of
 from okid.campaign.trend_pictures import draw_chart, draw_over_temperature, draw_over_time, time_axis
 from okid.data.whole_file import whole_file
@@ -24,7 +25,8 @@ MOST_SERIES, MOST_TRACKS, MOST_ROWS = 12, 8, 60
 _TABLE_WORDS = (
     "f, σ and ζ: medians over the groups; σ is that of one group, by leaving out parts of its records, changes of "
     "temperature within the group included. Scatter: standard deviation of the training's residuals, after the "
-    "regression. Shift: mean residual after the change less that before, ± its standard deviation."
+    "regression. f per °C: of each straight piece, from the cold on. Shift: mean residual after the change less that "
+    "before, ± its standard deviation."
 )
 
 
@@ -105,8 +107,8 @@ def _pm(value: float, std: float, digits: int = 2) -> str:
 def _track_table(series: SeriesTrend) -> str:
     head = ["mode", "groups", "f [Hz]", "σ [Hz]", "ζ [%]"]
     model = series.regression
-    with_slope = model is not None and len(model.coefficients) > 1
-    head += ["f per °C [%]"] if with_slope else []
+    steep = slopes(model) if model is not None and len(model.coefficients) > 1 else None
+    head += ["f per °C [%]"] if steep is not None else []
     head += ["scatter [Hz]"] if model is not None else []
     head += ["shift [%]"] if series.shift_hz is not None else []
     rows = []
@@ -120,12 +122,9 @@ def _track_table(series: SeriesTrend) -> str:
                f"{100 * np.median(damping):.3g}" if len(damping) else "-"]  # fmt: skip
         if model is not None:
             k = series.watched.index(track.number) if track.number in series.watched else None
-            if with_slope:
-                row.append(
-                    "-"
-                    if k is None
-                    else _pm(10 * model.coefficients[1, k] / middle, 10 * model.deviations[1, k] / middle)
-                )
+            if steep is not None:
+                pieces = [] if k is None else (100.0 / middle * np.array(steep)[:, :, k]).T.tolist()
+                row.append(", ".join(_pm(*piece) for piece in pieces) or "-")
             row.append("-" if k is None else f"{np.sqrt(model.variance[k]):.2g}")
             if series.shift_hz is not None and series.shift_std_hz is not None:
                 shifts = 100 / middle * series.shift_hz, 100 / middle * series.shift_std_hz

@@ -11,7 +11,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from numpy.typing import NDArray
 
 from okid.campaign.trend import SeriesTrend, Track
-from okid.campaign.trend_model import design, leverage
+from okid.campaign.trend_model import leverage
 from okid.result.figures import BLUE, FAINT, GREEN, GREY, ORANGE, RED, log_axis
 
 Real = NDArray[np.float64]
@@ -104,9 +104,9 @@ def draw_over_temperature(ax: Axes, series: SeriesTrend, track: Track, named: bo
             ax.plot(t[own], f[own], ls="", marker=".", ms=3.2, color=colour, label=name if named else None)
     model = series.regression
     if model is not None and track.number in series.watched:
-        column, order = series.watched.index(track.number), len(model.coefficients) - 1
+        column = series.watched.index(track.number)
         line = np.linspace(float(np.nanmin(t)), float(np.nanmax(t)), 60)
-        X = design(line if order else None, model.centre_c, order, len(line))
+        X = series.curve.regressors(line, len(line))
         middle = X @ model.coefficients[:, column]
         lever = leverage(X, model, np.ones((len(X), len(model.variance))))[:, column]
         width = 2.0 * np.sqrt(model.variance[column] * (1.0 + lever))

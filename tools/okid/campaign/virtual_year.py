@@ -192,7 +192,6 @@ by = {by}
 column = "temperature_c"
 [trend]
 training_share = 0.4
-temperature_order = 2
 false_alarm_per_year = 0.05     # probability of any alarm in a year without damage
 [cluster]
 workers = 2
