@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <drv/candump.h>
+#include <utility>
 
 namespace okid_host {
 namespace {
@@ -20,7 +21,11 @@ unsigned sendable(unsigned bytes) {
 
 bool same_message(const channel_config& a, const channel_config& b) {
     return a.bus == b.bus && a.frame.id == b.frame.id && a.frame.extended == b.frame.extended &&
-           a.frame.mask == b.frame.mask && a.selectors == b.selectors;
+           a.frame.mask == b.frame.mask;
+}
+
+bool same_page(const channel_config& a, const channel_config& b) {
+    return same_message(a, b) && a.selectors == b.selectors;
 }
 
 } // namespace
@@ -29,7 +34,7 @@ frame_maker::frame_maker(const live_config& config) : config_(config), period_ns
     for (std::size_t i = 0; i < config.channels.size(); ++i) {
         const channel_config& channel = config.channels[i];
         auto found = std::find_if(messages_.begin(), messages_.end(), [&](const message& each) {
-            return same_message(config.channels[each.channels.front()], channel);
+            return same_page(config.channels[each.channels.front()], channel);
         });
         if (found == messages_.end()) {
             messages_.emplace_back();
@@ -45,8 +50,33 @@ frame_maker::frame_maker(const live_config& config) : config_(config), period_ns
         if (channel.sequence) bytes = std::max(bytes, drv_signal_bytes(&*channel.sequence));
         found->frame.len = static_cast<std::uint8_t>(sendable(static_cast<unsigned>(std::min<std::size_t>(bytes, 64))));
         if (found->frame.len > 8) found->frame.flags |= DRV_FRAME_FD;
+        if (found->frame.len > 8 && config.buses[channel.bus].dbitrate) found->frame.flags |= DRV_FRAME_BRS;
     }
+    put_into_pages();
     between_ns_ = std::min(frame_ns, period_ns_ / static_cast<double>(messages_.size() + 1));
+}
+
+/// What is not multiplexed stands in every page of its message.
+void frame_maker::put_into_pages() {
+    const auto first = [&](const message& each) -> const channel_config& {
+        return config_.channels[each.channels.front()];
+    };
+    const auto filled = [&](const message& plain) {
+        if (!first(plain).selectors.empty()) return false;
+        bool out = false;
+        for (message& page : messages_) {
+            if (!same_message(first(page), first(plain)) || first(page).selectors.empty()) continue;
+            page.channels.insert(page.channels.end(), plain.channels.begin(), plain.channels.end());
+            page.frame.len = std::max(page.frame.len, plain.frame.len);
+            page.frame.flags |= plain.frame.flags;
+            out = true;
+        }
+        return out;
+    };
+    std::vector<message> kept;
+    for (const message& each : messages_)
+        if (!filled(each)) kept.push_back(each);
+    messages_ = std::move(kept);
 }
 
 bool frame_maker::fill(const message& from, std::int64_t index, const double* row, drv_frame_t& frame) {

@@ -28,6 +28,7 @@ class frame_maker {
         drv_frame_t frame{};
         std::string interface;
     };
+    void put_into_pages();
     bool fill(const message& from, std::int64_t index, const double* row, drv_frame_t& frame);
 
     const live_config& config_;

@@ -80,6 +80,12 @@ void grid::build_lanes(const live_config& config) {
         }
         found->channels.push_back(c);
     }
+    for (lane& each : lanes_) {
+        each.pages = each.sequence && !each.selectors.empty();
+        each.repeated = each.sequence && each.selectors.empty() &&
+                        std::any_of(lanes_.begin(), lanes_.end(),
+                                    [&](const lane& o) { return !o.selectors.empty() && one_message(o, each); });
+    }
     std::sort(masks_.begin(), masks_.end(),
               [](std::uint32_t a, std::uint32_t b) { return std::bitset<32>(a).count() > std::bitset<32>(b).count(); });
     std::size_t most = 0;
@@ -177,14 +183,14 @@ void grid::insert(lane& l, std::int64_t index, const drv_frame_t& frame) {
         if (index < 0) return; // before the grid begins
         const bool remembered = opened_ - index <= mask_;
         const bool twice = remembered && present(index)[which];
-        counts.duplicate += twice;
+        counts.duplicate += twice && !l.repeated;
         counts.out_of_order += !twice;
         counts.too_late += !twice;
         return;
     }
     open_rows(index);
     if (present(index)[which]) {
-        ++counts.duplicate;
+        counts.duplicate += !l.repeated;
         return;
     }
     if (late) ++counts.out_of_order;

@@ -124,6 +124,10 @@ class grid {
         std::vector<std::size_t> channels;
         std::optional<drv_signal_t> sequence;
         std::vector<multiplexor> selectors;
+        bool pages = false;      ///< counted and multiplexed
+        bool repeated = false;   ///< counted, in every page of a multiplexed message
+        std::int64_t stride = 1; ///< the counter rises by so much from sample to sample
+        std::int64_t page = 0;   ///< so many frames behind the first page of its sample, -1: not known
         // Where the lane stands on the grid.
         bool waiting = false, heard = false;
         bool gone = false;         ///< silent for longer than others wait
@@ -188,6 +192,10 @@ class grid {
     bool push_to_lanes(const drv_frame_t& frame, std::uint32_t mask);
     void push_to(lane& l, const drv_frame_t& frame);
     bool decode(lane& l, const drv_frame_t& frame);
+    static bool one_message(const lane& a, const lane& b);
+    static std::int64_t step_of(const lane& l, std::uint64_t from, std::uint64_t to);
+    static void find_page(lane& l, std::uint64_t counter, const lane& beside, std::uint64_t its_counter);
+    void find_strides();
     bool read_counter(const lane& l, const drv_frame_t& frame, std::uint64_t& counter) const;
 
     void hold_until_anchored(lane& l, const drv_frame_t& frame);

@@ -88,6 +88,7 @@ void grid::hold_until_anchored(lane& l, const drv_frame_t& frame) {
 
 /// Is there a lane whose place depends on stamps? Counters of the lanes heard so far are compared.
 bool grid::placed_by_time() const {
+    if (std::any_of(lanes_.begin(), lanes_.end(), [](const lane& l) { return l.pages; })) return true; // find_strides()
     if (lanes_.size() == 1) return false;
     const lane* root = nullptr;
     for (const auto& [which, frame] : held_) {
@@ -107,11 +108,13 @@ bool grid::placed_by_time() const {
 /// A lane whose counter stands close to this one. @return NULL when there is none
 const grid::lane* grid::kin_of(const lane& l, std::uint64_t counter, std::int64_t& index) const {
     for (const lane& other : lanes_) {
-        if (!other.heard || &other == &l || !other.sequence) continue;
+        if (!other.heard || &other == &l || !other.sequence || other.stride != l.stride) continue;
+        if (l.stride > 1 && !one_message(l, other)) continue;
         const unsigned bits = std::min(l.sequence->length, other.sequence->length);
-        const std::int64_t apart = wrapped_step(other.counter, counter, bits);
+        const std::uint64_t begin = counter - static_cast<std::uint64_t>(l.page - other.page);
+        const std::int64_t apart = wrapped_step(other.counter, begin, bits);
         if (std::abs(apart) > kinship(bits)) continue;
-        index = other.last + apart;
+        index = other.last + apart / l.stride;
         return &other;
     }
     return nullptr;
@@ -140,7 +143,7 @@ void grid::gather_starts(std::vector<lane_start>& starts) {
             its.before = arrived;
             l.heard = true;
         } else {
-            const std::int64_t step = counted ? wrapped_step(l.counter, counter, l.sequence->length) : 1;
+            const std::int64_t step = counted ? step_of(l, l.counter, counter) : 1;
             if (step <= 0 || step > window_) continue;
             numbers[w] += step;
             l.last += step;
@@ -197,6 +200,7 @@ std::int64_t grid::start_offset(const std::vector<lane_start>& starts, std::size
 /// All lanes were heard (or waiting has no end): sample 0 is the first one that every lane can have.
 void grid::anchor() {
     anchored_ = true;
+    find_strides();
     std::vector<lane_start> starts(lanes_.size());
     gather_starts(starts);
     const auto root = static_cast<std::size_t>(held_.front().first);
@@ -247,6 +251,9 @@ void grid::settle_start(lane& l, const lane_start& start) {
 /// wait until they tell its line.
 void grid::join(lane& l, const drv_frame_t& frame) {
     std::uint64_t counter = 0;
+    if (l.page < 0 && read_counter(l, frame, counter))
+        for (const lane& other : lanes_)
+            if (l.page < 0 && other.heard && one_message(l, other)) find_page(l, counter, other, other.counter);
     if (read_counter(l, frame, counter) && l.late.empty() && kin_of(l, counter, l.last)) {
         l.heard = true;
         l.counter = counter;
@@ -274,7 +281,7 @@ void grid::end_joining(lane& l) {
     for (const late_frame& frame : frames) {
         std::uint64_t counter = 0;
         if (read_counter(l, frame, counter)) {
-            const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+            const std::int64_t step = step_of(l, l.counter, counter);
             if (step < 0 || step > window_) continue;
             number += step;
             l.counter = counter;

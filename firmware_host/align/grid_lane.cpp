@@ -2,8 +2,6 @@
 // Where a lane stands on the grid once it has begun: counters unwrapped, jumps believed or not.
 #include "grid.hpp"
 
-#include "wrapped_step.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -45,7 +43,7 @@ void grid::move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool p
 }
 
 void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
-    const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+    const std::int64_t step = step_of(l, l.counter, counter);
     if (step <= 0 && (step >= -reorder_ || awaited(l, l.last + step))) { // again, or late
         doubt_suspect(l);
         insert(l, l.last + step, frame);
@@ -67,7 +65,7 @@ void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t cou
 void grid::recall_suspect(lane& l) {
     std::uint64_t counter = 0;
     if (!l.suspected || !read_counter(l, l.suspect, counter)) return;
-    const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+    const std::int64_t step = step_of(l, l.counter, counter);
     const drv_frame_t frame = l.suspect;
     decode(l, frame);
     if (std::abs(step) > reorder_ && (step > 0 || !awaited(l, l.last + step))) return;
@@ -91,11 +89,12 @@ bool grid::count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& s
     const double pause_ns = static_cast<double>(frame.time_ns - l.time_ns);
     if (step == 1 || (!l.loss && pause_ns < 1e9 * longest_pause_s) || pause_ns <= 0 || pause_ns > longest_silence_ns)
         return false;
-    const double range = std::ldexp(1.0, l.sequence->length), guess = pause_ns / period_ns_;
+    const double range = std::ldexp(1.0, l.sequence->length) / static_cast<double>(l.stride);
+    const double guess = pause_ns / period_ns_;
     const double rounds = std::max(0.0, std::round((guess - static_cast<double>(step)) / range));
     const double found = static_cast<double>(step) + rounds * range;
     if (found < 1 || std::abs(found - guess) > std::max(static_cast<double>(window_), 0.2 * guess)) return false;
-    step = static_cast<std::int64_t>(found);
+    step = std::llround(found);
     return true;
 }
 
@@ -105,13 +104,13 @@ void grid::judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter) 
     std::uint64_t before = 0;
     if (l.suspected) {
         read_counter(l, l.suspect, before);
-        const std::int64_t apart = wrapped_step(before, counter, l.sequence->length);
+        const std::int64_t apart = step_of(l, before, counter);
         if (apart == 0) {
             ++buses_[l.bus].duplicate;
             return;
         }
         const auto ahead = [&](std::uint64_t c) {
-            const std::int64_t step = wrapped_step(l.counter, c, l.sequence->length);
+            const std::int64_t step = step_of(l, l.counter, c);
             return step > 0 && step <= window_;
         };
         if (std::abs(apart) <= (ahead(before) && ahead(counter) ? window_ : reorder_)) {
@@ -134,7 +133,7 @@ void grid::judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter) 
 void grid::accept_jump(lane& l, const drv_frame_t& frame) {
     std::uint64_t counter = 0;
     read_counter(l, frame, counter);
-    const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+    const std::int64_t step = step_of(l, l.counter, counter);
     const std::int64_t index = step > 0 ? l.last + step : place_restart(l, frame, counter);
     l.counter = counter;
     decode(l, frame);
@@ -145,7 +144,7 @@ void grid::accept_jump(lane& l, const drv_frame_t& frame) {
 void grid::end_suspicion(lane& l) {
     std::uint64_t counter = 0;
     if (!l.suspected || !read_counter(l, l.suspect, counter)) return;
-    const std::int64_t step = wrapped_step(l.counter, counter, l.sequence->length);
+    const std::int64_t step = step_of(l, l.counter, counter);
     if (step <= 0 || step > window_) {
         drop_suspect(l);
         return;

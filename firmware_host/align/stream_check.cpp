@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fmt/format.h>
+#include <limits>
+#include <utility>
 
 namespace okid_host {
 namespace {
@@ -42,7 +44,13 @@ stream_check::stream_check(const live_config& config)
         };
         auto found = std::find_if(messages_.begin(), messages_.end(), same);
         if (found == messages_.end()) {
-            messages_.push_back({channel.bus, channel.frame, channel.selectors, channel.sequence, {}, 0, 0, 0, 0, {}});
+            message fresh;
+            fresh.bus = channel.bus;
+            fresh.frame = channel.frame;
+            fresh.selectors = channel.selectors;
+            fresh.sequence = channel.sequence;
+            if (!channel.selectors.empty()) fresh.stride = std::numeric_limits<std::uint64_t>::max();
+            messages_.push_back(std::move(fresh));
             found = messages_.end() - 1;
         }
         message_of_[c] = static_cast<std::size_t>(found - messages_.begin());
@@ -82,7 +90,12 @@ void stream_check::judge(message& one, const drv_frame_t& frame) {
     if (one.sequence && drv_signal_raw(&*one.sequence, frame.data, frame.len, &raw)) {
         const auto counter = static_cast<std::uint64_t>(raw);
         const std::uint64_t range = one.sequence->length < 64 ? (std::uint64_t{1} << one.sequence->length) - 1 : ~0ull;
-        one.counted += one.judged > 0 && ((counter - one.counter) & range) == 1;
+        const std::uint64_t step = (counter - one.counter) & range;
+        if (one.judged > 0 && step > 0 && step < one.stride) { // of a page: its counter may count the frames of all
+            one.stride = step;
+            one.counted = 0;
+        }
+        one.counted += one.judged > 0 && step == one.stride;
         one.counter = counter;
     }
     for (const std::size_t channel : one.channels) {
@@ -170,7 +183,11 @@ std::string stream_check::others(std::size_t bus) const {
 
 void stream_check::remark_counter(const message& one, remarks& out) const {
     const std::int64_t steps = one.judged - 1;
-    if (!one.sequence || steps < least_frames ||
+    const bool repeated =
+        one.selectors.empty() && std::any_of(messages_.begin(), messages_.end(), [&](const message& other) {
+            return !other.selectors.empty() && other.bus == one.bus && same_frames(other.frame, one.frame);
+        });
+    if (!one.sequence || repeated || steps < least_frames ||
         static_cast<double>(one.counted) >= counting * static_cast<double>(steps))
         return;
     const channel_config& channel = config_.channels[one.channels.front()];

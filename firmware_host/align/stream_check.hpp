@@ -45,9 +45,9 @@ class stream_check {
         std::vector<multiplexor> selectors;
         std::optional<drv_signal_t> sequence;
         std::vector<std::size_t> channels;
-        std::int64_t frames = 0, judged = 0, counted = 0; ///< received; of them looked at; whose counter rose by one
-        std::uint64_t counter = 0;
-        std::bitset<256> senders; ///< of a J1939 group
+        std::int64_t frames = 0, judged = 0, counted = 0; ///< received; of them looked at; whose counter rose by stride
+        std::uint64_t counter = 0, stride = 1;            ///< of a page the least step so far
+        std::bitset<256> senders;                         ///< of a J1939 group
     };
     struct code {
         std::int64_t last = 0, jumps = 0, middle = 0; ///< steps of more than half the range; codes in its middle half

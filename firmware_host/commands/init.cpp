@@ -36,7 +36,7 @@ struct init_arguments {
     int baud = 115200;
 };
 
-/// Frames of one identifier: how many, from when to when.
+/// Frames of one identifier and page: how many, from when to when.
 struct heard_frame {
     std::size_t count = 0;
     std::int64_t first_ns = 0, last_ns = 0;
@@ -47,10 +47,32 @@ struct heard_frame {
     }
 };
 
-using heard_frames = std::map<std::pair<std::uint32_t, bool>, heard_frame>;
+struct heard_message {
+    std::map<std::int64_t, heard_frame> pages; ///< by the value of the multiplexor, 0 where there is none
+    double rate_hz() const {
+        double out = 0;
+        for (const auto& [page, frames] : pages) out = std::max(out, frames.rate_hz());
+        return out;
+    }
+};
+
+using heard_frames = std::map<std::pair<std::uint32_t, bool>, heard_message>;
+
+/// The number that tells the pages of a message apart.
+std::int64_t page_of(const std::vector<dbc_message>& messages, const drv_frame_t& frame) {
+    const auto message = std::find_if(messages.begin(), messages.end(), [&](const dbc_message& each) {
+        return each.id == frame.id && each.extended == ((frame.flags & DRV_FRAME_EXTENDED) != 0);
+    });
+    std::int64_t page = 0;
+    if (message == messages.end()) return page;
+    for (const dbc_signal& signal : message->signals)
+        if (signal.multiplexor && signal.mux_values.empty())
+            (void)drv_signal_raw(&signal.layout, frame.data, frame.len, &page);
+    return page;
+}
 
 /// What comes on the interface for so many seconds, or stands in the log.
-heard_frames listen(const init_arguments& given) {
+heard_frames listen(const init_arguments& given, const std::vector<dbc_message>& messages) {
     heard_frames out;
     drv_source_t source{};
     drv_source_config_t config{};
@@ -67,7 +89,7 @@ heard_frames listen(const init_arguments& given) {
         if (count < 0) break;
         for (int i = 0; i < count; ++i) {
             const drv_frame_t& frame = frames[static_cast<std::size_t>(i)];
-            heard_frame& one = out[{frame.id, (frame.flags & DRV_FRAME_EXTENDED) != 0}];
+            heard_frame& one = out[{frame.id, (frame.flags & DRV_FRAME_EXTENDED) != 0}].pages[page_of(messages, frame)];
             if (one.count++ == 0) one.first_ns = frame.time_ns;
             one.last_ns = frame.time_ns;
         }
@@ -98,7 +120,8 @@ std::string quoted_toml(const std::string& text) {
 struct proposal {
     std::string channels, left_out;
     std::size_t forces = 0, responses = 0;
-    double rate_hz = 0; ///< of the fastest message with a response; 0 = not heard
+    double rate_hz = 0;    ///< of the fastest message with a response; 0 = not heard
+    bool flexible = false; ///< there is a message of CAN FD
 };
 
 void propose(const dbc_message& message, double rate_hz, std::set<std::string>& names, proposal& out) {
@@ -121,13 +144,16 @@ void propose(const dbc_message& message, double rate_hz, std::set<std::string>& 
         if (counter != message.signals.end())
             out.channels += fmt::format("sequence = {:<9} # counts samples\n", quoted_toml(counter->name));
         if (!force) out.rate_hz = std::max(out.rate_hz, rate_hz);
+        out.flexible = out.flexible || message.length > 8;
     }
 }
 
-proposal from_dbc(const init_arguments& given, const heard_frames& heard) {
+proposal from_dbc(const init_arguments& given, bool hears) {
     proposal out;
     std::set<std::string> names;
-    for (const dbc_message& message : read_dbc(given.dbc).messages) {
+    const std::vector<dbc_message> messages = read_dbc(given.dbc).messages;
+    const heard_frames heard = hears ? listen(given, messages) : heard_frames{};
+    for (const dbc_message& message : messages) {
         const auto found = heard.find({message.id, message.extended});
         if (!message.fault.empty() || (!heard.empty() && found == heard.end())) {
             out.left_out += fmt::format("# left out: message {} ({:#x}), {}\n", message.name, message.id,
@@ -167,7 +193,7 @@ proposal from_fields(const init_arguments& given) {
     return out;
 }
 
-std::string bus_section(const init_arguments& given) {
+std::string bus_section(const init_arguments& given, bool flexible) {
     if (!given.device.empty()) {
         const std::vector<std::string> names = split_names("--fields", given.fields);
         const auto count = std::find(names.begin(), names.end(), "count");
@@ -180,10 +206,12 @@ std::string bus_section(const init_arguments& given) {
                                : fmt::format("counter_field = {}\n", count - names.begin()));
     }
     const std::filesystem::path folder = std::filesystem::absolute(given.config).parent_path();
-    return fmt::format("[[bus]]\nname = \"can0\"\ntype = \"socketcan\"\ninterface = {}\n# bitrate = 1000000         # "
-                       "for the load figure: the bit rate of the bus\ndbc = {}\n",
-                       quoted_toml(given.interface),
-                       quoted_toml(std::filesystem::absolute(given.dbc).lexically_relative(folder).string()));
+    return fmt::format(
+        "[[bus]]\nname = \"can0\"\ntype = \"socketcan\"\ninterface = {}\n{}# bitrate = 1000000         # "
+        "for the load figure: the bit rate of the bus\n{}dbc = {}\n",
+        quoted_toml(given.interface), flexible ? "fd = true\n" : "",
+        flexible ? "# dbitrate = 5000000        # and that of the data of its FD frames\n" : "",
+        quoted_toml(std::filesystem::absolute(given.dbc).lexically_relative(folder).string()));
 }
 
 std::string text_of(const init_arguments& given, const proposal& found) {
@@ -194,7 +222,7 @@ std::string text_of(const init_arguments& given, const proposal& found) {
         "[acquisition]\nrate_hz = {:<10.10g} # {}\n# title = \"frame, first test\"\n\n",
         std::filesystem::path(given.config).filename().string(), rate,
         measured ? fmt::format("measured: {:.6g} frames a second", found.rate_hz) : "what the sensors sample with");
-    out += bus_section(given) + found.channels + (found.left_out.empty() ? "" : "\n" + found.left_out);
+    out += bus_section(given, found.flexible) + found.channels + (found.left_out.empty() ? "" : "\n" + found.left_out);
     out += "\n[identification]           # all of it may be left out\nupdate_s = 2.0\n";
     if (found.forces > 0)
         out += "# hold = \"foh\"            # the force is a load cell's; default: determined from the record\n"
@@ -220,8 +248,7 @@ void init(const init_arguments& given) {
     if (given.rate_hz == 0 && (!hears || given.dbc.empty()))
         throw failure(exit_usage, "no sample rate: expected --rate HZ, or with --dbc --listen SECONDS or --log FILE");
     check_writable(given.config);
-    const proposal found =
-        given.dbc.empty() ? from_fields(given) : from_dbc(given, hears ? listen(given) : heard_frames{});
+    const proposal found = given.dbc.empty() ? from_fields(given) : from_dbc(given, hears);
     if (given.rate_hz == 0 && !(found.rate_hz >= 1))
         throw failure(exit_usage, "the frames that were received give no sample rate; expected --rate HZ");
     const std::string text = text_of(given, found);

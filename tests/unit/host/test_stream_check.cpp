@@ -101,6 +101,29 @@ void test_losses_are_no_wrong_counter(void) {
     TEST_ASSERT_EQUAL_INT(0, check.doubts().size());
 }
 
+/// Three pages in turn, counted frame by frame or sample by sample, and what is on each of them.
+std::string doubts_of_pages(bool counts_frames, const drv_signal_t& counter) {
+    live_config config = make_config(counter, right_signal);
+    config.channels.push_back(config.channels.front());
+    config.channels.back().selectors = {{signal_at(32, 8, false), {{1, 1}}}};
+    stream_check check(config);
+    for (std::int64_t n = 0; n < 3 * frames; ++n) {
+        drv_frame_t frame = make_frame(0x101, counts_frames ? n : n / 3, 7919 * n % 2003);
+        frame.data[4] = static_cast<std::uint8_t>(n % 3);
+        check.add(frame);
+    }
+    std::string out;
+    for (const auto& [code, text] : check.doubts()) out += code + " ";
+    return out;
+}
+
+void test_pages(void) {
+    for (const bool counts_frames : {false, true}) {
+        TEST_ASSERT_EQUAL_STRING("", doubts_of_pages(counts_frames, right_counter).c_str());
+        TEST_ASSERT_EQUAL_STRING("counter_erratic ", doubts_of_pages(counts_frames, right_signal).c_str());
+    }
+}
+
 void test_too_few_frames_say_nothing(void) {
     const live_config config = make_config(signal_at(16, 16, false), right_signal);
     stream_check check(config);
@@ -174,6 +197,7 @@ int main(void) {
     RUN_TEST(test_misread_sign);
     RUN_TEST(test_misread_bits);
     RUN_TEST(test_losses_are_no_wrong_counter);
+    RUN_TEST(test_pages);
     RUN_TEST(test_too_few_frames_say_nothing);
     RUN_TEST(test_identifiers);
     RUN_TEST(test_many_identifiers);
