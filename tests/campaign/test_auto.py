@@ -102,7 +102,7 @@ def test_command(tmp_path: Path) -> None:
         done = subprocess.run(run, capture_output=True, text=True, timeout=1800)
         assert done.returncode == 0, done.stderr
         assert told in done.stdout
-    assert "frame: not watched: 2 training groups, 11 are needed" in done.stdout
+    assert "frame: not watched: 2 training groups, 10 are needed" in done.stdout
     page = (tmp_path / "out" / "report.html").read_text()
     assert "<tr><th>method</th><td>auto</td></tr>" in page
 
