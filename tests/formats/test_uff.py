@@ -145,7 +145,8 @@ def test_result_as_pyuff_sees_it(tmp_path: Path) -> None:
 def test_result_comes_back(tmp_path: Path) -> None:
     result = identified()
     tree = result.to_dict()
-    tree["modes"][1]["modal_mass"] = 2.5
+    for mode, mass in zip(tree["modes"], (None, 2.5, None), strict=True):
+        mode["modal_mass"] = mass
     write_uff(tmp_path / "r.uff", tree)
     found = read_uff(tmp_path / "r.uff")
     assert [seen["modal_m"] for seen in seen_by_pyuff(tmp_path / "r.uff", 55)] == [0.0, 2.5, 0.0]
