@@ -9,9 +9,9 @@ import subprocess
 from pathlib import Path
 
 from program import PROGRAM
+from wire_bits import FD_LENGTHS, classic, flexible
 
 BITRATE, DBITRATE, RATE = 1000, 4000, 1000.0
-FD_LENGTHS = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64]
 CONFIG = f"""
 [acquisition]
 rate_hz = {RATE}
@@ -41,43 +41,6 @@ update_s = 0.1
 """
 
 
-def stuff(bits: str, closing: bool) -> str:
-    """The bits as they stand on the wire; `closing`: a run that is full at the end is stuffed too."""
-    wire = ""
-    for at, bit in enumerate(bits):
-        wire += bit
-        if wire[-5:] in ("00000", "11111") and (closing or at + 1 < len(bits)):
-            wire += "1" if bit == "0" else "0"
-    return wire
-
-
-def crc15(bits: str) -> str:
-    value = int(bits + "0" * 15, 2)
-    for shift in range(len(bits) - 1, -1, -1):
-        if value >> (shift + 15) & 1:
-            value ^= 0xC599 << shift
-    return f"{value:015b}"
-
-
-def address(identifier: int, extended: bool) -> str:
-    """Start of frame and identifier, up to the bit before RTR or RRS."""
-    return f"0{identifier >> 18:011b}11{identifier & 0x3FFFF:018b}" if extended else f"0{identifier:011b}"
-
-
-def classic(identifier: int, extended: bool, data: bytes) -> float:
-    bits = address(identifier, extended) + "000" + f"{len(data):04b}" + "".join(f"{byte:08b}" for byte in data)
-    return (len(stuff(bits + crc15(bits), True)) + 13) / BITRATE
-
-
-def flexible(identifier: int, extended: bool, switched: bool, data: bytes) -> float:
-    head = address(identifier, extended) + ("010" if extended else "0010") + ("1" if switched else "0")
-    rest = "0" + f"{FD_LENGTHS.index(len(data)):04b}" + "".join(f"{byte:08b}" for byte in data)
-    slow = len(stuff(head, False))
-    check = 4 + (21 if len(data) > 16 else 17)
-    fast = len(stuff(head + rest, False)) - slow + check + (check + 3) // 4
-    return (slow + 13) / BITRATE + fast / (DBITRATE if switched else BITRATE)
-
-
 def test_load_counts_every_bit(tmp_path: Path) -> None:
     dice = random.Random(5)
     (tmp_path / "c.toml").write_text(CONFIG)
@@ -97,9 +60,9 @@ def test_load_counts_every_bit(tmp_path: Path) -> None:
                 mark = "#" if switched is None else f"##{int(switched)}"
                 lines.append(f"({1000 + n / RATE + k * 1e-5:.6f}) can0 {name}{mark}{payload.hex().upper()}")
                 if switched is None:
-                    seconds += classic(identifier, extended, payload)
+                    seconds += classic(identifier, extended, payload, BITRATE)
                 else:
-                    seconds += flexible(identifier, extended, switched, payload)
+                    seconds += flexible(identifier, extended, switched, payload, BITRATE, DBITRATE)
         (tmp_path / "l.log").write_text("\n".join(lines) + "\n")
         events = tmp_path / "e.jsonl"
         subprocess.run(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Frames onto CAN interfaces in batches, at absolute deadlines or as fast as they take them: numbered ones, or those of a
-// file for each interface (struct can_frame one behind the other).
-// usage: vcan_flood INTERFACE[,INTERFACE] COUNT FRAMES_PER_SECOND(0 = flat out) classic|fd|FILE[,FILE]
+// file for each interface (struct can_frame one behind the other, behind "fd:" struct canfd_frame).
+// usage: vcan_flood INTERFACE[,INTERFACE] COUNT FRAMES_PER_SECOND(0 = flat out) classic|fd|[fd:]FILE[,[fd:]FILE]
 // COUNT and FRAMES_PER_SECOND are those of one interface.
 #include <drv/pacer.h>
 
@@ -57,9 +57,10 @@ static int send_batch(int fd, struct mmsghdr* messages, unsigned count) {
 
 /// @return 0, or -1 when the interface or the file cannot be opened
 static int begin(stream_t* self, const char* interface, const char* kind) {
-    const int is_fd = strcmp(kind, "fd") == 0, numbered = is_fd || strcmp(kind, "classic") == 0;
+    const int is_fd = strcmp(kind, "fd") == 0 || strncmp(kind, "fd:", 3) == 0;
+    const int numbered = strcmp(kind, "fd") == 0 || strcmp(kind, "classic") == 0;
     self->fd = open_socket(interface);
-    self->recorded = numbered ? NULL : fopen(kind, "rb");
+    self->recorded = numbered ? NULL : fopen(strncmp(kind, "fd:", 3) == 0 ? kind + 3 : kind, "rb");
     for (int i = 0; i < BATCH; ++i) {
         self->frames[i].can_id = 0x123;
         self->frames[i].len = is_fd ? 64 : 8;
@@ -76,7 +77,7 @@ static int send_next(stream_t* self, long first, unsigned count) {
         const uint32_t number = (uint32_t)(first + i);
         if (!self->recorded)
             memcpy(self->frames[i].data, &number, sizeof number);
-        else if (fread(&self->frames[i], CAN_MTU, 1, self->recorded) != 1)
+        else if (fread(&self->frames[i], self->pieces[i].iov_len, 1, self->recorded) != 1)
             return -1;
     }
     return send_batch(self->fd, self->messages, count);

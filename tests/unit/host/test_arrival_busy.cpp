@@ -174,6 +174,42 @@ static void test_always_late() {
     TEST_ASSERT_TRUE(static_cast<double>(told) >= 0.99 * static_cast<double>(made));
 }
 
+/// A computer that is short of memory: the reader's pages are away for 20 ms to 2 s, every 2 s on average, and for 0.5 s behind
+/// that each read waits 1 to 30 ms for others of them. Nothing is missing.
+static void test_short_of_memory() {
+    std::int64_t wrong = 0, marked = 0;
+    const unsigned runs = std::max(120U, seeds()); // a rate is judged
+    for (unsigned seed = 1; seed <= runs; ++seed) {
+        std::mt19937 random(seed);
+        const double rate_hz = std::array<double, 4>{200, 500, 1000, 2000}[random() % 4];
+        const int burst = std::array<int, 3>{1, 8, 16}[random() % 3], samples = static_cast<int>(30 * rate_hz);
+        const auto due_s = [&](std::size_t n) { return (static_cast<int>(n) / burst + 1) * burst / rate_hz; };
+        std::exponential_distribution<double> calm_s(0.5);
+        double from_s = calm_s(random), to_s = from_s + 0.02, here_s = 0;
+        std::vector<double> arrivals;
+        while (arrivals.size() < static_cast<std::size_t>(samples)) {
+            here_s = std::max(here_s, due_s(arrivals.size()));
+            while (here_s > to_s + 0.5) {
+                from_s = to_s + calm_s(random);
+                to_s = from_s + 0.02 * std::pow(100, pick(random, 0, 1));
+            }
+            if (here_s >= from_s) here_s = std::max(here_s, to_s) + pick(random, 1e-3, 0.03);
+            here_s += pick(random, 0, 2e-4);
+            do arrivals.push_back(here_s);
+            while (due_s(arrivals.size()) <= here_s);
+        }
+        rows out(1);
+        play(
+            rate_hz, 0, samples, [&](double t) { return arrivals[static_cast<std::size_t>(std::lround(t * rate_hz))]; },
+            {}, out);
+        wrong += out.marked > 0;
+        marked += out.marked;
+    }
+    std::printf("short of memory: %lld of %u with a false gap, %lld samples\n", static_cast<long long>(wrong), runs,
+                static_cast<long long>(marked));
+    TEST_ASSERT_TRUE(static_cast<double>(wrong) <= 0.01 * runs);
+}
+
 /// Lines that fail their check sum, anywhere in bursts and across their borders: as the bus tells of them with the next line
 /// that is whole, their places are known to the sample.
 static void test_damage_across_bursts() {
@@ -211,6 +247,7 @@ int main(void) {
     RUN_TEST(test_busy_for_a_while);
     RUN_TEST(test_falls_behind);
     RUN_TEST(test_always_late);
+    RUN_TEST(test_short_of_memory);
     RUN_TEST(test_damage_across_bursts);
     return UNITY_END();
 }
