@@ -73,9 +73,11 @@ void frame_maker::put_into_pages() {
         }
         return out;
     };
+    std::vector<bool> spare;
+    for (const message& each : messages_) spare.push_back(filled(each));
     std::vector<message> kept;
-    for (const message& each : messages_)
-        if (!filled(each)) kept.push_back(each);
+    for (std::size_t k = 0; k < messages_.size(); ++k)
+        if (!spare[k]) kept.push_back(std::move(messages_[k]));
     messages_ = std::move(kept);
 }
 
