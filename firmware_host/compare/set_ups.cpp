@@ -9,9 +9,9 @@
 #include "files/nearest_name.hpp"
 #include "files/order_statistics.hpp"
 #include "merge.hpp"
-#include "result/drive_mass.hpp"
 #include "record/modal_model.hpp"
 #include "record/record_check.hpp"
+#include "result/drive_mass.hpp"
 #include "result/hold.hpp"
 #include "result/method.hpp"
 

@@ -89,7 +89,7 @@ def finished_figures(browser: Any, gigabytes: float, folder: Path) -> dict[str, 
     result = okid.identify(u, y, fs=1000.0, method="okid-era", input_names=["u"], output_names=["a1", "a2", "a3"])
     (folder / "r.json").write_text(json.dumps(result.to_dict()))
     data = np.resize(piece, (rows, channels)) + 1e-3 * rng.standard_normal((rows, 1))
-    write_record(okid.Record(["u", "a1", "a2", "a3"], data, 1000.0), folder / "r.h5")
+    write_record(folder / "r.h5", okid.Record(["u", "a1", "a2", "a3"], data, 1000.0))
     del data
     begin = time.monotonic()
     live = Live(folder / "r.json", "--record", folder / "r.h5")

@@ -56,7 +56,7 @@ def test_masses_without_noise(hold: str, sensing: str, force: int, dofs: list[in
 
 @pytest.mark.parametrize("method", ["okid-era", "n4sid-cva", "auto"])
 def test_deviations_hold_the_truth(method: str) -> None:
-    """Of 12 records with 2 % noise: errors are as large as their deviations, of the default a little smaller at most."""
+    """Of 12 records with 2 % noise: errors are as large as their deviations, of the default a little smaller."""
     masses, pulls = truth()[1], []
     for seed in range(12):
         u, y = demo_record(6000, seed=seed, noise_percent=2.0)
