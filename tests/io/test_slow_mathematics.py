@@ -23,7 +23,8 @@ import numpy as np
 import program
 import pytest
 from lines import Line, Run, line, node_config, of_type, packet
-from live_feed import w2_codes, watching
+from live_feed import watching
+from systems import w2_codes
 from test_torn_away import busy_processors
 
 pytestmark = pytest.mark.realtime

@@ -9,8 +9,8 @@ from pathlib import Path
 import can
 import cantools
 import numpy as np
-from live_feed import w2_codes
 from numpy.typing import NDArray
+from systems import w2_codes
 
 NAMES = ["f1", "f2", "a1", "a2", "a3", "a4", "a5", "a6", "Temperature"]
 ID, PAGES, BITRATE, DBITRATE = 0x1CF0A05, 3, 1_000_000, 8_000_000

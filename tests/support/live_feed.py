@@ -13,22 +13,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from systems import record, w2
 from waiting import until
 
 UPDATE_S = 0.5
-
-
-def w2_codes(samples: int) -> NDArray[np.int16]:
-    """(samples, 8): two forces and six accelerations with 1 % noise, int16 at a quarter of full scale (peak)."""
-    u, y = record(w2(), samples, 1.0, seed=11)
-    data = np.hstack([u, y])
-    return np.asarray(np.round(8000 * data / np.abs(data).max(axis=0)), np.int16)
-
-
-def w2_frequencies(rate_hz: float) -> NDArray[np.float64]:
-    """Of the same numbers when they are played at another rate."""
-    return w2().modes()[0] * rate_hz / w2().fs
 
 
 class Watch:

@@ -130,3 +130,15 @@ def record(s: Structure, samples: int, noise_percent: float, seed: int, x0: Arra
     y = simulate(s.discrete(), u, x0)
     sigma = noise_percent / 100.0 * np.sqrt(np.mean(y**2, axis=0))
     return u, y + sigma * rng.standard_normal(y.shape)
+
+
+def w2_codes(samples: int) -> NDArray[np.int16]:
+    """(samples, 8): two forces and six accelerations with 1 % noise, int16 at a quarter of full scale (peak)."""
+    u, y = record(w2(), samples, 1.0, seed=11)
+    data = np.hstack([u, y])
+    return np.asarray(np.round(8000 * data / np.abs(data).max(axis=0)), np.int16)
+
+
+def w2_frequencies(rate_hz: float) -> NDArray[np.float64]:
+    """Of the same numbers when they are played at another rate."""
+    return w2().modes()[0] * rate_hz / w2().fs

@@ -14,9 +14,9 @@ import fd_sensor
 import numpy as np
 import pytest
 from can_run import OKID, Run, bus, sh
-from live_feed import w2_frequencies
 from numpy.typing import NDArray
 from okid import capture
+from systems import w2_frequencies
 from test_vcan import interface  # noqa: F401  (a fixture)
 from waiting import until
 from wire_bits import flexible

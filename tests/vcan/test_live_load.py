@@ -23,8 +23,9 @@ import journal
 import numpy as np
 import pytest
 from lines import Line, packet
-from live_feed import UPDATE_S, latencies_ms, summary, w2_codes, w2_frequencies, watching
+from live_feed import UPDATE_S, latencies_ms, summary, watching
 from numpy.typing import NDArray
+from systems import w2_codes, w2_frequencies
 from test_vcan import OKID, Run, interface, sh  # noqa: F401  (interface is a fixture)
 from waiting import until
 
