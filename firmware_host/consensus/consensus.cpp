@@ -363,17 +363,6 @@ void judge_agreement(consensus_mode& mode) {
     if (mode.agreement < one_half) mode.why.emplace_back("noise_shape");
 }
 
-double shape_mac(const std::vector<std::complex<double>>& a, const std::vector<std::complex<double>>& b) {
-    std::complex<double> dot = 0;
-    double aa = 0, bb = 0;
-    for (std::size_t i = 0; i < a.size() && i < b.size(); ++i) {
-        dot += std::conj(a[i]) * b[i];
-        aa += std::norm(a[i]);
-        bb += std::norm(b[i]);
-    }
-    return aa * bb > 0 ? std::norm(dot) / (aa * bb) : 0;
-}
-
 std::vector<int> consensus_orders(int most) {
     std::vector<int> out;
     for (int n = 4; n <= most; n += n < 24 ? 2 : 4) out.push_back(n);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Modes that several methods, horizons, rates and orders agree on: the numerics behind `--method auto`.
 #pragma once
+#include "result/shape_mac.hpp"
 #include "zoom.hpp"
 
 #include <okid/identify.h>
@@ -91,8 +92,5 @@ std::vector<consensus_mode> find_agreement(std::vector<consensus_run>& runs, std
 /// The rule that makes a mode confident, of records, set-ups and responses alike: half of the runs that could see it, three at
 /// least, and an agreement of one half. Sets .agreement and the codes few_runs and noise_shape.
 void judge_agreement(consensus_mode& mode);
-
-/// |a^H b|^2 / (a^H a)(b^H b).
-double shape_mac(const std::vector<std::complex<double>>& a, const std::vector<std::complex<double>>& b);
 
 } // namespace okid_host

@@ -149,7 +149,7 @@ void find_matrices(const record_options& options, record_work& work) {
     if (!options.mass.wanted()) return;
     mass_plan plan = options.mass;
     plan.hold = "band";
-    work.context.modal_masses = modal_masses_of(work.model, plan, plan.hold);
+    work.context.modal_masses = modal_masses_of(work.model, plan);
     work.context.mass = find_mass_matrices(work.model, plan, work.context.warnings);
 }
 

@@ -196,7 +196,7 @@ void stream::remark_fit(result_context& about) {
 
 void stream::add_mass(result_context& about) const {
     if (!config_.mass.wanted() || identifier_.agreed()) return;
-    about.modal_masses = modal_masses_of(model(), config_.mass, config_.mass.hold);
+    about.modal_masses = modal_masses_of(model(), config_.mass);
     try {
         about.mass = find_mass_matrices(model(), config_.mass, about.warnings);
     } catch (const failure& why) {

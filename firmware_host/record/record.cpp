@@ -167,7 +167,7 @@ void find_matrices(const std::vector<replicate_model>& replicates, const record_
     mass_plan plan = options.mass;
     if (plan.hold == "auto") plan.hold = work.context.hold = told_hold(work.set, structure, plan);
     work.context.mass = find_mass_matrices(structure, plan, said);
-    modal_mass_statistics masses(plan, plan.hold, structure.dt);
+    modal_mass_statistics masses(plan, structure.dt);
     masses.begin(structure);
     for (const replicate_model& replicate : replicates)
         if (replicate.found()) masses.add(replicate.view(), replicate.share);

@@ -52,7 +52,7 @@ void find_matrices_agreed(const record_options& options, record_work& work) {
     if (options.hold == "auto" && work.set.n_u == 0) work.context.hold = "zoh";
     plan.hold = work.context.hold;
     if (!options.mass.wanted()) return;
-    work.context.modal_masses = modal_masses_of(work.model, plan, plan.hold);
+    work.context.modal_masses = modal_masses_of(work.model, plan);
     try {
         work.context.mass = find_mass_matrices(work.model, plan, said);
     } catch (const failure& why) {
@@ -68,16 +68,17 @@ void find_matrix_deviations(const std::vector<listed_mode>& listed, const record
     for (const auto& shifts : work.shifts) blocks = std::max(blocks, shifts.size());
     if (!options.mass.wanted() || blocks < std::size_t{fewest_blocks} || work.force_is_older) return;
     mass_plan plan = options.mass;
-    const bool band = work.context.hold == "band";
-    plan.hold = band ? "zoh" : work.context.hold;
+    plan.hold = work.context.hold;
+    modal_mass_statistics masses(plan, work.model.dt);
+    masses.begin(work.model);
+    const bool band = plan.hold == "band";
+    if (band) plan.hold = "zoh";
     std::vector<int> sensing;
     for (const mass_channel& channel : plan.outputs) sensing.push_back(channel.sensing);
     const auto as_taken = [&](const okid_identified_t& model, held_model& held) {
         return model_view(band && as_if_held(model, sensing, held) ? held.view : model);
     };
     replicate_statistics statistics(work.model.n_u, work.model.n_y, work.model.n_z, plan, work.model.dt);
-    modal_mass_statistics masses(plan, work.context.hold, work.model.dt);
-    masses.begin(work.model);
     held_model held;
     statistics.begin(as_taken(work.model, held));
     record_work part;

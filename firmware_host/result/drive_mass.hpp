@@ -31,6 +31,8 @@ struct drive_mass {
         sum += std::conj(psi * psi) * r;
         power += std::norm(psi * psi);
     }
+    /// Its angle is that of the residues to those of a normal mode; not finite: no drive point.
+    std::complex<double> complex_kg() const { return power / sum; }
     /// NaN: no drive point, or they contradict each other.
     double kg() const {
         const double mass = power / sum.real();

@@ -7,6 +7,7 @@
 
 #include "drive_mass.hpp"
 #include "json_number.hpp"
+#include "shape_mac.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -20,17 +21,6 @@ constexpr double farthest = 0.1, least_mac = 0.5; // of a mode from the one it i
 constexpr double least_share = 0.75;              // of the information in the replicates that had the mode
 constexpr std::size_t fewest = 3;
 
-double mac(const std::vector<complex>& a, const std::vector<complex>& b) {
-    complex both = 0;
-    double own = 0, other = 0;
-    for (std::size_t o = 0; o < a.size(); ++o) {
-        both += std::conj(a[o]) * b[o];
-        own += std::norm(a[o]);
-        other += std::norm(b[o]);
-    }
-    return std::norm(both) / (own * other);
-}
-
 std::size_t largest(const std::vector<complex>& shape) {
     return static_cast<std::size_t>(
         std::max_element(shape.begin(), shape.end(), [](complex a, complex b) { return std::norm(a) < std::norm(b); }) -
@@ -39,8 +29,7 @@ std::size_t largest(const std::vector<complex>& shape) {
 
 } // namespace
 
-modal_mass_statistics::modal_mass_statistics(const mass_plan& plan, std::string hold, double dt)
-    : plan_(plan), hold_(std::move(hold)), dt_(dt) {
+modal_mass_statistics::modal_mass_statistics(const mass_plan& plan, double dt) : plan_(plan), dt_(dt) {
     for (std::size_t o = 0; o < plan.outputs.size(); ++o)
         for (std::size_t i = 0; i < plan.inputs.size(); ++i)
             if (plan.outputs[o].dof > 0 && plan.outputs[o].dof == plan.inputs[i].dof)
@@ -62,7 +51,7 @@ std::vector<modal_mass_statistics::driven_mode> modal_mass_statistics::modes_in(
         if (!(mu.imag() > 0)) continue;
         driven_mode& mode = out.emplace_back();
         mode.pole = std::log(mu) / dt_;
-        const complex turn = drive_factor(mode.pole, dt_, hold_);
+        const complex turn = drive_factor(mode.pole, dt_, plan_.hold);
         for (Eigen::Index o = 0; o < seen.rows(); ++o) {
             const mass_channel& one = plan_.outputs[static_cast<std::size_t>(o)];
             mode.shape.push_back(one.si * seen(o, k) * to_displacement(mode.pole, one.sensing));
@@ -74,16 +63,13 @@ std::vector<modal_mass_statistics::driven_mode> modal_mass_statistics::modes_in(
 }
 
 modal_mass modal_mass_statistics::mass_of(const driven_mode& mode, std::size_t top) const {
-    complex sum = 0;
-    double power = 0;
-    for (const drive_point& point : points_) {
-        const complex psi = mode.shape[point.output] / mode.shape[top];
-        sum += std::conj(psi * psi) * point.sign * mode.shape[point.output] * mode.force[point.input];
-        power += std::norm(psi * psi);
-    }
+    drive_mass found;
+    for (const drive_point& point : points_)
+        found.add(mode.shape[point.output] / mode.shape[top],
+                  point.sign * mode.shape[point.output] * mode.force[point.input]);
     modal_mass out;
-    const complex mass = power / sum;
-    if (!std::isfinite(mass.real()) || !std::isfinite(mass.imag()) || !(power > 0)) return out;
+    const complex mass = found.complex_kg();
+    if (!std::isfinite(mass.real()) || !std::isfinite(mass.imag()) || !(found.power > 0)) return out;
     out.kg = mass.real();
     out.stiffness = out.kg * std::norm(mode.pole);
     out.damping = -2 * mode.pole.real() * out.kg;
@@ -114,7 +100,7 @@ void modal_mass_statistics::add(const okid_model_t& replicate, double share) {
         double least = HUGE_VAL;
         for (const driven_mode& other : found) {
             if (own.shape.empty() || !(std::abs(other.pole - own.pole) < farthest * std::abs(own.pole))) continue;
-            const double alike = mac(own.shape, other.shape);
+            const double alike = shape_mac(own.shape, other.shape);
             const double apart = std::abs(other.pole - own.pole) / std::abs(own.pole) + 1 - alike;
             if (alike >= least_mac && apart < least) least = apart, best = &other;
         }
@@ -151,9 +137,8 @@ std::vector<modal_mass> modal_mass_statistics::finish() const {
     return out;
 }
 
-std::vector<modal_mass> modal_masses_of(const okid_identified_t& model, const mass_plan& plan,
-                                        const std::string& hold) {
-    modal_mass_statistics masses(plan, hold, model.dt);
+std::vector<modal_mass> modal_masses_of(const okid_identified_t& model, const mass_plan& plan) {
+    modal_mass_statistics masses(plan, model.dt);
     masses.begin(model);
     return masses.finish();
 }

@@ -7,7 +7,6 @@
 
 #include <complex>
 #include <nlohmann/json.hpp>
-#include <string>
 #include <vector>
 
 namespace okid_host {
@@ -22,8 +21,7 @@ struct modal_mass {
 /// Collects the masses of one model and of the same without one block each (the jackknife of okid/uncertainty.h).
 class modal_mass_statistics {
   public:
-    /// @param plan  degrees of freedom, kinds of sensors, units. @param hold  zoh, foh or band
-    modal_mass_statistics(const mass_plan& plan, std::string hold, double dt);
+    modal_mass_statistics(const mass_plan& plan, double dt);
 
     /// Is there a drive point?
     bool wanted() const { return !points_.empty(); }
@@ -52,7 +50,6 @@ class modal_mass_statistics {
     modal_mass mass_of(const driven_mode& mode, std::size_t top) const;
 
     mass_plan plan_;
-    std::string hold_;
     double dt_;
     std::vector<drive_point> points_;
     std::vector<driven_mode> full_;                 ///< of each mode of the full model; no shape: not found
@@ -60,7 +57,7 @@ class modal_mass_statistics {
 };
 
 /// Those of one model, without deviations.
-std::vector<modal_mass> modal_masses_of(const okid_identified_t& model, const mass_plan& plan, const std::string& hold);
+std::vector<modal_mass> modal_masses_of(const okid_identified_t& model, const mass_plan& plan);
 
 /// What an entry of "modes" has of it.
 void put_modal_mass_json(const modal_mass& found, nlohmann::ordered_json& to);

@@ -18,7 +18,7 @@ import beam
 import numpy as np
 import pytest
 from event_source import Listener, ask
-from live_process import Live
+from live_process import Live, post
 from okid.data.records import read_csv
 from okid.formats.geometry_file import read_geometry
 from okid.live import desk as desks
@@ -41,16 +41,6 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     columns = ("--inputs", "force1", "--outputs", "acc1,acc2", "--p", "20")
     okid("identify", folder / "t.csv", *columns, "--json", folder / "r.json", status=0)
     return folder
-
-
-def post(live: Live, path: str, content: Any, token: str | None = None, **headers: str) -> tuple[int, bytes]:
-    link = http.client.HTTPConnection("127.0.0.1", live.port, timeout=1800)
-    body = content if isinstance(content, bytes) else json.dumps(content).encode()
-    link.request("POST", path, body, {"X-Okid-Token": live.token if token is None else token, **headers})
-    reply = link.getresponse()
-    data = reply.read()
-    link.close()
-    return reply.status, data
 
 
 def until_over(live: Live) -> dict[str, Any]:

@@ -6,7 +6,6 @@ The line is fed as fast as it is read: samples are counted by their numbers, not
 
 from __future__ import annotations
 
-import http.client
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import pytest
 from event_source import Listener
 from lines import Line, line
-from live_process import Live
+from live_process import Live, post
 from two_masses import rig_text, simulate_rig
 
 
@@ -28,12 +27,8 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
 
 
 def wish(live: Live, where: str, /, **content: object) -> tuple[int, Any]:
-    link = http.client.HTTPConnection("127.0.0.1", live.port, timeout=1800)
-    link.request("POST", where, json.dumps(content), {"X-Okid-Token": live.token})
-    reply = link.getresponse()
-    data = reply.read()
-    link.close()
-    return reply.status, json.loads(data) if reply.status == 200 else data.decode()
+    status, data = post(live, where, content)
+    return status, json.loads(data) if status == 200 else data.decode()
 
 
 def until(live: Live, wanted: Callable[[str, Any], bool]) -> Any:

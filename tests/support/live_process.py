@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import http.client
+import json
 import signal
 import subprocess
 import sys
+from typing import Any
 
 
 class Live:
@@ -28,3 +31,14 @@ class Live:
         self.process.send_signal(how)
         errors = self.process.communicate(timeout=1800)[1]
         return self.process.returncode, errors
+
+
+def post(live: Live, path: str, content: Any, token: str | None = None, **headers: str) -> tuple[int, bytes]:
+    """Status and body of what a page asks for: JSON, or bytes of a file."""
+    link = http.client.HTTPConnection("127.0.0.1", live.port, timeout=1800)
+    body = content if isinstance(content, bytes) else json.dumps(content).encode()
+    link.request("POST", path, body, {"X-Okid-Token": live.token if token is None else token, **headers})
+    reply = link.getresponse()
+    data = reply.read()
+    link.close()
+    return reply.status, data

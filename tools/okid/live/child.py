@@ -33,7 +33,7 @@ class Child:
         self.stopped = False
 
     def run(
-        self, command: Sequence[str], on_stage: Callable[[str], None],
+        self, command: Sequence[str], on_stage: Callable[[str], None] = lambda _text: None,
         on_line: Callable[[str], None] | None = None,
     ) -> None:  # fmt: skip
         """Run to the end. `on_stage(text)`: what the program does now and how long it goes on; `on_line(text)`: every

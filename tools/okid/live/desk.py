@@ -193,7 +193,7 @@ class Desk:
             if files.result is None:
                 result.write_text(json.dumps(raw), encoding="utf-8")
             command = [sys.executable, "-P", "-m", "okid.report", str(result), *files.options(), "--out", str(page)]
-            self._reporter.run(command, lambda _stage: None)
+            self._reporter.run(command)
             return page.read_bytes()
         finally:
             self._reporting.release()
@@ -270,8 +270,7 @@ class Desk:
         if not name.endswith(".toml"):
             raise InputError(f"the config file is {name!r}, expected a new name that ends with .toml")
         config = Path(name).expanduser().absolute()
-        child = Child()
-        child.run([needed_program(), "init", str(config), *options], lambda _stage: None)
+        Child().run([needed_program(), "init", str(config), *options])
         self._proposed.add(config)
         return {"path": str(config), "toml": config.read_text(encoding="utf-8"),
                 "command": shlex.join(["okid", "init", str(config), *options])}  # fmt: skip

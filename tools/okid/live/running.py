@@ -43,7 +43,7 @@ class Running(Worker):
         self._feed.start()
         try:
             command = [needed_program(), "run", str(self._config), "--quiet", f"--json={self._result}"]
-            self.child.run(command, lambda _stage: None)
+            self.child.run(command)
             self._gone.wait(LAST_LINES_S)
         finally:
             self._feed.stop()
