@@ -21,7 +21,7 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-CHANNELS, OUTPUTS, PAYLOAD = 4, 3, 480
+CHANNELS, PAYLOAD = 4, 480
 RESET, IDENTIFY, STATE, COUNTS = 0xC0, 0xC1, 0xC2, 0xC3
 REPORT_MODES, REPORT_STATE, REPORT_COUNTS = 0x81, 0x82, 0x83
 COUNT_NAMES = (
@@ -81,16 +81,18 @@ class Modes:
     mpc: NDArray[np.float64]
     emac: NDArray[np.float64]
     shape: NDArray[np.complex128]
+    frequency_std_hz: NDArray[np.float64] | None = None
+    damping_ratio_std: NDArray[np.float64] | None = None
 
 
-def modes_of(report: bytes) -> Modes:
+def modes_of(report: bytes, outputs: int = 3) -> Modes:
     """Take a report of modes apart."""
     status, stage, count = struct.unpack_from("<3i", report)
     numbers = np.frombuffer(report[12:], dtype="<f8")
-    table = numbers[12:].reshape(count, 4 + 2 * OUTPUTS)
-    shape = table[:, 4 : 4 + OUTPUTS] + 1j * table[:, 4 + OUTPUTS :]
-    f, zeta, mpc, emac = table[:, :4].T
-    return Modes(status, stage, numbers[0], numbers[1], numbers[2:12], f, zeta, mpc, emac, shape)
+    table = numbers[12:].reshape(count, 6 + 2 * outputs)
+    shape = table[:, 6 : 6 + outputs] + 1j * table[:, 6 + outputs :]
+    f, zeta, f_std, zeta_std, mpc, emac = table[:, :6].T
+    return Modes(status, stage, numbers[0], numbers[1], numbers[2:12], f, zeta, mpc, emac, shape, f_std, zeta_std)
 
 
 class Node:
@@ -166,9 +168,9 @@ class Node:
         """The node's accumulator as okid_accumulator_serialise() writes it."""
         return self.ask(STATE, REPORT_STATE)
 
-    def modes(self) -> Modes:
+    def modes(self, outputs: int = 3) -> Modes:
         """Let the node identify."""
-        return modes_of(self.ask(IDENTIFY, REPORT_MODES))
+        return modes_of(self.ask(IDENTIFY, REPORT_MODES), outputs)
 
     def counts(self) -> dict[str, int]:
         """What it has counted and measured since it started."""

@@ -18,7 +18,7 @@ import stack_depth  # noqa: E402
 
 CLOCK_HZ, CYCLES_PER_INSTRUCTION = 168e6, 1.5
 SMALL_STACK = 500
-IMAGES = ("m4-double-p20", "m4-double-p10", "m4-float-p20", "m7-double-p20")
+IMAGES = ("m4-double-p20", "m4-double-p10", "m4-float-p20", "m7-double-p20", "m4-float-pm10", "m7-double-pm10")
 KERNELS = {
     "accumulator": (
         "absorb",
@@ -78,6 +78,7 @@ def print_images(folder: Path) -> None:
             )
         rows.append(image_row(name, json.loads(path.read_text())))
     print("\nThe node, W1 (1 input, 3 outputs, 10,000 samples of 16 bits), bytes. Stack: deepest seen in QEMU;")
+    print("pm10: 2 inputs, 2 outputs, 4 modes with deviations; off NumPy in the place of the host.")
     print("instructions a sample: summing + packet; kHz without and with packets, and seconds of one identification:")
     print(f"at {CLOCK_HZ / 1e6:.0f} MHz with {CYCLES_PER_INSTRUCTION} cycles an instruction.\n")
     print_table(HEAD, rows)

@@ -110,7 +110,7 @@ def test_correlation_sums_are_those_of_the_host_to_the_last_bit(folder: str, mac
         assert node.state() == host
         counts = node.counts()
     assert counts["missing"] == 100
-    size = sections(image)
+    size = sections(image.path)
     assert size["data"] + size["bss"] + counts["stack_used"] <= 80 * 1024
     (BUILD / f"{image.name}.json").write_text(json.dumps({**counts, **size, "machine": machine}))
 
@@ -120,23 +120,23 @@ def keep_measurements(node: Node, image: Image, modes: Modes, expected: Modes) -
     counts = node.counts()
     f = np.abs(modes.frequency_hz / expected.frequency_hz - 1).max()
     zeta = np.abs(modes.damping_ratio / expected.damping_ratio - 1).max()
-    counted = {**counts, **sections(image), "f_error": f, "zeta_error": zeta, "machine": image.machine}
+    counted = {**counts, **sections(image.path), "f_error": f, "zeta_error": zeta, "machine": image.machine}
     (BUILD / f"{image.name}.json").write_text(json.dumps(counted))
     assert counts["samples"] == SAMPLES
     assert counts["damaged"] == 0
     assert counts["stack_used"] < counts["stack_room"], "the stack has been at its end"
 
 
-def sections(image: Image) -> dict[str, int]:
-    """Bytes of .text, .data, .bss (without the stack's room) by arm-none-eabi-size."""
-    text = subprocess.run(["arm-none-eabi-size", "-A", str(image.path)], capture_output=True, text=True, check=True)
+def sections(path: Path) -> dict[str, int]:
+    """Bytes of .text, .data, .bss (without the stack's room) of an image, by arm-none-eabi-size."""
+    text = subprocess.run(["arm-none-eabi-size", "-A", str(path)], capture_output=True, text=True, check=True)
     lines = (line.split() for line in text.stdout.splitlines() if line.startswith("."))
     sizes = {words[0]: int(words[1]) for words in lines}
     return {"text": sizes[".text"] + sizes.get(".ARM.exidx", 0), "data": sizes[".data"], "bss": sizes[".bss"]}
 
 
 def test_flash_and_ram_stay_within_what_is_promised(node: Node, image: Image) -> None:
-    size, stack = sections(image), node.counts()["stack_used"]
+    size, stack = sections(image.path), node.counts()["stack_used"]
     assert size["text"] + size["data"] <= FLASH
     assert size["data"] + size["bss"] + stack <= RAM[image.p]
 

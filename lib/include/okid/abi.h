@@ -47,6 +47,7 @@
 #define okid_observer_solve_factor OKID_LINKED(okid_observer_solve_factor)
 #define okid_pdc_damping OKID_LINKED(okid_pdc_damping)
 #define okid_pdc_fit OKID_LINKED(okid_pdc_fit)
+#define okid_structured_leave_out OKID_LINKED(okid_structured_leave_out)
 #define okid_structured_solve OKID_LINKED(okid_structured_solve)
 #define okid_subspace_output_error OKID_LINKED(okid_subspace_output_error)
 /// @endcond

@@ -205,6 +205,33 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, 
     return OKID_OK;
 }
 
+okid_status_t okid_era_realize_near(okid_era_t* self, int32_t order, const okid_real_t* markov, okid_real_t* A,
+                                    okid_real_t* C) {
+    if (self == nullptr || markov == nullptr || A == nullptr || C == nullptr) return OKID_ERR_NULL;
+    okid_era& e = *self;
+    if (correlated(e) || order < 1 || order > largest_order(e) || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
+    const auto fill_core = [&](int shift, okid_real_t* out) { // Sigma^(-1/2) U^T H V Sigma^(-1/2), H V stays in product
+        fill(e, markov, shift);
+        okid::linalg::multiply(false, true, e.height, order, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0,
+                               e.product, e.height);
+        okid::linalg::multiply(true, false, order, order, e.height, 1, e.left, e.height, e.product, e.height, 0, out,
+                               order);
+        for (int j = 0; j < order; ++j)
+            for (int i = 0; i < order; ++i) out[j * order + i] /= std::sqrt(e.values[i] * e.values[j]);
+    };
+    fill_core(1, A);
+    okid_real_t* now = e.hankel; // of H(0): 1 and its change
+    fill_core(0, now);
+    for (int j = 0; j < order; ++j) { // A less the change times A
+        okid_real_t* column = A + static_cast<size_t>(j * order);
+        okid::linalg::multiply(false, false, order, 1, order, 1, now, order, column, order, 0, e.rotated, order);
+        for (int i = 0; i < order; ++i) column[i] += column[i] - e.rotated[i];
+        for (int o = 0; o < e.config.n_y; ++o)
+            C[j * e.config.n_y + o] = e.product[okid::at(o, j, e.height)] / std::sqrt(e.values[j]);
+    }
+    return OKID_OK;
+}
+
 okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_modes_t* modes, okid_real_t* emac) {
     if (self == nullptr || modes == nullptr || modes->mu_re == nullptr || modes->mu_im == nullptr ||
         modes->psi_re == nullptr || modes->psi_im == nullptr || emac == nullptr)

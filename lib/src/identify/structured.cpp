@@ -14,6 +14,7 @@
 #include <okid/steps/observer.h>
 
 #include "identify/companion.hpp"
+#include "identify/rotations.hpp"
 #include "identify/stabilise.hpp"
 #include "linalg/arena.hpp"
 #include "linalg/linalg.hpp"
@@ -65,45 +66,6 @@ double short_number(double x) {
     int exponent = 0;
     const double fraction = std::frexp(x, &exponent);
     return std::ldexp(std::round(fraction * 65536), exponent - 16);
-}
-
-/// Householder reflection of `count` columns (each `size` long, one after the other) that leaves entry `row` in the first
-/// only. Plain loops over strips: the columns are few and long, and both backends give the same bits.
-void reflect(double* columns, int count, int size, int row, double* vector) {
-    constexpr int strip = 64;
-    double sum[strip], rest = 0;
-    auto column = [&](int j) { return columns + static_cast<size_t>(j) * static_cast<size_t>(size); };
-    for (int j = 0; j < count; ++j) vector[j] = column(j)[row];
-    for (int j = 1; j < count; ++j) rest += vector[j] * vector[j];
-    if (!(rest > 0)) return;
-    const double length = std::sqrt(vector[0] * vector[0] + rest), left = -std::copysign(length, vector[0]);
-    const double factor = 1 / (length * (length + std::abs(vector[0])));
-    vector[0] -= left;
-    for (int from = 0; from < size; from += strip) {
-        const int width = std::min(strip, size - from);
-        std::fill(sum, sum + strip, 0.0);
-        for (int j = 0; j < count; ++j)
-            for (int i = 0; i < width; ++i) sum[i] += vector[j] * column(j)[from + i];
-        for (int j = 0; j < count; ++j)
-            for (int i = 0; i < width; ++i) column(j)[from + i] -= factor * vector[j] * sum[i];
-    }
-    column(0)[row] = left;
-    for (int j = 1; j < count; ++j) column(j)[row] = 0;
-}
-
-/// Hyperbolic rotation of a column of each sign that clears entry `row` of the negative one, in its orthogonal-diagonal
-/// form. @return the square of the entry left in the positive one; not above 0 when the matrix is not positive definite
-double rotate(double* __restrict positive, double* __restrict negative, int size, int row) {
-    const double a = positive[row], b = negative[row];
-    if (!(std::abs(b) < std::abs(a))) return 0;
-    const double stretch = std::sqrt((a + b) / (a - b)), up = 0.5 * stretch, down = 0.5 / stretch;
-    for (int i = 0; i < size; ++i) {
-        const double difference = (positive[i] - negative[i]) * up, total = (positive[i] + negative[i]) * down;
-        positive[i] = total + difference;
-        negative[i] = total - difference;
-    }
-    negative[row] = 0;
-    return (a - b) * (a + b);
 }
 
 /// The problem in hand: sizes, the sums and where everything is written. G below is equilibrated and centred.
@@ -348,13 +310,18 @@ struct solver {
         return estimate;
     }
 
-    /// theta, and the covariance unless it is nullptr, for one ridge; false when the ridged Gram is not positive definite.
-    bool solve(double ridge, bool refine_unridged, okid_real_t* theta, okid_real_t* covariance) {
+    /// All that apply_inverse() needs, for one ridge; false when the ridged Gram is not positive definite.
+    bool factor(double ridge) {
         if (!eliminate(m, ridge, nullptr)) return false;
         const double *positive = w.generator + n_u, *negative = column(plus) + n_u;
         linalg::multiply(false, true, n_y, n_y, plus, 1, negative, height, negative, height, 0, w.border, n_y);
         linalg::multiply(false, true, n_y, n_y, plus, -1, positive, height, positive, height, 1, w.border, n_y);
-        if (linalg::cholesky(n_y, w.border, n_y) != 0) return false;
+        return linalg::cholesky(n_y, w.border, n_y) == 0;
+    }
+
+    /// theta, and the covariance unless it is nullptr, for one ridge; false when the ridged Gram is not positive definite.
+    bool solve(double ridge, bool refine_unridged, okid_real_t* theta, okid_real_t* covariance) {
+        if (!factor(ridge)) return false;
         info->condition = norm(ridge) * inverse_norm();
         info->ridge = ridge;
         for (int first = 0; first < n_y; first += batch) {
@@ -390,6 +357,54 @@ struct solver {
         clear_outputs(w.rhs, columns);
         apply_inverse(columns);
         for (size_t k = 0; k < size; ++k) w.x[k] += w.out[k];
+    }
+
+    /// w.rhs <- (G of the part about the means of the whole) w.x, `lags` the lag sums of the part about the centres.
+    void multiply_part(const okid_run_sums_t& part, double* lags, int columns) {
+        const auto count = static_cast<double>(part.rows);
+        for (int c = 0; c < m; ++c) {
+            lags[c] = mean ? part.sum[c] - count * w.centre[c] : 0;
+            for (int k = c; k < p * m; k += m) lags[k + m] = mean ? lags[k] + (part.head[k] - part.tail[k]) : 0;
+        }
+        solver own = *this;
+        own.S = part.S;
+        own.head = part.head;
+        own.tail = part.tail;
+        own.rows = part.rows;
+        own.mean = false; // the means are taken out below
+        own.w.sum = lags;
+        own.multiply(w.x, w.rhs, columns);
+        for (int j = 0; j < columns && mean; ++j) {
+            double by_part = 0, by_whole = 0;
+            for (int k = 0; k < n; ++k) {
+                by_part += lags[k] * w.scale[k % m] * w.x[at(k, j, n)];
+                by_whole += lag_sum(k / m, k % m) / static_cast<double>(rows) * w.x[at(k, j, n)];
+            }
+            for (int k = 0; k < n; ++k)
+                w.rhs[at(k, j, n)] -= lags[k] * w.scale[k % m] * by_whole +
+                                      lag_sum(k / m, k % m) / static_cast<double>(rows) * (by_part - count * by_whole);
+        }
+    }
+
+    /// change = theta without the part, less theta: -(sum over its rows of e v^T) K^-1. After factor().
+    void leave_out(const okid_run_sums_t& part, const okid_real_t* theta, okid_real_t* change) {
+        for (int first = 0; first < n_y; first += batch) {
+            const int columns = std::min(batch, n_y - first);
+            std::fill(w.x, w.x + at(0, columns, n), 0.0);
+            for (int j = 0; j < columns; ++j) {
+                const double scale = w.scale[n_u + first + j];
+                for (int k = 0; k < q; ++k)
+                    w.x[at(regressor(k), j, n)] = theta[at(first + j, k, n_y)] * scale / w.scale[regressor(k) % m];
+                w.x[at(n_u + first + j, j, n)] = -1;
+            }
+            multiply_part(part, w.out, columns);
+            clear_outputs(w.rhs, columns);
+            apply_inverse(columns);
+            for (int j = 0; j < columns; ++j)
+                for (int k = 0; k < q; ++k)
+                    change[at(first + j, k, n_y)] = static_cast<okid_real_t>(
+                        w.out[at(regressor(k), j, n)] * w.scale[regressor(k) % m] / w.scale[n_u + first + j]);
+        }
     }
 
     /// Covariance of the residual, [theta, -I] G [theta, -I]^T / dof, of outputs first.. with themselves and those before.
@@ -450,4 +465,29 @@ okid_status_t okid_structured_solve(const okid_observer_config_t* config, okid_d
         info->radius = radius();
         return info->radius < 1;
     });
+}
+
+okid_status_t okid_structured_leave_out(const okid_observer_config_t* config, okid_detrend_t detrend,
+                                        const okid_run_sums_t* whole, double ridge, const okid_real_t* theta,
+                                        const okid_run_sums_t* parts, int32_t count, okid_real_t* change, void* work,
+                                        size_t bytes) {
+    const bool mean = detrend == OKID_DETREND_MEAN;
+    const auto complete = [&](const okid_run_sums_t& sums) {
+        return sums.S != nullptr && sums.head != nullptr && sums.tail != nullptr && (!mean || sums.sum != nullptr);
+    };
+    if (config == nullptr || whole == nullptr || theta == nullptr || parts == nullptr || change == nullptr ||
+        work == nullptr || !complete(*whole) || (count > 0 && !std::all_of(parts, parts + count, complete)))
+        return OKID_ERR_NULL;
+    const size_t needed = okid_structured_memsize(config);
+    if (needed == 0 || count < 0 || !(ridge >= 0)) return OKID_ERR_DIM;
+    if (bytes < needed) return OKID_ERR_MEMORY;
+    const int m = config->n_u + config->n_y, n = m * (config->p + 1);
+    okid::solver s{config->n_u, config->n_y, config->p, m,           n,  n - config->n_y, whole->S,
+                   whole->head, whole->tail, mean,      whole->rows, {}, nullptr};
+    okid::lay_out(*config, work, &s.w);
+    okid::linalg::warm_up();
+    if (whole->rows < s.q) return OKID_ERR_TOO_SHORT;
+    if (s.prepare(whole->sum) >= 0 || !s.factor(ridge)) return OKID_ERR_NUMERIC;
+    for (int b = 0; b < count; ++b) s.leave_out(parts[b], theta, change + okid::solver::at(0, b, s.q * s.n_y));
+    return OKID_OK;
 }

@@ -2,13 +2,21 @@
 /// @file identifier.h
 /// Sums and identification of one structure in static memory: okid's kernels with sizes known at compile time.
 /// NODE_P lags (observer order), as many block rows and columns of the Hankel matrix, order twice the degrees of freedom.
+/// NODE_PARTS > 0: deviations too, from the scatter among NODE_PARTS / 2 to NODE_PARTS parts of the record and its rest.
 #ifndef NODE_IDENTIFIER_H
 #define NODE_IDENTIFIER_H
 
 #include <okid/accumulator.h>
 
-enum { NODE_INPUTS = 1, NODE_OUTPUTS = 3, NODE_CHANNELS = NODE_INPUTS + NODE_OUTPUTS, NODE_DOFS = 3 };
-enum { NODE_ORDER = 2 * NODE_DOFS, NODE_VALUES = 10 };
+#ifndef NODE_INPUTS
+#define NODE_INPUTS 1
+#define NODE_OUTPUTS 3
+#define NODE_DOFS 3
+#endif
+#ifndef NODE_PARTS
+#define NODE_PARTS 0
+#endif
+enum { NODE_CHANNELS = NODE_INPUTS + NODE_OUTPUTS, NODE_ORDER = 2 * NODE_DOFS, NODE_VALUES = 10 };
 
 /// What identification gave. The numbers are those of the build, float or double, in double.
 typedef struct node_modes_t {
@@ -19,7 +27,8 @@ typedef struct node_modes_t {
     double ridge;                        ///< that was needed, relative
     double singular_values[NODE_VALUES]; ///< the first of the Hankel matrix
     struct {
-        double frequency_hz, damping_ratio, mpc, emac, shape_re[NODE_OUTPUTS], shape_im[NODE_OUTPUTS];
+        double frequency_hz, damping_ratio, frequency_std_hz, damping_ratio_std; ///< deviations: 0 without NODE_PARTS
+        double mpc, emac, shape_re[NODE_OUTPUTS], shape_im[NODE_OUTPUTS];
     } mode[NODE_DOFS];
 } node_modes_t;
 

@@ -24,7 +24,7 @@ static uint8_t* put_numbers(uint8_t* at, const double* numbers, size_t count) {
 }
 
 static void send_modes(void) {
-    static uint8_t bytes[12 + 8 * (2 + NODE_VALUES + NODE_DOFS * (4 + 2 * NODE_OUTPUTS))];
+    static uint8_t bytes[12 + 8 * (2 + NODE_VALUES + NODE_DOFS * (6 + 2 * NODE_OUTPUTS))];
     static node_modes_t modes;
     const uint32_t start = board_ticks();
     identifier_run(NODE_RATE_HZ, &modes);
@@ -37,6 +37,8 @@ static void send_modes(void) {
     for (int32_t k = 0; k < modes.count; ++k) {
         at = put_numbers(at, &modes.mode[k].frequency_hz, 1);
         at = put_numbers(at, &modes.mode[k].damping_ratio, 1);
+        at = put_numbers(at, &modes.mode[k].frequency_std_hz, 1);
+        at = put_numbers(at, &modes.mode[k].damping_ratio_std, 1);
         at = put_numbers(at, &modes.mode[k].mpc, 1);
         at = put_numbers(at, &modes.mode[k].emac, 1);
         at = put_numbers(at, modes.mode[k].shape_re, NODE_OUTPUTS);

@@ -4,6 +4,8 @@
 #include "identify_bench.h"
 #include "tolerance.h"
 
+#include <okid/steps/era.h>
+
 enum { P = 20, N = 6000, LONG = 24000, ROWS = 40 };
 
 static okid_identify_config_t config_of(okid_method_t method, okid_hankel_t hankel, int n_u) {
@@ -175,6 +177,91 @@ static void what_does_not_fit_is_refused(void) {
     free(y);
 }
 
+enum { NEAR_ROWS = 12, NEAR_LAST = 2 * NEAR_ROWS };
+
+/// Modes of A and C; the frequencies and damping ratios go to `out`.
+static void poles_of(const okid_real_t* A, const okid_real_t* C, double* out) {
+    static okid_real_t f[RIG_MODES], zeta[RIG_MODES];
+    const size_t bytes = okid_modal_memsize(RIG_NY, RIG_NZ);
+    char* work = malloc(bytes);
+    const okid_model_t its = {.n_u = RIG_NU, .n_y = RIG_NY, .n_z = RIG_NZ, .A = A, .C = C};
+    okid_modes_t modes = {.frequency_hz = f, .damping_ratio = zeta};
+    TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(&its, 1 / RIG_FS, &modes, work, bytes));
+    free(work);
+    TEST_ASSERT_EQUAL(RIG_MODES, modes.count);
+    for (int k = 0; k < RIG_MODES; ++k) {
+        out[2 * k] = (double)f[k];
+        out[2 * k + 1] = (double)zeta[k];
+    }
+}
+
+/// Markov parameters of the rig with noise: what is left out by the order is not zero. `step` of another noise beside.
+static void noisy_markov(double step, okid_real_t* out) {
+    uint64_t state = 11, other = 12;
+    double size = 0;
+    for (int k = 0; k <= NEAR_LAST; ++k) {
+        double clean[RIG_NY * RIG_NU];
+        rig_markov(&rig, k, clean);
+        for (int i = 0; i < RIG_NY * RIG_NU; ++i) {
+            size = fmax(size, fabs(clean[i]));
+            out[k * RIG_NY * RIG_NU + i] =
+                (okid_real_t)(clean[i] + size * (1e-3 * rig_normal(&state) + step * rig_normal(&other)));
+        }
+    }
+}
+
+static void near_parameters_move_the_poles_as_a_decomposition_does(void) {
+    const okid_era_config_t c = okid_era_defaults(RIG_NU, RIG_NY, NEAR_ROWS);
+    static okid_real_t markov[(NEAR_LAST + 1) * RIG_NY * RIG_NU], A[RIG_NZ * RIG_NZ], B[RIG_NZ * RIG_NU],
+        C[RIG_NY * RIG_NZ], near_A[RIG_NZ * RIG_NZ], near_C[RIG_NY * RIG_NZ];
+    double before[2 * RIG_MODES], by_step[2 * RIG_MODES], by_decomposing[2 * RIG_MODES];
+    void* block = malloc(okid_era_memsize(&c));
+    okid_era_t* era = NULL;
+    TEST_ASSERT_EQUAL(OKID_OK, okid_era_create(&era, &c, block, okid_era_memsize(&c)));
+    noisy_markov(0, markov);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_era_decompose(era, markov));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_era_realize(era, RIG_NZ, A, B, C, NULL, NULL));
+    poles_of(A, C, before);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_era_realize_near(era, RIG_NZ, markov, near_A, near_C));
+    for (int k = 0; k < RIG_NZ * RIG_NZ; ++k)
+        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-5), (double)A[k], (double)near_A[k]);
+    for (int k = 0; k < RIG_NY * RIG_NZ; ++k)
+        TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-5), (double)C[k], (double)near_C[k]);
+    noisy_markov(TOLERANCE(1e-5, 1e-3), markov);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_era_realize_near(era, RIG_NZ, markov, near_A, near_C));
+    poles_of(near_A, near_C, by_step);
+    TEST_ASSERT_EQUAL(OKID_OK,
+                      okid_era_realize(era, RIG_NZ, A, B, C, NULL, NULL)); // what was decomposed is still there
+    poles_of(A, C, by_decomposing);
+    for (int k = 0; k < 2 * RIG_MODES; ++k) TEST_ASSERT_EQUAL_DOUBLE(before[k], by_decomposing[k]);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_era_decompose(era, markov));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_era_realize(era, RIG_NZ, A, B, C, NULL, NULL));
+    poles_of(A, C, by_decomposing);
+    for (int k = 0; k < 2 * RIG_MODES; ++k) {
+        const double change = by_decomposing[k] - before[k];
+        TEST_ASSERT_DOUBLE_WITHIN(0.05 * fabs(change), change, by_step[k] - before[k]);
+    }
+    free(block);
+}
+
+static void near_parameters_of_correlations_and_wrong_orders_are_refused(void) {
+    okid_era_config_t c = okid_era_defaults(RIG_NU, RIG_NY, NEAR_ROWS);
+    static okid_real_t markov[(NEAR_LAST + 1) * RIG_NY * RIG_NU], A[RIG_NZ * RIG_NZ], C[RIG_NY * RIG_NZ];
+    noisy_markov(0, markov);
+    for (c.tau = 0; c.tau < 2; ++c.tau) {
+        void* block = malloc(okid_era_memsize(&c));
+        okid_era_t* era = NULL;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_era_create(&era, &c, block, okid_era_memsize(&c)));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_era_decompose(era, markov));
+        TEST_ASSERT_EQUAL(c.tau ? OKID_ERR_DIM : OKID_OK, okid_era_realize_near(era, RIG_NZ, markov, A, C));
+        TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_era_realize_near(era, 0, markov, A, C));
+        TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_era_realize_near(era, okid_era_max_order(&c) + 1, markov, A, C));
+        TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_era_realize_near(NULL, RIG_NZ, markov, A, C));
+        TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_era_realize_near(era, RIG_NZ, markov, A, NULL));
+        free(block);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(trap_01_without_noise_only_the_literal_form_is_wrong);
@@ -182,5 +269,7 @@ int main(void) {
     RUN_TEST(cmi_is_emac_times_mpc);
     RUN_TEST(without_inputs_the_covariances_are_realized);
     RUN_TEST(what_does_not_fit_is_refused);
+    RUN_TEST(near_parameters_move_the_poles_as_a_decomposition_does);
+    RUN_TEST(near_parameters_of_correlations_and_wrong_orders_are_refused);
     return UNITY_END();
 }

@@ -320,6 +320,137 @@ static void wrong_use_is_refused(void) {
     free(block);
 }
 
+/// Solves G x = b for the regressors, G the Gram matrix: Gauss-Jordan with pivots, in `table` of q x (q + columns).
+static void eliminate(double* table, int columns) {
+    const int width = q + columns;
+    for (int k = 0; k < q; ++k) {
+        int best = k;
+        for (int i = k + 1; i < q; ++i)
+            if (fabs(table[i * width + k]) > fabs(table[best * width + k])) best = i;
+        for (int j = 0; j < width; ++j) {
+            const double swap = table[k * width + j];
+            table[k * width + j] = table[best * width + j];
+            table[best * width + j] = swap;
+        }
+        for (int i = 0; i < q; ++i) {
+            const double factor = i == k ? 0 : table[i * width + k] / table[k * width + k];
+            for (int j = k; j < width && i != k; ++j) table[i * width + j] -= factor * table[k * width + j];
+        }
+    }
+    for (int k = 0; k < q; ++k)
+        for (int j = q; j < width; ++j) table[k * width + j] /= table[k * width + k];
+}
+
+/// What leaving out rows first .. last - 1 does to theta by the rows themselves: -(sum of e v^T) (V V^T)^-1.
+static void change_by_rows(const double* v, int first, int last, okid_detrend_t detrend, double* change) {
+    double *table = calloc((size_t)(q * (q + n_y)), sizeof *table), mean[W_MAX] = {0};
+    const int width = q + n_y;
+    for (int n = P; n < samples && detrend == OKID_DETREND_MEAN; ++n)
+        for (int k = 0; k < w; ++k) mean[k] += v[(n - k / m) * m + k % m] / (samples - P);
+    for (int n = P; n < samples; ++n) {
+        double row[W_MAX];
+        for (int k = 0; k < w; ++k) row[k] = v[(n - k / m) * m + k % m] - mean[k];
+        for (int i = 0; i < q; ++i)
+            for (int j = 0; j < q; ++j) table[i * width + j] += row[i < n_u ? i : i + n_y] * row[j < n_u ? j : j + n_y];
+        for (int o = 0; o < n_y && n >= first && n < last; ++o) {
+            double e = row[n_u + o];
+            for (int k = 0; k < q; ++k) e -= (double)theta[k * n_y + o] * row[k < n_u ? k : k + n_y];
+            for (int i = 0; i < q; ++i) table[i * width + q + o] -= e * row[i < n_u ? i : i + n_y];
+        }
+    }
+    eliminate(table, n_y);
+    for (int k = 0; k < q; ++k)
+        for (int o = 0; o < n_y; ++o) change[k * n_y + o] = table[k * width + q + o];
+    free(table);
+}
+
+/// The sums of rows first .. last - 1, in arrays of its own.
+static okid_run_sums_t part_of(const double* v, int first, int last, double* room) {
+    double *its = room, *before = its + m * w, *end = before + m * P, *total = end + m * P;
+    memset(room, 0, (size_t)(m * w + 2 * m * P + m) * sizeof *room);
+    for (int n = first; n < last; ++n)
+        for (int k = 0; k < w; ++k)
+            for (int r = 0; r < m; ++r) its[k * m + r] += v[n * m + r] * v[(n - k / m) * m + k % m];
+    for (int n = first; n < last; ++n)
+        for (int r = 0; r < m; ++r) total[r] += v[n * m + r];
+    for (int a = 0; a < P; ++a) {
+        memcpy(before + a * m, v + (first - 1 - a) * m, (size_t)m * sizeof *v);
+        memcpy(end + a * m, v + (last - 1 - a) * m, (size_t)m * sizeof *v);
+    }
+    return (okid_run_sums_t){its, before, end, total, NULL, last - first};
+}
+
+static void part_left_out_changes_theta_as_its_rows_do(void) {
+    enum { PARTS = 3 };
+    const int ends[PARTS + 1] = {P, 700, 2500, N};
+    static double room[PARTS][M_MAX * W_MAX + 2 * M_MAX * P + M_MAX], expected[NY_MAX * W_MAX];
+    static okid_real_t change[PARTS * NY_MAX * W_MAX];
+    double* v = rig_record(&rig, N, 0.05, NULL, 5);
+    for (int n = 0; n < N; ++n)
+        for (int c = 0; c < RIG_M; ++c) v[n * RIG_M + c] += 3 - c; // an offset
+    for (int detrend = OKID_DETREND_NONE; detrend <= OKID_DETREND_MEAN; ++detrend) {
+        sums_of(v);
+        TEST_ASSERT_EQUAL(OKID_OK, solve(&plain, (okid_detrend_t)detrend));
+        okid_run_sums_t part[PARTS];
+        for (int b = 0; b < PARTS; ++b) part[b] = part_of(v, ends[b], ends[b + 1], room[b]);
+        const okid_run_sums_t whole = {S, head, tail, sum, NULL, N - P};
+        const size_t bytes = okid_structured_memsize(&plain);
+        char* work = malloc(bytes + 1);
+        work[bytes] = 77;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_structured_leave_out(&plain, (okid_detrend_t)detrend, &whole, info.ridge, theta,
+                                                             part, PARTS, change, work, bytes));
+        TEST_ASSERT_EQUAL(77, work[bytes]);
+        free(work);
+        for (int b = 0; b < PARTS; ++b) {
+            double worst = 0, size = 0;
+            change_by_rows(v, ends[b], ends[b + 1], (okid_detrend_t)detrend, expected);
+            for (int k = 0; k < n_y * q; ++k) {
+                worst = fmax(worst, fabs((double)change[b * n_y * q + k] - expected[k]));
+                size = fmax(size, fabs(expected[k]));
+            }
+            TEST_ASSERT_TRUE(size > 0);
+            TEST_ASSERT_TRUE(worst < size * (sizeof(okid_real_t) == 8 ? 1e-7 : 1e-2));
+        }
+    }
+    free(v);
+}
+
+static void wrong_parts_are_refused(void) {
+    double* v = rig_record(&rig, N, 0.05, NULL, 5);
+    sums_of(v);
+    TEST_ASSERT_EQUAL(OKID_OK, solve(&plain, OKID_DETREND_NONE));
+    const okid_run_sums_t whole = {S, head, tail, NULL, NULL, N - P}, no_tail = {S, head, NULL, NULL, NULL, N - P},
+                          few = {S, head, tail, NULL, NULL, q - 1};
+    const size_t bytes = okid_structured_memsize(&plain);
+    static okid_real_t change[NY_MAX * W_MAX];
+    char* work = malloc(bytes);
+    const struct {
+        const okid_run_sums_t *whole, *part;
+        okid_detrend_t detrend;
+        double ridge;
+        int count;
+        size_t bytes;
+        okid_status_t expected;
+    } uses[] = {{&whole, &whole, OKID_DETREND_NONE, 0, 0, bytes, OKID_OK},
+                {&whole, &no_tail, OKID_DETREND_NONE, 0, 1, bytes, OKID_ERR_NULL},
+                {&whole, &whole, OKID_DETREND_MEAN, 0, 1, bytes, OKID_ERR_NULL},
+                {&whole, NULL, OKID_DETREND_NONE, 0, 1, bytes, OKID_ERR_NULL},
+                {&whole, &whole, OKID_DETREND_NONE, -1, 1, bytes, OKID_ERR_DIM},
+                {&whole, &whole, OKID_DETREND_NONE, (double)NAN, 1, bytes, OKID_ERR_DIM},
+                {&whole, &whole, OKID_DETREND_NONE, 0, -1, bytes, OKID_ERR_DIM},
+                {&whole, &whole, OKID_DETREND_NONE, 0, 1, bytes - 1, OKID_ERR_MEMORY},
+                {&few, &whole, OKID_DETREND_NONE, 0, 1, bytes, OKID_ERR_TOO_SHORT}};
+    for (size_t k = 0; k < sizeof uses / sizeof *uses; ++k)
+        TEST_ASSERT_EQUAL(uses[k].expected,
+                          okid_structured_leave_out(&plain, uses[k].detrend, uses[k].whole, uses[k].ridge, theta,
+                                                    uses[k].part, uses[k].count, change, work, uses[k].bytes));
+    S[RIG_M * RIG_M + 6] = 100 * S[0]; // a correlation above 1
+    TEST_ASSERT_EQUAL(OKID_ERR_NUMERIC, okid_structured_leave_out(&plain, OKID_DETREND_NONE, &whole, 0, theta, &whole,
+                                                                  1, change, work, bytes));
+    free(work);
+    free(v);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(noise_gives_the_dense_solution);
@@ -335,5 +466,7 @@ int main(void) {
     RUN_TEST(poor_excitation_is_refused);
     RUN_TEST(numbers_that_are_no_sums_are_refused);
     RUN_TEST(wrong_use_is_refused);
+    RUN_TEST(part_left_out_changes_theta_as_its_rows_do);
+    RUN_TEST(wrong_parts_are_refused);
     return UNITY_END();
 }

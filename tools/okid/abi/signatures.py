@@ -131,6 +131,11 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
         c_int,
         [POINTER(ObserverConfig), c_int, POINTER(RunSums), doubles, doubles, POINTER(ObserverInfo), opaque, c_size_t],
     ),
+    "okid_structured_leave_out": (
+        c_int,
+        [POINTER(ObserverConfig), c_int, POINTER(RunSums), c_double, doubles]
+        + [POINTER(RunSums), c_int32, doubles, opaque, c_size_t],
+    ),
     "okid_markov_recursion": (c_int, [c_int32, c_int32, c_int32, doubles, c_int32, doubles, doubles]),
     "okid_era_memsize": (c_size_t, [POINTER(EraConfig)]),
     "okid_era_create": (c_int, [POINTER(opaque), POINTER(EraConfig), opaque, c_size_t]),
@@ -139,6 +144,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_era_max_order": (c_int32, [POINTER(EraConfig)]),
     "okid_era_markov_last": (c_int32, [POINTER(EraConfig)]),
     "okid_era_realize": (c_int, [opaque, c_int32, doubles, doubles, doubles, doubles, doubles]),
+    "okid_era_realize_near": (c_int, [opaque, c_int32, doubles, doubles, doubles]),
     "okid_era_emac": (c_int, [opaque, c_int32, POINTER(Modes), doubles]),
     "okid_subspace_max_order": (c_int32, [POINTER(SubspaceConfig)]),
     "okid_subspace_memsize": (c_size_t, [POINTER(SubspaceConfig)]),

@@ -75,6 +75,15 @@ OKID_API int32_t okid_era_max_order(const okid_era_config_t* config);
 OKID_NODISCARD OKID_API okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, okid_real_t* B,
                                                        okid_real_t* C, const okid_real_t* gain_markov, okid_real_t* K);
 
+/// A and C of other Markov parameters in the singular subspaces that were decomposed, to first order in their difference:
+/// what a part of the record does to the modes, without another decomposition. With the parameters that were decomposed
+/// they are A and C of okid_era_realize(). Not with tau > 0 (OKID_ERR_DIM).
+/// @param markov  in, Y_0 .. Y_(okid_era_markov_last())
+/// @param A  out n_z x n_z, C out n_y x n_z, column-major
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM. Cost 4 (r n_y) (c n_u) n_z flop
+OKID_NODISCARD OKID_API okid_status_t okid_era_realize_near(okid_era_t* self, int32_t order, const okid_real_t* markov,
+                                                            okid_real_t* A, okid_real_t* C);
+
 /// EMAC of eigenvectors (Pappa, Elliott, Schenk 1993, output side): how well C A^k psi at the last block row of the
 /// identified observability matrix agrees with its prediction from the first; 0..1 per eigenvector.
 /// @param modes  in, count, eigenvalues mu and eigenvectors psi of A, by okid_modal_analyse()

@@ -114,6 +114,24 @@ OKID_NODISCARD OKID_API okid_status_t okid_structured_solve(const okid_observer_
                                                             okid_real_t* theta, okid_real_t* innovation,
                                                             okid_observer_info_t* info, void* work, size_t bytes);
 
+/// What leaving out each of some parts of the run does to theta, to first order: -(sum over its rows of e v^T) (V V^T)^-1,
+/// e = y - theta v. The squares of what follows from the changes add up to a variance: times 1 / (1 - sum of W^2), W the
+/// shares of the parts in the rows, when the parts make up the run.
+/// @param whole   in, of the run, as okid_structured_solve() takes it, about the same constant as the parts: of
+///                okid_accumulator_run() with OKID_DETREND_NONE
+/// @param ridge   in, of okid_observer_info_t
+/// @param theta   in, n_y x q of okid_structured_solve()
+/// @param parts   in, count of them: S and sum over their rows, head before their first and tail at their last row
+/// @param change  out, n_y x q column-major for each part
+/// @param work    caller's block of okid_structured_memsize() bytes
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MEMORY, OKID_ERR_TOO_SHORT, OKID_ERR_NUMERIC
+/// Cost (6 m + 20) n^2 flop, and 10 n^2 n_y for each part. Source: infinitesimal jackknife, Efron (1982).
+OKID_NODISCARD OKID_API okid_status_t okid_structured_leave_out(const okid_observer_config_t* config,
+                                                                okid_detrend_t detrend, const okid_run_sums_t* whole,
+                                                                double ridge, const okid_real_t* theta,
+                                                                const okid_run_sums_t* parts, int32_t count,
+                                                                okid_real_t* change, void* work, size_t bytes);
+
 // ---- what follows from the observer: the Markov parameters of the system and of the gain (eq. 40, 41)
 
 /// The recursions (40) and (41), with the minus sign of eq. 26 applied.
