@@ -37,6 +37,10 @@ def _axis_hz(m: Material) -> float:
     return min(m.result.shown_hz, highest) if highest > 0.0 else m.result.shown_hz
 
 
+def _with(value: float, deviation: float | None) -> str:
+    return f"{value:.4g}" + ("" if deviation is None else f" ±{deviation:.2g}")
+
+
 def modal_mass_section(m: Material) -> page.Section | None:
     """None without a drive point."""
     found, rows = modal_masses(m.result.raw), []
@@ -44,17 +48,16 @@ def modal_mass_section(m: Material) -> page.Section | None:
         one = found[k]
         head = [str(k + 1), f"{m.result.frequency_hz[k]:.4f}"]
         if one is None:
-            rows.append([*head, *["–"] * 8])
+            rows.append([*head, *["–"] * 5])
             continue
         scale = 1.0 / np.sqrt(one.mass_kg) if one.mass_kg > 0.0 else None
         sure = one.mass_kg > 0.0 and abs(one.phase_deg) <= OFF_PHASE
-        rows.append([*head, f"{one.mass_kg:.4g}{'' if sure else ' ?'}", plain(one.mass_std, ".2g"),
-                     f"{one.stiffness_n_m:.4g}", plain(one.stiffness_std, ".2g"), f"{one.damping_n_s_m:.4g}",
-                     plain(one.damping_std, ".2g"), plain(scale, ".4g"), f"{abs(one.phase_deg):.1f}"])  # fmt: skip
+        rows.append([*head, _with(one.mass_kg, one.mass_std) + ("" if sure else " ?"),
+                     _with(one.stiffness_n_m, one.stiffness_std), _with(one.damping_n_s_m, one.damping_std),
+                     plain(scale, ".4g"), f"{abs(one.phase_deg):.1f}"])  # fmt: skip
     if not rows:
         return None
-    head = ["mode", "f [Hz]", "mass [kg]", "± σ", "stiffness [N/m]", "± σ", "damping [N s/m]", "± σ",
-            "1/√mass [1/√kg]", "phase [°]"]  # fmt: skip
+    head = ["mode", "f [Hz]", "mass [kg]", "stiffness [N/m]", "damping [N s/m]", "1/√mass [1/√kg]", "phase [°]"]
     units = all(m.unit(name) for name in m.result.outputs)
     words = "Of the shape whose largest entry is 1, from the residues at the drive point; the shape times 1/√mass is "
     words += "mass-normalised. Phase: how far the residue is from that of a real mode; beyond 20° (?) the mass is "

@@ -43,7 +43,7 @@ def _table(modes: Sequence[dict[str, Any]], shown: Sequence[int], sure: bool) ->
     f_std = any(modes[k].get("frequency_std_hz") is not None for k in shown)
     z_std = any(modes[k].get("damping_ratio_std") is not None for k in shown)
     voted = any(modes[k].get("found_in") is not None for k in shown)
-    weighed = any(modes[k].get("modal_mass") is not None for k in shown)
+    weighed = any(modes[k].get("modal_mass") is not None and "modal_stiffness" not in modes[k] for k in shown)
     head = ["mode", "f [Hz]", *(["± σ [Hz]"] if f_std else []), "ζ [%]", *(["± σ [%]"] if z_std else [])]
     head += ["mass [kg]"] if weighed else []
     head += ["MPC", "EMAC", "CMI", *(["found in"] if voted else []), *([] if sure else ["why doubtful"])]
