@@ -137,6 +137,7 @@ docs: ## the documentation as web pages in build/docs; every warning is an error
 
 docs-pictures: build ## every picture of docs/images, from real runs (some minutes; needs Chromium)
 	@tools/setup.sh programs
+	@tools/setup.sh docs
 	@PYTHONPATH=tools $(PYTHON) -m docs_pictures
 
 lint: ## format, clang-tidy, cppcheck, warnings of two compilers, ruff, mypy

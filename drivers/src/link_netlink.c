@@ -226,13 +226,13 @@ int drv_link_watch(void) { return open_netlink(RTMGRP_LINK); }
 
 int drv_link_changes(int fd, const char* interface, drv_link_t* out) {
     _Alignas(struct nlmsghdr) char message[MESSAGE_BYTES];
-    int told = 0;
+    int changed = 0;
     for (int messages = 0; messages < 256; ++messages) { // bounded: the rest wakes us again
         ssize_t got = recv(fd, message, sizeof message, MSG_DONTWAIT);
         if (got < 0 && errno == EINTR) continue;
         if (got < 0 && errno == ENOBUFS) { // some were lost: whatever happened, look
             memset(out, 0, sizeof *out);
-            told = 1;
+            changed = 1;
             continue;
         }
         if (got <= 0) break;
@@ -244,7 +244,7 @@ int drv_link_changes(int fd, const char* interface, drv_link_t* out) {
             drv_link_t one;
             if (drv_link_parse(at, left, &one) == 0 && strcmp(one.name, interface) == 0) {
                 *out = one;
-                told = 1;
+                changed = 1;
             }
             size_t step = NLMSG_ALIGN(header.nlmsg_len);
             if (step > left) break;
@@ -252,5 +252,5 @@ int drv_link_changes(int fd, const char* interface, drv_link_t* out) {
             left -= step;
         }
     }
-    return told;
+    return changed;
 }

@@ -154,8 +154,8 @@ int drv_serial_write(drv_serial_t* self, const uint8_t* bytes, size_t count, int
         const int64_t left = deadline - monotonic_ms();
         if (left <= 0) {
             snprintf(self->error, sizeof self->error,
-                     "takes no more bytes: nobody fetches them, or the baud rate is "
-                     "too low");
+                     "takes no more bytes: no program reads them at the other end, "
+                     "or the baud rate is too low");
             return -ETIMEDOUT;
         }
         struct pollfd writable = {self->fd, POLLOUT, 0};

@@ -43,7 +43,7 @@ std::vector<bus_event> bus_watch::look(const drv_stats_t& now) {
                  now.lost_overflow, now.buffer_bytes),
              first(&drv_stats_t::lost_overflow)});
     if (more(&drv_stats_t::no_ack))
-        out.push_back({"no_ack", "nobody acknowledges what is sent: is another node on the bus, at this bit rate?",
+        out.push_back({"no_ack", "no node acknowledges what is sent: is another one on the bus, at this bit rate?",
                        first(&drv_stats_t::no_ack)});
     constexpr std::uint64_t plenty = 2000; // bytes: longer than any packet and any line
     if (now.received == 0 && now.bytes >= plenty && seen_.bytes < plenty)

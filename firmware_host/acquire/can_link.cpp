@@ -10,7 +10,7 @@ constexpr int fd_mtu = 72;
 constexpr std::uint32_t usual_bitrate = 1000000, short_queue = 100;
 
 /// Down, settings, up: what a running controller does not take.
-std::string anew(const bus_config& bus, const drv_link_t& link) {
+std::string set_again(const bus_config& bus, const drv_link_t& link) {
     const double bitrate = bus.bitrate.value_or(link.bitrate ? link.bitrate : usual_bitrate);
     std::string out = fmt::format("sudo ip link set {0} down; sudo ip link set {0} up type can bitrate {1:.0f}",
                                   bus.interface, bitrate);
@@ -34,13 +34,14 @@ void judge_settings(const bus_config& bus, const drv_link_t& link, std::vector<l
     if (bus.fd && link.mtu < fd_mtu)
         out.push_back({"up, but its mtu carries no FD frames",
                        link.has_can_data
-                           ? anew(bus, link)
+                           ? set_again(bus, link)
                            : fmt::format("sudo ip link set {0} down; sudo ip link set {0} mtu 72 up", bus.interface),
                        true});
     if (link.bitrate && bus.bitrate && static_cast<double>(link.bitrate) != *bus.bitrate)
-        out.push_back({fmt::format("{}, expected {:.0f} bit/s", state, *bus.bitrate), anew(bus, link), true});
+        out.push_back({fmt::format("{}, expected {:.0f} bit/s", state, *bus.bitrate), set_again(bus, link), true});
     if (bus.fd && link.dbitrate && bus.dbitrate && static_cast<double>(link.dbitrate) != *bus.dbitrate)
-        out.push_back({fmt::format("{}, expected {:.0f} bit/s for data", state, *bus.dbitrate), anew(bus, link), true});
+        out.push_back(
+            {fmt::format("{}, expected {:.0f} bit/s for data", state, *bus.dbitrate), set_again(bus, link), true});
     const bool sends = bus.sync_hz || !bus.start_frames.empty();
     if (sends && link.listen_only)
         out.push_back(
@@ -59,7 +60,7 @@ std::vector<link_finding> judge_link(const bus_config& bus, const drv_link_t& li
     if (!link.is_can) return {{"exists, but is no CAN interface", "correct interface in the [[bus]]", true}};
     if (!link.up) {
         const std::string up = fmt::format("sudo ip link set {} up", bus.interface);
-        return {{state_text(link), link.kind == std::string("can") ? anew(bus, link) : up, true}};
+        return {{state_text(link), link.kind == std::string("can") ? set_again(bus, link) : up, true}};
     }
     if (link.state == DRV_BUS_OFF)
         out.push_back({state_text(link) +
@@ -73,7 +74,7 @@ std::vector<link_finding> judge_link(const bus_config& bus, const drv_link_t& li
             {fmt::format("{}: many errors on the wire; check bit rate and terminators", drv_bus_state_name(link.state)),
              "", false});
     if (link.has_can_data && link.restart_ms == 0)
-        out.push_back({"restart-ms is 0: the bus stays off after bus-off", anew(bus, link), false});
+        out.push_back({"restart-ms is 0: the bus stays off after bus-off", set_again(bus, link), false});
     if (link.rx_dropped + link.rx_over_errors > 0)
         out.push_back({fmt::format("since it exists the driver dropped {} frames, the controller overran {} times",
                                    link.rx_dropped, link.rx_over_errors),

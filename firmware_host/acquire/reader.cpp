@@ -36,7 +36,7 @@ std::uint64_t happenings(const drv_stats_t& counts) {
 }
 
 /// What messages call it.
-std::string told_name(const bus_config& bus) {
+std::string name_in_messages(const bus_config& bus) {
     if (bus.on_line()) return bus.device;
     return bus.adapter.empty() ? bus.interface : bus.adapter;
 }
@@ -46,7 +46,7 @@ std::string told_name(const bus_config& bus) {
 std::size_t bus_reader::most_waiting() { return ring_frames / 4 * 3; }
 
 bus_reader::bus_reader(const live_config& config_of_all, std::size_t bus, wake_event& wake, watermark& mark)
-    : interface_(told_name(config_of_all.buses[bus])), bus_(static_cast<std::uint8_t>(bus)), wake_(wake),
+    : interface_(name_in_messages(config_of_all.buses[bus])), bus_(static_cast<std::uint8_t>(bus)), wake_(wake),
       stop_fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)), mark_(mark),
       block_(new std::byte[drv_ring_memsize(ring_frames)]()), batch_(64) {
     ring_ = drv_ring_create(ring_frames, block_.get(), drv_ring_memsize(ring_frames));

@@ -19,7 +19,7 @@ class wake_event {
 
     /// After what is to be found was put in place.
     void signal() {
-        if (told_.exchange(true, std::memory_order_acq_rel)) return;
+        if (is_set_.exchange(true, std::memory_order_acq_rel)) return;
         const std::uint64_t one = 1;
         (void)!write(fd_, &one, sizeof one);
     }
@@ -29,13 +29,13 @@ class wake_event {
         (void)poll(waits.data(), waits.size(), timeout_ms);
         std::uint64_t count = 0;
         (void)!read(fd_, &count, sizeof count);
-        (void)told_.exchange(false,
-                             std::memory_order_acq_rel); // last: a signal before it needs no write, one after it writes
+        // Last: a signal before it needs no write, one after it writes.
+        (void)is_set_.exchange(false, std::memory_order_acq_rel);
     }
 
   private:
     int fd_;
-    std::atomic<bool> told_{false};
+    std::atomic<bool> is_set_{false};
 };
 
 } // namespace okid_host

@@ -163,7 +163,7 @@ class grid {
         std::int64_t ahead = 0;              ///< frames in a row that came before their time
         std::int64_t in_burst = 0;           ///< frames of the burst at hand
         std::int64_t frames = 0, bursts = 0; ///< of all bursts, for the share of those that hold several
-        std::int64_t uncertain = 0; ///< times polls slipped past a sample, or samples are missing: nobody knows
+        std::int64_t uncertain = 0; ///< times polls slipped past a sample, or samples are missing: the two look alike
         std::int64_t slips = 0;     ///< by so many places the line is behind the samples for it
         std::int64_t slip_at = never, lost_at = never; ///< places of the newest slip and loss
         // How late the least late of each eighth of the decision time was, less how far the line has moved since.
@@ -245,7 +245,7 @@ class grid {
     static double step_over_sigma(const std::vector<double>& values, std::size_t behind, double& by);
     bool floors_apart(const lane& l, double& by, double& sigma) const;
     bool steady(const lane& l, std::size_t begin, std::size_t end, bool ended) const;
-    bool told_of_loss(const lane& l, std::size_t last) const;
+    bool loss_reported(const lane& l, std::size_t last) const;
     bool may_slip(const lane& l) const;
     bool flickered(const lane& l) const;
     double silence_before(const lane& l, std::size_t which) const;

@@ -21,7 +21,7 @@ constexpr double least_early = 0.25;     // periods by which arrivals are taken 
 constexpr double remembers = 0.999;      // a frame, of how early the earliest was
 constexpr double longest_beat_s = 1;     // a lane that pauses longer has stalled
 constexpr double clock_set_ns = -1e9;    // so early is nothing but a clock that was set
-constexpr double told_periods = 20;      // a frame later than this shows nothing of the line
+constexpr double longest_periods = 20;   // a frame later than this shows nothing of the line
 constexpr double rate_ppm = 300;         // by which a sensor may miss its nominal rate
 constexpr double same_burst = 0.5;       // periods between two frames that were handed over together
 constexpr double one_beat = 0.7;         // a silence of a period, give or take so much, held no loss
@@ -118,11 +118,12 @@ std::size_t grid::burst_end(const lane& l, std::size_t of) const {
 void grid::look_at_late(lane& l) {
     for (; l.seen < l.late.size() && (l.seen == l.placed || l.least > l.on_time); ++l.seen) {
         const double late = lateness(l, l.late[l.seen], l.seen - l.placed);
-        const bool told = l.seen > l.placed + 1 || (l.late[l.seen].loss && 2 * l.frames >= 3 * l.bursts);
-        const bool anew = l.seen == l.placed || (told && !together(l, l.seen) && burst_end(l, l.placed) + 1 == l.seen &&
-                                                 !told_of_loss(l, l.seen - 1));
-        if (anew || late < l.least + as_late) l.which = l.seen;
-        l.least = anew ? late : std::min(l.least, late);
+        const bool known = l.seen > l.placed + 1 || (l.late[l.seen].loss && 2 * l.frames >= 3 * l.bursts);
+        const bool first =
+            l.seen == l.placed ||
+            (known && !together(l, l.seen) && burst_end(l, l.placed) + 1 == l.seen && !loss_reported(l, l.seen - 1));
+        if (first || late < l.least + as_late) l.which = l.seen;
+        l.least = first ? late : std::min(l.least, late);
     }
 }
 
@@ -204,21 +205,22 @@ void grid::judge_shift(lane& l, bool alike, std::int64_t times, double waited, b
         place_late(l, first);
         return;
     }
-    const bool told = told_of_loss(l, l.which);
+    const bool reported = loss_reported(l, l.which);
     const bool few = ended && lost == 1 && times < 4 * cut_off_bursts; // of one sample little is seen
     const bool stays = !few && (!never_calm || apart_now) && !on_the_move(l) && shift_stays(l, more, times, ended);
-    if (told || stays || (ended && !never_calm && static_cast<double>(lost) > held_up_s * rate_hz_)) {
+    if (reported || stays || (ended && !never_calm && static_cast<double>(lost) > held_up_s * rate_hz_)) {
         const std::size_t end = burst_end(l, l.placed);
         const bool cut = end < l.which && lateness(l, l.late[end], end - l.placed) < l.least - as_late;
-        if (cut && !told_of_loss(l, end)) {
+        if (cut && !loss_reported(l, end)) {
             place_late(l, end - l.placed + 1);
             return;
         }
-        if (!told && stays && !steady(l, l.placed, l.which + 1, ended)) { // they were late, and the loss is behind them
+        if (!reported && stays &&
+            !steady(l, l.placed, l.which + 1, ended)) { // they were late, and the loss is behind them
             place_late(l, first);
             return;
         }
-        l.uncertain += (alike && !told && (lost == 1 || in_two_steps(l))) || by_std > sure_of_number;
+        l.uncertain += (alike && !reported && (lost == 1 || in_two_steps(l))) || by_std > sure_of_number;
         place_after_loss(l, lost);
         return;
     }
@@ -284,7 +286,7 @@ bool grid::pairs_gather(const lane& l, double pairs, double behind) const {
 /// every poll misses it. Until then pairs of samples come, many more than usual. Before a loss there are none, and
 /// behind a loss they go on.
 bool grid::flickered(const lane& l) const {
-    if (2 * l.frames >= 3 * l.bursts || told_of_loss(l, l.which)) return false;
+    if (2 * l.frames >= 3 * l.bursts || loss_reported(l, l.which)) return false;
     double behind = 0;
     for (std::size_t i = l.placed + 2; i + 1 < l.late.size(); ++i)
         behind += together(l, i) && !together(l, i - 1) && !together(l, i + 1) && on_raster(silence_before(l, i - 1));
@@ -310,11 +312,11 @@ void grid::place_after_loss(lane& l, std::int64_t lost) {
     while (last < l.which && lateness(l, l.late[last], last - first) >= l.least + as_late) ++last;
     for (std::size_t i = first + 1; i <= last; ++i)
         if (silence(i) > silence(place) + longer_silence) place = i;
-    std::int64_t told = 0;
+    std::int64_t reported = 0;
     const std::size_t end = last + (l.which > last ? 2 : 1); // the last of a burst may be the one
     for (std::size_t i = end; i-- > first;) {
         if (!l.late[i].loss || std::abs(silence(i) - 1) < one_beat) continue;
-        ++told;
+        ++reported;
         place = i;
     }
     place_late(l, place - first);
@@ -323,8 +325,8 @@ void grid::place_after_loss(lane& l, std::int64_t lost) {
         slip(l, -1);
     }
     l.lost_at = l.last;
-    const std::int64_t step = 1 + std::max<std::int64_t>(1, lost - std::max<std::int64_t>(0, told - 1));
-    beat(l, l.late[place], step, told ? 0 : static_cast<std::int64_t>(std::max(last, place) - place));
+    const std::int64_t step = 1 + std::max<std::int64_t>(1, lost - std::max<std::int64_t>(0, reported - 1));
+    beat(l, l.late[place], step, reported ? 0 : static_cast<std::int64_t>(std::max(last, place) - place));
     l.seen = l.placed = place + 1;
 }
 
@@ -377,7 +379,7 @@ void grid::follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, do
     l.inside = silence;
     ++l.in_burst;
     l.tail_late = late_ns / period_ns_;
-    const bool tells = late_ns < told_periods * period_ns_ && late_ns > -most_early * period_ns_;
+    const bool tells = late_ns < longest_periods * period_ns_ && late_ns > -most_early * period_ns_;
     l.tail = tells || l.clock.points == 0 ? index : index + 1; // one that is too late or too early is no tail
     l.tail_ns = frame.time_ns;
     std::int64_t expected = 0;

@@ -256,7 +256,7 @@ bool grid::bursts_alike(const lane& l, std::int64_t& times) const {
 }
 
 /// The bus reported a loss no later than before this frame.
-bool grid::told_of_loss(const lane& l, std::size_t last) const {
+bool grid::loss_reported(const lane& l, std::size_t last) const {
     return std::any_of(l.late.begin() + static_cast<std::ptrdiff_t>(l.placed),
                        l.late.begin() + static_cast<std::ptrdiff_t>(last) + 1,
                        [](const late_frame& each) { return each.loss != 0; });
@@ -266,7 +266,7 @@ bool grid::told_of_loss(const lane& l, std::size_t last) const {
 /// arrivals look the same. Slips recur, but not soon after each other. A loss is rare, unless the bus reports it or the
 /// lane has lost frames.
 bool grid::may_slip(const lane& l) const {
-    if (told_of_loss(l, l.which)) return false;
+    if (loss_reported(l, l.which)) return false;
     const std::int64_t silence = (l.late[l.placed].time_ns - l.time_ns) / std::llround(period_ns_);
     return l.last + silence - std::max(l.slip_at, l.lost_at) > slip_apart;
 }

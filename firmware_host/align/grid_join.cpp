@@ -82,8 +82,8 @@ void grid::hold_until_anchored(lane& l, const drv_frame_t& frame) {
         all_heard_ns_ = frame.time_ns;
         by_time_ = heard_ == lanes_.size() && placed_by_time();
     }
-    const bool told = !by_time_ || std::abs(static_cast<double>(frame.time_ns - all_heard_ns_)) > gather_ns();
-    if ((heard_ == lanes_.size() && told) || held_.size() >= most_before_) anchor();
+    const bool gathered = !by_time_ || std::abs(static_cast<double>(frame.time_ns - all_heard_ns_)) > gather_ns();
+    if ((heard_ == lanes_.size() && gathered) || held_.size() >= most_before_) anchor();
 }
 
 /// Is there a lane whose place depends on stamps? Counters of the lanes heard so far are compared.
@@ -265,8 +265,8 @@ void grid::join(lane& l, const drv_frame_t& frame) {
     }
     late_lanes_ += l.late.empty();
     l.late.push_back({frame, 0});
-    const bool told = static_cast<double>(frame.time_ns - l.late.front().time_ns) > gather_ns();
-    if (told || lanes_.size() == 1 || l.late.size() >= most_held_) end_joining(l);
+    const bool gathered = static_cast<double>(frame.time_ns - l.late.front().time_ns) > gather_ns();
+    if (gathered || lanes_.size() == 1 || l.late.size() >= most_held_) end_joining(l);
 }
 
 void grid::end_joining(lane& l) {

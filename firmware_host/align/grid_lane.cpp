@@ -49,15 +49,15 @@ void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t cou
         insert(l, l.last + step, frame);
         return;
     }
-    std::int64_t far = step;
-    const bool timed = count_rounds(l, frame, far);
+    std::int64_t whole = step;
+    const bool timed = count_rounds(l, frame, whole);
     if (!timed && (step < 0 || step > (l.loss ? window_ : reorder_))) {
         judge_jump(l, frame, counter);
         return;
     }
     doubt_suspect(l);
     l.counter = counter;
-    move_on(l, frame, l.last + far, false);
+    move_on(l, frame, l.last + whole, false);
     recall_suspect(l);
 }
 

@@ -54,7 +54,7 @@ std::string virtual_text(const live_config& config) {
 
 std::string summary(const live_config& config, const stream_config& stream, const std::string& computed) {
     const identification_config& id = stream.wanted;
-    std::string out = fmt::format("{}: well\n\n{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", config.path, "channel",
+    std::string out = fmt::format("{}: OK\n\n{:<16} {:<13} {:<9} {:<10} {:<12} {:<20} {}\n", config.path, "channel",
                                   "role", "unit", "bus", "identifier", "bits", "samples counted by");
     for (const channel_config& channel : config.channels) {
         const drv_signal_t& layout = channel.layout;
@@ -72,11 +72,11 @@ std::string summary(const live_config& config, const stream_config& stream, cons
                     stream.sample == OKID_SAMPLE_INT16 && id.method != "auto" ? ", 16-bit codes summed exactly" : "");
     const okid_method_t method = method_of(id.method);
     const std::string horizon =
-        id.method == "auto"
-            ? "several methods, horizons and rates, which modes there are when an eighth is new, an update each"
-            : fmt::format("{}{} block rows, an update each",
-                          looks_back_rows(method, config.n_u) ? "" : fmt::format("p {}, ", id.p),
-                          rows_used(method, config.n_u, id.p, id.rows));
+        id.method == "auto" ? "several methods, horizons and rates, modes sought again when an eighth of the samples "
+                              "is new, an update each"
+                            : fmt::format("{}{} block rows, an update each",
+                                          looks_back_rows(method, config.n_u) ? "" : fmt::format("p {}, ", id.p),
+                                          rows_used(method, config.n_u, id.p, id.rows));
     out += fmt::format("{}, {} {:g} s, memory: {}\n", id.method, horizon, id.update_s, memory_text(config));
     out += fmt::format("needs {:.0f} MB of memory, at most {:g} are allowed\n", std::ceil(stream_bytes(stream) / 1e6),
                        id.max_memory_mb);

@@ -37,7 +37,7 @@ struct convert_arguments {
 };
 
 /// What was written, unless it was asked to be quiet.
-template <class... Words> void told(const convert_arguments& given, Words&&... words) {
+template <class... Words> void report(const convert_arguments& given, Words&&... words) {
     if (!given.quiet) say(std::forward<Words>(words)...);
 }
 
@@ -138,8 +138,8 @@ void frames_to_csv(const convert_arguments& given, const live_config& config) {
         say("okid: channel \"{}\" has no frame in {}: its column is all nan\n", config.channels[index].name,
             given.from);
     out.commit();
-    told(given, "{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(), config.channels.size(),
-         table.missing());
+    report(given, "{}: {} samples, {} channels, {} values missing\n", given.to, samples.emitted(),
+           config.channels.size(), table.missing());
 }
 
 /// What the comment lines of the table say about its rate must agree with the config.
@@ -174,7 +174,7 @@ void csv_to_log(const convert_arguments& given, const live_config& config) {
     display.reset();
     if (maker.saturated() > 0)
         say("okid: {} values did not fit their signal and stand at its limit\n", maker.saturated());
-    told(given, "{}: {} frames of {} samples\n", given.to, maker.frames(), record.count);
+    report(given, "{}: {} frames of {} samples\n", given.to, maker.frames(), record.count);
 }
 
 /// Name of a bus of a journal as a log can have it.
@@ -203,7 +203,7 @@ void journal_to_log(const convert_arguments& given) {
         losses += frame->loss != 0;
     }
     out.commit();
-    told(given, "{}: {} frames\n", given.to, count);
+    report(given, "{}: {} frames\n", given.to, count);
     if (stamps + losses > 0)
         say("okid: a log has no place for the stamps of the devices ({}), for marks of losses ({}) and for "
             "times below a microsecond; the journal keeps them\n",
@@ -285,7 +285,7 @@ void log_to_journal(const convert_arguments& given, const std::optional<live_con
                                                  config ? fmt::format(" of the buses of {}", config->path) : ""));
     journal.end();
     out.commit();
-    told(given, "{}: {} frames{}\n", given.to, count, config ? "" : "; without -c it holds no config");
+    report(given, "{}: {} frames{}\n", given.to, count, config ? "" : "; without -c it holds no config");
 }
 
 /// The config given, or that of the journal; none where it is not needed.

@@ -172,12 +172,12 @@ std::vector<std::pair<std::size_t, std::size_t>> pair_modes(const std::vector<co
     std::vector<candidate> shapes, frequencies;
     for (std::size_t i = 0; i < a.size(); ++i)
         for (std::size_t j = 0; j < b.size(); ++j) {
-            const double far = apart(*a[i], *b[j]), same = mac.empty() ? NAN : mac[i][j];
-            if (same >= alike && far < rule.of_one_shape)
-                shapes.push_back({far / rule.of_one_shape + (1 - same) / (1 - alike), i, j});
-            else if (std::isnan(same) ? far < rule.without_shape
-                                      : agree(*a[i], *b[j]) || (same >= half_alike && far < rule.of_half_shape))
-                frequencies.push_back({far, i, j});
+            const double difference = apart(*a[i], *b[j]), same = mac.empty() ? NAN : mac[i][j];
+            if (same >= alike && difference < rule.of_one_shape)
+                shapes.push_back({difference / rule.of_one_shape + (1 - same) / (1 - alike), i, j});
+            else if (std::isnan(same) ? difference < rule.without_shape
+                                      : agree(*a[i], *b[j]) || (same >= half_alike && difference < rule.of_half_shape))
+                frequencies.push_back({difference, i, j});
         }
     std::vector<bool> taken_a(a.size()), taken_b(b.size());
     std::vector<std::pair<std::size_t, std::size_t>> out;

@@ -230,12 +230,12 @@ std::map<std::string, dbc_file> read_dbcs(live_config& config, bool from_files, 
         if (fresh && !from_files) refuse_file(config.path, fmt::format("\"{}\" is not in it", bus.dbc_name));
         if (fresh) text->second = dbc_text_of(config.path, bus);
         const dbc_file& dbc = out.emplace(bus.dbc, read_dbc(bus.dbc, text->second)).first->second;
-        constexpr std::size_t most_told = 4;
-        for (std::size_t i = 0; i < std::min(dbc.faults.size(), most_told); ++i)
+        constexpr std::size_t most_listed = 4;
+        for (std::size_t i = 0; i < std::min(dbc.faults.size(), most_listed); ++i)
             config.warnings.push_back(dbc.faults[i]);
-        if (dbc.faults.size() > most_told)
+        if (dbc.faults.size() > most_listed)
             config.warnings.push_back(
-                fmt::format("{}: {} more lines could not be read", dbc.path, dbc.faults.size() - most_told));
+                fmt::format("{}: {} more lines could not be read", dbc.path, dbc.faults.size() - most_listed));
     }
     return out;
 }

@@ -87,13 +87,9 @@ void read_band(const config_place& place, const toml::table& t, identification_c
     out.band = {low, high};
 }
 
-} // namespace
-
-void read_identification(const toml::table& file, live_config& config) {
-    identification_config& out = config.identification;
-    const toml::table *table = file["identification"].as_table(), none; // without the section its defaults, too
-    const config_place place{config.path, "[identification]"};
-    const toml::table& t = table ? *table : none;
+/// The method, and what every method has: matrices, hold, detrend, refinement, lags, order.
+void read_method(const config_place& place, const toml::table& t, const live_config& config,
+                 identification_config& out) {
     out.method = chosen_method(t);
     const bool agreed = out.method == "auto";
     out.hankel = t["hankel"].value_or(out.hankel);
@@ -114,9 +110,11 @@ void read_identification(const toml::table& file, live_config& config) {
     out.p = static_cast<int>(t["p"].value_or(std::int64_t{out.p}));
     out.rows = static_cast<int>(t["rows"].value_or(std::int64_t{0}));
     out.order = static_cast<int>(t["order"].value_or(std::int64_t{0}));
-    out.window_s = t["window_s"].value<double>();
-    out.forgetting = t["forgetting"].value<double>();
-    out.update_s = t["update_s"].value_or(std::max(out.update_s, 1 / config.rate_hz));
+    out.decimate = static_cast<int>(t["decimate"].value_or(std::int64_t{1}));
+}
+
+/// Standard deviations: how, and from how many blocks.
+void read_sigma(const config_place& place, const toml::table& t, identification_config& out) {
     out.sigma_blocks = static_cast<int>(t["sigma_blocks"].value_or(std::int64_t{out.sigma_blocks}));
     if (out.sigma_blocks > 0 && out.sigma_blocks < fewest_blocks)
         refuse_key(
@@ -125,15 +123,25 @@ void read_identification(const toml::table& file, live_config& config) {
     const auto sigma = t["sigma"].value_or(std::string(t.contains("sigma_blocks") ? "jackknife" : "analytic"));
     out.analytic = sigma == "analytic";
     if (sigma == "none") out.sigma_blocks = 0;
+}
+
+/// Which samples count: a window or forgetting, and how often there is an update.
+void read_memory(const config_place& place, const toml::table& t, double rate_hz, identification_config& out) {
+    out.window_s = t["window_s"].value<double>();
+    out.forgetting = t["forgetting"].value<double>();
+    out.update_s = t["update_s"].value_or(std::max(out.update_s, 1 / rate_hz));
     out.window = t["window"].value_or(out.window);
     if (const std::string fault = chosen_window_fault(out); !fault.empty())
         refuse_key(place, t.get("window"), "window", fault);
     if (out.window_s && out.forgetting)
         refuse_key(place, t.get("forgetting"), "forgetting",
                    "window_s is given too; a window and forgetting together are not available, choose one");
-    check_agreement(place, t, out);
-    read_band(place, t, out);
-    out.decimate = static_cast<int>(t["decimate"].value_or(std::int64_t{1}));
+}
+
+/// How far a named method looks back: by p or by rows.
+void check_horizon(const toml::table& t, live_config& config) {
+    identification_config& out = config.identification;
+    const bool agreed = out.method == "auto";
     const okid_method_t method = method_of(agreed ? "n4sid-cva" : out.method);
     const bool by_rows = looks_back_rows(method, config.n_u);
     out.horizon_given = is_subspace(method) ? t.contains("rows") : t.contains("p") || (by_rows && t.contains("rows"));
@@ -142,6 +150,32 @@ void read_identification(const toml::table& file, live_config& config) {
             fmt::format("[identification] p belongs to the observer of the okid methods: {} looks back {} block rows "
                         "here",
                         out.method, rows_used(method, config.n_u, out.p, out.rows)));
+}
+
+/// Mass, stiffness and damping matrices: can they be found from these channels?
+void read_mkr(const config_place& place, const toml::table& t, live_config& config) {
+    config.identification.mkr = t["mkr"].value_or(false);
+    if (!config.identification.mkr) return;
+    if (config.n_u == 0)
+        config.warnings.emplace_back(
+            "[identification] mkr: no [[channel]] has the role force, so there is no M, K and R");
+    const std::string fault = config.n_u > 0 && config.n_y > 0 ? plan_fault(live_mass_plan(config)) : "";
+    if (!fault.empty()) refuse_key(place, t.get("mkr"), "mkr", fault + ". The key \"dof\" of [[channel]] says where");
+}
+
+} // namespace
+
+void read_identification(const toml::table& file, live_config& config) {
+    identification_config& out = config.identification;
+    const toml::table *table = file["identification"].as_table(), none; // without the section its defaults, too
+    const config_place place{config.path, "[identification]"};
+    const toml::table& t = table ? *table : none;
+    read_method(place, t, config, out);
+    read_sigma(place, t, out);
+    read_memory(place, t, config.rate_hz, out);
+    check_agreement(place, t, out);
+    read_band(place, t, out);
+    check_horizon(t, config);
     if (const std::string fault = window_fault(out, config.n_u, config.n_y, config.rate_hz); !fault.empty())
         refuse_key(place, t.get("window_s"), "window_s", fault);
     if (t.contains("update_s") && out.update_s * config.rate_hz < 1)
@@ -149,13 +183,8 @@ void read_identification(const toml::table& file, live_config& config) {
             place, t.get("update_s"), "update_s",
             fmt::format("found {:g} s, expected at least one sample ({:g} s)", out.update_s, 1 / config.rate_hz));
     out.restart_on_change = t["restart_on_change"].value_or(true);
-    out.mkr = t["mkr"].value_or(false);
     out.max_memory_mb = t["max_memory_mb"].value_or(out.max_memory_mb);
-    if (out.mkr && config.n_u == 0)
-        config.warnings.emplace_back(
-            "[identification] mkr: no [[channel]] has the role force, so there is no M, K and R");
-    const std::string fault = out.mkr && config.n_u > 0 && config.n_y > 0 ? plan_fault(live_mass_plan(config)) : "";
-    if (!fault.empty()) refuse_key(place, t.get("mkr"), "mkr", fault + ". The key \"dof\" of [[channel]] says where");
+    read_mkr(place, t, config);
 }
 
 } // namespace okid_host

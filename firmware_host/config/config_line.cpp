@@ -16,7 +16,7 @@ constexpr int usual_baud = 115200;
 
 /// Keys that mean something only on some types of bus.
 struct key_owner {
-    const char *key, *types, *told;
+    const char *key, *types, *expected;
 };
 constexpr key_owner owners[] = {
     {"device", "serial slcan", "serial or slcan"},
@@ -40,7 +40,7 @@ void check_owners(const config_place& place, const toml::table& table, const bus
             if ((' ' + std::string(each.types) + ' ').find(' ' + bus.type + ' ') == std::string::npos)
                 refuse_key(
                     place, node, each.key,
-                    fmt::format("found on a bus of type {}, expected only on one of type {}", bus.type, each.told));
+                    fmt::format("found on a bus of type {}, expected only on one of type {}", bus.type, each.expected));
 }
 
 void require(const config_place& place, const toml::table& table, const char* key, const std::string& why) {

@@ -152,6 +152,32 @@ void require_built(const config_place& place, const toml::table& table, const ch
                                package));
 }
 
+void read_prometheus(const config_place& place, const toml::node& node, live_config& config) {
+    std::optional<net_address> at = address_of(*node.value<std::string>(), 0);
+    if (at && at->host == "localhost") at->host = "127.0.0.1";
+    if (!at || !numeric(at->host))
+        refuse_address(place, node, "prometheus", "a numeric address and a port, such as 127.0.0.1:9273");
+    if (!at->loopback())
+        config.warnings.push_back(fmt::format(
+            "[publish] prometheus listens on {}: anyone who reaches that address can read the modes", at->text()));
+    config.publish.prometheus = std::move(at);
+}
+
+/// Warnings about passwords that others can read and addresses beyond this computer.
+void warn_of_exposure(live_config& config) {
+    const publish_config& out = config.publish;
+    if (out.mqtt && !out.mqtt->password.empty() && everybody_reads(config.path))
+        config.warnings.emplace_back(
+            "[publish] mqtt holds a password, and every user of this computer can read the config: "
+            "chmod o-r, or use password_file");
+    for (const auto& [what, address] :
+         {std::pair{"udp", out.udp}, std::pair{"mqtt", out.mqtt ? std::optional(out.mqtt->at) : std::nullopt},
+          std::pair{"influx", out.influx && out.influx->file.empty() ? std::optional(out.influx->at) : std::nullopt}})
+        if (address && !address->loopback())
+            config.warnings.push_back(
+                fmt::format("[publish] {} sends to {}, beyond this computer, and unencrypted", what, address->text()));
+}
+
 } // namespace
 
 bool net_address::loopback() const { return host == "localhost" || host.compare(0, 4, "127.") == 0 || host == "::1"; }
@@ -188,16 +214,7 @@ void read_publish(const toml::table& file, live_config& config) {
         out.udp = address_of(*node->value<std::string>(), 0);
         if (!out.udp) refuse_address(place, *node, "udp", "an address and a port, such as 127.0.0.1:9870");
     }
-    if (const toml::node* node = table->get("prometheus")) {
-        out.prometheus = address_of(*node->value<std::string>(), 0);
-        if (out.prometheus && out.prometheus->host == "localhost") out.prometheus->host = "127.0.0.1";
-        if (!out.prometheus || !numeric(out.prometheus->host))
-            refuse_address(place, *node, "prometheus", "a numeric address and a port, such as 127.0.0.1:9273");
-        if (!out.prometheus->loopback())
-            config.warnings.push_back(
-                fmt::format("[publish] prometheus listens on {}: anyone who reaches that address can read the modes",
-                            out.prometheus->text()));
-    }
+    if (const toml::node* node = table->get("prometheus")) read_prometheus(place, *node, config);
     if (const toml::node* node = table->get("mqtt")) out.mqtt = broker_of(place, *node);
     if (const toml::node* node = table->get("password_file")) read_password_file(place, *node, out);
     if (const toml::node* node = table->get("discovery")) {
@@ -210,16 +227,7 @@ void read_publish(const toml::table& file, live_config& config) {
             refuse_key(place, node, "influx_token_file", "it is for HTTP, expected influx = \"http://…\" beside it");
         out.influx->token_file = *node->value<std::string>();
     }
-    if (out.mqtt && !out.mqtt->password.empty() && everybody_reads(config.path))
-        config.warnings.emplace_back(
-            "[publish] mqtt holds a password, and every user of this computer can read the config: "
-            "chmod o-r, or use password_file");
-    for (const auto& [what, address] :
-         {std::pair{"udp", out.udp}, std::pair{"mqtt", out.mqtt ? std::optional(out.mqtt->at) : std::nullopt},
-          std::pair{"influx", out.influx && out.influx->file.empty() ? std::optional(out.influx->at) : std::nullopt}})
-        if (address && !address->loopback())
-            config.warnings.push_back(
-                fmt::format("[publish] {} sends to {}, beyond this computer, and unencrypted", what, address->text()));
+    warn_of_exposure(config);
 }
 
 void read_virtual(const toml::table& file, live_config& config) {

@@ -27,7 +27,7 @@ constexpr std::uint32_t no_message_id = 0xC0000000u; // VECTOR__INDEPENDENT_SIG_
 struct frame_formats {
     std::uint64_t j1939 = 3; ///< its number
     bool j1939_by_default = false;
-    std::vector<std::uint32_t> told; ///< messages it names, as numbered in the file
+    std::vector<std::uint32_t> named; ///< messages it names, as numbered in the file
 };
 
 /// One line under inspection; every refusal names file, line and column.
@@ -100,7 +100,7 @@ class dbc_line {
         at_ -= letters;
         refuse(expected);
     }
-    /// A number nobody needs: one beyond the range of a double will do.
+    /// A number that is not used: one beyond the range of a double will do.
     void bound(const char* expected) {
         blanks();
         double value = 0;
@@ -312,7 +312,7 @@ void read_attribute(dbc_line& line, std::string_view keyword, dbc_file& file, fr
     }
     if (line.word() != "BO_") return;
     const std::uint32_t id = line.message_id();
-    formats.told.push_back(id);
+    formats.named.push_back(id);
     if (line.whole("the number of a frame format", 255) != formats.j1939) return;
     for (dbc_message& message : file.messages)
         if (message.extended && has_id(message, id)) message.j1939 = true;
@@ -323,7 +323,7 @@ void apply_default_format(const frame_formats& formats, dbc_file& file) {
     if (!formats.j1939_by_default) return;
     for (dbc_message& message : file.messages)
         if (message.extended &&
-            std::find(formats.told.begin(), formats.told.end(), message.id | extended_bit) == formats.told.end())
+            std::find(formats.named.begin(), formats.named.end(), message.id | extended_bit) == formats.named.end())
             message.j1939 = true;
 }
 

@@ -2,7 +2,7 @@
 // PURPOSE  okid_host/capture.h: a session fed by somebody else's reader
 // METHOD   a session and what stands around it in `okid run` (journal, GPIO lines, health of the buses), without the readers.
 //          Bytes of a line go through the source that reads such a line, opened without a device. Samples and events that
-//          nobody has taken yet wait in arrays, runs of missing samples as one entry
+//          were not taken yet wait in arrays, runs of missing samples as one entry
 #include "acquire/bus_watch.hpp"
 #include "acquire/serial_line.hpp"
 #include "files.hpp"
@@ -115,7 +115,7 @@ struct okid_host_capture_t final : private session_listener {
     bool done() const { return finished_ || session_->done(); }
     const session& state() const { return *session_; }
     const char* take_events();
-    const char* keep(std::string text) { return (told_ = std::move(text)).c_str(); }
+    const char* keep(std::string text) { return (returned_ = std::move(text)).c_str(); }
 
   private:
     void on_sample(std::int64_t index, const double* row) override {
@@ -135,7 +135,7 @@ struct okid_host_capture_t final : private session_listener {
     face::waiting_rows waiting_;
     std::vector<double> scaled_;
     std::mutex mutex_; ///< of events_: another thread may report an update
-    std::string events_, told_;
+    std::string events_, returned_;
     std::vector<std::unique_ptr<face::pushed_bus>> buses_;
     std::unique_ptr<log_frames> log_;
     std::unique_ptr<gpio_lines> lines_;
@@ -171,9 +171,9 @@ void okid_host_capture_t::on_event(const std::string& line) {
 
 const char* okid_host_capture_t::take_events() {
     const std::lock_guard<std::mutex> hold(mutex_);
-    told_.clear();
-    told_.swap(events_);
-    return told_.c_str();
+    returned_.clear();
+    returned_.swap(events_);
+    return returned_.c_str();
 }
 
 void okid_host_capture_t::push(const drv_frame_t& frame) {

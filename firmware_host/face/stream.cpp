@@ -185,9 +185,8 @@ std::string stream_json(const stream_config& config) {
         .dump();
 }
 
-stream_config read_stream(const char* text, const live_config* config) {
-    stream_request given;
-    if (config) start_from(*config, given);
+/// The options of the text, over those that are there.
+void read_request(const char* text, stream_request& given) {
     option_places places = places_of(given.record);
     for (const auto& [name, place] :
          {std::pair{"window_s", &given.window_s}, std::pair{"window", &given.window},
@@ -198,6 +197,28 @@ stream_config read_stream(const char* text, const live_config* config) {
     places.flags.emplace_back("restart_on_change", &given.restart_on_change);
     places.flags.emplace_back("states_only", &given.states_only);
     read_options(text, places);
+}
+
+/// What a record and a stream have in common.
+void copy_method(const record_options& from, identification_config& to) {
+    to.method = from.method;
+    to.hankel = from.hankel;
+    to.hold = from.hold;
+    to.detrend = from.detrend;
+    to.p = from.p;
+    to.rows = from.rows;
+    to.order = from.order;
+    to.band = from.band;
+    to.decimate = from.decimate;
+    to.sigma_blocks = from.sigma_blocks;
+    to.refine = from.refine;
+    to.analytic = from.analytic;
+}
+
+stream_config read_stream(const char* text, const live_config* config) {
+    stream_request given;
+    if (config) start_from(*config, given);
+    read_request(text, given);
     if (config && config->identification.method != "auto" && given.record.method == "auto") // of the file's own method
         given.record.p = given.record.rows = "", given.record.order = "auto", given.record.hankel = "system";
     if (given.record.method.empty() && (!given.forgetting.empty() || given.window == "auto"))
@@ -230,19 +251,8 @@ stream_config read_stream(const char* text, const live_config* config) {
             out.mass = live_mass_plan(*config);
         out.mass.hold = checked.hold;
     }
-    identification_config& wanted = out.wanted;
-    wanted.method = checked.method;
-    wanted.hankel = checked.hankel;
-    wanted.hold = checked.hold;
-    wanted.detrend = checked.detrend;
-    wanted.p = checked.p;
-    wanted.rows = checked.rows;
-    wanted.order = checked.order;
-    wanted.band = checked.band;
-    wanted.decimate = checked.decimate;
-    wanted.sigma_blocks = checked.sigma_blocks;
-    wanted.refine = where_it_serves ? "auto" : checked.refine;
-    wanted.analytic = checked.analytic;
+    copy_method(checked, out.wanted);
+    if (where_it_serves) out.wanted.refine = "auto";
     take_memory(given, out);
     take_samples(given, out);
     return out;

@@ -38,10 +38,10 @@ void alarm_watch::learn(baseline& to, const observed_mode& mode, std::int64_t fi
     to.scatter += weight * (mode.frequency_hz - before) * (mode.frequency_hz - to.mean);
     ++to.updates;
     if (to.steps < config_.baseline_updates) return;
-    const double told = to.updates / to.weight; // harmonic mean of the variances
+    const double expected = to.updates / to.weight; // harmonic mean of the variances
     const double seen =
         to.scatter / to.weight / independence(static_cast<double>(end - to.begun), static_cast<double>(end - first));
-    to.sigma = std::sqrt(std::max(told, to.updates > 2 ? seen : 0.0));
+    to.sigma = std::sqrt(std::max(expected, to.updates > 2 ? seen : 0.0));
 }
 
 void alarm_watch::judge(baseline& to, const observed_mode& mode) const {
@@ -70,9 +70,9 @@ bool alarm_watch::update(const std::vector<observed_mode>& modes, std::int64_t f
     away_.clear();
     for (const baseline& each : all_)
         if (each.away) away_.push_back(each.newest);
-    const auto far = [](const departure& d) { return std::abs(d.frequency_hz - d.baseline_hz) / d.sigma_hz; };
+    const auto in_sigma = [](const departure& d) { return std::abs(d.frequency_hz - d.baseline_hz) / d.sigma_hz; };
     std::sort(away_.begin(), away_.end(), [&](const departure& a, const departure& b) {
-        return far(a) != far(b) ? far(a) > far(b) : a.track < b.track;
+        return in_sigma(a) != in_sigma(b) ? in_sigma(a) > in_sigma(b) : a.track < b.track;
     });
     const bool before = standing_;
     standing_ = !away_.empty();

@@ -53,7 +53,7 @@ live_blocks::live_blocks(const okid_accumulator_config_t& whole, const okid_iden
     linear_mass_ = !is_subspace(identify.method) || identify.method == OKID_METHOD_N4SID_SSARX;
     const live_jackknives needed(identify, sums_, analytic);
     if (needed.linear) create(needed.config(1), linear_block_, linear_);
-    create(needed.config(0), anew_block_, anew_);
+    create(needed.config(0), again_block_, again_);
     modes_ = std::make_unique<replicate_statistics>(n_u_, n_y_, most_states_, mass_plan{}, dt_);
 }
 
@@ -193,12 +193,12 @@ bool live_blocks::begin(okid_accumulator_t* whole, okid_identify_t* by, const ok
     if (linear_ && (linear_mass_ || !mass)) {
         if (okid_jackknife_begin_linear(linear_, by, gather(whole, first), &model) == OKID_OK) return true;
     }
-    return begin_anew(whole, model, first);
+    return begin_again(whole, model, first);
 }
 
-bool live_blocks::begin_anew(okid_accumulator_t* whole, const okid_identified_t& model, std::int32_t first) {
-    jackknife_ = anew_;
-    return okid_jackknife_begin(anew_, window() ? together(whole, first) : whole, &model) == OKID_OK;
+bool live_blocks::begin_again(okid_accumulator_t* whole, const okid_identified_t& model, std::int32_t first) {
+    jackknife_ = again_;
+    return okid_jackknife_begin(again_, window() ? together(whole, first) : whole, &model) == OKID_OK;
 }
 
 okid_accumulator_t* live_blocks::gather(okid_accumulator_t* whole, std::int32_t first) {
@@ -231,7 +231,7 @@ std::optional<deviations> live_blocks::sigma(okid_accumulator_t* whole, okid_ide
     };
     deviations out = without_each();
     if (jackknife_ == linear_ && linear_ && most_of_one_ > most_of_one_block) {
-        if (!begin_anew(whole, model, first)) return std::nullopt;
+        if (!begin_again(whole, model, first)) return std::nullopt;
         out = without_each();
     }
     if (out.replicates < fewest_blocks) return std::nullopt;

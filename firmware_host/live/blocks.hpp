@@ -80,7 +80,7 @@ class live_blocks {
     void leave_out(okid_accumulator_t* one, double weight, replicate_statistics& to);
     bool begin(okid_accumulator_t* whole, okid_identify_t* by, const okid_identified_t& model, bool mass,
                std::int32_t first);
-    bool begin_anew(okid_accumulator_t* whole, const okid_identified_t& model, std::int32_t first);
+    bool begin_again(okid_accumulator_t* whole, const okid_identified_t& model, std::int32_t first);
 
     okid_accumulator_config_t whole_, sums_{};
     std::size_t m_, blocks_;
@@ -91,9 +91,9 @@ class live_blocks {
     std::vector<double> history_;     ///< the last samples of the run, at most `lags`
     std::vector<std::int16_t> codes_; ///< the same as codes, when a part begins
     std::vector<std::int32_t> wide_codes_;
-    std::unique_ptr<std::byte[]> linear_block_, anew_block_;
+    std::unique_ptr<std::byte[]> linear_block_, again_block_;
     okid_jackknife_t *linear_ = nullptr,
-                     *anew_ = nullptr;      ///< to first order (NULL: there is no derivative), identified again
+                     *again_ = nullptr;     ///< to first order (NULL: there is no derivative), identified again
     okid_jackknife_t* jackknife_ = nullptr; ///< the one in use
     double most_of_one_ = 0;                ///< largest share of the channels' power that one block had
     std::unique_ptr<replicate_statistics> modes_;

@@ -102,14 +102,14 @@ void change_test::end_test() {
     const bool learning = okid_change_order(test_) == 0;
     okid_change_verdict_t found{};
     const okid_status_t status = learning ? okid_change_learn(test_) : okid_change_test(test_, &found);
-    const bool told = !learning && status == OKID_OK && std::isfinite(found.p_value);
+    const bool tested = !learning && status == OKID_OK && std::isfinite(found.p_value);
     if (status == OKID_OK && !learning) standing_ = found.alarm != 0;
     std::string text;
     if (status < 0)
         text = fmt::format("{}: {}", learning ? "no baseline" : "no test", okid_status_text(status));
     else if (learning)
         text = fmt::format("baseline of {} states", okid_change_order(test_));
-    else if (!told)
+    else if (!tested)
         text = "too many blocks without samples for a test";
     else
         text = standing_ ? "the structure has changed" : "no change";
@@ -117,8 +117,8 @@ void change_test::end_test() {
                        {"t", static_cast<double>(samples_) / rate_hz_},
                        {"baseline", learning},
                        {"alarm", standing_},
-                       {"p_value", told ? ordered_json(found.p_value) : ordered_json(nullptr)},
-                       {"statistic", told ? ordered_json(found.statistic) : ordered_json(nullptr)},
+                       {"p_value", tested ? ordered_json(found.p_value) : ordered_json(nullptr)},
+                       {"statistic", tested ? ordered_json(found.statistic) : ordered_json(nullptr)},
                        {"modes", status < 0 ? ordered_json::array() : modes(!learning)},
                        {"text", text}});
 }

@@ -161,7 +161,7 @@ log_frames::~log_frames() { source_.ops->close(&source_); }
 
 /// What was left out, once, at the end.
 void log_frames::tell_damage() {
-    if (std::exchange(told_, true)) return;
+    if (std::exchange(reported_, true)) return;
     drv_stats_t counts{};
     source_.ops->stats(&source_, &counts);
     const drv_journal_reader_t* reader = is_journal(path_) ? drv_source_journal_reader(&source_) : nullptr;

@@ -68,7 +68,7 @@ class log_frames {
     read_share on_share_;
     std::vector<double> sizes_; ///< bytes of each file
     drv_source_t source_{};
-    bool told_ = false;
+    bool reported_ = false;
     std::vector<int> bus_of_; ///< of each bus of a journal, -1 = not wanted; empty = as it was
     std::vector<drv_frame_t> batch_;
     int at_ = 0, count_ = 0;

@@ -409,7 +409,7 @@ void session::remark_clocks(result_context& about) const {
                                                 config_.decimate, fir_kernel::pass_band * config_.rate_hz));
 }
 
-/// Channels without a counter whose bursts all end alike: what nobody can see in their arrivals.
+/// Channels without a counter whose bursts all end alike: what their arrivals cannot show.
 void session::remark_places(result_context& about) const {
     const okid_identified_t& model = stream_.model();
     for (std::size_t c = 0; c < config_.channels.size(); ++c) {
@@ -421,7 +421,7 @@ void session::remark_places(result_context& about) const {
                 "place_uncertain",
                 fmt::format(
                     "\"{}\" has no counter: at {} place{} its frames began to come later. Polls slipped past a "
-                    "sample, or whoever sends was late to the end of the stream, or samples are missing there and the "
+                    "sample, or the sender was late to the end of the stream, or samples are missing there and the "
                     "channel is late by them from then on; only a counter tells",
                     name, counts.uncertain, counts.uncertain == 1 ? "" : "s"));
         double worst = 0; // of R: the phase of the delay beside that of the damping

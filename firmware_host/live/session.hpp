@@ -119,7 +119,7 @@ class session : public stream_target, private grid_sink {
     std::int64_t start_ns_ = 0; ///< what t counts from
     std::int64_t gaps_ = 0;
     table_state shown_; ///< hammer test: after the newest hit
-    std::int64_t stats_told_ = 0;
+    std::int64_t stats_sent_ = 0;
     std::uint64_t updates_made_ = 0, updates_skipped_ = 0, updates_given_up_ = 0;
     relief relief_;
     std::array<bool, relief::steps> overloaded_{}; ///< reported, by step

@@ -15,8 +15,8 @@ void session::update(std::int64_t samples) {
         await(samples);
     else
         hand_over(samples);
-    if (samples / stats_samples_ == stats_told_) return;
-    stats_told_ = samples / stats_samples_;
+    if (samples / stats_samples_ == stats_sent_) return;
+    stats_sent_ = samples / stats_samples_;
     tell(stats_event());
 }
 

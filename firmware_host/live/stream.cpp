@@ -58,7 +58,7 @@ void stream::forget_updates() {
     baseline_tracks_.jump();
     looks_ = 0;
     look_at_ = 0;
-    changed_at_ = restarted_at_ = restarts_told_ = 0;
+    changed_at_ = restarted_at_ = restarts_reported_ = 0;
 }
 
 std::optional<stream_update::change> stream::take_change(std::int64_t now) {
@@ -67,8 +67,8 @@ std::optional<stream_update::change> stream::take_change(std::int64_t now) {
     changed_at_ = now - *ago;
     looks_ = 0;
     look_at_ = 0;
-    const bool restarted = identifier_.restarts() > restarts_told_;
-    restarts_told_ = identifier_.restarts();
+    const bool restarted = identifier_.restarts() > restarts_reported_;
+    restarts_reported_ = identifier_.restarts();
     if (restarted) {
         restarted_at_ = now - identifier_.basis();
         for (mode_tracks* each : {&tracks_, &baseline_tracks_}) each->jump();

@@ -60,8 +60,8 @@ void virtual_channels::find_places(const live_config& config) {
         const bool input = i < static_cast<std::size_t>(model.n_u());
         if (!found && input)
             throw failure(exit_usage,
-                          fmt::format("{}: its input \"{}\" is no channel of {}, expected one: forces that nobody "
-                                      "measures need virtual sensors made with force_std",
+                          fmt::format("{}: its input \"{}\" is no channel of {}, expected one: forces without a sensor "
+                                      "need virtual sensors made with force_std",
                                       config.virtual_sensors.model, names[i], config.path));
         places_.emplace_back();
         if (!found) continue;

@@ -181,14 +181,14 @@ class connection {
 
     /// Once is enough.
     void complain(const char* why) {
-        if (told_.exchange(true)) return;
+        if (reported_.exchange(true)) return;
         say("okid: [publish] mqtt {}: {}; trying again, the run goes on\n", to_.at.text(), why);
     }
 
     broker_address to_;
     mosquitto* client_;
     int wake_fd_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    std::atomic<bool> told_{false}, greeted_{false}; ///< greeted: CONNECT is sent, or waits before all else
+    std::atomic<bool> reported_{false}, greeted_{false}; ///< greeted: CONNECT is sent, or waits before all else
     std::mutex mutex_;
     std::condition_variable changed_;
     bool ending_ = false, ended_ = false;
@@ -229,17 +229,17 @@ class broker : public event_sink {
         for (const auto& mode : event.at("modes")) {
             if (!mode.at("track").is_number()) continue;
             const int track = mode.at("track").get<int>();
-            if (told_.count(track)) continue;
+            if (announced_.count(track)) continue;
             bool sent = true;
             for (const auto& [topic, text] : discovery_of(level_, modes_topic, track))
                 sent = link_->send(topic, text.data(), text.size(), true) && sent;
-            if (sent) told_.insert(track);
+            if (sent) announced_.insert(track);
         }
     }
 
     std::string level_;
     bool discovery_;
-    std::set<int> told_;
+    std::set<int> announced_;
     std::string topic_;
     std::shared_ptr<connection> link_;
     std::thread thread_;

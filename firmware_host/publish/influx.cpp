@@ -147,8 +147,8 @@ class influx_post : public event_sink {
     }
     /// Once is enough.
     void complain(const char* why) {
-        if (told_) return;
-        told_ = true;
+        if (reported_) return;
+        reported_ = true;
         say("okid: [publish] influx {}: {}; the run goes on\n", to_.at.text(), why);
     }
 
@@ -159,7 +159,7 @@ class influx_post : public event_sink {
     std::size_t sent_ = 0;
     double give_up_at_ = 0, not_before_ = 0;
     int fd_ = -1;
-    bool told_ = false;
+    bool reported_ = false;
 };
 
 } // namespace

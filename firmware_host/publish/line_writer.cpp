@@ -87,10 +87,10 @@ void line_writer::run() {
         const bool broken = !error_.empty();
         lock.unlock();
         reopen();
-        const bool told = !broken && (lost == 0 || write(fmt::format("{{\"type\":\"lost\",\"count\":{}}}\n", lost)));
-        if (told && line) (void)write(*line);
+        const bool counted = !broken && (lost == 0 || write(fmt::format("{{\"type\":\"lost\",\"count\":{}}}\n", lost)));
+        if (counted && line) (void)write(*line);
         lock.lock();
-        if (!told && line) lost_ += lost; // and the line itself was counted by give_up()
+        if (!counted && line) lost_ += lost; // and the line itself was counted by give_up()
     }
 }
 
@@ -118,7 +118,7 @@ bool line_writer::write(const std::string& line) {
 /// A replay ends; a measurement goes on, and tries again with the next line.
 void line_writer::give_up(const char* why) {
     const std::string text = fmt::format("{}: cannot be written: {}", what_, why);
-    if (!patient_ && !std::exchange(told_, true)) say("okid: {}; the run goes on, these lines are lost\n", text);
+    if (!patient_ && !std::exchange(reported_, true)) say("okid: {}; the run goes on, these lines are lost\n", text);
     const std::lock_guard<std::mutex> lock(mutex_);
     ++lost_;
     if (patient_) error_ = text;

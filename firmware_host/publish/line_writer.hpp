@@ -48,7 +48,7 @@ class line_writer {
     std::size_t bytes_ = 0;
     std::uint64_t lost_ = 0;
     bool ending_ = false;
-    bool torn_ = false, told_ = false; ///< of the thread: a line was cut; the trouble was reported
+    bool torn_ = false, reported_ = false; ///< of the thread: a line was cut; the trouble was reported
     std::string error_;
     std::thread thread_;
 };

@@ -29,7 +29,7 @@ void notify_service(const std::string& text) {
 bool service_notice::wanted() { return std::getenv("NOTIFY_SOCKET") != nullptr; }
 
 service_notice::service_notice(const std::atomic<std::uint64_t>& beats)
-    : beats_(beats), told_(std::chrono::steady_clock::now()) {
+    : beats_(beats), notified_(std::chrono::steady_clock::now()) {
     const char *limit = std::getenv("WATCHDOG_USEC"), *whom = std::getenv("WATCHDOG_PID");
     if (limit && (!whom || std::strtoll(whom, nullptr, 10) == getpid()))
         half_ = std::chrono::microseconds(std::strtoll(limit, nullptr, 10) / 2);
@@ -49,9 +49,9 @@ void service_notice::take(const publication& one) {
 void service_notice::tick() {
     const auto now = std::chrono::steady_clock::now();
     const std::uint64_t beats = beats_.load(std::memory_order_relaxed);
-    if (half_.count() <= 0 || now - told_ < half_ || beats == seen_) return;
+    if (half_.count() <= 0 || now - notified_ < half_ || beats == seen_) return;
     notify_service("WATCHDOG=1");
-    told_ = now;
+    notified_ = now;
     seen_ = beats;
 }
 

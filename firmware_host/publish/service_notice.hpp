@@ -27,7 +27,7 @@ class service_notice : public event_sink {
     const std::atomic<std::uint64_t>& beats_;
     std::uint64_t seen_ = 0;
     std::chrono::microseconds half_{0}; ///< 0 = no watchdog
-    std::chrono::steady_clock::time_point told_;
+    std::chrono::steady_clock::time_point notified_;
 };
 
 } // namespace okid_host

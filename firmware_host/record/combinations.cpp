@@ -306,9 +306,9 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
     fill(work, s);
     const auto before =
         std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; });
-    std::vector<std::string> told;
+    std::vector<std::string> products;
     const auto tell = [&](double f, const product& of) {
-        told.push_back(fmt::format("{:.4g} Hz = {}", f, words_of(of, modes)));
+        products.push_back(fmt::format("{:.4g} Hz = {}", f, words_of(of, modes)));
     };
     const std::vector<product> more = distortions(s);
     const std::vector<std::size_t> first = bases_of(s, modes.size(), 1); // the strongest stays
@@ -325,9 +325,9 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
         }
     };
     look(in_phase, product_frequency);
-    if (told.empty())
+    if (products.empty())
         for (const product& of : more) tell(frequency_of(of, modes), of);
-    if (told.empty()) return false;
+    if (products.empty()) return false;
     look(then_in_phase, then_frequency);
     for (std::size_t k = 0; k < modes.size(); ++k)
         if (driven && k != first.front() && modes[k].in_model && s.strands[k].peak < resonance_peak &&
@@ -336,7 +336,7 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
     work.context.warnings.emplace_back(
         "nonlinear", fmt::format("the structure is not linear: what it does at {} moves in phase with the product of "
                                  "these vibrations. The model holds for the level of this record",
-                                 fmt::join(told, ", ")));
+                                 fmt::join(products, ", ")));
     return std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; }) != before;
 }
 

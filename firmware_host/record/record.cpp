@@ -165,7 +165,7 @@ void find_matrices(const std::vector<replicate_model>& replicates, const record_
     okid_identified_t structure = work.model;
     if (work.context.refined) structure = without_skew(replicates, options.mass, work);
     mass_plan plan = options.mass;
-    if (plan.hold == "auto") plan.hold = work.context.hold = told_hold(work.set, structure, plan);
+    if (plan.hold == "auto") plan.hold = work.context.hold = hold_of_data(work.set, structure, plan);
     work.context.mass = find_mass_matrices(structure, plan, said);
     modal_mass_statistics masses(plan, structure.dt);
     masses.begin(structure);

@@ -25,7 +25,7 @@ bool falls_to_nyquist(const record_set& set) {
     return false;
 }
 
-std::string told_hold(const record_set& set, const okid_identified_t& model, const mass_plan& plan) {
+std::string hold_of_data(const record_set& set, const okid_identified_t& model, const mass_plan& plan) {
     std::vector<int> sensing;
     for (const mass_channel& channel : plan.outputs) sensing.push_back(channel.sensing);
     return tell_hold(model, sensing, falls_to_nyquist(set));

@@ -9,6 +9,6 @@ namespace okid_host {
 bool falls_to_nyquist(const record_set& set);
 
 /// "zoh", "foh" or "band", of the records a model was identified from; the plan says what the outputs measure.
-std::string told_hold(const record_set& set, const okid_identified_t& model, const mass_plan& plan);
+std::string hold_of_data(const record_set& set, const okid_identified_t& model, const mass_plan& plan);
 
 } // namespace okid_host

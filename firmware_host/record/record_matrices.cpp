@@ -48,7 +48,7 @@ void find_matrices_agreed(const record_options& options, record_work& work) {
     mass_plan plan = options.mass;
     if (plan.outputs.empty()) plan.outputs.resize(work.set.n_y);
     if (work.set.n_u > 0 && options.hold == "auto")
-        work.context.hold = told_hold(work.force_is_older ? record_set() : work.set, work.model, plan);
+        work.context.hold = hold_of_data(work.force_is_older ? record_set() : work.set, work.model, plan);
     if (options.hold == "auto" && work.set.n_u == 0) work.context.hold = "zoh";
     plan.hold = work.context.hold;
     if (!options.mass.wanted()) return;

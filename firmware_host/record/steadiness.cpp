@@ -205,24 +205,24 @@ void remark_unsteady(const std::vector<listed_mode>& modes, double fs_hz, record
     }
     const bool driven = work.set.n_u > 0;
     if (driven && (!work.context.x0 || work.model.n_u != static_cast<int>(work.set.n_u))) return;
-    std::vector<std::vector<block_frequency>> told_by;
-    if (driven) told_by = with_force(s, work);
+    std::vector<std::vector<block_frequency>> forced;
+    if (driven) forced = with_force(s, work);
     std::vector<std::string> levels, drifts;
     for (std::size_t k = 0; k < s.modes.size(); ++k) {
         const listed_mode& mode = *s.modes[k];
         if (mode.damping_ratio > widest) continue;
-        const std::vector<block_frequency> over = driven ? told_by[k] : turning(s, k);
+        const std::vector<block_frequency> over = driven ? forced[k] : turning(s, k);
         slopes found = slopes_of(over, &block_frequency::power);
         const slopes other = slopes_of(over, &block_frequency::motion);
         if (other.level_ratio > found.level_ratio) found = other;
         const double least = worth_saying * 2 * mode.damping_ratio;
-        const auto told = [&](double change, double ratio) {
+        const auto text = [&](double change, double ratio) {
             return fmt::format("{:+.2g} % at {:.4g} Hz ({:.0f} σ)", 100 * change, mode.frequency_hz, ratio);
         };
         if (found.level_ratio > sure && std::abs(found.level) > least)
-            levels.push_back(told(found.level, found.level_ratio));
+            levels.push_back(text(found.level, found.level_ratio));
         if (found.drift_ratio > std::max(sure, found.level_ratio) && std::abs(found.drift) > least)
-            drifts.push_back(told(found.drift, found.drift_ratio));
+            drifts.push_back(text(found.drift, found.drift_ratio));
     }
     if (!levels.empty())
         work.context.warnings.emplace_back(

@@ -25,7 +25,7 @@ constexpr std::size_t around = 4, beside = 32; // lines of a peak, of its neighb
 constexpr double above = 10;                   // times the median there
 constexpr double least_share = 0.01;           // of the power of the output
 constexpr double left_share = 0.5;             // of the power of the peak: less is explained by the model
-constexpr std::size_t most_told = 5;
+constexpr std::size_t most_listed = 5;
 
 struct peak {
     double share, frequency_hz;
@@ -115,14 +115,14 @@ void remark_unexplained(const std::vector<listed_mode>& listed, double fs_hz, re
     }
     if (found.empty()) return;
     std::sort(found.begin(), found.end(), [](const peak& a, const peak& b) { return a.share > b.share; });
-    std::vector<std::string> told;
-    for (std::size_t i = 0; i < std::min(most_told, found.size()); ++i)
-        told.push_back(fmt::format("{:.4g} Hz ({:.0f} %)", found[i].frequency_hz, 100 * found[i].share));
+    std::vector<std::string> listed;
+    for (std::size_t i = 0; i < std::min(most_listed, found.size()); ++i)
+        listed.push_back(fmt::format("{:.4g} Hz ({:.0f} %)", found[i].frequency_hz, 100 * found[i].share));
     work.context.warnings.emplace_back(
         "unexplained",
         fmt::format("power at {}{} that no mode explains (share of an output's power): a mode the record shows too "
                     "little of, a tone, or an order too low. Look at --all-modes, or at one method: --method n4sid-cva",
-                    fmt::join(told, ", "), found.size() > most_told ? " and elsewhere" : ""));
+                    fmt::join(listed, ", "), found.size() > most_listed ? " and elsewhere" : ""));
 }
 
 } // namespace okid_host

@@ -12,8 +12,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int widest = 12;                                           // columns that stand side by side on a screen
-constexpr double not_proportional = 0.2, cannot_be_told_apart = 1e3; // of okid_pdc_t residual and condition
+constexpr int widest = 12;                                        // columns that stand side by side on a screen
+constexpr double not_proportional = 0.2, indistinguishable = 1e3; // of okid_pdc_t residual and condition
 
 ordered_json square_json(const std::vector<double>& values, int n) {
     ordered_json out = ordered_json::array();
@@ -205,7 +205,7 @@ remarks mass_remarks(const mass_matrices& found) {
         const char* name = (found.notes & bit) ? okid_mkr_note(bit) : nullptr;
         if (name) out.emplace_back(fmt::format("mkr_{}", name), note_words(found, bit));
     }
-    if (!(found.pdc.condition < cannot_be_told_apart))
+    if (!(found.pdc.condition < indistinguishable))
         out.emplace_back("pdc_undetermined",
                          "one frequency cannot tell alpha from beta: they share the damping evenly; their R is right "
                          "for these modes");

@@ -16,6 +16,7 @@ from functools import cache
 import pytest
 from markdown_pages import ROOT, name_of, pages, prose
 
+NOBODY = r"\b(?:nobody|whoever)\b"
 ODD = {  # pattern -> what to write
     r"\bblows?\b": "hit",
     r"\badds? the good ones up\b": "averages the accepted hits",
@@ -51,10 +52,11 @@ ODD = {  # pattern -> what to write
     r"\bit does not serve\b": "it cannot be used",
     r"\btells? nothing\b": "reports nothing",
     r"\bwanders\b": "scatters",
+    NOBODY: "no node, no reader, unmeasured",
 }
 DIALECT = {  # in comments and docstrings; pattern -> what to write
     r"\btold\b(?! apart)": "reported, known, given",
-    r"\bwhoever\b": "any reader, every source",
+    NOBODY: "no reader, unmeasured, every source",
     r"\banew\b": "again",
     r"\bmend(?:s|ed)?\b": "fix",
     r"\bno one's business\b|\bis nobody's\b": "undefined, discarded",
@@ -130,6 +132,18 @@ def comments() -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
+@cache
+def names() -> tuple[tuple[str, str], ...]:
+    """(where, names in the code) of the sources, words within a name apart."""
+    listed = ["git", "ls-files", "firmware_host", "lib", "drivers", "tools/okid"]
+    out = []
+    for name in subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split():
+        path = ROOT / name
+        if path.suffix in (".c", ".h", ".cpp", ".hpp", ".py", ".js") and path.exists():
+            out.append((name, re.sub(r"[_\W]+", " ", path.read_text())))
+    return tuple(out)
+
+
 def found_in(named: Iterable[tuple[str, str]], pattern: str) -> list[str]:
     return [
         f"{name}: …{text[max(0, hit.start() - 40) : hit.end() + 20]!r}"
@@ -142,6 +156,12 @@ def found_in(named: Iterable[tuple[str, str]], pattern: str) -> list[str]:
 def test_comments_are_plain(pattern: str) -> None:
     found = found_in(comments(), pattern)
     assert not found, f"write {DIALECT[pattern]!r}:\n" + "\n".join(found)
+
+
+@pytest.mark.parametrize("pattern", [r"\btold\b(?! apart)", r"\banew\b", NOBODY])
+def test_names_are_plain(pattern: str) -> None:
+    found = found_in(names(), pattern)
+    assert not found, "\n".join(found)
 
 
 @pytest.mark.parametrize("pattern", ODD)

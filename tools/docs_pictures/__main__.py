@@ -19,6 +19,7 @@ def main(wanted: list[str]) -> int:
         "report": browser.reports,
         "live": browser.live,
         "campaign": browser.campaign,
+        "notebook": browser.notebook,
     }
     unknown = [name for name in wanted if name not in groups]
     if unknown:

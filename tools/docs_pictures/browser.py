@@ -122,6 +122,38 @@ def campaign() -> list[str]:
         return [keep("campaign.png", tab.locator("main").screenshot())]
 
 
+def notebook() -> list[str]:
+    """The modes of an executed notebook as its page shows them, and a session that shows itself."""
+    with chromium() as browser:
+        tab = browser.new_page(viewport={"width": 1280, "height": 1000}, device_scale_factor=1.5)
+        tab.goto((runs.site() / "notebooks" / "shaker_test.html").as_uri())
+        part = """() => {
+          const all = [...document.querySelectorAll("h2")], first = all.findIndex((h) => h.id === "modes");
+          const from = all[first].getBoundingClientRect(), end = all[first + 2].getBoundingClientRect();
+          return { x: from.x - 10, y: from.y + scrollY - 10, width: from.width + 20, height: end.y - from.y }; }"""
+        return [keep("notebook.png", tab.screenshot(full_page=True, clip=tab.evaluate(part))), live_view(browser)]
+
+
+def live_view(browser: Any) -> str:
+    """okid.notebook.LiveView of the demo, with a model of its own in place of Jupyter's."""
+    import numpy as np
+    import okid
+
+    session = okid.Session(["shaker"], ["a1", "a2", "a3"], fs=1000.0, p=20)
+    view = okid.notebook.LiveView(session)
+    session.feed(np.hstack(okid.demo_record()))
+    view.update()
+    values = {key: getattr(view, key) for key in ("signals", "modes", "poles", "picked", "status")}
+    tab = browser.new_page(viewport={"width": 760, "height": 800}, device_scale_factor=1.5)
+    tab.set_content('<body style="font: 14px sans-serif"><div id="place" style="padding: 10px"></div>')
+    tab.evaluate(str(view._esm).replace("export default", "window.widget ="))
+    show = """(values) => {
+      widget.render({ model: { get: (key) => values[key], on() {} }, el: document.getElementById("place") }); }"""
+    tab.evaluate(show, values)
+    tab.wait_for_timeout(500)
+    return keep("notebook-live.png", tab.locator("#place").screenshot())
+
+
 def live() -> list[str]:
     """The page while a log plays, wide and on a phone."""
     runs.frame()

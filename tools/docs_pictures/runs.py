@@ -87,6 +87,14 @@ def campaign() -> Path:
     return FOLDER / "year" / "out" / "report.html"
 
 
+def site() -> Path:
+    """The documentation as web pages, its notebooks executed."""
+    folder = FOLDER / "site"
+    mkdocs = Path(sys.executable).with_name("mkdocs")
+    subprocess.run([mkdocs, "build", "--quiet", "--site-dir", folder], cwd=ROOT, check=True)
+    return folder
+
+
 def read(name: str) -> dict[str, Any]:
     out: dict[str, Any] = json.loads((FOLDER / name).read_text())
     return out

@@ -253,8 +253,8 @@ okid_status_t okid_change_test(okid_change_t* self, okid_change_verdict_t* out) 
             mode.shift = s.estimate[k] - s.at_baseline[k];
             const double variance = s.covariance[area(k, s.modes + 1)] + s.spread[area(k, s.modes + 1)];
             mode.sigma = known ? std::sqrt(variance) : not_a_number;
-            const double far = std::abs(mode.shift) / (known ? mode.sigma : 1);
-            if (far > most) most = far, out->farthest = k;
+            const double size = std::abs(mode.shift) / (known ? mode.sigma : 1);
+            if (size > most) most = size, out->farthest = k;
         }
         judge(s, *out);
     }

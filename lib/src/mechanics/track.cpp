@@ -28,7 +28,7 @@ struct okid_tracks {
     // Of one update: rows are modes, columns tracks, then one private column a mode for staying alone.
     double *cost, *row_price, *column_price, *slack;
     int32_t *owner, *way, *of_mode;        // mode of a column, column before it on the path; track of a mode; -1 none
-    uint8_t *reached, *mode_close, *close; // of the newest update's modes; of tracks, when last seen
+    uint8_t *in_tree, *mode_close, *close; // of the newest update's modes; of tracks, when last seen
 };
 
 namespace {
@@ -49,7 +49,7 @@ size_t lay_out(okid_tracks& s, okid::arena& memory) {
     for (double** each : {&s.column_price, &s.slack}) *each = memory.take<double>(columns);
     for (int32_t** each : {&s.owner, &s.way}) *each = memory.take<int32_t>(columns);
     s.of_mode = memory.take<int32_t>(modes);
-    s.reached = memory.take<uint8_t>(columns);
+    s.in_tree = memory.take<uint8_t>(columns);
     s.mode_close = memory.take<uint8_t>(modes);
     s.close = memory.take<uint8_t>(tracks);
     return memory.bytes();
@@ -79,11 +79,11 @@ struct mode_view {
 
 size_t column_of(const okid_tracks& s, int k) { return static_cast<size_t>(s.config.n_y) * static_cast<size_t>(k); }
 
-/// @param far  from where the track was lost
-double distance(const okid_tracks& s, const mode_view& to, int mode, int track, bool far) {
+/// @param lost  the track was lost, and the mode may have moved by up to the configured jump
+double distance(const okid_tracks& s, const mode_view& to, int mode, int track, bool lost) {
     const double f = s.track[track].frequency_hz;
-    const double reach = far ? s.config.jump : s.config.frequency;
-    const double mac = far ? 0.5 + 0.5 * s.config.mac : s.config.mac;
+    const double reach = lost ? s.config.jump : s.config.frequency;
+    const double mac = lost ? 0.5 + 0.5 * s.config.mac : s.config.mac;
     const double apart = (to.frequency_hz[mode] - f) / (reach * f);
     if (std::abs(apart) >= 1) return 2 * alone;
     const size_t a = column_of(s, track), b = column_of(s, mode);
@@ -94,7 +94,7 @@ double distance(const okid_tracks& s, const mode_view& to, int mode, int track, 
     };
     const double newest = unlike(s.shape_re, s.shape_im);
     const double usual = unlike(s.mean_re, s.mean_im);
-    if (far) return apart * apart + std::min(newest, usual);
+    if (lost) return apart * apart + std::min(newest, usual);
     if (newest >= 1 && usual >= 1) return 2 * alone;
     const double weight = s.close[track] != 0 || s.mode_close[mode] != 0 ? 1 : by_memory;
     return apart * apart + (1 - weight) * std::min(1.0, newest) + weight * std::min(1.0, usual);
@@ -114,13 +114,13 @@ int grow(okid_tracks& s, int columns, int at) {
     double least = std::numeric_limits<double>::infinity();
     int next = 0;
     for (int j = 1; j <= columns; ++j) {
-        if (s.reached[j] != 0) continue;
+        if (s.in_tree[j] != 0) continue;
         const double reduced = cost(s, mode, j) - s.row_price[mode] - s.column_price[j];
         if (reduced < s.slack[j]) s.slack[j] = reduced, s.way[j] = at;
         if (s.slack[j] < least) least = s.slack[j], next = j;
     }
     for (int j = 0; j <= columns; ++j)
-        if (s.reached[j] != 0)
+        if (s.in_tree[j] != 0)
             s.row_price[s.owner[j]] += least, s.column_price[j] -= least;
         else
             s.slack[j] -= least;
@@ -135,11 +135,11 @@ void assign(okid_tracks& s, int modes) {
     std::fill(s.row_price, s.row_price + modes, 0.0);
     for (int mode = 0; mode < modes; ++mode) {
         std::fill(s.slack, s.slack + columns + 1, std::numeric_limits<double>::infinity());
-        std::fill(s.reached, s.reached + columns + 1, uint8_t{0});
+        std::fill(s.in_tree, s.in_tree + columns + 1, uint8_t{0});
         s.owner[0] = mode;
         int at = 0;
         do {
-            s.reached[at] = 1;
+            s.in_tree[at] = 1;
             at = grow(s, columns, at);
         } while (s.owner[at] >= 0);
         for (; at != 0; at = s.way[at]) s.owner[at] = s.owner[s.way[at]];
