@@ -115,14 +115,14 @@ void remark_unexplained(const std::vector<listed_mode>& listed, double fs_hz, re
     }
     if (found.empty()) return;
     std::sort(found.begin(), found.end(), [](const peak& a, const peak& b) { return a.share > b.share; });
-    std::vector<std::string> listed;
+    std::vector<std::string> peaks;
     for (std::size_t i = 0; i < std::min(most_listed, found.size()); ++i)
-        listed.push_back(fmt::format("{:.4g} Hz ({:.0f} %)", found[i].frequency_hz, 100 * found[i].share));
+        peaks.push_back(fmt::format("{:.4g} Hz ({:.0f} %)", found[i].frequency_hz, 100 * found[i].share));
     work.context.warnings.emplace_back(
         "unexplained",
         fmt::format("power at {}{} that no mode explains (share of an output's power): a mode the record shows too "
                     "little of, a tone, or an order too low. Look at --all-modes, or at one method: --method n4sid-cva",
-                    fmt::join(listed, ", "), found.size() > most_listed ? " and elsewhere" : ""));
+                    fmt::join(peaks, ", "), found.size() > most_listed ? " and elsewhere" : ""));
 }
 
 } // namespace okid_host

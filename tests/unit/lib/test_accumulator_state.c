@@ -382,7 +382,7 @@ static void sums_that_overflow_and_a_base_of_a_window(void) {
     okid_accumulator_config_t config = okid_accumulator_defaults(1, 1, 1);
     config.sample = OKID_SAMPLE_INT16;
     config.edges = 1;
-    const int16_t codes[] = {1, 2, 3, 4, -5, 6, 7, -8, 9, 10};
+    const int16_t five[] = {1, 2, 3, 4, -5, 6, 7, -8, 9, 10};
     const double values[] = {1, 2, 3, 4, -5, 6, 7, -8, 9, 10};
     const size_t header = 8 + 4 * 10 + 8, weight = header + sizeof(okid_accumulator_stats_t) + 8;
     const size_t sums = weight + 8 + 16 + 8 * 4 + 4 * 2 + 24, products = 8; // of a plane
@@ -392,7 +392,7 @@ static void sums_that_overflow_and_a_base_of_a_window(void) {
         void* block = malloc(size);
         okid_accumulator_t* a = NULL;
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&a, &config, block, size));
-        TEST_ASSERT_EQUAL(OKID_OK, window ? okid_accumulator_add(a, values, 5) : okid_accumulator_add_i16(a, codes, 5));
+        TEST_ASSERT_EQUAL(OKID_OK, window ? okid_accumulator_add(a, values, 5) : okid_accumulator_add_i16(a, five, 5));
         const size_t bytes = okid_accumulator_serialised_size(a);
         uint8_t* good = malloc(bytes);
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(a, good, bytes));
