@@ -18,7 +18,7 @@ import stack_depth  # noqa: E402
 
 CLOCK_HZ, CYCLES_PER_INSTRUCTION = 168e6, 1.5
 SMALL_STACK = 500
-IMAGES = ("m4-double-p20", "m4-double-p10", "m4-float-p20", "m7-double-p20", "m4-float-pm10", "m7-double-pm10")
+IMAGES = ("m4-double-p20", "m4-double-p10", "m4-float-p20", "m7-double-p20", "m4-float-O2-pm10", "m7-double-O2-pm10")
 KERNELS = {
     "accumulator": (
         "absorb",
