@@ -178,6 +178,8 @@ class Record:
     def select(self, wanted: Sequence[str], source: str) -> Record:
         """The same record with only these channels, in this order; names as in columns(). InputError as there."""
         places = self._places(wanted, source).tolist()
+        if places == list(range(len(self.names))):
+            return self
         return replace(
             self, names=[self.names[k] for k in places], samples=self.samples[:, places],
             units=[self.units[k] for k in places], roles=[self.roles[k] for k in places],

@@ -24,7 +24,7 @@ _CHUNK = 8192
 
 
 def _digest(samples: NDArray[np.float64]) -> str:
-    return hashlib.sha256(np.ascontiguousarray(samples, dtype="<f8").tobytes()).hexdigest()
+    return hashlib.sha256(np.ascontiguousarray(samples, dtype="<f8").data).hexdigest()
 
 
 def _put_record(file: Any, record: Record) -> None:

@@ -103,14 +103,18 @@ class Averages:
     def add_segment(self, rows: Real) -> None:
         """One segment (length, m): a stretch of the stream, or a hit with its ring-down."""
         self.tried += 1
-        whole = np.all(np.isfinite(rows), axis=0)
+        steady = np.ascontiguousarray(rows.T)  # its rows are transformed where they lie
+        mean = np.mean(steady, axis=1)
+        whole = np.isfinite(mean)
         if not np.any(whole):
             return
-        steady = np.where(whole, rows - np.mean(rows, axis=0), 0.0)
-        spectrum = np.fft.rfft(steady * self._shape[:, None], axis=0).T  # (m, F)
+        steady = (steady - mean[:, None]) * self._shape
+        steady[~whole] = 0.0
+        spectrum = np.fft.rfft(steady, axis=1)  # (m, F)
+        power = spectrum.real**2 + spectrum.imag**2
         self._seen[whole] += 1
         share = self._share(self._seen[whole])[:, None]
-        self._power[whole] += share * (np.abs(spectrum[whole]) ** 2 - self._power[whole])
+        self._power[whole] += share * (power[whole] - self._power[whole])
         if self.n_u == 0 or not np.all(whole[: self.n_u]):
             return
         good = np.flatnonzero(whole[self.n_u : self.n_u + self.n_y])
@@ -122,7 +126,7 @@ class Averages:
         cross = (y[:, :, None] * u[None].conj()) - self._gyu[good]
         self._gyu[good] += part[:, None, None] * cross
         self._guu[good] += part[:, None, None, None] * ((u[:, :, None] * u[:, None, :].conj())[None] - self._guu[good])
-        self._gyy[good] += part[:, None] * (np.abs(y) ** 2 - self._gyy[good])
+        self._gyy[good] += part[:, None] * (power[self.n_u + good] - self._gyy[good])
 
     def _share(self, seen: NDArray[np.int64]) -> Real:
         """Weight of the newest segment: that of a mean, not below 1 / most."""

@@ -48,15 +48,18 @@ class Envelope:
             self._put(rows[: whole * self.width], unsent[: whole * self.width], whole)
 
     def _put(self, rows: Real, unsent: NDArray[np.bool_], whole: int) -> None:
-        pieces = rows.reshape(whole, self.width, self.channels)
+        pieces = np.ascontiguousarray(rows.T).reshape(self.channels, whole, self.width)
         hole = unsent.reshape(whole, self.width)
-        marks = np.where(np.any(np.isnan(pieces) & ~hole[:, :, None], axis=1), MISSING, 0)
-        marks = np.where(np.any(hole, axis=1)[:, None] & (marks == 0), NOT_SENT, marks)
+        if hole.any():
+            marks = np.where(np.any(np.isnan(pieces) & ~hole, axis=2), MISSING, 0)
+            marks = np.where(np.any(hole, axis=1) & (marks == 0), NOT_SENT, marks)
+        else:
+            marks = np.where(np.isnan(np.minimum.reduce(pieces, axis=2)), MISSING, 0)
         kept = min(whole, self.capacity)
         at = np.arange(self.end + whole - kept, self.end + whole) % self.capacity
-        self._low[at] = np.fmin.reduce(pieces[-kept:], axis=1)
-        self._high[at] = np.fmax.reduce(pieces[-kept:], axis=1)
-        self._marks[at] = marks[-kept:]
+        self._low[at] = np.fmin.reduce(pieces[:, -kept:], axis=2).T
+        self._high[at] = np.fmax.reduce(pieces[:, -kept:], axis=2).T
+        self._marks[at] = marks[:, -kept:].T
         self.end += whole
 
     def since(self, first: int) -> tuple[int, Small, Small, NDArray[np.uint8]]:

@@ -56,9 +56,11 @@ def _joined(result: Loaded, files: Sequence[Path]) -> Record:
     """The channels of the result in all records, one missing sample between two of them."""
     names = _forces(result.raw) + result.outputs
     parts = [channels_of(result, open_record(file), str(file), names) for file in files]
-    gap = np.full((1, len(parts[0].names)), np.nan)
-    rows = np.vstack([block for part in parts for block in (part.samples, gap)][:-1])
     first = parts[0]
+    gap = np.full((1, len(first.names)), np.nan)
+    rows = first.samples
+    if len(parts) > 1:
+        rows = np.vstack([block for part in parts for block in (part.samples, gap)][:-1])
     return Record(first.names, rows, result.fs, first.units, first.title, first.start_time, first.roles, first.dofs)
 
 
