@@ -85,6 +85,7 @@ std::vector<response_set> respond(lag_work& work, const std::vector<lag_sums>& s
 /// Set-ups under the same measured forces are one set of responses; others keep columns of their own.
 joint_responses join(const lag_work& work, std::vector<response_set> sets) {
     joint_responses out;
+    out.sample_s = 1 / work.options.fs_hz;
     out.outputs = work.options.outputs;
     out.references = work.references;
     std::vector<std::string> names;

@@ -46,6 +46,7 @@ struct problem {
     Eigen::VectorXcd s; // j w over the highest w
     double w_high = 0;
     double window = 0; // length of a Hann window, in 1 / w_high; 0: none
+    double sample = 0; // of sampled decays, in 1 / w_high; 0: of none
     MatrixXcd H;
     VectorXd root; // one over the noise of each line, rms 1
     // Weighted, parts below each other:
@@ -54,10 +55,11 @@ struct problem {
     MatrixXd slopes, gram;  // along the poles, the residues eliminated
 };
 
-problem make_problem(const response_set& set, double window_s) {
+problem make_problem(const response_set& set, double window_s, double sample_s) {
     problem out;
     out.w_high = 2 * M_PI * set.frequency_hz.back();
     out.window = window_s * out.w_high;
+    out.sample = sample_s * out.w_high;
     out.s.resize(set.lines());
     for (Index l = 0; l < set.lines(); ++l)
         out.s[l] = complex(0, set.frequency_hz[static_cast<std::size_t>(l)] / set.frequency_hz.back());
@@ -85,11 +87,17 @@ complex through_window(complex z, int power, double T) {
            (moment(z - turn, power - 1, T, e) - moment(z + turn, power - 1, T, e)) / complex(0, 4 * M_PI);
 }
 
+/// 1 / z^power; of a decay exp(-z t) in samples, the first halved, their sum times the step: near Nyquist it is another.
+complex seen(const problem& all, complex z, int power) {
+    if (all.sample == 0 || all.window > 0) return through_window(z, power, all.window);
+    const complex half = all.sample / 2 * z;
+    return power == 1 ? all.sample / 2 / std::tanh(half) : std::pow(all.sample / 2 / std::sinh(half), 2);
+}
+
 /// 1 / (s - l)^power and its partner, the columns of Re and Im of a coefficient.
 void put_pole(const problem& all, complex pole, int power, MatrixXcd& to, Index column) {
     for (Index l = 0; l < all.s.size(); ++l) {
-        const complex a = through_window(all.s[l] - pole, power, all.window),
-                      b = through_window(all.s[l] - std::conj(pole), power, all.window);
+        const complex a = seen(all, all.s[l] - pole, power), b = seen(all, all.s[l] - std::conj(pole), power);
         to(l, column) = a + b;
         to(l, column + 1) = complex(0, 1) * (a - b);
     }
@@ -302,8 +310,8 @@ void meet_places(const std::vector<complex>& poles, const problem& all, const Ve
 } // namespace
 
 modal_fit fit_modes(const response_set& set, const std::vector<Index>& places, std::vector<complex> poles, int steps,
-                    double window_s) {
-    problem all = make_problem(set, window_s);
+                    double window_s, double sample_s) {
+    problem all = make_problem(set, window_s, sample_s);
     for (complex& pole : poles) pole /= all.w_high;
     const std::vector<complex> start = poles;
     VectorXd weight = VectorXd::Ones(set.H.cols());

@@ -19,8 +19,8 @@ struct modal_fit {
 
 /// @param window_s  length of the Hann window that the responses were averaged under, 0: none; @param places  of each column, which place it was measured at, from 0; @param poles  the start, at least one. Fitted with
 /// the residuals of modes below and above the band; poles that would run away stay where they were. @param steps  of the
-/// poles, at most
+/// poles, at most. @param sample_s  of sampled decays, the first halved, whose transforms the responses are; 0: they are not
 modal_fit fit_modes(const response_set& set, const std::vector<Eigen::Index>& places,
-                    std::vector<std::complex<double>> poles, int steps, double window_s);
+                    std::vector<std::complex<double>> poles, int steps, double window_s, double sample_s);
 
 } // namespace okid_host

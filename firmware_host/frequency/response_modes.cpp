@@ -165,7 +165,7 @@ std::pair<double, double> spread_of(const modal_fit& fit, std::size_t k) {
 std::pair<modal_fit, refined_modes> fit_all(const joint_responses& from, const std::vector<complex>& poles, int steps) {
     std::vector<Index> places;
     const response_set columns = side_by_side_columns(from, places);
-    std::pair<modal_fit, refined_modes> out{fit_modes(columns, places, poles, steps, from.window_s), {}};
+    std::pair<modal_fit, refined_modes> out{fit_modes(columns, places, poles, steps, from.window_s, from.sample_s), {}};
     out.second.poles = out.first.poles;
     for (std::size_t k = 0; k < poles.size(); ++k) {
         out.second.shapes.push_back(shape_of(from, out.first, static_cast<Index>(k)));

@@ -18,6 +18,7 @@ struct joint_responses {
     std::vector<std::string> outputs;    ///< of all set-ups
     std::vector<std::string> references; ///< outputs that stand in every set-up
     double window_s = 0;                 ///< that averages of random vibration may have had; 0: none
+    double sample_s = 0;                 ///< between the samples of the decays whose transforms they are; 0: none
 };
 
 /// Outputs that every set-up has.

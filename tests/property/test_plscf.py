@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from okid import modal
 from program import okid as program
 from scipy.linalg import eigh
+from scipy.signal import lfilter
 from systems import Structure, record, w2
 
 Real = NDArray[np.float64]
@@ -119,6 +120,24 @@ def test_half_spectra_of_an_ambient_record() -> None:
     assert result.model.K.shape == (12, 6) and np.all(np.abs(np.linalg.eigvals(result.model.A)) < 1.0)
     narrow = okid.identify(None, y, fs=s.fs, method="plscf", band=(0.5 * f[0], 1.1 * f[2]))
     assert [mode.frequency_hz for mode in narrow.confident_modes] == pytest.approx(f[:3], rel=4e-3)
+
+
+def test_damping_near_the_nyquist_frequency() -> None:
+    """A mode at 0.86 of it: the spectrum of samples is another than that of the continuous decay."""
+    errors = []
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        shapes, y = rng.standard_normal((4, 4)), np.zeros((60000, 4))
+        for f, shape in zip((5.0, 20.0, 33.0, 43.0), shapes, strict=True):
+            pole = np.exp(2 * np.pi * f * complex(-0.01, np.sqrt(1 - 0.01**2)) / 100.0)
+            one = lfilter([0, 1], [1, -2 * pole.real, abs(pole) ** 2], rng.standard_normal(len(y)))
+            y += np.outer(one / one.std(), shape)
+        y += 0.02 * y.std(axis=0) * rng.standard_normal(y.shape)
+        modes = okid.identify(None, y, fs=100.0, method="plscf").modes
+        nearest = min(modes, key=lambda mode: abs(mode.frequency_hz - 43.0))
+        assert nearest.frequency_hz == pytest.approx(43.0, rel=1e-3)
+        errors.append(nearest.damping_ratio / 0.01 - 1.0)
+    assert abs(np.mean(errors)) < 0.05
 
 
 def test_responses_of_a_record_with_forces() -> None:
