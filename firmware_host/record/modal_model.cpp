@@ -145,6 +145,7 @@ void put_back_outputs(const std::vector<bool>& kept, record_work& work) {
         if (*percent) spread(**percent, NAN);
     if (work.context.sigma)
         for (auto* values : {&work.context.sigma->shape_re, &work.context.sigma->shape_im}) spread(*values, NAN);
+    if (work.context.refined) spread(work.context.refined->noise_std, NAN);
     model.n_y = static_cast<std::int32_t>(n_y);
     model.shape_re = arrays.shape_re.data();
     model.shape_im = arrays.shape_im.data();

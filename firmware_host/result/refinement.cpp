@@ -57,7 +57,9 @@ std::string refinement_text(const refinement& found, const std::vector<std::stri
                         : fmt::format(", from sums over {} samples", found.samples),
                     found.noise_order > 0 ? fmt::format(", noise of order {}", found.noise_order) : "");
     for (std::size_t i = 0; i < outputs.size(); ++i)
-        out += fmt::format("{} {} {:.3g}", i == 0 ? "" : ",", outputs[i], found.noise_std[i]);
+        out += std::isfinite(found.noise_std[i])
+                   ? fmt::format("{} {} {:.3g}", i == 0 ? "" : ",", outputs[i], found.noise_std[i])
+                   : fmt::format("{} {} -", i == 0 ? "" : ",", outputs[i]); // of an output that was left out
     return out + "\n";
 }
 

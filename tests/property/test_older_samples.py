@@ -146,6 +146,9 @@ def test_an_output_that_is_left_out() -> None:
     found = okid.identify(*split(broken), fs=W2.fs)
     codes = [warning.code for warning in found.warnings]
     assert "newest_only" in codes and "screened" in codes and found.to_dict()["samples"] <= KEPT
+    noise = list(found.to_dict()["refinement"]["noise_std"].values())
+    assert noise[5] is None
+    np.testing.assert_allclose(noise[:5], 0.02 * rows()[:, 2:7].std(axis=0), rtol=0.05)
     np.testing.assert_allclose([mode.frequency_hz for mode in confident(found)], W2.modes()[0], rtol=1e-3)
 
 
