@@ -96,6 +96,8 @@ def finished_figures(browser: Any, gigabytes: float, folder: Path) -> dict[str, 
     try:
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.goto(live.url)
+        page.wait_for_function("() => window.okidLive && okidLive.page", timeout=600_000)
+        painted = time.monotonic() - begin
         page.wait_for_function(
             "() => window.okidLive && okidLive.lanes.end > 0 && okidLive.lanes.draws", timeout=600_000
         )
@@ -104,7 +106,7 @@ def finished_figures(browser: Any, gigabytes: float, folder: Path) -> dict[str, 
         page.close()
     finally:
         live.end()
-    return {"first_signals_s": first}
+    return {"first_paint_s": painted, "first_signals_s": first}
 
 
 def main() -> None:

@@ -172,6 +172,18 @@ class Finished(Worker):
         show_over(self.session, self._found)
 
 
+class Opened(Worker):
+    """A result and its records, read while the page is there."""
+
+    def __init__(self, session: Session, path: Path, files: ReportFiles) -> None:
+        super().__init__(session)
+        self._path, self._files = path, files
+
+    def work(self) -> None:
+        self.session.working(f"reading {', '.join(file.name for file in self._files.record[:3])}")
+        show_over(self.session, over(self._path, self._files))
+
+
 class Identified(Worker):
     """Records that `okid identify` works on: files, its options, and the folder for the result."""
 
