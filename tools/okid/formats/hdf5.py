@@ -73,9 +73,19 @@ def write_hdf5(path: str | Path, what: Record | Result | Mapping[str, Any]) -> N
             _put_tree(file, tree)
 
 
+def _rows(data: Any) -> NDArray[np.float64]:
+    """A dataset in pieces: h5py lets no other thread run while it reads one."""
+    if len(data.shape) != 2:
+        return np.asarray(data[()], dtype=np.float64)
+    out, step = np.empty(data.shape), 16 * _CHUNK
+    for first in range(0, len(out), step):
+        out[first : first + step] = data[first : first + step]
+    return out
+
+
 def _own(file: Any) -> Record:
     data = file["samples"]
-    samples = np.asarray(data[()], dtype=np.float64)
+    samples = _rows(data)
     attrs = data.attrs
     if "sha256" in attrs and attrs["sha256"] != _digest(samples):
         raise InputError("dataset samples is not what was written: its sha256 differs, the file is damaged or changed")
