@@ -46,7 +46,7 @@ struct problem {
     Eigen::VectorXcd s; // j w over the highest w
     double w_high = 0;
     double window = 0; // length of a Hann window, in 1 / w_high; 0: none
-    double sample = 0; // of sampled decays, in 1 / w_high; 0: of none
+    double sample = 0; // step of sampled decays, in 1 / w_high; 0: not from samples
     MatrixXcd H;
     VectorXd root; // one over the noise of each line, rms 1
     // Weighted, parts below each other:
@@ -87,9 +87,10 @@ complex through_window(complex z, int power, double T) {
            (moment(z - turn, power - 1, T, e) - moment(z + turn, power - 1, T, e)) / complex(0, 4 * M_PI);
 }
 
-/// 1 / z^power; of a decay exp(-z t) in samples, the first halved, their sum times the step: near Nyquist it is another.
-complex seen(const problem& all, complex z, int power) {
-    if (all.sample == 0 || all.window > 0) return through_window(z, power, all.window);
+/// Transform of t^(power-1) exp(-z t): of its samples, the first halved, where the responses come from sampled decays. Near
+/// the Nyquist frequency the two differ.
+complex transform(const problem& all, complex z, int power) {
+    if (all.sample == 0) return through_window(z, power, all.window);
     const complex half = all.sample / 2 * z;
     return power == 1 ? all.sample / 2 / std::tanh(half) : std::pow(all.sample / 2 / std::sinh(half), 2);
 }
@@ -97,7 +98,7 @@ complex seen(const problem& all, complex z, int power) {
 /// 1 / (s - l)^power and its partner, the columns of Re and Im of a coefficient.
 void put_pole(const problem& all, complex pole, int power, MatrixXcd& to, Index column) {
     for (Index l = 0; l < all.s.size(); ++l) {
-        const complex a = seen(all, all.s[l] - pole, power), b = seen(all, all.s[l] - std::conj(pole), power);
+        const complex a = transform(all, all.s[l] - pole, power), b = transform(all, all.s[l] - std::conj(pole), power);
         to(l, column) = a + b;
         to(l, column + 1) = complex(0, 1) * (a - b);
     }

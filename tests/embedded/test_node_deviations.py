@@ -7,49 +7,30 @@ The numbers share the definition of the parts with the node, and no code. What i
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+import core_feed
 import numpy as np
 import pytest
 import systems
-from numpy.typing import NDArray
-from qemu_node import RESET, Modes, Node, packet, samples
-from test_node import BUILD, FLASH, RATE_HZ, Codes, sections
+from qemu_node import RESET, Node, packet, samples
+from test_node import RATE_HZ, Codes, Image, Real, each_in_a_process, keep_measurements, keep_within
 
 SAMPLES, P, INPUTS, OUTPUTS, ORDER, EACH, FIRST_PART = 10000, 10, 2, 2, 8, 32, 128
 RAM = 64 * 1024
-Real = NDArray[np.float64]
+PARTS = {False: 8, True: 12}  # most of them, in double and in float: CMakeLists.txt of the node
+IMAGES = [Image("m7-double-O2", "mps2-an500", P, "pm"), Image("m4-float-O2", "netduinoplus2", P, "pm")]
 
 
-@dataclass(frozen=True)
-class Image:
-    """A build of the node, the machine it runs on and the parts it has room for."""
-
-    folder: str
-    machine: str
-    parts: int
-
-    @property
-    def name(self) -> str:
-        return f"{self.folder}-pm10"
-
-
-@pytest.fixture(
-    scope="module",
-    params=[
-        pytest.param(i, id=i.name, marks=pytest.mark.xdist_group(i.name))
-        for i in (Image("m7-double-O2", "mps2-an500", 8), Image("m4-float-O2", "netduinoplus2", 12))
-    ],
-)
+@pytest.fixture(scope="module", params=each_in_a_process(IMAGES))
 def image(request: pytest.FixtureRequest) -> Image:
     return request.param  # type: ignore[no-any-return]
 
 
 @pytest.fixture(scope="module")
 def node(image: Image) -> Iterator[Node]:
-    with Node(image.machine, BUILD / image.folder / "node_pm10.elf") as it:
+    with Node(image.machine, image.path) as it:
         yield it
 
 
@@ -60,10 +41,13 @@ def structure() -> systems.Structure:
 
 
 def record(seed: int) -> Codes:
-    """1 % noise, as a converter of 16 bits gives it, with an offset on each channel."""
-    plain = np.hstack(systems.record(structure(), SAMPLES, 1.0, seed))
-    codes = np.round(plain / np.abs(plain).max(axis=0) * 30000) + [100, -300, 250, 40]
-    return codes.astype(np.int16)
+    return core_feed.record_codes(structure(), SAMPLES, seed)
+
+
+def true_modes() -> tuple[Real, Real]:
+    """At the rate that the node believes."""
+    f, zeta = structure().modes()
+    return f * RATE_HZ * structure().dt, zeta
 
 
 def ends_of_parts(most: int) -> list[int]:
@@ -115,8 +99,8 @@ def left_out(codes: Codes, ends: list[int]) -> tuple[Real, Real, Real, Real]:
 
 
 def test_deviations_are_those_of_identifications_without_each_part(node: Node, image: Image) -> None:
-    ends = ends_of_parts(image.parts)
-    assert image.parts / 2 < len(ends) <= image.parts + 1
+    ends = ends_of_parts(PARTS[image.is_float])
+    assert PARTS[image.is_float] / 2 < len(ends) <= PARTS[image.is_float] + 1
     for seed in (1, 2):
         codes = record(seed)
         node.send(packet(bytes([RESET])), *samples(codes, 0, EACH))
@@ -125,26 +109,28 @@ def test_deviations_are_those_of_identifications_without_each_part(node: Node, i
         f, zeta, f_std, zeta_std = left_out(codes, ends)
         if seed == 1:
             keep_measurements(node, image, modes, f, zeta)
-        is_float = "float" in image.folder
-        np.testing.assert_allclose(modes.frequency_hz, f, rtol=1e-5 if is_float else 1e-7)
-        np.testing.assert_allclose(modes.damping_ratio, zeta, rtol=2e-3 if is_float else 1e-5)
+        np.testing.assert_allclose(modes.frequency_hz, f, rtol=1e-5 if image.is_float else 1e-7)
+        np.testing.assert_allclose(modes.damping_ratio, zeta, rtol=2e-3 if image.is_float else 1e-5)
         assert modes.frequency_std_hz is not None and modes.damping_ratio_std is not None
         np.testing.assert_allclose(modes.frequency_std_hz, f_std, rtol=0.1)
         np.testing.assert_allclose(modes.damping_ratio_std, zeta_std, rtol=0.1)
-        true_f, true_zeta = structure().modes()
-        true_f = true_f * RATE_HZ * structure().dt
+        true_f, true_zeta = true_modes()
         assert np.all(np.abs(modes.frequency_hz - true_f) < 10 * modes.frequency_std_hz)  # few parts: a wide t
         assert np.all(np.abs(modes.damping_ratio - true_zeta) < 10 * modes.damping_ratio_std)
+    keep_within(node, image, RAM)
 
 
-def keep_measurements(node: Node, image: Image, modes: Modes, f: Real, zeta: Real) -> None:
-    """Sizes, stack, instructions and distances from NumPy, for table.py; within flash and memory."""
-    counts, size = node.counts(), sections(BUILD / image.folder / "node_pm10.elf")
-    off = np.abs(modes.frequency_hz / f - 1).max(), np.abs(modes.damping_ratio / zeta - 1).max()
-    measured = {**counts, **size, "f_error": off[0], "zeta_error": off[1], "machine": image.machine}
-    (BUILD / f"{image.name}.json").write_text(json.dumps(measured))
-    assert size["text"] + size["data"] <= FLASH
-    assert size["data"] + size["bss"] + counts["stack_used"] <= RAM
+@pytest.mark.parametrize("most", PARTS.values())
+def test_errors_over_deviations_scatter_as_t_does(most: int) -> None:
+    """With so few parts a deviation is uncertain itself: of 60 records."""
+    ends, (true_f, true_zeta) = ends_of_parts(most), true_modes()
+    errors = []
+    for seed in range(100, 160):
+        f, zeta, f_std, zeta_std = left_out(record(seed), ends)
+        errors.append([(f - true_f) / f_std, (zeta - true_zeta) / zeta_std])
+    rms, freedom = np.sqrt(np.mean(np.square(errors))), len(ends) - 1
+    print(f"{len(ends)} parts: errors are {rms:.2f} deviations (rms), t has {np.sqrt(freedom / (freedom - 2)):.2f}")
+    assert rms == pytest.approx(np.sqrt(freedom / (freedom - 2)), rel=0.15)
 
 
 def test_parts_begin_again_behind_a_gap(node: Node, image: Image) -> None:

@@ -174,7 +174,7 @@ def test_a_large_record_is_read_while_the_page_is_there(
     rig: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One that is not of the result ends the page with the same line."""
-    monkeypatch.setattr("okid.live.command.LARGE_BYTES", 10)
+    monkeypatch.setattr("okid.live.finished.LARGE_BYTES", 10)
     monkeypatch.chdir(rig)
     (rig / "a.csv").write_text("# fs_hz: 500\nother,names\n1,2\n3,4\n")
     assert main(["r.json", "--record", "a.csv", "--port", "0"]) == 2

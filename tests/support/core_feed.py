@@ -22,7 +22,12 @@ Codes = NDArray[np.int16]
 
 def w1(count: int) -> Codes:
     """W1, 1 % noise, as a converter of 16 bits gives it: force, then the accelerations; an offset on each channel."""
-    record = np.hstack(systems.record(systems.w1(), count, 1.0, 7))
+    return record_codes(systems.w1(), count, 7)
+
+
+def record_codes(structure: systems.Structure, count: int, seed: int) -> Codes:
+    """The same of any structure with four channels."""
+    record = np.hstack(systems.record(structure, count, 1.0, seed))
     codes = np.round(record / np.abs(record).max(axis=0) * 30000) + [100, -300, 250, 40]
     return codes.astype(np.int16)
 

@@ -77,6 +77,21 @@ void fill(okid_era& e, const okid_real_t* markov, int shift) {
         okid::fill_hankel(c.n_u, c.n_y, c.rows, c.cols, markov + (1 + shift) * c.n_u * c.n_y, e.hankel);
 }
 
+/// out (count x count) <- U^T H(shift) V of the first singular vectors; H(shift) V stays in product.
+void fill_core(okid_era& e, const okid_real_t* markov, int shift, int count, okid_real_t* out) {
+    fill(e, markov, shift);
+    okid::linalg::multiply(false, true, e.height, count, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0,
+                           e.product, e.height);
+    okid::linalg::multiply(true, false, count, count, e.height, 1, e.left, e.height, e.product, e.height, 0, out,
+                           count);
+}
+
+/// out (order x order) <- Sigma^(-1/2) core Sigma^(-1/2).
+void scale_core(const okid_era& e, int order, const okid_real_t* core, int ld, okid_real_t* out) {
+    for (int j = 0; j < order; ++j)
+        for (int i = 0; i < order; ++i) out[j * order + i] = core[j * ld + i] / std::sqrt(e.values[i] * e.values[j]);
+}
+
 /// rotated (rank x count) <- P^+ rhs without Sigma: least squares on the first r block rows of the observability matrix.
 /// @param rhs  r n_y x count, leading dimension height
 bool project(okid_era& e, int order, const okid_real_t* rhs, int count) {
@@ -135,11 +150,7 @@ okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov) {
     fill(e, markov, 0);
     if (okid::linalg::svd(e.height, e.breadth, e.hankel, e.left, e.values, e.right, e.work) != 0)
         return OKID_ERR_NUMERIC;
-    fill(e, markov, 1);
-    okid::linalg::multiply(false, true, e.height, e.rank, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0,
-                           e.product, e.height);
-    okid::linalg::multiply(true, false, e.rank, e.rank, e.height, 1, e.left, e.height, e.product, e.height, 0, e.core,
-                           e.rank);
+    fill_core(e, markov, 1, e.rank, e.core);
     if (correlated(e)) e.correlation.observability(e.rank, e.left);
     return OKID_OK;
 }
@@ -178,9 +189,7 @@ okid_status_t okid_era_realize(okid_era_t* self, int32_t order, okid_real_t* A, 
     okid_era& e = *self;
     if (order < 1 || order > largest_order(e) || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
     const int ny = e.config.n_y, nu = e.config.n_u;
-    for (int j = 0; j < order; ++j)
-        for (int i = 0; i < order; ++i)
-            A[j * order + i] = e.core[j * e.rank + i] / std::sqrt(e.values[i] * e.values[j]);
+    scale_core(e, order, e.core, e.rank, A);
     if (correlated(e) && !project(e, order, e.correlation.input, nu)) return OKID_ERR_NUMERIC;
     for (int c = 0; c < nu; ++c)
         for (int i = 0; i < order; ++i)
@@ -210,18 +219,11 @@ okid_status_t okid_era_realize_near(okid_era_t* self, int32_t order, const okid_
     if (self == nullptr || markov == nullptr || A == nullptr || C == nullptr) return OKID_ERR_NULL;
     okid_era& e = *self;
     if (correlated(e) || order < 1 || order > largest_order(e) || !(e.values[order - 1] > 0)) return OKID_ERR_DIM;
-    const auto fill_core = [&](int shift, okid_real_t* out) { // Sigma^(-1/2) U^T H V Sigma^(-1/2), H V stays in product
-        fill(e, markov, shift);
-        okid::linalg::multiply(false, true, e.height, order, e.breadth, 1, e.hankel, e.height, e.right, e.rank, 0,
-                               e.product, e.height);
-        okid::linalg::multiply(true, false, order, order, e.height, 1, e.left, e.height, e.product, e.height, 0, out,
-                               order);
-        for (int j = 0; j < order; ++j)
-            for (int i = 0; i < order; ++i) out[j * order + i] /= std::sqrt(e.values[i] * e.values[j]);
-    };
-    fill_core(1, A);
+    fill_core(e, markov, 1, order, A);
+    scale_core(e, order, A, order, A);
     okid_real_t* now = e.hankel; // of H(0): 1 and its change
-    fill_core(0, now);
+    fill_core(e, markov, 0, order, now);
+    scale_core(e, order, now, order, now);
     for (int j = 0; j < order; ++j) { // A less the change times A
         okid_real_t* column = A + static_cast<size_t>(j * order);
         okid::linalg::multiply(false, false, order, 1, order, 1, now, order, column, order, 0, e.rotated, order);

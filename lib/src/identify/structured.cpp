@@ -423,6 +423,19 @@ struct solver {
     }
 };
 
+bool is_complete(const okid_run_sums_t& sums, bool mean) {
+    return sums.S != nullptr && sums.head != nullptr && sums.tail != nullptr && (!mean || sums.sum != nullptr);
+}
+
+solver make_solver(const okid_observer_config_t& c, bool mean, const okid_run_sums_t& sums, okid_observer_info_t* info,
+                   void* work) {
+    const int m = c.n_u + c.n_y, n = m * (c.p + 1);
+    solver s{c.n_u, c.n_y, c.p, m, n, n - c.n_y, sums.S, sums.head, sums.tail, mean, sums.rows, {}, info};
+    lay_out(c, work, &s.w);
+    linalg::warm_up();
+    return s;
+}
+
 } // namespace
 } // namespace okid
 
@@ -435,18 +448,14 @@ okid_status_t okid_structured_solve(const okid_observer_config_t* config, okid_d
                                     const okid_run_sums_t* sums, okid_real_t* theta, okid_real_t* innovation,
                                     okid_observer_info_t* info, void* work, size_t bytes) {
     const bool mean = detrend == OKID_DETREND_MEAN;
-    if (config == nullptr || sums == nullptr || sums->S == nullptr || sums->head == nullptr || sums->tail == nullptr ||
-        (mean && sums->sum == nullptr) || theta == nullptr || info == nullptr || work == nullptr)
+    if (config == nullptr || sums == nullptr || !okid::is_complete(*sums, mean) || theta == nullptr ||
+        info == nullptr || work == nullptr)
         return OKID_ERR_NULL;
     const size_t needed = okid_structured_memsize(config);
     if (needed == 0) return OKID_ERR_DIM;
     if (bytes < needed) return OKID_ERR_MEMORY;
     *info = okid_observer_info_t{0, 0, 0, 0, 0, -1};
-    const int m = config->n_u + config->n_y, n = m * (config->p + 1);
-    okid::solver s{config->n_u, config->n_y, config->p,  m,  n,   n - config->n_y, sums->S, sums->head,
-                   sums->tail,  mean,        sums->rows, {}, info};
-    okid::lay_out(*config, work, &s.w);
-    okid::linalg::warm_up();
+    okid::solver s = okid::make_solver(*config, mean, *sums, info, work);
     if (sums->rows < s.q) return OKID_ERR_TOO_SHORT;
     info->channel = s.prepare(sums->sum);
     if (info->channel >= 0) return info->channel < s.n_u ? OKID_ERR_INPUT : OKID_ERR_OUTPUT;
@@ -472,20 +481,14 @@ okid_status_t okid_structured_leave_out(const okid_observer_config_t* config, ok
                                         const okid_run_sums_t* parts, int32_t count, okid_real_t* change, void* work,
                                         size_t bytes) {
     const bool mean = detrend == OKID_DETREND_MEAN;
-    const auto complete = [&](const okid_run_sums_t& sums) {
-        return sums.S != nullptr && sums.head != nullptr && sums.tail != nullptr && (!mean || sums.sum != nullptr);
-    };
+    const auto complete = [mean](const okid_run_sums_t& sums) { return okid::is_complete(sums, mean); };
     if (config == nullptr || whole == nullptr || theta == nullptr || parts == nullptr || change == nullptr ||
         work == nullptr || !complete(*whole) || (count > 0 && !std::all_of(parts, parts + count, complete)))
         return OKID_ERR_NULL;
     const size_t needed = okid_structured_memsize(config);
     if (needed == 0 || count < 0 || !(ridge >= 0)) return OKID_ERR_DIM;
     if (bytes < needed) return OKID_ERR_MEMORY;
-    const int m = config->n_u + config->n_y, n = m * (config->p + 1);
-    okid::solver s{config->n_u, config->n_y, config->p, m,           n,  n - config->n_y, whole->S,
-                   whole->head, whole->tail, mean,      whole->rows, {}, nullptr};
-    okid::lay_out(*config, work, &s.w);
-    okid::linalg::warm_up();
+    okid::solver s = okid::make_solver(*config, mean, *whole, nullptr, work);
     if (whole->rows < s.q) return OKID_ERR_TOO_SHORT;
     if (s.prepare(whole->sum) >= 0 || !s.factor(ridge)) return OKID_ERR_NUMERIC;
     for (int b = 0; b < count; ++b) s.leave_out(parts[b], theta, change + okid::solver::at(0, b, s.q * s.n_y));

@@ -21,7 +21,8 @@ enum { NODE_CHANNELS = NODE_INPUTS + NODE_OUTPUTS, NODE_ORDER = 2 * NODE_DOFS, N
 /// What identification gave. The numbers are those of the build, float or double, in double.
 typedef struct node_modes_t {
     okid_status_t status;
-    int32_t stage; ///< of the status: 0 sums, 1 observer, 2 Markov parameters, 3 decomposition, 4 realization, 5 modes
+    int32_t stage; ///< of the status: 0 sums, 1 observer, 2 Markov parameters, 3 decomposition, 4 realization, 5 modes,
+                   ///< 6 deviations
     int32_t count;
     double radius;                       ///< of the ARX companion
     double ridge;                        ///< that was needed, relative

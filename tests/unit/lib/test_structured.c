@@ -36,20 +36,27 @@ void setUp(void) {
 }
 void tearDown(void) {}
 
-/// The sums of one run as the solver wants them.
-static void sums_of(const double* v) {
-    memset(S, 0, sizeof S);
-    memset(sum, 0, sizeof sum);
-    for (int n = P; n < samples; ++n)
+/// Row of regressor k in [v_n; v_(n-1); ..]: the outputs of now are none.
+static int row_of(int k) { return k < n_u ? k : k + n_y; }
+
+/// The sums of rows first .. last - 1, into arrays as the solver wants them.
+static okid_run_sums_t sum_rows(const double* v, int first, int last, double* its, double* before, double* end,
+                                double* total) {
+    memset(its, 0, (size_t)(m * w) * sizeof *its);
+    memset(total, 0, (size_t)m * sizeof *total);
+    for (int n = first; n < last; ++n)
         for (int k = 0; k < w; ++k)
-            for (int r = 0; r < m; ++r) S[k * m + r] += v[n * m + r] * v[(n - k / m) * m + k % m];
-    for (int n = P; n < samples; ++n)
-        for (int r = 0; r < m; ++r) sum[r] += v[n * m + r];
+            for (int r = 0; r < m; ++r) its[k * m + r] += v[n * m + r] * v[(n - k / m) * m + k % m];
+    for (int n = first; n < last; ++n)
+        for (int r = 0; r < m; ++r) total[r] += v[n * m + r];
     for (int a = 0; a < P; ++a) {
-        memcpy(head + a * m, v + (P - 1 - a) * m, (size_t)m * sizeof *v);
-        memcpy(tail + a * m, v + (samples - 1 - a) * m, (size_t)m * sizeof *v);
+        memcpy(before + a * m, v + (first - 1 - a) * m, (size_t)m * sizeof *v);
+        memcpy(end + a * m, v + (last - 1 - a) * m, (size_t)m * sizeof *v);
     }
+    return (okid_run_sums_t){its, before, end, total, NULL, last - first};
 }
+
+static void sums_of(const double* v) { (void)sum_rows(v, P, samples, S, head, tail, sum); }
 
 /// The Gram matrix by its definition, row by row of the record.
 static void gram_of(const double* v, okid_detrend_t detrend) {
@@ -351,11 +358,11 @@ static void change_by_rows(const double* v, int first, int last, okid_detrend_t 
         double row[W_MAX];
         for (int k = 0; k < w; ++k) row[k] = v[(n - k / m) * m + k % m] - mean[k];
         for (int i = 0; i < q; ++i)
-            for (int j = 0; j < q; ++j) table[i * width + j] += row[i < n_u ? i : i + n_y] * row[j < n_u ? j : j + n_y];
+            for (int j = 0; j < q; ++j) table[i * width + j] += row[row_of(i)] * row[row_of(j)];
         for (int o = 0; o < n_y && n >= first && n < last; ++o) {
             double e = row[n_u + o];
-            for (int k = 0; k < q; ++k) e -= (double)theta[k * n_y + o] * row[k < n_u ? k : k + n_y];
-            for (int i = 0; i < q; ++i) table[i * width + q + o] -= e * row[i < n_u ? i : i + n_y];
+            for (int k = 0; k < q; ++k) e -= (double)theta[k * n_y + o] * row[row_of(k)];
+            for (int i = 0; i < q; ++i) table[i * width + q + o] -= e * row[row_of(i)];
         }
     }
     eliminate(table, n_y);
@@ -364,26 +371,11 @@ static void change_by_rows(const double* v, int first, int last, okid_detrend_t 
     free(table);
 }
 
-/// The sums of rows first .. last - 1, in arrays of its own.
-static okid_run_sums_t part_of(const double* v, int first, int last, double* room) {
-    double *its = room, *before = its + m * w, *end = before + m * P, *total = end + m * P;
-    memset(room, 0, (size_t)(m * w + 2 * m * P + m) * sizeof *room);
-    for (int n = first; n < last; ++n)
-        for (int k = 0; k < w; ++k)
-            for (int r = 0; r < m; ++r) its[k * m + r] += v[n * m + r] * v[(n - k / m) * m + k % m];
-    for (int n = first; n < last; ++n)
-        for (int r = 0; r < m; ++r) total[r] += v[n * m + r];
-    for (int a = 0; a < P; ++a) {
-        memcpy(before + a * m, v + (first - 1 - a) * m, (size_t)m * sizeof *v);
-        memcpy(end + a * m, v + (last - 1 - a) * m, (size_t)m * sizeof *v);
-    }
-    return (okid_run_sums_t){its, before, end, total, NULL, last - first};
-}
-
 static void part_left_out_changes_theta_as_its_rows_do(void) {
     enum { PARTS = 3 };
     const int ends[PARTS + 1] = {P, 700, 2500, N};
-    static double room[PARTS][M_MAX * W_MAX + 2 * M_MAX * P + M_MAX], expected[NY_MAX * W_MAX];
+    static double its[PARTS][M_MAX * W_MAX], before[PARTS][M_MAX * P], end[PARTS][M_MAX * P], total[PARTS][M_MAX],
+        expected[NY_MAX * W_MAX];
     static okid_real_t change[PARTS * NY_MAX * W_MAX];
     double* v = rig_record(&rig, N, 0.05, NULL, 5);
     for (int n = 0; n < N; ++n)
@@ -392,7 +384,8 @@ static void part_left_out_changes_theta_as_its_rows_do(void) {
         sums_of(v);
         TEST_ASSERT_EQUAL(OKID_OK, solve(&plain, (okid_detrend_t)detrend));
         okid_run_sums_t part[PARTS];
-        for (int b = 0; b < PARTS; ++b) part[b] = part_of(v, ends[b], ends[b + 1], room[b]);
+        for (int b = 0; b < PARTS; ++b)
+            part[b] = sum_rows(v, ends[b], ends[b + 1], its[b], before[b], end[b], total[b]);
         const okid_run_sums_t whole = {S, head, tail, sum, NULL, N - P};
         const size_t bytes = okid_structured_memsize(&plain);
         char* work = malloc(bytes + 1);

@@ -21,14 +21,13 @@ from okid._errors import InputError, complain, say
 from okid.abi.program import run_program
 from okid.live.config import PageConfig, ReportFiles, read_config
 from okid.live.desk import Desk, page_of_log
-from okid.live.finished import Finished, Identified, Opened, Worker, over
+from okid.live.finished import Identified, Worker, page_of_result
 from okid.live.replayed import Replayed
 from okid.live.server import PageServer, is_loopback
 from okid.live.session import Session
 from okid.report.other_kinds import check_kind, kind_of
 
 EXIT_DONE, EXIT_USAGE, EXIT_DEVICE = 0, 2, 4
-LARGE_BYTES = 64 << 20  # records above it are read while the page is there, smaller ones before
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -151,12 +150,7 @@ def _wanted(args: argparse.Namespace, folder: Path) -> _Wanted:
         _only(args, "a result", "record", "geometry", "config")
         record = tuple(Path(one).absolute() for one in args.record)
         config, geometry = _absolute(args.config), _absolute(args.geometry)
-        given = ReportFiles(record=record, config=config, geometry=geometry)
-        if sum(one.stat().st_size for one in record if one.is_file()) > LARGE_BYTES:
-            page = PageConfig(files[0], None, True, "", length_s=0.0)
-            return _Wanted(page, lambda session: Opened(session, files[0], given))
-        ready = over(files[0], given)
-        return _Wanted(ready.config, lambda session: Finished(session, ready))
+        return _Wanted(*page_of_result(files[0], ReportFiles(record=record, config=config, geometry=geometry)))
     if key in ("journal", "log") or files[0].suffix in (".okj", ".log"):
         _single(args, "log")
         _only(args, "a log", "config", "rest")

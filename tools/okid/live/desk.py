@@ -31,7 +31,7 @@ from okid.data.records import Record
 from okid.formats.geometry_file import read_geometry
 from okid.live.child import Child
 from okid.live.config import PageConfig, ReportFiles, config_of_log, read_config
-from okid.live.finished import Finished, Identified, over
+from okid.live.finished import Finished, Identified, over, page_of_result
 from okid.live.replayed import Replayed
 from okid.live.running import Running
 from okid.live.session import Session
@@ -332,8 +332,7 @@ class Desk:
             place = self._job()
             if found is not None and found.key == "result":
                 records = tuple(named_file(one) for one in _texts(fields, "records", MOST_FILES))
-                ready = over(path, ReportFiles(record=records))
-                self.session.show(ready.config, lambda session: Finished(session, ready))
+                self.session.show(*page_of_result(path, ReportFiles(record=records)))
                 more = ["--record", *map(str, records)] if records else []
                 return {"command": shlex.join(["okid-live", str(path), *more])}
             config = _text(fields, "config")

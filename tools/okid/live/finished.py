@@ -27,6 +27,7 @@ from okid.result.shape_places import places_of_shapes, struck_at
 
 Real = NDArray[np.float64]
 CHUNK = 1 << 18  # numbers that go to the session at once: pages are served in between
+LARGE_BYTES = 64 << 20  # of records: above it the page is there before they are
 NO_RECORD = "no record was given: okid-live RESULT.json --record FILE shows its signals"
 OTHERS = {"responses": "frequency responses", "set_ups": "set-ups"}
 
@@ -124,6 +125,10 @@ def show_over(session: Session, found: Over) -> None:
     session.event({"type": "result", "t": config.length_s or 0.0, "result": result.raw})
 
 
+def _names(files: ReportFiles) -> str:
+    return ", ".join(file.name for file in files.record[:3])
+
+
 def _nothing(_text: str) -> None:
     pass
 
@@ -180,8 +185,17 @@ class Opened(Worker):
         self._path, self._files = path, files
 
     def work(self) -> None:
-        self.session.working(f"reading {', '.join(file.name for file in self._files.record[:3])}")
+        self.session.working(f"reading {_names(self._files)}")
         show_over(self.session, over(self._path, self._files))
+
+
+def page_of_result(path: Path, files: ReportFiles) -> tuple[PageConfig, Callable[[Session], Worker]]:
+    """What the page of a result begins with, and its source. InputError as over() has it; of records above 64 MB the
+    source says what is wrong, they are read while the page is there."""
+    if sum(one.stat().st_size for one in files.record if one.is_file()) > LARGE_BYTES:
+        return PageConfig(path, None, True, "", length_s=0.0), lambda session: Opened(session, path, files)
+    ready = over(path, files)
+    return ready.config, lambda session: Finished(session, ready)
 
 
 class Identified(Worker):
@@ -192,7 +206,7 @@ class Identified(Worker):
         self._files, self._options, self._folder = files, list(options), folder
 
     def work(self) -> None:
-        names = ", ".join(file.name for file in self._files.record[:3])
+        names = _names(self._files)
         self.session.working(f"identifying {names}")
         target = self._folder / "result.json"
         command = [needed_program(), "identify", *map(str, self._files.record), *self._options, f"--json={target}"]
