@@ -47,7 +47,7 @@ void choose_columns(identify_arguments& given, record_files& files) {
                           given.records.front(), list_names(columns),
                           proposed.empty() ? "" : "; by their names perhaps", proposed));
     }
-    if (!given.inputs.empty()) given.wanted.inputs = split_names("--inputs", given.inputs);
+    if (!given.inputs.empty() && given.inputs != "none") given.wanted.inputs = split_names("--inputs", given.inputs);
     given.wanted.outputs = split_names("--outputs", given.outputs);
     for (const std::string& name : given.wanted.outputs)
         if (std::find(given.wanted.inputs.begin(), given.wanted.inputs.end(), name) != given.wanted.inputs.end())
@@ -236,7 +236,9 @@ void add_records(CLI::App& command, identify_arguments& given) {
             "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4 ...)")
         ->required()
         ->type_name("RECORD.csv");
-    command.add_option("--inputs", given.inputs, "force columns, with commas between; none = ambient: modes only")
+    command
+        .add_option("--inputs", given.inputs,
+                    "force columns, with commas between; without it, or with none: ambient, modes only")
         ->type_name("NAMES");
     command.add_option("--outputs", given.outputs, "response columns, with commas between")->type_name("NAMES");
     command.add_option("--fs", given.wanted.fs, "sample rate; default: what the file says")->type_name("HZ");

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <tuple>
 
@@ -35,6 +36,9 @@ constexpr std::size_t fewest_voters = 6; // those with the longest horizons vote
 constexpr double one_half = 0.5;         // votes and agreement
 constexpr double scatter_scale = 0.6;    // relative scatter of damping over the runs that halves the agreement
 constexpr int fewest_runs = 3;
+constexpr double most_widths = 2.5; // half-power widths within which two of one shape may be one
+constexpr double nearly_all = 0.9;  // of the runs that vote
+constexpr double decays_left = 2;   // in a horizon: what has fallen to a seventh at its end still tells something there
 constexpr double clear_vibration = 0.8; // agreement of a mode that all runs find
 constexpr double most_filled = 0.75;    // of a run's states, by two for each mode: above, weak ones find no room
 
@@ -116,6 +120,20 @@ run_track track_of(const chain& poles) {
     return out;
 }
 
+/// Do higher orders resolve it into two, one on either side, of other shapes?
+bool is_resolved(const run_track& track, const std::vector<run_track>& tracks, int highest) {
+    const run_track *below = nullptr, *above = nullptr;
+    for (const run_track& other : tracks) {
+        const double apart = other.frequency_hz - track.frequency_hz;
+        if (other.orders.front() < track.orders.back() || other.orders.back() < highest ||
+            std::abs(apart) > track.damping_ratio * track.frequency_hz)
+            continue;
+        const run_track*& side = apart < 0 ? below : above;
+        if (!side || std::abs(apart) < std::abs(side->frequency_hz - track.frequency_hz)) side = &other;
+    }
+    return below && above && shape_mac(below->shape, above->shape) < same_shape;
+}
+
 struct member {
     int run, track;
     const run_track* found;
@@ -177,7 +195,7 @@ std::vector<cluster> gather(const std::vector<consensus_run>& runs) {
 
 /// Hz within which two clusters of one shape may be one vibration.
 double within(double f, double zeta, double other_f, double other_zeta) {
-    return 2.5 * (f * zeta + other_f * other_zeta);
+    return most_widths * (f * zeta + other_f * other_zeta);
 }
 
 /// Can this run tell two modes so far apart from each other? Each output doubles what it knows of a sample.
@@ -274,6 +292,21 @@ void set_values(const std::vector<consensus_run>& runs, const std::vector<member
     set_scatter(runs, seen, mode);
 }
 
+/// Whose EMAC counts: all that vote; of a mode under a force that has died away by the end of most of their horizons, the runs at
+/// whose end it has not. Without a force that end tells a mode from a hump of the excitation, which does not decay as one.
+std::vector<member> lasting(const std::vector<consensus_run>& runs, const std::vector<member>& all,
+                            const std::vector<member>& seen) {
+    const auto lasts = [&](const member& m) {
+        const consensus_run& run = runs[static_cast<std::size_t>(m.run)];
+        const double decay = 2 * M_PI * m.found->frequency_hz * m.found->damping_ratio;
+        return run.inputs == 0 || run.horizon_s() * decay <= decays_left;
+    };
+    if (2 * std::count_if(seen.begin(), seen.end(), lasts) >= static_cast<std::ptrdiff_t>(seen.size())) return seen;
+    std::vector<member> out;
+    std::copy_if(all.begin(), all.end(), std::back_inserter(out), lasts);
+    return out.size() < fewest_runs ? seen : out;
+}
+
 consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c, double spacing_hz,
                        const std::vector<bool>& turned) {
     consensus_mode mode;
@@ -304,7 +337,7 @@ consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c,
     mode.damping_ratio = med([](const member& m) { return m.found->damping_ratio; });
     mode.mpc = med(
         [&](const member& m) { return turned.empty() ? m.found->mpc : shape_collinearity(m.found->shape, turned); });
-    mode.emac = med([](const member& m) { return m.found->emac; });
+    mode.emac = median_of(lasting(runs, c.members, seen), [](const member& m) { return m.found->emac; });
     const double zeta = mode.damping_ratio;
     mode.damping_spread = 1.4826 * med([&](const member& m) { return std::abs(m.found->damping_ratio / zeta - 1); });
     set_values(runs, seen, mode);
@@ -312,27 +345,26 @@ consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c,
     return mode;
 }
 
-/// A weaker cluster beside a stronger one of the same shape: one mode of a structure that changes with its amplitude.
+/// A weaker cluster beside a stronger one of the same shape: one mode of a structure that changes with its amplitude, unless
+/// their half-power bands are apart and nearly all runs see both.
+bool is_split(const consensus_mode& mode, const consensus_mode& stronger) {
+    if (mode.shape.size() < 3) return false; // one or two outputs tell no shapes apart
+    const double apart = std::abs(mode.frequency_hz - stronger.frequency_hz);
+    const double far = within(mode.frequency_hz, mode.damping_ratio, stronger.frequency_hz, stronger.damping_ratio);
+    const double one = mode.found_in < nearly_all ? far : far / most_widths;
+    // below resolved_hz a shadow: no three runs can tell it from the stronger one
+    return apart < std::max({one, same_frequency * stronger.frequency_hz, mode.resolved_hz}) &&
+           shape_mac(mode.shape, stronger.shape) > same_shape_run;
+}
+
 void mark_split(std::vector<consensus_mode>& modes) {
     std::vector<std::size_t> split;
     for (std::size_t i = 0; i < modes.size(); ++i)
-        for (const consensus_mode& other : modes) {
-            const consensus_mode& mode = modes[i];
-            if (&other == &mode || other.agreement <= mode.agreement || !other.confident()) continue;
-            const double apart = std::abs(mode.frequency_hz - other.frequency_hz);
-            // One or two outputs tell no shapes apart.
-            const double one =
-                mode.shape.size() < 3
-                    ? 0
-                    : std::max(within(mode.frequency_hz, mode.damping_ratio, other.frequency_hz, other.damping_ratio),
-                               same_frequency * other.frequency_hz);
-            // A shadow: no three runs can tell it from the stronger one, and it has its shape.
-            const bool shadow = mode.shape.size() >= 3 && apart < mode.resolved_hz;
-            if ((apart < one || shadow) && shape_mac(mode.shape, other.shape) > same_shape_run) {
-                split.push_back(i);
-                break;
-            }
-        }
+        if (std::any_of(modes.begin(), modes.end(), [&](const consensus_mode& other) {
+                return &other != &modes[i] && other.agreement > modes[i].agreement && other.confident() &&
+                       is_split(modes[i], other);
+            }))
+            split.push_back(i);
     for (const std::size_t i : split) modes[i].why.emplace_back("split");
 }
 
@@ -400,6 +432,10 @@ void link_tracks(consensus_run& run) {
             static_cast<double>(poles.size()) >= share_of_orders * static_cast<double>(possible))
             run.tracks.push_back(track_of(poles));
     }
+    std::vector<run_track> own;
+    std::copy_if(run.tracks.begin(), run.tracks.end(), std::back_inserter(own),
+                 [&run](const run_track& track) { return !is_resolved(track, run.tracks, run.orders.back()); });
+    run.tracks = std::move(own);
 }
 
 bool in_band(const consensus_run& run, double frequency_hz) {

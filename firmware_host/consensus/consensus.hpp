@@ -34,7 +34,7 @@ struct consensus_run {
     int level = 0;    ///< 0: the record's own rate, k: a 2^k-th of it
     double fs_hz = 0; ///< of this level
     int rows = 0;     ///< samples it looks back on
-    int outputs = 1;
+    int inputs = 0, outputs = 1;
     double top = 0;    ///< modes above this share of fs_hz are not seen
     double bottom = 0; ///< nor below this one
     int band = 0;      ///< of a zoom

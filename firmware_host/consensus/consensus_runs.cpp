@@ -55,6 +55,14 @@ int rows_of(int n_u, int n_y, long long samples, bool crowded) {
     return static_cast<int>(std::min<long long>({wanted, borne, std::max(6, most_unknowns / (n_u + n_y))}));
 }
 
+/// To the lags that the sums of the older samples have: those of more outputs, of which some are left out, have fewer.
+void shorten(consensus_run& run, int n_u, int n_y, const record_level& level) {
+    for (; level.older && run.rows > fewest_rows; --run.rows) {
+        const okid_identify_config_t config = run_config(run, n_u, n_y);
+        if (okid_identify_lags(&config) <= level.older->lags()) return;
+    }
+}
+
 /// States that the Hankel matrix of a run holds, an even number, at most `most`.
 int most_states(const consensus_run& run, int n_y, int most) {
     const int held = (is_subspace(run.method) ? run.rows - 1 : run.rows) * n_y;
@@ -75,11 +83,13 @@ bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, co
 
 void place_run(consensus_run& run, const record_level& level, int number, int n_u, int n_y) {
     run.level = number;
+    run.inputs = n_u;
     run.outputs = n_y;
     run.fs_hz = level.fs_hz;
     run.top = level.top;
     run.bottom = level.bottom;
     run.band = level.band;
+    shorten(run, n_u, n_y, level);
     const okid_identify_config_t config = run_config(run, n_u, n_y);
     run.orders = consensus_orders(std::min(config.max_order, okid_identify_max_order(&config)));
     run.states = run.orders.empty() ? 0 : run.orders.back();

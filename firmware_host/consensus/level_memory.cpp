@@ -104,6 +104,20 @@ void level_memory::merge(const level_memory& other) {
     samples_ += other.samples_;
 }
 
+level_memory level_memory::without_outputs(const std::vector<bool>& kept) const {
+    const auto n_u = static_cast<std::int32_t>(m_ - kept.size());
+    std::vector<std::int32_t> channels;
+    for (std::int32_t c = 0; c < static_cast<std::int32_t>(m_); ++c)
+        if (c < n_u || kept[static_cast<std::size_t>(c - n_u)]) channels.push_back(c);
+    okid_accumulator_config_t window{};
+    okid_accumulator_config(newest_.sums, &window);
+    level_memory out(n_u, static_cast<int>(channels.size()) - n_u, lags_, window.block);
+    check(okid_accumulator_take_channels(out.newest_.sums, newest_.sums, channels.data()));
+    check(okid_accumulator_take_channels(out.base_.sums, base_.sums, channels.data()));
+    out.samples_ = samples_;
+    return out;
+}
+
 double level_memory::rows_of_block() const {
     const double rows = static_cast<double>(okid_accumulator_rows(newest_.sums) + okid_accumulator_rows(base_.sums));
     return rows / static_cast<double>(std::max<std::size_t>(1, blocks()));

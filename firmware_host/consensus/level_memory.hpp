@@ -24,9 +24,12 @@ class level_memory {
     void gap();                  ///< what comes next does not follow what came
     void silence();              ///< the record begins in it
     void merge(const level_memory& other);
+    /// The same without some outputs. @param kept  a flag for each output
+    level_memory without_outputs(const std::vector<bool>& kept) const;
 
     long long samples() const { return samples_; } ///< complete ones
-    double rows_of_block() const;                  ///< on average
+    int lags() const { return lags_; }
+    double rows_of_block() const; ///< on average
     /// Blocks that can be taken out of all, oldest first. What a stream full of gaps folds together is the first one.
     std::size_t blocks() const;
     bool take_block(std::size_t k, okid_accumulator_t* to) const;

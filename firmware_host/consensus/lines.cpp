@@ -4,7 +4,8 @@
 //          scatters (its spread is half its mean), that of a line stays. A record silent before its force has no line
 //          louder than that silence. A multiple of a stronger vibration moves in phase with the power of that vibration
 //          (Kim & Powers 1979, in the time domain). A line of the force, a harmonic of a drive say, is in the responses
-//          too: where the force has a narrow peak and the responses over the force have none, there is no mode
+//          too: where the force has a narrow peak, or its band ends, and the responses over the force have no peak, there
+//          is no mode
 #include "lines.hpp"
 
 #include "demodulation.hpp"
@@ -42,6 +43,7 @@ constexpr int rate_parts = 8;   // fs / 8, 2 fs / 8 ..: where a converter and it
 constexpr double on_the_rate = 3e-4;
 constexpr double alone = 0.98;        // of the power of a shape in one output
 constexpr double forced = 10;         // power of a line of the force over that beside it
+constexpr double ended = 100;         // power of a force over that beyond the edge of its band
 constexpr double resonant = 2;        // power of the responses over that of the force, at a mode over beside it
 constexpr std::size_t averaged = 4;   // segments of a spectrum, at least
 constexpr std::size_t shortest = 128; // samples of a segment
@@ -246,33 +248,51 @@ class level_spectra {
     std::map<std::tuple<const record_level*, std::size_t, std::size_t>, std::vector<double>> known_;
 };
 
+/// @param beside  how many widths off the powers beside it begin; they are as wide
 band_powers powers_around(level_spectra& spectra, const record_level& level, std::size_t first, std::size_t last,
-                          std::size_t size, double f, double width) {
+                          std::size_t size, double f, double width, double beside) {
+    const double near = beside * width, far = 2 * near;
     band_powers out;
     for (std::size_t k = first; k < last; ++k) {
         const std::vector<double>& power = spectra.of(level, k, size);
         if (power.empty()) continue;
         out.at += mean_power(power, f - width, f + width);
-        out.below += mean_power(power, f - 4 * width, f - 2 * width);
-        out.above += mean_power(power, f + 2 * width, f + 4 * width);
+        out.below += mean_power(power, f - far, f - near);
+        out.above += mean_power(power, f + near, f + far);
     }
     return out;
 }
 
-/// Is it the force that has a narrow peak there, and not the structure?
-bool is_line_of_force(level_spectra& spectra, const record_level& level, std::size_t m, std::size_t n_u,
-                      const consensus_mode& mode) {
+/// What the force alone explains at a mode: a peak of its own, or the edge of its band, and the structure shows no peak there.
+enum class of_force { nothing, peak, edge };
+
+of_force shown_by_force(level_spectra& spectra, const record_level& level, std::size_t m, std::size_t n_u,
+                        const consensus_mode& mode) {
     std::size_t longest = 0, size = shortest;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
     const double f = mode.frequency_hz / level.fs_hz;
     while (2 * averaged * size <= longest && mode.damping_ratio * f * static_cast<double>(size) < 2) size *= 2;
     const double width = std::max(mode.damping_ratio * f, 2 / static_cast<double>(size));
-    if (n_u == 0 || longest < averaged * size || f < 4 * width) return false;
-    const band_powers force = powers_around(spectra, level, 0, n_u, size, f, width);
-    if (force.at < forced * std::max(force.below, force.above)) return false;
-    const band_powers response = powers_around(spectra, level, n_u, m, size, f, width);
-    const double beside = std::max(response.below / force.below, response.above / force.above);
-    return response.at / force.at < resonant * beside;
+    if (n_u == 0 || longest < averaged * size || f < 4 * width) return of_force::nothing;
+    const auto powers = [&](std::size_t first, std::size_t last, double beside) {
+        return powers_around(spectra, level, first, last, size, f, width, beside);
+    };
+    const auto flat = [](double at, double beside) { return at < resonant * beside; }; // never of NaN
+    const band_powers force = powers(0, n_u, 2);
+    if (force.at >= forced * std::max(force.below, force.above)) {
+        const band_powers response = powers(n_u, m, 2);
+        const double beside = std::max(response.below / force.below, response.above / force.above);
+        return flat(response.at / force.at, beside) ? of_force::peak : of_force::nothing;
+    }
+    if (f + 4 * width > level.top) return of_force::nothing; // where a filter ends the band of all channels
+    const band_powers close = powers(0, n_u, 1);
+    const bool drops = close.below > close.above; // and stays so
+    const double most = drops ? std::min(close.below, force.below) : std::min(close.above, force.above);
+    const double least = drops ? std::max(close.above, force.above) : std::max(close.below, force.below);
+    if (most < ended * least) return of_force::nothing;
+    const band_powers response = powers(n_u, m, 1); // of the side with the force: beyond the edge is noise over noise
+    const double beside = drops ? response.below / close.below : response.above / close.above;
+    return flat(response.at / close.at, beside) ? of_force::edge : of_force::nothing;
 }
 
 } // namespace
@@ -294,8 +314,8 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
             mode.why.emplace_back(mains ? "pickup" : "tone");
             continue;
         }
-        if (is_line_of_force(spectra, level, m, n_u, mode)) {
-            mode.why.emplace_back("harmonic");
+        if (const of_force shown = shown_by_force(spectra, level, m, n_u, mode); shown != of_force::nothing) {
+            mode.why.emplace_back(shown == of_force::peak ? "harmonic" : "band_edge");
             continue;
         }
         for (const consensus_mode& base : modes) {

@@ -35,12 +35,12 @@ constexpr double widest_frequency = 0.05;
 constexpr double least_strength = 2;                              // of a residue matrix over its noise
 constexpr int first_steps = 2, window_steps = 5, last_steps = 12; // of the poles
 constexpr double neighbours = 0.02;                               // in frequency: poles that compete for one resonance
-constexpr double one_mode = 2.5, one_mode_share = 0.01; // sum of widths, or share of the frequency: as of records
-constexpr double same_residues = 0.9;                   // MAC of the residues of two poles that are one mode
-constexpr double narrowest = 0.25;                      // half a resonance's width in lines: below it no damping shows
-constexpr double edge_lines = 2;                        // from the ends of the band
-constexpr double broadest = 0.2;                        // damping of a vibration
-constexpr double worth_listing = 0.25;                  // share of the runs below which a cluster is chance
+constexpr double one_mode = 2.5, one_mode_share = 0.01;           // sum of widths, or share of the frequency
+constexpr double same_residues = 0.9;                             // MAC of the residues of two poles that are one mode
+constexpr double narrowest = 0.25;     // half a resonance's width in lines: below it no damping shows
+constexpr double edge_lines = 2;       // from the ends of the band
+constexpr double broadest = 0.2;       // damping of a vibration
+constexpr double worth_listing = 0.25; // share of the runs below which a cluster is chance
 constexpr double doubtful_share = 0.5; // of the runs: a doubtful mode that fewer found is not listed by itself
 
 /// The columns of all set-ups side by side, each an output of its own.

@@ -127,6 +127,20 @@ void older_samples::merge(const older_samples& other) {
     longest_ = std::max({longest_, other.longest_, other.length_});
 }
 
+older_samples older_samples::without_outputs(const record_options& fewer, const std::vector<bool>& kept) const {
+    older_samples out(fewer);
+    for (std::size_t k = 0; k < levels_.size(); ++k) out.levels_[k] = levels_[k].without_outputs(kept);
+    out.samples_ = samples_;
+    out.missing_ = missing_;
+    out.gaps_ = gaps_;
+    out.screened_ = screened_;
+    out.length_ = length_;
+    out.longest_ = longest_;
+    out.records_ = records_;
+    out.within_ = within_;
+    return out;
+}
+
 std::vector<bool> older_samples::moved() const {
     const auto n_u = static_cast<int>(n_u_), n_y = static_cast<int>(n_y_);
     okid_accumulator_config_t config = okid_accumulator_defaults(n_u, n_y, 1);

@@ -32,6 +32,8 @@ class older_samples {
     /// @param newest  all that are kept. @return how many went: a quarter, or up to the end of the record that ends next
     std::size_t take(const record_set& newest);
     void merge(const older_samples& other); ///< as further records
+    /// Without some outputs, and of the options without them; it takes no more samples. @param kept  a flag for each output
+    older_samples without_outputs(const record_options& fewer, const std::vector<bool>& kept) const;
 
     const level_memory& level(std::size_t k) const { return levels_[k]; }
     long long samples() const { return samples_; } ///< those missing with them

@@ -415,7 +415,11 @@ record_result identify_auto(record_set records, const record_options& given, con
     const bool all = std::all_of(screened.kept.begin(), screened.kept.end(), [](bool kept) { return kept; });
     if (!all) work.set = without_outputs(work.set, screened.kept);
     const record_options options = all ? given : without_outputs(given, screened.kept);
-    const std::vector<bool> moved = work.before && all ? work.before->moved() : std::vector<bool>();
+    if (work.before && !all) {
+        split = std::make_unique<older_samples>(work.before->without_outputs(options, screened.kept));
+        work.before = split.get();
+    }
+    const std::vector<bool> moved = work.before ? work.before->moved() : std::vector<bool>();
     check_moving(work.set, options, !screened.said.empty(), moved);
     if (std::find(moved.begin(), moved.end(), true) == moved.end())
         check_different_inputs(moments_of(work.set), options); // else they need not have been alike before
@@ -423,14 +427,6 @@ record_result identify_auto(record_set records, const record_options& given, con
     work.context = describe_records(work.set, options, missing);
     if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened
     work.context.warnings.insert(work.context.warnings.end(), repeated.begin(), repeated.end());
-    if (work.before && !all) {
-        work.context.warnings.emplace_back(
-            "newest_only",
-            fmt::format("the newest {} samples alone are used: of the {} before them only sums are kept, "
-                        "with the output that is left out in them",
-                        work.set.count(), work.before->samples()));
-        work.before = nullptr;
-    }
     if (work.before)
         work.before->add_counts(asked_gaps > 0 ? missing : missing_count(), work.set.count(), work.context);
     work.context.warnings.insert(work.context.warnings.end(), screened.said.begin(), screened.said.end());

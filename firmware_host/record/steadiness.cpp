@@ -29,6 +29,8 @@ constexpr double sure = 7;              // slope over its deviation; the largest
 constexpr double worth_saying = 0.02;   // change over the half-power bandwidth
 constexpr double widest = 0.1;          // damping above: nothing repeats over a block
 constexpr double alone = 4;             // bandwidths to the next mode, without a force
+constexpr double outstanding = 2;       // a mode over what the model leaves: below, that is mostly something else
+constexpr double throughout = 0.5;      // of the time, in which the middle 90 % of the evidence on a drift lie
 
 /// The frequency of a mode in one block, relative to that of the model.
 struct block_frequency {
@@ -38,6 +40,19 @@ struct block_frequency {
 struct slopes {
     double level = 0, level_ratio = 0, drift = 0, drift_ratio = 0; ///< relative changes, each over its deviation
 };
+
+/// The share of the time in which the middle 90 % of the weight of blocks, in order of time, lie: little where a mode answers to a
+/// part of a sweep only.
+double time_covered(const std::vector<block_frequency>& over) {
+    double total = 0, sum = 0, first = over.front().time, last = over.back().time;
+    for (const block_frequency& b : over) total += b.weight;
+    for (const block_frequency& b : over) {
+        if (sum <= 0.05 * total) first = b.time;
+        if (sum <= 0.95 * total) last = b.time;
+        sum += b.weight;
+    }
+    return (last - first) / (over.back().time - over.front().time);
+}
 
 /// Weighted line over a power and time; changes from the quietest to the loudest tenth, and from begin to end.
 slopes slopes_of(const std::vector<block_frequency>& over, double block_frequency::* level) {
@@ -82,6 +97,7 @@ struct steady_search {
     std::vector<complex> mu;
     double fs_hz;
     std::vector<double> spread; ///< of each output's residual
+    std::vector<double> seen;   ///< each mode over that, in the record and output that show it best
 };
 
 /// Of each sample of a record, the power of all displacements.
@@ -134,6 +150,7 @@ std::size_t block_length(const listed_mode& mode, double fs_hz) {
 
 std::vector<std::vector<block_frequency>> with_force(steady_search& s, const record_work& work) {
     std::vector<std::vector<block_frequency>> out(s.modes.size());
+    s.seen.assign(s.modes.size(), 0);
     double seconds_before = 0;
     for (std::size_t r = 0; r < s.set.records.size(); ++r) {
         const answered_record record = answer(work, s.modes, r);
@@ -150,6 +167,10 @@ std::vector<std::vector<block_frequency>> with_force(steady_search& s, const rec
             for (std::size_t first = 0; first + length <= record.count; first += length)
                 out[k].push_back(corrected(s, record, moved, k, first, length,
                                            seconds_before + static_cast<double>(first) / s.fs_hz));
+            double square = 0;
+            for (const complex& q : record.states[k]) square += std::norm(q) / static_cast<double>(record.count);
+            for (std::size_t o = 0; o < s.set.n_y; ++o)
+                s.seen[k] = std::max(s.seen[k], std::abs(s.modes[k]->shape[o]) * std::sqrt(square) / s.spread[o]);
         }
         seconds_before += static_cast<double>(record.count) / s.fs_hz;
     }
@@ -197,7 +218,7 @@ std::vector<block_frequency> turning(const steady_search& s, std::size_t k) {
 } // namespace
 
 void remark_unsteady(const std::vector<listed_mode>& modes, double fs_hz, record_work& work) {
-    steady_search s{work.set, {}, {}, fs_hz, {}};
+    steady_search s{work.set, {}, {}, fs_hz, {}, {}};
     for (const listed_mode& mode : modes) {
         if (!mode.in_model) continue;
         s.modes.push_back(&mode);
@@ -210,7 +231,7 @@ void remark_unsteady(const std::vector<listed_mode>& modes, double fs_hz, record
     std::vector<std::string> levels, drifts;
     for (std::size_t k = 0; k < s.modes.size(); ++k) {
         const listed_mode& mode = *s.modes[k];
-        if (mode.damping_ratio > widest) continue;
+        if (mode.damping_ratio > widest || (driven && s.seen[k] < outstanding)) continue;
         const std::vector<block_frequency> over = driven ? forced[k] : turning(s, k);
         slopes found = slopes_of(over, &block_frequency::power);
         const slopes other = slopes_of(over, &block_frequency::motion);
@@ -221,7 +242,8 @@ void remark_unsteady(const std::vector<listed_mode>& modes, double fs_hz, record
         };
         if (found.level_ratio > sure && std::abs(found.level) > least)
             levels.push_back(text(found.level, found.level_ratio));
-        if (found.drift_ratio > std::max(sure, found.level_ratio) && std::abs(found.drift) > least)
+        if (found.drift_ratio > std::max(sure, found.level_ratio) && std::abs(found.drift) > least &&
+            time_covered(over) >= throughout)
             drifts.push_back(text(found.drift, found.drift_ratio));
     }
     if (!levels.empty())

@@ -16,13 +16,13 @@ namespace {
 constexpr std::array<std::pair<const char*, const char*>, 11> words{{
     {"few_runs", "fewer than half of the runs that could see it found it"},
     {"noise_shape", "short-lived, complex or scattering: probably noise"},
-    {"split", "beside a stronger one of the same shape: one mode whose frequency changes with amplitude"},
+    {"split", "too near to a stronger one of the same shape: probably the same mode"},
     {"tone", "a steady line, not a vibration that decays"},
     {"pickup", "a steady line at a multiple of the mains frequency"},
     {"harmonic", "a multiple, sum or difference of stronger vibrations, or a multiple of the drive"},
     {"undriven", "a structure that is not linear, and no resonance in what the forces drive there"},
     {"wide_sigma", "its standard deviation is too wide"},
-    {"band_edge", "too slow for the record, or at the edge of the band"},
+    {"band_edge", "too slow for the record, or at the edge of the band or of the force"},
     {"overdamped", "damped too much to vibrate"},
     {"narrow", "narrower than the lines of the responses show: its damping is not known"},
 }};

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import waiting
 from event_source import Listener
 from lines import Line, line
 from live_process import Live, post
@@ -75,9 +76,9 @@ def test_from_a_line_to_its_result(rows: list[bytes], tmp_path: Path, okid_live:
         shown = until(live, lambda kind, content: kind == "result" or (kind == "hello" and content["result"]))
     found = (shown.get("result") or shown)["modes"]
     assert sum(mode["confident"] for mode in found) == 2
+    waiting.until(lambda: wish(live, "/end") == (422, "no run goes on\n"))  # the file comes after the page's result
     results = list(tmp_path.glob("lab-*.json"))
     assert len(results) == 1 and json.loads(results[0].read_text())["inputs"] == ["force"]
-    assert wish(live, "/end") == (422, "no run goes on\n")
     assert live.end() == (0, "")
 
 

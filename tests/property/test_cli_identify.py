@@ -158,6 +158,13 @@ def test_table_goes_to_stdout(record: Path) -> None:
     assert "\x1b" not in done.stdout and done.stderr == ""
 
 
+def test_no_inputs_by_name(record: Path) -> None:
+    ambient = okid("identify", record, "--outputs", "y1,y2", "--method", "n4sid-cva", "--json", "-")
+    assert ambient.returncode == 0
+    named = okid("identify", record, "--inputs", "none", "--outputs", "y1,y2", "--method", "n4sid-cva", "--json", "-")
+    assert named.stdout == ambient.stdout and json.loads(named.stdout)["inputs"] == []
+
+
 def test_quiet_writes_only_the_file(record: Path, tmp_path: Path) -> None:
     target = tmp_path / "result.json"
     done = identify(record, "--json", target, "--quiet")

@@ -14,6 +14,7 @@ import okid
 import pytest
 from laboratory import Laboratory, ambient, chain, forced
 from numpy.typing import NDArray
+from program import ROOT
 
 Real = NDArray[np.float64]
 FS = 256.0
@@ -97,3 +98,15 @@ def test_linear_and_forced(seed: int) -> None:
 def test_linear_and_otherwise() -> None:
     for lab in (ambient(41, True, seconds=300), chain(42, count=10000).lab):
         assert not codes(lab) & {"level_dependent", "nonlinear", "time_varying"}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3] if SLOW else [2])
+def test_linear_and_swept(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a swept sine each mode answers for a short time, one above its end hardly: that is no drift, no dependence."""
+    monkeypatch.syspath_prepend(str(ROOT / "tests" / "kinds"))
+    import forced_kinds  # noqa: PLC0415
+
+    kind = forced_kinds.KINDS["sweep"]
+    record = kind.make(np.random.default_rng([kind.number, seed, 13]))
+    result = okid.identify(record.inputs, record.outputs, fs=record.rate, sigma_blocks=0)
+    assert not {w.code for w in result.warnings} & {"level_dependent", "time_varying"}

@@ -181,6 +181,15 @@ OKID_NODISCARD OKID_API okid_status_t okid_accumulator_drop_slots(okid_accumulat
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH (no window), OKID_ERR_RANGE (the block is 2^30 rows long)
 OKID_NODISCARD OKID_API okid_status_t okid_accumulator_pair_slots(okid_accumulator_t* self);
 
+/// What `from` would hold had the other channels never been measured, to the last bit: for a sensor that proves to be broken when
+/// the samples are gone. What `self` held is dropped; `from` keeps its content. Samples that were missing for the sake of
+/// another channel stay so.
+/// @param channels  one for each channel of `self`, its number in `from`: rising, inputs from inputs and outputs from outputs
+/// `self` is like `from` in lags, sample type, slots, spare slots, edges and whether it forgets. Cost O((m p)^2) of `self`.
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_MISMATCH, OKID_ERR_DIM (channels)
+OKID_NODISCARD OKID_API okid_status_t okid_accumulator_take_channels(okid_accumulator_t* self, okid_accumulator_t* from,
+                                                                     const int32_t* channels);
+
 /// Take the offsets out of a finished record before it is merged: every channel less its mean over the record, so that
 /// offsets that moved between records do no harm. Codes: less the mean rounded to 2^-8 code, exactly, so that any order of
 /// merging still gives the same bits. The run ends; no samples are taken any more (OKID_ERR_MISMATCH), only merges with others

@@ -40,6 +40,41 @@ static void a_short_lived_or_scattering_pole_is_noise() {
     TEST_ASSERT_TRUE(has(found_by(6, 1, 0.45), "noise_shape"));
 }
 
+/// It falls to a seventh in 1.3 s: at the end of 2.4 s little is left, at that of 0.3 s all. Only a force makes that a decay.
+static void what_dies_away_is_judged_where_it_lasts() {
+    for (const int inputs : {0, 1}) {
+        auto runs = rate(4, 30, 3);
+        give(runs, 0, 4, track(4, 0.06, bending, 0.95));
+        const auto lower = rate(8, 30, 3, 3, 12.5);
+        runs.insert(runs.end(), lower.begin(), lower.end());
+        give(runs, 4, 12, track(4, 0.06, bending, 0.1));
+        for (consensus_run& run : runs) run.inputs = inputs;
+        const auto modes = find_agreement(runs);
+        TEST_ASSERT_EQUAL_UINT64(1, modes.size());
+        TEST_ASSERT_EQUAL(inputs == 1, modes[0].confident());
+        TEST_ASSERT_EQUAL(inputs == 0, has(modes[0], "noise_shape"));
+    }
+}
+
+/// One pole to order 28, from 32 on two, one on either side: the first was both. If they have one shape it may be the mode.
+static void a_pole_that_higher_orders_resolve_is_none() {
+    for (const bool alike : {false, true}) {
+        consensus_run run = rate(1, 17, 3, 0, 256)[0];
+        run.orders = consensus_orders(64);
+        const shape both = {1.0, 0.0, 0.0};
+        for (const int order : run.orders) {
+            if (order <= 28) run.poles.push_back({order, 31.08, 0.022, 0.8, 0.8, both});
+            if (order >= 32) run.poles.push_back({order, 30.92, 0.022, 1, 1, bending});
+            if (order >= 32) run.poles.push_back({order, 31.40, 0.016, 1, 1, alike ? bending : torsion});
+        }
+        link_tracks(run);
+        const auto merged = std::count_if(run.tracks.begin(), run.tracks.end(),
+                                          [](const run_track& found) { return found.orders.back() <= 28; });
+        TEST_ASSERT_EQUAL_UINT64(alike ? 3 : 2, run.tracks.size());
+        TEST_ASSERT_EQUAL_INT(alike ? 1 : 0, merged);
+    }
+}
+
 /// Two modes of one output, 0.8 Hz apart: a horizon of 0.3 s sees one pole between them, one of 2.4 s sees both.
 static void only_runs_that_can_part_two_modes_vote_on_them() {
     auto runs = rate(6, 30, 1);
@@ -67,17 +102,20 @@ static void the_longest_horizons_vote_where_none_can_part() {
     TEST_ASSERT_TRUE(modes[0].confident() && !modes[1].confident());
 }
 
-/// A pair closer than 2.5 bandwidths is one mode if its shapes are alike, two if they are not; one output cannot tell.
+/// Two of one shape are one mode where their half-power bands touch, or where fewer than nine tenths of the runs see both; of
+/// other shapes they are two, and one output cannot tell.
 static void a_close_pair_is_split_only_by_its_shapes() {
-    for (const bool alike : {true, false}) {
-        auto runs = rate(6, 100, 3);
-        give(runs, 0, 6, track(10, 0.01, bending));
-        give(runs, 0, 5, track(10.3, 0.01, alike ? bending : torsion));
-        const auto modes = find_agreement(runs);
-        TEST_ASSERT_EQUAL_UINT64(2, modes.size());
-        TEST_ASSERT_TRUE(modes[0].confident());
-        TEST_ASSERT_EQUAL(alike, has(modes[1], "split"));
-    }
+    for (const double apart_hz : {0.19, 0.21})
+        for (const bool alike : {true, false})
+            for (const std::size_t both : {8U, 9U}) {
+                auto runs = rate(10, 200, 3);
+                give(runs, 0, 10, track(10, 0.01, bending));
+                give(runs, 0, both, track(10 + apart_hz, 0.01, alike ? bending : torsion, 0.9));
+                const auto modes = find_agreement(runs);
+                TEST_ASSERT_EQUAL_UINT64(2, modes.size());
+                TEST_ASSERT_TRUE(modes[0].confident());
+                TEST_ASSERT_EQUAL(alike && (apart_hz < 0.2 || both < 9), has(modes[1], "split"));
+            }
     auto runs = rate(6, 300, 1);
     give(runs, 0, 6, track(10, 0.01, {1.0}));
     give(runs, 0, 5, track(10.3, 0.01, {1.0}));
@@ -152,6 +190,8 @@ int main() {
     UNITY_BEGIN();
     RUN_TEST(half_of_the_runs_make_a_mode);
     RUN_TEST(a_short_lived_or_scattering_pole_is_noise);
+    RUN_TEST(what_dies_away_is_judged_where_it_lasts);
+    RUN_TEST(a_pole_that_higher_orders_resolve_is_none);
     RUN_TEST(only_runs_that_can_part_two_modes_vote_on_them);
     RUN_TEST(the_longest_horizons_vote_where_none_can_part);
     RUN_TEST(a_close_pair_is_split_only_by_its_shapes);

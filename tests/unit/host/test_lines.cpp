@@ -112,6 +112,45 @@ static void a_mode_stays_one_wherever_it_lies() {
     for (const double mode : {7.95, 8.3, 9.0, 9.1, 20.3}) TEST_ASSERT_EQUAL_UINT64(0, why(mode, mode, damping).size());
 }
 
+/// Noise below 20 Hz, as a shaker's controller makes it, one mode, and a second force that nobody measures, of the same band.
+static std::vector<record_level> driven_below_20_hz(double mode_hz) {
+    std::mt19937 random(11);
+    std::normal_distribution<double> normal;
+    record_level level = one_record();
+    constexpr int half = 300;
+    std::vector<double> taps, noise[2];
+    for (int k = -half; k <= half; ++k)
+        taps.push_back((k ? std::sin(2 * M_PI * 20 / fs * k) / (M_PI * k) : 40 / fs) *
+                       (0.5 + 0.5 * std::cos(M_PI * k / (half + 1))));
+    for (auto& one : noise)
+        for (std::size_t i = 0; i < count + taps.size(); ++i) one.push_back(normal(random));
+    const std::complex<double> pole = pole_of(mode_hz, damping);
+    std::complex<double> state = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        double force[2] = {0, 0};
+        for (std::size_t k = 0; k < taps.size(); ++k)
+            for (int c = 0; c < 2; ++c) force[c] += taps[k] * noise[c][i + k];
+        state = pole * state + force[0] + 0.1 * force[1];
+        level.records.front().push_back(force[0] + 1e-4 * normal(random));
+        level.records.front().push_back(0.1 * state.imag() + 0.1 * force[1] + 1e-3 * normal(random));
+    }
+    return {level};
+}
+
+static std::vector<std::string> why_below_20_hz(double mode_hz, double listed_hz) {
+    std::vector<consensus_mode> modes = {pole(listed_hz, damping, 1)};
+    modes[0].shape = {1.0};
+    mark_lines(driven_below_20_hz(mode_hz), 1, 1, false, modes);
+    return modes[0].why;
+}
+
+static void where_the_force_ends_is_no_mode() {
+    const auto codes = why_below_20_hz(8, 20);
+    TEST_ASSERT_EQUAL_UINT64(1, codes.size());
+    TEST_ASSERT_EQUAL_STRING("band_edge", codes[0].c_str());
+    for (const double mode : {8.0, 19.5, 20.0}) TEST_ASSERT_EQUAL_UINT64(0, why_below_20_hz(mode, mode).size());
+}
+
 /// In each output the mode beside it makes the amplitude of the line wander; along its shape that mode cancels.
 static void a_line_is_seen_along_its_shape() {
     const auto modes = listed(answered(8, 0.02, false, 7.3, 0.3, 3), false, {pole(7.3, 2e-4, 1), pole(8, 0.02, -0.5)});
@@ -184,5 +223,6 @@ int main() {
     RUN_TEST(what_rings_after_silence_is_no_line);
     RUN_TEST(a_multiple_of_the_drive_is_no_mode);
     RUN_TEST(a_mode_stays_one_wherever_it_lies);
+    RUN_TEST(where_the_force_ends_is_no_mode);
     return UNITY_END();
 }

@@ -73,6 +73,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_accumulator_take_slots": (c_int, [opaque, opaque, c_int32, c_int32]),
     "okid_accumulator_drop_slots": (c_int, [opaque, c_int32]),
     "okid_accumulator_pair_slots": (c_int, [opaque]),
+    "okid_accumulator_take_channels": (c_int, [opaque, opaque, POINTER(c_int32)]),
     "okid_accumulator_energy": (c_int, [opaque, c_int, doubles]),
     "okid_accumulator_centre": (c_int, [opaque]),
     "okid_accumulator_run": (c_int, [opaque, c_int, POINTER(RunSums)]),
