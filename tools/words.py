@@ -99,7 +99,7 @@ def passed(found: dict[str, Count]) -> list[str]:
     for name, bound in bounds.items():
         for what, most in bound.items() if name in found else ():
             if (there := getattr(found[name], what)) > most:
-                out.append(f"{name}: {what} {there:.4g}, bound {most}")
+                out.append(f"{name}: {what} {there:.6g}, bound {most}")
     return out
 
 

@@ -7,17 +7,15 @@
 #include <math.h>
 #include <string.h>
 
-typedef drv_scan_t (*scanner_t)(const uint8_t*, size_t, drv_packet_t*, size_t*);
-
-static const scanner_t scanners[DRV_FRAMINGS] = {drv_scan_cobs, drv_scan_ascii, drv_scan_witmotion, drv_scan_vectornav};
+const drv_framing_info_t drv_framings[] = {
+    [DRV_FRAMING_COBS] = {"cobs", drv_scan_cobs, 7, 252, 32, ""},
+    [DRV_FRAMING_ASCII] = {"ascii", drv_scan_ascii, 7, 252, 0, ""},
+    [DRV_FRAMING_WITMOTION] = {"witmotion", drv_scan_witmotion, 3, 9, 0, "g"},
+    [DRV_FRAMING_VECTORNAV] = {"vectornav", drv_scan_vectornav, 7, 6, 0, "m/s^2"},
+};
+_Static_assert(sizeof drv_framings / sizeof *drv_framings == DRV_FRAMINGS, "every framing has its line");
 
 enum { LINES_TO_AGREE = 3 };
-
-unsigned drv_framing_fields(drv_framing_t framing) { return framing == DRV_FRAMING_WITMOTION ? 3 : 7; }
-
-unsigned drv_framing_limit(drv_framing_t framing) {
-    return framing == DRV_FRAMING_WITMOTION ? 9 : framing == DRV_FRAMING_VECTORNAV ? 6 : 252;
-}
 
 void drv_decoder_init(drv_decoder_t* self, drv_framing_t framing, int32_t counter) {
     memset(self, 0, sizeof *self);
@@ -74,7 +72,7 @@ int drv_decoder_next(drv_decoder_t* self) {
     while (self->begin < self->end) {
         size_t used = 0;
         drv_scan_t found =
-            scanners[self->framing](self->bytes + self->begin, self->end - self->begin, &self->packet, &used);
+            drv_framings[self->framing].scan(self->bytes + self->begin, self->end - self->begin, &self->packet, &used);
         if (found == DRV_SCAN_MORE) return 0;
         self->begin += used;
         if (self->framing == DRV_FRAMING_ASCII) {

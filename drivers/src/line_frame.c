@@ -11,7 +11,7 @@ static void put(uint8_t* at, uint64_t value, unsigned bytes) {
 }
 
 uint32_t drv_line_frame_field(drv_framing_t framing, unsigned field, drv_signal_t* signal) {
-    const unsigned together = drv_framing_fields(framing);
+    const unsigned together = drv_framings[framing].fields;
     memset(signal, 0, sizeof *signal);
     signal->start_bit = (uint16_t)(64 * (1 + field % together));
     signal->length = 64;

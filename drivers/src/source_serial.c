@@ -97,7 +97,7 @@ static int64_t stamp(const serial_t* state, const drv_packet_t* packet) {
 /// The next frame of the packet at hand.
 static void next_frame(drv_source_t* self, serial_t* state, drv_frame_t* frame) {
     const drv_packet_t* packet = &state->decoder.packet;
-    const unsigned together = drv_framing_fields(state->decoder.framing);
+    const unsigned together = drv_framings[state->decoder.framing].fields;
     const unsigned left = packet->fields - state->field;
     memset(frame, 0, offsetof(drv_frame_t, data));
     drv_line_frame_fill(

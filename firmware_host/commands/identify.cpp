@@ -11,17 +11,16 @@
 #include "frequency/response_file.hpp"
 #include "record/csv_header.hpp"
 #include "record/hit_files.hpp"
+#include "record/identify_options.hpp"
 #include "record/proposal.hpp"
 #include "record/record.hpp"
 #include "record/request.hpp"
 #include "record_files.hpp"
 #include "result/mat_file.hpp"
-#include "result/method.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 namespace okid_host {
 namespace {
@@ -228,130 +227,32 @@ void identify(const identify_arguments& given) {
         write_whole_file("-", shown(result_table(model, result.context)));
 }
 
-/// Options: the files and their columns.
-void add_records(CLI::App& command, identify_arguments& given) {
+/// Options: those of the table, the files before them.
+void add_table(CLI::App& command, identify_arguments& given) {
     command
         .add_option(
             "records", given.records,
             "records of one structure, merged exactly: .csv, .npy, or what okid-convert reads (.mat, .uff, .mf4 ...)")
         ->required()
         ->type_name("RECORD.csv");
-    command
-        .add_option("--inputs", given.inputs,
-                    "force columns, with commas between; without it, or with none: ambient, modes only")
-        ->type_name("NAMES");
-    command.add_option("--outputs", given.outputs, "response columns, with commas between")->type_name("NAMES");
-    command.add_option("--fs", given.wanted.fs, "sample rate; default: what the file says")->type_name("HZ");
-}
-
-/// Options: how the model is found.
-void add_methods(CLI::App& command, identify_arguments& given) {
-    command
-        .add_option("--method", given.wanted.method,
-                    "how the model is found: auto (default), what several methods agree on, or one of them. With an "
-                    "option of one method alone (--p, --rows, --order, --max-order, --hankel, --refine, "
-                    "--stabilization) okid-era. "
-                    "plscf: modes from correlations through frequency responses")
-        ->type_name(fmt::format("auto|{}|{}", fmt::join(method_names(), "|"), lag_method));
-    command.add_option("--p", given.wanted.p, "observer order in samples (default 40; not for n4sid)")->type_name("N");
-    command
-        .add_option("--rows", given.wanted.rows,
-                    "block rows of the Hankel matrix (default 2 p, n4sid 30, okid without inputs p)")
-        ->type_name("N");
-    command
-        .add_option("--hankel", given.wanted.hankel,
-                    "what the Hankel matrix of the okid methods holds: system (default), innovations (those too, "
-                    "weighted: free of units) or literal (eq. 42 as printed, for comparison only)")
-        ->type_name(fmt::format("{}", fmt::join(hankel_names(), "|")));
-    command.add_option("--order", given.wanted.order, "number of states, or auto (default)")->type_name("N|auto");
-    command.add_option("--max-order", given.wanted.max_order, "largest order that auto may choose")->type_name("N");
-    command
-        .add_option(
-            "--hold", given.wanted.hold,
-            "force between samples: held (zoh), linear (foh) or band-limited, as a load cell behind an anti-alias "
-            "filter gives it (band); auto (default of --method auto) determines it from the record")
-        ->type_name("auto|zoh|foh|band");
-    command.add_option("--band", given.wanted.band, "only modes in this band, Hz (auto, plscf)")->type_name("LO:HI");
-    command
-        .add_option("--decimate", given.wanted.decimate,
-                    "--method auto looks at no higher rate than one Nth of the record's (default auto: all rates)")
-        ->type_name("N|auto");
-    command
-        .add_option("--threads", given.wanted.threads,
-                    "processors for --method auto (default: all it may use); the result is the same for any number")
-        ->type_name("N");
-}
-
-/// Options: which modes, and what is known of the record.
-void add_wishes(CLI::App& command, identify_arguments& given) {
-    command.add_flag("--all-modes", given.all_modes,
-                     "the table also lists the doubtful modes, and why they are doubtful");
-    command.add_option("--modes", given.wanted.modes, "only these modes, by their numbers in the table (auto, plscf)")
-        ->type_name("1,3-5");
-    command
-        .add_option("--picks", given.wanted.picks,
-                    "only the modes nearest to these poles: frequencies in Hz, or a .json with modes (auto)")
-        ->type_name("FILE.json|HZ,HZ");
-    command.add_option("--detrend", given.wanted.detrend, "what is removed from every channel first (default mean)")
-        ->type_name("none|mean|linear");
-    command
-        .add_option(
-            "--start", given.wanted.start,
-            "moving (default): nothing is known before the record; rest: every record begins with the structure "
-            "at rest, as a hammer test with a short pre-trigger does")
-        ->type_name("moving|rest");
-    command
-        .add_option("--sensing", given.wanted.sensing,
-                    "what the outputs measure (default acceleration): one kind, or one per output with commas between")
-        ->type_name("acceleration|velocity|displacement");
-}
-
-/// Options: where forces and sensors are.
-void add_places(CLI::App& command, identify_arguments& given) {
-    command
-        .add_option("--input-dofs", given.wanted.input_dofs,
-                    "where each force acts: numbers of degrees of freedom from 1 (-3: at 3, polarity reversed). With "
-                    "--output-dofs: mass, stiffness and damping matrices")
-        ->type_name("LIST");
-    command
-        .add_option("--hit-dofs", given.wanted.hit_dofs,
-                    "roving hammer: where each record was struck, one number a record in their order (-3: at 3, "
-                    "direction reversed). Each place becomes an input of its own")
-        ->type_name("LIST");
+    record_request& wanted = given.wanted;
+    for (const identify_option& option : identify_options()) {
+        if (const auto* flag = std::get_if<bool record_request::*>(&option.place)) {
+            command.add_flag(option.typed(), wanted.**flag, option.help);
+            continue;
+        }
+        const auto* text = std::get_if<std::string record_request::*>(&option.place);
+        std::string& value = text ? wanted.**text : option.key() == "inputs" ? given.inputs : given.outputs;
+        if (option.kind == option_kind::answer)
+            command.add_flag(option.typed() + "{yes}", value, option.help);
+        else
+            command.add_option(option.typed(), value, option.help)->type_name(option.shape);
+    }
     command
         .add_option("--places", given.places,
-                    "the same from the names of the files: a regular expression whose one group is the number of the "
+                    "--hit-dofs from the names of the files: a regular expression whose one group is the number of the "
                     "place, as 'P(\\d+)_' of P07_1.csv")
         ->type_name("REGEX");
-    command.add_flag("--keep-all", given.wanted.keep_all,
-                     "use the bad hits of --hit-dofs and --places too (a double hit, an overload ...)");
-    command
-        .add_option("--output-dofs", given.wanted.output_dofs,
-                    "where each sensor stands; every degree of freedom needs a force or a sensor, one needs both")
-        ->type_name("LIST");
-}
-
-/// Options: what is done with the model: refinement, standard deviations.
-void add_sigma(CLI::App& command, identify_arguments& given) {
-    command.add_flag(
-        "--refine{yes}", given.wanted.refine,
-        "improve the model by maximum likelihood: with noise at the sensors no unbiased estimate is more exact. "
-        "Needs --inputs. --refine=auto, the default of method auto: if the noise is white and every mode keeps its "
-        "identity; --refine=no");
-    command.add_flag(
-        "--stabilization", given.wanted.stabilization,
-        "look at all orders and three horizons too, and list the stable modes (JSON: \"stabilization\"); of auto the "
-        "poles of all runs (JSON: \"agreement\")");
-    command
-        .add_option("--sigma", given.wanted.sigma,
-                    "standard deviations: analytic (default; the method's derivative along each block of the record), "
-                    "jackknife (identified again without each block; also where a method has no derivative), none")
-        ->type_name("analytic|jackknife|none");
-    command
-        .add_option(
-            "--sigma-blocks", given.wanted.sigma_blocks,
-            "blocks of the record for the standard deviations (default 20), 0 = none. Without --sigma: jackknife")
-        ->type_name("N");
 }
 
 /// Options: files of another kind.
@@ -385,6 +286,8 @@ void add_other_files(CLI::App& command, identify_arguments& given) {
 
 /// Options: what comes out.
 void add_targets(CLI::App& command, identify_arguments& given) {
+    command.add_flag("--all-modes", given.all_modes,
+                     "the table also lists the doubtful modes, and why they are doubtful");
     command.add_option("--json", given.json, "write okid.result/1 to this file, - is stdout")->type_name("FILE.json");
     command.add_option("--model", given.model, "write A, B, C, D, K, dt as a MAT file for scipy")
         ->type_name("FILE.mat");
@@ -396,8 +299,7 @@ void add_targets(CLI::App& command, identify_arguments& given) {
 void add_identify(CLI::App& app) {
     auto given = std::make_shared<identify_arguments>();
     CLI::App* command = app.add_subcommand("identify", "Identify modes and a model from measured CSV records");
-    for (const auto& add : {add_records, add_methods, add_wishes, add_places, add_sigma, add_other_files, add_targets})
-        add(*command, *given);
+    for (const auto& add : {add_table, add_other_files, add_targets}) add(*command, *given);
     command->footer(
         "Examples:\n  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --json result.json\n"
         "  okid identify frame.csv --inputs force1 --outputs acc1,acc2,acc3 --input-dofs 1 --output-dofs 1,2,3\n"

@@ -3,6 +3,7 @@
 // METHOD   check_schema() has looked at keys, kinds and ranges; here is what one key makes of another
 #include "config_identification.hpp"
 
+#include "record/identify_options.hpp"
 #include "result/deviations.hpp"
 #include "result/method.hpp"
 
@@ -48,23 +49,29 @@ std::string chosen_window_fault(const identification_config& wanted) {
 
 namespace {
 
+/// The first key that belongs to one method and says something; "" = none.
+std::string key_of_one(const toml::table& t) {
+    for (const identify_option& option : identify_options()) {
+        const std::string key = option.key();
+        if (option.methods == option_methods::one && t.contains(key) && t[key].value<std::string>() != "auto" &&
+            t[key].value<std::string>() != "system")
+            return key;
+    }
+    return "";
+}
+
 /// An option of one method alone means the method that release 0.1 took by default.
 std::string chosen_method(const toml::table& t) {
     if (const auto named = t["method"].value<std::string>()) return *named;
-    for (const char* key : {"p", "rows", "order", "hankel", "forgetting"})
-        if (t.contains(key) && t[key].value<std::string>() != "auto" && t[key].value<std::string>() != "system")
-            return "okid-era";
+    if (t.contains("forgetting") || !key_of_one(t).empty()) return "okid-era";
     return t["window"].value<std::string>() == "auto" ? "okid-era" : "auto";
 }
 
 /// Keys of one method beside auto, and of auto beside one method.
 void check_agreement(const config_place& place, const toml::table& t, const identification_config& wanted) {
     const bool agreed = wanted.method == "auto";
-    for (const char* key : {"p", "rows", "order", "hankel"})
-        if (agreed && t.contains(key) && t[key].value<std::string>() != "auto" &&
-            t[key].value<std::string>() != "system")
-            refuse_key(place, t.get(key), key,
-                       "belongs to one method, \"auto\" agrees over many: leave one of them out");
+    if (const std::string key = agreed ? key_of_one(t) : ""; !key.empty())
+        refuse_key(place, t.get(key), key, "belongs to one method, \"auto\" agrees over many: leave one of them out");
     if (agreed && wanted.forgetting)
         refuse_key(place, t.get("forgetting"), "forgetting",
                    "\"auto\" keeps the samples of a window, without forgetting: expected window_s, or one method");

@@ -57,7 +57,6 @@ ordered_json frame_json(const drv_frame_t& frame) {
 }
 
 ordered_json bus_json(const bus_config& bus) {
-    static const std::array<const char*, DRV_FRAMINGS> framings{"cobs", "ascii", "witmotion", "vectornav"};
     ordered_json out{{"name", bus.name},
                      {"type", bus.type},
                      {"interface", text_or_null(bus.interface)},
@@ -77,7 +76,7 @@ ordered_json bus_json(const bus_config& bus) {
     for (const drv_frame_t& frame : bus.start_frames) out["start"].push_back(frame_json(frame));
     if (bus.on_line()) out.update({{"baud", bus.baud}, {"btr", text_or_null(bus.btr)}});
     if (bus.serial())
-        out.update({{"framing", framings[bus.framing]},
+        out.update({{"framing", drv_framings[bus.framing].name},
                     {"counter_field", or_null(bus.counter_field)},
                     {"counter_bits", bus.counter_bits}});
     return out;

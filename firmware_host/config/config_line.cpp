@@ -2,6 +2,7 @@
 #include "config_line.hpp"
 
 #include "error.hpp"
+#include "files/nearest_name.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -50,18 +51,19 @@ void require(const config_place& place, const toml::table& table, const char* ke
 }
 
 void read_counter(const config_place& place, const toml::table& table, bus_config& bus) {
+    const drv_framing_info_t& own = drv_framings[bus.framing];
     bus.counter_bits = table["counter_bits"].value_or(bus.counter_bits);
     const toml::node *field = table.get("counter_field"), *bits = table.get("counter_bits");
     if ((field || bits) && bus.framing != DRV_FRAMING_ASCII)
         refuse_key(place, field ? field : bits, field ? "counter_field" : "counter_bits",
-                   fmt::format("only framing = \"ascii\" has it; {} {}", framing_name(bus.framing),
-                               bus.framing == DRV_FRAMING_COBS ? "counts samples by itself" : "counts none"));
+                   fmt::format("only framing = \"ascii\" has it; {} {}", own.name,
+                               own.counter_bits ? "counts samples by itself" : "counts none"));
     if (!field) {
         if (bits) refuse_key(place, bits, "counter_bits", "it needs counter_field beside it");
         return;
     }
     bus.counter_field = table["counter_field"].value<int>();
-    const auto most = static_cast<int>(drv_framing_limit(bus.framing)) - 1;
+    const auto most = static_cast<int>(own.limit) - 1;
     if (*bus.counter_field > most)
         refuse_key(place, field, "counter_field", fmt::format("found {}, expected 0 to {}", *bus.counter_field, most));
 }
@@ -92,9 +94,10 @@ void check_rates(const config_place& place, const toml::table& table, const bus_
 
 } // namespace
 
-const char* framing_name(drv_framing_t framing) {
-    static const char* const names[DRV_FRAMINGS] = {"cobs", "ascii", "witmotion", "vectornav"};
-    return names[framing];
+std::vector<std::string> framing_names() {
+    std::vector<std::string> out;
+    for (const drv_framing_info_t& framing : drv_framings) out.emplace_back(framing.name);
+    return out;
 }
 
 std::string name_in_logs(const std::string& name) {
@@ -113,10 +116,10 @@ void read_line(const config_place& place, const toml::table& table, bus_config& 
         refuse_key(place, table.get("device"), "device",
                    fmt::format("a device has a path of at most {} characters", int{DRV_PATH_BYTES} - 1));
     if (bus.serial()) {
-        require(place, table, "framing", "one of: cobs, ascii, witmotion, vectornav");
+        require(place, table, "framing", "one of: " + list_names(framing_names()));
         const std::string name = *table["framing"].value<std::string>();
         for (int i = 0; i < DRV_FRAMINGS; ++i)
-            if (name == framing_name(static_cast<drv_framing_t>(i))) bus.framing = static_cast<drv_framing_t>(i);
+            if (name == drv_framings[i].name) bus.framing = static_cast<drv_framing_t>(i);
         read_counter(place, table, bus);
     } else {
         bus.btr = table["btr"].value_or(std::string());
@@ -126,6 +129,7 @@ void read_line(const config_place& place, const toml::table& table, bus_config& 
 
 void resolve_field(const config_place& place, const toml::table& table, const bus_config& bus,
                    channel_config& channel) {
+    const drv_framing_info_t& own = drv_framings[bus.framing];
     const toml::node* field = table.get("field");
     if (!field)
         refuse_key(place, &table, "field",
@@ -138,23 +142,19 @@ void resolve_field(const config_place& place, const toml::table& table, const bu
             refuse_key(place, node, key, "a channel of a serial bus has a field instead");
     if (const toml::node* node = table.get("sequence"))
         refuse_key(place, node, "sequence",
-                   bus.framing == DRV_FRAMING_COBS
-                       ? "framing \"cobs\" counts samples by itself"
-                       : "a serial bus counts samples with counter_field = N in its [[bus]]");
+                   own.counter_bits ? fmt::format("framing \"{}\" counts samples by itself", own.name)
+                                    : "a serial bus counts samples with counter_field = N in its [[bus]]");
     const auto number = *field->value<std::int64_t>();
-    const auto most = static_cast<std::int64_t>(drv_framing_limit(bus.framing)) - 1;
+    const auto most = static_cast<std::int64_t>(own.limit) - 1;
     if (number > most)
-        refuse_key(
-            place, field, "field",
-            fmt::format("found {}, expected 0 to {} with framing \"{}\"", number, most, framing_name(bus.framing)));
+        refuse_key(place, field, "field",
+                   fmt::format("found {}, expected 0 to {} with framing \"{}\"", number, most, own.name));
     channel.field = static_cast<unsigned>(number);
     channel.frame = {drv_line_frame_field(bus.framing, *channel.field, &channel.layout), 0, 0};
     channel.length = DRV_LINE_FRAME_BYTES;
-    if (bus.framing == DRV_FRAMING_COBS || bus.counter_field) {
-        drv_line_frame_counter(static_cast<unsigned>(bus.counter_bits), &channel.sequence.emplace());
-    }
-    if (channel.unit.empty() && number < 3)
-        channel.unit = bus.framing == DRV_FRAMING_WITMOTION ? "g" : bus.framing == DRV_FRAMING_VECTORNAV ? "m/s^2" : "";
+    const unsigned bits = own.counter_bits ? own.counter_bits : static_cast<unsigned>(bus.counter_bits);
+    if (own.counter_bits || bus.counter_field) drv_line_frame_counter(bits, &channel.sequence.emplace());
+    if (channel.unit.empty() && number < 3) channel.unit = own.unit;
 }
 
 } // namespace okid_host

@@ -15,6 +15,6 @@ void read_line(const config_place& place, const toml::table& table, bus_config& 
 /// Frame, layout, sequence and unit of a channel of a serial bus.
 void resolve_field(const config_place& place, const toml::table& table, const bus_config& bus, channel_config& channel);
 
-const char* framing_name(drv_framing_t framing);
+std::vector<std::string> framing_names();
 
 } // namespace okid_host

@@ -2,9 +2,12 @@
 // One rule a key; the rules of a section stand together in the order of the documentation.
 #include "config_schema.hpp"
 
+#include "config_line.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
 #include "number_keys.hpp"
+#include "record/identify_options.hpp"
+#include "result/method.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +22,7 @@ namespace {
 enum class kind { text, number, positive, whole, flag, choice, order, array, start_bits, line, gpio };
 
 struct key_rule {
-    const char* key;
+    std::string key;
     kind what;
     double low = -std::numeric_limits<double>::infinity();
     double high = std::numeric_limits<double>::infinity();
@@ -31,6 +34,26 @@ struct section_rule {
     bool many; ///< [[name]]
     std::vector<key_rule> keys;
 };
+
+/// The keys that are options of `okid identify` too, then those of a stream alone.
+std::vector<key_rule> with_options(const std::vector<key_rule>& own) {
+    std::vector<key_rule> out;
+    for (const identify_option& option : identify_options()) {
+        if (!(option.reach & of_configs)) continue;
+        const bool order = option.kind == option_kind::whole_or_auto;
+        key_rule rule{option.key(), order ? kind::order : kind::array};
+        if (order || option.kind == option_kind::whole) {
+            if (!order) rule.what = kind::whole;
+            rule.low = static_cast<double>(option.low), rule.high = static_cast<double>(option.high);
+        } else if (option.kind != option_kind::text) {
+            rule.what = kind::choice, rule.choices = option.alternatives(); // plscf takes whole records
+            rule.choices.erase(std::remove(rule.choices.begin(), rule.choices.end(), lag_method), rule.choices.end());
+        }
+        out.push_back(rule);
+    }
+    out.insert(out.end(), own.begin(), own.end());
+    return out;
+}
 
 /// One lamp.
 const section_rule gpio_rule = {
@@ -57,7 +80,7 @@ const std::vector<section_rule> schema = {
       {"adapter_channel", kind::whole, 0, 31},
       {"device", kind::text},
       {"baud", kind::whole, 50, 2e7},
-      {"framing", kind::choice, 0, 0, {"cobs", "ascii", "witmotion", "vectornav"}},
+      {"framing", kind::choice, 0, 0, framing_names()},
       {"counter_field", kind::whole, 0, 1023},
       {"counter_bits", kind::whole, 2, 32},
       {"btr", kind::text},
@@ -96,27 +119,14 @@ const std::vector<section_rule> schema = {
       {"zero_code", kind::number},
       {"field", kind::whole, 0, 1023},
       {"sequence", kind::start_bits}}},
-    {"identification",
-     false,
-     {{"method", kind::choice, 0, 0, {"auto", "okid-era", "okid-era-dc", "n4sid-moesp", "n4sid-cva", "n4sid-ssarx"}},
-      {"p", kind::whole, 1, 4096},
-      {"rows", kind::whole, 2, 100000},
-      {"hankel", kind::choice, 0, 0, {"system", "innovations", "literal"}},
-      {"order", kind::order, 1, 10000},
-      {"hold", kind::choice, 0, 0, {"auto", "zoh", "foh", "band"}},
-      {"detrend", kind::choice, 0, 0, {"none", "mean", "linear"}},
-      {"band", kind::array},
-      {"decimate", kind::order, 1, 1000},
-      {"refine", kind::choice, 0, 0, {"auto", "yes", "no"}},
-      {"window_s", kind::positive, 0, 1e6},
-      {"window", kind::choice, 0, 0, {"fixed", "auto"}},
-      {"forgetting", kind::positive, 0, 1},
-      {"update_s", kind::positive, 0, 1e5},
-      {"sigma", kind::choice, 0, 0, {"analytic", "jackknife", "none"}},
-      {"sigma_blocks", kind::whole, 0, 100},
-      {"restart_on_change", kind::flag},
-      {"mkr", kind::flag},
-      {"max_memory_mb", kind::positive, 0, 1e6}}},
+    {"identification", false,
+     with_options({{"window_s", kind::positive, 0, 1e6},
+                   {"window", kind::choice, 0, 0, {"fixed", "auto"}},
+                   {"forgetting", kind::positive, 0, 1},
+                   {"update_s", kind::positive, 0, 1e5},
+                   {"restart_on_change", kind::flag},
+                   {"mkr", kind::flag},
+                   {"max_memory_mb", kind::positive, 0, 1e6}})},
     {"alarm",
      false,
      {{"enabled", kind::flag},
@@ -249,7 +259,7 @@ std::vector<table_entry> in_order(const toml::table& table) {
 
 void check_table(const config_place& place, const toml::table& table, const section_rule& rule) {
     std::vector<std::string> known;
-    for (const key_rule& key : rule.keys) known.emplace_back(key.key);
+    for (const key_rule& key : rule.keys) known.push_back(key.key);
     for (const auto& [key, node] : in_order(table)) {
         const std::string name(key);
         const auto found =
@@ -302,9 +312,9 @@ std::vector<number_key> number_keys() {
     for (const section_rule& section : schema)
         for (const key_rule& rule : section.keys)
             if (std::isfinite(rule.high) && rule.high > rule.low)
-                out.push_back({section.name, rule.key, section.many, rule.low, rule.high});
+                out.push_back({section.name, rule.key.c_str(), section.many, rule.low, rule.high});
             else if (rule.what == kind::number)
-                out.push_back({section.name, rule.key, section.many, -1, 1});
+                out.push_back({section.name, rule.key.c_str(), section.many, -1, 1});
     return out;
 }
 

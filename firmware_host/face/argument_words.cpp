@@ -3,7 +3,9 @@
 // METHOD   texts name options as the program has them; a known option becomes its argument, with "=" before a value
 #include "argument_words.hpp"
 
-#include <array>
+#include "record/identify_options.hpp"
+
+#include <algorithm>
 #include <cctype>
 #include <string_view>
 
@@ -11,38 +13,16 @@ namespace okid_host::face {
 namespace {
 
 struct argument {
-    std::string_view option, name;
-    std::string_view values; // words that can follow as a value, with blanks around; a number always can
+    std::string option, name;
+    std::vector<std::string> values; // words that can follow as a value; a number always can
 };
 
-constexpr std::array arguments{argument{"--inputs", "inputs", ""},
-                               argument{"--outputs", "outputs", ""},
-                               argument{"--fs", "fs", " HZ "},
-                               argument{"--method", "method", " auto "},
-                               argument{"--p", "p", " N "},
-                               argument{"--rows", "rows", " N "},
-                               argument{"--order", "order", " N "},
-                               argument{"--max-order", "max_order", " N "},
-                               argument{"--hankel", "hankel", " system innovations literal "},
-                               argument{"--hold", "hold", " auto zoh foh band "},
-                               argument{"--detrend", "detrend", " none mean linear "},
-                               argument{"--start", "start", " moving rest "},
-                               argument{"--sensing", "sensing", ""},
-                               argument{"--input-dofs", "input_dofs", ""},
-                               argument{"--output-dofs", "output_dofs", ""},
-                               argument{"--refine", "refine", ""},
-                               argument{"--stabilization", "stabilization", ""},
-                               argument{"--sigma", "sigma", " analytic jackknife none "},
-                               argument{"--sigma-blocks", "sigma_blocks", " N "},
-                               argument{"--band", "band", ""},
-                               argument{"--decimate", "decimate", " N "},
-                               argument{"--picks", "picks", " "},
-                               argument{"--modes", "modes", ""},
-                               argument{"--threads", "threads", " N "},
-                               argument{"--hit-dofs", "hit_dofs", ""},
-                               argument{"--keep-all", "keep_all", ""},
-                               argument{"--exponential", "exponential", " S "},
-                               argument{"--json", "to_dict()", ""}};
+std::vector<argument> make_arguments() {
+    std::vector<argument> out{{"--exponential", "exponential", {"S"}}, {"--json", "to_dict()", {}}};
+    for (const identify_option& option : identify_options())
+        out.push_back({option.typed(), option.key(), option.alternatives()});
+    return out;
+}
 
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-'; }
 
@@ -52,15 +32,16 @@ std::string_view word_at(std::string_view text, std::size_t at) {
     return text.substr(at, end - at);
 }
 
-bool is_value(std::string_view word, std::string_view values) {
+bool is_value(std::string_view word, const std::vector<std::string>& values) {
     if (word.empty()) return false;
     return std::isdigit(static_cast<unsigned char>(word.front())) != 0 ||
-           values.find(" " + std::string(word) + " ") != std::string_view::npos;
+           std::find(values.begin(), values.end(), word) != values.end();
 }
 
 } // namespace
 
 std::string argument_words(const std::string& text) {
+    static const std::vector<argument> arguments = make_arguments();
     std::string out;
     for (std::size_t at = 0; at < text.size();) {
         const bool begins = text.compare(at, 2, "--") == 0 && (at == 0 || !is_word(text[at - 1]));

@@ -55,24 +55,19 @@ void take_option(const std::string& key, const json& value, const option_places&
 
 } // namespace
 
-option_places places_of(record_request& r) {
-    return {{{"fs", &r.fs},
-             {"method", &r.method},
-             {"p", &r.p},
-             {"rows", &r.rows},
-             {"order", &r.order},
-             {"max_order", &r.max_order},
-             {"hankel", &r.hankel},
-             {"hold", &r.hold},
-             {"detrend", &r.detrend},
-             {"sensing", &r.sensing},
-             {"input_dofs", &r.input_dofs},
-             {"output_dofs", &r.output_dofs},
-             {"sigma", &r.sigma},
-             {"sigma_blocks", &r.sigma_blocks},
-             {"refine", &r.refine}},
-            {},
-            {{"inputs", &r.inputs}, {"outputs", &r.outputs}}};
+option_places places_of(record_request& request, unsigned reach) {
+    option_places out;
+    for (const identify_option& option : identify_options()) {
+        if ((option.reach & reach) != reach) continue;
+        const std::string key = option.key();
+        if (const auto* text = std::get_if<std::string record_request::*>(&option.place))
+            out.texts.emplace_back(key, &(request.**text));
+        else if (const auto* flag = std::get_if<bool record_request::*>(&option.place))
+            out.flags.emplace_back(key, &(request.**flag));
+        else
+            out.lists.emplace_back(key, &(request.*std::get<std::vector<std::string> record_request::*>(option.place)));
+    }
+    return out;
 }
 
 void read_options(const char* text, const option_places& to) {
@@ -81,7 +76,7 @@ void read_options(const char* text, const option_places& to) {
     for (const auto& [key, value] : options.items())
         if (!value.is_null()) take_option(key, value, to);
     for (const auto& [name, place] : to.texts)
-        if (std::string_view(name) == "fs" && place->empty())
+        if (name == "fs" && place->empty())
             throw failure(exit_usage, "fs is missing, expected a sample rate in Hz above 0");
 }
 

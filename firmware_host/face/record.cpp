@@ -30,14 +30,6 @@ struct asked {
 asked read_record(const char* text) {
     asked out;
     option_places places = places_of(out.request);
-    places.texts.emplace_back("start", &out.request.start);
-    places.texts.emplace_back("band", &out.request.band);
-    places.texts.emplace_back("decimate", &out.request.decimate);
-    places.texts.emplace_back("picks", &out.request.picks);
-    places.texts.emplace_back("modes", &out.request.modes);
-    places.texts.emplace_back("threads", &out.request.threads);
-    places.texts.emplace_back("hit_dofs", &out.request.hit_dofs);
-    places.flags = {{"stabilization", &out.request.stabilization}, {"keep_all", &out.request.keep_all}};
     places.lists.emplace_back("units", &out.units);
     places.lists.emplace_back("references", &out.references);
     read_options(text, places);

@@ -28,15 +28,10 @@ int32_t okid_host_identify_responses(const char* options, size_t lines, const do
         response_request asked;
         record_request& wanted = asked.wanted;
         std::string set_ups;
-        face::read_options(options, {{{"sensing", &wanted.sensing},
-                                      {"input_dofs", &wanted.input_dofs},
-                                      {"output_dofs", &wanted.output_dofs},
-                                      {"band", &wanted.band},
-                                      {"modes", &wanted.modes},
-                                      {"set_ups", &set_ups},
-                                      {"exponential", &asked.exponential}},
-                                     {{"all_modes", &asked.all_modes}, {"stabilization", &wanted.stabilization}},
-                                     {{"inputs", &wanted.inputs}, {"outputs", &wanted.outputs}}});
+        face::option_places places = face::places_of(wanted, of_responses);
+        places.texts.insert(places.texts.end(), {{"set_ups", &set_ups}, {"exponential", &asked.exponential}});
+        places.flags.emplace_back("all_modes", &asked.all_modes);
+        face::read_options(options, places);
         response_set set;
         set.inputs = wanted.inputs;
         set.outputs = wanted.outputs;

@@ -187,7 +187,7 @@ std::string stream_json(const stream_config& config) {
 
 /// The options of the text, over those that are there.
 void read_request(const char* text, stream_request& given) {
-    option_places places = places_of(given.record);
+    option_places places = places_of(given.record, of_streams);
     for (const auto& [name, place] :
          {std::pair{"window_s", &given.window_s}, std::pair{"window", &given.window},
           std::pair{"forgetting", &given.forgetting}, std::pair{"update_s", &given.update_s},

@@ -6,6 +6,7 @@
 
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "record/identify_options.hpp"
 #include "record/modal_model.hpp"
 #include "record/record_refine.hpp"
 #include "response_modes.hpp"
@@ -62,17 +63,9 @@ double finest_spacing(const std::vector<double>& f) {
 }
 
 void check_options(const record_request& given) {
-    for (const auto& [option, there] :
-         {std::pair{"--fs", !given.fs.empty()}, std::pair{"--method", !given.method.empty()},
-          std::pair{"--p", !given.p.empty()}, std::pair{"--rows", !given.rows.empty()},
-          std::pair{"--order", given.order != "auto"}, std::pair{"--max-order", !given.max_order.empty()},
-          std::pair{"--hankel", given.hankel != "system"}, std::pair{"--hold", !given.hold.empty()},
-          std::pair{"--detrend", given.detrend != "mean"}, std::pair{"--start", given.start != "moving"},
-          std::pair{"--decimate", !given.decimate.empty()}, std::pair{"--sigma", !given.sigma.empty()},
-          std::pair{"--sigma-blocks", !given.sigma_blocks.empty()}, std::pair{"--threads", !given.threads.empty()},
-          std::pair{"--hit-dofs", !given.hit_dofs.empty()}, std::pair{"--refine", !given.refine.empty()},
-          std::pair{"--picks", !given.picks.empty()}})
-        if (there) throw failure(exit_usage, fmt::format("{} is an option of records, found with --frf", option));
+    for (const identify_option& option : identify_options())
+        if (!(option.reach & of_responses) && option.is_given(given))
+            throw failure(exit_usage, fmt::format("{} is an option of records, found with --frf", option.typed()));
 }
 
 double time_constant(const std::string& text) {

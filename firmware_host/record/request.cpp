@@ -5,6 +5,7 @@
 
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "identify_options.hpp"
 #include "picks.hpp"
 #include "record_check.hpp"
 #include "result/method.hpp"
@@ -29,7 +30,6 @@ void one_of(const std::string& option, const std::string& value, const std::vect
 }
 
 void check_refine(const record_request& given) {
-    if (!given.refine.empty()) one_of("--refine", given.refine, {"auto", "yes", "no"});
     if (given.refine == "yes" && given.inputs.empty())
         usage("--refine needs a measured force: without --inputs (ambient) there is nothing to simulate");
 }
@@ -96,8 +96,11 @@ mass_plan check_dofs(const record_request& given, const record_options& options,
 /// An option of one method alone means the method that release 0.1 took by default.
 std::string chosen_method(const record_request& given) {
     if (!given.method.empty()) return given.method;
-    const bool single = !given.p.empty() || !given.rows.empty() || !given.max_order.empty() || given.order != "auto" ||
-                        given.hankel != "system" || given.refine == "yes" || given.stabilization;
+    const auto& options = identify_options();
+    const bool single = given.refine == "yes" || given.stabilization ||
+                        std::any_of(options.begin(), options.end(), [&](const identify_option& option) {
+                            return option.methods == option_methods::one && option.is_given(given);
+                        });
     return single ? "okid-era" : default_method;
 }
 
@@ -129,20 +132,19 @@ std::vector<int> numbers_of(const std::string& option, const std::string& text) 
 void check_agreement(const record_request& given, record_options& options) {
     const bool agreed = options.method == "auto";
     const bool of_lags = options.method == lag_method;
-    for (const auto& [option, text] :
-         {std::pair{"--decimate", &given.decimate}, std::pair{"--threads", &given.threads},
-          std::pair{"--band", &given.band}, std::pair{"--modes", &given.modes}, std::pair{"--picks", &given.picks}})
-        if (!agreed && !text->empty() && !(of_lags && (text == &given.band || text == &given.modes)))
-            usage(fmt::format("{} belongs to --method auto, {} takes the record as it is", option, options.method));
-    for (const auto& [option, there] :
-         {std::pair{"--p", !given.p.empty()}, std::pair{"--rows", !given.rows.empty()},
-          std::pair{"--order", given.order != "auto"}, std::pair{"--max-order", !given.max_order.empty()},
-          std::pair{"--hankel", given.hankel != "system"}}) {
-        if (agreed && there)
-            usage(
-                fmt::format("{} belongs to one method, --method auto agrees over many: leave one of them out", option));
-        if (of_lags && there)
-            usage(fmt::format("{} belongs to the okid and n4sid methods, plscf finds it itself: leave it out", option));
+    for (const identify_option& option : identify_options()) {
+        if (!option.is_given(given)) continue;
+        const bool lags_too = option.methods == option_methods::agreement_or_lags;
+        if (!agreed && (option.methods == option_methods::agreement || (lags_too && !of_lags)))
+            usage(fmt::format("{} belongs to --method auto, {} takes the record as it is", option.typed(),
+                              options.method));
+        if (option.methods != option_methods::one) continue;
+        if (agreed)
+            usage(fmt::format("{} belongs to one method, --method auto agrees over many: leave one of them out",
+                              option.typed()));
+        if (of_lags)
+            usage(fmt::format("{} belongs to the okid and n4sid methods, plscf finds it itself: leave it out",
+                              option.typed()));
     }
     if (of_lags && (given.refine == "yes" || !given.sigma_blocks.empty()))
         usage(fmt::format("{} belongs to other methods, found with plscf: leave it out",
@@ -157,9 +159,8 @@ void check_agreement(const record_request& given, record_options& options) {
         if (!(options.band->first < options.band->second))
             usage(fmt::format("--band: found \"{}\", expected the lower frequency first", printable(given.band)));
     }
-    if (!given.decimate.empty() && given.decimate != "auto")
-        options.decimate = static_cast<int>(whole_number("--decimate", given.decimate, 1, 1000));
-    if (!given.threads.empty()) options.threads = static_cast<int>(whole_number("--threads", given.threads, 1, 1024));
+    options.decimate = whole_of(given, &record_request::decimate).value_or(options.decimate);
+    options.threads = whole_of(given, &record_request::threads).value_or(options.threads);
     if (!given.modes.empty()) options.modes = numbers_of("--modes", given.modes);
     if (given.picks.empty()) return;
     if (!given.modes.empty()) usage("--picks and --modes both say which modes are kept: leave one of them out");
@@ -194,32 +195,18 @@ void check_picked(const std::vector<int>& numbers, std::size_t listed) {
 record_options check_request(const record_request& given) {
     record_options options;
     options.method = chosen_method(given);
-    std::vector<std::string> known = method_names();
-    known.insert(known.begin(), "auto");
-    known.emplace_back(lag_method);
-    one_of("--method", options.method, known);
-    one_of("--hankel", given.hankel, hankel_names());
+    check_words(given);
     check_refine(given);
     const bool agreed = options.method == "auto";
     options.hold = !given.hold.empty() ? given.hold : agreed ? "auto" : "zoh";
-    one_of("--hold", options.hold, {"auto", "zoh", "foh", "band"});
     check_agreement(given, options);
-    one_of("--detrend", given.detrend, {"none", "mean", "linear"});
-    one_of("--start", given.start, {"moving", "rest"});
     options.p_given = !given.p.empty();
-    if (options.p_given) options.p = static_cast<int>(whole_number("--p", given.p, 1, 4096));
-    if (!given.rows.empty()) options.rows = static_cast<int>(whole_number("--rows", given.rows, 2, 100000));
-    if (given.order != "auto") {
-        if (given.order.empty() || given.order[0] < '0' || given.order[0] > '9')
-            usage(fmt::format("--order: found \"{}\", expected a whole number or auto", printable(given.order)));
-        options.order = static_cast<int>(whole_number("--order", given.order, 1, 10000));
-    }
-    if (!given.max_order.empty())
-        options.max_order = static_cast<int>(whole_number("--max-order", given.max_order, 1, 10000));
-    if (!given.sigma.empty()) one_of("--sigma", given.sigma, {"analytic", "jackknife", "none"});
+    options.p = whole_of(given, &record_request::p).value_or(options.p);
+    options.rows = whole_of(given, &record_request::rows).value_or(options.rows);
+    options.order = whole_of(given, &record_request::order).value_or(options.order);
+    options.max_order = whole_of(given, &record_request::max_order).value_or(options.max_order);
     options.analytic = given.sigma.empty() ? given.sigma_blocks.empty() : given.sigma == "analytic";
-    if (!given.sigma_blocks.empty())
-        options.sigma_blocks = static_cast<int>(whole_number("--sigma-blocks", given.sigma_blocks, 0, most_blocks));
+    options.sigma_blocks = whole_of(given, &record_request::sigma_blocks).value_or(options.sigma_blocks);
     if (options.sigma_blocks > 0 && options.sigma_blocks < fewest_blocks)
         usage(fmt::format("--sigma-blocks: found {}, expected 0 (no standard deviations) or {} to {}",
                           options.sigma_blocks, fewest_blocks, most_blocks));

@@ -11,9 +11,11 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-from program import PROGRAM as OKID
-
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+
+from program import PROGRAM as OKID  # noqa: E402
+
 SUBCOMMANDS: dict[str, tuple[str, ...]] = {
     "okid": (),  # those its own --help lists, filled in below
     "okid-capture": ("can", "serial", "sync", "emulate"),

@@ -13,6 +13,7 @@ PAGES = {  # how many blocks of commands each has at least
     "wire-a-node.md": 3,
     "write-a-dbc.md": 5,
     "write-a-driver.md": 2,
+    "serial-framing.md": 2,
     "several-buses.md": 3,
     "port-to-a-board.md": 2,
     "long-term-monitoring.md": 3,

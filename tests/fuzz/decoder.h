@@ -26,7 +26,7 @@ static inline void fuzz_decoder(drv_framing_t framing, const uint8_t* data, size
             const drv_packet_t* packet = &decoder.packet;
             if (packet->fields == 0 || packet->samples == 0 ||
                 (size_t)packet->fields * packet->samples > DRV_PACKET_VALUES ||
-                packet->first_field + packet->fields > (int)drv_framing_limit(framing))
+                packet->first_field + packet->fields > (int)drv_framings[framing].limit)
                 abort();
         }
     }

@@ -87,10 +87,18 @@ void drv_decoder_add(drv_decoder_t* self, size_t count);
 /// The next packet into self->packet. @return 1; 2 when something was refused just before it; 0 = more bytes are needed
 int drv_decoder_next(drv_decoder_t* self);
 
-/// Consecutive fields that arrive together, at most 7: the frames of source_serial.c hold so many.
-unsigned drv_framing_fields(drv_framing_t framing);
-/// Fields the framing can deliver.
-unsigned drv_framing_limit(drv_framing_t framing);
+/// What is known of a framing.
+typedef struct drv_framing_info_t {
+    const char* name; ///< in a CONFIG.toml
+    drv_scan_t (*scan)(const uint8_t* bytes, size_t count, drv_packet_t* packet, size_t* used);
+    unsigned fields; ///< consecutive ones that arrive together, at most 7: the frames of line_frame.h hold so many
+    unsigned limit;  ///< fields it can deliver
+    unsigned counter_bits; ///< of the number that its packets give to samples; 0 = none
+    const char* unit;      ///< of fields 0 to 2, "" = whatever the sender measures
+} drv_framing_info_t;
+
+/// Of every framing, in the order of drv_framing_t; a new one is a line here.
+extern const drv_framing_info_t drv_framings[DRV_FRAMINGS];
 
 #ifdef __cplusplus
 }

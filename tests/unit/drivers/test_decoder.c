@@ -217,7 +217,7 @@ static void test_noise_of_every_framing(void) {
             while (drv_decoder_next(&decoder))
                 TEST_ASSERT_TRUE(decoder.packet.fields * decoder.packet.samples <= DRV_PACKET_VALUES &&
                                  decoder.packet.first_field + decoder.packet.fields <=
-                                     (int)drv_framing_limit((drv_framing_t)framing));
+                                     (int)drv_framings[framing].limit);
         }
     }
 }

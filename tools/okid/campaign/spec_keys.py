@@ -36,7 +36,7 @@ KEYS: dict[str, dict[str, Any]] = {
         "codes": (0, 16, 24, 32), "scale": NUMBERS, "offset": NUMBERS, "saturated": ("keep", "missing"),
     },
     "identification": {
-        "method": METHODS, "p": Number(1, 4096, whole=True), "rows": Number(1, 4096, whole=True),
+        "method": METHODS, "p": Number(1, 4096, whole=True), "rows": Number(2, 4096, whole=True),
         "order": ("auto", Number(1, 4096, whole=True)), "max_order": Number(1, 4096, whole=True),
         "hankel": ("system", "innovations", "literal"), "detrend": ("none", "mean"),
         "sigma_blocks": (0, Number(8, 100, whole=True)), "pieces": Number(1, 100, whole=True),
