@@ -6,6 +6,7 @@
 #include "result_keys.hpp"
 
 #include "files/input_file.hpp"
+#include "result/judgement.hpp"
 #include "result/mode_verdict.hpp"
 
 #include <algorithm>
@@ -70,7 +71,7 @@ known_mode read_mode(const keys_of& from, int number, std::size_t places) {
     const json* confident = from.find("confident");
     if (confident && !confident->is_boolean()) from.refuse_value("confident", *confident, "true or false");
     // results before release 0.2 judge no mode
-    out.confident = confident ? confident->get<bool>() : !(out.emac < doubtful_emac);
+    out.confident = confident ? confident->get<bool>() : !(out.emac < judgement::doubtful_emac);
     if (from.find("why")) out.why = names_in(from, "why", "a list of codes");
     return out;
 }

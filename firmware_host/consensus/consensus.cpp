@@ -7,6 +7,7 @@
 
 #include "files/order_statistics.hpp"
 #include "quantity.hpp"
+#include "result/judgement.hpp"
 #include "result/method.hpp"
 
 #include <algorithm>
@@ -18,29 +19,7 @@
 namespace okid_host {
 namespace {
 
-constexpr double most_damping = 0.25;   // a pole above is no vibration to an engineer
-constexpr double overdamped = 0.2;      // a mode above is listed, not signed
-constexpr double same_frequency = 0.01; // within a run, and between runs (docs/how-okid-decides.md)
-constexpr double same_damping = 0.3;    // from one order to the next
-constexpr double same_shape_run = 0.9;  // MAC from one order to the next
-constexpr double same_shape = 0.8;      // MAC between runs
-constexpr int fewest_orders = 4;        // a track shorter than this is chance
-constexpr double share_of_orders = 0.4; // of the orders from its first on
 constexpr double as_near = 1e-4; // distances from a median, in thousandths of f and 2 % of the damping, that are one
-constexpr int order_reach = 8;   // a pole may be missing for this many states
-constexpr double periods_seen = 0.75; // of a mode within the horizon
-constexpr double periods_well = 1.5;  // where its damping is sharp
-constexpr double periods_least = 0.3; // where several outputs together have periods_seen
-constexpr double beats_seen = 0.75; // of a mode and its neighbour within the horizon: fewer, and a run sees one of both
-constexpr std::size_t fewest_voters = 6; // those with the longest horizons vote in any case
-constexpr double one_half = 0.5;         // votes and agreement
-constexpr double scatter_scale = 0.6;    // relative scatter of damping over the runs that halves the agreement
-constexpr int fewest_runs = 3;
-constexpr double most_widths = 2.5; // half-power widths within which two of one shape may be one
-constexpr double nearly_all = 0.9;  // of the runs that vote
-constexpr double decays_left = 2;   // in a horizon: what has fallen to a seventh at its end still tells something there
-constexpr double clear_vibration = 0.8; // agreement of a mode that all runs find
-constexpr double most_filled = 0.75;    // of a run's states, by two for each mode: above, weak ones find no room
 
 template <class Item, class Of> double median_of(const std::vector<Item>& items, Of of) {
     std::vector<double> values;
@@ -59,15 +38,15 @@ using chain = std::vector<const run_pole*>;
 
 /// Distance of a pole from the end of a chain; infinite when they are not the same.
 double link_cost(const run_pole& pole, const run_pole& last, double most_hz) {
-    if (last.order < pole.order - order_reach) return INFINITY;
+    if (last.order < pole.order - judgement::order_reach) return INFINITY;
     const double e = std::abs(pole.frequency_hz - last.frequency_hz) / std::min(last.frequency_hz, most_hz);
     const double narrow = std::min(pole.damping_ratio, last.damping_ratio),
                  wide = std::max(pole.damping_ratio, last.damping_ratio);
-    if (e >= std::max(same_frequency, narrow) || e >= 3 * same_frequency) return INFINITY;
+    if (e >= std::max(judgement::same_frequency, narrow) || e >= 3 * judgement::same_frequency) return INFINITY;
     const double dz = std::abs(pole.damping_ratio - last.damping_ratio);
-    if (dz >= std::max(same_damping * wide, 1e-3)) return INFINITY;
+    if (dz >= std::max(judgement::same_damping * wide, 1e-3)) return INFINITY;
     const double mac = shape_mac(pole.shape, last.shape);
-    return mac > same_shape_run ? e / same_frequency + 5 * (1 - mac) + dz / wide : INFINITY;
+    return mac > judgement::same_shape_of_a_run ? e / judgement::same_frequency + 5 * (1 - mac) + dz / wide : INFINITY;
 }
 
 /// Continue the chains with the poles of the next order, each by at most one, the nearest first.
@@ -131,7 +110,7 @@ bool is_resolved(const run_track& track, const std::vector<run_track>& tracks, i
         const run_track*& side = apart < 0 ? below : above;
         if (!side || std::abs(apart) < std::abs(side->frequency_hz - track.frequency_hz)) side = &other;
     }
-    return below && above && shape_mac(below->shape, above->shape) < same_shape;
+    return below && above && shape_mac(below->shape, above->shape) < judgement::same_shape;
 }
 
 struct member {
@@ -146,7 +125,7 @@ std::vector<member> ranked(const std::vector<consensus_run>& runs) {
     for (std::size_t r = 0; r < runs.size(); ++r)
         for (std::size_t t = 0; t < runs[r].tracks.size(); ++t) {
             const run_track& track = runs[r].tracks[t];
-            if (!in_band(runs[r], track.frequency_hz) || track.damping_ratio >= overdamped) continue;
+            if (!in_band(runs[r], track.frequency_hz) || track.damping_ratio >= judgement::overdamped) continue;
             const double rank = (can_see(runs[r], track.frequency_hz) ? 0.0 : 1e3) + track.damping_spread +
                                 100 * track.frequency_spread - 0.02 * track.length;
             out.push_back({static_cast<int>(r), static_cast<int>(t), &track, rank});
@@ -167,11 +146,12 @@ struct cluster {
     double cost(const member& m) const {
         const run_track& t = *m.found;
         const double e = std::abs(t.frequency_hz / frequency_hz - 1);
-        if (e > std::max(same_frequency, 0.5 * std::min(t.damping_ratio, damping_ratio)) || holds(m.run))
+        if (e > std::max(judgement::same_frequency, 0.5 * std::min(t.damping_ratio, damping_ratio)) || holds(m.run))
             return INFINITY;
         const double mac = shape_mac(t.shape, members.front().found->shape);
-        if (mac < same_shape) return INFINITY;
-        return e / same_frequency + 3 * (1 - mac) + 0.3 * std::abs(std::log(t.damping_ratio / damping_ratio));
+        if (mac < judgement::same_shape) return INFINITY;
+        return e / judgement::same_frequency + 3 * (1 - mac) +
+               0.3 * std::abs(std::log(t.damping_ratio / damping_ratio));
     }
     void add(const member& m) {
         members.push_back(m);
@@ -195,12 +175,12 @@ std::vector<cluster> gather(const std::vector<consensus_run>& runs) {
 
 /// Hz within which two clusters of one shape may be one vibration.
 double within(double f, double zeta, double other_f, double other_zeta) {
-    return most_widths * (f * zeta + other_f * other_zeta);
+    return judgement::most_widths * (f * zeta + other_f * other_zeta);
 }
 
 /// Can this run tell two modes so far apart from each other? Each output doubles what it knows of a sample.
 bool can_part(const consensus_run& run, double apart_hz, std::size_t n_y) {
-    return run.horizon_s() * static_cast<double>(n_y) * apart_hz >= beats_seen;
+    return run.horizon_s() * static_cast<double>(n_y) * apart_hz >= judgement::beats_seen;
 }
 
 /// Is it a vibration at one rate at least: found by three runs of it, and by half of those that could?
@@ -215,7 +195,7 @@ bool at_one_rate(const std::vector<consensus_run>& runs, const cluster& c) {
         hits[level] += c.holds(static_cast<int>(r));
     }
     for (std::size_t k = 0; k < hits.size(); ++k)
-        if (hits[k] >= fewest_runs && hits[k] >= one_half * could[k]) return true;
+        if (hits[k] >= judgement::fewest_runs && hits[k] >= judgement::least_found_in * could[k]) return true;
     return false;
 }
 
@@ -228,8 +208,9 @@ std::vector<double> spacings(const std::vector<consensus_run>& runs, const std::
             const cluster& c = clusters[i];
             const double apart = std::abs(c.frequency_hz - other.frequency_hz);
             const double one = within(c.frequency_hz, c.damping_ratio, other.frequency_hz, other.damping_ratio);
-            if (&c == &other || (apart < one && shape_mac(c.members.front().found->shape,
-                                                          other.members.front().found->shape) > same_shape_run))
+            if (&c == &other ||
+                (apart < one && shape_mac(c.members.front().found->shape, other.members.front().found->shape) >
+                                    judgement::same_shape_of_a_run))
                 continue;
             out[i] = std::min(out[i], apart);
         }
@@ -251,13 +232,13 @@ std::vector<bool> voters(const std::vector<consensus_run>& runs, double f, doubl
         const double one = runs[a].horizon_s(), other = runs[b].horizon_s();
         return one > other || (!(other > one) && a < b);
     });
-    for (std::size_t i = 0; i < std::min(fewest_voters, see.size()); ++i) vote[see[i]] = true;
+    for (std::size_t i = 0; i < std::min(judgement::fewest_voters, see.size()); ++i) vote[see[i]] = true;
     return vote;
 }
 
 bool sharp(const consensus_run& run, double f) {
     return (run.method == OKID_METHOD_N4SID_CVA || run.method == OKID_METHOD_N4SID_MOESP) && in_band(run, f) &&
-           f * run.horizon_s() >= periods_well;
+           f * run.horizon_s() >= judgement::periods_sharp;
 }
 
 /// Root mean square distance of the subspace runs of the mode's level from its values.
@@ -299,12 +280,12 @@ std::vector<member> lasting(const std::vector<consensus_run>& runs, const std::v
     const auto lasts = [&](const member& m) {
         const consensus_run& run = runs[static_cast<std::size_t>(m.run)];
         const double decay = 2 * M_PI * m.found->frequency_hz * m.found->damping_ratio;
-        return run.inputs == 0 || run.horizon_s() * decay <= decays_left;
+        return run.inputs == 0 || run.horizon_s() * decay <= judgement::decays_left;
     };
     if (2 * std::count_if(seen.begin(), seen.end(), lasts) >= static_cast<std::ptrdiff_t>(seen.size())) return seen;
     std::vector<member> out;
     std::copy_if(all.begin(), all.end(), std::back_inserter(out), lasts);
-    return out.size() < fewest_runs ? seen : out;
+    return out.size() < judgement::fewest_runs ? seen : out;
 }
 
 consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c, double spacing_hz,
@@ -322,8 +303,9 @@ consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c,
         horizons.push_back(run.horizon_s());
     }
     std::sort(horizons.rbegin(), horizons.rend());
-    const std::size_t third = fewest_runs - 1;
-    mode.resolved_hz = third < horizons.size() ? beats_seen / static_cast<double>(n_y) / horizons[third] : INFINITY;
+    const std::size_t third = judgement::fewest_runs - 1;
+    mode.resolved_hz =
+        third < horizons.size() ? judgement::beats_seen / static_cast<double>(n_y) / horizons[third] : INFINITY;
     std::vector<member> seen;
     for (const member& m : c.members) {
         mode.members.emplace_back(m.run, m.track);
@@ -351,10 +333,10 @@ bool is_split(const consensus_mode& mode, const consensus_mode& stronger) {
     if (mode.shape.size() < 3) return false; // one or two outputs tell no shapes apart
     const double apart = std::abs(mode.frequency_hz - stronger.frequency_hz);
     const double far = within(mode.frequency_hz, mode.damping_ratio, stronger.frequency_hz, stronger.damping_ratio);
-    const double one = mode.found_in < nearly_all ? far : far / most_widths;
+    const double one = mode.found_in < judgement::nearly_all ? far : far / judgement::most_widths;
     // below resolved_hz a shadow: no three runs can tell it from the stronger one
-    return apart < std::max({one, same_frequency * stronger.frequency_hz, mode.resolved_hz}) &&
-           shape_mac(mode.shape, stronger.shape) > same_shape_run;
+    return apart < std::max({one, judgement::same_frequency * stronger.frequency_hz, mode.resolved_hz}) &&
+           shape_mac(mode.shape, stronger.shape) > judgement::same_shape_of_a_run;
 }
 
 void mark_split(std::vector<consensus_mode>& modes) {
@@ -373,26 +355,27 @@ void mark_full(const std::vector<cluster>& clusters, const std::vector<consensus
                std::vector<consensus_run>& runs) {
     std::vector<double> vibrations;
     for (std::size_t i = 0; i < clusters.size(); ++i)
-        if (modes[i].agreement >= clear_vibration * modes[i].found_in && at_one_rate(runs, clusters[i]))
+        if (modes[i].agreement >= judgement::clear_vibration * modes[i].found_in && at_one_rate(runs, clusters[i]))
             vibrations.push_back(clusters[i].frequency_hz);
     for (consensus_run& run : runs) {
         const auto inside = std::count_if(vibrations.begin(), vibrations.end(), [&](double f) {
             const double share = run.zoom().folded(f) / run.fs_hz;
             return share >= 0 && share < 0.5;
         });
-        run.full = run.states > 0 && 2.0 * static_cast<double>(inside) > most_filled * run.states;
+        run.full = run.states > 0 && 2.0 * static_cast<double>(inside) > judgement::most_filled * run.states;
     }
 }
 
 } // namespace
 
 void judge_agreement(consensus_mode& mode) {
-    const double scatter = mode.damping_spread / scatter_scale;
+    const double scatter = mode.damping_spread / judgement::scatter_scale;
     mode.agreement = mode.found_in * mode.emac * (1 + mode.mpc) / 2 / (1 + scatter * scatter);
     const auto ours = [](const std::string& code) { return code == "few_runs" || code == "noise_shape"; };
     mode.why.erase(std::remove_if(mode.why.begin(), mode.why.end(), ours), mode.why.end());
-    if (mode.hits < fewest_runs || mode.found_in < one_half) mode.why.emplace_back("few_runs");
-    if (mode.agreement < one_half) mode.why.emplace_back("noise_shape");
+    if (mode.hits < judgement::fewest_runs || mode.found_in < judgement::least_found_in)
+        mode.why.emplace_back("few_runs");
+    if (mode.agreement < judgement::least_agreement) mode.why.emplace_back("noise_shape");
 }
 
 std::vector<int> consensus_orders(int most) {
@@ -421,15 +404,15 @@ void link_tracks(consensus_run& run) {
     for (const int order : run.orders) {
         std::vector<const run_pole*> next;
         for (const run_pole& pole : run.poles)
-            if (pole.order == order && pole.damping_ratio > 1e-7 && pole.damping_ratio < most_damping)
+            if (pole.order == order && pole.damping_ratio > 1e-7 && pole.damping_ratio < judgement::most_damping)
                 next.push_back(&pole);
         extend(chains, next, run.fs_hz / 2); // in a band that is folded, of what stands there
     }
     for (const chain& poles : chains) {
         const auto possible = std::count_if(run.orders.begin(), run.orders.end(),
                                             [&](int order) { return order >= poles.front()->order; });
-        if (poles.size() >= fewest_orders &&
-            static_cast<double>(poles.size()) >= share_of_orders * static_cast<double>(possible))
+        if (poles.size() >= judgement::fewest_orders &&
+            static_cast<double>(poles.size()) >= judgement::share_of_orders * static_cast<double>(possible))
             run.tracks.push_back(track_of(poles));
     }
     std::vector<run_track> own;
@@ -444,7 +427,8 @@ bool in_band(const consensus_run& run, double frequency_hz) {
 }
 
 bool can_see(const consensus_run& run, double frequency_hz) {
-    const double periods = std::max(periods_least, periods_seen * std::min(1.0, 3.0 / run.outputs));
+    const double periods =
+        std::max(judgement::periods_least, judgement::periods_seen * std::min(1.0, 3.0 / run.outputs));
     return in_band(run, frequency_hz) && frequency_hz * run.horizon_s() >= periods;
 }
 
@@ -457,8 +441,8 @@ std::vector<consensus_mode> find_agreement(std::vector<consensus_run>& runs, std
     if (turned && quarter.empty()) {
         std::vector<mode_shape> shapes; // of what would be believed but for its phases
         for (const consensus_mode& mode : modes)
-            if (mode.found_in >= one_half && mode.hits >= fewest_runs &&
-                2 * mode.agreement >= one_half * (1 + mode.mpc))
+            if (mode.found_in >= judgement::least_found_in && mode.hits >= judgement::fewest_runs &&
+                2 * mode.agreement >= judgement::least_agreement * (1 + mode.mpc))
                 shapes.push_back(mode.shape);
         quarter = turned_outputs(shapes);
         *turned = quarter;

@@ -9,6 +9,7 @@
 #include "lines.hpp"
 
 #include "demodulation.hpp"
+#include "result/judgement.hpp"
 #include "spectrum.hpp"
 
 #include <algorithm>
@@ -21,30 +22,6 @@ namespace {
 
 using complex = std::complex<double>;
 
-constexpr double steady = 0.25;          // spread over mean of an amplitude; 0.52 for noise in a narrow band
-constexpr std::size_t fewest_blocks = 8; // below that a spread means nothing
-constexpr std::size_t line_blocks = 64;
-constexpr double loudest_silence = 0.07; // a line stronger than this would be seen in the silence before the force
-constexpr double begun = 0.05;           // of the largest force
-constexpr double quieter = 0.5;          // amplitude before the hits over that of the record
-constexpr double line_periods = 8;       // at least so many in a block
-constexpr double fewest_periods = 3;     // … where a fall is looked for
-constexpr double line_damping = 0.01;    // a pole damped more is no line
-constexpr double unresolved = 2;         // decay times in the record; below that a decay and a line look the same
-constexpr double mains_tolerance = 0.003;
-constexpr double multiple_tolerance = 0.015;
-constexpr double coupled = 0.7; // 1 = in phase all the time; chance gives 1 / sqrt(blocks)
-constexpr double stronger = 10; // amplitude of the vibration over that of its multiple
-constexpr double coupled_periods = 6;
-constexpr int most_multiple = 5;
-constexpr double falls = 3;     // deviations of a slope: from here on an amplitude falls
-constexpr double as_damped = 2; // factor between the fall of an amplitude and that of the mode's own damping
-constexpr int rate_parts = 8;   // fs / 8, 2 fs / 8 ..: where a converter and its clock leave lines
-constexpr double on_the_rate = 3e-4;
-constexpr double alone = 0.98;        // of the power of a shape in one output
-constexpr double forced = 10;         // power of a line of the force over that beside it
-constexpr double ended = 100;         // power of a force over that beyond the edge of its band
-constexpr double resonant = 2;        // power of the responses over that of the force, at a mode over beside it
 constexpr std::size_t averaged = 4;   // segments of a spectrum, at least
 constexpr std::size_t shortest = 128; // samples of a segment
 
@@ -99,10 +76,11 @@ bool near_multiple(double frequency_hz, double base, double tolerance) {
 
 /// Does the response at n f follow the n-th power of that at f?
 bool follows(const record_level& level, std::size_t m, std::size_t channel, double base, int n) {
-    const auto block = static_cast<std::size_t>(coupled_periods * level.fs_hz / base) + 1;
+    const auto block = static_cast<std::size_t>(judgement::product_periods * level.fs_hz / base) + 1;
     const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
                                b = amplitudes(level, m, channel, {1}, n * base, block);
-    if (a.size() < 2 * fewest_blocks || b.size() != a.size() || strength(a) < stronger * strength(b) || !lasts(a))
+    if (a.size() < 2 * judgement::fewest_blocks || b.size() != a.size() ||
+        strength(a) < judgement::stronger * strength(b) || !lasts(a))
         return false; // the phases of a single decay are those of its hit
     complex sum = 0;
     double both = 0;
@@ -111,7 +89,7 @@ bool follows(const record_level& level, std::size_t m, std::size_t channel, doub
         sum += b[i] * std::conj(power);
         both += std::abs(b[i]) * std::abs(power);
     }
-    return both > 0 && std::abs(sum) > coupled * both;
+    return both > 0 && std::abs(sum) > judgement::in_phase * both;
 }
 
 const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
@@ -149,7 +127,8 @@ bool decays(const std::vector<std::vector<complex>>& records, double decay) {
     }
     if (free < 2) return false;
     const double slope = sxy / sxx, sigma = std::sqrt(std::max(0.0, syy - slope * sxy) / free / sxx);
-    return -slope > falls * sigma && -slope > decay / as_damped && -slope < decay * as_damped;
+    return -slope > judgement::falls * sigma && -slope > decay / judgement::as_damped &&
+           -slope < decay * judgement::as_damped;
 }
 
 /// Samples of a record before its force sets in.
@@ -159,7 +138,7 @@ std::size_t quiet_samples(const sample_rows& rows, std::size_t m, std::size_t n_
         double largest = 0;
         for (std::size_t i = c; i < rows.size(); i += m) largest = std::fmax(largest, std::abs(rows[i]));
         for (std::size_t i = 0; i < out; ++i)
-            if (std::abs(rows[i * m + c]) > begun * largest) out = i;
+            if (std::abs(rows[i * m + c]) > judgement::begun * largest) out = i;
     }
     return out;
 }
@@ -184,7 +163,7 @@ bool quieter_before(const record_level& level, std::size_t m, std::size_t n_u, c
         square += std::norm(sum / static_cast<double>(count));
         ++records;
     }
-    return records > 0 && std::sqrt(square / records) < quieter * over_all;
+    return records > 0 && std::sqrt(square / records) < judgement::quieter * over_all;
 }
 
 bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
@@ -192,22 +171,23 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
     const double seconds = static_cast<double>(longest) / level.fs_hz;
     const double rate = 2 * M_PI * mode.damping_ratio * mode.frequency_hz;
-    const bool endless = rate * seconds < unresolved;
-    if (!endless && mode.damping_ratio > line_damping) return false;
-    const auto periods = static_cast<std::size_t>(line_periods * level.fs_hz / mode.frequency_hz) + 1;
-    const std::size_t block = std::max(periods, longest / line_blocks);
+    const bool endless = rate * seconds < judgement::unresolved_decays;
+    if (!endless && mode.damping_ratio > judgement::line_damping) return false;
+    const auto periods = static_cast<std::size_t>(judgement::line_periods * level.fs_hz / mode.frequency_hz) + 1;
+    const std::size_t block = std::max(periods, longest / judgement::line_blocks);
     const std::vector<complex> weights = weights_along(mode.shape),
                                a = amplitudes(level, m, n_u, weights, mode.frequency_hz, block);
-    if (at_rest &&
-        (strength(a) > loudest_silence || quieter_before(level, m, n_u, weights, mode.frequency_hz, strength(a))))
+    if (at_rest && (strength(a) > judgement::loudest_silence ||
+                    quieter_before(level, m, n_u, weights, mode.frequency_hz, strength(a))))
         return false;
-    if (!endless) return a.size() >= fewest_blocks && spread_over_mean(a) < steady;
+    if (!endless) return a.size() >= judgement::fewest_blocks && spread_over_mean(a) < judgement::steady;
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
-        a.size() >= fewest_blocks * level.records.size()
+        a.size() >= judgement::fewest_blocks * level.records.size()
             ? block
-            : std::max<std::size_t>(static_cast<std::size_t>(fewest_periods * level.fs_hz / mode.frequency_hz) + 1,
-                                    longest / fewest_blocks);
+            : std::max<std::size_t>(
+                  static_cast<std::size_t>(judgement::fall_periods * level.fs_hz / mode.frequency_hz) + 1,
+                  longest / judgement::fewest_blocks);
     std::vector<std::vector<complex>> falling;
     for (const sample_rows& rows : level.records)
         falling.push_back(amplitudes(rows, level.fs_hz, m, n_u, weights, mode.frequency_hz, step));
@@ -219,10 +199,10 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
 bool is_of_the_rate(double fs_hz, const consensus_mode& mode) {
     double all = 0, most = 0;
     for (const complex& x : mode.shape) all += std::norm(x), most = std::max(most, std::norm(x));
-    if (mode.shape.size() < 2 || most < alone * all) return false;
-    const bool narrow = mode.damping_ratio < line_damping;
-    const double near_hz = std::max(on_the_rate * mode.frequency_hz, narrow ? mode.frequency_scatter_hz : 0);
-    for (int parts = 3; parts <= rate_parts; ++parts)
+    if (mode.shape.size() < 2 || most < judgement::in_one_output * all) return false;
+    const bool narrow = mode.damping_ratio < judgement::line_damping;
+    const double near_hz = std::max(judgement::on_the_rate * mode.frequency_hz, narrow ? mode.frequency_scatter_hz : 0);
+    for (int parts = 3; parts <= judgement::rate_parts; ++parts)
         for (int k = 1; 2 * k < parts; ++k)
             if (std::abs(mode.frequency_hz - fs_hz * k / parts) < near_hz) return true;
     return false;
@@ -277,9 +257,9 @@ of_force shown_by_force(level_spectra& spectra, const record_level& level, std::
     const auto powers = [&](std::size_t first, std::size_t last, double beside) {
         return powers_around(spectra, level, first, last, size, f, width, beside);
     };
-    const auto flat = [](double at, double beside) { return at < resonant * beside; }; // never of NaN
+    const auto flat = [](double at, double beside) { return at < judgement::resonance_peak * beside; }; // never of NaN
     const band_powers force = powers(0, n_u, 2);
-    if (force.at >= forced * std::max(force.below, force.above)) {
+    if (force.at >= judgement::force_line * std::max(force.below, force.above)) {
         const band_powers response = powers(n_u, m, 2);
         const double beside = std::max(response.below / force.below, response.above / force.above);
         return flat(response.at / force.at, beside) ? of_force::peak : of_force::nothing;
@@ -289,7 +269,7 @@ of_force shown_by_force(level_spectra& spectra, const record_level& level, std::
     const bool drops = close.below > close.above; // and stays so
     const double most = drops ? std::min(close.below, force.below) : std::min(close.above, force.above);
     const double least = drops ? std::max(close.above, force.above) : std::max(close.below, force.below);
-    if (most < ended * least) return of_force::nothing;
+    if (most < judgement::force_ends * least) return of_force::nothing;
     const band_powers response = powers(n_u, m, 1); // of the side with the force: beyond the edge is noise over noise
     const double beside = drops ? response.below / close.below : response.above / close.above;
     return flat(response.at / close.at, beside) ? of_force::edge : of_force::nothing;
@@ -309,8 +289,8 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
             continue;
         }
         if (is_line(level, m, n_u, at_rest, mode)) {
-            const bool mains = near_multiple(mode.frequency_hz, 50, mains_tolerance) ||
-                               near_multiple(mode.frequency_hz, 60, mains_tolerance);
+            const bool mains = near_multiple(mode.frequency_hz, 50, judgement::mains_tolerance) ||
+                               near_multiple(mode.frequency_hz, 60, judgement::mains_tolerance);
             mode.why.emplace_back(mains ? "pickup" : "tone");
             continue;
         }
@@ -320,8 +300,8 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
         }
         for (const consensus_mode& base : modes) {
             const int n = static_cast<int>(std::lround(mode.frequency_hz / base.frequency_hz));
-            if (n < 2 || n > most_multiple || base.agreement < 0.5 ||
-                std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > multiple_tolerance ||
+            if (n < 2 || n > judgement::most_multiple || base.agreement < judgement::least_agreement ||
+                std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
                 !follows(level, m, channel, base.frequency_hz, n))
                 continue;
             mode.why.emplace_back("harmonic");

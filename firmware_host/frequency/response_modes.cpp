@@ -12,6 +12,7 @@
 #include "matrix_fraction.hpp"
 #include "record/request.hpp"
 #include "result/hold.hpp"
+#include "result/judgement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -29,19 +30,9 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr std::size_t middle_of_whole_band = 2; // among the runs of fit_matrix_fractions()
-constexpr double widest_damping = 0.5;          // sigma of damping over damping
-constexpr double widest_frequency = 0.05;
-constexpr double least_strength = 2;                              // of a residue matrix over its noise
+constexpr std::size_t middle_of_whole_band = 2;                   // among the runs of fit_matrix_fractions()
 constexpr int first_steps = 2, window_steps = 5, last_steps = 12; // of the poles
 constexpr double neighbours = 0.02;                               // in frequency: poles that compete for one resonance
-constexpr double one_mode = 2.5, one_mode_share = 0.01;           // sum of widths, or share of the frequency
-constexpr double same_residues = 0.9;                             // MAC of the residues of two poles that are one mode
-constexpr double narrowest = 0.25;     // half a resonance's width in lines: below it no damping shows
-constexpr double edge_lines = 2;       // from the ends of the band
-constexpr double broadest = 0.2;       // damping of a vibration
-constexpr double worth_listing = 0.25; // share of the runs below which a cluster is chance
-constexpr double doubtful_share = 0.5; // of the runs: a doubtful mode that fewer found is not listed by itself
 
 /// The columns of all set-ups side by side, each an output of its own.
 response_set side_by_side_columns(const joint_responses& from, std::vector<Index>& places) {
@@ -69,9 +60,10 @@ void mark_doubtful(const response_set& set, std::vector<consensus_mode>& modes) 
     const std::vector<double>& f = set.frequency_hz;
     const double line = (f.back() - f.front()) / static_cast<double>(set.lines() - 1);
     for (consensus_mode& mode : modes) {
-        if (mode.frequency_hz * mode.damping_ratio < narrowest * line) mode.why.emplace_back("narrow");
-        if (mode.damping_ratio > broadest) mode.why.emplace_back("overdamped");
-        if (mode.frequency_hz < f.front() + edge_lines * line || mode.frequency_hz > f.back() - edge_lines * line)
+        if (mode.frequency_hz * mode.damping_ratio < judgement::narrowest * line) mode.why.emplace_back("narrow");
+        if (mode.damping_ratio > judgement::overdamped) mode.why.emplace_back("overdamped");
+        if (mode.frequency_hz < f.front() + judgement::edge_lines * line ||
+            mode.frequency_hz > f.back() - judgement::edge_lines * line)
             mode.why.emplace_back("band_edge");
     }
 }
@@ -183,7 +175,7 @@ bool is_candidate(const consensus_mode& mode) {
 /// Chance, or a second pole within the resonance of a mode that the runs agree on: fitted, both would share one shape.
 bool is_none(const consensus_mode& mode, const std::vector<consensus_mode>& all) {
     const double width = mode.frequency_hz * mode.damping_ratio;
-    return mode.found_in < worth_listing ||
+    return mode.found_in < judgement::worth_listing ||
            (!mode.confident() && std::any_of(
                                      all.begin(), all.end(),
                                      [&](const consensus_mode& other) {
@@ -209,7 +201,7 @@ bool better(const fitted_mode& a, const fitted_mode& b) {
 }
 
 bool close(const fitted_mode& a, const fitted_mode& b, double share) {
-    const double widths = -one_mode * (a.pole.real() + b.pole.real());
+    const double widths = -judgement::most_widths * (a.pole.real() + b.pole.real());
     return std::abs(a.pole.imag() - b.pole.imag()) < std::max(widths, share * a.pole.imag());
 }
 
@@ -217,10 +209,10 @@ bool close(const fitted_mode& a, const fitted_mode& b, double share) {
 bool repeats(const modal_fit& fit, const std::vector<fitted_mode>& all, std::size_t k) {
     if (fit.residues.cols() < 3) return false;
     for (std::size_t j = 0; j < all.size(); ++j) {
-        if (j == k || !better(all[j], all[k]) || !close(all[j], all[k], one_mode_share)) continue;
+        if (j == k || !better(all[j], all[k]) || !close(all[j], all[k], judgement::share_of_frequency)) continue;
         const Eigen::RowVectorXcd x = fit.residues.row(static_cast<Index>(k)),
                                   y = fit.residues.row(static_cast<Index>(j));
-        if (std::norm(x.dot(y)) > same_residues * x.squaredNorm() * y.squaredNorm()) return true;
+        if (std::norm(x.dot(y)) > judgement::same_residues * x.squaredNorm() * y.squaredNorm()) return true;
     }
     return false;
 }
@@ -260,11 +252,12 @@ std::vector<fitted_mode> fit_candidates(const joint_responses& from, std::vector
     }
     for (std::size_t k = 0; k < all.size(); ++k) {
         const double f = std::abs(all[k].pole) / (2 * M_PI), zeta = -all[k].pole.real() / std::abs(all[k].pole);
-        if (all[k].shape.strength < least_strength)
+        if (all[k].shape.strength < judgement::least_strength)
             all[k].why = "noise_shape";
-        else if (!(all[k].sigma.first < widest_frequency * f && all[k].sigma.second < widest_damping * zeta))
+        else if (!(all[k].sigma.first < judgement::widest_frequency * f &&
+                   all[k].sigma.second < judgement::widest_damping * zeta))
             all[k].why = "wide_sigma";
-        else if (zeta > broadest)
+        else if (zeta > judgement::overdamped)
             all[k].why = "overdamped";
         else if (f < line.front() || f > line.back())
             all[k].why = "band_edge";
@@ -314,7 +307,7 @@ void leave_out(const std::vector<double>& line, bool all, const std::vector<int>
     std::vector<std::size_t> order;
     for (std::size_t k = 0; k < modes.size(); ++k)
         if (modes[k].frequency_hz >= line.front() && modes[k].frequency_hz <= line.back() &&
-            (modes[k].confident() || all || modes[k].found_in >= doubtful_share))
+            (modes[k].confident() || all || modes[k].found_in >= judgement::doubtful_share))
             order.push_back(k);
     std::sort(order.begin(), order.end(),
               [&own = modes](std::size_t a, std::size_t b) { return own[a].frequency_hz < own[b].frequency_hz; });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "terminal_table.hpp"
 
+#include "result/judgement.hpp"
 #include "result/result.hpp"
 
 #include <algorithm>
@@ -60,12 +61,12 @@ std::string table_line(const table_state& state) {
     std::string line = fmt::format("t {:.3f} s", state.t);
     std::size_t listed = 0; // doubtful modes are only counted: the table and the events have them
     for (const mode_row& row : state.modes)
-        if (row.alarm || row.emac >= doubtful_emac)
+        if (row.alarm || row.emac >= judgement::doubtful_emac)
             line += fmt::format("{} {:.4f}{} Hz {:.3f}{} %", listed++ ? "," : ":", row.frequency_hz,
                                 deviation(row.frequency_std_hz, ""), 100 * row.damping_ratio,
                                 deviation(100 * row.damping_ratio_std, ""));
     if (const std::size_t weak = state.modes.size() - listed; weak > 0)
-        line += fmt::format("{} {} of EMAC below {}", listed ? " and" : ":", weak, doubtful_emac);
+        line += fmt::format("{} {} of EMAC below {}", listed ? " and" : ":", weak, judgement::doubtful_emac);
     return line + "; " + state_text(state) + "\n";
 }
 

@@ -10,6 +10,7 @@
 #include "consensus/demodulation.hpp"
 #include "consensus/spectrum.hpp"
 #include "modal_answer.hpp"
+#include "result/judgement.hpp"
 
 #include <algorithm>
 #include <array>
@@ -30,23 +31,12 @@ using series = std::vector<double>;
 constexpr std::size_t most_bases = 5,
                       most_mixed = 3; ///< the strongest vibrations, to explain a mode and to look for more
 constexpr std::size_t most_outputs = 8;
-constexpr int most_factors = 3, most_multiple = 5;
-constexpr double product_periods = 6; ///< of the slowest factor
-constexpr double resolved = 2;        ///< beats in a block under a Hann window: fewer, and one leaks into the other
-constexpr std::size_t product_blocks = 16; ///< to speak of a coherence
-constexpr double in_phase = 0.7;           ///< 1: always; the largest of linear structures is below 0.45
-constexpr double then_in_phase = 0.5, then_frequency = 0.025; ///< where the structure is known not to be linear
-constexpr double surely_in_phase = 0.75; ///< where no mode was found; the largest of linear structures is 0.5
-constexpr double by_chance = 12; ///< blocks times coherence squared: phases of chance exceed it once in e^12 (Rayleigh)
-constexpr double highest = 0.45; ///< of the rate
-constexpr double product_frequency = 0.015;
+constexpr double resolved = 2;          ///< beats in a block under a Hann window: fewer, and one leaks into the other
+constexpr double highest = 0.45;        ///< of the rate
 constexpr double two_vibrations = 0.03; ///< two vibrations
 constexpr double wandering = 0.15,
                  one_shape = 0.8;             ///< one vibration whose frequency moves: that close, of one shape (MAC)
 constexpr double next_to = 0.1;               ///< of a mode of the model its own residual is looked at
-constexpr double resonance_peak = 2;          ///< power at a mode over that beside it
-constexpr double left_alone = 0.8;            ///< of the power there: the force has no part in it
-constexpr double undriven = 0.5;              ///< of the power there, where the structure is known not to be linear
 constexpr std::size_t shortest_spectrum = 64; ///< samples of a spectrum
 
 /// One mode along its shape: all of it, and what the forces do not explain.
@@ -95,30 +85,31 @@ double coherence(const std::vector<complex>& b, const std::vector<complex>& of) 
         squares += size * size;
     }
     const double length = total > 0 ? std::abs(sum) / total : 0;
-    return total * total * length * length > by_chance * squares ? length : 0;
+    return total * total * length * length > judgement::by_chance * squares ? length : 0;
 }
 
 /// Every product of the bases with these numbers of factors.
 void each_product(const std::vector<std::size_t>& bases, const std::function<void(const product&)>& see) {
-    std::vector<int> n(bases.size(), -most_factors);
+    std::vector<int> n(bases.size(), -judgement::most_factors);
     const auto next = [&n] {
         for (int& one : n) {
-            if (++one <= most_factors) return true;
-            one = -most_factors;
+            if (++one <= judgement::most_factors) return true;
+            one = -judgement::most_factors;
         }
         return false;
     };
     do {
         const int factors =
             std::accumulate(n.begin(), n.end(), 0, [](int sum, int one) { return sum + std::abs(one); });
-        if (factors < 2 || factors > most_factors) continue;
+        if (factors < 2 || factors > judgement::most_factors) continue;
         product out;
         for (std::size_t i = 0; i < n.size(); ++i)
             if (n[i] != 0) out.emplace_back(bases[i], n[i]);
         see(out);
     } while (next());
     for (const std::size_t base : bases)
-        for (int multiple = most_factors + 1; multiple <= most_multiple; ++multiple) see({{base, multiple}});
+        for (int multiple = judgement::most_factors + 1; multiple <= judgement::most_multiple; ++multiple)
+            see({{base, multiple}});
 }
 
 std::string words_of(const product& of, const std::vector<listed_mode>& modes) {
@@ -169,7 +160,7 @@ std::size_t block_of(const product_search& s, const product& of) {
         for (const double other : apart) closest = std::min(closest, std::abs(f - other));
         apart.push_back(f);
     }
-    return static_cast<std::size_t>(std::max(product_periods / slowest, resolved / closest) * s.fs_hz) + 1;
+    return static_cast<std::size_t>(std::max(judgement::product_periods / slowest, resolved / closest) * s.fs_hz) + 1;
 }
 
 /// How much records follow a product of vibrations; 0 where that is not known.
@@ -177,7 +168,7 @@ double following(product_search& s, const std::vector<series>& records, const pr
     const std::size_t block = block_of(s, of);
     std::size_t count = 0;
     for (const series& x : records) count += x.size() / block;
-    if (count < product_blocks) return 0;
+    if (count < judgement::product_blocks) return 0;
     const std::vector<complex> b = demodulated(records, frequency_of(of, s.modes) / s.fs_hz, block);
     std::vector<complex> together(b.size(), 1);
     for (const auto& [i, n] : of) {
@@ -206,14 +197,14 @@ std::vector<product> distortions(product_search& s) {
     const std::vector<std::size_t> bases = bases_of(s, s.modes.size(), most_mixed);
     each_product(bases, [&](const product& of) {
         const double f = frequency_of(of, s.modes);
-        if (f > highest * s.fs_hz || of.front().second > most_factors ||
+        if (f > highest * s.fs_hz || of.front().second > judgement::most_factors ||
             std::any_of(of.begin(), of.end(), [](const auto& factor) { return factor.second < 0; }) ||
             std::any_of(s.modes.begin(), s.modes.end(), [f](const listed_mode& mode) {
                 return mode.in_model && std::abs(mode.frequency_hz / f - 1) < next_to;
             }))
             return;
         for (const std::vector<series>& output : s.outputs)
-            if (following(s, output, of) > surely_in_phase) {
+            if (following(s, output, of) > judgement::surely_in_phase) {
                 out.push_back(of);
                 return;
             }
@@ -316,7 +307,8 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
         for (std::size_t k = 0; k < modes.size(); ++k) {
             const std::vector<std::string>& why = work.context.verdicts[k].why;
             if (k == first.front() || std::find(why.begin(), why.end(), "harmonic") != why.end() ||
-                (driven && s.strands[k].peak > resonance_peak && s.strands[k].share_left < left_alone))
+                (driven && s.strands[k].peak > judgement::resonance_peak &&
+                 s.strands[k].share_left < judgement::left_alone))
                 continue;
             const product of = followed(s, k, least, tolerance);
             if (of.empty()) continue;
@@ -324,14 +316,14 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
             doubt("harmonic", work.context.verdicts[k], modes[k]);
         }
     };
-    look(in_phase, product_frequency);
+    look(judgement::in_phase, judgement::multiple_frequency);
     if (products.empty())
         for (const product& of : more) tell(frequency_of(of, modes), of);
     if (products.empty()) return false;
-    look(then_in_phase, then_frequency);
+    look(judgement::nonlinear_in_phase, judgement::nonlinear_frequency);
     for (std::size_t k = 0; k < modes.size(); ++k)
-        if (driven && k != first.front() && modes[k].in_model && s.strands[k].peak < resonance_peak &&
-            s.strands[k].share_left > undriven)
+        if (driven && k != first.front() && modes[k].in_model && s.strands[k].peak < judgement::resonance_peak &&
+            s.strands[k].share_left > judgement::undriven)
             doubt("undriven", work.context.verdicts[k], modes[k]);
     work.context.warnings.emplace_back(
         "nonlinear", fmt::format("the structure is not linear: what it does at {} moves in phase with the product of "

@@ -23,6 +23,7 @@
 #include "record_rest.hpp"
 #include "request.hpp"
 #include "result/hold.hpp"
+#include "result/judgement.hpp"
 #include "roving.hpp"
 #include "screening.hpp"
 #include "shape_quantity.hpp"
@@ -36,18 +37,14 @@
 namespace okid_host {
 namespace {
 
-constexpr double doubtful_share = 0.5; // of the runs: fewer is not even doubtful
-constexpr double worth_listing = 0.25; // agreement, or share of the runs, below which a cluster is not even doubtful
-constexpr double widest_lonely = 0.5;  // sigma of damping over damping of one output without force
-constexpr double fewest_periods = 8;   // of a mode in the record: fewer are a trend
 constexpr double periods_of_horizon = 0.025; // 0.75 of a period in 30 samples
 
 using listed_pair = std::pair<consensus_mode, std::optional<carried_mode>>;
 
 std::vector<consensus_mode> worth_telling(std::vector<consensus_mode> modes, bool all) {
     const auto chance = [all](const consensus_mode& mode) {
-        return !mode.confident() &&
-               (all ? std::max(mode.agreement, mode.found_in) < worth_listing : mode.found_in < doubtful_share);
+        return !mode.confident() && (all ? std::max(mode.agreement, mode.found_in) < judgement::worth_listing
+                                         : mode.found_in < judgement::doubtful_share);
     };
     modes.erase(std::remove_if(modes.begin(), modes.end(), chance), modes.end());
     return modes;
@@ -116,7 +113,7 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
         mode.shape = carried->shape;
         // of one output no shape and no force vouch for a mode: noise agrees by chance, but not from block to block
         if (options.outputs.size() == 1 && options.inputs.empty() &&
-            carried->damping_std > widest_lonely * mode.damping_ratio)
+            carried->damping_std > judgement::widest_damping * mode.damping_ratio)
             mode.why.emplace_back("wide_sigma");
         if (carried->exact) continue;
         // what a model leaves out moves each method elsewhere, and no block of the record shows it
@@ -176,7 +173,7 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
             "leave, or look at one method with --method n4sid-cva");
     std::string seen;
     for (const auto& [mode, carried] : found)
-        if (mode.agreement > worth_listing)
+        if (mode.agreement > judgement::worth_listing)
             seen +=
                 fmt::format("{}{:.4g} Hz ({})", seen.empty() ? "" : ", ", mode.frequency_hz, fmt::join(mode.why, ", "));
     throw failure(
@@ -218,7 +215,8 @@ void mark_slow(const record_work& work, double fs_hz, std::vector<consensus_mode
     }
     const double seconds = longest / fs_hz;
     for (consensus_mode& mode : modes)
-        if (mode.frequency_hz * seconds < fewest_periods || mode.could == 0) mode.why.emplace_back("band_edge");
+        if (mode.frequency_hz * seconds < judgement::fewest_periods || mode.could == 0)
+            mode.why.emplace_back("band_edge");
 }
 
 /// Two groups of outputs stand at 90 degrees in all modes: velocities beside accelerations, say, whose units are not given.

@@ -10,6 +10,7 @@
 #include "record_fit.hpp"
 #include "record_refine.hpp"
 #include "residue_fit.hpp"
+#include "result/judgement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -245,7 +246,7 @@ std::vector<listed_mode> modes_of(const okid_identified_t& model) {
         std::vector<std::complex<double>> shape;
         for (int i = 0; i < model.n_y; ++i) shape.emplace_back(model.shape_re[at + i], model.shape_im[at + i]);
         out.push_back({model.frequency_hz[k], model.damping_ratio[k], model.mpc[k], model.emac[k], std::move(shape),
-                       model.emac[k] >= doubtful_emac});
+                       model.emac[k] >= judgement::doubtful_emac});
     }
     return out;
 }

@@ -3,6 +3,7 @@
 #include "mode_verdict.hpp"
 
 #include "json_number.hpp"
+#include "judgement.hpp"
 #include "result.hpp"
 
 #include <algorithm>
@@ -53,7 +54,7 @@ std::vector<mode_verdict> mode_verdicts(const okid_identified_t& model, const re
     std::vector<mode_verdict> out;
     for (int k = 0; k < model.mode_count; ++k) {
         mode_verdict& verdict = out.emplace_back();
-        verdict.confident = model.emac[k] >= doubtful_emac;
+        verdict.confident = model.emac[k] >= judgement::doubtful_emac;
         if (!verdict.confident) verdict.why.emplace_back("noise_shape");
     }
     return out;

@@ -12,8 +12,6 @@ namespace okid_host {
 
 struct result_context;
 
-constexpr double doubtful_emac = 0.5; ///< below this a mode seldom belongs to the structure
-
 struct mode_verdict {
     bool confident = false;
     double found_in = NAN;        ///< share of the runs that could have seen it and did; NaN for a named method

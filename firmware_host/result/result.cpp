@@ -3,6 +3,7 @@
 
 #include "error.hpp"
 #include "json_number.hpp"
+#include "judgement.hpp"
 #include "method.hpp"
 
 #include <algorithm>
@@ -108,7 +109,8 @@ std::string note_text(const okid_identified_t& model, std::uint32_t bit) {
             "no clear gap in the singular values: {} is the smallest order that keeps every stable mode{}. Compare a "
             "few orders with --order N",
             model.n_z,
-            std::any_of(model.emac, model.emac + model.mode_count, [](auto emac) { return emac < doubtful_emac; })
+            std::any_of(model.emac, model.emac + model.mode_count,
+                        [](auto emac) { return emac < judgement::doubtful_emac; })
                 ? "; it holds noise modes too (EMAC below 0.5)"
                 : "");
     case OKID_NOTE_WEAK_EXCITATION:

@@ -90,6 +90,7 @@ int drv_decoder_next(drv_decoder_t* self);
 /// What is known of a framing.
 typedef struct drv_framing_info_t {
     const char* name; ///< in a CONFIG.toml
+    /// Its scanner.
     drv_scan_t (*scan)(const uint8_t* bytes, size_t count, drv_packet_t* packet, size_t* used);
     unsigned fields; ///< consecutive ones that arrive together, at most 7: the frames of line_frame.h hold so many
     unsigned limit;  ///< fields it can deliver

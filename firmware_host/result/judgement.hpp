@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// PURPOSE  every number that decides whether a mode is believed, with its unit, its reason and what it rests on
+// METHOD   docs/how-okid-decides.md is the rule in words. "Corpora": measured/ and measured_b/ of `make score`; "kinds": the
+//          simulated tests of tests/kinds and tests/property/test_corpus.py. A number that is also a test's bound is met on both of
+//          its sides by tests/unit/host/test_agreement.cpp, test_consensus.cpp and test_lines.cpp
+#pragma once
+#include <cstddef>
+
+namespace okid_host::judgement {
+
+// A track: the poles of one run that are the same vibration from one order to the next.
+constexpr double most_damping = 0.25;       ///< a pole above is no vibration to an engineer
+constexpr double same_frequency = 0.01;     ///< relative, within a run and between runs
+constexpr double same_damping = 0.3;        ///< relative, from one order to the next
+constexpr double same_shape_of_a_run = 0.9; ///< MAC, from one order to the next
+constexpr int fewest_orders = 4;            ///< a shorter track is chance
+constexpr double share_of_orders = 0.4;     ///< of the orders from its first on
+constexpr int order_reach = 8;              ///< states for which a pole may be missing
+
+// What a run can see.
+constexpr double periods_seen = 0.75; ///< of a mode within the horizon; with fewer its pole is a trend
+constexpr double periods_least = 0.3; ///< where several outputs together have periods_seen
+constexpr double periods_sharp = 1.5; ///< where its damping is sharp
+constexpr double beats_seen =
+    0.75;                         ///< of a mode and its neighbour within the horizon: fewer, and a run sees one of both
+constexpr double decays_left = 2; ///< in a horizon: what has fallen to a seventh at its end still tells something there
+constexpr double most_filled = 0.75;     ///< of a run's states, by two for each mode: above, weak ones find no room
+constexpr std::size_t fewest_voters = 6; ///< runs with the longest horizons, which vote in any case
+
+// Agreement: found_in x EMAC x (1 + MPC)/2 / (1 + (scatter of damping / scatter_scale)^2).
+constexpr double same_shape = 0.8;      ///< MAC, between runs
+constexpr int fewest_runs = 3;          ///< of MOESP and CVA, which share their projections, two may err alike
+constexpr double least_found_in = 0.5;  ///< of the runs that vote
+constexpr double least_agreement = 0.5; ///< below: short-lived, complex or scattering
+constexpr double scatter_scale = 0.6;   ///< relative scatter of damping over the runs that halves the agreement
+constexpr double overdamped = 0.2;      ///< damping ratio: above, a mode is listed and not believed
+constexpr double clear_vibration = 0.8; ///< agreement of a mode that all runs find
+constexpr double doubtful_emac = 0.5;   ///< of a named method: below, a mode seldom belongs to the structure
+constexpr double worth_listing = 0.25;  ///< of agreement or of the runs: below, a cluster is chance
+constexpr double doubtful_share = 0.5;  ///< of the runs: fewer, and a doubtful mode is not listed by itself
+constexpr double widest_damping =
+    0.5; ///< sigma of damping over damping: of one output without a force, and of responses
+constexpr double widest_frequency = 0.05; ///< sigma of a frequency over it, of responses
+constexpr double fewest_periods = 8;      ///< of a mode in the record: fewer are a trend
+
+// Two that may be one.
+constexpr double most_widths = 2.5; ///< half-power widths within which two of one shape may be one
+constexpr double nearly_all =
+    0.9; ///< of the runs that vote: where so many see both, two are two (pairs of tests/kinds)
+constexpr double same_residues = 0.9;       ///< MAC of the residues of two poles that are one mode, of responses
+constexpr double share_of_frequency = 0.01; ///< the same as most_widths where modes are narrow, of responses
+
+// A line: a vibration that a machine keeps up, and no resonance.
+constexpr double steady = 0.25; ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)
+constexpr std::size_t fewest_blocks = 8; ///< below that a spread means nothing
+constexpr std::size_t line_blocks = 64;  ///< into which a record is cut
+constexpr double line_periods = 8;       ///< in a block, at least
+constexpr double fall_periods = 3;       ///< … where a fall is looked for
+constexpr double line_damping = 0.01;    ///< a pole damped more is no line
+constexpr double unresolved_decays = 2;  ///< in the record: with fewer a decay and a line look the same
+constexpr double falls = 3;              ///< deviations of a slope: from here on an amplitude falls
+constexpr double as_damped = 2;          ///< factor between the fall of an amplitude and that of the mode's own damping
+constexpr double begun = 0.05;           ///< of the largest force: the first hit
+constexpr double loudest_silence =
+    0.07; ///< of its usual amplitude: a line stronger would be seen in the silence before the force
+constexpr double quieter = 0.5;           ///< amplitude before the hits over that of the record
+constexpr double mains_tolerance = 0.003; ///< relative, of a multiple of 50 or 60 Hz
+constexpr int rate_parts = 8;             ///< fs / 8, 2 fs / 8 ..: where a converter and its clock leave lines
+constexpr double on_the_rate = 3e-4;      ///< relative, of such a part
+constexpr double in_one_output = 0.98;    ///< of the power of a shape
+
+// A multiple of a stronger vibration, and what the force alone shows.
+constexpr int most_multiple = 5;             ///< of a vibration, looked at
+constexpr double multiple_frequency = 0.015; ///< relative distance from a multiple, a sum or a difference
+constexpr double in_phase =
+    0.7; ///< coherence of phases; 1: always. Linear structures stay below 0.45; chance 1/sqrt(blocks)
+constexpr double stronger = 10;       ///< amplitude of the vibration over that of its multiple
+constexpr double product_periods = 6; ///< in a block, of the slowest factor
+constexpr double force_line = 10;     ///< power of a line of the force over that beside it
+constexpr double force_ends = 100;    ///< power of a force over that beyond the edge of its band
+constexpr double resonance_peak = 2;  ///< power of the responses, over that of the force, at a mode over beside it
+
+// Distortion: products of stronger vibrations.
+constexpr std::size_t product_blocks = 16;    ///< to speak of a coherence
+constexpr int most_factors = 3;               ///< of a product
+constexpr double nonlinear_in_phase = 0.5;    ///< where the structure is known not to be linear
+constexpr double nonlinear_frequency = 0.025; ///< relative; its frequencies move with the level
+constexpr double surely_in_phase = 0.75;      ///< where no mode was found; the largest of linear structures is 0.5
+constexpr double by_chance = 12; ///< blocks times coherence squared: phases of chance exceed it once in e^12 (Rayleigh)
+constexpr double left_alone = 0.8; ///< of the power at a mode: the force has no part in it
+constexpr double undriven = 0.5;   ///< … where the structure is known not to be linear
+
+// Frequency responses.
+constexpr double least_strength = 2; ///< of a residue matrix over its noise
+constexpr double narrowest = 0.25;   ///< half a resonance's width in lines: below it no damping shows
+constexpr double edge_lines = 2;     ///< from the ends of the band
+
+} // namespace okid_host::judgement
