@@ -40,16 +40,16 @@ std::vector<key_rule> with_options(const std::vector<key_rule>& own) {
     std::vector<key_rule> out;
     for (const identify_option& option : identify_options()) {
         if (!(option.reach & of_configs)) continue;
-        const bool order = option.kind == option_kind::whole_or_auto;
-        key_rule rule{option.key(), order ? kind::order : kind::array};
-        if (order || option.kind == option_kind::whole) {
-            if (!order) rule.what = kind::whole;
-            rule.low = static_cast<double>(option.low), rule.high = static_cast<double>(option.high);
-        } else if (option.kind != option_kind::text) {
-            rule.what = kind::choice, rule.choices = option.alternatives(); // plscf takes whole records
-            rule.choices.erase(std::remove(rule.choices.begin(), rule.choices.end(), lag_method), rule.choices.end());
+        const auto low = static_cast<double>(option.low), high = static_cast<double>(option.high);
+        std::vector<std::string> choices = option.alternatives();
+        choices.erase(std::remove(choices.begin(), choices.end(), lag_method), choices.end()); // of whole records
+        switch (option.kind) {
+        case option_kind::whole: out.push_back({option.key(), kind::whole, low, high}); break;
+        case option_kind::whole_or_auto: out.push_back({option.key(), kind::order, low, high}); break;
+        case option_kind::words:
+        case option_kind::answer: out.push_back({option.key(), kind::choice, 0, 0, choices}); break;
+        default: out.push_back({option.key(), kind::array}); // a band
         }
-        out.push_back(rule);
     }
     out.insert(out.end(), own.begin(), own.end());
     return out;

@@ -209,7 +209,7 @@ bool close(const fitted_mode& a, const fitted_mode& b, double share) {
 bool repeats(const modal_fit& fit, const std::vector<fitted_mode>& all, std::size_t k) {
     if (fit.residues.cols() < 3) return false;
     for (std::size_t j = 0; j < all.size(); ++j) {
-        if (j == k || !better(all[j], all[k]) || !close(all[j], all[k], judgement::share_of_frequency)) continue;
+        if (j == k || !better(all[j], all[k]) || !close(all[j], all[k], judgement::same_frequency)) continue;
         const Eigen::RowVectorXcd x = fit.residues.row(static_cast<Index>(k)),
                                   y = fit.residues.row(static_cast<Index>(j));
         if (std::norm(x.dot(y)) > judgement::same_residues * x.squaredNorm() * y.squaredNorm()) return true;

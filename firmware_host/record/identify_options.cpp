@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
 // METHOD   an option is a line with the place of its value; what a command line, a JSON object or a CONFIG.toml must know of it is
-//          read from there. A new one: a line here, its member of record_request, and its use in check_request()
+//          read from there. A new one: a line here, its member of record_request, and its use in request.cpp
 #include "identify_options.hpp"
 
-#include "error.hpp"
-#include "files/nearest_name.hpp"
 #include "result/deviations.hpp"
 #include "result/method.hpp"
 
@@ -117,33 +115,6 @@ bool identify_option::is_given(const record_request& request) const {
 const std::vector<identify_option>& identify_options() {
     static const std::vector<identify_option> options = make_options();
     return options;
-}
-
-std::optional<int> whole_of(const record_request& given, std::string record_request::* place) {
-    for (const identify_option& option : identify_options()) {
-        const auto* own = std::get_if<std::string record_request::*>(&option.place);
-        if (!own || *own != place || !option.is_given(given)) continue;
-        const std::string& text = given.*place;
-        if (option.kind == option_kind::whole_or_auto && (text.empty() || text[0] < '0' || text[0] > '9')) {
-            if (text == "auto") return std::nullopt;
-            throw failure(exit_usage, fmt::format("{}: found \"{}\", expected a whole number or auto", option.typed(),
-                                                  printable(text)));
-        }
-        return static_cast<int>(whole_number(option.typed(), text, option.low, option.high));
-    }
-    return std::nullopt;
-}
-
-void check_words(const record_request& given) {
-    for (const identify_option& option : identify_options()) {
-        if ((option.kind != option_kind::words && option.kind != option_kind::answer) || !option.is_given(given))
-            continue;
-        const std::string& value = given.*std::get<std::string record_request::*>(option.place);
-        const std::vector<std::string> choices = option.alternatives();
-        if (std::find(choices.begin(), choices.end(), value) == choices.end())
-            throw failure(exit_usage, fmt::format("{}: found \"{}\"{}, expected one of: {}", option.typed(),
-                                                  printable(value), did_you_mean(value, choices), list_names(choices)));
-    }
 }
 
 } // namespace okid_host

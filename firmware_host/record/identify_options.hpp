@@ -4,7 +4,6 @@
 #pragma once
 #include "request.hpp"
 
-#include <optional>
 #include <variant>
 
 namespace okid_host {
@@ -44,11 +43,5 @@ struct identify_option {
 
 /// In the order of `okid identify --help`.
 const std::vector<identify_option>& identify_options();
-
-/// The number of an option of kind whole or whole_or_auto; nothing where none is given. Throws `failure` (exit 2).
-std::optional<int> whole_of(const record_request& given, std::string record_request::* place);
-
-/// Every option of kind words or answer holds one of them. Throws `failure` (exit 2).
-void check_words(const record_request& given);
 
 } // namespace okid_host

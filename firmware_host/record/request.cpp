@@ -15,6 +15,7 @@
 #include <charconv>
 #include <cmath>
 #include <fmt/format.h>
+#include <optional>
 
 namespace okid_host {
 namespace {
@@ -27,6 +28,27 @@ void one_of(const std::string& option, const std::string& value, const std::vect
     if (std::find(choices.begin(), choices.end(), value) != choices.end()) return;
     usage(fmt::format("{}: found \"{}\"{}, expected one of: {}", option, printable(value), did_you_mean(value, choices),
                       list_names(choices)));
+}
+
+void check_words(const record_request& given) {
+    for (const identify_option& option : identify_options())
+        if ((option.kind == option_kind::words || option.kind == option_kind::answer) && option.is_given(given))
+            one_of(option.typed(), given.*std::get<std::string record_request::*>(option.place), option.alternatives());
+}
+
+/// The number of an option of kind whole or whole_or_auto; nothing where none is given.
+std::optional<int> whole_of(const record_request& given, std::string record_request::* place) {
+    for (const identify_option& option : identify_options()) {
+        const auto* own = std::get_if<std::string record_request::*>(&option.place);
+        if (!own || *own != place || !option.is_given(given)) continue;
+        const std::string& text = given.*place;
+        if (option.kind == option_kind::whole_or_auto && (text.empty() || text[0] < '0' || text[0] > '9')) {
+            if (text == "auto") return std::nullopt;
+            usage(fmt::format("{}: found \"{}\", expected a whole number or auto", option.typed(), printable(text)));
+        }
+        return static_cast<int>(whole_number(option.typed(), text, option.low, option.high));
+    }
+    return std::nullopt;
 }
 
 void check_refine(const record_request& given) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  every number that decides whether a mode is believed, with its unit, its reason and what it rests on
-// METHOD   docs/how-okid-decides.md is the rule in words. "Corpora": measured/ and measured_b/ of `make score`; "kinds": the
-//          simulated tests of tests/kinds and tests/property/test_corpus.py. A number that is also a test's bound is met on both of
-//          its sides by tests/unit/host/test_agreement.cpp, test_consensus.cpp and test_lines.cpp
+// PURPOSE  every number that decides whether a mode is believed, with its unit and its reason
+// METHOD   docs/how-okid-decides.md is the rule in words; tests/mutation/run changes the numbers and asks the unit tests to notice
 #pragma once
 #include <cstddef>
 
@@ -22,7 +20,7 @@ constexpr double periods_seen = 0.75; ///< of a mode within the horizon; with fe
 constexpr double periods_least = 0.3; ///< where several outputs together have periods_seen
 constexpr double periods_sharp = 1.5; ///< where its damping is sharp
 constexpr double beats_seen =
-    0.75;                         ///< of a mode and its neighbour within the horizon: fewer, and a run sees one of both
+    0.75;                         ///< of a mode and its neighbour within the horizon; with fewer a run sees one of both
 constexpr double decays_left = 2; ///< in a horizon: what has fallen to a seventh at its end still tells something there
 constexpr double most_filled = 0.75;     ///< of a run's states, by two for each mode: above, weak ones find no room
 constexpr std::size_t fewest_voters = 6; ///< runs with the longest horizons, which vote in any case
@@ -47,8 +45,7 @@ constexpr double fewest_periods = 8;      ///< of a mode in the record: fewer ar
 constexpr double most_widths = 2.5; ///< half-power widths within which two of one shape may be one
 constexpr double nearly_all =
     0.9; ///< of the runs that vote: where so many see both, two are two (pairs of tests/kinds)
-constexpr double same_residues = 0.9;       ///< MAC of the residues of two poles that are one mode, of responses
-constexpr double share_of_frequency = 0.01; ///< the same as most_widths where modes are narrow, of responses
+constexpr double same_residues = 0.9; ///< MAC of the residues of two poles that are one mode, of responses
 
 // A line: a vibration that a machine keeps up, and no resonance.
 constexpr double steady = 0.25; ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)

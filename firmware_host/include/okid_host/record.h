@@ -21,11 +21,10 @@ typedef void (*okid_host_stage_t)(void* context, const char* stage);
 /**
  * Identify records of one structure, merged exactly; what `okid identify` does with its files.
  *
- * @param options  JSON object with the options of `okid identify` by their long names, `-` written `_` (docs, "okid
- *                 identify"): inputs and outputs (lists of channel names, outputs at least one), fs (Hz, needed), method,
- *                 p, rows, order, max_order, hankel, hold, detrend, start, sensing, input_dofs, output_dofs, hit_dofs (lists),
- *                 sigma_blocks, refine (auto, yes, no), stabilization. null = as if not given. units: one a channel, for M, K, R; without
- *                 it they are taken from the names ("acc1 [g]", "acc1_g").
+ * @param options  JSON object with the options of `okid identify` from inputs to sigma_blocks (docs, "okid identify") by their
+ *                 long names, `-` written `_`: inputs and outputs as lists of channel names, outputs at least one; fs (Hz)
+ *                 is needed. null = as if not given. units: one a channel, for M, K, R; without it they are taken from the
+ *                 names ("acc1 [g]", "acc1_g").
  * @param records  how many
  * @param samples  of each: counts[i] rows [u; y], NaN = missing; read during the call only
  * @param names    of each, for messages

@@ -18,7 +18,7 @@ struct okid_host_result; /* okid_host/record.h */
  * Identify from frequency responses; what `okid identify --frf` does with its files.
  *
  * @param options   JSON object: inputs and outputs (lists of names, needed), sensing, input_dofs, output_dofs, band, modes,
- *                  exponential (s), set_ups (how many the responses come from); null = as if not given
+ *                  stabilization, all_modes, exponential (s), set_ups (how many the responses come from); null = as if not given
  * @param lines     frequencies
  * @param frequency_hz  ascending
  * @param response  (re, im) of output o to input i at line l from response[2 * ((l * inputs + i) * outputs + o)] on; read

@@ -25,7 +25,8 @@ struct okid_host_result; /* okid_host/record.h */
 /**
  * Make a stream.
  * @param options  JSON object: inputs, outputs (lists of names), fs (Hz), method, p, rows, order, max_order, hankel, hold,
- *                 detrend (none or mean), sigma_blocks, refine, sensing, input_dofs, output_dofs as for okid_host_identify();
+ *                 band, decimate, detrend (none or mean), sigma, sigma_blocks, refine, sensing, input_dofs, output_dofs as for
+ *                 okid_host_identify();
  *                 window_s, window, forgetting, update_s, restart_on_change as in [identification] of a CONFIG.toml; codes (0 real
  *                 numbers, or the bits of ADC codes: 16, 24, 32), scale and offset (one number, or one a channel: value =
  *                 scale * sample + offset), saturated (keep, missing: samples with a code at full scale); states_only

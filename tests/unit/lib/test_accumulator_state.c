@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What is kept of an accumulator: its memory, its written form, its sums of one run, records centred one by one.
 #include "modal_rig.h"
+#include "same_sums.h"
 
 #include <okid/okid.h>
 #include <unity.h>
@@ -43,18 +44,7 @@ static okid_status_t feed(okid_accumulator_t* a, okid_sample_t sample, int first
     return okid_accumulator_add_i32(a, codes + at, n);
 }
 
-static void same_bits(okid_accumulator_t* a, okid_accumulator_t* b) {
-    static double left[W * W], right[W * W];
-    okid_accumulator_stats_t one, two;
-    for (int detrend = 0; detrend < 2; ++detrend) {
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, (okid_detrend_t)detrend, left, NULL));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(b, (okid_detrend_t)detrend, right, NULL));
-        TEST_ASSERT_EQUAL_MEMORY(left, right, sizeof left);
-    }
-    okid_accumulator_stats(a, &one);
-    okid_accumulator_stats(b, &two);
-    TEST_ASSERT_EQUAL_MEMORY(&one, &two, sizeof one);
-}
+static void same_bits(okid_accumulator_t* a, okid_accumulator_t* b) { same_sums(a, b, W); }
 
 static void bytes_go_on_bit_for_bit(void) {
     const okid_sample_t kinds[] = {OKID_SAMPLE_DOUBLE, OKID_SAMPLE_INT16, OKID_SAMPLE_INT24, OKID_SAMPLE_INT32};
