@@ -73,10 +73,10 @@ older_samples::older_samples(const record_options& options)
 }
 
 void older_samples::begin_record(bool at_rest) {
-    longest_ = std::max(longest_, length_);
-    length_ = 0;
-    in_gap_ = false;
-    ++records_;
+    counts_.longest = std::max(counts_.longest, counts_.length);
+    counts_.length = 0;
+    counts_.in_gap = false;
+    ++counts_.records;
     chain_.begin_record(at_rest);
     for (level_memory& level : levels_) {
         level.gap();
@@ -86,11 +86,11 @@ void older_samples::begin_record(bool at_rest) {
 
 void older_samples::add(const double* row) {
     const bool there = std::all_of(row, row + n_u_ + n_y_, [](double x) { return !std::isnan(x); });
-    missing_ += !there;
-    gaps_ += !there && !in_gap_;
-    in_gap_ = !there;
-    ++samples_;
-    ++length_;
+    counts_.missing += !there;
+    counts_.gaps += !there && !counts_.in_gap;
+    counts_.in_gap = !there;
+    ++counts_.samples;
+    ++counts_.length;
     chain_.add(row, [this](std::size_t k, const double* of_rate) { levels_[k].add(of_rate); });
 }
 
@@ -105,39 +105,32 @@ std::size_t older_samples::take(const record_set& newest) {
     if (lines_)
         for (const record_data& record : clean.records) remove_lines(clean.rows(record), m, record.count);
     remove_means(clean);
-    screened_ += complete(raw, 0, count) - complete(clean, 0, count);
+    counts_.screened += complete(raw, 0, count) - complete(clean, 0, count);
     for (std::size_t r = 0; r < clean.records.size() && clean.records[r].first < count; ++r) {
         const record_data& record = clean.records[r];
-        if (!within_) begin_record(begins_at_rest_ || begins_at_rest(clean, record));
+        if (!counts_.within) begin_record(begins_at_rest_ || begins_at_rest(clean, record));
         const std::size_t last = std::min(record.first + record.count, count);
         for (std::size_t n = record.first; n < last; ++n) add(clean.samples.data() + n * m);
-        within_ = last < newest.records[r].first + newest.records[r].count;
+        counts_.within = last < newest.records[r].first + newest.records[r].count;
     }
     return count;
 }
 
 void older_samples::merge(const older_samples& other) {
-    if (other.samples_ == 0) return;
+    if (other.counts_.samples == 0) return;
     for (std::size_t k = 0; k < levels_.size(); ++k) levels_[k].merge(other.levels_[k]);
-    samples_ += other.samples_;
-    missing_ += other.missing_;
-    gaps_ += other.gaps_;
-    screened_ += other.screened_;
-    records_ += other.records_;
-    longest_ = std::max({longest_, other.longest_, other.length_});
+    counts_.samples += other.counts_.samples;
+    counts_.missing += other.counts_.missing;
+    counts_.gaps += other.counts_.gaps;
+    counts_.screened += other.counts_.screened;
+    counts_.records += other.counts_.records;
+    counts_.longest = std::max({counts_.longest, other.counts_.longest, other.counts_.length});
 }
 
 older_samples older_samples::without_outputs(const record_options& fewer, const std::vector<bool>& kept) const {
     older_samples out(fewer);
     for (std::size_t k = 0; k < levels_.size(); ++k) out.levels_[k] = levels_[k].without_outputs(kept);
-    out.samples_ = samples_;
-    out.missing_ = missing_;
-    out.gaps_ = gaps_;
-    out.screened_ = screened_;
-    out.length_ = length_;
-    out.longest_ = longest_;
-    out.records_ = records_;
-    out.within_ = within_;
+    out.counts_ = counts_;
     return out;
 }
 
@@ -166,28 +159,29 @@ void older_samples::lend_sums(const std::vector<double>& scale, std::vector<reco
 }
 
 void older_samples::add_counts(const missing_count& newest, std::size_t judged, result_context& to) const {
-    to.samples += samples_;
+    to.samples += counts_.samples;
     to.records += static_cast<int>(records());
-    to.gaps += gaps_;
+    to.gaps += counts_.gaps;
     to.judged_samples = static_cast<long long>(judged);
     remarks& said = to.warnings;
     said.erase(std::remove_if(said.begin(), said.end(), [](const auto& one) { return one.first == "missing_samples"; }),
                said.end());
     missing_count all = newest;
-    all.samples += missing_ - screened_;
+    all.samples += counts_.missing - counts_.screened;
     all.gaps = to.gaps;
     if (all.samples > 0) said.push_back(missing_samples(all, to.samples));
-    if (screened_ > 0)
+    if (counts_.screened > 0)
         said.emplace_back(
             "screened", fmt::format("{} of the {} samples before the newest {} had an output that was clipped, frozen, "
                                     "dropped to zero or a spike: left out as gaps, nothing is interpolated",
-                                    screened_, samples_, judged));
+                                    counts_.screened, counts_.samples, judged));
 }
 
 std::vector<std::byte> older_samples::state() const {
     std::vector<std::byte> out;
-    for (const long long number : {samples_, missing_, gaps_, screened_, length_, longest_, records_,
-                                   static_cast<long long>(within_), static_cast<long long>(in_gap_)})
+    const auto& c = counts_;
+    for (const long long number : {c.samples, c.missing, c.gaps, c.screened, c.length, c.longest, c.records,
+                                   static_cast<long long>(c.within), static_cast<long long>(c.in_gap)})
         put_word(out, static_cast<std::uint64_t>(number));
     const std::vector<double> filters = chain_.state();
     put_word(out, filters.size());
@@ -205,13 +199,14 @@ older_samples::older_samples(const record_options& options, const std::string& w
     byte_reader in(state.data(), state.size());
     long long within = 0, in_gap = 0;
     bool good = true;
+    auto& c = counts_;
     for (long long* const to :
-         {&samples_, &missing_, &gaps_, &screened_, &length_, &longest_, &records_, &within, &in_gap}) {
+         {&c.samples, &c.missing, &c.gaps, &c.screened, &c.length, &c.longest, &c.records, &within, &in_gap}) {
         *to = static_cast<long long>(in.word());
         good = good && *to >= 0;
     }
-    within_ = within == 1;
-    in_gap_ = in_gap == 1;
+    counts_.within = within == 1;
+    counts_.in_gap = in_gap == 1;
     const std::uint64_t count = in.word();
     good = good && within <= 1 && in_gap <= 1 && count <= in.left() / word_bytes;
     std::vector<double> filters(good ? static_cast<std::size_t>(count) : 0);

@@ -36,13 +36,13 @@ class older_samples {
     older_samples without_outputs(const record_options& fewer, const std::vector<bool>& kept) const;
 
     const level_memory& level(std::size_t k) const { return levels_[k]; }
-    long long samples() const { return samples_; } ///< those missing with them
-    long long missing() const { return missing_; }
-    long long gaps() const { return gaps_; }
-    long long records() const { return records_ - (within_ ? 1 : 0); } ///< that are older as a whole
+    long long samples() const { return counts_.samples; } ///< those missing with them
+    long long missing() const { return counts_.missing; }
+    long long gaps() const { return counts_.gaps; }
+    long long records() const { return counts_.records - (counts_.within ? 1 : 0); } ///< that are older as a whole
     /// Samples of the longest record, and of the one that goes on among the newest (0: none does).
-    long long longest() const { return longest_; }
-    long long begun() const { return within_ ? length_ : 0; }
+    long long longest() const { return counts_.longest; }
+    long long begun() const { return counts_.within ? counts_.length : 0; }
 
     /// Of each channel, does it move?
     std::vector<bool> moved() const;
@@ -62,9 +62,11 @@ class older_samples {
     bool begins_at_rest_, lines_;
     rate_chain chain_;
     std::vector<level_memory> levels_;
-    long long samples_ = 0, missing_ = 0, gaps_ = 0, length_ = 0, longest_ = 0, records_ = 0;
-    long long screened_ = 0;               ///< of those missing
-    bool within_ = false, in_gap_ = false; ///< the newest samples go on with the last record taken
+    struct {
+        long long samples = 0, missing = 0, gaps = 0, length = 0, longest = 0, records = 0;
+        long long screened = 0;              ///< of those missing
+        bool within = false, in_gap = false; ///< the newest samples go on with the last record taken
+    } counts_;
 };
 
 /// Of more samples than are kept the older ones go, as in a stream. @return them; none went: nullptr

@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from okid._errors import InputError
+from okid.result.parts import MODE_NUMBERS
 from okid.result.result import Result
 from okid.result.result_file import read_result
-
-_NUMBERS = ("frequency_hz", "damping_ratio", "frequency_std_hz", "damping_ratio_std", "mpc", "emac", "cmi",
-            "confident", "found_in")  # fmt: skip
 
 
 def result_dict(result: Result | Mapping[str, Any]) -> dict[str, Any]:
@@ -53,10 +51,9 @@ def _matrices(part: Mapping[str, Any] | None) -> dict[str, Any]:
 
 
 def mode_arrays(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """frequency_hz, damping_ratio, their std, mpc, emac, cmi, confident (1 or 0), found_in (n,), shapes
-    (outputs or shape_dofs, n)."""
+    """The numbers of MODE_NUMBERS (n,), confident as 1 or 0, NaN for what is not known; shapes (outputs or shape_dofs, n)."""
     modes = raw["modes"]
-    out: dict[str, Any] = {key: np.array([_float(mode.get(key)) for mode in modes]) for key in _NUMBERS}
+    out: dict[str, Any] = {key: np.array([_float(mode.get(key)) for mode in modes]) for key in MODE_NUMBERS}
     shapes = [np.array(mode["shape_re"], float) + 1j * np.array(mode["shape_im"], float) for mode in modes]
     out["shapes"] = np.array(shapes, np.complex128).reshape(len(modes), -1 if modes else 0).T
     return out

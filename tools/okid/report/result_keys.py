@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 from okid._errors import InputError
+from okid.result.parts import MODE_NUMBERS
 
 NEEDED = (
     "fs_hz", "samples", "inputs", "outputs", "p", "rows", "order", "singular_values", "model", "modes", "warnings",
@@ -21,11 +22,9 @@ _TOP = {
     "markov": "object?", "modes": "objects", "fit": "object?", "mkr": "object?", "pdc": "object?", "warnings": "list",
 }  # fmt: skip
 _MODEL = {"dt": "rate", "A": "matrix", "B": "matrix", "C": "loose matrix", "D": "loose matrix", "K": "loose matrix?"}
-_MODE = {
+_MODE = dict.fromkeys(MODE_NUMBERS, "number?") | {
     "frequency_hz": "number", "damping_ratio": "number", "shape_re": "maybe", "shape_im": "maybe",
-    "frequency_std_hz": "number?", "damping_ratio_std": "number?", "mpc": "number?", "emac": "number?",
-    "cmi": "number?", "confident": "flag?", "found_in": "number?", "why": "list?",
-    "why_text": "list?",
+    "why": "list?", "why_text": "list?", "confident": "flag?",
 }  # fmt: skip
 _HIT = {
     "file": "text", "place": "number", "accepted": "flag", "reason": "text?", "text": "text?", "peak": "number?",

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from okid.result.parts import Mode, known
+from okid.result.parts import MODE_NUMBERS, Mode, known
 from okid.shown.notebook_html import items, short, table
 
 
@@ -14,15 +14,8 @@ def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
     return [
         {
             "mode": k,
-            "frequency_hz": mode.frequency_hz,
-            "frequency_std_hz": known(mode.frequency_std_hz),
-            "damping_ratio": mode.damping_ratio,
-            "damping_ratio_std": known(mode.damping_ratio_std),
-            "mpc": known(mode.mpc),
-            "emac": known(mode.emac),
-            "cmi": known(mode.cmi),
+            **{key: known(getattr(mode, key)) for key in MODE_NUMBERS},
             "confident": mode.confident,
-            "found_in": mode.found_in,
             "why": ", ".join(mode.why),
         }
         for k, mode in enumerate(modes, 1)
@@ -31,8 +24,8 @@ def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
 
 class ModalTable(list[dict[str, Any]]):
     """A row a mode, ascending in frequency: mode (from 1), frequency_hz, frequency_std_hz, damping_ratio,
-    damping_ratio_std, mpc, emac, cmi, confident, found_in, why (codes); None = not known. str() and notebooks show it
-    with the warnings of the result, and without the modes that "auto" lists as doubtful.
+    damping_ratio_std, mpc, emac, cmi, confident, found_in, modal_mass, modal_mass_std (kg), why (codes); None = not
+    known. str() and notebooks show it with the warnings of the result, and without the modes that "auto" lists as doubtful.
 
     >>> import okid
     >>> table = okid.ModalTable([okid.Mode(10.96, 0.012, None, 0.99, 0.98)], "one mode")

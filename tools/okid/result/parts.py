@@ -31,6 +31,14 @@ def _optional(nested: Any) -> Real | None:
     return None if nested is None else numbers(nested)
 
 
+# The numbers of a mode, in the order of tables: keys of okid.result/1 and fields of Mode. Its checks, ModalTable, .mat and
+# HDF5 follow this list.
+MODE_NUMBERS = (
+    "frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac", "cmi", "confident", "found_in",
+    "modal_mass", "modal_mass_std",
+)  # fmt: skip
+
+
 class Observer(NamedTuple):
     """What the least-squares step found; see okid_observer_info_t."""
 
@@ -86,23 +94,10 @@ class Mode(NamedTuple):
         f, zeta, mpc, emac = numbers([one[key] for key in ("frequency_hz", "damping_ratio", "mpc", "emac")]).tolist()
         shape = numbers(one["shape_re"]) + 1j * numbers(one["shape_im"])
         why, texts = (tuple(map(str, one.get(key) or one.get("why") or ())) for key in ("why", "why_text"))
-        return cls(
-            f,
-            zeta,
-            shape,
-            mpc,
-            emac,
-            known(one.get("frequency_std_hz")),
-            known(one.get("damping_ratio_std")),
-            _optional(one.get("shape_re_std")),
-            _optional(one.get("shape_im_std")),
-            one.get("confident"),
-            known(one.get("found_in")),
-            why,
-            texts,
-            known(one.get("modal_mass")),
-            known(one.get("modal_mass_std")),
-        )
+        more: dict[str, Any] = {key: known(one.get(key)) for key in MODE_NUMBERS if key in cls._field_defaults}
+        more |= {f"shape_{part}_std": _optional(one.get(f"shape_{part}_std")) for part in ("re", "im")}
+        more["confident"] = one.get("confident")
+        return cls(f, zeta, shape, mpc, emac, why=why, why_text=texts, **more)
 
     def _repr_html_(self) -> str:
         return own_fields(self)

@@ -6,7 +6,10 @@ const okidSelection = {
   // A row a mode; the shape follows as one column a part of each output, an output that was left out stays empty.
   csv(result, numbers) {
     const quoted = (text) => `"${String(text).replaceAll('"', '""')}"`;
-    const keys = ["frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac", "confident", "found_in"];
+    const first = ["frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac", "confident", "found_in"];
+    const number = (value) => typeof value === "number" || typeof value === "boolean";
+    const others = result.modes.flatMap((mode) => Object.keys(mode).filter((key) => number(mode[key])));
+    const keys = [...new Set([...first, ...others])];
     const shapes = (result.shape_dofs || result.outputs).flatMap((name) => [`${name} re`, `${name} im`]).map(quoted);
     const rows = numbers.map((k) => {
       const mode = result.modes[k - 1];
