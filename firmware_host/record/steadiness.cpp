@@ -177,7 +177,22 @@ std::vector<std::vector<block_frequency>> with_force(steady_search& s, const rec
     return out;
 }
 
-/// Analytic signal of a mode: the outputs along its shape, turned back and smoothed over two inverse bandwidths.
+/// What shows of a change of frequency: the window is as narrow as the mode and pulls what it sees to its middle. The phase of the
+/// correlation exp(-decay |s|) behind a Hann window, from one block to `apart` samples later, by the change of frequency.
+double share_seen(double decay, std::size_t width, std::size_t apart) {
+    const auto w = static_cast<double>(width), lag = static_cast<double>(apart);
+    double sum = 0, moment = 0;
+    for (double s = 1 - w; s < w; ++s) {
+        const double x = std::abs(s), angle = 2 * M_PI * x / w;
+        const double window = (w - x) * (1 + std::cos(angle) / 2) + 0.75 * w / M_PI * std::sin(angle);
+        const double both = window * std::exp(-decay * std::abs(s + lag));
+        sum += both;
+        moment += both * (s + lag);
+    }
+    return moment / sum / lag;
+}
+
+/// Analytic signal of a mode: the outputs along its shape, turned back and smoothed over an inverse bandwidth.
 std::vector<block_frequency> turning(const steady_search& s, std::size_t k) {
     std::vector<block_frequency> out;
     const listed_mode& mode = *s.modes[k];
@@ -188,6 +203,7 @@ std::vector<block_frequency> turning(const steady_search& s, std::size_t k) {
     const auto width =
         std::max(least_block, static_cast<std::size_t>(s.fs_hz / (2 * mode.damping_ratio * mode.frequency_hz)));
     const std::size_t apart = width / 4;
+    const double share = share_seen(2 * M_PI * mode.damping_ratio * mode.frequency_hz / s.fs_hz, width, apart);
     const complex back = std::polar(1.0, -2 * M_PI * mode.frequency_hz / s.fs_hz);
     double seconds_before = 0;
     for (const record_data& record : s.set.records) {
@@ -207,7 +223,7 @@ std::vector<block_frequency> turning(const steady_search& s, std::size_t k) {
             const double power = std::norm(a) / 2 + std::norm(b) / 2;
             const double angle = std::arg(b * std::conj(a)) / (2 * M_PI * static_cast<double>(apart)) * s.fs_hz;
             if (power > 0)
-                out.push_back({angle / mode.frequency_hz, power, power,
+                out.push_back({angle / mode.frequency_hz / share, power, power,
                                seconds_before + static_cast<double>(first) / s.fs_hz, power});
         }
         seconds_before += static_cast<double>(record.count) / s.fs_hz;
