@@ -223,17 +223,28 @@ std::vector<fault> screen(const output_view& y, const force_times& forces) {
     return out;
 }
 
-/// An output whose missing samples would cost the others theirs, since only complete rows with complete lags are used.
-void leave_out_sparse(const std::vector<std::string>& outputs, const std::vector<std::size_t>& usable_of,
-                      screened_outputs& out) {
-    const double best = static_cast<double>(*std::max_element(usable_of.begin(), usable_of.end()));
-    for (std::size_t k = 0; k < outputs.size(); ++k) {
-        if (!out.kept[k] || static_cast<double>(usable_of[k]) >= (1 - share_lost) * best) continue;
-        out.kept[k] = false;
-        out.said.emplace_back("screened", fmt::format("output \"{}\": samples missing so often that only {} have {} "
-                                                      "complete ones before them, of another output {}{}",
-                                                      outputs[k], usable_of[k], clean_lags, best, lost_words));
+/// What is wrong with an output over all records.
+struct output_faults {
+    bool dead = false; ///< it never moves
+    bool lost = false; ///< too much of it is faulty
+    std::map<std::string_view, std::vector<fault>> of_kind;
+    std::size_t usable = 0; ///< samples, as if it stood alone
+};
+
+output_faults faults_of(record_set& set, std::size_t output, const std::vector<force_times>& forces) {
+    output_faults out;
+    out.dead = is_dead(set, output);
+    if (out.dead) return out;
+    std::size_t before = 0;
+    for (std::size_t r = 0; r < set.records.size(); ++r) {
+        const record_data& record = set.records[r];
+        const output_view view{record, set.rows(record) + set.n_u + output, set.channels()};
+        before += usable(view);
+        for (fault& found : screen(view, forces[r])) out.of_kind[found.kind].push_back(std::move(found));
+        out.usable += usable(view);
     }
+    out.lost = !out.of_kind.empty() && static_cast<double>(out.usable) < (1 - share_lost) * static_cast<double>(before);
+    return out;
 }
 
 } // namespace
@@ -241,41 +252,33 @@ void leave_out_sparse(const std::vector<std::string>& outputs, const std::vector
 screened_outputs screen_outputs(record_set& set, const std::vector<std::string>& outputs) {
     screened_outputs out;
     set.complete = false; // what is faulty becomes missing
-    out.kept.assign(outputs.size(), true);
-    std::vector<std::size_t> usable_of(outputs.size(), 0);
     std::vector<force_times> forces;
     for (const record_data& record : set.records) forces.push_back(times_of_forces(set, record));
+    std::vector<output_faults> found;
+    std::size_t best = 0;
     for (std::size_t k = 0; k < outputs.size(); ++k) {
-        if (is_dead(set, k)) {
-            out.kept[k] = false;
-            out.said.emplace_back("screened",
-                                  fmt::format("output \"{}\" {}", outputs[k], std::string("never moves") + lost_words));
-            continue;
-        }
-        std::map<std::string_view, std::vector<fault>> faults; // by kind
-        std::size_t before = 0, after = 0;
-        for (std::size_t r = 0; r < set.records.size(); ++r) {
-            const record_data& record = set.records[r];
-            const output_view view{record, set.rows(record) + set.n_u + k, set.channels()};
-            before += usable(view);
-            for (fault& found : screen(view, forces[r])) faults[found.kind].push_back(std::move(found));
-            after += usable(view);
-        }
-        const bool lost = static_cast<double>(after) < (1 - share_lost) * static_cast<double>(before);
-        if (!faults.empty() && lost) out.kept[k] = false;
-        usable_of[k] = after;
-        for (const auto& [kind, found] : faults)
-            out.said.emplace_back("screened", fault_text(outputs[k], found) +
-                                                  (lost ? lost_words : ": left out as gaps, nothing is interpolated"));
+        found.push_back(faults_of(set, k, forces));
+        best = std::max(best, found[k].usable);
     }
-    leave_out_sparse(outputs, usable_of, out);
-    if (std::none_of(out.kept.begin(), out.kept.end(), [](bool kept) { return kept; })) {
-        out.kept.assign(outputs.size(), true); // nothing else is there: the clean samples have to do
-        out.said.erase(
-            std::remove_if(out.said.begin(), out.said.end(),
-                           [](const auto& one) { return one.second.find("never moves") != std::string::npos; }),
-            out.said.end());
+    // only complete rows with complete lags are used: an output with many gaps would cost the others their samples
+    const auto sparse = [best](const output_faults& one) {
+        return static_cast<double>(one.usable) < (1 - share_lost) * static_cast<double>(best);
+    };
+    for (const output_faults& one : found) out.kept.push_back(!one.dead && !one.lost && !sparse(one));
+    const bool none = std::none_of(out.kept.begin(), out.kept.end(), [](bool kept) { return kept; });
+    if (none) out.kept.assign(outputs.size(), true); // nothing else is there: the clean samples have to do
+    const auto say = [&out](std::string text) { out.said.emplace_back("screened", std::move(text)); };
+    for (std::size_t k = 0; k < outputs.size(); ++k) {
+        if (found[k].dead && !none) say(fmt::format("output \"{}\" {}{}", outputs[k], never_moves, lost_words));
+        for (const auto& [kind, faults] : found[k].of_kind)
+            say(fault_text(outputs[k], faults) +
+                (found[k].lost && !none ? lost_words : ": left out as gaps, nothing is interpolated"));
     }
+    for (std::size_t k = 0; k < outputs.size() && !none; ++k)
+        if (!found[k].dead && !found[k].lost && sparse(found[k]))
+            say(fmt::format("output \"{}\": samples missing so often that only {} have {} complete ones before them, "
+                            "of another output {}{}",
+                            outputs[k], found[k].usable, clean_lags, best, lost_words));
     return out;
 }
 

@@ -221,6 +221,19 @@ static void where_nothing_moves_all_is_kept() {
     TEST_ASSERT_TRUE(out.kept[0] && out.kept[1] && out.said.empty());
 }
 
+/// The only output, clipped at every second crest: what is clean of it has to do, and that is said.
+static void the_only_output_is_not_left_out() {
+    column y = moving();
+    for (double& x : y) x = std::min(x, 0.2);
+    record_set set;
+    set.n_y = 1;
+    set.add("", y, 0, y.size());
+    const screened_outputs out = screen_outputs(set, {"a"});
+    TEST_ASSERT_TRUE(out.kept[0] && out.said.size() == 1);
+    TEST_ASSERT_TRUE(out.said[0].second.find("clipped") != std::string::npos);
+    TEST_ASSERT_TRUE(out.said[0].second.find(": left out as gaps, nothing is interpolated") != std::string::npos);
+}
+
 /// Of two records it rests in the second, named for its file: from 32 samples on these are missing.
 static void an_output_that_rests_in_one_record_is_missing_there() {
     for (const std::size_t count : {31U, 32U}) {
@@ -263,6 +276,7 @@ int main() {
     RUN_TEST(an_output_that_costs_the_others_three_tenths_goes);
     RUN_TEST(an_output_that_never_moves_goes);
     RUN_TEST(where_nothing_moves_all_is_kept);
+    RUN_TEST(the_only_output_is_not_left_out);
     RUN_TEST(an_output_that_rests_in_one_record_is_missing_there);
     RUN_TEST(channels_of_outputs_that_go_are_taken_out);
     return UNITY_END();
