@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+// Each number that tells a line from a mode, from both sides: amplitudes that scatter by so much, parts of the rate, mains, and
+// multiples of a stronger vibration.
+#include "consensus/lines.hpp"
+#include "narrow_bands.hpp"
+
+#include <functional>
+#include <unity.h>
+
+using namespace okid_host;
+
+namespace {
+
+record_level level_of(const std::vector<series>& outputs) {
+    record_level out;
+    out.fs_hz = sample_rate;
+    out.top = 0.48;
+    out.records.push_back(record_of(outputs).samples);
+    out.samples = static_cast<long long>(outputs[0].size());
+    return out;
+}
+
+consensus_mode found_at(double frequency_hz, double damping_ratio, std::vector<std::complex<double>> of = {1.0}) {
+    consensus_mode out;
+    out.frequency_hz = frequency_hz;
+    out.damping_ratio = damping_ratio;
+    out.agreement = 1;
+    out.shape = std::move(of);
+    return out;
+}
+
+/// The codes of the last mode, separated by spaces.
+std::string why(const std::vector<series>& outputs, std::vector<consensus_mode> modes) {
+    mark_lines({level_of(outputs)}, 0, outputs.size(), false, modes);
+    std::string out;
+    for (const std::string& code : modes.back().why) out += (out.empty() ? "" : " ") + code;
+    return out;
+}
+
+/// A sine whose amplitude follows a law of the block, 64 of them.
+series sine(double hz, std::size_t count, const std::function<double(std::size_t)>& amplitude) {
+    series out(count);
+    for (std::size_t t = 0; t < count; ++t)
+        out[t] = amplitude(t / (count / 64)) * std::sin(2 * M_PI * hz / sample_rate * static_cast<double>(t));
+    return out;
+}
+
+double constant(std::size_t) { return 1; }
+
+constexpr std::size_t usual = 64 * 512;
+
+/// Of a strong vibration of 10 Hz and a weak one at n times that, so much of whose amplitude is the n-th power of the first's.
+std::string why_of_multiple(int n, double share, double size, double listed_hz, double agreement = 1) {
+    const std::size_t count = 60'000;
+    const analytic first = chance_amplitude(count, 10, 0.003, 1), other = chance_amplitude(count, 10 * n, 0.003, 2);
+    analytic second(count);
+    double power = 0;
+    for (std::size_t t = 0; t < count; ++t) power += std::norm(std::pow(first[t], n)) / static_cast<double>(count);
+    for (std::size_t t = 0; t < count; ++t)
+        second[t] = share * std::pow(first[t], n) / std::sqrt(power) + std::sqrt(1 - share * share) * other[t];
+    series out = white(count, 1e-4, 3);
+    add(out, 1, turning_at(10, first));
+    add(out, size, turning_at(10 * n, second));
+    std::vector<consensus_mode> modes = {found_at(10, 0.003), found_at(listed_hz, 0.003)};
+    modes[0].agreement = agreement;
+    return why({out}, modes);
+}
+
+} // namespace
+
+void setUp() {}
+void tearDown() {}
+
+/// A quarter of its mean; noise in a narrow band scatters by a half.
+static void an_amplitude_that_hardly_scatters_is_a_line() {
+    for (const double spread : {0.23, 0.27}) {
+        const series out = sine(20, usual, [spread](std::size_t block) { return block % 2 ? 1 + spread : 1 - spread; });
+        TEST_ASSERT_EQUAL_STRING(spread < 0.25 ? "tone" : "", why({out}, {found_at(20, 0.005)}).c_str());
+    }
+    series chance = white(usual, 1e-3, 1);
+    add(chance, 1, turning_at(20, chance_amplitude(usual, 20, 0.005, 2)));
+    TEST_ASSERT_EQUAL_STRING("", why({chance}, {found_at(20, 0.005)}).c_str());
+}
+
+static void what_is_damped_more_than_a_hundredth_is_no_line() {
+    const series out = sine(20, usual, constant);
+    TEST_ASSERT_EQUAL_STRING("tone", why({out}, {found_at(20, 0.0099)}).c_str());
+    TEST_ASSERT_EQUAL_STRING("", why({out}, {found_at(20, 0.0101)}).c_str());
+}
+
+/// Eight blocks of eight periods: 2,049 samples at 1 Hz.
+static void eight_blocks_show_a_spread() {
+    for (const std::size_t count : {8 * 2049, 8 * 2049 - 1})
+        TEST_ASSERT_EQUAL_STRING(count % 2049 == 0 ? "tone" : "",
+                                 why({sine(1, count, constant)}, {found_at(1, 0.0099)}).c_str());
+}
+
+/// Within 0.003 of 50 or 60 Hz of a multiple of theirs.
+static void lines_of_the_mains_are_pickup() {
+    for (const auto& [hz, code] : {std::pair{50.14, "pickup"},
+                                   {50.16, "tone"},
+                                   {49.86, "pickup"},
+                                   {49.84, "tone"},
+                                   {100.14, "pickup"},
+                                   {100.16, "tone"},
+                                   {60.17, "pickup"},
+                                   {60.19, "tone"},
+                                   {119.83, "pickup"},
+                                   {119.81, "tone"}})
+        TEST_ASSERT_EQUAL_STRING(code, why({sine(hz, usual, constant)}, {found_at(hz, 0.005)}).c_str());
+}
+
+/// Thirds to eighths of the rate, within three ten thousandths, with 98 % of the power in one output.
+static void simple_parts_of_the_rate_are_pickup() {
+    series chance = white(usual, 1, 1);
+    const auto at = [&](double hz, double second) {
+        return why({chance, chance}, {found_at(hz, 0.02, {1.0, second})});
+    };
+    for (const double part :
+         {1.0 / 3, 1.0 / 4, 1.0 / 5, 2.0 / 5, 1.0 / 6, 1.0 / 7, 2.0 / 7, 3.0 / 7, 1.0 / 8, 3.0 / 8}) {
+        const double hz = part * sample_rate;
+        for (const double way : {-1.0, 1.0}) {
+            TEST_ASSERT_EQUAL_STRING("pickup", at(hz * (1 + way * 2.9e-4), 0.01).c_str());
+            TEST_ASSERT_EQUAL_STRING("", at(hz * (1 + way * 3.1e-4), 0.01).c_str());
+        }
+    }
+    TEST_ASSERT_EQUAL_STRING("", at(sample_rate / 9, 0.01).c_str());
+    TEST_ASSERT_EQUAL_STRING("pickup", at(64, 0.142).c_str());                 // 0.9802
+    TEST_ASSERT_EQUAL_STRING("", at(64, 0.144).c_str());                       // 0.9797
+    TEST_ASSERT_EQUAL_STRING("", why({chance}, {found_at(64, 0.02)}).c_str()); // of one output no shape speaks
+}
+
+/// Twice to five times the frequency, within a hundredth and a half, a tenth of the amplitude, seven tenths in phase.
+static void multiples_of_a_vibration_are_harmonics() {
+    for (const int n : {2, 3, 5}) {
+        TEST_ASSERT_EQUAL_STRING("harmonic", why_of_multiple(n, 1, 0.02, 10 * n).c_str());
+        TEST_ASSERT_EQUAL_STRING("", why_of_multiple(n, 0, 0.02, 10 * n).c_str());
+    }
+    TEST_ASSERT_EQUAL_STRING("", why_of_multiple(6, 1, 0.01, 60).c_str());
+    TEST_ASSERT_EQUAL_STRING("harmonic", why_of_multiple(2, 1, 0.02, 20.29).c_str());
+    TEST_ASSERT_EQUAL_STRING("", why_of_multiple(2, 1, 0.02, 20.31).c_str());
+    TEST_ASSERT_EQUAL_STRING("harmonic", why_of_multiple(2, 1, 0.08, 20).c_str());
+    TEST_ASSERT_EQUAL_STRING("", why_of_multiple(2, 1, 0.13, 20).c_str());
+    TEST_ASSERT_EQUAL_STRING("harmonic", why_of_multiple(2, 0.9, 0.02, 20).c_str());
+    TEST_ASSERT_EQUAL_STRING("", why_of_multiple(2, 0.45, 0.02, 20).c_str());
+    TEST_ASSERT_EQUAL_STRING("harmonic",
+                             why_of_multiple(2, 1, 0.02, 20, 0.5).c_str()); // of a vibration that is believed
+    TEST_ASSERT_EQUAL_STRING("", why_of_multiple(2, 1, 0.02, 20, 0.49).c_str());
+}
+
+/// The phases of a single decay are those of its hit, at multiples too.
+static void a_single_decay_has_no_harmonics() {
+    const std::size_t count = 20'000;
+    analytic decay(count), square(count);
+    for (std::size_t t = 0; t < count; ++t) {
+        decay[t] = std::exp(-4e-4 * static_cast<double>(t));
+        square[t] = decay[t] * decay[t];
+    }
+    series out = white(count, 1e-6, 1);
+    add(out, 1, turning_at(10, decay));
+    add(out, 0.02, turning_at(20, square));
+    TEST_ASSERT_EQUAL_STRING("", why({out}, {found_at(10, 0.0016), found_at(20, 0.0016)}).c_str());
+}
+
+int main() {
+    UNITY_BEGIN();
+    RUN_TEST(an_amplitude_that_hardly_scatters_is_a_line);
+    RUN_TEST(what_is_damped_more_than_a_hundredth_is_no_line);
+    RUN_TEST(eight_blocks_show_a_spread);
+    RUN_TEST(lines_of_the_mains_are_pickup);
+    RUN_TEST(simple_parts_of_the_rate_are_pickup);
+    RUN_TEST(multiples_of_a_vibration_are_harmonics);
+    RUN_TEST(a_single_decay_has_no_harmonics);
+    return UNITY_END();
+}
