@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// Several forces and sensors without noise: every method, content of the Hankel matrix, solver and source of the sums
+// gives the system back, D, C B, C A B .. of every force at every sensor.
+#include "wide_rig.h"
+
+#include <okid/okid.h>
+#include <okid/steps/square_root.h>
+#include <unity.h>
+
+enum { P = 10, ROWS = 12, N = 3000, LAST = 14 };
+static const double limit = 1e-6; // of the largest; singular sums leave 1e-8
+
+static wide_t rig;
+static void* blocks[3];
+static double truth[(LAST + 1) * WIDE_MOST * WIDE_MOST], found[(LAST + 1) * WIDE_MOST * WIDE_MOST];
+static okid_identified_t model;
+
+void setUp(void) {}
+void tearDown(void) {
+    for (int k = 0; k < 3; ++k) {
+        free(blocks[k]);
+        blocks[k] = NULL;
+    }
+}
+
+/// Largest difference of Y_0 .. Y_count-1 from the true ones, over the largest of them.
+static double error_of(const double* markov, int count) {
+    double worst = 0, size = 0;
+    for (int k = 0; k < count * rig.n_y * rig.n_u; ++k) {
+        worst = fmax(worst, fabs(markov[k] - truth[k]));
+        size = fmax(size, fabs(truth[k]));
+    }
+    return worst / size;
+}
+
+static void is_the_system(void) {
+    wide_markov(rig.n_u, rig.n_y, model.n_z, model.A, model.B, model.C, model.D, LAST, found);
+    TEST_ASSERT_EQUAL(WIDE_NZ, model.n_z);
+    TEST_ASSERT_TRUE(error_of(found, LAST + 1) < limit);
+    TEST_ASSERT_GREATER_THAN(LAST, model.markov_count);
+    for (int k = 0; k < (LAST + 1) * rig.n_y * rig.n_u; ++k) found[k] = (double)model.markov[k];
+    TEST_ASSERT_TRUE(error_of(found, LAST + 1) < limit);
+    TEST_ASSERT_EQUAL(WIDE_MODES, model.mode_count);
+    for (int k = 0; k < WIDE_MODES; ++k) {
+        TEST_ASSERT_DOUBLE_WITHIN(limit, 1, (double)model.frequency_hz[k] / wide_frequency[k]);
+        TEST_ASSERT_DOUBLE_WITHIN(limit, wide_damping[k], (double)model.damping_ratio[k]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1, (double)model.emac[k]);
+    }
+}
+
+/// From the Gram matrix, and from the triangular factor where `by_factor` says so.
+static void identify(const okid_identify_config_t* c, const double* v, int by_factor) {
+    const int lags = okid_identify_lags(c);
+    const okid_accumulator_config_t a = {.n_u = c->n_u, .n_y = c->n_y, .lags = lags, .forgetting = 1, .edges = 1};
+    const okid_square_root_config_t q = {.n_u = c->n_u, .n_y = c->n_y, .lags = lags, .forgetting = 1};
+    const size_t bytes[3] = {okid_accumulator_memsize(&a), okid_identify_memsize(c), okid_square_root_memsize(&q)};
+    okid_accumulator_t* accumulator = NULL;
+    okid_identify_t* identifier = NULL;
+    okid_square_root_t* square_root = NULL;
+    tearDown();
+    for (int k = 0; k < 3; ++k) blocks[k] = malloc(bytes[k]);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&accumulator, &a, blocks[0], bytes[0]));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&identifier, c, blocks[1], bytes[1]));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&square_root, &q, blocks[2], bytes[2]));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
+    TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
+    is_the_system();
+    if (!by_factor) return;
+    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(square_root, v, N));
+    TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run_factor(identifier, square_root, &model));
+    is_the_system();
+}
+
+/// Two forces and three sensors, three forces and two sensors.
+static double* make(int which) {
+    wide_make(&rig, 2 + which, 3 - which);
+    wide_truth(&rig, LAST, truth);
+    return wide_record(&rig, N, 0, 7 + (uint64_t)which);
+}
+
+static okid_identify_config_t config_of(okid_method_t method, okid_hankel_t hankel, okid_solver_t solver) {
+    return (okid_identify_config_t){.n_u = rig.n_u,
+                                    .n_y = rig.n_y,
+                                    .p = P,
+                                    .rows = ROWS,
+                                    .order = WIDE_NZ,
+                                    .fs_hz = WIDE_FS,
+                                    .method = method,
+                                    .solver = solver,
+                                    .hankel = hankel};
+}
+
+static void okid_gives_the_system_whatever_its_hankel_matrix_holds(void) {
+    for (int which = 0; which < 2; ++which) {
+        double* v = make(which);
+        for (int method = OKID_METHOD_OKID_ERA; method <= OKID_METHOD_OKID_ERA_DC; ++method)
+            for (int hankel = OKID_HANKEL_SYSTEM; hankel <= OKID_HANKEL_INNOVATIONS; ++hankel)
+                for (int solver = OKID_SOLVER_DENSE; solver <= OKID_SOLVER_STRUCTURED; ++solver) {
+                    const okid_identify_config_t c =
+                        config_of((okid_method_t)method, (okid_hankel_t)hankel, (okid_solver_t)solver);
+                    identify(&c, v, solver == OKID_SOLVER_DENSE);
+                }
+        free(v);
+    }
+}
+
+static void subspace_methods_give_the_system(void) {
+    for (int which = 0; which < 2; ++which) {
+        double* v = make(which);
+        for (int method = OKID_METHOD_N4SID_MOESP; method <= OKID_METHOD_N4SID_SSARX; ++method) {
+            const okid_identify_config_t c = config_of((okid_method_t)method, OKID_HANKEL_SYSTEM, OKID_SOLVER_DENSE);
+            identify(&c, v, 1);
+        }
+        free(v);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(okid_gives_the_system_whatever_its_hankel_matrix_holds);
+    RUN_TEST(subspace_methods_give_the_system);
+    return UNITY_END();
+}
