@@ -145,7 +145,7 @@ struct factor_solver {
                 for (size_t i = 0; i < n; ++i) c[i] -= part * column[i];
             }
         }
-        info->input_excitation = most > 0 ? least / most : 0;
+        info->input_excitation = least / most; // no channel is constant: the first pivot is 1
         return rank;
     }
 
