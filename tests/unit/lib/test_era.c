@@ -29,7 +29,7 @@ void tearDown(void) {
 static const okid_era_config_t shapes[] = {{2, 3, 8, 5, 0, 0, 0},  {2, 3, 4, 11, 0, 0, 0}, {3, 2, 6, 9, 0, 0, 0},
                                            {3, 2, 12, 4, 0, 0, 0}, {1, 4, 3, 12, 0, 0, 0}, {2, 3, 8, 6, 2, 1, 2},
                                            {2, 3, 6, 9, 1, 3, 1},  {3, 2, 7, 8, 0, 2, 3},  {3, 2, 9, 4, 3, 0, 4},
-                                           {4, 1, 12, 3, 1, 1, 1}};
+                                           {4, 1, 12, 3, 1, 1, 1}, {4, 1, 10, 9, 1, 0, 2}, {4, 1, 10, 9, 0, 1, 1}};
 enum { SHAPES = sizeof shapes / sizeof *shapes };
 
 static void create(const okid_era_config_t* c) {
