@@ -281,8 +281,7 @@ struct solver {
                     if (a < b) w.out[a * m + r] += v;
                 }
         });
-        clear_outputs(w.out, 1);
-        return *std::max_element(w.out, w.out + n);
+        return *std::max_element(w.out, w.out + n); // the rows of y_n hold the ridge alone
     }
 
     /// Estimate of the 1-norm of K^-1.
