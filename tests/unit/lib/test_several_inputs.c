@@ -14,6 +14,9 @@ static wide_t rig;
 static void* blocks[3];
 static double truth[(LAST + 1) * WIDE_MOST * WIDE_MOST], found[(LAST + 1) * WIDE_MOST * WIDE_MOST];
 static okid_identified_t model;
+static okid_accumulator_t* accumulator;
+static okid_identify_t* identifier;
+static okid_square_root_t* square_root;
 
 void setUp(void) {}
 void tearDown(void) {
@@ -48,20 +51,21 @@ static void is_the_system(void) {
     }
 }
 
-/// From the Gram matrix, and from the triangular factor where `by_factor` says so.
-static void identify(const okid_identify_config_t* c, const double* v, int by_factor) {
+static void create(const okid_identify_config_t* c) {
     const int lags = okid_identify_lags(c);
     const okid_accumulator_config_t a = {.n_u = c->n_u, .n_y = c->n_y, .lags = lags, .forgetting = 1, .edges = 1};
     const okid_square_root_config_t q = {.n_u = c->n_u, .n_y = c->n_y, .lags = lags, .forgetting = 1};
     const size_t bytes[3] = {okid_accumulator_memsize(&a), okid_identify_memsize(c), okid_square_root_memsize(&q)};
-    okid_accumulator_t* accumulator = NULL;
-    okid_identify_t* identifier = NULL;
-    okid_square_root_t* square_root = NULL;
     tearDown();
     for (int k = 0; k < 3; ++k) blocks[k] = malloc(bytes[k]);
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&accumulator, &a, blocks[0], bytes[0]));
     TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&identifier, c, blocks[1], bytes[1]));
     TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&square_root, &q, blocks[2], bytes[2]));
+}
+
+/// From the Gram matrix, and from the triangular factor where `by_factor` says so.
+static void identify(const okid_identify_config_t* c, const double* v, int by_factor) {
+    create(c);
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
     TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
     is_the_system();
@@ -115,9 +119,49 @@ static void subspace_methods_give_the_system(void) {
     }
 }
 
+/// The leading singular triplets alone give the poles that the whole decomposition gives; of noisy records, of any order.
+static void poles_need_no_whole_decomposition(void) {
+    enum { MOST = 14 };
+    for (int which = 0; which < 2; ++which) {
+        free(make(which));
+        double* v = wide_record(&rig, N, 0.3, 9);
+        for (int method = OKID_METHOD_OKID_ERA; method <= OKID_METHOD_N4SID_SSARX; ++method)
+            for (int hankel = OKID_HANKEL_SYSTEM; hankel <= OKID_HANKEL_LITERAL; ++hankel) {
+                okid_identify_config_t c = config_of((okid_method_t)method, (okid_hankel_t)hankel, OKID_SOLVER_DENSE);
+                double whole[MOST][MOST], consistent[MOST][MOST];
+                int count[MOST];
+                if (method >= OKID_METHOD_N4SID_MOESP && hankel != OKID_HANKEL_SYSTEM) continue;
+                c.max_order = MOST;
+                c.order = 4;
+                create(&c);
+                TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
+                TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
+                for (int order = 2; order <= MOST; order += 2) {
+                    TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_poles(identifier, order, &model));
+                    count[order / 2] = model.mode_count;
+                    for (int k = 0; k < model.mode_count; ++k) {
+                        whole[order / 2][k] = (double)model.frequency_hz[k];
+                        consistent[order / 2][k] = (double)model.emac[k];
+                    }
+                }
+                TEST_ASSERT_EQUAL(OKID_OK, okid_identify_decompose(identifier, accumulator, &model));
+                for (int order = 2; order <= MOST; order += 2) {
+                    TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_poles(identifier, order, &model));
+                    TEST_ASSERT_EQUAL(count[order / 2], model.mode_count);
+                    for (int k = 0; k < model.mode_count; ++k) {
+                        TEST_ASSERT_DOUBLE_WITHIN(1e-6 * WIDE_FS, whole[order / 2][k], (double)model.frequency_hz[k]);
+                        TEST_ASSERT_DOUBLE_WITHIN(1e-4, consistent[order / 2][k], (double)model.emac[k]);
+                    }
+                }
+            }
+        free(v);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(okid_gives_the_system_whatever_its_hankel_matrix_holds);
     RUN_TEST(subspace_methods_give_the_system);
+    RUN_TEST(poles_need_no_whole_decomposition);
     return UNITY_END();
 }
