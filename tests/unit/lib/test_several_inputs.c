@@ -158,10 +158,36 @@ static void poles_need_no_whole_decomposition(void) {
     }
 }
 
+/// Without forces: a sensor that says what two others say together leaves the modes as they are.
+static void a_redundant_sensor_does_no_harm(void) {
+    enum { LONG = 30000 };
+    wide_make(&rig, 2, 3);
+    double *v = wide_record(&rig, LONG, 0, 3), *y = malloc(sizeof *y * LONG * 3);
+    for (int n = 0; n < LONG; ++n) {
+        y[n * 3] = v[n * 5 + 2] - rig.D[0] * v[n * 5] - rig.D[3] * v[n * 5 + 1];
+        y[n * 3 + 1] = v[n * 5 + 3] - rig.D[1] * v[n * 5] - rig.D[4] * v[n * 5 + 1];
+        y[n * 3 + 2] = y[n * 3] + y[n * 3 + 1];
+    }
+    rig.n_u = 0;
+    for (int method = OKID_METHOD_OKID_ERA; method <= OKID_METHOD_OKID_ERA_DC; ++method) {
+        okid_identify_config_t c = config_of((okid_method_t)method, OKID_HANKEL_SYSTEM, OKID_SOLVER_DENSE);
+        c.rows = 40;
+        create(&c);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, y, LONG));
+        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
+        TEST_ASSERT_EQUAL(WIDE_MODES, model.mode_count);
+        for (int k = 0; k < WIDE_MODES; ++k)
+            TEST_ASSERT_DOUBLE_WITHIN(0.01, 1, (double)model.frequency_hz[k] / wide_frequency[k]);
+    }
+    free(v);
+    free(y);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(okid_gives_the_system_whatever_its_hankel_matrix_holds);
     RUN_TEST(subspace_methods_give_the_system);
     RUN_TEST(poles_need_no_whole_decomposition);
+    RUN_TEST(a_redundant_sensor_does_no_harm);
     return UNITY_END();
 }
