@@ -19,8 +19,8 @@ extern "C" {
 
 /// Sizes and the rate of false alarms.
 typedef struct okid_change_config_t {
-    int32_t n_u;    ///< inputs, >= 0; 0 = output-only
-    int32_t n_y;    ///< outputs, >= 1
+    int32_t n_u;    ///< inputs, 0..256; 0 = output-only
+    int32_t n_y;    ///< outputs, 1..256
     int32_t rows;   ///< i, block rows of past and of future, 2..512; 2 i (n_u + n_y) <= 8192
     int32_t order;  ///< states of the baseline, even, at most (i-1) n_y; 0 = as many as the baseline shows. Too many
                     ///< do no harm, too few are taken for a change when the excitation changes

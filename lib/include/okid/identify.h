@@ -55,9 +55,10 @@ OKID_API const char* okid_warning_code(uint32_t bit);
 /// What is to be identified, and how; zeros are defaults.
 typedef struct okid_identify_config_t {
     int32_t n_u;   ///< inputs, >= 0; 0 (ambient): modes and predictor only
-    int32_t n_y;   ///< outputs, >= 1
-    int32_t p;     ///< observer (ARX) order; n4sid: not used; okid without inputs: only the default of rows
-    int32_t rows;  ///< block rows (okid: and columns) of the Hankel matrices; 0 = 2 p, n4sid 30, okid without inputs p
+    int32_t n_y;   ///< outputs, >= 1; n_u + n_y <= 256
+    int32_t p;     ///< observer (ARX) order, 1..4096; n4sid: not used; okid without inputs: only the default of rows
+    int32_t rows;  ///< block rows (okid: and columns) of the Hankel matrices, at most 8192; 0 = 2 p, n4sid 30, okid
+                   ///< without inputs p
     int32_t order; ///< n_z; 0 = automatic
     int32_t max_order; ///< bound of the automatic order and of the memory; 0 = min(128, what the Hankel matrix carries)
     double fs_hz;      ///< sample rate

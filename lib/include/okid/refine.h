@@ -17,7 +17,7 @@
 extern "C" {
 #endif
 
-/// Sizes of the model and of the record.
+/// Sizes of the model and of the record; n_z (n_u + runs + 1) + n_u + runs <= 16384.
 typedef struct okid_refine_config_t {
     int32_t n_u; ///< inputs, >= 1: without a measured input there is nothing to simulate
     int32_t n_y; ///< outputs, >= 1

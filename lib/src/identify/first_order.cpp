@@ -60,10 +60,10 @@ void first_order::begin(const okid_model_t& model) {
     std::copy(model.A, model.A + area(n, n), A);
     if (!std::all_of(A, A + area(n, n), [](double x) { return std::isfinite(x); })) return;
     if (linalg::eigen(n, a, re, im, vectors, eigen) != 0) return;
-    for (int k = 0; k < n; k += size(k))
-        for (int part = 0; part < size(k); ++part)
-            for (int r = 0; r < n; ++r)
-                basis[at(r, k + part, n)] = (part == 0 ? 1 : -1) * double(vectors[at(r, k + part, n)]);
+    for (int k = 0; k < n; k += size(k)) {
+        for (int r = 0; r < n; ++r) basis[at(r, k, n)] = double(vectors[at(r, k, n)]);
+        for (int r = 0; pair(k) && r < n; ++r) basis[at(r, k + 1, n)] = -double(vectors[at(r, k + 1, n)]);
+    }
     if (!invert()) return;
     if (n_u > 0) {
         std::copy(model.B, model.B + area(n, n_u), room);

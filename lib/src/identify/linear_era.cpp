@@ -32,9 +32,9 @@ void linear_era::lay_out(const okid_identify& s, int largest, arena& memory) {
     n = s.n;
     n_y = s.n_y;
     q = s.q;
-    height = (shape.rows + shape.xi * shape.tau) * n_y;
+    height = (shape.rows + shape.xi) * n_y;
     tall = height + n_y;
-    breadth = (shape.cols + shape.zeta * shape.tau) * s.width;
+    breadth = (shape.cols + shape.zeta) * s.width;
     seen = correlated() ? (shape.zeta + 1) * shape.rows * n_y : breadth;
     last = s.markov_last;
     const int n_u = s.n_u, w = s.width;
@@ -69,8 +69,7 @@ void linear_era::lay_out(const okid_identify& s, int largest, arena& memory) {
 /// How often a block row of T stands in what is decomposed: N.
 int linear_era::stands(int row) const {
     int count = correlated() ? 0 : 1;
-    for (int a = 0; correlated() && a <= shape.xi; ++a)
-        count += row >= a * shape.tau && row < a * shape.tau + shape.rows;
+    for (int a = 0; correlated() && a <= shape.xi; ++a) count += row >= a && row < a + shape.rows;
     return count;
 }
 
@@ -84,8 +83,8 @@ void linear_era::through(const real* T, const real* x, int count, real* out) con
     std::fill(out, out + area(breadth, count), real{0});
     const int own = shape.rows * n_y, wide = shape.cols * shape.n_u;
     for (int b = 0; b <= shape.zeta; ++b)
-        multiply(true, true, wide, count, own, 1, T, tall, x + area(b * own, count), count, 1,
-                 out + b * shape.tau * shape.n_u, breadth);
+        multiply(true, true, wide, count, own, 1, T, tall, x + area(b * own, count), count, 1, out + b * shape.n_u,
+                 breadth);
 }
 
 /// out (count x seen) <- x F + keep out, x count x breadth.
@@ -96,7 +95,7 @@ void linear_era::back(const real* T, const real* x, int count, real keep, real* 
     }
     const int own = shape.rows * n_y, wide = shape.cols * shape.n_u;
     for (int b = 0; b <= shape.zeta; ++b)
-        multiply(false, true, count, own, wide, 1, x + area(b * shape.tau * shape.n_u, count), count, T, tall, keep,
+        multiply(false, true, count, own, wide, 1, x + area(b * shape.n_u, count), count, T, tall, keep,
                  out + area(b * own, count), count);
 }
 

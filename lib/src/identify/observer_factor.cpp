@@ -43,7 +43,7 @@ size_t lay_out(const okid_observer_config_t& c, arena& memory, factor_work* work
     w.triangle = memory.take<real>(okid_triangle_size(stride));
     w.rows = memory.take<real>(batch * stride);
     w.panel = memory.take<real>((batch + 3) * OKID_PANEL);
-    w.x = memory.take<real>(n * n_y);
+    w.x = memory.take<real>(n);
     w.t = memory.take<real>(n * n_y);
     w.out = memory.take<real>(n * n_y);
     w.inputs = memory.take<real>(n * n_u * lags);
@@ -145,7 +145,7 @@ struct factor_solver {
                 for (size_t i = 0; i < n; ++i) c[i] -= part * column[i];
             }
         }
-        info->input_excitation = most > 0 ? least / most : 0;
+        info->input_excitation = least / most; // no channel is constant: the first pivot is 1
         return rank;
     }
 
@@ -192,11 +192,10 @@ struct factor_solver {
         info->ridge = ridge;
         real finite = 0;
         for (size_t o = 0; o < n_y; ++o) {
-            real* x = w.x + o * q;
-            for (size_t i = 0; i < q; ++i) x[i] = row(i)[q + o];
-            back(x);
+            for (size_t i = 0; i < q; ++i) w.x[i] = row(i)[q + o];
+            back(w.x);
             for (size_t k = 0; k < q; ++k) {
-                theta[k * n_y + o] = x[k] * w.scale[k] / w.scale[q + o];
+                theta[k * n_y + o] = w.x[k] * w.scale[k] / w.scale[q + o];
                 finite += theta[k * n_y + o] * 0;
             }
         }

@@ -123,10 +123,11 @@ bool sort_modes(okid_refine& s) {
         if (next < 0) return false;
         l.pair[to] = s.im[next] > 0;
         s.best.pole[to] = double(s.re[next]);
-        if (l.pair[to]) s.best.pole[to + 1] = double(s.im[next]);
-        for (int part = 0; part < l.size(to); ++part)
-            for (int r = 0; r < n; ++r)
-                s.basis[at(r, to + part, n)] = (part == 0 ? 1 : -1) * double(s.vectors[at(r, next + part, n)]);
+        for (int r = 0; r < n; ++r) s.basis[at(r, to, n)] = double(s.vectors[at(r, next, n)]);
+        if (l.pair[to]) {
+            s.best.pole[to + 1] = double(s.im[next]);
+            for (int r = 0; r < n; ++r) s.basis[at(r, to + 1, n)] = -double(s.vectors[at(r, next + 1, n)]);
+        }
         s.re[next] = NAN;
     }
     return true;

@@ -225,7 +225,8 @@ struct solver {
         std::fill(pivots, pivots + size, 0.0);
         eliminate(n_u, input_ridge, pivots); // when it stops, the pivots beyond count as zero
         const double largest = *std::max_element(pivots, pivots + size);
-        info->input_excitation = largest > 0 ? *std::min_element(pivots, pivots + size) / largest : 0;
+        const double least = *std::min_element(pivots, pivots + size); // all are 0 when the first block stopped it
+        info->input_excitation = least > 0 ? least / largest : 0;
         for (int k = 0; k < n_u; ++k)
             if (!(pivots[k] > rank_tolerance)) {
                 info->channel = k;
@@ -280,8 +281,7 @@ struct solver {
                     if (a < b) w.out[a * m + r] += v;
                 }
         });
-        clear_outputs(w.out, 1);
-        return *std::max_element(w.out, w.out + n);
+        return *std::max_element(w.out, w.out + n); // the rows of y_n hold the ridge alone
     }
 
     /// Estimate of the 1-norm of K^-1.

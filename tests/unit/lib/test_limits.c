@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 // The limits that the headers state: the least and the most of a key are taken, what is beyond them is not (memory of 0 bytes).
+#include <math.h>
 #include <okid/accumulator.h>
 #include <okid/change.h>
 #include <okid/correlation.h>
+#include <okid/identify.h>
 #include <okid/refine.h>
 #include <okid/stabilization.h>
 #include <okid/steps/square_root.h>
 #include <okid/steps/subspace.h>
+#include <okid/watch.h>
 #include <unity.h>
 
 void setUp(void) {}
@@ -76,6 +79,8 @@ static void memory_that_fades_needs_blocks(void) {
 static void of_what_is_made_of_them(void) {
     const okid_change_config_t change = okid_change_defaults(1, 1, 8, 100);
     LIMITS(change, change, rows, 3, 512); // 2 rows of one output hold no mode
+    LIMITS(change, change, n_u, 0, 256);
+    LIMITS(change, change, n_y, 1, 256);
     LIMITS(change, change, blocks, 0, 1024);
     okid_change_config_t wide = okid_change_defaults(4, 4, 512, 100); // 2 i (n_u + n_y) = 8192
     TEST_ASSERT_TRUE(okid_change_memsize(&wide) > 0);
@@ -92,6 +97,102 @@ static void of_what_is_made_of_them(void) {
     LIMITS(refine, refine, offset, 0, 1);
     const okid_stabilization_config_t poles = okid_stabilization_defaults(1, 1024, 16);
     LIMITS(stabilization, poles, max_poles, 1, 1024); // models times poles: 2^20
+    LIMITS(stabilization, poles, max_models, 1, 65536);
+    const okid_watch_config_t watch = okid_watch_defaults(1, 1, 4, 8);
+    LIMITS(watch, watch, n_u, 0, 4096);
+    LIMITS(watch, watch, n_y, 1, 4096);
+    LIMITS(watch, watch, max_order, 1, 4096);
+    LIMITS(watch, watch, learn, 0, 1024);
+    for (int negative = 0; negative < 2; ++negative) {
+        TEST_ASSERT_EQUAL(!negative, TAKEN(watch, .n_y = 1, .max_order = 4, .lead = -negative));
+        TEST_ASSERT_EQUAL(!negative, TAKEN(watch, .n_y = 1, .max_order = 4, .block = -negative));
+        TEST_ASSERT_EQUAL(!negative, TAKEN(watch, .n_y = 1, .max_order = 4, .confirm = -negative));
+        TEST_ASSERT_EQUAL(!negative, TAKEN(refine, .n_u = 1, .n_y = 1, .n_z = 1, .iterations = -negative));
+        TEST_ASSERT_EQUAL(!negative, TAKEN(refine, .n_u = 1, .n_y = 1, .n_z = 1, .runs = -negative));
+    }
+    TEST_ASSERT_FALSE(TAKEN(watch, .n_y = 1, .max_order = 4, .ratio = 1));
+    TEST_ASSERT_TRUE(TAKEN(watch, .n_y = 1, .max_order = 4, .ratio = 1.001));
+    TEST_ASSERT_FALSE(TAKEN(watch, .n_y = 1, .max_order = 4, .ratio = HUGE_VAL));
+}
+
+/// n_z (n_u + runs + 1) + n_u + runs of a refinement is at most 16384.
+static void unknowns_of_a_refinement(void) {
+    TEST_ASSERT_TRUE(TAKEN(refine, .n_u = 1, .n_y = 1, .n_z = 5460, .runs = 1)); // 5460 * 3 + 2 = 16382
+    TEST_ASSERT_FALSE(TAKEN(refine, .n_u = 1, .n_y = 1, .n_z = 5461, .runs = 1));
+    TEST_ASSERT_TRUE(TAKEN(refine, .n_u = 1, .n_y = 1, .n_z = 1, .runs = 8190)); // 8192 + 8191 = 16383
+    TEST_ASSERT_FALSE(TAKEN(refine, .n_u = 1, .n_y = 1, .n_z = 1, .runs = 8191));
+    TEST_ASSERT_TRUE(TAKEN(refine, .n_u = 8191, .n_y = 1, .n_z = 1));
+    TEST_ASSERT_FALSE(TAKEN(refine, .n_u = 8192, .n_y = 1, .n_z = 1));
+}
+
+static void of_an_identification(void) {
+    const okid_identify_config_t era = {.n_u = 1, .n_y = 1, .p = 4, .fs_hz = 100},
+                                 ambient = {.n_y = 1, .p = 4, .fs_hz = 100},
+                                 n4sid = {.n_u = 1, .n_y = 1, .fs_hz = 100, .method = OKID_METHOD_N4SID_CVA};
+    LIMITS(identify, era, p, 1, 4096);
+    LIMITS(identify, era, rows, 0, 8192);
+    LIMITS(identify, era, n_u, 0, 255);
+    LIMITS(identify, era, n_y, 1, 255);
+    LIMITS(identify, era, method, OKID_METHOD_OKID_ERA, OKID_METHOD_N4SID_SSARX);
+    LIMITS(identify, era, detrend, OKID_DETREND_NONE, OKID_DETREND_MEAN);
+    LIMITS(identify, era, solver, OKID_SOLVER_DENSE, OKID_SOLVER_STRUCTURED);
+    LIMITS(identify, era, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_LITERAL);
+    LIMITS(identify, ambient, p, 1, 4096); // rows = p
+    LIMITS(identify, ambient, solver, OKID_SOLVER_DENSE, OKID_SOLVER_DENSE);
+    LIMITS(identify, ambient, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_SYSTEM);
+    LIMITS(identify, n4sid, solver, OKID_SOLVER_DENSE, OKID_SOLVER_DENSE);
+    LIMITS(identify, n4sid, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_SYSTEM);
+    for (int rows = -1; rows < 4; ++rows)
+        TEST_ASSERT_EQUAL(rows == 0 || rows > 1, TAKEN(identify, .n_u = 1, .n_y = 2, .rows = rows, .fs_hz = 100,
+                                                       .method = OKID_METHOD_N4SID_CVA));
+    for (int negative = 0; negative < 2; ++negative) {
+        TEST_ASSERT_EQUAL(!negative, TAKEN(identify, .n_u = 1, .n_y = 1, .p = 4, .fs_hz = 100, .order = -negative));
+        TEST_ASSERT_EQUAL(!negative, TAKEN(identify, .n_u = 1, .n_y = 1, .p = 4, .fs_hz = 100, .max_order = -negative));
+    }
+    for (int wrong = 0; wrong < 4; ++wrong) {
+        const double fs_hz = (const double[]){0, -1, HUGE_VAL, NAN}[wrong];
+        TEST_ASSERT_FALSE(TAKEN(identify, .n_u = 1, .n_y = 1, .p = 4, .fs_hz = fs_hz));
+        TEST_ASSERT_FALSE(TAKEN(change, .n_y = 1, .rows = 8, .fs_hz = fs_hz));
+    }
+}
+
+/// The lags that a method looks back, and what it can carry: 128 states unless more are asked for.
+static void lags_and_orders_of_an_identification(void) {
+    okid_identify_config_t c = {.n_u = 2, .n_y = 3, .p = 9, .rows = 7, .fs_hz = 100};
+    TEST_ASSERT_EQUAL(9, okid_identify_lags(&c));
+    TEST_ASSERT_EQUAL(14, okid_identify_max_order(&c)); // 7 block columns of 2 inputs
+    c.rows = 0;
+    TEST_ASSERT_EQUAL(27, okid_identify_max_order(&c)); // 9 lags of 3 outputs; 18 block rows
+    c.max_order = 20;
+    TEST_ASSERT_EQUAL(20, okid_identify_max_order(&c));
+    c.order = 22;
+    TEST_ASSERT_EQUAL(22, okid_identify_max_order(&c));
+    c.max_order = c.order = 0;
+    c.p = 100;
+    TEST_ASSERT_EQUAL(128, okid_identify_max_order(&c));
+    c.order = 150;
+    TEST_ASSERT_EQUAL(150, okid_identify_max_order(&c));
+    c.order = 0;
+    c.n_u = 0;
+    c.rows = 7;
+    TEST_ASSERT_EQUAL(14, okid_identify_lags(&c));
+    TEST_ASSERT_EQUAL(21, okid_identify_max_order(&c));
+    c.method = OKID_METHOD_OKID_ERA_DC;
+    TEST_ASSERT_EQUAL(18, okid_identify_lags(&c));
+    c.method = OKID_METHOD_N4SID_CVA;
+    TEST_ASSERT_EQUAL(13, okid_identify_lags(&c));
+    TEST_ASSERT_EQUAL(18, okid_identify_max_order(&c));
+    c.rows = 0;
+    TEST_ASSERT_EQUAL(59, okid_identify_lags(&c));
+    TEST_ASSERT_EQUAL(87, okid_identify_max_order(&c));
+}
+
+/// A tenth of the rows of a record can be unknowns: 10 (n_u + p m) <= samples.
+static void lags_that_a_record_carries(void) {
+    TEST_ASSERT_EQUAL(40, okid_identify_usable_p(2, 3, 40, 2020)); // 10 (2 + 40 * 5)
+    TEST_ASSERT_EQUAL(39, okid_identify_usable_p(2, 3, 40, 2019));
+    TEST_ASSERT_EQUAL(1, okid_identify_usable_p(2, 3, 40, 70));
+    TEST_ASSERT_EQUAL(1, okid_identify_usable_p(2, 3, 40, 0));
 }
 
 /// What 0 stands for, as the headers say: the same memory as the number itself, and another than the next.
@@ -127,6 +228,10 @@ int main(void) {
     RUN_TEST(of_the_sums);
     RUN_TEST(memory_that_fades_needs_blocks);
     RUN_TEST(of_what_is_made_of_them);
+    RUN_TEST(unknowns_of_a_refinement);
+    RUN_TEST(of_an_identification);
+    RUN_TEST(lags_and_orders_of_an_identification);
+    RUN_TEST(lags_that_a_record_carries);
     RUN_TEST(defaults_are_numbers);
     return UNITY_END();
 }
