@@ -32,7 +32,7 @@ void scale_rows(mkr_work& w) {
         double size = 0;
         for (int k = 0; k < w.n_x; ++k)
             size += double(w.lambda_im[k]) * std::norm(complex(w.W_re[k * w.n_x + i], w.W_im[k * w.n_x + i]));
-        w.balance[i] = static_cast<real>(size > 0 ? 1 / std::sqrt(size) : 1);
+        w.balance[i] = static_cast<real>(1 / std::sqrt(size)); // a row of zeros has no inverse before
     }
 }
 

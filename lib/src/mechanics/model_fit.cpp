@@ -197,7 +197,7 @@ okid_status_t okid_model_fit(const okid_model_t* model, const double* rows, size
 size_t okid::initial_state_numbers(const okid_model_t& model) {
     okid::arena memory;
     const first_state unused(model, memory);
-    return memory.bytes() / sizeof(okid_real_t) + 1;
+    return memory.bytes() / sizeof(okid_real_t); // whole lines of memory
 }
 
 okid_status_t okid_model_initial_state(const okid_model_t* model, const okid_real_t* u, const okid_real_t* y,

@@ -45,7 +45,7 @@ size_t lay_out(okid_tracks& s, okid::arena& memory) {
         *each = memory.take<okid_real_t>(shapes);
     for (int32_t** each : {&s.streak, &s.mode}) *each = memory.take<int32_t>(tracks);
     s.cost = memory.take<double>(modes * tracks);
-    s.row_price = memory.take<double>(modes + 1);
+    s.row_price = memory.take<double>(modes);
     for (double** each : {&s.column_price, &s.slack}) *each = memory.take<double>(columns);
     for (int32_t** each : {&s.owner, &s.way}) *each = memory.take<int32_t>(columns);
     s.of_mode = memory.take<int32_t>(modes);
