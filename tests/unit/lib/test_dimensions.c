@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every X_memsize() of the public headers takes the least of each dimension, and refuses what lies below it, each alone.
+// Every X_memsize() of the public headers takes the least of each dimension and refuses what lies below, each alone.
 #include <okid/accumulator.h>
 #include <okid/change.h>
 #include <okid/correlation.h>

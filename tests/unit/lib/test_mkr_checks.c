@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every number of okid_mkr_identify() beside its formula in mkr.h, for models that fit no structure: channels with errors, of
-// any gain, on no degree of freedom; modes that are too many; a feedthrough that is wrong. And the limits of the notes.
+// Every number of okid_mkr_identify() beside its formula in mkr.h, for models that fit no structure: channels with
+// errors, of any gain, on no degree of freedom; modes too many; a wrong feedthrough. And the limits of the notes.
 #include "mkr_rig.h"
 
 static structure_t s;
@@ -178,7 +178,8 @@ static void look_at_the_feedthrough(const int* taken) {
         for (int j = 0; j < m.n_u; ++j) {
             if (m.input_dof[j] < 0 || m.output_dof[o] < 0) continue;
             double modes = 0;
-            for (int k = 0; k < N; ++k) modes += 2 * cabs(known.c[taken[k]][o] * known.b[taken[k]][j] / truth.lambda[k]);
+            for (int k = 0; k < N; ++k)
+                modes += 2 * cabs(known.c[taken[k]][o] * known.b[taken[k]][j] / truth.lambda[k]);
             const double gains = (double)m.output_gain[o] * (double)m.input_gain[j], direct = m.D[j * m.n_y + o];
             const double right = m.sensing[o] == 2 ? truth.mobility[m.output_dof[o]][m.input_dof[j]] : 0;
             misfit += pow(direct - gains * right, 2);

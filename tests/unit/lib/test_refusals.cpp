@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Mechanics and models: without any one of the pointers that they need, with any one size or value out of range, the calls
-// are refused. One mass on a spring goes through all of them.
+// Mechanics and models: without any one of the pointers that they need, with any one size or value out of range, the
+// calls are refused. One mass on a spring goes through all of them.
 #include "refusals.hpp"
 
 #include <okid/mechanics.h>

@@ -29,14 +29,16 @@ void tearDown(void) {
     block = NULL;
 }
 
-/// One more mode of the update in hand: its shape is (cos angle, sin angle, 0), of any phase and size.
+/// One more mode of the update in hand: its shape is (cos angle, i sin angle, 0), of any phase and size.
 static void put(double frequency, double angle) {
-    const double turn = 0.7 * ++turns, size = 1 + 0.4 * sin(3.0 * turns), shape[NY] = {cos(angle), sin(angle), 0};
+    const double turn = 0.7 * ++turns, size = 1 + 0.4 * sin(3.0 * turns);
+    const double shape[2][NY] = {{cos(angle) * cos(turn), -sin(angle) * sin(turn), 0},
+                                 {cos(angle) * sin(turn), sin(angle) * cos(turn), 0}};
     f[count] = (okid_real_t)frequency;
     zeta[count] = (okid_real_t)0.01;
     for (int o = 0; o < NY; ++o) {
-        re[count * NY + o] = (okid_real_t)(shape[o] * size * cos(turn));
-        im[count * NY + o] = (okid_real_t)(shape[o] * size * sin(turn));
+        re[count * NY + o] = (okid_real_t)(shape[0][o] * size);
+        im[count * NY + o] = (okid_real_t)(shape[1][o] * size);
     }
     ++count;
 }
@@ -67,7 +69,7 @@ static void settle(int times) {
 /// ((1 - MAC) / (1 - mac))^2 of shapes at some angle.
 static double unlike(double angle, double mac) { return pow(pow(sin(angle), 2) / (1 - mac), 2); }
 
-/// A mode at the bound belongs to track 1 just within it, not just beyond it. `before` leads to the state before the mode.
+/// A mode at the bound belongs to track 1 just within it, not just beyond it. `before` leads to where it comes.
 static void assert_bound(void (*before)(void), double apart, double reach, double angle, int close) {
     for (int beyond = 0; beyond < 2; ++beyond)
         for (int below = 0; below < 2; ++below) {
@@ -179,7 +181,7 @@ static void seen_close(void) {
     TEST_ASSERT_EQUAL_INT32(1, update());
 }
 
-// Of a mode beside another one, or of a track last seen so, the mean says it all; and what was seen so is no part of it.
+// Of a mode beside another one, or of a track last seen so, the mean says it all; what was seen so is no part of it.
 static void close_modes_are_known_by_the_mean_which_waits(void) {
     const double mean = mean_angle(0.1);
     for (double angle = -0.3; angle < 0.6; angle += 0.3)
@@ -211,7 +213,7 @@ static void three_hits_in_a_row_make_one(void) {
     }
 }
 
-// A track that was lost as long ago as its successor exists is one with it, with all its hits; one lost later is another mode.
+// A track lost as long ago as its successor exists is one with it, with all its hits; one lost later is another mode.
 static void a_candidate_goes_on_with_what_was_lost_before_it(void) {
     for (int shared = 0; shared < 3; ++shared) {
         setUp();
