@@ -165,7 +165,7 @@ struct first_state {
         if (okid::linalg::cholesky(n_z, normal, n_z) != 0) return false;
         okid::linalg::cholesky_solve(n_z, normal, n_z, right, n_z, 1);
         for (int i = 0; i < n_z; ++i) right[i] *= scale[i];
-        return true;
+        return std::all_of(right, right + n_z, [](double x) { return std::isfinite(x); });
     }
 };
 
