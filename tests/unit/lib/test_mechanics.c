@@ -70,6 +70,37 @@ static void continuous_model_is_newtons_law(void) {
     }
 }
 
+// A map that is not given is one of zeros, whatever the outputs held before.
+static void maps_that_are_absent_are_zeros(void) {
+    enum { NY = 3 };
+    uint64_t seed = 9;
+    static const okid_real_t none[NY * S_MAX];
+    okid_real_t maps[3][NY * S_MAX], B_a[S_MAX * 2];
+    make(2, 0, 0);
+    for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < NY * s.n; ++i) maps[k][i] = (okid_real_t)(s_uniform(&seed) - 0.5);
+    for (int i = 0; i < 2 * s.n; ++i) B_a[i] = (okid_real_t)(s_uniform(&seed) - 0.5);
+    const size_t bytes = okid_mechanics_memsize(s.n, 2);
+    void* work = malloc(bytes);
+    for (int given = 0; given < 8; ++given) {
+        const okid_real_t* at[2][3];
+        for (int k = 0; k < 3; ++k) {
+            at[0][k] = given >> k & 1 ? maps[k] : NULL;
+            at[1][k] = given >> k & 1 ? maps[k] : none;
+        }
+        system_t both[2];
+        for (int way = 0; way < 2; ++way) {
+            system_t* to = &both[way];
+            memset(to, 0xff, sizeof *to); // numbers that are none
+            const okid_mechanics_t truth = {s.n, 2, NY, s.M, s.R, s.K, B_a, at[way][0], at[way][1], at[way][2]};
+            TEST_ASSERT_EQUAL(OKID_OK, okid_mechanics_continuous(&truth, to->A, to->B, to->C, to->D, work, bytes));
+        }
+        for (int i = 0; i < 2 * s.n * NY; ++i) TEST_ASSERT_TRUE(both[0].C[i] == both[1].C[i]);
+        for (int i = 0; i < 2 * NY; ++i) TEST_ASSERT_TRUE(both[0].D[i] == both[1].D[i]);
+    }
+    free(work);
+}
+
 static void maps_place_gains_and_kinds(void) {
     const int32_t dof[] = {2, 0, 1}, kind[] = {OKID_SENSE_ACCELERATION, OKID_SENSE_DISPLACEMENT, OKID_SENSE_VELOCITY};
     const okid_real_t gain[] = {-1, 2, (okid_real_t)0.5};
@@ -202,6 +233,7 @@ static void a_mass_matrix_that_is_none_is_refused(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(continuous_model_is_newtons_law);
+    RUN_TEST(maps_that_are_absent_are_zeros);
     RUN_TEST(maps_place_gains_and_kinds);
     RUN_TEST(modes_of_a_uniform_chain_in_closed_form);
     RUN_TEST(modes_of_the_structures);
