@@ -2,6 +2,8 @@
 // From M, R, K to state space and modes.
 #include "mechanics_rig.h"
 
+#include <float.h>
+
 static okid_status_t modes(int n, const okid_real_t* M, const okid_real_t* R, const okid_real_t* K, int32_t* count,
                            okid_real_t* f, okid_real_t* zeta, okid_real_t* re, okid_real_t* im) {
     const size_t bytes = okid_mechanics_memsize(n, 1);
@@ -200,6 +202,45 @@ static void rigid_and_overdamped_motions_are_no_modes(void) {
     assert_near(0.1, TOLERANCE(1e-12, 1e-5), zeta[0]);
 }
 
+/// Undamped masses of any size; free: the first spring to the ground is missing. @return modes found
+static int32_t chain(int n, double speed, int is_free, uint64_t seed) {
+    okid_real_t M[S_MAX * S_MAX] = {0}, f[S_MAX], zeta[S_MAX];
+    int32_t count = 0;
+    memset(&s, 0, sizeof s);
+    s.n = n;
+    for (int i = 0; i < n; ++i) {
+        M[i * n + i] = (okid_real_t)(0.5 + s_uniform(&seed));
+        if (i > 0 || !is_free) s_spring(&s, i, i - 1, speed * speed * (0.5 + s_uniform(&seed)));
+    }
+    TEST_ASSERT_EQUAL(OKID_OK, modes(n, M, NULL, s.K, &count, f, zeta, NULL, NULL));
+    return count;
+}
+
+// Rounding moves the double zero of a body that floats, in proportion to the fastest pole.
+static void what_floats_has_one_mode_less_at_any_speed(void) {
+    for (int n = 2; n <= S_MAX; ++n)
+        for (uint64_t seed = 1; seed <= 20; ++seed)
+            for (double speed = 1e-4; speed < 1e5; speed *= 100) {
+                TEST_ASSERT_EQUAL_INT32(n, chain(n, speed, 0, seed));
+                TEST_ASSERT_EQUAL_INT32(n - 1, chain(n, speed, 1, seed));
+            }
+}
+
+// Two oscillators that know nothing of each other: below 16 sqrt(eps) of the faster one nothing is a mode.
+static void the_slowest_mode_is_sixteen_roots_of_eps_of_the_fastest(void) {
+    const double root = sqrt(sizeof(okid_real_t) == sizeof(float) ? FLT_EPSILON : DBL_EPSILON);
+    for (int above = 0; above < 2; ++above)
+        for (double speed = 0.01; speed < 200; speed *= 10) {
+            const double slow = (above ? 16.4 : 15.6) * root * speed;
+            const okid_real_t M[] = {1, 0, 0, 1}, K[] = {(okid_real_t)(slow * slow), 0, 0,
+                                                         (okid_real_t)(speed * speed)};
+            okid_real_t f[2], zeta[2];
+            int32_t count = 0;
+            TEST_ASSERT_EQUAL(OKID_OK, modes(2, M, NULL, K, &count, f, zeta, NULL, NULL));
+            TEST_ASSERT_EQUAL_INT32(1 + above, count);
+        }
+}
+
 static void wrong_use_is_refused(void) {
     okid_real_t f[S_MAX], zeta[S_MAX], out[S_NZ * S_NZ];
     int32_t count = 0;
@@ -238,6 +279,8 @@ int main(void) {
     RUN_TEST(modes_of_a_uniform_chain_in_closed_form);
     RUN_TEST(modes_of_the_structures);
     RUN_TEST(rigid_and_overdamped_motions_are_no_modes);
+    RUN_TEST(what_floats_has_one_mode_less_at_any_speed);
+    RUN_TEST(the_slowest_mode_is_sixteen_roots_of_eps_of_the_fastest);
     RUN_TEST(wrong_use_is_refused);
     RUN_TEST(a_mass_matrix_that_is_none_is_refused);
     return UNITY_END();
