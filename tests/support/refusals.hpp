@@ -41,10 +41,13 @@ void each_size_has_a_least(const char* name, const Call& call, std::initializer_
     TEST_ASSERT_TRUE_MESSAGE(call() >= 0, name);
     for (const least_of& one : sizes) {
         const int32_t kept = *one.size;
+        *one.size = one.least;
+        const okid_status_t at = call();
         *one.size = one.least - 1;
-        const okid_status_t status = call();
+        const okid_status_t below = call();
         *one.size = kept;
-        TEST_ASSERT_EQUAL_MESSAGE(OKID_ERR_DIM, status, name);
+        TEST_ASSERT_NOT_EQUAL_MESSAGE(OKID_ERR_DIM, at, name);
+        TEST_ASSERT_EQUAL_MESSAGE(OKID_ERR_DIM, below, name);
     }
 }
 

@@ -241,6 +241,22 @@ static void the_slowest_mode_is_sixteen_roots_of_eps_of_the_fastest(void) {
         }
 }
 
+static void a_pole_that_is_real_can_be_the_fastest(void) {
+    const double root = sqrt(sizeof(okid_real_t) == sizeof(float) ? FLT_EPSILON : DBL_EPSILON);
+    for (int place = 0; place < 3; ++place)
+        for (int stiff = 0; stiff < 2; ++stiff)
+            for (int above = 0; above < 2; ++above) {
+                const double fast = 10, slow = (above ? 16.4 : 15.6) * root * fast; // a mass in oil: poles -10 and -0.1
+                const okid_real_t M[] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+                okid_real_t R[9] = {0}, K[9] = {0}, f[3], zeta[3];
+                int32_t count = 0;
+                for (int i = 0; i < 3; ++i) K[4 * i] = (okid_real_t)(i == place ? stiff : slow * slow);
+                R[4 * place] = (okid_real_t)(fast + 0.1 * stiff);
+                TEST_ASSERT_EQUAL(OKID_OK, modes(3, M, R, K, &count, f, zeta, NULL, NULL));
+                TEST_ASSERT_EQUAL_INT32(2 * above, count);
+            }
+}
+
 static void wrong_use_is_refused(void) {
     okid_real_t f[S_MAX], zeta[S_MAX], out[S_NZ * S_NZ];
     int32_t count = 0;
@@ -281,6 +297,7 @@ int main(void) {
     RUN_TEST(rigid_and_overdamped_motions_are_no_modes);
     RUN_TEST(what_floats_has_one_mode_less_at_any_speed);
     RUN_TEST(the_slowest_mode_is_sixteen_roots_of_eps_of_the_fastest);
+    RUN_TEST(a_pole_that_is_real_can_be_the_fastest);
     RUN_TEST(wrong_use_is_refused);
     RUN_TEST(a_mass_matrix_that_is_none_is_refused);
     return UNITY_END();

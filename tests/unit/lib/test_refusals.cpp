@@ -40,7 +40,7 @@ struct mass_on_a_spring {
 };
 
 void maps() {
-    int32_t n_x = 2, n = 1, at = 1, kind = OKID_SENSE_VELOCITY;
+    int32_t n_x = 2, n = 1, at = 0, kind = OKID_SENSE_VELOCITY;
     const int32_t *dof = &at, *sensing = &kind;
     real room[8], *B_a = room, *C_p = room + 2, *C_v = room + 4, *C_a = room + 6;
     const auto inputs = [&] { return okid_mechanics_inputs(n_x, n, dof, nullptr, B_a); };
