@@ -160,11 +160,15 @@ void remember(okid_tracks& s, int k) {
     }
     const double turn = std::hypot(along, across);
     const double scale = turn > 0 && theirs > 0 ? std::sqrt(own / theirs) / turn : 0;
-    const double weight = s.track[k].hits > 1 && scale > 0 ? std::max(remembered, 1.0 / s.track[k].hits) : 1;
+    const double weight = scale > 0 ? std::max(remembered, 1.0 / s.track[k].hits) : 1;
+    if (!(weight < 1)) { // the first one: there is no mean yet
+        std::copy(new_re, new_re + n, re);
+        std::copy(new_im, new_im + n, im);
+        return;
+    }
     for (size_t i = 0; i < n; ++i) {
         const double c = new_re[i], d = new_im[i];
-        const double to_re = weight < 1 ? scale * (along * c - across * d) : c;
-        const double to_im = weight < 1 ? scale * (along * d + across * c) : d;
+        const double to_re = scale * (along * c - across * d), to_im = scale * (along * d + across * c);
         re[i] = static_cast<okid_real_t>((1 - weight) * re[i] + weight * to_re);
         im[i] = static_cast<okid_real_t>((1 - weight) * im[i] + weight * to_im);
     }

@@ -145,6 +145,31 @@ static void a_state_that_outgrows_all_numbers_is_refused(void) {
     }
 }
 
+static void a_gain_of_kalman_changes_nothing(void) {
+    okid_real_t gain[6], plain[6];
+    for (int i = 0; i < 6; ++i) gain[i] = (okid_real_t)draw();
+    make(1, 1, 6);
+    y[7] = (okid_real_t)NAN;
+    TEST_ASSERT_EQUAL(OKID_OK, of(6));
+    memcpy(plain, found, sizeof plain);
+    const okid_model_t model = {1, 1, 6, A, B, C, D, gain};
+    okid_real_t* work = malloc(sizeof *work * okid_model_workspace(&model));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_model_initial_state(&model, u, y, MOST, found, work));
+    TEST_ASSERT_EQUAL_MEMORY(plain, found, sizeof plain);
+    free(work);
+}
+
+// A state that stays: the mean of what the force does not explain, over the whole record.
+static void the_initial_state_of_a_constant_is_the_mean(void) {
+    double sum = 0;
+    make(1, 1, 1);
+    A[0] = C[0] = 1;
+    B[0] = D[0] = 0;
+    for (int n = 0; n < MOST; ++n) sum += y[n];
+    TEST_ASSERT_EQUAL(OKID_OK, of(1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, sum / MOST, found[0]);
+}
+
 static void a_record_without_outputs_says_nothing(void) {
     make(1, 1, 2);
     for (int n = 0; n < MOST; ++n) y[n] = (okid_real_t)NAN;
@@ -158,6 +183,8 @@ int main(void) {
     RUN_TEST(missing_outputs_and_forces);
     RUN_TEST(what_comes_after_the_state_has_died_out_changes_nothing);
     RUN_TEST(a_state_that_outgrows_all_numbers_is_refused);
+    RUN_TEST(a_gain_of_kalman_changes_nothing);
+    RUN_TEST(the_initial_state_of_a_constant_is_the_mean);
     RUN_TEST(a_record_without_outputs_says_nothing);
     return UNITY_END();
 }
