@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Arrays that end where a page begins that must not be touched, or begin where one ends: a read or a write one number too
-// far is a fault.
+// Arrays that end where a page begins that must not be touched, or begin where one ends: a read or a write one number
+// too far is a fault.
 #ifndef OKID_TEST_FENCED_HPP
 #define OKID_TEST_FENCED_HPP
 

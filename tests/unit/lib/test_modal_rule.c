@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which poles are modes, in which order, and which entry of a shape is the 1: okid_modal_analyse() and okid_mkr_identify()
-// by the same rule.
+// Which poles are modes, in which order, and which entry of a shape is the 1: okid_modal_analyse() and
+// okid_mkr_identify() by the same rule.
 #include "mkr_rig.h"
 
 #include <okid/modal.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every number of okid_skew_finish() beside its formula, for modes whose angles are chosen: delays, their deviations over
-// the replicates, the scatter, and where an output counts as late.
+// Every number of okid_skew_finish() beside its formula, for modes whose angles are chosen: delays, their deviations
+// over the replicates, the scatter, and where an output counts as late.
 #include "mkr_rig.h"
 
 #include <okid/steps/skew.h>
@@ -82,13 +82,13 @@ static void expect(void) {
             for (int k = 0; k < N; ++k) column[k] = turned[r][k][o];
             slopes[r] = slope(weight, column);
         }
-        for (int k = 0; k < N; ++k) column[k] = angle[k][o];
+        for (int k = 0; k < N; ++k) column[k] = remainder(angle[k][o], RIG_PI);
         truth.delay[o] = slope(weight, column);
         truth.std[o] = deviation(slopes);
         for (int k = 0; k < N; ++k) {
             if (weight[k] == 0) continue;
             for (int r = 0; r < BLOCKS; ++r) each[r] = turned[r][k][o] + turn_of(k) * slopes[r];
-            const double rest = angle[k][o] + turn_of(k) * truth.delay[o];
+            const double rest = remainder(column[k] + turn_of(k) * truth.delay[o], RIG_PI);
             sum += rest * rest / (pow(deviation(each), 2) + 1e-8);
             ++count;
         }
@@ -108,7 +108,7 @@ static struct {
 static void one_trial(uint64_t seed) {
     double late[NY], noise = 0.002 * pow(10, 1.5 * draw(&seed)), misfit = 9 * noise * s_uniform(&seed);
     for (int o = 0; o < NY; ++o)
-        late[o] = m.dt * 0.35 * pow(10, -2 + 2 * s_uniform(&seed)) * (draw(&seed) > 0 ? 1 : -1);
+        late[o] = m.dt * 0.7 * pow(10, -2 + 2 * s_uniform(&seed)) * (draw(&seed) > 0 ? 1 : -1);
     for (int k = 0; k < N; ++k)
         for (int o = 0; o < NY; ++o) angle[k][o] = -turn_of(k) * late[o] + misfit * draw(&seed);
     okid_model_t model = turned_model(NULL, seed);

@@ -235,6 +235,18 @@ static void a_candidate_goes_on_with_what_was_lost_before_it(void) {
     }
 }
 
+static void a_candidate_that_is_not_seen_is_none(void) {
+    put(10, 0);
+    put_another(20);
+    update();
+    TEST_ASSERT_EQUAL_INT32(2, okid_track_count(tracks));
+    put(10, 0);
+    update();
+    TEST_ASSERT_EQUAL_INT32(1, okid_track_count(tracks));
+    update();
+    TEST_ASSERT_EQUAL_INT32(0, okid_track_count(tracks));
+}
+
 /// Modes that come, go and change, some of them close, and jumps. @return a sum of all that is said of them
 static uint64_t story(int fill) {
     uint64_t seed = 5, sum = 0;
@@ -274,6 +286,7 @@ int main(void) {
     RUN_TEST(a_hundred_misses_end_a_track);
     RUN_TEST(three_hits_in_a_row_make_one);
     RUN_TEST(a_candidate_goes_on_with_what_was_lost_before_it);
+    RUN_TEST(a_candidate_that_is_not_seen_is_none);
     RUN_TEST(what_stood_in_the_block_is_not_seen);
     return UNITY_END();
 }
