@@ -114,7 +114,6 @@ static double sum_less(const okid_accumulator_t* a, size_t at, int64_t gi, int64
         const int32_t index = acc_ring(a, k);
         const double* data = acc_slot_data(a, index);
         const int64_t* words = (const int64_t*)data;
-        if (acc_slot(a, index)->rows == 0) continue;
         if (acc_has_codes(a))
             wide_add_wide(&high, &low, words[acc_sum_count(a) + at], words[at]);
         else

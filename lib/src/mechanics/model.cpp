@@ -65,9 +65,7 @@ const okid_real_t* usable_input(const okid_real_t* u, int count, okid_real_t* sp
 } // namespace
 
 size_t okid_model_workspace(const okid_model_t* model) {
-    if (model == nullptr) return 0;
-    const size_t steps = 2 * static_cast<size_t>(model->n_z) + static_cast<size_t>(model->n_u + model->n_y);
-    return sized(*model) ? std::max(steps, okid::initial_state_numbers(*model)) : steps;
+    return model != nullptr && sized(*model) ? okid::initial_state_numbers(*model) : 0; // simulation takes less
 }
 
 okid_status_t okid_model_simulate(const okid_model_t* model, const okid_real_t* u, size_t count, const okid_real_t* x0,

@@ -165,7 +165,7 @@ struct first_state {
         if (okid::linalg::cholesky(n_z, normal, n_z) != 0) return false;
         okid::linalg::cholesky_solve(n_z, normal, n_z, right, n_z, 1);
         for (int i = 0; i < n_z; ++i) right[i] *= scale[i];
-        return true;
+        return std::all_of(right, right + n_z, [](double x) { return std::isfinite(x); });
     }
 };
 
@@ -197,7 +197,7 @@ okid_status_t okid_model_fit(const okid_model_t* model, const double* rows, size
 size_t okid::initial_state_numbers(const okid_model_t& model) {
     okid::arena memory;
     const first_state unused(model, memory);
-    return memory.bytes() / sizeof(okid_real_t) + 1;
+    return memory.bytes() / sizeof(okid_real_t); // whole lines of memory
 }
 
 okid_status_t okid_model_initial_state(const okid_model_t* model, const okid_real_t* u, const okid_real_t* y,

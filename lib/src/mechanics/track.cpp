@@ -6,7 +6,7 @@
 // REFERENCE  Jonker, Volgenant (1987), the assignment; MAC: Pappa, Elliott, Schenk (1993)
 // NUMERICS   only ratios of frequencies and MACs enter: nothing depends on units. A track is where it was last seen, so a
 //            slow drift of any size is followed; ties go to the older track
-// WORKSPACE  tracks (4 n_y + 8 numbers each) and a table of (modes + tracks) x tracks distances; n^3 flop at worst
+// WORKSPACE  tracks (4 n_y + 7 numbers each) and a table of (modes + tracks) x tracks distances; n^3 flop at worst
 #include <okid/modal.h>
 #include <okid/track.h>
 
@@ -24,7 +24,7 @@ struct okid_tracks {
     okid_track_t* track;
     okid_real_t *shape_re, *shape_im; // n_y x max_tracks, when last seen
     okid_real_t *mean_re, *mean_im;   // the same, remembered
-    int32_t *streak, *mode;           // consecutive hits; which mode it is in the newest update, -1 none
+    int32_t* mode;                    // which one it is in the newest update, -1 none
     // Of one update: rows are modes, columns tracks, then one private column a mode for staying alone.
     double *cost, *row_price, *column_price, *slack;
     int32_t *owner, *way, *of_mode;        // mode of a column, column before it on the path; track of a mode; -1 none
@@ -43,9 +43,9 @@ size_t lay_out(okid_tracks& s, okid::arena& memory) {
     s.track = memory.take<okid_track_t>(tracks);
     for (okid_real_t** each : {&s.shape_re, &s.shape_im, &s.mean_re, &s.mean_im})
         *each = memory.take<okid_real_t>(shapes);
-    for (int32_t** each : {&s.streak, &s.mode}) *each = memory.take<int32_t>(tracks);
+    s.mode = memory.take<int32_t>(tracks);
     s.cost = memory.take<double>(modes * tracks);
-    s.row_price = memory.take<double>(modes + 1);
+    s.row_price = memory.take<double>(modes);
     for (double** each : {&s.column_price, &s.slack}) *each = memory.take<double>(columns);
     for (int32_t** each : {&s.owner, &s.way}) *each = memory.take<int32_t>(columns);
     s.of_mode = memory.take<int32_t>(modes);
@@ -85,7 +85,7 @@ double distance(const okid_tracks& s, const mode_view& to, int mode, int track, 
     const double reach = lost ? s.config.jump : s.config.frequency;
     const double mac = lost ? 0.5 + 0.5 * s.config.mac : s.config.mac;
     const double apart = (to.frequency_hz[mode] - f) / (reach * f);
-    if (std::abs(apart) >= 1) return 2 * alone;
+    if (std::abs(apart) >= 1) return alone;
     const size_t a = column_of(s, track), b = column_of(s, mode);
     const auto unlike = [&](const okid_real_t* re, const okid_real_t* im) {
         const double like = okid_modal_mac(s.config.n_y, re + a, im + a, to.shape_re + b, to.shape_im + b);
@@ -95,7 +95,6 @@ double distance(const okid_tracks& s, const mode_view& to, int mode, int track, 
     const double newest = unlike(s.shape_re, s.shape_im);
     const double usual = unlike(s.mean_re, s.mean_im);
     if (lost) return apart * apart + std::min(newest, usual);
-    if (newest >= 1 && usual >= 1) return 2 * alone;
     const double weight = s.close[track] != 0 || s.mode_close[mode] != 0 ? 1 : by_memory;
     return apart * apart + (1 - weight) * std::min(1.0, newest) + weight * std::min(1.0, usual);
 }
@@ -161,11 +160,15 @@ void remember(okid_tracks& s, int k) {
     }
     const double turn = std::hypot(along, across);
     const double scale = turn > 0 && theirs > 0 ? std::sqrt(own / theirs) / turn : 0;
-    const double weight = s.track[k].hits > 1 && scale > 0 ? std::max(remembered, 1.0 / s.track[k].hits) : 1;
+    const double weight = scale > 0 ? std::max(remembered, 1.0 / s.track[k].hits) : 1;
+    if (!(weight < 1)) { // the first one: there is no mean yet
+        std::copy(new_re, new_re + n, re);
+        std::copy(new_im, new_im + n, im);
+        return;
+    }
     for (size_t i = 0; i < n; ++i) {
         const double c = new_re[i], d = new_im[i];
-        const double to_re = weight < 1 ? scale * (along * c - across * d) : c;
-        const double to_im = weight < 1 ? scale * (along * d + across * c) : d;
+        const double to_re = scale * (along * c - across * d), to_im = scale * (along * d + across * c);
         re[i] = static_cast<okid_real_t>((1 - weight) * re[i] + weight * to_re);
         im[i] = static_cast<okid_real_t>((1 - weight) * im[i] + weight * to_im);
     }
@@ -177,7 +180,6 @@ void see(okid_tracks& s, int k, const mode_view& modes, int mode) {
     track.damping_ratio = modes.damping_ratio[mode];
     track.misses = 0;
     ++track.hits;
-    ++s.streak[k];
     s.mode[k] = mode;
     const size_t from = column_of(s, mode), to = column_of(s, k), n = static_cast<size_t>(s.config.n_y);
     std::copy(modes.shape_re + from, modes.shape_re + from + n, s.shape_re + to);
@@ -205,7 +207,6 @@ void remove(okid_tracks& s, int k) {
     const int last = --s.count;
     if (k == last) return;
     s.track[k] = s.track[last];
-    s.streak[k] = s.streak[last];
     s.mode[k] = s.mode[last];
     s.close[k] = s.close[last];
     const size_t from = column_of(s, last), to = column_of(s, k), n = static_cast<size_t>(s.config.n_y);
@@ -213,11 +214,10 @@ void remove(okid_tracks& s, int k) {
         std::copy(each + from, each + from + n, each + to);
 }
 
-/// Candidates live on hits alone, tracks survive misses.
+/// Candidates live on hits alone, so that all of theirs are consecutive; tracks survive misses.
 void age(okid_tracks& s) {
     for (int k = s.count - 1; k >= 0; --k) {
         if (s.track[k].misses == 0) continue;
-        s.streak[k] = 0;
         if (s.track[k].number == 0 || s.track[k].misses >= s.config.dies) remove(s, k);
     }
 }
@@ -230,7 +230,7 @@ int holder(const okid_tracks& s, int mode) {
 void give_birth(okid_tracks& s, int modes) {
     for (int mode = 0; mode < modes; ++mode) {
         const int k = holder(s, mode);
-        if (k == s.count || s.track[k].number != 0 || s.streak[k] < s.config.born) continue;
+        if (k == s.count || s.track[k].number != 0 || s.track[k].hits < s.config.born) continue;
         const int lost = lost_track(s, k);
         s.track[k].number = lost >= 0 ? s.track[lost].number : ++s.born;
         if (lost < 0) continue;
@@ -290,7 +290,6 @@ okid_status_t okid_track_update(okid_tracks_t* self, int32_t count, const okid_r
         if (s.of_mode[m] >= 0) continue;
         const int k = s.count++;
         s.track[k] = {};
-        s.streak[k] = 0;
         see(s, k, modes, m);
     }
     give_birth(s, count);

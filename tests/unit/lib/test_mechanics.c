@@ -2,6 +2,8 @@
 // From M, R, K to state space and modes.
 #include "mechanics_rig.h"
 
+#include <float.h>
+
 static okid_status_t modes(int n, const okid_real_t* M, const okid_real_t* R, const okid_real_t* K, int32_t* count,
                            okid_real_t* f, okid_real_t* zeta, okid_real_t* re, okid_real_t* im) {
     const size_t bytes = okid_mechanics_memsize(n, 1);
@@ -68,6 +70,37 @@ static void continuous_model_is_newtons_law(void) {
             TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-12, 1e-4) * size, expected, y);
         }
     }
+}
+
+// A map that is not given is one of zeros, whatever the outputs held before.
+static void maps_that_are_absent_are_zeros(void) {
+    enum { NY = 3 };
+    uint64_t seed = 9;
+    static const okid_real_t none[NY * S_MAX];
+    okid_real_t maps[3][NY * S_MAX], B_a[S_MAX * 2];
+    make(2, 0, 0);
+    for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < NY * s.n; ++i) maps[k][i] = (okid_real_t)(s_uniform(&seed) - 0.5);
+    for (int i = 0; i < 2 * s.n; ++i) B_a[i] = (okid_real_t)(s_uniform(&seed) - 0.5);
+    const size_t bytes = okid_mechanics_memsize(s.n, 2);
+    void* work = malloc(bytes);
+    for (int given = 0; given < 8; ++given) {
+        const okid_real_t* at[2][3];
+        for (int k = 0; k < 3; ++k) {
+            at[0][k] = given >> k & 1 ? maps[k] : NULL;
+            at[1][k] = given >> k & 1 ? maps[k] : none;
+        }
+        system_t both[2];
+        for (int way = 0; way < 2; ++way) {
+            system_t* to = &both[way];
+            memset(to, 0xff, sizeof *to); // numbers that are none
+            const okid_mechanics_t truth = {s.n, 2, NY, s.M, s.R, s.K, B_a, at[way][0], at[way][1], at[way][2]};
+            TEST_ASSERT_EQUAL(OKID_OK, okid_mechanics_continuous(&truth, to->A, to->B, to->C, to->D, work, bytes));
+        }
+        for (int i = 0; i < 2 * s.n * NY; ++i) TEST_ASSERT_TRUE(both[0].C[i] == both[1].C[i]);
+        for (int i = 0; i < 2 * NY; ++i) TEST_ASSERT_TRUE(both[0].D[i] == both[1].D[i]);
+    }
+    free(work);
 }
 
 static void maps_place_gains_and_kinds(void) {
@@ -169,6 +202,61 @@ static void rigid_and_overdamped_motions_are_no_modes(void) {
     assert_near(0.1, TOLERANCE(1e-12, 1e-5), zeta[0]);
 }
 
+/// Undamped masses of any size; free: the first spring to the ground is missing. @return modes found
+static int32_t chain(int n, double speed, int is_free, uint64_t seed) {
+    okid_real_t M[S_MAX * S_MAX] = {0}, f[S_MAX], zeta[S_MAX];
+    int32_t count = 0;
+    memset(&s, 0, sizeof s);
+    s.n = n;
+    for (int i = 0; i < n; ++i) {
+        M[i * n + i] = (okid_real_t)(0.5 + s_uniform(&seed));
+        if (i > 0 || !is_free) s_spring(&s, i, i - 1, speed * speed * (0.5 + s_uniform(&seed)));
+    }
+    TEST_ASSERT_EQUAL(OKID_OK, modes(n, M, NULL, s.K, &count, f, zeta, NULL, NULL));
+    return count;
+}
+
+// Rounding moves the double zero of a body that floats, in proportion to the fastest pole.
+static void what_floats_has_one_mode_less_at_any_speed(void) {
+    for (int n = 2; n <= S_MAX; ++n)
+        for (uint64_t seed = 1; seed <= 20; ++seed)
+            for (double speed = 1e-4; speed < 1e5; speed *= 100) {
+                TEST_ASSERT_EQUAL_INT32(n, chain(n, speed, 0, seed));
+                TEST_ASSERT_EQUAL_INT32(n - 1, chain(n, speed, 1, seed));
+            }
+}
+
+// Two oscillators that know nothing of each other: below 16 sqrt(eps) of the faster one nothing is a mode.
+static void the_slowest_mode_is_sixteen_roots_of_eps_of_the_fastest(void) {
+    const double root = sqrt(sizeof(okid_real_t) == sizeof(float) ? FLT_EPSILON : DBL_EPSILON);
+    for (int above = 0; above < 2; ++above)
+        for (double speed = 0.01; speed < 200; speed *= 10) {
+            const double slow = (above ? 16.4 : 15.6) * root * speed;
+            const okid_real_t M[] = {1, 0, 0, 1}, K[] = {(okid_real_t)(slow * slow), 0, 0,
+                                                         (okid_real_t)(speed * speed)};
+            okid_real_t f[2], zeta[2];
+            int32_t count = 0;
+            TEST_ASSERT_EQUAL(OKID_OK, modes(2, M, NULL, K, &count, f, zeta, NULL, NULL));
+            TEST_ASSERT_EQUAL_INT32(1 + above, count);
+        }
+}
+
+static void a_pole_that_is_real_can_be_the_fastest(void) {
+    const double root = sqrt(sizeof(okid_real_t) == sizeof(float) ? FLT_EPSILON : DBL_EPSILON);
+    for (int place = 0; place < 3; ++place)
+        for (int stiff = 0; stiff < 2; ++stiff)
+            for (int above = 0; above < 2; ++above) {
+                const double fast = 10, slow = (above ? 16.4 : 15.6) * root * fast; // a mass in oil: poles -10 and -0.1
+                const okid_real_t M[] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+                okid_real_t R[9] = {0}, K[9] = {0}, f[3], zeta[3];
+                int32_t count = 0;
+                for (int i = 0; i < 3; ++i) K[4 * i] = (okid_real_t)(i == place ? stiff : slow * slow);
+                R[4 * place] = (okid_real_t)(fast + 0.1 * stiff);
+                TEST_ASSERT_EQUAL(OKID_OK, modes(3, M, R, K, &count, f, zeta, NULL, NULL));
+                TEST_ASSERT_EQUAL_INT32(2 * above, count);
+            }
+}
+
 static void wrong_use_is_refused(void) {
     okid_real_t f[S_MAX], zeta[S_MAX], out[S_NZ * S_NZ];
     int32_t count = 0;
@@ -202,10 +290,14 @@ static void a_mass_matrix_that_is_none_is_refused(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(continuous_model_is_newtons_law);
+    RUN_TEST(maps_that_are_absent_are_zeros);
     RUN_TEST(maps_place_gains_and_kinds);
     RUN_TEST(modes_of_a_uniform_chain_in_closed_form);
     RUN_TEST(modes_of_the_structures);
     RUN_TEST(rigid_and_overdamped_motions_are_no_modes);
+    RUN_TEST(what_floats_has_one_mode_less_at_any_speed);
+    RUN_TEST(the_slowest_mode_is_sixteen_roots_of_eps_of_the_fastest);
+    RUN_TEST(a_pole_that_is_real_can_be_the_fastest);
     RUN_TEST(wrong_use_is_refused);
     RUN_TEST(a_mass_matrix_that_is_none_is_refused);
     return UNITY_END();

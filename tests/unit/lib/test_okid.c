@@ -52,10 +52,29 @@ static void a_missing_input_is_no_force(void) {
     TEST_ASSERT_TRUE(y[0] == 11 && y[1] == 6 && y[2] == 9); // 2*4 + 3*1; x = 3; x = 1.5, u = 2
 }
 
+static void no_initial_state_is_one_of_zeros(void) {
+    const okid_real_t A[1] = {(okid_real_t)0.5}, B[1] = {1}, C[1] = {2}, D[1] = {3}, K[1] = {(okid_real_t)0.25};
+    const okid_model_t model = {1, 1, 1, A, B, C, D, K};
+    const okid_real_t u[3] = {1, 0, 2}, measured[3] = {4, 1, 3}, zero[1] = {0};
+    okid_real_t simulated[2][3], predicted[2][3], work[4096];
+    for (int given = 0; given < 2; ++given) {
+        const okid_real_t* x0 = given ? zero : NULL;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_model_simulate(&model, u, 3, x0, simulated[given], work));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_model_predict(&model, u, measured, 3, x0, predicted[given], work));
+    }
+    for (int n = 0; n < 3; ++n) {
+        TEST_ASSERT_TRUE(simulated[0][n] == simulated[1][n]);
+        TEST_ASSERT_TRUE(predicted[0][n] == predicted[1][n]);
+    }
+    TEST_ASSERT_TRUE(simulated[0][0] == 3 && simulated[0][1] == 2 && simulated[0][2] == 7);
+    TEST_ASSERT_TRUE(predicted[0][1] == 2 + 2 * (okid_real_t)0.25 * (4 - 3)); // x = B u + K (y - yhat)
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(every_status_has_words_of_its_own);
     RUN_TEST(the_version_is_three_numbers);
     RUN_TEST(a_missing_input_is_no_force);
+    RUN_TEST(no_initial_state_is_one_of_zeros);
     return UNITY_END();
 }
