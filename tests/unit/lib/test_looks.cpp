@@ -157,7 +157,9 @@ void the_fft_changes_no_bit_of_codes_and_little_of_doubles() {
                 okid_accumulator_stats(bulk.self, &stats);
                 TEST_ASSERT_EQUAL_INT64(4000 - 60, stats.rows);
                 bulk.add(all, 4000, count - 4000);
-                if (kind == OKID_SAMPLE_INT16) TEST_ASSERT_TRUE(direct.file() == bulk.file());
+                if (kind == OKID_SAMPLE_INT16) {
+                    TEST_ASSERT_TRUE(direct.file() == bulk.file());
+                }
                 const std::vector<double> a = direct.gram(OKID_DETREND_NONE), b = bulk.gram(OKID_DETREND_NONE);
                 for (size_t i = 0; i < a.size(); ++i) TEST_ASSERT_DOUBLE_WITHIN(1e-9 * (1 + a[0]), a[i], b[i]);
             }
