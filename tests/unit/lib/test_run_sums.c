@@ -30,7 +30,10 @@ void setUp(void) {
         }
 }
 
-void tearDown(void) { free(block); }
+void tearDown(void) {
+    free(block);
+    block = NULL;
+}
 
 static void make(okid_sample_t kind, int window, int edges, int bare) {
     okid_accumulator_config_t c = okid_accumulator_defaults(1, 2, LAGS);
