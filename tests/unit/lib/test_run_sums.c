@@ -72,8 +72,7 @@ static double mean_of(int c, int lag) {
 static void sums_of_a_run(int whole, int detrend, int bare) {
     double S[M * WIDTH], head[M * LAGS], tail[M * LAGS], sum[M], mean[M];
     okid_run_sums_t out = {S, head, tail, sum, mean, 0};
-    TEST_ASSERT_EQUAL(OKID_OK,
-                      okid_accumulator_run(sums, detrend ? OKID_DETREND_MEAN : OKID_DETREND_NONE, &out));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_run(sums, detrend ? OKID_DETREND_MEAN : OKID_DETREND_NONE, &out));
     TEST_ASSERT_EQUAL_INT64(rows, out.rows);
     double gain[M], less[M]; // value = gain (x - less)
     for (int c = 0; c < M; ++c) {
@@ -113,8 +112,8 @@ static void gram_and_lag_means_are_those_over_the_rows(void) {
             make((okid_sample_t)kind, what & 1, !(what & 1), bare);
             double gram[WIDTH * WIDTH], mean[M], means[WIDTH];
             memset(means, 0xff, sizeof means);
-            TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(sums, detrend ? OKID_DETREND_MEAN : OKID_DETREND_NONE,
-                                                             gram, mean));
+            TEST_ASSERT_EQUAL(OKID_OK,
+                              okid_accumulator_gram(sums, detrend ? OKID_DETREND_MEAN : OKID_DETREND_NONE, gram, mean));
             TEST_ASSERT_EQUAL_DOUBLE(rows, okid_accumulator_lag_means(sums, means));
             for (int j = 0; j < WIDTH; ++j) {
                 const int cj = j % M, lj = j / M;
