@@ -236,7 +236,7 @@ static void every_number_is_that_of_its_formula(void) {
         near(truth.residual, result.residual);
         near(truth.feedthrough, result.feedthrough);
         near(truth.gain, result.gain);
-        TEST_ASSERT_EQUAL(truth.row, result.feedthrough_row);
+        if (truth.feedthrough > 1e-6) TEST_ASSERT_EQUAL(truth.row, result.feedthrough_row); // else rounding decides
         TEST_ASSERT_TRUE(off(result.M, truth.M) < 1e-7);
         TEST_ASSERT_TRUE(off(result.K, truth.K) < 1e-7);
         TEST_ASSERT_TRUE(off(result.R, truth.R) < 1e-7);
