@@ -157,6 +157,30 @@ void both_ways_to_the_gram_matrix() {
         }
 }
 
+// Factors whose rows fill their panels, and others: the triangles of a window are stacked row by row to their ends.
+void factors_of_any_width() {
+    const std::vector<double> all = noise(20, 7); // of one channel, 60 samples
+    for (int32_t lags = 1; lags <= 16; ++lags) {
+        okid_accumulator_config_t c = okid_accumulator_defaults(0, 1, lags);
+        c.block = 7;
+        c.slots = 4;
+        const sums a(c);
+        okid_square_root_config_t r = okid_square_root_defaults(0, 1, lags);
+        r.block = 7;
+        r.slots = 4;
+        bytes_t block(okid_square_root_memsize(&r));
+        okid_square_root_t* root = nullptr;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&root, &r, block.data(), block.size()));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(a.self, all.data(), all.size()));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(root, all.data(), all.size()));
+        const auto n = static_cast<size_t>(lags + 1);
+        std::vector<double> one(n * n), other(n * n);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a.self, OKID_DETREND_NONE, one.data(), nullptr));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(root, OKID_DETREND_NONE, other.data(), nullptr));
+        for (size_t i = 0; i < n * n; ++i) TEST_ASSERT_DOUBLE_WITHIN(1e-11 * one[0], one[i], other[i]);
+    }
+}
+
 } // namespace
 
 int main() {
@@ -164,5 +188,6 @@ int main() {
     RUN_TEST(counts_add_up_and_are_taken_off);
     RUN_TEST(a_file_at_any_time_goes_on_as_the_record);
     RUN_TEST(both_ways_to_the_gram_matrix);
+    RUN_TEST(factors_of_any_width);
     return UNITY_END();
 }
