@@ -102,7 +102,7 @@ template <class Ask> lapack_int remembered(int a, int b, Ask ask) {
     static thread_local answer known[4] = {};
     static thread_local unsigned oldest = 0;
     for (const answer& one : known)
-        if (one.size > 0 && one.a == a && one.b == b) return one.size;
+        if (one.a == a && one.b == b) return one.size; // no size is 0
     answer& next = known[oldest++ % 4];
     next = {a, b, ask()};
     return next.size;

@@ -232,8 +232,8 @@ static void the_slowest_mode_is_sixteen_roots_of_eps_of_the_fastest(void) {
     for (int above = 0; above < 2; ++above)
         for (double speed = 0.01; speed < 200; speed *= 10) {
             const double slow = (above ? 16.4 : 15.6) * root * speed;
-            const okid_real_t M[] = {1, 0, 0, 1}, K[] = {(okid_real_t)(slow * slow), 0, 0,
-                                                         (okid_real_t)(speed * speed)};
+            const okid_real_t M[] = {1, 0, 0, 1},
+                              K[] = {(okid_real_t)(slow * slow), 0, 0, (okid_real_t)(speed * speed)};
             okid_real_t f[2], zeta[2];
             int32_t count = 0;
             TEST_ASSERT_EQUAL(OKID_OK, modes(2, M, NULL, K, &count, f, zeta, NULL, NULL));

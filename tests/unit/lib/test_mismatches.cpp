@@ -77,7 +77,7 @@ okid_accumulator_config_t fading() {
 }
 
 /// The configuration with one number changed.
-template <class Config, class Number> Config with(Config c, Number Config::*place, Number value) {
+template <class Config, class Number> Config with(Config c, Number Config::* place, Number value) {
     c.*place = value;
     return c;
 }
@@ -199,8 +199,8 @@ void channels_of_another() {
     const struct {
         okid_status_t status;
         int32_t channels[2];
-    } each[] = {{OKID_OK, {0, 2}},        {OKID_OK, {1, 3}},       {OKID_ERR_DIM, {-1, 2}}, {OKID_ERR_DIM, {0, 4}},
-                {OKID_ERR_DIM, {2, 3}},   {OKID_ERR_DIM, {0, 1}},  {OKID_ERR_DIM, {2, 1}}};
+    } each[] = {{OKID_OK, {0, 2}},      {OKID_OK, {1, 3}},      {OKID_ERR_DIM, {-1, 2}}, {OKID_ERR_DIM, {0, 4}},
+                {OKID_ERR_DIM, {2, 3}}, {OKID_ERR_DIM, {0, 1}}, {OKID_ERR_DIM, {2, 1}}};
     for (const auto& one : each)
         TEST_ASSERT_EQUAL(one.status, okid_accumulator_take_channels(to.self, from.self, one.channels));
     accumulator_config outputs = growing();

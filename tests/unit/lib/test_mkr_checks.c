@@ -165,8 +165,7 @@ static void assemble(void) {
             for (int j = 0; j < N; ++j) MF[i] += truth.M[j * N + i] * F[j];
         for (int i = 0; i < N; ++i) mass += F[i] * MF[i];
         for (int i = 0; i < N; ++i)
-            for (int j = 0; j < N; ++j)
-                truth.R_normal[j * N + i] += MF[i] * MF[j] * -2 * creal(truth.lambda[k]) / mass;
+            for (int j = 0; j < N; ++j) truth.R_normal[j * N + i] += MF[i] * MF[j] * -2 * creal(truth.lambda[k]) / mass;
     }
 }
 
@@ -237,9 +236,7 @@ static void every_number_is_that_of_its_formula(void) {
         near(truth.residual, result.residual);
         near(truth.feedthrough, result.feedthrough);
         near(truth.gain, result.gain);
-        if (truth.feedthrough > 1e-6) { // else rounding says which
-            TEST_ASSERT_EQUAL(truth.row, result.feedthrough_row);
-        }
+        if (truth.feedthrough > 1e-6) TEST_ASSERT_EQUAL(truth.row, result.feedthrough_row); // else rounding decides
         TEST_ASSERT_TRUE(off(result.M, truth.M) < 1e-7);
         TEST_ASSERT_TRUE(off(result.K, truth.K) < 1e-7);
         TEST_ASSERT_TRUE(off(result.R, truth.R) < 1e-7);
@@ -288,8 +285,8 @@ static void notes_begin_at_their_limits(void) {
                                (definite(result.M, 1) || definite(result.M, -1) ? 0 : OKID_MKR_MASS) |
                                (definite(result.K, 1) ? 0 : OKID_MKR_STIFFNESS) |
                                (definite(result.R, 1) ? 0 : OKID_MKR_DAMPING);
-        TEST_ASSERT_EQUAL(signs, result.notes & (OKID_MKR_POLARITY | OKID_MKR_MASS | OKID_MKR_STIFFNESS |
-                                                 OKID_MKR_DAMPING));
+        TEST_ASSERT_EQUAL(signs,
+                          result.notes & (OKID_MKR_POLARITY | OKID_MKR_MASS | OKID_MKR_STIFFNESS | OKID_MKR_DAMPING));
     }
     for (int k = 0; k < 5; ++k) TEST_ASSERT_TRUE(seen[k].below > 0 && seen[k].above > 0);
 }

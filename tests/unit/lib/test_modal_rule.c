@@ -38,8 +38,13 @@ static void analyse(int n_z, double dt) {
     const okid_model_t model = view(n_z);
     const size_t bytes = okid_modal_memsize(NY, n_z);
     void* work = malloc(bytes);
-    modes = (okid_modes_t){.frequency_hz = f, .damping_ratio = zeta, .mpc = mpc, .shape_re = re, .shape_im = im,
-                           .mu_re = mu_re, .mu_im = mu_im};
+    modes = (okid_modes_t){.frequency_hz = f,
+                           .damping_ratio = zeta,
+                           .mpc = mpc,
+                           .shape_re = re,
+                           .shape_im = im,
+                           .mu_re = mu_re,
+                           .mu_im = mu_im};
     TEST_ASSERT_EQUAL(OKID_OK, okid_modal_analyse(&model, dt, &modes, work, bytes));
     free(work);
 }
@@ -109,7 +114,7 @@ static void a_mode_that_no_output_sees_has_no_shape(void) {
 
 static void modes_ascend_in_frequency_not_in_angle(void) {
     for (int swap = 0; swap < 2; ++swap) {
-        put_pair(swap, NZ, 0.4, 1.0, 1, 0); // |log mu| = 1.36
+        put_pair(swap, NZ, 0.4, 1.0, 1, 0);  // |log mu| = 1.36
         put_pair(!swap, NZ, 0.9, 1.2, 0, 1); // 1.20
         analyse(NZ, 0.01);
         TEST_ASSERT_EQUAL_INT32(2, modes.count);

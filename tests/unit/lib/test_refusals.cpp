@@ -34,8 +34,8 @@ struct mass_on_a_spring {
     mass_on_a_spring() {
         bytes_t work(okid_mechanics_memsize(1, 1)), more(okid_mechanics_hold_memsize(1, 1, 2));
         TEST_ASSERT_EQUAL(OKID_OK, okid_mechanics_continuous(&mechanics, A, B, C, D, work.data(), work.size()));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_mechanics_c2d(&continuous, dt, OKID_HOLD_ZERO, A_d, B_d, D_d, more.data(),
-                                                      more.size()));
+        TEST_ASSERT_EQUAL(OKID_OK,
+                          okid_mechanics_c2d(&continuous, dt, OKID_HOLD_ZERO, A_d, B_d, D_d, more.data(), more.size()));
     }
 };
 
@@ -73,9 +73,9 @@ void continuous_model_and_modes() {
     modes.shape_im = room + 3;
     okid_modes_t* to = &modes;
     const auto analyse = [&] { return okid_mechanics_modes(self, to, work, bytes); };
-    each_pointer_is_needed("modes", analyse,
-                           {self, m.M, m.K, to, modes.frequency_hz, modes.damping_ratio, modes.shape_re,
-                            modes.shape_im, work});
+    each_pointer_is_needed(
+        "modes", analyse,
+        {self, m.M, m.K, to, modes.frequency_hz, modes.damping_ratio, modes.shape_re, modes.shape_im, work});
     each_size_has_a_least("modes", analyse, {{&m.n_x, 1}});
     every_byte_is_needed("modes", analyse, bytes);
 }
@@ -152,9 +152,9 @@ void mass_damping_and_stiffness() {
     bytes_t block(bytes);
     void* work = block.data();
     const auto identify = [&] { return okid_mkr_identify(model, config, result, work, bytes); };
-    each_pointer_is_needed("mkr", identify,
-                           {model, m.A, m.B, m.C, m.D, config, c.input_dof, c.output_dof, c.output_sensing, result,
-                            work});
+    each_pointer_is_needed(
+        "mkr", identify,
+        {model, m.A, m.B, m.C, m.D, config, c.input_dof, c.output_dof, c.output_sensing, result, work});
     each_size_has_a_least("mkr", identify, {{&m.n_u, 1}, {&m.n_y, 1}, {&m.n_z, 1}, {&c.n_x, 1}});
     each_value_is_refused("mkr", identify, c.hold, {-1, 2});
     each_value_is_refused("mkr", identify, c.dt, {0.0, -1.0, std::nan(""), double(INFINITY)});
@@ -304,7 +304,7 @@ void delays() {
         std::memcpy(one_of.place, &kept, sizeof kept);
     }
     TEST_ASSERT_EQUAL(OKID_OK, correct());
-    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, correct()); // once
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, correct());                                                  // once
     for (int k = 0; k < 2; ++k) TEST_ASSERT_TRUE(std::abs(C[k] - s.C[k]) < 1e-10 * std::abs(s.C[0])); // nothing is late
     TEST_ASSERT_TRUE(D[0] == s.D_d[0]);
 }

@@ -56,7 +56,7 @@ struct factors {
     okid_square_root_t* self = nullptr;
 
     factors() {
-        const okid_square_root_config_t c = {.n_u = 1, .n_y = 1, .lags = LAGS, .forgetting = 1};
+        const okid_square_root_config_t c = okid_square_root_defaults(1, 1, LAGS);
         block.resize(okid_square_root_memsize(&c));
         TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&self, &c, block.data(), block.size()));
     }
@@ -78,7 +78,7 @@ void creating() {
     const okid_accumulator_config_t* a_config = &a;
     okid_correlation_config_t c = okid_correlation_defaults(1, 1, LAGS);
     const okid_correlation_config_t* c_config = &c;
-    okid_square_root_config_t r = {.n_u = 1, .n_y = 1, .lags = LAGS, .forgetting = 1};
+    okid_square_root_config_t r = okid_square_root_defaults(1, 1, LAGS);
     const okid_square_root_config_t* r_config = &r;
     size_t a_bytes = okid_accumulator_memsize(&a), c_bytes = okid_correlation_memsize(&c),
            r_bytes = okid_square_root_memsize(&r);
@@ -129,8 +129,7 @@ void samples_of_another_kind() {
         correlations c(kind);
         const okid_status_t number = kind == OKID_SAMPLE_DOUBLE ? OKID_OK : OKID_ERR_MISMATCH;
         const okid_status_t word = kind == OKID_SAMPLE_INT16 ? OKID_OK : OKID_ERR_MISMATCH;
-        const okid_status_t code =
-            kind == OKID_SAMPLE_INT24 || kind == OKID_SAMPLE_INT32 ? OKID_OK : OKID_ERR_MISMATCH;
+        const okid_status_t code = kind == OKID_SAMPLE_INT24 || kind == OKID_SAMPLE_INT32 ? OKID_OK : OKID_ERR_MISMATCH;
         TEST_ASSERT_EQUAL(number, okid_accumulator_add(a.self, numbers, SAMPLES));
         TEST_ASSERT_EQUAL(number, okid_accumulator_add_f32(a.self, floats, SAMPLES));
         TEST_ASSERT_EQUAL(word, okid_accumulator_add_i16(a.self, words, SAMPLES));
@@ -224,8 +223,8 @@ void bytes_of_a_file() {
     every_byte_is_needed("correlation_serialise", write_correlation, bytes);
     each_pointer_is_needed("correlation_peek", [&] { return okid_correlation_peek(in, bytes, correlation); },
                            {in, correlation});
-    each_pointer_is_needed("correlation_deserialise",
-                           [&] { return okid_correlation_deserialise(c.self, in, bytes); }, {c.self, in});
+    each_pointer_is_needed("correlation_deserialise", [&] { return okid_correlation_deserialise(c.self, in, bytes); },
+                           {c.self, in});
 }
 
 /// What answers nothing does nothing, and without an object there is nothing to count.

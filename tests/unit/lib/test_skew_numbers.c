@@ -107,8 +107,7 @@ static struct {
 
 static void one_trial(uint64_t seed) {
     double late[NY], noise = 0.002 * pow(10, 1.5 * draw(&seed)), misfit = 9 * noise * s_uniform(&seed);
-    for (int o = 0; o < NY; ++o)
-        late[o] = m.dt * 0.7 * pow(10, -2 + 2 * s_uniform(&seed)) * (draw(&seed) > 0 ? 1 : -1);
+    for (int o = 0; o < NY; ++o) late[o] = m.dt * 0.7 * pow(10, -2 + 2 * s_uniform(&seed)) * (draw(&seed) > 0 ? 1 : -1);
     for (int k = 0; k < N; ++k)
         for (int o = 0; o < NY; ++o) angle[k][o] = -turn_of(k) * late[o] + misfit * draw(&seed);
     okid_model_t model = turned_model(NULL, seed);
