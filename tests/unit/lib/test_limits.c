@@ -7,6 +7,7 @@
 #include <okid/identify.h>
 #include <okid/refine.h>
 #include <okid/stabilization.h>
+#include <okid/steps/observer.h>
 #include <okid/steps/square_root.h>
 #include <okid/steps/subspace.h>
 #include <okid/watch.h>
@@ -223,6 +224,21 @@ static void defaults_are_numbers(void) {
     }
 }
 
+/// The structured solver: 2 (m + 2)(n + m) + (1 + 3 min(4, n_y)) n numbers, n = m (p + 1), and those of small matrices.
+static void memory_of_the_structured_solver(void) {
+    static const int sizes[][3] = {
+        {1, 1, 60}, {2, 3, 20}, {6, 5, 12}, {1, 9, 7}, {30, 2, 30}}; // companions of 64 states and less
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; ++k) {
+        const int n_y = sizes[k][1], m = sizes[k][0] + n_y, n = m * (sizes[k][2] + 1), columns = n_y < 4 ? n_y : 4;
+        const int large = 2 * (m + 2) * (n + m) + (1 + 3 * columns) * n,
+                  small = m * m + n_y * n_y + n_y * columns + 2 * (m + 2) * columns + 3 * m + 2;
+        const okid_observer_config_t c = okid_observer_defaults(sizes[k][0], n_y, sizes[k][2]);
+        const int most = (int)sizeof(double) * (large + small) + 14 * 64;
+        TEST_ASSERT_TRUE((int)okid_structured_memsize(&c) <= most);
+        TEST_ASSERT_TRUE((int)okid_structured_memsize(&c) >= most - 14 * 64);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(of_the_sums);
@@ -232,6 +248,7 @@ int main(void) {
     RUN_TEST(of_an_identification);
     RUN_TEST(lags_and_orders_of_an_identification);
     RUN_TEST(lags_that_a_record_carries);
+    RUN_TEST(memory_of_the_structured_solver);
     RUN_TEST(defaults_are_numbers);
     return UNITY_END();
 }
