@@ -227,7 +227,7 @@ static void defaults_are_numbers(void) {
 /// The structured solver: 2 (m + 2)(n + m) + (1 + 3 min(4, n_y)) n numbers, n = m (p + 1), and those of small matrices.
 static void memory_of_the_structured_solver(void) {
     // their companions take less
-    static const int sizes[][3] = {{9, 5, 4}, {9, 9, 2}, {30, 2, 10}, {40, 1, 20}};
+    static const int sizes[][3] = {{20, 6, 5}, {30, 2, 10}, {40, 1, 20}};
     for (size_t k = 0; k < sizeof sizes / sizeof *sizes; ++k) {
         const int n_y = sizes[k][1], m = sizes[k][0] + n_y, n = m * (sizes[k][2] + 1), columns = n_y < 4 ? n_y : 4;
         const int large = 2 * (m + 2) * (n + m) + (1 + 3 * columns) * n,
