@@ -131,6 +131,7 @@ static void poles_need_no_whole_decomposition(void) {
                 double whole[MOST][MOST], consistent[MOST][MOST];
                 int count[MOST];
                 if (method >= OKID_METHOD_N4SID_MOESP && hankel != OKID_HANKEL_SYSTEM) continue;
+                c.rows = 30; // large enough for it
                 c.max_order = MOST;
                 c.order = 4;
                 create(&c);
@@ -144,7 +145,14 @@ static void poles_need_no_whole_decomposition(void) {
                         consistent[order / 2][k] = (double)model.emac[k];
                     }
                 }
+                static double markov[(LAST + 1) * WIDE_MOST * WIDE_MOST];
+                TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_order(identifier, WIDE_NZ, &model));
+                wide_markov(rig.n_u, rig.n_y, WIDE_NZ, model.A, model.B, model.C, model.D, LAST, markov);
                 TEST_ASSERT_EQUAL(OKID_OK, okid_identify_decompose(identifier, accumulator, &model));
+                TEST_ASSERT_TRUE(model.singular_values[MOST - 1] > 0);
+                // with fewer inputs than outputs a whole decomposition takes less memory, and is made
+                const int leading = method == OKID_METHOD_OKID_ERA && (hankel != OKID_HANKEL_SYSTEM || which == 1);
+                TEST_ASSERT_EQUAL(leading, model.singular_values[MOST] == 0);
                 for (int order = 2; order <= MOST; order += 2) {
                     TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_poles(identifier, order, &model));
                     TEST_ASSERT_EQUAL(count[order / 2], model.mode_count);
@@ -153,6 +161,10 @@ static void poles_need_no_whole_decomposition(void) {
                         TEST_ASSERT_DOUBLE_WITHIN(1e-4, consistent[order / 2][k], (double)model.emac[k]);
                     }
                 }
+                TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_order(identifier, WIDE_NZ, &model)); // a whole model
+                wide_markov(rig.n_u, rig.n_y, WIDE_NZ, model.A, model.B, model.C, model.D, LAST, found);
+                for (int k = 0; k < (LAST + 1) * rig.n_u * rig.n_y; ++k)
+                    TEST_ASSERT_DOUBLE_WITHIN(1e-6, markov[k], found[k]);
             }
         free(v);
     }
