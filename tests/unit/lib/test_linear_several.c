@@ -153,6 +153,8 @@ static void is_the_derivative(okid_method_t method, int n_u) {
     const int inputs_stay = method == OKID_METHOD_N4SID_MOESP || method == OKID_METHOD_N4SID_CVA;
     const double by_markov = worst(low.markov, high.markov, down.markov, up.markov, scale, BLOCKS * n_u * rig.n_y);
     TEST_ASSERT_TRUE(inputs_stay || n_u == 0 || by_markov < most);
+    okid_model_t none;
+    TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_jackknife_delete(s.jackknife, NULL, 1, &none, &share)); // no part, no change
     TEST_ASSERT_EQUAL_MEMORY(&down, &again, sizeof down); // what is asked in between leaves nothing behind
     release(&s);
 }
@@ -182,10 +184,38 @@ static void without_forces(void) {
     }
 }
 
+/// Of sums with nothing left out: the full model again.
+static void nothing_left_out_is_the_whole(void) {
+    make(0, 0.3);
+    for (int method = OKID_METHOD_OKID_ERA; method <= OKID_METHOD_N4SID_SSARX; ++method) {
+        setting_t s = prepare((okid_method_t)method, rig.n_u);
+        const printed_t whole = identified(&s, s.whole);
+        okid_jackknife_config_t by_models = s.config;
+        by_models.linear = 0;
+        const size_t bytes = okid_jackknife_memsize(&by_models);
+        void* block = malloc(bytes);
+        okid_jackknife_t* jackknife = NULL;
+        okid_model_t model;
+        double share = -1;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_jackknife_create(&jackknife, &by_models, block, bytes));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_jackknife_begin(jackknife, s.whole, &s.full));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_jackknife_delete(jackknife, NULL, 1, &model, &share));
+        TEST_ASSERT_EQUAL_DOUBLE(0, share);
+        const printed_t again = print_model(&model);
+        const double most = TOLERANCE(1e-4, 1e-2); // okid-era starts from the model, and comes near it
+        for (int k = 0; k < 2 * WIDE_MODES; ++k) TEST_ASSERT_DOUBLE_WITHIN(most, whole.modes[k], again.modes[k]);
+        for (int k = 0; k < BLOCKS * rig.n_u * rig.n_y; ++k)
+            TEST_ASSERT_DOUBLE_WITHIN(10 * most, whole.markov[k], again.markov[k]);
+        free(block);
+        release(&s);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(okid_of_several_channels);
     RUN_TEST(subspace_methods_of_several_channels);
     RUN_TEST(without_forces);
+    RUN_TEST(nothing_left_out_is_the_whole);
     return UNITY_END();
 }
