@@ -134,15 +134,19 @@ static void of_an_identification(void) {
     LIMITS(identify, era, rows, 0, 8192);
     LIMITS(identify, era, n_u, 0, 255);
     LIMITS(identify, era, n_y, 1, 255);
-    LIMITS(identify, era, method, OKID_METHOD_OKID_ERA, OKID_METHOD_N4SID_SSARX);
-    LIMITS(identify, era, detrend, OKID_DETREND_NONE, OKID_DETREND_MEAN);
-    LIMITS(identify, era, solver, OKID_SOLVER_DENSE, OKID_SOLVER_STRUCTURED);
-    LIMITS(identify, era, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_LITERAL);
     LIMITS(identify, ambient, p, 1, 4096); // rows = p
-    LIMITS(identify, ambient, solver, OKID_SOLVER_DENSE, OKID_SOLVER_DENSE);
-    LIMITS(identify, ambient, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_SYSTEM);
-    LIMITS(identify, n4sid, solver, OKID_SOLVER_DENSE, OKID_SOLVER_DENSE);
-    LIMITS(identify, n4sid, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_SYSTEM);
+    for (int kind = 0; kind < 3; ++kind)   // solver and content of the Hankel matrix: only where an observer is solved
+        for (int solver = OKID_SOLVER_DENSE; solver <= OKID_SOLVER_STRUCTURED; ++solver)
+            for (int hankel = OKID_HANKEL_SYSTEM; hankel <= OKID_HANKEL_LITERAL + 1; ++hankel) {
+                okid_identify_config_t c = kind == 0 ? era : kind == 1 ? ambient : n4sid;
+                c.solver = (okid_solver_t)solver;
+                c.hankel = (okid_hankel_t)hankel;
+                const int plain = solver == OKID_SOLVER_DENSE && hankel == OKID_HANKEL_SYSTEM;
+                TEST_ASSERT_EQUAL(kind == 0 ? hankel <= OKID_HANKEL_LITERAL : plain, okid_identify_memsize(&c) > 0);
+            }
+    for (int method = OKID_METHOD_OKID_ERA; method <= OKID_METHOD_N4SID_SSARX + 1; ++method)
+        TEST_ASSERT_EQUAL(method <= OKID_METHOD_N4SID_SSARX,
+                          TAKEN(identify, .n_u = 1, .n_y = 1, .p = 4, .fs_hz = 100, .method = (okid_method_t)method));
     for (int rows = -1; rows < 4; ++rows)
         TEST_ASSERT_EQUAL(rows == 0 || rows > 1, TAKEN(identify, .n_u = 1, .n_y = 2, .rows = rows, .fs_hz = 100,
                                                        .method = OKID_METHOD_N4SID_CVA));
