@@ -252,8 +252,8 @@ bool modal_filters::run(const double* v, int count) {
                 z[k] = z[padded_ + k] = 0;
             else
                 last = k + 1;
-        filters.lasting = area(last, 1);
-        step(&filters, v, area(std::min(stretch, count - n), 1));
+        filters.lasting = area(last);
+        step(&filters, v, area(std::min(stretch, count - n)));
         for (int k = 0; k < 2 * padded_ * (n_u + 1); ++k)
             if (std::abs(filter_states_[k]) < denormal) filter_states_[k] = 0;
     }

@@ -10,6 +10,7 @@
 #include <okid/steps/observer.h>
 #include <okid/steps/square_root.h>
 #include <okid/steps/subspace.h>
+#include <okid/uncertainty.h>
 #include <okid/watch.h>
 #include <unity.h>
 
@@ -114,6 +115,12 @@ static void of_what_is_made_of_them(void) {
     TEST_ASSERT_FALSE(TAKEN(watch, .n_y = 1, .max_order = 4, .ratio = 1));
     TEST_ASSERT_TRUE(TAKEN(watch, .n_y = 1, .max_order = 4, .ratio = 1.001));
     TEST_ASSERT_FALSE(TAKEN(watch, .n_y = 1, .max_order = 4, .ratio = HUGE_VAL));
+}
+
+static void of_deviations(void) {
+    const okid_replicates_config_t replicates = okid_replicates_defaults(1, 1, 1);
+    LIMITS(replicates, replicates, n_u, 0, 1048576);
+    LIMITS(replicates, replicates, n_y, 1, 1048576);
 }
 
 /// n_z (n_u + runs + 1) + n_u + runs of a refinement is at most 16384.
@@ -248,6 +255,7 @@ int main(void) {
     RUN_TEST(of_the_sums);
     RUN_TEST(memory_that_fades_needs_blocks);
     RUN_TEST(of_what_is_made_of_them);
+    RUN_TEST(of_deviations);
     RUN_TEST(unknowns_of_a_refinement);
     RUN_TEST(of_an_identification);
     RUN_TEST(lags_and_orders_of_an_identification);
