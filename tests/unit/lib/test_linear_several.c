@@ -170,7 +170,7 @@ static void okid_of_several_channels(void) {
 
 static void subspace_methods_of_several_channels(void) {
     for (int which = 0; which < 2; ++which) {
-        make(which, 1);
+        make(which, 3);
         for (int method = OKID_METHOD_N4SID_MOESP; method <= OKID_METHOD_N4SID_SSARX; ++method)
             is_the_derivative((okid_method_t)method, rig.n_u);
     }
