@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Units of the channels mean nothing to a change test: baseline, shifts and what is said of them stay, with several forces and
-// sensors, blocks of unequal loudness, and where no force is measured.
+// Units of the channels mean nothing to a change test: baseline, shifts and what is said of them stay, with several
+// forces and sensors, blocks of unequal loudness, and where no force is measured.
 #include "wide_rig.h"
 
 #include <okid/okid.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ERA and ERA/DC on exact Markov parameters of several inputs and outputs: the system comes back with its gain, from Hankel
-// matrices of any shape; sizes that make none are refused.
+// ERA and ERA/DC on exact Markov parameters of several inputs and outputs: the system comes back with its gain, from
+// Hankel matrices of any shape; sizes that make none are refused.
 #include "tolerance.h"
 #include "wide_rig.h"
 

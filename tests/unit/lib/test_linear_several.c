@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The derivative of an identification along the sums of a part, of several forces and sensors, against central differences of
-// the identification itself. The order is all that there is room for.
+// The derivative of an identification along the sums of a part, of several forces and sensors, against central
+// differences of the identification itself. The order is all that there is room for.
 #include "tolerance.h"
 #include "wide_rig.h"
 

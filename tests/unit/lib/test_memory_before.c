@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a block held before means nothing: every object gives the same bits in memory of zeros, of huge numbers and of NaN.
+// What a block held before means nothing: every object gives the same bits in memory of zeros, of huge numbers and of
+// NaN.
 #include "wide_rig.h"
 
 #include <okid/okid.h>

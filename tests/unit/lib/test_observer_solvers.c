@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The three solvers of the observer against the rows themselves. Excitation: pivots of the input lags by Gram and Schmidt, the
-// largest rest first from the Gram matrix and the factor, lag after lag from the sums of one run. Ridge: normal equations.
+// The three solvers of the observer against the rows themselves. Excitation: pivots of the input lags by Gram and
+// Schmidt, the largest rest first from the Gram matrix and the factor, lag after lag from the sums of one run. Ridge:
+// normal equations.
 #include "modal_rig.h"
 
 #include <okid/okid.h>
@@ -29,8 +30,8 @@ static void make(double independent) {
     }
 }
 
-/// Smallest over largest squared rest of the input lags. first < 0: lag after lag, each of the length that its channel has
-/// at lag 0 in units of it. Else all of unit length, this one first, then the one with the largest rest.
+/// Smallest over largest squared rest of the input lags. first < 0: lag after lag, each of the length that its channel
+/// has at lag 0 in units of it. Else all of unit length, this one first, then the one with the largest rest.
 static double excitation(int first) {
     double most = 0, least = 1;
     for (int k = 0; k < LAGGED; ++k) {
@@ -171,7 +172,8 @@ static void sines(int of_first, int of_second, int alternates) {
         }
 }
 
-// A sine is two directions, what alternates one. More than four of each input are wanted, more than p of a short observer.
+// A sine is two directions, what alternates one. More than four of each input are wanted, more than p of a short
+// observer.
 static void as_many_directions_are_wanted_as_leave_none_to_chance(void) {
     okid_status_t (*const solvers[])(void) = {by_gram, by_factor, by_sums};
     static const struct {

@@ -120,7 +120,8 @@ static void subspace_methods_give_the_system(void) {
     }
 }
 
-/// The leading singular triplets alone give the poles that the whole decomposition gives; of noisy records, of any order.
+/// The leading singular triplets alone give the poles that the whole decomposition gives; of noisy records, of any
+/// order.
 static void poles_need_no_whole_decomposition(void) {
     enum { MOST = 14 };
     for (int which = 0; which < 2; ++which) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Criteria of the stabilization diagram at their very limits, in numbers that are exact: what reaches a limit holds, what
-// passes it by one bit does not.
+// Criteria of the stabilization diagram at their very limits, in numbers that are exact: what reaches a limit holds,
+// what passes it by one bit does not.
 #include <okid/okid.h>
 
 #include <math.h>

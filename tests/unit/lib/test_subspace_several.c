@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Subspace methods with several forces and sensors: what is asked for does not depend on what else is asked for, and output
-// error gives B, D and every initial state back.
+// Subspace methods with several forces and sensors: what is asked for does not depend on what else is asked for, and
+// output error gives B, D and every initial state back.
 #include "wide_rig.h"
 
 #include <okid/okid.h>
