@@ -154,7 +154,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_identify_run(okid_identify_t* self, o
                                                         okid_identified_t* out);
 
 /// The part of okid_identify_run() that all orders have in common, for okid_identify_poles(): no order is chosen, no model made.
-/// Of an okid method the singular values of `out` end at max_order, zeros follow.
+/// Of okid-era with a large Hankel matrix the singular values of `out` end at max_order, zeros follow.
 /// @return as okid_identify_run(), without OKID_WARN_MODEL and OKID_ERR_NO_MODES
 OKID_NODISCARD OKID_API okid_status_t okid_identify_decompose(okid_identify_t* self, okid_accumulator_t* accumulator,
                                                               okid_identified_t* out);

@@ -24,8 +24,8 @@ typedef struct okid_replicates okid_replicates_t;
 
 /// Sizes, and whether M, K and R are wanted.
 typedef struct okid_replicates_config_t {
-    int32_t n_u;                  ///< inputs, >= 0
-    int32_t n_y;                  ///< outputs, >= 1
+    int32_t n_u;                  ///< inputs, 0..1048576
+    int32_t n_y;                  ///< outputs, 1..1048576
     int32_t n_z;                  ///< largest order of a model that will come, >= 1
     const okid_mkr_config_t* mkr; ///< for M, K, R, alpha, beta; NULL: modes only. Used until finish(), not copied
 } okid_replicates_config_t;

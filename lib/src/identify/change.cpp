@@ -32,6 +32,7 @@ constexpr double ridge = 1e-12; // on unit diagonals
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
+size_t area(int count) { return static_cast<size_t>(count); }
 
 bool valid(const okid_change_config_t& c) {
     if (c.n_u < 0 || c.n_y < 1 || c.n_u > 256 || c.n_y > 256 || c.rows < 2 || c.rows > 512 ||
@@ -61,38 +62,38 @@ void lay_out_learning(okid_change& s, okid::arena& memory) {
     const int h = s.h, n = s.most_order, q = 2 * s.config.n_y;
     s.projected = memory.take<double>(area(s.k, h));
     for (double** each : {&s.explained, &s.vectors, &s.noise}) *each = memory.take<double>(area(h, h));
-    s.values = memory.take<double>(area(h, 1));
+    s.values = memory.take<double>(area(h));
     s.spare = memory.take<double>(okid::linalg::symmetric_work(h, h));
     for (double** each : {&s.jacobian, &s.whitened}) *each = memory.take<double>(area(2 * h, q));
     s.normal = memory.take<double>(area(q, q));
-    s.target = memory.take<double>(area(q, 1));
+    s.target = memory.take<double>(area(q));
     for (okid_real_t** each : {&s.transition, &s.eigenvectors}) *each = memory.take<okid_real_t>(area(n, n));
-    for (okid_real_t** each : {&s.re, &s.im}) *each = memory.take<okid_real_t>(area(n, 1));
+    for (okid_real_t** each : {&s.re, &s.im}) *each = memory.take<okid_real_t>(area(n));
     s.work = memory.take<okid_real_t>(okid::linalg::eigen_work(n));
-    s.shape = memory.take<std::complex<double>>(area(s.config.n_y, 1));
+    s.shape = memory.take<std::complex<double>>(area(s.config.n_y));
     for (std::complex<double>** each : {&s.powers, &s.derivative})
-        *each = memory.take<std::complex<double>>(area(s.config.rows, 1));
+        *each = memory.take<std::complex<double>>(area(s.config.rows));
 }
 
 size_t lay_out(okid_change& s, okid::arena& memory) {
     const int h = s.h, n = s.most_order, d = s.most_modes, blocks = s.config.blocks;
-    s.direction = memory.take<okid::change_direction>(area(n / 2, 1));
-    s.mode = memory.take<okid_change_mode_t>(area(n / 2, 1));
+    s.direction = memory.take<okid::change_direction>(area(n / 2));
+    s.mode = memory.take<okid_change_mode_t>(area(n / 2));
     for (int k = 0; k < n / 2; ++k) {
         okid::change_direction one{};
-        for (double** each : {&one.left_re, &one.left_im}) *each = memory.take<double>(area(h, 1));
-        for (double** each : {&one.right_re, &one.right_im}) *each = memory.take<double>(area(n, 1));
+        for (double** each : {&one.left_re, &one.left_im}) *each = memory.take<double>(area(h));
+        for (double** each : {&one.right_re, &one.right_im}) *each = memory.take<double>(area(n));
         if (s.direction != nullptr) s.direction[k] = one;
     }
     s.sums = memory.take<double>(area(blocks, s.w) * static_cast<size_t>(s.w));
     s.total = memory.take<double>(area(s.w, s.w));
-    s.block_rows = memory.take<double>(area(blocks, 1));
-    s.scale = memory.take<double>(area(s.m, 1));
+    s.block_rows = memory.take<double>(area(blocks));
+    s.scale = memory.take<double>(area(s.m));
     for (double** each : {&s.own, &s.residual}) *each = memory.take<double>(area(h, n));
     s.outside = memory.take<double>(area(h, h));
     const int wide = std::max(d, n / 2); // while it learns, all modes of the baseline stand here
-    s.at_baseline = memory.take<double>(area(wide, 1));
-    s.estimate = memory.take<double>(area(wide, 1));
+    s.at_baseline = memory.take<double>(area(wide));
+    s.estimate = memory.take<double>(area(wide));
     s.deviation = memory.take<double>(area(wide, blocks));
     for (double** each : {&s.spread, &s.covariance, &s.solved, &s.weights})
         *each = memory.take<double>(area(wide, wide));
@@ -103,7 +104,7 @@ size_t lay_out(okid_change& s, okid::arena& memory) {
     s.future = memory.take<double>(area(h, h));
     for (double** each : {&s.seen, &s.instrument}) *each = memory.take<double>(area(s.k, n));
     s.core = memory.take<double>(area(n, n));
-    for (double** each : {&s.left, &s.right, &s.half}) *each = memory.take<double>(area(s.w, 1));
+    for (double** each : {&s.left, &s.right, &s.half}) *each = memory.take<double>(area(s.w));
     lay_out_learning(s, memory);
     return memory.bytes();
 }

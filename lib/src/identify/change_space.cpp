@@ -169,10 +169,10 @@ okid_status_t change_space(okid_change& s) {
     s.modes = 0;
     for (int k = 0; k < s.order; ++k) {
         const complex lambda(static_cast<double>(s.re[k]), static_cast<double>(s.im[k]));
-        if (!(lambda.imag() > 0) || std::abs(lambda) >= 1) continue;
+        if (!(lambda.imag() > 0)) continue;
         const complex rate = std::log(lambda);
         const double damping = -rate.real() / std::abs(rate);
-        if (damping > most_damping) continue;
+        if (!(damping > 0) || damping > most_damping) continue;
         status = find_direction(s, k, lambda, s.direction[s.modes]);
         if (status < 0) return status;
         s.mode[s.modes++] = {std::abs(rate) * s.config.fs_hz / (2 * 3.14159265358979323846), damping, 0, 0};

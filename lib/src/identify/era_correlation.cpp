@@ -47,13 +47,13 @@ void correlation::lay_out(int columns, arena& memory) {
     hankel = memory.take<okid_real_t>(area(height, breadth));
     shifts = memory.take<okid_real_t>(area(breadth, seen));
     basis = memory.take<okid_real_t>(area(breadth, rank));
-    values = memory.take<okid_real_t>(area(rank, 1));
+    values = memory.take<okid_real_t>(area(rank));
     right = memory.take<okid_real_t>(area(rank, seen));
     work = memory.take<okid_real_t>(linalg::svd_work(breadth, seen));
     input = memory.take<okid_real_t>(area(height, config.n_u));
     square = memory.take<okid_real_t>(area(columns, columns));
     root = memory.take<okid_real_t>(area(columns, columns));
-    repeat = memory.take<okid_real_t>(area(rows, 1));
+    repeat = memory.take<okid_real_t>(area(rows));
 }
 
 bool correlation::prepare(const okid_real_t* markov) {

@@ -29,7 +29,7 @@ leading_triplets::leading_triplets(const okid_era_config_t& c, int past, int cou
 
 void leading_triplets::lay_out(arena& memory) {
     const int height = rows * n_y;
-    values = memory.take<double>(area(span, 1));
+    values = memory.take<double>(area(span));
     left = memory.take<double>(area(height, count));
     core = memory.take<double>(area(count, count));
     first = memory.take<double>(area(count, n_u));

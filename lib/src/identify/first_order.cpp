@@ -24,7 +24,7 @@ void first_order::lay_out(int inputs, int outputs, int largest, arena& memory) {
     B = memory.take<double>(area(largest, n_u));
     C = memory.take<double>(area(n_y, largest));
     for (okid_real_t** each : {&a, &vectors, &out_A}) *each = memory.take<okid_real_t>(area(largest, largest));
-    for (okid_real_t** each : {&re, &im}) *each = memory.take<okid_real_t>(area(largest, 1));
+    for (okid_real_t** each : {&re, &im}) *each = memory.take<okid_real_t>(area(largest));
     eigen = memory.take<okid_real_t>(linalg::eigen_work(largest));
     out_B = memory.take<okid_real_t>(area(largest, n_u));
     out_C = memory.take<okid_real_t>(area(n_y, largest));

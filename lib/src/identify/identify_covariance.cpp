@@ -91,7 +91,7 @@ void lay_out_covariance(okid_identify& s, arena& memory) {
     const int past = past_rows(s), size = past + s.n_y, z = s.max_order;
     covariance_work& w = s.covariance;
     s.sequence = memory.take<okid_real_t>(area(s.markov_last + 1, s.n_y * s.n_y));
-    w.scale = memory.take<double>(area(s.n_y, 1));
+    w.scale = memory.take<double>(area(s.n_y));
     w.factor = memory.take<double>(area(size, size));
     w.A = memory.take<double>(area(z, z));
     w.Re = memory.take<double>(area(s.n_y, s.n_y));

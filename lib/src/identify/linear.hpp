@@ -15,8 +15,9 @@ struct asked_of_gram {
     double* products; ///< to be filled in
 };
 
-/// okid-era and okid-era-dc: A, B, C and D, in the states of the right singular vectors; without inputs A and C. What is
-/// decomposed is H = N^(1/2) T F, T a Hankel matrix (era_correlation.cpp, tau = 1); of okid-era N and F are 1. G = T F V.
+/// okid-era and okid-era-dc: A, B, C and D, in the states of the right singular vectors; without inputs A and C. What
+/// is decomposed is H = N^(1/2) T F, T a Hankel matrix (era_correlation.cpp, tau = 1); of okid-era N and F are 1. G = T
+/// F V.
 struct linear_era {
     okid_observer_config_t observer;
     okid_era_config_t shape;

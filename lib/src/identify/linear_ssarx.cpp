@@ -37,7 +37,7 @@ void linear_ssarx::lay_out(const okid_identify& s, int largest, arena& memory) {
     found = memory.take<double>(area(ask, largest));
     normal = memory.take<double>(area(most_known, most_known));
     for (double** each : {&regression, &change, &solved}) *each = memory.take<double>(area(most_left, most_known));
-    level = memory.take<double>(area(largest, 1));
+    level = memory.take<double>(area(largest));
     solve = memory.take<double>(solve_work(std::max({size, ask, most_left, most_known})));
     A = memory.take<okid_real_t>(area(largest, largest));
     B = memory.take<okid_real_t>(area(largest, n_u));

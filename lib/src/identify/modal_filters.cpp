@@ -51,12 +51,12 @@ modal_filters::modal_filters(int inputs, int outputs, int states, arena& memory)
     with_y = memory.take<double>(area(base, n_y));
     a_ = memory.take<okid_real_t>(area(n_z, n_z));
     vectors_ = memory.take<okid_real_t>(area(n_z, n_z));
-    re_ = memory.take<okid_real_t>(area(n_z, 1));
-    im_ = memory.take<okid_real_t>(area(n_z, 1));
+    re_ = memory.take<okid_real_t>(area(n_z));
+    im_ = memory.take<okid_real_t>(area(n_z));
     eigen_ = memory.take<okid_real_t>(linalg::eigen_work(n_z));
     shapes_ = memory.take<double>(area(n_y, n_z));
     shared_ = memory.take<double>(area(n_z, n_z));
-    state_ = memory.take<double>(area(base, 1));
+    state_ = memory.take<double>(area(base));
     signals_ = memory.take<double>(area(base, batch));
     outputs_ = memory.take<double>(area(n_y, batch));
     const int most = static_cast<int>(okid_filters_padded(area(n_z, 1))), m = n_u + n_y;
@@ -65,7 +65,7 @@ modal_filters::modal_filters(int inputs, int outputs, int states, arena& memory)
     filter_states_ = memory.take<double>(area(2 * most, n_u + 1));
     filter_sums_ = memory.take<double>(area(2 * wide, n_z * (n_u + 1)));
     filter_lags_ = memory.take<double>(area(wide, n_u * block));
-    filter_work_ = memory.take<double>(okid_filters_work(area(n_u, 1), area(n_z, 1)));
+    filter_work_ = memory.take<double>(okid_filters_work(area(n_u), area(n_z)));
     with_v_ = memory.take<double>(area(n_u + 2 * n_z * (n_u + 1), m));
 }
 
@@ -252,8 +252,8 @@ bool modal_filters::run(const double* v, int count) {
                 z[k] = z[padded_ + k] = 0;
             else
                 last = k + 1;
-        filters.lasting = area(last, 1);
-        step(&filters, v, area(std::min(stretch, count - n), 1));
+        filters.lasting = area(last);
+        step(&filters, v, area(std::min(stretch, count - n)));
         for (int k = 0; k < 2 * padded_ * (n_u + 1); ++k)
             if (std::abs(filter_states_[k]) < denormal) filter_states_[k] = 0;
     }

@@ -27,13 +27,13 @@ constexpr double margin = 1.5;
 /// d Y_n = d Ybar^I_n + sum_h (d theta^y_h Y_(n-h) + theta^y_h d Y_(n-h)). Blocks of a stack stand one below the other,
 /// the newest on top and p zeros at the bottom, so that each sum is one product.
 void propagate(const okid_observer_config_t& c, int last, const noise_work& w) {
-    const int n_u = c.n_u, n_y = c.n_y, m = n_u + n_y, tall = (last + 1 + c.p) * n_y;
+    const int n_u = c.n_u, n_y = c.n_y, m = n_u + n_y, before = (last + c.p) * n_y, tall = before + n_y;
     for (int n = 0; n <= last; ++n) {
         okid_real_t *top = w.changes + (last - n) * n_y, *next = top + n_y;
         const okid_real_t* own = w.error + (n == 0 ? 0 : area(n_u + (n - 1) * m, n_y));
         for (int k = 0; k < n_u; ++k)
             for (int o = 0; o < n_y; ++o) top[area(k, tall) + size_t(o)] = n <= c.p ? own[k * n_y + o] : 0;
-        multiply(false, false, n_y, n_u, c.p * n_y, 1, w.feedback_error, n_y, w.stack + (last - n + 1) * n_y, tall, 1,
+        multiply(false, false, n_y, n_u, c.p * n_y, 1, w.feedback_error, n_y, w.stack + (last - n) * n_y, before, 1,
                  top, tall);
         multiply(false, false, n_y, n_u, c.p * n_y, 1, w.feedback, n_y, next, tall, 1, top, tall);
     }
@@ -86,19 +86,19 @@ void noise_work::lay_out(const okid_observer_config_t& c, int rows, int last, ar
     left = memory.take<okid_real_t>(area(rows, c.n_y));
     right = memory.take<okid_real_t>(area(rows, c.n_u));
     for (okid_real_t** each : {&feedback, &feedback_error}) *each = memory.take<okid_real_t>(area(c.p * c.n_y, c.n_y));
-    for (okid_real_t** each : {&stack, &changes})
-        *each = memory.take<okid_real_t>(area((last + 1 + c.p) * c.n_y, c.n_u));
+    stack = memory.take<okid_real_t>(area((last + c.p) * c.n_y, c.n_u));
+    changes = memory.take<okid_real_t>(area((last + 1 + c.p) * c.n_y, c.n_u));
 }
 
 void begin_spread(const okid_observer_config_t& c, const okid_real_t* theta, const okid_real_t* markov, int last,
                   const noise_work& w) {
-    const int n_y = c.n_y, tall = (last + 1 + c.p) * n_y;
-    std::fill(w.stack, w.stack + area(tall, c.n_u), okid_real_t{0});
+    const int n_y = c.n_y, before = (last + c.p) * n_y, tall = before + n_y;
+    std::fill(w.stack, w.stack + area(before, c.n_u), okid_real_t{0});
     std::fill(w.changes, w.changes + area(tall, c.n_u), okid_real_t{0});
-    for (int n = 0; n <= last; ++n)
+    for (int n = 0; n < last; ++n) // nothing follows on the last one
         for (int k = 0; k < c.n_u; ++k) {
             const okid_real_t* from = markov + area(n * c.n_u + k, n_y);
-            std::copy(from, from + n_y, w.stack + area(k, tall) + (last - n) * n_y);
+            std::copy(from, from + n_y, w.stack + area(k, before) + (last - 1 - n) * n_y);
         }
     take_feedback(c.n_u, n_y, c.p, theta, w.feedback);
 }

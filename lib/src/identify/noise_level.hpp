@@ -19,7 +19,7 @@ struct noise_work {
     double *draw, *solve;
     okid_real_t *plain, *error, *root;      ///< the draw; of theta, n_y x q; factor of the innovation covariance
     okid_real_t *feedback, *feedback_error; ///< of theta and its error, n_y x p n_y
-    okid_real_t *stack, *changes;           ///< Y_last .. Y_0, zeros, one below the other; and their errors
+    okid_real_t *stack, *changes;           ///< Y_(last-1) .. Y_0, zeros, one below the other; errors from Y_last on
     okid_real_t* markov;                    ///< errors of Y_0 .. Y_last
     okid_real_t *left, *right;              ///< singular vectors in the making
 

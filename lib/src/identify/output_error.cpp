@@ -31,9 +31,9 @@ struct output_error {
         : filters(inputs, outputs, states, memory), n_u(inputs), n_y(outputs), n_z(states),
           unknowns(n_u * (n_z + n_y)) {
         equations = memory.take<double>(area(unknowns, unknowns));
-        right = memory.take<double>(area(unknowns, 1));
+        right = memory.take<double>(area(unknowns));
         own = memory.take<double>(area(n_z, n_z + unknowns + 1));
-        found = memory.take<double>(area(unknowns + n_z, 1));
+        found = memory.take<double>(area(unknowns + n_z));
         back = memory.take<double>(area(n_z, unknowns + 1));
         each = memory.take<double>(area(n_z, unknowns + 1) * static_cast<size_t>(records));
     }

@@ -49,7 +49,7 @@ void projection::lay_out(const subspace_sizes& z, arena& memory) {
         memory.take<double>(std::max(area(n, n) * static_cast<size_t>(z.i + 1), area(n, z.i) * static_cast<size_t>(p)));
     lagged = memory.take<double>(2 * area(n, n));
     equations = memory.take<double>(area(p * z.n_u, p * z.n_u));
-    root = memory.take<double>(std::max({area(p, z.n_u), area(z.i, 1), area(z.n_y, 1)}));
+    root = memory.take<double>(std::max({area(p, z.n_u), area(z.i), area(z.n_y)}));
     chunk = memory.take<double>(area(n * chunk_columns, p * z.n_u));
     remainder = memory.take<double>(area(z.h, z.a) + area(n, z.a));
 }

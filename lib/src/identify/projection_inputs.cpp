@@ -109,7 +109,7 @@ void projection::right_side(const subspace_sizes& z, int order) const {
     std::copy(cross, cross + at(0, z.a, z.h), remainder);
     multiply(true, false, n, z.a, z.h, 1, gamma, z.h, cross, z.h, 0, inside, n);
     multiply(false, false, z.h, z.a, n, -1, gamma, z.h, inside, n, 1, remainder, z.h);
-    std::fill(theta, theta + at(0, z.n_u, p), 0.0);
+    std::fill_n(theta, area(p, z.n_u), 0.0);
     for (int c = 0; c < z.n_u; ++c)
         for (int k = 0; k < z.i; ++k) {
             const double* column = remainder + at(k * z.n_y, c * z.i + k, z.h);

@@ -56,8 +56,8 @@ void lay_out(okid_refine& s, const okid_refine_config_t& c, okid::arena& memory)
     s.config = c;
     okid::refine_layout& l = s.layout;
     l = {c.n_u, c.n_y, c.n_z, c.runs, c.offset != 0, nullptr, nullptr, nullptr, 1};
-    for (bool** flags : {&l.pair, &l.held}) *flags = memory.take<bool>(area(c.n_z, 1));
-    l.fixed = memory.take<int>(area(c.n_z, 1));
+    for (bool** flags : {&l.pair, &l.held}) *flags = memory.take<bool>(area(c.n_z));
+    l.fixed = memory.take<int>(area(c.n_z));
     s.best.lay_out(l, memory);
     s.trial.lay_out(l, memory);
     s.at_best.lay_out(l, memory);
@@ -72,15 +72,15 @@ void lay_out(okid_refine& s, const okid_refine_config_t& c, okid::arena& memory)
     for (double** square : {&s.basis, &s.inverse}) *square = memory.take<double>(area(c.n_z, c.n_z));
     for (double** wide : {&s.spare, &s.product}) *wide = memory.take<double>(area(c.n_z, widest));
     s.scores = memory.take<double>(area(l.total(), c.n_y) * static_cast<size_t>(c.blocks));
-    s.drive = memory.take<double>(area(c.n_u, 1));
+    s.drive = memory.take<double>(area(c.n_u));
     for (okid_real_t** square : {&s.a, &s.vectors, &s.A}) *square = memory.take<okid_real_t>(area(c.n_z, c.n_z));
-    for (okid_real_t** column : {&s.re, &s.im}) *column = memory.take<okid_real_t>(area(c.n_z, 1));
+    for (okid_real_t** column : {&s.re, &s.im}) *column = memory.take<okid_real_t>(area(c.n_z));
     s.eigen = memory.take<okid_real_t>(okid::linalg::eigen_work(c.n_z));
     s.B = memory.take<okid_real_t>(area(c.n_z, c.n_u));
     s.C = memory.take<okid_real_t>(area(c.n_y, c.n_z));
     s.D = memory.take<okid_real_t>(area(c.n_y, c.n_u));
     s.x0 = memory.take<okid_real_t>(area(c.n_z, c.runs));
-    s.noise = memory.take<okid_real_t>(area(c.n_y, 1));
+    s.noise = memory.take<okid_real_t>(area(c.n_y));
     s.ready = false;
 }
 
@@ -205,7 +205,7 @@ okid_status_t look_at(okid_refine& s, const okid::refine_records& records) {
         }
     if (used * n_y <= static_cast<long long>(okid::refine_parameters::count(s.layout))) return OKID_ERR_TOO_SHORT;
     for (int o = 0; o < n_y; ++o) s.at_best.output[o] /= double(used);
-    std::copy(s.at_best.output, s.at_best.output + n_y, s.at_trial.output);
+    std::copy_n(s.at_best.output, n_y, s.at_trial.output);
     return OKID_OK;
 }
 

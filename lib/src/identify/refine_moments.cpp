@@ -24,12 +24,12 @@ void refine_moments::lay_out(const refine_layout& l, arena& memory) {
     late = memory.take<complex>(area(l.n_u, base()));
     alike = memory.take<complex>(area(base(), base()));
     mirror = memory.take<complex>(area(base(), base()));
-    end = memory.take<complex>(area(base(), 1));
-    total = memory.take<complex>(area(base(), 1));
+    end = memory.take<complex>(area(base()));
+    total = memory.take<complex>(area(base()));
     block = memory.take<complex>(area(two, two));
     turned = memory.take<complex>(area(two, two));
     horner = memory.take<double>(4 * area(m, l.n_u));
-    one = memory.take<double>(area(l.total(), 1));
+    one = memory.take<double>(area(l.total()));
 }
 
 /// value = sum_i w^i column(i), slope its derivative by w, i < lags; `width` numbers a column.

@@ -16,7 +16,7 @@ using linalg::multiply;
 
 void refine_signals::lay_out(const refine_layout& l, arena& memory) {
     layout = &l;
-    now = memory.take<double>(area(l.of_run(), 1));
+    now = memory.take<double>(area(l.of_run()));
     signals = memory.take<double>(area(l.of_run(), batch));
     errors = memory.take<double>(area(l.n_y, batch));
     follows = memory.take<bool>(batch);

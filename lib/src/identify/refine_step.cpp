@@ -25,14 +25,14 @@ constexpr double equations_floor = 1e-13;
 void refine_sums::lay_out(const refine_layout& l, arena& memory) {
     gram = memory.take<double>(area(l.total(), l.total()));
     with_e = memory.take<double>(area(l.total(), l.n_y));
-    square = memory.take<double>(area(l.n_y, 1));
+    square = memory.take<double>(area(l.n_y));
     mean = memory.take<double>(area(l.n_y, l.runs));
-    output = memory.take<double>(area(l.n_y, 1));
+    output = memory.take<double>(area(l.n_y));
 }
 
 void refine_change::lay_out(const refine_layout& l, arena& memory) {
     linear = memory.take<double>(area(l.linear(), l.n_y));
-    shaped = memory.take<double>(area(l.shaped(), 1));
+    shaped = memory.take<double>(area(l.shaped()));
 }
 
 void refine_change::add_to(const refine_layout& l, const refine_parameters& p, double alpha,
@@ -50,16 +50,16 @@ void refine_change::add_to(const refine_layout& l, const refine_parameters& p, d
 
 void refine_equations::lay_out(const refine_layout& l, arena& memory) {
     layout = &l;
-    weight = memory.take<double>(area(l.n_y, 1));
-    scale = memory.take<double>(area(l.total(), 1));
+    weight = memory.take<double>(area(l.n_y));
+    scale = memory.take<double>(area(l.total()));
     own = memory.take<double>(area(l.linear(), l.linear()));
     cross = memory.take<double>(area(l.linear(), l.shaped()));
     across = memory.take<double>(area(l.linear(), l.shaped()));
     left = memory.take<double>(area(l.shaped(), l.shaped()));
     core = memory.take<double>(area(l.shaped(), l.shaped()));
     factor = memory.take<double>(area(l.shaped(), l.shaped()));
-    balance = memory.take<double>(area(l.shaped(), 1));
-    gradient = memory.take<double>(area(l.shaped(), 1));
+    balance = memory.take<double>(area(l.shaped()));
+    gradient = memory.take<double>(area(l.shaped()));
     residual = memory.take<double>(area(l.total(), l.n_y));
     alike = memory.take<complex>(area(l.n_z, l.n_z));
     mirror = memory.take<complex>(area(l.n_z, l.n_z));

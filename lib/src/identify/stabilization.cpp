@@ -116,13 +116,15 @@ double distance(const okid_stabilization& s, int centre, int k) {
 
 /// Call visit(pole, distance) for every free pole near the centre, the centre included.
 template <class Visit> void neighbours(const okid_stabilization& s, int centre, Visit visit) {
-    for (const int step : {-1, 1})
-        for (int at = s.place[centre] + (step > 0 ? 0 : -1); at >= 0 && at < s.poles; at += step) {
-            const int k = s.sorted[at];
-            if (off(s, centre, k) > s.config.frequency) break;
-            const double d = distance(s, centre, k);
-            if (d >= 0) visit(k, d);
-        }
+    const auto near = [&](int at) {
+        const int k = s.sorted[at];
+        if (off(s, centre, k) > s.config.frequency) return false;
+        const double d = distance(s, centre, k);
+        if (d >= 0) visit(k, d);
+        return true;
+    };
+    for (int at = s.place[centre] - 1; at >= 0 && near(at);) --at;
+    for (int at = s.place[centre]; at < s.poles && near(at);) ++at;
 }
 
 /// Models with a free pole near the centre.

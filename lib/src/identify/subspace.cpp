@@ -97,7 +97,7 @@ void state_model::lay_out(const subspace_sizes& z, arena& memory) {
     D = memory.take<double>(area(z.n_y, z.n_u));
     K = memory.take<double>(area(z.top, z.n_y));
     innovation = memory.take<double>(area(z.n_y, z.n_y));
-    scale = memory.take<double>(area(z.top, 1));
+    scale = memory.take<double>(area(z.top));
 }
 
 void expect(okid_subspace_t* self, int order, bool condition) {

@@ -57,9 +57,8 @@ int orthonormalise(int rows, int columns, double* x, double* core, int top) {
 void rank_cut::share(const subspace_sizes& z, arena& memory) {
     const auto carve = [&](arena squares, arena svd) {
         square_ = squares.take<double>(area(z.h, z.h));
-        symmetric_ =
-            squares.take<double>(area(z.h, 1) + std::max(linalg::symmetric_work(z.h, z.top),
-                                                         linalg::symmetric_work(z.h, std::min(z.top, z.h / 3))));
+        symmetric_ = squares.take<double>(area(z.h) + std::max(linalg::symmetric_work(z.h, z.top),
+                                                               linalg::symmetric_work(z.h, std::min(z.top, z.h / 3))));
         target_ = svd.take<okid_real_t>(area(z.h, z.w));
         left_ = svd.take<okid_real_t>(area(z.h, z.h));
         right_ = svd.take<okid_real_t>(area(z.h, z.w));
@@ -79,7 +78,7 @@ void rank_cut::lay_out(const subspace_sizes& z, bool weighted, bool right_side, 
     right_side_ = right_side;
     left = memory.take<double>(area(z.h, z.top));
     right = memory.take<double>(area(z.w, z.top));
-    values = memory.take<okid_real_t>(area(z.h, 1));
+    values = memory.take<okid_real_t>(area(z.h));
     solve = memory.take<double>(solve_work(2 * z.w));
     share(z, memory);
 }

@@ -15,6 +15,7 @@ inline std::size_t at(int row, int col, int ld) {
 
 /// Numbers in a matrix.
 inline std::size_t area(int rows, int cols) { return at(0, cols, rows); }
+inline std::size_t area(int count) { return static_cast<std::size_t>(count); }
 
 constexpr int solve_block = 32;
 

@@ -30,7 +30,7 @@ void followed_era::lay_out(const okid_era_config_t& c, int most, arena& memory) 
     hankel = memory.take<okid_real_t>(area(height, breadth));
     for (okid_real_t** each : {&start, &left, &seen}) *each = memory.take<okid_real_t>(area(height, most));
     for (okid_real_t** each : {&right, &driven}) *each = memory.take<okid_real_t>(area(most, breadth));
-    values = memory.take<okid_real_t>(area(most, 1));
+    values = memory.take<okid_real_t>(area(most));
     turn = memory.take<okid_real_t>(area(most, most));
     core = memory.take<okid_real_t>(area(most, std::max(most, c.n_u)));
     work = memory.take<okid_real_t>(std::max(linalg::svd_work(height, most), linalg::svd_work(most, breadth)));

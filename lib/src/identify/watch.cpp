@@ -52,6 +52,7 @@ constexpr double ridge = 1e-9; // on the diagonal of the innovation covariance
 constexpr double spike = 25;   // mean square of an error, in usual ones: beyond lies a spike
 
 size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
+size_t area(int count) { return static_cast<size_t>(count); }
 
 size_t lay_out(okid_watch& s, okid::arena& memory) {
     const okid_watch_config_t& c = s.config;
@@ -60,14 +61,14 @@ size_t lay_out(okid_watch& s, okid::arena& memory) {
         each->step = memory.take<okid_real_t>(area(c.max_order, all));
         each->look = memory.take<okid_real_t>(area(c.n_y, c.max_order + c.n_u));
         each->weight = memory.take<okid_real_t>(area(c.n_y, c.n_y));
-        each->state = memory.take<okid_real_t>(area(all, 1));
-        each->mean = memory.take<double>(area(c.n_u + c.n_y, 1));
-        each->errors = memory.take<double>(area(c.learn, 1));
-        each->shares = memory.take<double>(area(c.learn, 1));
+        each->state = memory.take<okid_real_t>(area(all));
+        each->mean = memory.take<double>(area(c.n_u + c.n_y));
+        each->errors = memory.take<double>(area(c.learn));
+        each->shares = memory.take<double>(area(c.learn));
     }
-    for (okid_real_t** each : {&s.outputs, &s.weighted}) *each = memory.take<okid_real_t>(area(c.n_y, 1));
-    s.scratch = memory.take<okid_real_t>(std::max(area(c.n_y, c.n_y), area(c.max_order, 1)));
-    s.sorted = memory.take<double>(area(c.learn, 1));
+    for (okid_real_t** each : {&s.outputs, &s.weighted}) *each = memory.take<okid_real_t>(area(c.n_y));
+    s.scratch = memory.take<okid_real_t>(std::max(area(c.n_y, c.n_y), area(c.max_order)));
+    s.sorted = memory.take<double>(area(c.learn));
     return memory.bytes();
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The radius of an ARX model against roots it was made of: outputs that each have a polynomial of their own, seen through a
-// rotation of the outputs. Dense up to 64 states, by Arnoldi beyond.
+// The radius of an ARX model against roots it was made of: outputs that each have a polynomial of their own, seen
+// through a rotation of the outputs. Dense up to 64 states, by Arnoldi beyond.
 #include "identify/companion.hpp"
 #include "tolerance.h"
 
@@ -20,8 +20,9 @@ constexpr double pi = 3.14159265358979323846;
 constexpr double dense_limit = TOLERANCE(1e-10, 2e-5), arnoldi_limit = TOLERANCE(1e-6, 3e-5);
 constexpr double own_units[8] = {1, 1, 1, 1, 1, 1, 1, 1};
 
-/// theta of n_u inputs, whose columns hold what must not be read, and n_y outputs with pairs of roots: `radius(output, pair)`
-/// at angles spread evenly over the half circle, where a polynomial is not sensitive to rounding. An odd p has a root at 0.
+/// theta of n_u inputs, whose columns hold what must not be read, and n_y outputs with pairs of roots: `radius(output,
+/// pair)` at angles spread evenly over the half circle, where a polynomial is not sensitive to rounding. An odd p has a
+/// root at 0.
 template <class Radius> std::vector<okid_real_t> arx(int n_u, int n_y, int p, Radius radius) {
     std::vector<double> own(static_cast<std::size_t>(n_y * (p + 1))), turned(static_cast<std::size_t>(n_y * n_y));
     for (int o = 0; o < n_y; ++o) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// EMAC of modes in noise by its definition (Pappa, Elliott, Schenk 1993, output side): the last block row of the identified
-// observability matrix against what eigenvalue and first block row predict, amplitude and phase, weighted by the shape.
+// EMAC of modes in noise by its definition (Pappa, Elliott, Schenk 1993, output side): the last block row of the
+// identified observability matrix against what eigenvalue and first block row predict, amplitude and phase, weighted by
+// the shape.
 #include "identify/identify.hpp"
 #include "identify/subspace.hpp"
 #include "tolerance.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// ERA and ERA/DC on exact Markov parameters of several inputs and outputs: the system comes back with its gain, from Hankel
-// matrices of any shape; sizes that make none are refused.
+// ERA and ERA/DC on exact Markov parameters of several inputs and outputs: the system comes back with its gain, from
+// Hankel matrices of any shape; sizes that make none are refused.
 #include "tolerance.h"
 #include "wide_rig.h"
 
@@ -186,6 +186,12 @@ static void orders_that_are_not_there_are_refused(void) {
     TEST_ASSERT_EQUAL(OKID_OK, okid_era_realize_near(era, most, markov, a, d));
     TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_era_realize(era, 0, a, b, d, NULL, NULL));
     TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_era_realize(era, most + 1, a, b, d, NULL, NULL));
+    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_era_realize_near(era, 0, markov, a, d));
+    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_era_realize_near(era, most + 1, markov, a, d));
+    for (int k = 0; k < MOST * WIDE_MOST * WIDE_MOST; ++k) markov[k] = 0; // no singular value above 0
+    TEST_ASSERT_EQUAL(OKID_OK, okid_era_decompose(era, markov));
+    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_era_realize(era, 1, a, b, d, NULL, NULL));
+    TEST_ASSERT_EQUAL(OKID_ERR_DIM, okid_era_realize_near(era, 1, markov, a, d));
     free(a);
     free(b);
     free(d);

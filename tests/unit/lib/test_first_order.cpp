@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A model moved to first order against the model itself, a small step away: what is left between them is of second order.
+// A model moved to first order against the model itself, a small step away: what is left between them is of second
+// order.
 #include "identify/first_order.hpp"
 
 #include "tolerance.h"
@@ -34,8 +35,8 @@ numbers draw(size_t count, double size, std::mt19937& from) {
     return out;
 }
 
-/// Poles on the diagonal blocks (a pair takes two of `poles`: radius and angle, a real one a radius and 0), turned by a matrix
-/// that is not orthogonal.
+/// Poles on the diagonal blocks (a pair takes two of `poles`: radius and angle, a real one a radius and 0), turned by a
+/// matrix that is not orthogonal.
 model make(const std::vector<std::pair<double, double>>& poles, unsigned seed) {
     std::mt19937 from(seed);
     int n = 0;

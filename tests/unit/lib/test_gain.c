@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The Kalman gain and the covariance of the innovations of every method, with and without inputs, against the innovations
-// model that made the record; in units that differ.
+// The Kalman gain and the covariance of the innovations of every method, with and without inputs, against the
+// innovations model that made the record; in units that differ.
 #include "wide_rig.h"
 
 #include <okid/okid.h>

@@ -7,8 +7,10 @@
 #include <okid/identify.h>
 #include <okid/refine.h>
 #include <okid/stabilization.h>
+#include <okid/steps/observer.h>
 #include <okid/steps/square_root.h>
 #include <okid/steps/subspace.h>
+#include <okid/uncertainty.h>
 #include <okid/watch.h>
 #include <unity.h>
 
@@ -115,6 +117,12 @@ static void of_what_is_made_of_them(void) {
     TEST_ASSERT_FALSE(TAKEN(watch, .n_y = 1, .max_order = 4, .ratio = HUGE_VAL));
 }
 
+static void of_deviations(void) {
+    const okid_replicates_config_t replicates = okid_replicates_defaults(1, 1, 1);
+    LIMITS(replicates, replicates, n_u, 0, 1048576);
+    LIMITS(replicates, replicates, n_y, 1, 1048576);
+}
+
 /// n_z (n_u + runs + 1) + n_u + runs of a refinement is at most 16384.
 static void unknowns_of_a_refinement(void) {
     TEST_ASSERT_TRUE(TAKEN(refine, .n_u = 1, .n_y = 1, .n_z = 5460, .runs = 1)); // 5460 * 3 + 2 = 16382
@@ -133,15 +141,19 @@ static void of_an_identification(void) {
     LIMITS(identify, era, rows, 0, 8192);
     LIMITS(identify, era, n_u, 0, 255);
     LIMITS(identify, era, n_y, 1, 255);
-    LIMITS(identify, era, method, OKID_METHOD_OKID_ERA, OKID_METHOD_N4SID_SSARX);
-    LIMITS(identify, era, detrend, OKID_DETREND_NONE, OKID_DETREND_MEAN);
-    LIMITS(identify, era, solver, OKID_SOLVER_DENSE, OKID_SOLVER_STRUCTURED);
-    LIMITS(identify, era, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_LITERAL);
     LIMITS(identify, ambient, p, 1, 4096); // rows = p
-    LIMITS(identify, ambient, solver, OKID_SOLVER_DENSE, OKID_SOLVER_DENSE);
-    LIMITS(identify, ambient, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_SYSTEM);
-    LIMITS(identify, n4sid, solver, OKID_SOLVER_DENSE, OKID_SOLVER_DENSE);
-    LIMITS(identify, n4sid, hankel, OKID_HANKEL_SYSTEM, OKID_HANKEL_SYSTEM);
+    for (int kind = 0; kind < 3; ++kind)   // solver and content of the Hankel matrix: only where an observer is solved
+        for (int solver = OKID_SOLVER_DENSE; solver <= OKID_SOLVER_STRUCTURED; ++solver)
+            for (int hankel = OKID_HANKEL_SYSTEM; hankel <= OKID_HANKEL_LITERAL + 1; ++hankel) {
+                okid_identify_config_t c = kind == 0 ? era : kind == 1 ? ambient : n4sid;
+                c.solver = (okid_solver_t)solver;
+                c.hankel = (okid_hankel_t)hankel;
+                const int plain = solver == OKID_SOLVER_DENSE && hankel == OKID_HANKEL_SYSTEM;
+                TEST_ASSERT_EQUAL(kind == 0 ? hankel <= OKID_HANKEL_LITERAL : plain, okid_identify_memsize(&c) > 0);
+            }
+    for (int method = OKID_METHOD_OKID_ERA; method <= OKID_METHOD_N4SID_SSARX + 1; ++method)
+        TEST_ASSERT_EQUAL(method <= OKID_METHOD_N4SID_SSARX,
+                          TAKEN(identify, .n_u = 1, .n_y = 1, .p = 4, .fs_hz = 100, .method = (okid_method_t)method));
     for (int rows = -1; rows < 4; ++rows)
         TEST_ASSERT_EQUAL(rows == 0 || rows > 1, TAKEN(identify, .n_u = 1, .n_y = 2, .rows = rows, .fs_hz = 100,
                                                        .method = OKID_METHOD_N4SID_CVA));
@@ -223,15 +235,32 @@ static void defaults_are_numbers(void) {
     }
 }
 
+/// The structured solver: 2 (m + 2)(n + m) + (1 + 3 min(4, n_y)) n numbers, n = m (p + 1), and those of small matrices.
+static void memory_of_the_structured_solver(void) {
+    // their companions take less
+    static const int sizes[][3] = {{20, 6, 5}, {30, 2, 10}, {40, 1, 20}};
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; ++k) {
+        const int n_y = sizes[k][1], m = sizes[k][0] + n_y, n = m * (sizes[k][2] + 1), columns = n_y < 4 ? n_y : 4;
+        const int large = 2 * (m + 2) * (n + m) + (1 + 3 * columns) * n,
+                  small = m * m + n_y * n_y + n_y * columns + 2 * (m + 2) * columns + 3 * m + 2;
+        const okid_observer_config_t c = okid_observer_defaults(sizes[k][0], n_y, sizes[k][2]);
+        const int most = (int)sizeof(double) * (large + small) + 14 * 64;
+        TEST_ASSERT_TRUE((int)okid_structured_memsize(&c) <= most);
+        TEST_ASSERT_TRUE((int)okid_structured_memsize(&c) >= most - 14 * 64);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(of_the_sums);
     RUN_TEST(memory_that_fades_needs_blocks);
     RUN_TEST(of_what_is_made_of_them);
+    RUN_TEST(of_deviations);
     RUN_TEST(unknowns_of_a_refinement);
     RUN_TEST(of_an_identification);
     RUN_TEST(lags_and_orders_of_an_identification);
     RUN_TEST(lags_that_a_record_carries);
+    RUN_TEST(memory_of_the_structured_solver);
     RUN_TEST(defaults_are_numbers);
     return UNITY_END();
 }

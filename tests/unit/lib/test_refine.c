@@ -102,6 +102,28 @@ static void an_unknown_constant_does_no_harm(void) {
     free(v);
 }
 
+// Every step, what it gains and where it ends: as without the constant.
+static void with_an_offset_a_constant_changes_nothing(void) {
+    const int32_t counts[2] = {N / 2, N / 2};
+    double* v = rig_record(&rig, N, 0.05, NULL, 5);
+    okid_real_t a[RIG_NZ * RIG_NZ], d[RIG_NY];
+    TEST_ASSERT_EQUAL(OKID_OK, refine(2, 1, 0, counts, v));
+    const okid_refined_t before = found;
+    memcpy(a, found.A, sizeof a);
+    memcpy(d, found.D, sizeof d);
+    for (int n = 0; n < N; ++n) // another one in each run
+        for (int o = 0; o < RIG_NY; ++o) v[n * RIG_M + 1 + o] += (3 + o) * (n < N / 2 ? 1 : -2);
+    TEST_ASSERT_EQUAL(OKID_OK, refine(2, 1, 0, counts, v));
+    TEST_ASSERT_EQUAL(before.iterations, found.iterations);
+    TEST_ASSERT_EQUAL(1, found.converged);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6 * before.gain, before.gain, found.gain);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, before.decrement, found.decrement);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, before.whiteness, found.whiteness);
+    for (int i = 0; i < RIG_NZ * RIG_NZ; ++i) TEST_ASSERT_DOUBLE_WITHIN(exact_limit, (double)a[i], (double)found.A[i]);
+    for (int i = 0; i < RIG_NY; ++i) TEST_ASSERT_DOUBLE_WITHIN(10 * exact_limit, (double)d[i], (double)found.D[i]);
+    free(v);
+}
+
 static void runs_have_their_own_beginnings(void) {
     const int32_t counts[2] = {N, N / 2};
     double *v = malloc(sizeof *v * (N + N / 2) * RIG_M), x0[RIG_NZ];
@@ -223,6 +245,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(a_rough_start_finds_the_truth);
     RUN_TEST(an_unknown_constant_does_no_harm);
+    RUN_TEST(with_an_offset_a_constant_changes_nothing);
     RUN_TEST(runs_have_their_own_beginnings);
     RUN_TEST(noise_is_measured_and_replicates_scatter_like_the_errors);
     RUN_TEST(wrong_use_is_refused);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The gain that is held in each mode: that of the input that drives it hardest, by gain and by size of the input; of inputs
-// that drive it alike the first. It leaves the refinement as it came, all others move.
+// The gain that is held in each mode: that of the input that drives it hardest, by gain and by size of the input; of
+// inputs that drive it alike the first. It leaves the refinement as it came, all others move.
 #include "modal_rig.h"
 
 #include <okid/okid.h>
@@ -23,7 +23,8 @@ void tearDown(void) {
     block = sum_block = room = NULL;
 }
 
-/// Two modes as rotations, one pole on the real axis. The second input has the gains of the first, turned, times `share`.
+/// Two modes as rotations, one pole on the real axis. The second input has the gains of the first, turned, times
+/// `share`.
 static void make(double share, double off, system_t* out) {
     static const double pairs[2][2] = {{0.9, 0.6}, {0.85, 1.7}}, gains[2][2] = {{0.5, 0.25}, {-0.75, 1}};
     memset(out, 0, sizeof *out);
@@ -47,7 +48,8 @@ static okid_model_t view(const system_t* s) {
     return (okid_model_t){.n_u = NU, .n_y = NY, .n_z = NZ, .A = s->A, .B = s->B, .C = s->C, .D = s->D};
 }
 
-/// Inputs of -1 and 1, times `size` the second, so that their mean squares are equal to the bit; the system answers from rest.
+/// Inputs of -1 and 1, times `size` the second, so that their mean squares are equal to the bit; the system answers
+/// from rest.
 static void record(const system_t* s, double size) {
     uint64_t state = 4;
     double x[NZ] = {0}, next[NZ];

@@ -77,8 +77,8 @@ noisy_model make(int n, double radius, unsigned seed) {
     return m;
 }
 
-/// K and the covariance of the innovations by P <- (A - K C) P (A - K C)^T + (W - K V)(W - K V)^T, which is A P A^T + Q -
-/// (A P C^T + S) (C P C^T + R)^-1 (.)^T in a form that keeps its digits, from P = 0.
+/// K and the covariance of the innovations by P <- (A - K C) P (A - K C)^T + (W - K V)(W - K V)^T, which is A P A^T + Q
+/// - (A P C^T + S) (C P C^T + R)^-1 (.)^T in a form that keeps its digits, from P = 0.
 void by_recursion(const noisy_model& m, matrix* K, matrix* Re) {
     const int n = m.n, w = m.width;
     const matrix S = product(m.W, transposed(m.V, 2, w), n, w, 2), R = product(m.V, transposed(m.V, 2, w), 2, w, 2);

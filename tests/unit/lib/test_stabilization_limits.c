@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Criteria of the stabilization diagram at their very limits, in numbers that are exact: what reaches a limit holds, what
-// passes it by one bit does not.
+// Criteria of the stabilization diagram at their very limits, in numbers that are exact: what reaches a limit holds,
+// what passes it by one bit does not.
 #include <okid/okid.h>
 
 #include <math.h>
@@ -146,6 +146,21 @@ static void a_fifth_of_the_models_is_listed(void) {
     TEST_ASSERT_EQUAL_DOUBLE(1, found.clusters[0].frequency_hz);
 }
 
+/// Two poles have as many about them: the one that was added first gathers them.
+static void ties_go_to_the_pole_added_first(void) {
+    static const double frequencies[] = {8, 9.5, 11.5, 13.8};
+    create(0.5);
+    for (int m = 0; m < 4; ++m) {
+        put(0, frequencies[m], 0.5, 1, 0);
+        add(1);
+    }
+    TEST_ASSERT_EQUAL(OKID_OK, okid_stabilization_find(diagram, &found));
+    TEST_ASSERT_EQUAL(1, found.cluster_count);
+    TEST_ASSERT_EQUAL(3, found.clusters[0].hits);
+    TEST_ASSERT_EQUAL(1, found.clusters[0].pole);
+    TEST_ASSERT_EQUAL(-1, found.poles[3].cluster);
+}
+
 /// Median, and 1.4826 times the median of the distances from it; of an even number the mean of the middle two.
 static void a_mode_is_described_by_medians(void) {
     static const double frequencies[] = {8, 8.5, 7.75, 8.125, 9}, dampings[] = {0.5, 0.25, 0.5625, 0.75, 0.375};
@@ -180,6 +195,7 @@ int main(void) {
     RUN_TEST(the_partner_is_the_likest_in_shape);
     RUN_TEST(the_share_of_the_models_makes_a_mode);
     RUN_TEST(a_fifth_of_the_models_is_listed);
+    RUN_TEST(ties_go_to_the_pole_added_first);
     RUN_TEST(a_mode_is_described_by_medians);
     return UNITY_END();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Subspace methods with several forces and sensors: what is asked for does not depend on what else is asked for, and output
-// error gives B, D and every initial state back.
+// Subspace methods with several forces and sensors: what is asked for does not depend on what else is asked for, and
+// output error gives B, D and every initial state back.
 #include "wide_rig.h"
 
 #include <okid/okid.h>
@@ -94,6 +94,10 @@ static void output_error_gives_inputs_and_initial_states_back(void) {
             D[WIDE_MOST * WIDE_MOST], x0[RECORDS * WIDE_NZ];
         double start[RECORDS * WIDE_NZ];
         wide_make(&rig, 2 + which, 3 - which);
+        if (which == 1) { // a pair that becomes two real poles
+            rig.A[2 * (WIDE_NZ + 1)] = 0.8, rig.A[3 * (WIDE_NZ + 1)] = -0.6;
+            rig.A[2 * (WIDE_NZ + 1) + 1] = rig.A[3 * (WIDE_NZ + 1) - 1] = 0;
+        }
         const int n_u = rig.n_u, n_y = rig.n_y, m = n_u + n_y;
         double *v = malloc(sizeof *v * (size_t)(ALL * m)), *to = v;
         for (int r = 0; r < RECORDS; ++r) { // what a state rings down to is added to the answer from rest

@@ -198,6 +198,31 @@ static void models_that_cannot_be_watched(void) {
     TEST_ASSERT_EQUAL(0, okid_watch_memsize(&c));
 }
 
+/// One state, no input: neither B nor D is asked for, and the watch says that it learns.
+static void a_model_of_one_state_without_inputs_is_taken(void) {
+    const okid_real_t A = (okid_real_t)0.5, C = 1, K = (okid_real_t)0.1, innovation = 1;
+    const double mean = 0;
+    const okid_watch_config_t c = okid_watch_defaults(0, 1, 1, 4);
+    const size_t bytes = okid_watch_memsize(&c);
+    void* block = malloc(bytes);
+    okid_watch_t* self = NULL;
+    okid_watch_state_t state;
+    okid_identified_t one = {.n_y = 1, .n_z = 1, .A = &A, .C = &C, .K = &K, .innovation = &innovation, .mean = &mean};
+    TEST_ASSERT_EQUAL(OKID_OK, okid_watch_create(&self, &c, block, bytes));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_watch_set_model(self, &one));
+    okid_watch_state(self, &state);
+    TEST_ASSERT_EQUAL(0, state.watching);
+    TEST_ASSERT_EQUAL(1, state.learning);
+    for (int n = 0; n < 4 + 16 * 32; ++n) { // the lead, and sixteen blocks
+        const okid_real_t sample = n % 2 ? 1 : -1;
+        TEST_ASSERT_EQUAL(0, okid_watch_add(self, &sample));
+    }
+    okid_watch_state(self, &state);
+    TEST_ASSERT_EQUAL(1, state.watching);
+    TEST_ASSERT_EQUAL(0, state.learning);
+    free(block);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(quiet_while_nothing_changes);
@@ -207,5 +232,6 @@ int main(void) {
     RUN_TEST(gaps_are_no_change);
     RUN_TEST(the_model_at_work_stays_while_the_next_one_learns);
     RUN_TEST(models_that_cannot_be_watched);
+    RUN_TEST(a_model_of_one_state_without_inputs_is_taken);
     return UNITY_END();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What the three solvers say of the excitation, against the pivots of the input lags by Gram and Schmidt on the rows
-// themselves: the largest rest first from the Gram matrix and the factor, lag after lag from the sums of one run.
+// The three solvers of the observer against the rows themselves. Excitation: pivots of the input lags by Gram and
+// Schmidt, the largest rest first from the Gram matrix and the factor, lag after lag from the sums of one run. Ridge:
+// normal equations.
 #include "modal_rig.h"
 
 #include <okid/okid.h>
@@ -29,8 +30,8 @@ static void make(double independent) {
     }
 }
 
-/// Smallest over largest squared rest of the input lags. first < 0: lag after lag, each of the length that its channel has
-/// at lag 0 in units of it. Else all of unit length, this one first, then the one with the largest rest.
+/// Smallest over largest squared rest of the input lags. first < 0: lag after lag, each of the length that its channel
+/// has at lag 0 in units of it. Else all of unit length, this one first, then the one with the largest rest.
 static double excitation(int first) {
     double most = 0, least = 1;
     for (int k = 0; k < LAGGED; ++k) {
@@ -122,6 +123,7 @@ static okid_status_t by_sums(void) {
 void setUp(void) {
     info = (okid_observer_info_t){.channel = -2};
     config.p = P;
+    config.ridge_min = 0;
     across = 0;
 }
 void tearDown(void) {}
@@ -170,7 +172,8 @@ static void sines(int of_first, int of_second, int alternates) {
         }
 }
 
-// A sine is two directions, what alternates one. More than four of each input are wanted, more than p of a short observer.
+// A sine is two directions, what alternates one. More than four of each input are wanted, more than p of a short
+// observer.
 static void as_many_directions_are_wanted_as_leave_none_to_chance(void) {
     okid_status_t (*const solvers[])(void) = {by_gram, by_factor, by_sums};
     static const struct {
@@ -187,10 +190,49 @@ static void as_many_directions_are_wanted_as_leave_none_to_chance(void) {
     }
 }
 
+/// Sum over the rows of regressor k times regressor l, k = REGRESSORS: the output.
+static double product(int k, int l) {
+    const int place[2] = {k < NU                   ? k
+                          : k == NU + config.p * M ? NU
+                                                   : k + NY,
+                          l < NU                   ? l
+                          : l == NU + config.p * M ? NU
+                                                   : l + NY};
+    double sum = 0;
+    for (int n = config.p; n < N; ++n)
+        sum += samples[(n - place[0] / M) * M + place[0] % M] * samples[(n - place[1] / M) * M + place[1] % M];
+    return sum;
+}
+
+// (G + ridge D) theta = g: D is the diagonal of G, from the sums of one run that of each channel at lag 0.
+static void a_ridge_that_is_asked_for_is_used(void) {
+    okid_status_t (*const solvers[])(void) = {by_gram, by_factor, by_sums};
+    static const double ridges[] = {1e-6, 1e-3, 0.5};
+    make(1);
+    config.p = 3;
+    const int q = NU + config.p * M;
+    for (int r = 0; r < 3; ++r)
+        for (int solver = 0; solver < 3; ++solver) {
+            config.ridge_min = ridges[r];
+            TEST_ASSERT_EQUAL(OKID_OK, solvers[solver]());
+            TEST_ASSERT_EQUAL_DOUBLE(ridges[r], info.ridge);
+            for (int k = 0; k < q; ++k) {
+                const double size = product(k, k), wanted = product(k, q);
+                const int channel = k < NU ? k : (k + NY) % M;
+                double power = size, left = -wanted;
+                if (solver == 2) power = product(channel < NU ? channel : q, channel < NU ? channel : q);
+                for (int l = 0; l < q; ++l) left += product(k, l) * (double)theta[l];
+                left += ridges[r] * power * (double)theta[k];
+                TEST_ASSERT_DOUBLE_WITHIN(1e-8 * sqrt(size * product(q, q)), 0, left);
+            }
+        }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(it_is_the_ratio_of_the_pivots);
     RUN_TEST(an_input_that_repeats_another_is_named_and_excites_nothing);
+    RUN_TEST(a_ridge_that_is_asked_for_is_used);
     RUN_TEST(impossible_sums_excite_nothing);
     RUN_TEST(as_many_directions_are_wanted_as_leave_none_to_chance);
     return UNITY_END();
