@@ -128,6 +128,25 @@ static void test_an_edge_that_is_reported_late_is_looked_up(void) {
     TEST_ASSERT_TRUE(ahead.add(1, row, 1, 2000));
 }
 
+/// An edge before the first sample is that sample's. One of longer ago than a second is that of the oldest one kept.
+static void test_an_edge_before_the_oldest_sample(void) {
+    trigger young(make_config(trigger_source::gpio, DRV_GPIO_RISING));
+    trigger old(make_config(trigger_source::gpio, DRV_GPIO_RISING));
+    const double row[] = {1, 1};
+    for (std::int64_t n = 0; n <= 400; ++n) {
+        if (n < 50) {
+            TEST_ASSERT_FALSE(young.add(n, row, 1, 10000000 * (n + 1)));
+        }
+        TEST_ASSERT_FALSE(old.add(n, row, 1, 10000000 * (n + 1)));
+    }
+    for (trigger* one : {&young, &old}) {
+        one->edge(5000000);
+        TEST_ASSERT_TRUE(one->look_back());
+        TEST_ASSERT_EQUAL_INT64(one == &old ? 300 : 0, one->sample()); // a second ago
+        TEST_ASSERT_EQUAL_INT64(5000000, one->time_ns());
+    }
+}
+
 /// 0.2 s at 100 Hz: twenty samples before that of the trigger, and that one.
 static void test_the_samples_before_a_level(void) {
     trigger one(make_config(trigger_source::level, DRV_GPIO_RISING, 0.2));
@@ -216,6 +235,7 @@ int main(void) {
     RUN_TEST(test_a_missing_sample_does_not_hide_a_crossing);
     RUN_TEST(test_an_edge_belongs_to_the_first_sample_that_is_not_before_it);
     RUN_TEST(test_an_edge_that_is_reported_late_is_looked_up);
+    RUN_TEST(test_an_edge_before_the_oldest_sample);
     RUN_TEST(test_the_samples_before_a_level);
     RUN_TEST(test_the_samples_before_an_edge_of_a_second_ago);
     RUN_TEST(test_a_pause_before_the_trigger);
