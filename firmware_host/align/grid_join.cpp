@@ -93,7 +93,7 @@ bool grid::placed_by_time() const {
     const lane* root = nullptr;
     for (const auto& [which, frame] : held_) {
         const lane& l = lanes_[static_cast<std::size_t>(which)];
-        std::uint64_t counter = 0, first = 0;
+        std::uint64_t counter{}, first{};
         if (!read_counter(l, frame, counter)) return true;
         if (!root) root = &l;
         if (&l == root) continue;
@@ -131,7 +131,7 @@ void grid::gather_starts(std::vector<lane_start>& starts) {
         const auto w = static_cast<std::size_t>(which);
         lane& l = lanes_[w];
         lane_start& its = starts[w];
-        std::uint64_t counter = 0;
+        std::uint64_t counter{};
         const bool counted = read_counter(l, frame, counter);
         if (!l.heard) {
             l.last = 0;
@@ -250,7 +250,7 @@ void grid::settle_start(lane& l, const lane_start& start) {
 /// A lane that is first heard when the grid has begun. With the counter of another lane it has its place; else its frames
 /// wait until they tell its line.
 void grid::join(lane& l, const drv_frame_t& frame) {
-    std::uint64_t counter = 0;
+    std::uint64_t counter{};
     if (l.page < 0 && read_counter(l, frame, counter))
         for (const lane& other : lanes_)
             if (l.page < 0 && other.heard && one_message(l, other)) find_page(l, counter, other, other.counter);
@@ -279,7 +279,7 @@ void grid::end_joining(lane& l) {
     std::int64_t number = 0;
     read_counter(l, frames.front(), l.counter);
     for (const late_frame& frame : frames) {
-        std::uint64_t counter = 0;
+        std::uint64_t counter{};
         if (read_counter(l, frame, counter)) {
             const std::int64_t step = step_of(l, l.counter, counter);
             if (step < 0 || step > window_) continue;

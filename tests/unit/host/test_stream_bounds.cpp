@@ -54,9 +54,10 @@ std::string codes_of(const stream_check& check) {
     return out;
 }
 
-/// What is said of so many frames whose counter rises by one in `good` steps and by two in the others.
-std::string of_counter(std::int64_t frames, std::int64_t good) {
-    const live_config config = make_config(true, bits_at(16, 16, true));
+/// What is said of so many frames whose counter rises by one in `good` steps and by two in the others; `page`: of a multiplexed message.
+std::string of_counter(std::int64_t frames, std::int64_t good, bool page) {
+    live_config config = make_config(true, bits_at(16, 16, true));
+    if (page) config.channels[0].selectors.push_back({bits_at(48, 8, false), {{0, 0}}});
     stream_check check(config);
     const drv_signal_t counter = bits_at(0, 16, false);
     std::int64_t at = 65500;
@@ -107,11 +108,14 @@ static void test_a_message_is_judged_by_its_first_2000_frames(void) {
 }
 
 static void test_a_counter_counts_at_half_of_200_steps(void) {
-    TEST_ASSERT_EQUAL_STRING("", of_counter(200, 0).c_str()); // 199 steps say nothing
-    TEST_ASSERT_EQUAL_STRING("counter_erratic ", of_counter(201, 0).c_str());
-    TEST_ASSERT_EQUAL_STRING("counter_erratic ", of_counter(201, 99).c_str());
-    TEST_ASSERT_EQUAL_STRING("", of_counter(201, 100).c_str());
-    TEST_ASSERT_EQUAL_STRING("", of_counter(201, 200).c_str());
+    for (const bool page : {false, true}) {
+        TEST_ASSERT_EQUAL_STRING("counter_erratic ", of_counter(201, 99, page).c_str());
+        TEST_ASSERT_EQUAL_STRING("", of_counter(200, 99, page).c_str()); // 199 steps say nothing
+        TEST_ASSERT_EQUAL_STRING("", of_counter(201, 100, page).c_str());
+        TEST_ASSERT_EQUAL_STRING("", of_counter(201, 200, page).c_str());
+    }
+    TEST_ASSERT_EQUAL_STRING("counter_erratic ", of_counter(201, 0, false).c_str());
+    TEST_ASSERT_EQUAL_STRING("", of_counter(201, 0, true).c_str()); // its counter counts two pages
 }
 
 /// More than half the range at more than a tenth of the steps, though most codes are in the middle.
@@ -128,7 +132,8 @@ static void test_jumps_at_a_tenth_of_the_steps(void) {
     TEST_ASSERT_EQUAL_STRING("", of_codes(positive, jumps(80, 16384, 49152), 32768, 201).c_str());
     TEST_ASSERT_EQUAL_STRING("code_jumps ", of_codes(positive, jumps(80, 16383, 49152), 32768, 201).c_str());
     TEST_ASSERT_EQUAL_STRING(
-        "", of_codes(signal, jumps(80, -20000, 20000), 0, 201, channel_role::aux).c_str()); // no signal
+        "", of_codes(signal, jumps(80, -20000, 20000), 0, 201, channel_role::aux).c_str());        // no signal
+    TEST_ASSERT_EQUAL_STRING("", of_codes(positive, jumps(20, 60000, 10000), 32768, 201).c_str()); // the first is none
 }
 
 /// A sign that is misread: ten jumps, and fewer codes in the middle half of the range than that.
