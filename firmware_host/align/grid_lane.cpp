@@ -44,13 +44,16 @@ void grid::move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool p
 
 void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
     const std::int64_t step = step_of(l, l.counter, counter);
-    if (step <= 0 && (step >= -reorder_ || awaited(l, l.last + step))) { // again, or late
+    const bool behind = step <= 0 && (step >= -reorder_ || awaited(l, l.last + step)); // again, or late
+    // Behind a silence of more frames than may be out of order it is neither, if the counter went round.
+    const bool silent = static_cast<double>(frame.time_ns - l.time_ns) > static_cast<double>(reorder_) * period_ns_;
+    std::int64_t whole = step;
+    const bool timed = (!behind || silent) && count_rounds(l, frame, whole);
+    if (behind && !timed) {
         doubt_suspect(l);
         insert(l, l.last + step, frame);
         return;
     }
-    std::int64_t whole = step;
-    const bool timed = count_rounds(l, frame, whole);
     if (!timed && (step < 0 || step > (l.loss ? window_ : reorder_))) {
         judge_jump(l, frame, counter);
         return;

@@ -209,7 +209,7 @@ static void test_the_cause_of_several(void) {
 /// A counter of eight bits that went round many times: behind a known loss, or a silence of more than five seconds, the
 /// clock tells how often, though the frame may be late or early by less than half a round.
 static void test_rounds_of_the_counter_by_the_clock(void) {
-    for (const std::int64_t pause : {300, 1000, 4000, 5200, 9000, 60000})
+    for (const std::int64_t pause : {255, 300, 500, 1000, 4000, 5200, 5365, 5375, 9000, 60000})
         for (const double off : {-100.0, 0.0, 100.0})
             for (const bool said : {false, true}) {
                 if (!said && static_cast<double>(pause) + off < 5000) continue;
@@ -222,6 +222,19 @@ static void test_rounds_of_the_counter_by_the_clock(void) {
                     s.send(0, n, n, static_cast<double>(n) + std::max(0.0, off));
                 s.check(next + 100, pause, text.c_str());
             }
+}
+
+/// Counters of three and four bits, whatever they stand at behind a silence: no frame behind it is late or a double.
+static void test_any_round_of_a_short_counter(void) {
+    for (const unsigned bits : {3U, 4U, 5U})
+        for (std::int64_t pause = 6000; pause < 6032; ++pause) {
+            if (pause % (std::int64_t{1} << bits) == 0) continue; // it counts on by one: the clock may have been set
+            stream s(1, bits);
+            s.samples(0, 100);
+            s.samples(100 + pause, 200 + pause);
+            s.check(200 + pause, pause, std::to_string(pause).c_str());
+            TEST_ASSERT_EQUAL_UINT64(0, s.on.bus(0).duplicate + s.on.bus(0).out_of_order);
+        }
 }
 
 /// Nothing confirms the last frame: ahead within a quarter of a second it is believed, else it is damage.
@@ -260,6 +273,7 @@ int main(void) {
     RUN_TEST(test_losses_of_every_length);
     RUN_TEST(test_the_cause_of_several);
     RUN_TEST(test_rounds_of_the_counter_by_the_clock);
+    RUN_TEST(test_any_round_of_a_short_counter);
     RUN_TEST(test_a_last_frame_that_is_off);
     RUN_TEST(test_a_sender_that_starts_again);
     return UNITY_END();
