@@ -38,14 +38,14 @@ struct recorder : grid_sink {
     void on_gap(const grid_gap& gap) override { gaps.push_back(gap); }
 };
 
-/// Some lanes of 1000 Hz, each with a counter of so many bits and a number.
+/// Some lanes of one rate, each with a counter of so many bits and a number.
 struct stream {
     live_config config;
     recorder out;
     grid on;
-    static live_config config_of(std::size_t lanes, unsigned bits) {
+    static live_config config_of(std::size_t lanes, unsigned bits, double rate_hz) {
         live_config config;
-        config.rate_hz = 1000;
+        config.rate_hz = rate_hz;
         config.buses.resize(1);
         for (std::size_t i = 0; i < lanes; ++i) {
             channel_config channel;
@@ -57,15 +57,18 @@ struct stream {
         }
         return config;
     }
-    stream(std::size_t lanes, unsigned bits) : config(config_of(lanes, bits)), on(config, out) { out.width = lanes; }
+    stream(std::size_t lanes, unsigned bits, double rate_hz = 1000)
+        : config(config_of(lanes, bits, rate_hz)), on(config, out) {
+        out.width = lanes;
+    }
 
-    /// The sample, whose counter is the same; its stamp is that of `at`.
+    /// The sample, whose counter is the same; its stamp is that of `at`, samples.
     void send(std::size_t lane, std::int64_t counter, std::int64_t number, double at, std::uint8_t loss = 0) {
         drv_frame_t frame{};
         frame.id = static_cast<std::uint32_t>(0x100 + lane);
         frame.len = 8;
         frame.loss = loss;
-        frame.time_ns = day_ns + std::llround(at * 1e6) + static_cast<std::int64_t>(lane) * 40000;
+        frame.time_ns = day_ns + std::llround(at * 1e9 / config.rate_hz) + static_cast<std::int64_t>(lane) * 40000;
         const drv_signal_t& its = *config.channels[lane].sequence;
         drv_signal_put(&its, frame.data, 8, counter & ((std::int64_t{1} << its.length) - 1));
         drv_signal_put(&config.channels[lane].layout, frame.data, 8, number);
@@ -250,6 +253,48 @@ static void test_a_last_frame_that_is_off(void) {
     }
 }
 
+/// Losses with a sample between them: each has the cause that was reported with it.
+static void test_causes_of_losses_close_together(void) {
+    const unsigned said[] = {DRV_LOSS_OVERFLOW, 0, DRV_LOSS_DRIVER, DRV_LOSS_LINK, 0, 0, DRV_LOSS_CRC};
+    const gap_cause causes[] = {
+        gap_cause::socket_overflow, gap_cause::sequence, gap_cause::driver, gap_cause::link_down,
+        gap_cause::sequence,        gap_cause::sequence, gap_cause::crc};
+    stream s(1, 16);
+    s.samples(0, 100);
+    for (std::int64_t k = 0; k < 70; ++k) s.sample(101 + 2 * k, static_cast<std::uint8_t>(said[k % 7]));
+    s.check(240, 70, "close together");
+    TEST_ASSERT_EQUAL_UINT64(70, s.out.gaps.size());
+    for (std::size_t k = 0; k < 70; ++k) TEST_ASSERT_TRUE(s.out.gaps[k].cause == causes[k % 7]);
+}
+
+/// Two frames ahead of all by a quarter of a second at most are what is left of a bad bus; one beyond it needs another.
+static void test_two_frames_far_ahead(void) {
+    for (const std::int64_t ahead : {40, 249, 250, 251, 252}) {
+        stream s(1, 16);
+        const std::string text = "ahead by " + std::to_string(ahead);
+        s.samples(0, 100);
+        s.sample(79 + ahead);
+        s.samples(99 + ahead, 200 + ahead);
+        const bool damaged = ahead > 250;
+        s.check(200 + ahead, damaged ? ahead - 1 : ahead - 2, text.c_str());
+        TEST_ASSERT_EQUAL_UINT64_MESSAGE(damaged ? 1 : 0, s.on.bus(0).decode_errors, text.c_str());
+    }
+}
+
+/// A double of an old frame behind a silence that is longer than six seconds is a double, and the silence a gap.
+static void test_an_old_frame_behind_a_silence(void) {
+    for (const std::int64_t old : {99, 98, 90}) {
+        stream s(1, 16, 10);
+        const std::string text = "frame " + std::to_string(old);
+        s.samples(0, 100);
+        s.send(0, old, old, 161.5);
+        s.samples(162, 300);
+        s.check(300, 62, text.c_str());
+        TEST_ASSERT_EQUAL_UINT64_MESSAGE(1, s.on.bus(0).duplicate, text.c_str());
+        TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, s.on.bus(0).decode_errors, text.c_str());
+    }
+}
+
 /// A sender that counts from elsewhere on: two frames that agree say so, and the clock says how long it was away.
 static void test_a_sender_that_starts_again(void) {
     for (const std::int64_t away : {1, 2, 3, 50, 1000})
@@ -274,6 +319,9 @@ int main(void) {
     RUN_TEST(test_the_cause_of_several);
     RUN_TEST(test_rounds_of_the_counter_by_the_clock);
     RUN_TEST(test_any_round_of_a_short_counter);
+    RUN_TEST(test_causes_of_losses_close_together);
+    RUN_TEST(test_two_frames_far_ahead);
+    RUN_TEST(test_an_old_frame_behind_a_silence);
     RUN_TEST(test_a_last_frame_that_is_off);
     RUN_TEST(test_a_sender_that_starts_again);
     return UNITY_END();
