@@ -267,6 +267,28 @@ static void test_causes_of_losses_close_together(void) {
     for (std::size_t k = 0; k < 70; ++k) TEST_ASSERT_TRUE(s.out.gaps[k].cause == causes[k % 7]);
 }
 
+/// What was said of a loss is remembered while its sample waits for another lane.
+static void test_a_cause_is_remembered_while_the_sample_waits(void) {
+    stream s(2, 16);
+    s.samples(0, 100);
+    s.send(0, 103, 103, 103, DRV_LOSS_OVERFLOW);
+    for (std::int64_t n = 104; n < 600; ++n) s.send(0, n, n, static_cast<double>(n));
+    for (std::int64_t n = 100; n < 600; ++n) s.send(1, n, n, 600);
+    s.check(600, 3, "waits");
+    TEST_ASSERT_EQUAL_UINT64(1, s.out.gaps.size());
+    TEST_ASSERT_TRUE(s.out.gaps[0].cause == gap_cause::socket_overflow);
+}
+
+/// Behind a long silence the clock may be off by a fifth of it: it tells the rounds of the counter, not the samples.
+static void test_a_long_silence_by_a_clock_that_is_off(void) {
+    for (const std::int64_t off : {-9000, 9000}) {
+        stream s(1, 16);
+        s.samples(0, 100);
+        for (std::int64_t n = 60100; n < 60200; ++n) s.send(0, n, n, static_cast<double>(n + off));
+        s.check(60200, 60000, off > 0 ? "late" : "early");
+    }
+}
+
 /// Two frames ahead of all by a quarter of a second at most are what is left of a bad bus; one beyond it needs another.
 static void test_two_frames_far_ahead(void) {
     for (const std::int64_t ahead : {40, 249, 250, 251, 252}) {
@@ -322,6 +344,8 @@ int main(void) {
     RUN_TEST(test_causes_of_losses_close_together);
     RUN_TEST(test_two_frames_far_ahead);
     RUN_TEST(test_an_old_frame_behind_a_silence);
+    RUN_TEST(test_a_cause_is_remembered_while_the_sample_waits);
+    RUN_TEST(test_a_long_silence_by_a_clock_that_is_off);
     RUN_TEST(test_a_last_frame_that_is_off);
     RUN_TEST(test_a_sender_that_starts_again);
     return UNITY_END();
