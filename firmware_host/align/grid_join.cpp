@@ -37,10 +37,10 @@ std::int64_t kinship(unsigned bits) { return bits >= 9 ? 64 : std::max<std::int6
 void lane_start::add(std::int64_t number, std::int64_t time_ns, std::int64_t middle_ns, double period_ns) {
     if (frames == 0) first_ns = newest_ns = time_ns;
     const double late_ns = static_cast<double>(time_ns - first_ns) - static_cast<double>(number) * period_ns;
-    if (frames > 0 && static_cast<double>(time_ns - newest_ns) >= close_by * period_ns) {
+    if (static_cast<double>(time_ns - newest_ns) >= close_by * period_ns) {
         // The frame before this one was the last of its burst.
         spread_ns[0] = ends == 0 ? end_ns : std::min(spread_ns[0], end_ns);
-        spread_ns[1] = ends == 0 ? end_ns : std::max(spread_ns[1], std::min(end_ns, spread_ns[0] + period_ns));
+        spread_ns[1] = ends == 0 ? end_ns : std::max(spread_ns[1], end_ns);
         ++ends;
     }
     end_ns = late_ns;
@@ -263,6 +263,7 @@ void grid::join(lane& l, const drv_frame_t& frame) {
         insert(l, l.last, frame);
         return;
     }
+    l.gone = false;
     late_lanes_ += l.late.empty();
     l.late.push_back({frame, 0});
     const bool gathered = static_cast<double>(frame.time_ns - l.late.front().time_ns) > gather_ns();

@@ -173,6 +173,31 @@ static void test_a_lane_that_never_comes(void) {
             }
 }
 
+/// One that is first heard when the grid has long begun, before or after the others ceased to wait: by its counter where that
+/// is one of theirs, else by the line of its first frames.
+static void test_a_lane_that_comes_late(void) {
+    for (const int kind : {0, 1, 2}) // no counters, counters that have nothing in common, one counter
+        for (std::size_t which = 0; which < 3; ++which)
+            for (const std::int64_t first : {2500, 9000}) {
+                std::vector<sender> senders(3);
+                for (std::size_t i = 0; i < 3; ++i) {
+                    senders[i].bus = i % 2;
+                    if (kind > 0) senders[i].counter = static_cast<std::int64_t>(kind == 1 ? 100 + 15000 * i : 5000);
+                }
+                senders[which].first = first;
+                recorder out;
+                play(senders, 12000, out);
+                char text[80];
+                std::snprintf(text, sizeof text, "%zu comes at %lld, kind %d", which, static_cast<long long>(first),
+                              kind);
+                TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.base, text);
+                TEST_ASSERT_EQUAL_INT64_MESSAGE(0, out.wrong, text);
+                TEST_ASSERT_EQUAL_INT64_MESSAGE(first, out.holes, text);
+                TEST_ASSERT_EQUAL_INT64_MESSAGE(first, out.marked, text);
+                TEST_ASSERT_EQUAL_INT64_MESSAGE(12000, out.rows, text);
+            }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_counters_that_have_nothing_in_common);
@@ -180,5 +205,6 @@ int main(void) {
     RUN_TEST(test_lanes_without_a_counter);
     RUN_TEST(test_lanes_with_a_counter_beside_those_without);
     RUN_TEST(test_a_lane_that_never_comes);
+    RUN_TEST(test_a_lane_that_comes_late);
     return UNITY_END();
 }
