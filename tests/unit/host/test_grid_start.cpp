@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Where the grid begins: lanes of several counters, buses and none, each heard from another sample on. Sample 0 is the first
-// one that every lane can have, and every number stands in its row from there on, whichever lane is heard first.
+// Where the grid begins: lanes of several counters, buses and none, each heard from another sample on. Sample 0 is the
+// first one that every lane can have, and every number stands in its row from there on, whichever lane is heard first.
 #include "align/grid.hpp"
 
 #include <algorithm>
@@ -173,8 +173,8 @@ static void test_a_lane_that_never_comes(void) {
             }
 }
 
-/// One that is first heard when the grid has long begun, before or after the others ceased to wait: by its counter where that
-/// is one of theirs, else by the line of its first frames.
+/// One that is first heard when the grid has long begun, before or after the others ceased to wait: by its counter
+/// where that is one of theirs, else by the line of its first frames.
 static void test_a_lane_that_comes_late(void) {
     for (const int kind : {0, 1, 2}) // no counters, counters that have nothing in common, one counter
         for (std::size_t which = 0; which < 3; ++which)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// How long a sample waits: for a silent lane, for the memory there is, and for a loss without a counter to be believed. And
-// what a stream without any jitter tells: each loss at its place, with its cause, and how well the place is known.
+// How long a sample waits: for a silent lane, for the memory there is, and for a loss without a counter to be
+// believed. And what a stream without any jitter tells: each loss at its place, with its cause, and how well the place
+// is known.
 #include "align/grid.hpp"
 
 #include <algorithm>
@@ -100,7 +101,8 @@ static void test_a_silent_lane_is_waited_for_six_seconds(void) {
     TEST_ASSERT_EQUAL_INT64(7000, out.gaps[0].count);
 }
 
-/// Of many channels at a high rate fewer samples wait. The ring has at most four times as many rows, and most_rows_bytes.
+/// Of many channels at a high rate fewer samples wait. The ring has at most four times as many rows, and
+/// most_rows_bytes.
 static void test_samples_wait_as_far_as_there_is_memory(void) {
     constexpr std::size_t lanes = 100;
     const live_config config = make_config(lanes, 10000, true);

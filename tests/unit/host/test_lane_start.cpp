@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the first frames of a lane tell of its place: the line of its earliest arrivals, and how late bursts are behind it.
+// What the first frames of a lane tell of its place: the line of its earliest arrivals, and how late bursts are behind
+// it.
 #include "align/grid.hpp"
 
 #include <cmath>
@@ -54,7 +55,8 @@ static void test_punctual_frames_are_due_when_they_come(void) {
     TEST_ASSERT_EQUAL_INT64(0, start.close);
 }
 
-/// Frame 3 comes in time, frame 0 with it: that was due three periods before. And who looks now and then is late by more.
+/// Frame 3 comes in time, frame 0 with it: that was due three periods before. And who looks now and then is late by
+/// more.
 static void test_the_last_of_a_packet_tells_when_the_first_was_due(void) {
     const lane_start start = start_of(packets(std::vector<double>(20, 0)));
     TEST_ASSERT_DOUBLE_WITHIN(close_to, 0, earliest(start));

@@ -54,7 +54,8 @@ std::string codes_of(const stream_check& check) {
     return out;
 }
 
-/// What is said of so many frames whose counter rises by one in `good` steps and by two in the others; `page`: of a multiplexed message.
+/// What is said of so many frames whose counter rises by one in `good` steps and by two in the others; `page`: of a
+/// multiplexed message.
 std::string of_counter(std::int64_t frames, std::int64_t good, bool page) {
     live_config config = make_config(true, bits_at(16, 16, true));
     if (page) config.channels[0].selectors.push_back({bits_at(48, 8, false), {{0, 0}}});
