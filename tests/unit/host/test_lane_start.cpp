@@ -94,6 +94,9 @@ static void test_two_halves(void) {
     TEST_ASSERT_DOUBLE_WITHIN(close_to, 2, halves(3, 4, 0.2));
     TEST_ASSERT_DOUBLE_WITHIN(close_to, 2, halves(4, 3, 0.2));
     TEST_ASSERT_DOUBLE_WITHIN(close_to, 2, halves(5, 0, 0.2));
+    // The earliest of each half, its first or not, is the one that counts.
+    TEST_ASSERT_DOUBLE_WITHIN(close_to, 2.1, earliest(start_of({2, 3.1, 4.1, 5.1, 6.2, 7.3, 8.3, 9.3}, 5.6)));
+    TEST_ASSERT_DOUBLE_WITHIN(close_to, 2.1, earliest(start_of({2, 3.1, 4.1, 5.1, 6.3, 7.3, 8.3, 9.2}, 5.6)));
 }
 
 /// A frame a quarter of a period behind another is by itself; more than a tenth that are not make a burst.
