@@ -243,7 +243,7 @@ std::vector<std::size_t> aligner::silent_channels() const {
 std::vector<clock_skew> aligner::skews() const {
     std::vector<clock_skew> out;
     if (origin_ < 0) return out;
-    double own_sigma_s = 0;
+    double own_sigma_s{};
     (void)clock_.time_ns(next_, &own_sigma_s);
     for (const auto& node : nodes_)
         for (const std::size_t c : node->channels())

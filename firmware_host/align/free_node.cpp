@@ -34,8 +34,8 @@ void sample_clock::add(std::int64_t index, std::int64_t time_ns) {
 }
 
 bool sample_clock::settled() const {
-    double sigma_s = 0;
-    std::int64_t at = 0;
+    double sigma_s{};
+    std::int64_t at{};
     if (fit_.points < 2 ||
         drv_clock_fit_map(&fit_, static_cast<std::uint64_t>(last_index_ * ticks_a_sample), &at, &sigma_s) != 0)
         return false;
@@ -43,7 +43,7 @@ bool sample_clock::settled() const {
 }
 
 std::int64_t sample_clock::time_ns(std::int64_t index, double* sigma_s) const {
-    std::int64_t out = 0;
+    std::int64_t out{};
     (void)drv_clock_fit_map(&fit_, static_cast<std::uint64_t>(index * ticks_a_sample), &out, sigma_s);
     return out;
 }
@@ -54,7 +54,7 @@ double sample_clock::index_at(std::int64_t time, double* sigma_s) const {
 }
 
 double sample_clock::rate_ppm() const {
-    double ppm = 0;
+    double ppm{};
     (void)drv_clock_fit_rate(&fit_, &ppm, nullptr);
     return ppm;
 }

@@ -124,7 +124,7 @@ bool grid::push_to_lanes(const drv_frame_t& frame, std::uint32_t mask) {
 }
 
 bool grid::decode(lane& l, const drv_frame_t& frame) {
-    std::int64_t raw = 0;
+    std::int64_t raw{};
     for (std::size_t i = 0; i < l.channels.size(); ++i) {
         const drv_signal_t& layout = channels_[l.channels[i]].layout;
         if (!drv_signal_raw(&layout, frame.data, frame.len, &raw)) return false;

@@ -162,7 +162,7 @@ void grid::settle(lane& l, std::int64_t now_ns, bool all) {
 /// All waiting frames are late.
 void grid::judge_late(lane& l, bool ended) {
     const double waited = static_cast<double>(l.late.back().heard_ns - l.late[l.placed].heard_ns) / period_ns_;
-    std::int64_t times = 0;
+    std::int64_t times{};
     const bool enough = waited > (ended ? cut_off * static_cast<double>(hold_) : l.patience);
     const bool alike = enough && bursts_alike(l, times);
     const std::size_t before = l.placed, waiting = l.late.size() - l.placed;
@@ -382,7 +382,7 @@ void grid::follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, do
     const bool tells = late_ns < longest_periods * period_ns_ && late_ns > -most_early * period_ns_;
     l.tail = tells || l.clock.points == 0 ? index : index + 1; // one that is too late or too early is no tail
     l.tail_ns = frame.time_ns;
-    std::int64_t expected = 0;
+    std::int64_t expected{};
     if (l.ahead >= flicker_ends && 2 * l.frames < 3 * l.bursts && std::abs(l.tail_late + 1) < early_by_one) {
         slip(l, -1); // polls that are ever later against the samples have got one earlier
         l.ahead = 0;
@@ -394,7 +394,7 @@ void grid::follow_line(lane& l, const drv_frame_t& frame, std::int64_t index, do
         l.slip_at = never; // back again
         begin_cadence(l, static_cast<double>(frame.time_ns));
     } else if (drv_clock_fit_map(&l.clock, tick_of(index + l.slips), &expected, nullptr) == 0) {
-        double ppm = 0;
+        double ppm{};
         (void)drv_clock_fit_rate(&l.clock, &ppm, nullptr);
         l.beat_ns = period_ns_ * (1 + 1e-6 * ppm);
         const double early = static_cast<double>(expected - frame.time_ns) / period_ns_;

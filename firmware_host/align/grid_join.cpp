@@ -37,10 +37,10 @@ std::int64_t kinship(unsigned bits) { return bits >= 9 ? 64 : std::max<std::int6
 void lane_start::add(std::int64_t number, std::int64_t time_ns, std::int64_t middle_ns, double period_ns) {
     if (frames == 0) first_ns = newest_ns = time_ns;
     const double late_ns = static_cast<double>(time_ns - first_ns) - static_cast<double>(number) * period_ns;
-    if (frames > 0 && static_cast<double>(time_ns - newest_ns) >= close_by * period_ns) {
+    if (static_cast<double>(time_ns - newest_ns) >= close_by * period_ns) {
         // The frame before this one was the last of its burst.
         spread_ns[0] = ends == 0 ? end_ns : std::min(spread_ns[0], end_ns);
-        spread_ns[1] = ends == 0 ? end_ns : std::max(spread_ns[1], std::min(end_ns, spread_ns[0] + period_ns));
+        spread_ns[1] = ends == 0 ? end_ns : std::max(spread_ns[1], end_ns);
         ++ends;
     }
     end_ns = late_ns;
@@ -93,7 +93,7 @@ bool grid::placed_by_time() const {
     const lane* root = nullptr;
     for (const auto& [which, frame] : held_) {
         const lane& l = lanes_[static_cast<std::size_t>(which)];
-        std::uint64_t counter = 0, first = 0;
+        std::uint64_t counter{}, first{};
         if (!read_counter(l, frame, counter)) return true;
         if (!root) root = &l;
         if (&l == root) continue;
@@ -131,7 +131,7 @@ void grid::gather_starts(std::vector<lane_start>& starts) {
         const auto w = static_cast<std::size_t>(which);
         lane& l = lanes_[w];
         lane_start& its = starts[w];
-        std::uint64_t counter = 0;
+        std::uint64_t counter{};
         const bool counted = read_counter(l, frame, counter);
         if (!l.heard) {
             l.last = 0;
@@ -250,7 +250,7 @@ void grid::settle_start(lane& l, const lane_start& start) {
 /// A lane that is first heard when the grid has begun. With the counter of another lane it has its place; else its frames
 /// wait until they tell its line.
 void grid::join(lane& l, const drv_frame_t& frame) {
-    std::uint64_t counter = 0;
+    std::uint64_t counter{};
     if (l.page < 0 && read_counter(l, frame, counter))
         for (const lane& other : lanes_)
             if (l.page < 0 && other.heard && one_message(l, other)) find_page(l, counter, other, other.counter);
@@ -263,6 +263,7 @@ void grid::join(lane& l, const drv_frame_t& frame) {
         insert(l, l.last, frame);
         return;
     }
+    l.gone = false;
     late_lanes_ += l.late.empty();
     l.late.push_back({frame, 0});
     const bool gathered = static_cast<double>(frame.time_ns - l.late.front().time_ns) > gather_ns();
@@ -279,7 +280,7 @@ void grid::end_joining(lane& l) {
     std::int64_t number = 0;
     read_counter(l, frames.front(), l.counter);
     for (const late_frame& frame : frames) {
-        std::uint64_t counter = 0;
+        std::uint64_t counter{};
         if (read_counter(l, frame, counter)) {
             const std::int64_t step = step_of(l, l.counter, counter);
             if (step < 0 || step > window_) continue;

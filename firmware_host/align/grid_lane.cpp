@@ -14,14 +14,14 @@ constexpr double longest_pause_s = 5; // beyond it the clock says how often a co
 } // namespace
 
 bool grid::read_counter(const lane& l, const drv_frame_t& frame, std::uint64_t& counter) const {
-    std::int64_t raw = 0;
+    std::int64_t raw{};
     if (!l.sequence || !drv_signal_raw(&*l.sequence, frame.data, frame.len, &raw)) return false;
     counter = static_cast<std::uint64_t>(raw);
     return true;
 }
 
 void grid::place(lane& l, const drv_frame_t& frame) {
-    std::uint64_t counter = 0;
+    std::uint64_t counter{};
     if (!l.heard) {
         join(l, frame);
         return;
@@ -44,13 +44,16 @@ void grid::move_on(lane& l, const drv_frame_t& frame, std::int64_t index, bool p
 
 void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
     const std::int64_t step = step_of(l, l.counter, counter);
-    if (step <= 0 && (step >= -reorder_ || awaited(l, l.last + step))) { // again, or late
+    const bool behind = step <= 0 && (step >= -reorder_ || awaited(l, l.last + step)); // again, or late
+    // Behind a silence of more frames than may be out of order it is neither, if the counter went round.
+    const bool silent = static_cast<double>(frame.time_ns - l.time_ns) > static_cast<double>(reorder_) * period_ns_;
+    std::int64_t whole = step;
+    const bool timed = (!behind || silent) && count_rounds(l, frame, whole);
+    if (behind && !timed) {
         doubt_suspect(l);
         insert(l, l.last + step, frame);
         return;
     }
-    std::int64_t whole = step;
-    const bool timed = count_rounds(l, frame, whole);
     if (!timed && (step < 0 || step > (l.loss ? window_ : reorder_))) {
         judge_jump(l, frame, counter);
         return;
@@ -63,7 +66,7 @@ void grid::place_by_counter(lane& l, const drv_frame_t& frame, std::uint64_t cou
 
 /// The lane has come near the counter that was far off, or gone beyond it: it was right.
 void grid::recall_suspect(lane& l) {
-    std::uint64_t counter = 0;
+    std::uint64_t counter{};
     if (!l.suspected || !read_counter(l, l.suspect, counter)) return;
     const std::int64_t step = step_of(l, l.counter, counter);
     const drv_frame_t frame = l.suspect;
@@ -101,7 +104,7 @@ bool grid::count_rounds(const lane& l, const drv_frame_t& frame, std::int64_t& s
 /// A counter far off: one damaged frame, or did frames get lost, or did the sender jump or restart? Two frames that
 /// agree decide, in whichever order they came.
 void grid::judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter) {
-    std::uint64_t before = 0;
+    std::uint64_t before{};
     if (l.suspected) {
         read_counter(l, l.suspect, before);
         const std::int64_t apart = step_of(l, before, counter);
@@ -131,7 +134,7 @@ void grid::judge_jump(lane& l, const drv_frame_t& frame, std::uint64_t counter) 
 
 /// The lane goes on at this frame.
 void grid::accept_jump(lane& l, const drv_frame_t& frame) {
-    std::uint64_t counter = 0;
+    std::uint64_t counter{};
     read_counter(l, frame, counter);
     const std::int64_t step = step_of(l, l.counter, counter);
     const std::int64_t index = step > 0 ? l.last + step : place_restart(l, frame, counter);
@@ -142,7 +145,7 @@ void grid::accept_jump(lane& l, const drv_frame_t& frame) {
 
 /// The stream ends and nothing can confirm a jump any more: one ahead is taken for a loss, one back for damage.
 void grid::end_suspicion(lane& l) {
-    std::uint64_t counter = 0;
+    std::uint64_t counter{};
     if (!l.suspected || !read_counter(l, l.suspect, counter)) return;
     const std::int64_t step = step_of(l, l.counter, counter);
     if (step <= 0 || step > window_) {
@@ -155,7 +158,7 @@ void grid::end_suspicion(lane& l) {
 
 /// The sender's counter restarted: beside lanes that did so already, else by time, at least one sample apart.
 std::int64_t grid::place_restart(const lane& l, const drv_frame_t& frame, std::uint64_t counter) const {
-    std::int64_t index = 0;
+    std::int64_t index{};
     if (kin_of(l, counter, index) && index > l.last + 1) return index;
     const double pause = static_cast<double>(frame.time_ns - l.time_ns) / period_ns_;
     return l.last + (pause > 2 && pause < longest_silence_ns / period_ns_ ? std::llround(pause) : 2);

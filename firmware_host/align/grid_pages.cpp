@@ -18,8 +18,8 @@ constexpr double too_slow = 0.75;       // of the rate: pages that come more rar
 /// What a page's frames tell: how often its counter rose by what.
 struct page_steps {
     std::map<std::int64_t, std::int64_t> times;
-    std::uint64_t first = 0, newest = 0;
-    std::int64_t first_ns = 0, newest_ns = 0, frames = 0, sum = 0, steps = 0;
+    std::uint64_t first{}, newest{};
+    std::int64_t first_ns{}, newest_ns{}, frames = 0, sum = 0, steps = 0;
 
     void add(std::uint64_t counter, std::int64_t time_ns, unsigned bits) {
         if (frames++ == 0) {
@@ -79,7 +79,7 @@ void grid::find_strides() {
     std::vector<page_steps> seen(lanes_.size());
     for (const auto& [which, frame] : held_) {
         const auto w = static_cast<std::size_t>(which);
-        std::uint64_t counter = 0;
+        std::uint64_t counter{};
         if (lanes_[w].pages && read_counter(lanes_[w], frame, counter))
             seen[w].add(counter, frame.time_ns, lanes_[w].sequence->length);
     }

@@ -86,7 +86,7 @@ void stream_check::judge(message& one, const drv_frame_t& frame) {
     if (!std::all_of(one.selectors.begin(), one.selectors.end(), [&](const multiplexor& m) { return m.holds(frame); }))
         return;
     one.senders.set(frame.id & 0xFF);
-    std::int64_t raw = 0;
+    std::int64_t raw{};
     if (one.sequence && drv_signal_raw(&*one.sequence, frame.data, frame.len, &raw)) {
         const auto counter = static_cast<std::uint64_t>(raw);
         const std::uint64_t range = one.sequence->length < 64 ? (std::uint64_t{1} << one.sequence->length) - 1 : ~0ull;

@@ -286,6 +286,63 @@ static void test_decimation(void) {
     TEST_ASSERT_EQUAL_INT64(2000 - 64, to.channel(1).received);
 }
 
+/// What befell the frames of a node on its own clock is counted on its bus, beside what befell the reference.
+static void test_frames_of_a_node_are_counted_on_its_bus(void) {
+    world w{make_config(1000, false, true), {0, 1000, 0, 0}, {1, 1000, 0.4, 50}};
+    recorder out;
+    aligner to(w.config, out);
+    std::uint64_t received = 0;
+    const auto send = [&](const drv_frame_t& frame, std::size_t bus) {
+        received += bus;
+        to.push(frame);
+    };
+    drv_frame_t held{};
+    for (int n = 0; n < 3000; ++n, ++w.a.next, ++w.b.next) {
+        send(w.a.frame(w.config, 0, 0), 0);
+        if (n == 500) send(w.a.frame(w.config, 0, 0), 0); // the reference, twice
+        const drv_frame_t frame = w.b.frame(w.config, 0, 0);
+        if (n % 100 == 50) {
+            held = frame;
+            continue;
+        }
+        send(frame, 1);
+        if (n % 100 == 51) send(held, 1); // late by one
+        if (n % 200 == 20) send(frame, 1);
+        drv_frame_t cut = frame;
+        cut.len = 6;
+        if (n % 1000 == 33) send(cut, 1);
+    }
+    to.finish();
+    TEST_ASSERT_EQUAL_UINT64(3001, to.bus(0).received);
+    TEST_ASSERT_EQUAL_UINT64(1, to.bus(0).duplicate);
+    TEST_ASSERT_EQUAL_UINT64(0, to.bus(0).out_of_order + to.bus(0).decode_errors);
+    TEST_ASSERT_EQUAL_UINT64(received, to.bus(1).received);
+    TEST_ASSERT_EQUAL_UINT64(15, to.bus(1).duplicate);
+    TEST_ASSERT_EQUAL_UINT64(30, to.bus(1).out_of_order);
+    TEST_ASSERT_EQUAL_UINT64(0, to.bus(1).too_late);
+    TEST_ASSERT_EQUAL_UINT64(3, to.bus(1).decode_errors);
+}
+
+/// Channels are named by their place in the configuration, whichever of them is the reference.
+static void test_silent_channels_of_a_node_and_of_the_reference(void) {
+    for (const bool first_is_free : {false, true})
+        for (int heard = 0; heard < 4; ++heard) {
+            world w{make_config(1000, first_is_free, !first_is_free), {0, 1000, 0, 0}, {1, 1000, 0.4, 0}};
+            recorder out;
+            aligner to(w.config, out);
+            for (int n = 0; n < 50; ++n, ++w.a.next, ++w.b.next) {
+                if (heard & 1) to.push(w.a.frame(w.config, 0, 0));
+                if (heard & 2) to.push(w.b.frame(w.config, 0, 0));
+            }
+            to.finish();
+            std::vector<std::size_t> silent;
+            for (std::size_t c = 0; c < 2; ++c)
+                if (!(heard >> c & 1)) silent.push_back(c);
+            TEST_ASSERT_TRUE(silent == to.silent_channels());
+            TEST_ASSERT_EQUAL_UINT64(0, to.skews().size()); // nothing has begun
+        }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_the_filter_passes_its_band_and_nothing_beside_it);
@@ -295,5 +352,7 @@ int main(void) {
     RUN_TEST(test_a_node_that_falls_silent_and_comes_back);
     RUN_TEST(test_all_nodes_on_their_own_clocks_at_two_rates);
     RUN_TEST(test_decimation);
+    RUN_TEST(test_frames_of_a_node_are_counted_on_its_bus);
+    RUN_TEST(test_silent_channels_of_a_node_and_of_the_reference);
     return UNITY_END();
 }

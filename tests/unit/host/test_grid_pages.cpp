@@ -48,7 +48,7 @@ live_config make_config(std::uint64_t first, std::size_t pages, unsigned bits, b
 }
 
 struct rows : grid_sink {
-    std::int64_t wrong = 0, base = -1;
+    std::int64_t wrong = 0, base = -1, bulk = 0;
     std::vector<std::vector<double>> all;
     std::size_t width = 0;
     void on_sample(std::int64_t index, const double* row) override {
@@ -59,7 +59,7 @@ struct rows : grid_sink {
             wrong += static_cast<std::int64_t>(row[i]) != base + index;
         }
     }
-    void on_missing(std::int64_t, std::int64_t count) override { wrong += count; }
+    void on_missing(std::int64_t, std::int64_t count) override { wrong += count, bulk += count; }
     void on_gap(const grid_gap& gap) override { marked += gap.count; }
     std::int64_t marked = 0;
 };
@@ -176,6 +176,25 @@ void test_a_page_of_half_the_rate(void) {
     TEST_ASSERT_EQUAL_INT64(499, out.marked);
 }
 
+/// A silence in which a counter of frames, of eight bits, went round many times: the clock tells how often.
+void test_a_pause_of_all_pages(void) {
+    for (const std::int64_t pause : {2600, 3000, 3033, 20000}) {
+        const live_config config = make_config(0, 4, 8, false);
+        rows out;
+        out.width = 4;
+        grid on(config, out);
+        node one;
+        one.bits = 8;
+        for (std::int64_t n = 0; n < 700 + pause; ++n)
+            for (std::size_t page = 0; page < 4; ++page)
+                if (n < 400 || n >= 400 + pause) on.push(one.frame(n, page));
+        on.finish();
+        TEST_ASSERT_EQUAL_INT64(4 * pause, out.marked);
+        TEST_ASSERT_EQUAL_INT64(out.bulk, out.wrong); // what is missing in one piece
+        TEST_ASSERT_EQUAL_INT64(700 + pause, static_cast<std::int64_t>(out.all.size()) + out.bulk);
+    }
+}
+
 } // namespace
 
 int main(void) {
@@ -184,5 +203,6 @@ int main(void) {
     RUN_TEST(test_losses_are_those_that_were_made);
     RUN_TEST(test_some_pages);
     RUN_TEST(test_a_page_of_half_the_rate);
+    RUN_TEST(test_a_pause_of_all_pages);
     return UNITY_END();
 }
