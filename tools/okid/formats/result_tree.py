@@ -51,7 +51,8 @@ def _matrices(part: Mapping[str, Any] | None) -> dict[str, Any]:
 
 
 def mode_arrays(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers of MODE_NUMBERS (n,), confident as 1 or 0, NaN for what is not known; shapes (outputs or shape_dofs, n)."""
+    """The numbers of MODE_NUMBERS (n,), confident as 1 or 0, NaN for what is not known; shapes (outputs or shape_dofs,
+    n)."""
     modes = raw["modes"]
     out: dict[str, Any] = {key: np.array([_float(mode.get(key)) for mode in modes]) for key in MODE_NUMBERS}
     shapes = [np.array(mode["shape_re"], float) + 1j * np.array(mode["shape_im"], float) for mode in modes]

@@ -25,7 +25,7 @@ def _rows(modes: Sequence[Mode]) -> list[dict[str, Any]]:
 class ModalTable(list[dict[str, Any]]):
     """A row a mode, ascending in frequency: mode (from 1), frequency_hz, frequency_std_hz, damping_ratio,
     damping_ratio_std, mpc, emac, cmi, confident, found_in, modal_mass, modal_mass_std (kg), why (codes); None = not
-    known. str() and notebooks show it with the warnings of the result, and without the modes that "auto" lists as doubtful.
+    known. str() and notebooks show it with the warnings of the result, without the modes that "auto" lists as doubtful.
 
     >>> import okid
     >>> table = okid.ModalTable([okid.Mode(10.96, 0.012, None, 0.99, 0.98)], "one mode")

@@ -31,11 +31,11 @@ def _optional(nested: Any) -> Real | None:
     return None if nested is None else numbers(nested)
 
 
-# The numbers of a mode, in the order of tables: keys of okid.result/1 and fields of Mode. Its checks, ModalTable, .mat and
-# HDF5 follow this list.
+# The numbers of a mode, in the order of tables: keys of okid.result/1 and fields of Mode. Its checks, ModalTable, .mat
+# and HDF5 follow this list.
 MODE_NUMBERS = (
-    "frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac", "cmi", "confident", "found_in",
-    "modal_mass", "modal_mass_std",
+    "frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "mpc", "emac", "cmi", "confident",
+    "found_in", "modal_mass", "modal_mass_std",
 )  # fmt: skip
 
 
