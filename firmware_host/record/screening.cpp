@@ -173,6 +173,10 @@ std::size_t usable(const output_view& y) {
     return out;
 }
 
+bool too_few(std::size_t samples, std::size_t of) {
+    return static_cast<double>(samples) < (1 - share_lost) * static_cast<double>(of);
+}
+
 /// An output that never moves in any record.
 bool is_dead(const record_set& set, std::size_t output) {
     double low = INFINITY, high = -INFINITY;
@@ -225,8 +229,9 @@ std::vector<fault> screen(const output_view& y, const force_times& forces) {
 
 /// What is wrong with an output over all records.
 struct output_faults {
-    bool dead = false; ///< it never moves
-    bool lost = false; ///< too much of it is faulty
+    bool dead = false;   ///< it never moves
+    bool lost = false;   ///< too much of it is faulty
+    bool sparse = false; ///< another has far more usable samples
     std::map<std::string_view, std::vector<fault>> of_kind;
     std::size_t usable = 0; ///< samples, as if it stood alone
 };
@@ -243,7 +248,7 @@ output_faults faults_of(record_set& set, std::size_t output, const std::vector<f
         for (fault& found : screen(view, forces[r])) out.of_kind[found.kind].push_back(std::move(found));
         out.usable += usable(view);
     }
-    out.lost = !out.of_kind.empty() && static_cast<double>(out.usable) < (1 - share_lost) * static_cast<double>(before);
+    out.lost = !out.of_kind.empty() && too_few(out.usable, before);
     return out;
 }
 
@@ -260,11 +265,11 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
         found.push_back(faults_of(set, k, forces));
         best = std::max(best, found[k].usable);
     }
-    // only complete rows with complete lags are used: an output with many gaps would cost the others their samples
-    const auto sparse = [best](const output_faults& one) {
-        return static_cast<double>(one.usable) < (1 - share_lost) * static_cast<double>(best);
-    };
-    for (const output_faults& one : found) out.kept.push_back(!one.dead && !one.lost && !sparse(one));
+    for (output_faults& one : found) {
+        // only complete rows with complete lags are used: an output with many gaps would cost the others their samples
+        one.sparse = !one.dead && !one.lost && too_few(one.usable, best);
+        out.kept.push_back(!one.dead && !one.lost && !one.sparse);
+    }
     const bool none = std::none_of(out.kept.begin(), out.kept.end(), [](bool kept) { return kept; });
     if (none) out.kept.assign(outputs.size(), true); // nothing else is there: the clean samples have to do
     const auto say = [&out](std::string text) { out.said.emplace_back("screened", std::move(text)); };
@@ -275,7 +280,7 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
                 (found[k].lost && !none ? lost_words : ": left out as gaps, nothing is interpolated"));
     }
     for (std::size_t k = 0; k < outputs.size() && !none; ++k)
-        if (!found[k].dead && !found[k].lost && sparse(found[k]))
+        if (found[k].sparse)
             say(fmt::format("output \"{}\": samples missing so often that only {} have {} complete ones before them, "
                             "of another output {}{}",
                             outputs[k], found[k].usable, clean_lags, best, lost_words));

@@ -13,6 +13,7 @@
 #include "change.hpp"
 
 #include "f_distribution.hpp"
+#include "identify/triangular.hpp"
 #include "linalg/arena.hpp"
 #include "linalg/linalg.hpp"
 
@@ -24,15 +25,13 @@ using std::size_t;
 
 namespace {
 
+using okid::area;
 using okid::linalg::multiply;
 
 constexpr double most_sigma =
     0.02;                       // of a frequency in the baseline: what is not known to that is noise, or hardly seen
 constexpr double ridge = 1e-12; // on unit diagonals
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-size_t area(int count) { return static_cast<size_t>(count); }
 
 bool valid(const okid_change_config_t& c) {
     if (c.n_u < 0 || c.n_y < 1 || c.n_u > 256 || c.n_y > 256 || c.rows < 2 || c.rows > 512 ||

@@ -8,6 +8,7 @@
 // WORKSPACE  per model n_z (n_z + m) + n_y (n_z + m + n_y) numbers, two models; no work but per sample
 #include <okid/watch.h>
 
+#include "identify/triangular.hpp"
 #include "linalg/arena.hpp"
 #include "linalg/linalg.hpp"
 
@@ -45,14 +46,12 @@ struct okid_watch {
 
 namespace {
 
+using okid::area;
 using okid::predictor;
 using okid::linalg::multiply;
 
 constexpr double ridge = 1e-9; // on the diagonal of the innovation covariance
 constexpr double spike = 25;   // mean square of an error, in usual ones: beyond lies a spike
-
-size_t area(int rows, int cols) { return static_cast<size_t>(rows) * static_cast<size_t>(cols); }
-size_t area(int count) { return static_cast<size_t>(count); }
 
 size_t lay_out(okid_watch& s, okid::arena& memory) {
     const okid_watch_config_t& c = s.config;
