@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Frames without a counter as adapters hand them over, for the tests of their places: laws of arrival, and what comes out.
 #pragma once
-#include "align/grid.hpp"
+#include "grid_frames.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,22 +18,12 @@
 
 namespace okid_host {
 
-constexpr std::int64_t day_ns = 1700000000000000000;
-
 /// Channel c of identifier 0x100 + c on bus buses[c]; its number is the number of the sample.
 inline live_config make_config(double rate_hz, const std::vector<std::size_t>& buses) {
-    live_config config;
-    config.rate_hz = rate_hz;
-    config.buses.resize(4);
+    live_config config = lanes_of(buses.size(), 0, rate_hz, 4);
     for (std::size_t c = 0; c < buses.size(); ++c) {
-        channel_config channel;
-        channel.name = "c" + std::to_string(c);
-        channel.bus = buses[c];
-        channel.frame.id = static_cast<std::uint32_t>(0x100 + c);
-        channel.layout.length = 32;
-        channel.layout.scale = 1;
-        drv_signal_prepare(&channel.layout);
-        config.channels.push_back(channel);
+        config.channels[c].bus = buses[c];
+        config.channels[c].layout = bits_at(0, 32);
     }
     return config;
 }

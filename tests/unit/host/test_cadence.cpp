@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A sensor without a counter (WitMotion, VectorNav): its packets reach the host in bursts, behind a latency timer, late by
 // a scheduler. Every sample is placed, no gap that was not, and what was lost is marked to the sample.
-#include "align/grid.hpp"
+#include "grid_frames.hpp"
 
 #include <array>
 #include <cmath>
@@ -20,19 +20,9 @@ void tearDown(void) {}
 
 namespace {
 
-constexpr std::int64_t day_ns = 1700000000000000000;
-
 live_config make_config(double rate_hz) {
-    live_config config;
-    config.rate_hz = rate_hz;
-    config.buses.resize(1);
-    channel_config channel;
-    channel.name = "a";
-    channel.frame.id = 0x100;
-    channel.layout.length = 32;
-    channel.layout.scale = 1;
-    drv_signal_prepare(&channel.layout);
-    config.channels.push_back(channel);
+    live_config config = lanes_of(1, 0, rate_hz);
+    config.channels[0].layout = bits_at(0, 32);
     return config;
 }
 

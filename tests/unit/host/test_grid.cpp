@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Frames lost, doubled and out of order over many seeds: the gaps on the grid are the losses that were made.
-#include "align/grid.hpp"
+#include "grid_frames.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,47 +18,12 @@ void tearDown(void) {}
 
 namespace {
 
-constexpr std::int64_t day_ns = INT64_C(1700000000000000000);
-
-/// Messages of one int16 channel each behind a counter of `bits` bits (0 = none).
-live_config make_config(std::size_t messages, unsigned bits, double rate_hz = 1000) {
-    live_config config;
-    config.rate_hz = rate_hz;
-    config.buses.resize(1);
-    for (std::size_t i = 0; i < messages; ++i) {
-        channel_config channel;
-        channel.name = "c" + std::to_string(i);
-        channel.frame = {static_cast<std::uint32_t>(0x100 + i), 0};
-        channel.layout = {};
-        channel.layout.start_bit = 32;
-        channel.layout.length = 32;
-        channel.layout.scale = 1;
-        drv_signal_prepare(&channel.layout);
-        if (bits) {
-            drv_signal_t counter{};
-            counter.length = static_cast<std::uint16_t>(bits);
-            counter.scale = 1;
-            drv_signal_prepare(&counter);
-            channel.sequence = counter;
-        }
-        config.channels.push_back(channel);
-    }
-    return config;
-}
-
 drv_frame_t make_frame(const live_config& config, std::size_t message, std::int64_t sample, std::uint64_t first_counter,
                        double late_s = 0) {
-    drv_frame_t frame{};
-    const channel_config& channel = config.channels[message];
-    frame.id = channel.frame.id;
-    frame.len = 8;
-    frame.time_ns = day_ns + std::llround((static_cast<double>(sample) / config.rate_hz + late_s) * 1e9) +
-                    static_cast<std::int64_t>(message) * 20000;
-    if (channel.sequence)
-        drv_signal_put(&*channel.sequence, frame.data, 8,
-                       static_cast<std::int64_t>(first_counter + static_cast<std::uint64_t>(sample)));
-    drv_signal_put(&channel.layout, frame.data, 8, sample);
-    return frame;
+    const auto counter = static_cast<std::int64_t>(first_counter + static_cast<std::uint64_t>(sample));
+    const double at_s = static_cast<double>(sample) / config.rate_hz + late_s;
+    return lane_frame(config, message, counter, sample,
+                      std::llround(at_s * 1e9) + static_cast<std::int64_t>(message) * 20000);
 }
 
 /// Remembers what came out and checks that every number stands in its row.
@@ -116,7 +81,7 @@ void check_seed(unsigned seed) {
     const unsigned bits = widths[pick(0, 4)];
     const std::uint64_t first_counter =
         std::uniform_int_distribution<std::uint64_t>(0, (std::uint64_t{1} << bits) - 1)(random);
-    stream s(make_config(messages, bits));
+    stream s(lanes_of(messages, bits));
     const int samples = pick(200, 900), joined = pick(0, static_cast<int>(messages) - 1);
     struct sent {
         drv_frame_t frame;
@@ -173,7 +138,7 @@ static void test_gaps_are_the_losses() {
 }
 
 static void test_counter_wraps_many_times() {
-    stream s(make_config(3, 4)); // a counter of four bits
+    stream s(lanes_of(3, 4)); // a counter of four bits
     for (int n = 0; n < 5000; ++n)
         for (std::size_t m = 0; m < 3; ++m)
             if (!(m == 1 && n % 100 == 50)) s.send(m, n, 13);
@@ -184,7 +149,7 @@ static void test_counter_wraps_many_times() {
 }
 
 static void test_unrelated_counters_are_aligned_by_time() {
-    stream s(make_config(2, 16));
+    stream s(lanes_of(2, 16));
     for (int n = 0; n < 2000; ++n) {
         s.send(0, n, 100);
         s.send(1, n, 40000);
@@ -196,7 +161,7 @@ static void test_unrelated_counters_are_aligned_by_time() {
 }
 
 static void test_causes() {
-    stream s(make_config(2, 16));
+    stream s(lanes_of(2, 16));
     const auto both = [&](int from, int to) {
         for (int n = from; n < to; ++n)
             for (std::size_t m = 0; m < 2; ++m) s.send(m, n, 0);
@@ -224,7 +189,7 @@ static void test_causes() {
 }
 
 static void test_a_damaged_counter_moves_nothing() {
-    stream s(make_config(2, 16));
+    stream s(lanes_of(2, 16));
     for (int n = 0; n < 1000; ++n)
         for (std::size_t m = 0; m < 2; ++m) {
             drv_frame_t frame = make_frame(s.config, m, n, 0);
@@ -239,7 +204,7 @@ static void test_a_damaged_counter_moves_nothing() {
 }
 
 static void test_a_sender_that_starts_anew_is_taken_up() {
-    stream s(make_config(2, 16));
+    stream s(lanes_of(2, 16));
     for (int n = 0; n < 1000; ++n)
         for (std::size_t m = 0; m < 2; ++m) s.send(m, n, 30000);
     recorder& out = s.out;
@@ -259,7 +224,7 @@ static void test_cadence_with_jitter_and_losses() {
     for (unsigned seed = 1; seed <= 200; ++seed) {
         std::mt19937 random(seed);
         std::uniform_real_distribution<double> jitter(-0.2e-3, 0.2e-3);
-        stream s(make_config(2, 0));
+        stream s(lanes_of(2, 0));
         std::int64_t lost = 0;
         for (int n = 0; n < 3000; ++n)
             for (std::size_t m = 0; m < 2; ++m) {
@@ -278,7 +243,7 @@ static void test_cadence_with_jitter_and_losses() {
 }
 
 static void test_cadence_survives_bursts() {
-    stream s(make_config(2, 0)); // a reader that wakes every 10 ms, a device clock 50 ppm fast
+    stream s(lanes_of(2, 0)); // a reader that wakes every 10 ms, a device clock 50 ppm fast
     for (int n = 0; n < 20000; ++n)
         for (std::size_t m = 0; m < 2; ++m) {
             const double true_s = n * 1e-3 * (1 - 50e-6), seen_s = std::ceil(true_s / 10e-3) * 10e-3;
@@ -291,7 +256,7 @@ static void test_cadence_survives_bursts() {
 }
 
 static void test_frames_that_are_no_data() {
-    stream s(make_config(2, 16));
+    stream s(lanes_of(2, 16));
     for (int n = 0; n < 100; ++n) {
         for (std::size_t m = 0; m < 2; ++m) s.send(m, n, 0);
         drv_frame_t other = make_frame(s.config, 0, n, 0);
@@ -314,21 +279,21 @@ static void test_frames_that_are_no_data() {
 }
 
 static void test_a_silent_message_is_named() {
-    stream s(make_config(2, 16));
+    stream s(lanes_of(2, 16));
     for (int n = 0; n < 5000; ++n) s.send(0, n, 0);
     s.on.finish();
     TEST_ASSERT_EQUAL_INT(1, s.on.silent_channels().size());
     TEST_ASSERT_EQUAL_INT(1, s.on.silent_channels()[0]);
     TEST_ASSERT_EQUAL_INT64(0, s.on.channel(1).received);
     TEST_ASSERT_TRUE(s.out.rows > 4990);
-    stream none(make_config(2, 16));
+    stream none(lanes_of(2, 16));
     none.on.finish();
     TEST_ASSERT_EQUAL_INT64(0, none.on.emitted());
     TEST_ASSERT_EQUAL_INT(2, none.on.silent_channels().size());
 }
 
 static void test_limit() {
-    stream s(make_config(2, 16));
+    stream s(lanes_of(2, 16));
     s.on.set_limit(250);
     for (int n = 0; n < 1000 && s.on.emitted() < 250; ++n)
         for (std::size_t m = 0; m < 2; ++m) s.send(m, n, 0);
@@ -341,7 +306,7 @@ static void test_limit() {
 static void test_noise() {
     for (unsigned seed = 1; seed <= 300; ++seed) {
         std::mt19937_64 random(seed);
-        live_config config = make_config(4, seed % 2 ? 16 : 8);
+        live_config config = lanes_of(4, seed % 2 ? 16 : 8);
         if (seed % 3 == 0) config.channels[2].sequence.reset();
         stream s(config);
         s.out.width = 0;

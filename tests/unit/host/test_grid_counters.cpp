@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 // What a counter says of a frame's place: beside other counters, out of order, damaged, behind a pause and at the end.
-#include "align/grid.hpp"
+#include "grid_frames.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <string>
 #include <unity.h>
-#include <vector>
 
 using namespace okid_host;
 
@@ -16,62 +15,19 @@ void tearDown(void) {}
 
 namespace {
 
-constexpr std::int64_t day_ns = INT64_C(1700000000000000000);
-
-drv_signal_t bits_at(std::uint16_t start, unsigned length) {
-    drv_signal_t out{};
-    out.start_bit = start;
-    out.length = static_cast<std::uint16_t>(length);
-    out.scale = 1;
-    drv_signal_prepare(&out);
-    return out;
-}
-
-struct recorder : grid_sink {
-    std::size_t width = 0;
-    std::vector<std::vector<double>> rows;
-    std::vector<grid_gap> gaps;
-    void on_sample(std::int64_t, const double* row) override { rows.emplace_back(row, row + width); }
-    void on_missing(std::int64_t, std::int64_t count) override {
-        rows.insert(rows.end(), static_cast<std::size_t>(count), std::vector<double>(width, NAN));
-    }
-    void on_gap(const grid_gap& gap) override { gaps.push_back(gap); }
-};
-
 /// Some lanes of one rate, each with a counter of so many bits and a number.
 struct stream {
     live_config config;
-    recorder out;
+    row_recorder out;
     grid on;
-    static live_config config_of(std::size_t lanes, unsigned bits, double rate_hz) {
-        live_config config;
-        config.rate_hz = rate_hz;
-        config.buses.resize(1);
-        for (std::size_t i = 0; i < lanes; ++i) {
-            channel_config channel;
-            channel.name = "c" + std::to_string(i);
-            channel.frame.id = static_cast<std::uint32_t>(0x100 + i);
-            channel.layout = bits_at(32, 32);
-            channel.sequence = bits_at(0, bits);
-            config.channels.push_back(channel);
-        }
-        return config;
-    }
     stream(std::size_t lanes, unsigned bits, double rate_hz = 1000)
-        : config(config_of(lanes, bits, rate_hz)), on(config, out) {
-        out.width = lanes;
-    }
+        : config(lanes_of(lanes, bits, rate_hz)), out(lanes), on(config, out) {}
 
     /// The sample, whose counter is the same; its stamp is that of `at`, samples.
     void send(std::size_t lane, std::int64_t counter, std::int64_t number, double at, std::uint8_t loss = 0) {
-        drv_frame_t frame{};
-        frame.id = static_cast<std::uint32_t>(0x100 + lane);
-        frame.len = 8;
+        const std::int64_t after_ns = std::llround(at * 1e9 / config.rate_hz) + static_cast<std::int64_t>(lane) * 40000;
+        drv_frame_t frame = lane_frame(config, lane, counter, number, after_ns);
         frame.loss = loss;
-        frame.time_ns = day_ns + std::llround(at * 1e9 / config.rate_hz) + static_cast<std::int64_t>(lane) * 40000;
-        const drv_signal_t& its = *config.channels[lane].sequence;
-        drv_signal_put(&its, frame.data, 8, counter & ((std::int64_t{1} << its.length) - 1));
-        drv_signal_put(&config.channels[lane].layout, frame.data, 8, number);
         on.push(frame);
     }
     void sample(std::int64_t n, std::uint8_t loss = 0) {
@@ -83,16 +39,15 @@ struct stream {
     /// All rows from 0 on hold their samples; so many numbers are missing and marked.
     void check(std::int64_t rows, std::int64_t lost, const char* text) {
         on.finish();
-        std::int64_t holes = 0, marked = 0;
+        std::int64_t holes = 0;
         TEST_ASSERT_EQUAL_INT64_MESSAGE(rows, static_cast<std::int64_t>(out.rows.size()), text);
         for (std::size_t n = 0; n < out.rows.size(); ++n)
             for (const double number : out.rows[n]) {
                 holes += number != number;
                 if (number == number) TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(static_cast<double>(n), number, text);
             }
-        for (const grid_gap& gap : out.gaps) marked += gap.count;
         TEST_ASSERT_EQUAL_INT64_MESSAGE(lost, holes, text);
-        TEST_ASSERT_EQUAL_INT64_MESSAGE(lost, marked, text);
+        TEST_ASSERT_EQUAL_INT64_MESSAGE(lost, out.marked(), text);
     }
 };
 

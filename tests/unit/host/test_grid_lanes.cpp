@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which channels a frame belongs to: by bus, identifier, parameter group and page. Every frame carries its own number.
-#include "align/grid.hpp"
+#include "grid_frames.hpp"
 
-#include <cmath>
 #include <string>
 #include <unity.h>
 #include <vector>
@@ -14,26 +13,12 @@ void tearDown(void) {}
 
 namespace {
 
-constexpr std::int64_t day_ns = INT64_C(1700000000000000000);
-
-drv_signal_t bits_at(std::uint16_t start, std::uint16_t length) {
-    drv_signal_t out{};
-    out.start_bit = start;
-    out.length = length;
-    out.scale = 1;
-    drv_signal_prepare(&out);
-    return out;
-}
-
 /// A counter of 16 bits, a page in the byte behind it, a number from byte 4 on.
 channel_config channel_of(std::size_t bus, std::uint32_t id, bool extended, std::uint32_t mask = 0) {
-    channel_config out;
+    channel_config out = channel_at(id, bits_at(32, 32), bits_at(0, 16));
     out.bus = bus;
-    out.frame.id = id;
     out.frame.extended = extended;
     out.frame.mask = mask;
-    out.layout = bits_at(32, 32);
-    out.sequence = bits_at(0, 16);
     return out;
 }
 
@@ -59,17 +44,6 @@ live_config config_of(std::vector<channel_config> channels, std::size_t buses) {
     return out;
 }
 
-struct recorder : grid_sink {
-    std::size_t width = 0;
-    std::vector<std::vector<double>> rows;
-    std::int64_t marked = 0;
-    void on_sample(std::int64_t, const double* row) override { rows.emplace_back(row, row + width); }
-    void on_missing(std::int64_t, std::int64_t count) override {
-        rows.insert(rows.end(), static_cast<std::size_t>(count), std::vector<double>(width, NAN));
-    }
-    void on_gap(const grid_gap& gap) override { marked += gap.count; }
-};
-
 } // namespace
 
 /// Equal identifiers on many buses, with and without the long form, and many that differ in few bits.
@@ -82,8 +56,7 @@ static void test_every_identifier_of_every_bus_has_its_channel(void) {
             channels.push_back(channel_of(bus, id, true));
     }
     const live_config config = config_of(channels, buses);
-    recorder out;
-    out.width = channels.size();
+    row_recorder out(channels.size());
     grid on(config, out);
     for (std::int64_t n = 0; n < 50; ++n)
         for (std::size_t c = 0; c < channels.size(); ++c) {
@@ -112,8 +85,7 @@ static void test_a_group_takes_what_nothing_stricter_asks_for(void) {
                                                 channel_of(0, 0x18FEE517, true)};
         if (turned) std::swap(channels[0], channels[1]);
         const live_config config = config_of(channels, 1);
-        recorder out;
-        out.width = 3;
+        row_recorder out(3);
         grid on(config, out);
         for (std::int64_t n = 0; n < 40; ++n) {
             on.push(frame_of(0, 0x18FEE517, true, n, 3 * n));
@@ -140,8 +112,7 @@ static void test_a_frame_of_two_lanes_is_received_once(void) {
     channels[2].selectors.push_back({bits_at(16, 8), {{0, 9}}});
     for (channel_config& each : channels) each.sequence.reset();
     const live_config config = config_of(channels, 1);
-    recorder out;
-    out.width = 3;
+    row_recorder out(3);
     grid on(config, out);
     for (std::int64_t n = 0; n < 2000; ++n) on.push(frame_of(0, 0x100, false, n, n));
     on.finish();
@@ -154,8 +125,7 @@ static void test_a_frame_of_two_lanes_is_received_once(void) {
 /// A loss is one of the bus it was reported on, however many buses there are.
 static void test_a_reported_loss_belongs_to_its_bus(void) {
     const live_config config = config_of({channel_of(0, 0x100, false), channel_of(1, 0x100, false)}, 2);
-    recorder out;
-    out.width = 2;
+    row_recorder out(2);
     grid on(config, out);
     for (std::int64_t n = 0; n < 300; ++n)
         for (std::size_t bus = 0; bus < 2; ++bus) {
@@ -165,7 +135,7 @@ static void test_a_reported_loss_belongs_to_its_bus(void) {
             on.push(frame);
         }
     on.finish();
-    TEST_ASSERT_EQUAL_INT64(10, out.marked);
+    TEST_ASSERT_EQUAL_INT64(10, out.marked());
     TEST_ASSERT_EQUAL_UINT64(5, on.bus(0).lost[static_cast<std::size_t>(gap_cause::sequence)]);
     TEST_ASSERT_EQUAL_UINT64(0, on.bus(0).lost[static_cast<std::size_t>(gap_cause::socket_overflow)]);
     TEST_ASSERT_EQUAL_UINT64(5, on.bus(1).lost[static_cast<std::size_t>(gap_cause::socket_overflow)]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Multiplexed messages whose counter counts samples, or frames: every number in its row, every loss where it was made.
-#include "align/grid.hpp"
+#include "grid_frames.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,17 +17,7 @@ void tearDown(void) {}
 
 namespace {
 
-constexpr std::int64_t day_ns = INT64_C(1700000000000000000);
 constexpr double rate_hz = 500;
-
-drv_signal_t bits_at(std::uint16_t start, std::uint16_t length) {
-    drv_signal_t out{};
-    out.start_bit = start;
-    out.length = length;
-    out.scale = 1;
-    drv_signal_prepare(&out);
-    return out;
-}
 
 /// Pages first, first + 1 … of message 0x100 in byte 0, a counter of so many bits, a number from byte 4 on; `plain`: a number
 /// that is in every page.
@@ -36,11 +26,8 @@ live_config make_config(std::uint64_t first, std::size_t pages, unsigned bits, b
     config.rate_hz = rate_hz;
     config.buses.resize(1);
     for (std::size_t i = 0; i < pages + plain; ++i) {
-        channel_config channel;
+        channel_config channel = channel_at(0x100, bits_at(i < pages ? 32 : 64, 32), bits_at(8, bits));
         channel.name = "c" + std::to_string(i);
-        channel.frame = {0x100, 0, 0};
-        channel.layout = bits_at(i < pages ? 32 : 64, 32);
-        channel.sequence = bits_at(8, static_cast<std::uint16_t>(bits));
         if (i < pages) channel.selectors.push_back({bits_at(0, 8), {{first + i, first + i}}});
         config.channels.push_back(channel);
     }
@@ -80,8 +67,7 @@ struct node {
         out.time_ns =
             day_ns + std::llround(1e9 * (static_cast<double>(sample) / rate_hz + static_cast<double>(page) * apart_s));
         const auto frames = static_cast<std::int64_t>(sent) * sample + static_cast<std::int64_t>(page);
-        const drv_signal_t its = bits_at(8, static_cast<std::uint16_t>(bits)), number = bits_at(32, 32),
-                           more = bits_at(64, 32);
+        const drv_signal_t its = bits_at(8, bits), number = bits_at(32, 32), more = bits_at(64, 32);
         out.data[0] = static_cast<std::uint8_t>(page);
         drv_signal_put(&its, out.data, 64, counter + (counts_frames ? frames : sample));
         drv_signal_put(&number, out.data, 64, sample);

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Where the grid begins: lanes of several counters, buses and none, each heard from another sample on. Sample 0 is the
 // first one that every lane can have, and every number stands in its row from there on, whichever lane is heard first.
-#include "align/grid.hpp"
+#include "grid_frames.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <optional>
-#include <string>
 #include <unity.h>
 #include <vector>
 
@@ -18,8 +17,6 @@ void tearDown(void) {}
 
 namespace {
 
-constexpr std::int64_t day_ns = INT64_C(1700000000000000000);
-
 /// One message of one channel. Its number is the sample's.
 struct sender {
     std::size_t bus = 0;
@@ -28,43 +25,19 @@ struct sender {
     double late_s = 0;                   ///< on its way, always
 };
 
-drv_signal_t bits_at(std::uint16_t start, std::uint16_t length) {
-    drv_signal_t out{};
-    out.start_bit = start;
-    out.length = length;
-    out.scale = 1;
-    drv_signal_prepare(&out);
-    return out;
-}
-
 live_config make_config(const std::vector<sender>& senders, double rate_hz) {
-    live_config config;
-    config.rate_hz = rate_hz;
-    config.buses.resize(4);
+    live_config config = lanes_of(senders.size(), 16, rate_hz, 4);
     for (std::size_t i = 0; i < senders.size(); ++i) {
-        channel_config channel;
-        channel.name = "c" + std::to_string(i);
-        channel.bus = senders[i].bus;
-        channel.frame = {static_cast<std::uint32_t>(0x100 + i), 0, 0};
-        channel.layout = bits_at(32, 32);
-        if (senders[i].counter) channel.sequence = bits_at(0, 16);
-        config.channels.push_back(channel);
+        config.channels[i].bus = senders[i].bus;
+        if (!senders[i].counter) config.channels[i].sequence.reset();
     }
     return config;
 }
 
-drv_frame_t make_frame(const std::vector<sender>& senders, std::size_t which, std::int64_t sample, double rate_hz) {
-    const sender& from = senders[which];
-    drv_frame_t out{};
-    out.id = static_cast<std::uint32_t>(0x100 + which);
-    out.bus = static_cast<std::uint8_t>(from.bus);
-    out.len = 8;
-    out.time_ns = day_ns + std::llround(1e9 * (static_cast<double>(sample) / rate_hz + from.late_s)) +
-                  static_cast<std::int64_t>(which) * 40000;
-    const drv_signal_t counter = bits_at(0, 16), number = bits_at(32, 32);
-    if (from.counter) drv_signal_put(&counter, out.data, 8, (*from.counter + sample) & 0xFFFF);
-    drv_signal_put(&number, out.data, 8, sample);
-    return out;
+drv_frame_t make_frame(const live_config& config, const sender& from, std::size_t which, std::int64_t sample) {
+    const double sent_s = static_cast<double>(sample) / config.rate_hz;
+    return lane_frame(config, which, from.counter.value_or(0) + sample, sample,
+                      std::llround(1e9 * (sent_s + from.late_s)) + static_cast<std::int64_t>(which) * 40000);
 }
 
 struct recorder : grid_sink {
@@ -96,7 +69,7 @@ void play(const std::vector<sender>& senders, std::int64_t end, recorder& out, d
     std::vector<drv_frame_t> frames;
     for (std::int64_t n = 0; n < end; ++n)
         for (std::size_t i = 0; i < senders.size(); ++i)
-            if (n >= senders[i].first) frames.push_back(make_frame(senders, i, n, rate_hz));
+            if (n >= senders[i].first) frames.push_back(make_frame(config, senders[i], i, n));
     std::stable_sort(frames.begin(), frames.end(),
                      [](const drv_frame_t& a, const drv_frame_t& b) { return a.time_ns < b.time_ns; });
     for (const drv_frame_t& frame : frames) on.push(frame);

@@ -2,7 +2,7 @@
 // How long a sample waits: for a silent lane, for the memory there is, and for a loss without a counter to be
 // believed. And what a stream without any jitter tells: each loss at its place, with its cause, and how well the place
 // is known.
-#include "align/grid.hpp"
+#include "grid_frames.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,44 +17,8 @@ void tearDown(void) {}
 
 namespace {
 
-constexpr std::int64_t day_ns = INT64_C(1700000000000000000);
-
-drv_signal_t bits_at(std::uint16_t start, std::uint16_t length) {
-    drv_signal_t out{};
-    out.start_bit = start;
-    out.length = length;
-    out.scale = 1;
-    drv_signal_prepare(&out);
-    return out;
-}
-
-/// Lane i of identifier 0x100 + i, on bus i % buses.
-live_config make_config(std::size_t lanes, double rate_hz, bool counted, std::size_t buses = 1) {
-    live_config config;
-    config.rate_hz = rate_hz;
-    config.buses.resize(buses);
-    for (std::size_t i = 0; i < lanes; ++i) {
-        channel_config channel;
-        channel.name = "c" + std::to_string(i);
-        channel.bus = i % buses;
-        channel.frame.id = static_cast<std::uint32_t>(0x100 + i);
-        channel.layout = bits_at(32, 32);
-        if (counted) channel.sequence = bits_at(0, 32);
-        config.channels.push_back(channel);
-    }
-    return config;
-}
-
 drv_frame_t make_frame(const live_config& config, std::size_t lane, std::int64_t sample, double at_s) {
-    drv_frame_t out{};
-    out.id = static_cast<std::uint32_t>(0x100 + lane);
-    out.bus = static_cast<std::uint8_t>(config.channels[lane].bus);
-    out.len = 8;
-    out.time_ns = day_ns + std::llround(at_s * 1e9);
-    const drv_signal_t counter = bits_at(0, 32);
-    drv_signal_put(&counter, out.data, 8, sample);
-    drv_signal_put(&config.channels[lane].layout, out.data, 8, sample);
-    return out;
+    return lane_frame(config, lane, sample, sample, std::llround(at_s * 1e9));
 }
 
 struct recorder : grid_sink {
@@ -79,7 +43,7 @@ struct recorder : grid_sink {
 
 /// Six seconds at 1 kHz are 6000 samples. Then it is gone, and nothing waits for it until it is back.
 static void test_a_silent_lane_is_waited_for_six_seconds(void) {
-    const live_config config = make_config(2, 1000, true);
+    const live_config config = lanes_of(2, 32);
     recorder out;
     out.width = 2;
     grid on(config, out);
@@ -105,7 +69,7 @@ static void test_a_silent_lane_is_waited_for_six_seconds(void) {
 /// most_rows_bytes.
 static void test_samples_wait_as_far_as_there_is_memory(void) {
     constexpr std::size_t lanes = 100;
-    const live_config config = make_config(lanes, 10000, true);
+    const live_config config = lanes_of(lanes, 32, 10000);
     recorder out;
     out.width = lanes;
     grid on(config, out);
@@ -124,7 +88,7 @@ static void test_samples_wait_as_far_as_there_is_memory(void) {
 /// Without a counter, and without jitter: a loss shows as what is missing, where it is, after 0.7 s.
 static void test_a_loss_is_believed_after_the_decision_time(void) {
     for (const std::int64_t lost : {1, 2, 5, 40, 300, 900, 1100, 3000}) {
-        const live_config config = make_config(1, 1000, false);
+        const live_config config = lanes_of(1, 0);
         recorder out;
         out.width = 1;
         grid on(config, out);
@@ -154,7 +118,7 @@ static void test_a_loss_is_believed_after_the_decision_time(void) {
 static void test_what_is_made_up_for_is_no_loss(void) {
     for (const double late_s : {0.0015, 0.01, 0.3, 0.69, 1.5, 5.0})
         for (const bool at_the_end : {false, true}) {
-            const live_config config = make_config(1, 1000, false);
+            const live_config config = lanes_of(1, 0);
             recorder out;
             out.width = 1;
             grid on(config, out);
@@ -175,7 +139,7 @@ static void test_what_is_made_up_for_is_no_loss(void) {
 static void test_how_well_the_place_beside_another_bus_is_known(void) {
     const auto place_std = [](std::size_t lanes, bool counted, std::size_t buses, std::int64_t packet,
                               std::int64_t count) {
-        const live_config config = make_config(lanes, 1000, counted, buses);
+        const live_config config = lanes_of(lanes, counted ? 32 : 0, 1000, buses);
         recorder out;
         out.width = lanes;
         grid on(config, out);

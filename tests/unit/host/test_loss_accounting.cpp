@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Every fault over many seeds, from a source through the ring to the grid: nothing crashes or hangs, every number stands in
 // its row, and the marked gaps are the losses that were made.
-#include "align/grid.hpp"
 #include "fault_source.h"
+#include "grid_frames.hpp"
 
 #include <cmath>
 #include <cstdio>
@@ -22,28 +22,6 @@ void tearDown(void) {}
 namespace {
 
 constexpr std::int64_t period_ns = 1000000;
-
-live_config make_config(int lanes, bool counted) {
-    live_config config;
-    config.rate_hz = 1e9 / static_cast<double>(period_ns);
-    config.buses.resize(1);
-    for (int i = 0; i < lanes; ++i) {
-        channel_config channel;
-        channel.name = "c" + std::to_string(i);
-        channel.frame.id = 0x100u + static_cast<std::uint32_t>(i);
-        channel.layout.start_bit = 32;
-        channel.layout.length = 32;
-        channel.layout.scale = 1;
-        drv_signal_prepare(&channel.layout);
-        drv_signal_t counter{};
-        counter.length = 16;
-        counter.scale = 1;
-        drv_signal_prepare(&counter);
-        if (counted) channel.sequence = counter;
-        config.channels.push_back(channel);
-    }
-    return config;
-}
 
 /// Counts what comes out; `strange` is every row or number that is not where it should be.
 struct recorder : grid_sink {
@@ -82,7 +60,7 @@ struct outcome {
 
 /// One stream. @param stall_per_mille  how often the reader of a small ring falls asleep
 void play(const fault_plan_t& plan, unsigned stall_per_mille, outcome& result, bool counted = true) {
-    const live_config config = make_config(plan.lanes, counted);
+    const live_config config = lanes_of(static_cast<std::size_t>(plan.lanes), counted ? 16 : 0);
     grid on(config, result.out);
     result.out.width = config.channels.size();
     fault_source_make(&result.source, &plan);
@@ -226,7 +204,7 @@ static void test_clock_set_among_losses_without_a_counter() { check_mixture(fals
 /// The only frame between two outages, each shorter than the grid's window and both together longer, comes some places
 /// late: its sample waits for it.
 static void test_a_late_frame_between_two_outages() {
-    const live_config config = make_config(1, true);
+    const live_config config = lanes_of(1, 16);
     recorder out;
     out.width = 1;
     grid on(config, out);
@@ -235,7 +213,7 @@ static void test_a_late_frame_between_two_outages() {
         frame.id = 0x100;
         frame.len = 8;
         frame.loss = loss;
-        frame.time_ns = 1700000000000000000 + sample * period_ns;
+        frame.time_ns = day_ns + sample * period_ns;
         frame.data[0] = frame.data[4] = static_cast<std::uint8_t>(sample);
         frame.data[1] = frame.data[5] = static_cast<std::uint8_t>(sample >> 8);
         on.push(frame);

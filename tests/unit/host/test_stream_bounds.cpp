@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Each number by which the first frames of a stream are judged, from both sides; and what is said of identifiers.
 #include "align/stream_check.hpp"
+#include "grid_frames.hpp"
 
 #include <functional>
 #include <optional>
@@ -15,27 +16,14 @@ void tearDown(void) {}
 
 namespace {
 
-drv_signal_t bits_at(std::uint16_t start, std::uint16_t length, bool is_signed) {
-    drv_signal_t out{};
-    out.start_bit = start;
-    out.length = length;
-    out.is_signed = is_signed;
-    out.scale = 1;
-    drv_signal_prepare(&out);
-    return out;
-}
-
 /// Message 0x101 of the first of three buses: a counter in bits 0 ... 15, where it has one, and a signal.
 live_config make_config(bool counted, const drv_signal_t& signal) {
     live_config config;
     config.buses.resize(3);
-    channel_config channel;
-    channel.name = "acc1";
-    channel.role = channel_role::acceleration;
-    channel.frame = {0x101, 0, 0};
-    channel.layout = signal;
-    if (counted) channel.sequence = bits_at(0, 16, false);
-    config.channels.push_back(channel);
+    config.channels = {channel_at(0x101, signal)};
+    config.channels[0].name = "acc1";
+    config.channels[0].role = channel_role::acceleration;
+    if (counted) config.channels[0].sequence = bits_at(0, 16);
     return config;
 }
 
@@ -58,9 +46,9 @@ std::string codes_of(const stream_check& check) {
 /// multiplexed message.
 std::string of_counter(std::int64_t frames, std::int64_t good, bool page) {
     live_config config = make_config(true, bits_at(16, 16, true));
-    if (page) config.channels[0].selectors.push_back({bits_at(48, 8, false), {{0, 0}}});
+    if (page) config.channels[0].selectors.push_back({bits_at(48, 8), {{0, 0}}});
     stream_check check(config);
-    const drv_signal_t counter = bits_at(0, 16, false);
+    const drv_signal_t counter = bits_at(0, 16);
     std::int64_t at = 65500;
     for (std::int64_t n = 0; n < frames; ++n) {
         drv_frame_t frame = make_frame(0x101);
@@ -121,7 +109,7 @@ static void test_a_counter_counts_at_half_of_200_steps(void) {
 
 /// More than half the range at more than a tenth of the steps, though most codes are in the middle.
 static void test_jumps_at_a_tenth_of_the_steps(void) {
-    const drv_signal_t signal = bits_at(16, 16, true), positive = bits_at(16, 16, false);
+    const drv_signal_t signal = bits_at(16, 16, true), positive = bits_at(16, 16);
     const auto jumps = [](std::size_t times, std::int64_t low, std::int64_t high) {
         return to_and_fro(low, high, times, 0, 0);
     };
@@ -139,7 +127,7 @@ static void test_jumps_at_a_tenth_of_the_steps(void) {
 
 /// A sign that is misread: ten jumps, and fewer codes in the middle half of the range than that.
 static void test_few_jumps_of_codes_that_are_never_in_the_middle(void) {
-    const drv_signal_t signal = bits_at(16, 16, true), positive = bits_at(16, 16, false);
+    const drv_signal_t signal = bits_at(16, 16, true), positive = bits_at(16, 16);
     const auto said = [&](std::size_t times, std::size_t middle, std::int64_t between) {
         return of_codes(signal, to_and_fro(20000, -20000, times, middle, between), -20000, 400);
     };

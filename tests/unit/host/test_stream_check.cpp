@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the first frames of a stream say against the configuration, and that a right one gives no cause.
 #include "align/stream_check.hpp"
+#include "grid_frames.hpp"
 
 #include <cmath>
 #include <random>
@@ -16,28 +17,13 @@ namespace {
 
 constexpr std::int64_t frames = 2500;
 
-drv_signal_t signal_at(std::uint16_t start, std::uint16_t length, bool is_signed, bool big_endian = false) {
-    drv_signal_t out{};
-    out.start_bit = start;
-    out.length = length;
-    out.is_signed = is_signed;
-    out.big_endian = big_endian;
-    out.scale = 1;
-    drv_signal_prepare(&out);
-    return out;
-}
-
 /// One message 0x101 on the first of two buses: a counter in the first 16 bits, a signal in the next.
 live_config make_config(const drv_signal_t& counter, const drv_signal_t& signal) {
     live_config config;
     config.buses.resize(2);
-    channel_config channel;
-    channel.name = "acc1";
-    channel.role = channel_role::acceleration;
-    channel.frame = {0x101, 0, 0};
-    channel.layout = signal;
-    channel.sequence = counter;
-    config.channels.push_back(channel);
+    config.channels = {channel_at(0x101, signal, counter)};
+    config.channels[0].name = "acc1";
+    config.channels[0].role = channel_role::acceleration;
     return config;
 }
 
@@ -45,7 +31,7 @@ drv_frame_t make_frame(std::uint32_t id, std::int64_t counter, std::int64_t code
     drv_frame_t frame{};
     frame.id = id;
     frame.len = 8;
-    const drv_signal_t first = signal_at(0, 16, false), second = signal_at(16, 16, true);
+    const drv_signal_t first = bits_at(0, 16), second = bits_at(16, 16, true);
     drv_signal_put(&first, frame.data, 8, counter & 0xffff);
     drv_signal_put(&second, frame.data, 8, code);
     return frame;
@@ -65,7 +51,7 @@ std::string codes_of(const live_config& config, bool slow, double amplitude = 30
     return out;
 }
 
-const drv_signal_t right_counter = signal_at(0, 16, false), right_signal = signal_at(16, 16, true);
+const drv_signal_t right_counter = bits_at(0, 16), right_signal = bits_at(16, 16, true);
 
 void test_nothing_to_say(void) {
     TEST_ASSERT_EQUAL_STRING("", codes_of(make_config(right_counter, right_signal), false).c_str());
@@ -73,22 +59,21 @@ void test_nothing_to_say(void) {
     // noise of a third of full scale
     TEST_ASSERT_EQUAL_STRING("", codes_of(make_config(right_counter, right_signal), false, 10900).c_str());
     // the low byte of a counter counts as well
-    TEST_ASSERT_EQUAL_STRING("", codes_of(make_config(signal_at(0, 8, false), right_signal), false).c_str());
+    TEST_ASSERT_EQUAL_STRING("", codes_of(make_config(bits_at(0, 8), right_signal), false).c_str());
 }
 
 void test_misread_sign(void) {
-    const live_config config = make_config(right_counter, signal_at(16, 16, false));
+    const live_config config = make_config(right_counter, bits_at(16, 16));
     TEST_ASSERT_EQUAL_STRING("code_jumps ", codes_of(config, false).c_str());
     TEST_ASSERT_EQUAL_STRING("code_jumps ", codes_of(config, true).c_str());
 }
 
 void test_misread_bits(void) {
     TEST_ASSERT_EQUAL_STRING("code_jumps ",
-                             codes_of(make_config(right_counter, signal_at(23, 16, true, true)), false).c_str());
+                             codes_of(make_config(right_counter, bits_at(23, 16, true, true)), false).c_str());
+    TEST_ASSERT_EQUAL_STRING("counter_erratic ", codes_of(make_config(bits_at(16, 16), right_signal), false).c_str());
     TEST_ASSERT_EQUAL_STRING("counter_erratic ",
-                             codes_of(make_config(signal_at(16, 16, false), right_signal), false).c_str());
-    TEST_ASSERT_EQUAL_STRING("counter_erratic ",
-                             codes_of(make_config(signal_at(7, 16, false, true), right_signal), false).c_str());
+                             codes_of(make_config(bits_at(7, 16, false, true), right_signal), false).c_str());
 }
 
 /// Half of the frames lost in bursts is a bad bus, not a wrong counter.
@@ -105,7 +90,7 @@ void test_losses_are_no_wrong_counter(void) {
 std::string doubts_of_pages(bool counts_frames, const drv_signal_t& counter) {
     live_config config = make_config(counter, right_signal);
     config.channels.push_back(config.channels.front());
-    config.channels.back().selectors = {{signal_at(32, 8, false), {{1, 1}}}};
+    config.channels.back().selectors = {{bits_at(32, 8), {{1, 1}}}};
     stream_check check(config);
     for (std::int64_t n = 0; n < 3 * frames; ++n) {
         drv_frame_t frame = make_frame(0x101, counts_frames ? n : n / 3, 7919 * n % 2003);
@@ -125,7 +110,7 @@ void test_pages(void) {
 }
 
 void test_too_few_frames_say_nothing(void) {
-    const live_config config = make_config(signal_at(16, 16, false), right_signal);
+    const live_config config = make_config(bits_at(16, 16), right_signal);
     stream_check check(config);
     for (std::int64_t n = 0; n < 100; ++n) check.add(make_frame(0x101, n, 1));
     TEST_ASSERT_EQUAL_INT(0, check.doubts().size());

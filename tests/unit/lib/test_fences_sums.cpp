@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Accumulators of all kinds read and write no array further than it reaches: their blocks, samples, results and files.
+#include "accumulators.hpp"
 #include "fenced.hpp"
-
-#include <okid/accumulator.h>
-#include <okid/correlation.h>
-#include <okid/steps/square_root.h>
 
 #include <cmath>
 #include <cstdint>
@@ -37,24 +34,13 @@ struct samples {
 
 const okid_sample_t kinds[] = {OKID_SAMPLE_DOUBLE, OKID_SAMPLE_INT16, OKID_SAMPLE_INT24, OKID_SAMPLE_INT32};
 
-/// Growing; in blocks; a window; memory that fades.
-okid_accumulator_config_t shape_of(int shape, okid_sample_t kind) {
-    okid_accumulator_config_t c = okid_accumulator_defaults(1, M - 1, LAGS);
-    c.sample = kind;
-    c.edges = shape == 2 ? 0 : 1;
-    if (shape > 0) c.block = 40;
-    if (shape == 2) c.slots = 3;
-    if (shape == 3) c.forgetting = 0.99;
-    return c;
-}
-
 void accumulators() {
     on_both_sides([](fence where) {
         const samples all(where, M * COUNT);
         const fenced<double> scale(where, std::vector<double>{2, 3, 4}), offset(where, std::vector<double>{1, 0, -1});
         for (const okid_sample_t kind : kinds)
             for (int shape = 0; shape < 4; ++shape) {
-                const okid_accumulator_config_t c = shape_of(shape, kind);
+                const okid_accumulator_config_t c = okid_test::shape_of(shape, kind, 40);
                 const fenced<unsigned char> block(where, okid_accumulator_memsize(&c));
                 okid_accumulator_t* self = nullptr;
                 TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&self, &c, block, block.size()));

@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Neither looks at the results nor the buffer, the cut into calls or the FFT change what is summed: not a bit of codes.
 // What is read back from a file goes on as if nothing had happened.
-#include <okid/accumulator.h>
-#include <okid/correlation.h>
-#include <okid/steps/square_root.h>
+#include "accumulators.hpp"
 
-extern "C" {
-#include <unity.h>
-}
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -18,7 +13,7 @@ extern "C" void tearDown() {}
 
 namespace {
 
-using bytes_t = std::vector<unsigned char>;
+using okid_test::bytes_t;
 
 std::uint64_t state = 1;
 
@@ -55,14 +50,8 @@ okid_status_t feed(Object* self, okid_sample_t kind, const samples& from, size_t
     return add_longs(self, from.longs.data() + first * m, count);
 }
 
-struct sums {
-    okid_accumulator_config_t config;
-    bytes_t block;
-    okid_accumulator_t* self = nullptr;
-
-    explicit sums(const okid_accumulator_config_t& c) : config(c), block(okid_accumulator_memsize(&c)) {
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&self, &c, block.data(), block.size()));
-    }
+struct sums : okid_test::sums {
+    using okid_test::sums::sums;
     size_t m() const { return static_cast<size_t>(config.n_u + config.n_y); }
     void add(const samples& from, size_t first, size_t count) const {
         TEST_ASSERT_TRUE(feed(self, config.sample, from, first, count, m(), okid_accumulator_add,
@@ -72,11 +61,6 @@ struct sums {
         const size_t n = m() * static_cast<size_t>(config.lags + 1);
         std::vector<double> out(n * n);
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(self, detrend, out.data(), nullptr));
-        return out;
-    }
-    bytes_t file() const {
-        bytes_t out(okid_accumulator_serialised_size(self));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(self, out.data(), out.size()));
         return out;
     }
 };
@@ -109,19 +93,15 @@ void looks_change_no_bit() {
     constexpr size_t count = 700;
     for (const okid_sample_t kind : kinds)
         for (int shape = 0; shape < 4; ++shape) {
-            okid_accumulator_config_t c = okid_accumulator_defaults(1, 2, 3);
-            c.sample = kind;
-            c.edges = shape == 2 ? 0 : 1;
-            if (shape > 0) c.block = 50;
+            okid_accumulator_config_t c = okid_test::shape_of(shape, kind, 50);
             if (shape == 2) c.slots = 4;
-            if (shape == 3) c.forgetting = 0.99;
             const samples all(kind, 3 * count, false);
             const sums alone(c), looked_at(c);
             for (size_t n = 0; n < count; n += 35) {
-                alone.add(all, n, 35);
-                looked_at.add(all, n, 35);
-                if (n == 350) okid_accumulator_gap(alone.self, 2);
-                if (n == 350) okid_accumulator_gap(looked_at.self, 2);
+                for (const sums* each : {&alone, &looked_at}) {
+                    each->add(all, n, 35);
+                    if (n == 350) each->gap(2);
+                }
                 for (const okid_detrend_t detrend : {OKID_DETREND_NONE, OKID_DETREND_MEAN}) {
                     double energy[3];
                     const std::vector<double> gram = looked_at.gram(detrend);
@@ -163,14 +143,8 @@ void the_fft_changes_no_bit_of_codes_and_little_of_doubles() {
             }
 }
 
-struct correlations {
-    okid_correlation_config_t config;
-    bytes_t block;
-    okid_correlation_t* self = nullptr;
-
-    explicit correlations(const okid_correlation_config_t& c) : config(c), block(okid_correlation_memsize(&c)) {
-        TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_create(&self, &c, block.data(), block.size()));
-    }
+struct correlations : okid_test::correlations {
+    using okid_test::correlations::correlations;
     void add(const samples& from, size_t first, size_t count) const {
         const auto m = static_cast<size_t>(config.n_u + config.n_y);
         TEST_ASSERT_TRUE(feed(self, config.sample, from, first, count, m, okid_correlation_add,
@@ -180,11 +154,6 @@ struct correlations {
         bytes_t room(okid_correlation_sums_memsize(self));
         okid_correlation_sums_t found;
         TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_sums(self, detrend, &found, room.data(), room.size()));
-    }
-    bytes_t file() const {
-        bytes_t out(okid_correlation_serialised_size(self));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_serialise(self, out.data(), out.size()));
-        return out;
     }
 };
 
@@ -201,10 +170,10 @@ void correlations_are_not_changed_by_looks_nor_codes_by_the_buffer() {
                 const samples all(kind, 3 * count, loud);
                 const correlations alone(c), looked_at(c);
                 for (size_t n = 0; n < count; n += 125) {
-                    alone.add(all, n, 125);
-                    looked_at.add(all, n, 125);
-                    if (n == 1000) okid_correlation_gap(alone.self, 0);
-                    if (n == 1000) okid_correlation_gap(looked_at.self, 0);
+                    for (const correlations* each : {&alone, &looked_at}) {
+                        each->add(all, n, 125);
+                        if (n == 1000) each->gap(0);
+                    }
                     for (const okid_detrend_t detrend : {OKID_DETREND_NONE, OKID_DETREND_MEAN}) looked_at.look(detrend);
                 }
                 const bytes_t file = alone.file();
@@ -214,7 +183,7 @@ void correlations_are_not_changed_by_looks_nor_codes_by_the_buffer() {
                     c.buffer = buffer;
                     const correlations other(c);
                     other.add(all, 0, 1125);
-                    okid_correlation_gap(other.self, 0);
+                    other.gap(0);
                     other.add(all, 1125, count - 1125);
                     TEST_ASSERT_TRUE(file == other.file());
                 }
@@ -231,7 +200,7 @@ void what_is_read_back_goes_on() {
             const samples all(kind, 2 * 40, true);
             const correlations one(c), back(c);
             one.add(all, 0, 20);
-            okid_correlation_gap(one.self, 0);
+            one.gap(0);
             const bytes_t file = one.file();
             TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_deserialise(back.self, file.data(), file.size()));
             one.add(all, 20, 20);
@@ -250,28 +219,24 @@ void factors_are_not_changed_by_looks() {
             if (shape == 1) c.slots = 3;
             if (shape == 2) c.forgetting = 0.99;
             const samples all(OKID_SAMPLE_DOUBLE, m * count, false);
-            bytes_t blocks[2];
-            okid_square_root_t* each[2];
+            const okid_test::factors each[2] = {okid_test::factors(c), okid_test::factors(c)};
             std::vector<okid_real_t> factor[2] = {std::vector<okid_real_t>(n * n), std::vector<okid_real_t>(n * n)};
-            for (int k = 0; k < 2; ++k) {
-                blocks[k].resize(okid_square_root_memsize(&c));
-                TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&each[k], &c, blocks[k].data(), blocks[k].size()));
-                const double scale[m] = {2, 3, 4}, offset[m] = {1, 0, -1};
-                okid_square_root_set_units(each[k], scale, offset);
-            }
+            const double scale[m] = {2, 3, 4}, offset[m] = {1, 0, -1};
+            for (const okid_test::factors& one : each) okid_square_root_set_units(one.self, scale, offset);
             for (size_t at = 0; at < count; at += 32) { // whole batches: a look ends one
                 const size_t some = std::min<size_t>(32, count - at);
-                for (okid_square_root_t* one : each)
-                    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(one, all.numbers.data() + m * at, some));
+                for (const okid_test::factors& one : each)
+                    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(one.self, all.numbers.data() + m * at, some));
                 std::vector<double> gram(n * n);
                 for (const okid_detrend_t detrend : {OKID_DETREND_NONE, OKID_DETREND_MEAN}) {
-                    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(each[1], detrend, gram.data(), nullptr));
-                    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_factor(each[1], detrend, factor[1].data(), nullptr));
+                    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(each[1].self, detrend, gram.data(), nullptr));
+                    TEST_ASSERT_EQUAL(OKID_OK,
+                                      okid_square_root_factor(each[1].self, detrend, factor[1].data(), nullptr));
                 }
             }
             for (int k = 0; k < 2; ++k)
                 TEST_ASSERT_EQUAL(OKID_OK,
-                                  okid_square_root_factor(each[k], OKID_DETREND_NONE, factor[k].data(), nullptr));
+                                  okid_square_root_factor(each[k].self, OKID_DETREND_NONE, factor[k].data(), nullptr));
             for (size_t i = 0; i < n * n; ++i)
                 TEST_ASSERT_DOUBLE_WITHIN(1e-12 * std::abs(factor[0][0]), factor[0][i], factor[1][i]);
         }

@@ -1,58 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Accumulators that differ in one number of their configuration, each alone: they go together where that does no harm.
-#include <okid/accumulator.h>
-#include <okid/correlation.h>
-#include <okid/steps/square_root.h>
+#include "accumulators.hpp"
 
-extern "C" {
-#include <unity.h>
-}
 #include <cmath>
-#include <vector>
 
 extern "C" void setUp() {}
 extern "C" void tearDown() {}
 
+using namespace okid_test;
+
 namespace {
-
-using bytes_t = std::vector<unsigned char>;
-
-struct sums {
-    bytes_t block;
-    okid_accumulator_t* self = nullptr;
-
-    explicit sums(const okid_accumulator_config_t& c) : block(okid_accumulator_memsize(&c)) {
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&self, &c, block.data(), block.size()));
-    }
-    bytes_t file() const {
-        bytes_t out(okid_accumulator_serialised_size(self));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(self, out.data(), out.size()));
-        return out;
-    }
-};
-
-struct correlations {
-    bytes_t block;
-    okid_correlation_t* self = nullptr;
-
-    explicit correlations(const okid_correlation_config_t& c) : block(okid_correlation_memsize(&c)) {
-        TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_create(&self, &c, block.data(), block.size()));
-    }
-    bytes_t file() const {
-        bytes_t out(okid_correlation_serialised_size(self));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_serialise(self, out.data(), out.size()));
-        return out;
-    }
-};
-
-struct factors {
-    bytes_t block;
-    okid_square_root_t* self = nullptr;
-
-    explicit factors(const okid_square_root_config_t& c) : block(okid_square_root_memsize(&c)) {
-        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&self, &c, block.data(), block.size()));
-    }
-};
 
 /// Growing sums with room for further records.
 okid_accumulator_config_t growing() {

@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A sample with one channel that is no number, or a code at full scale, is missing as a whole, wherever it stands in a
 // call: the state is that of a call before it, a gap of one, and a call behind it.
-#include <okid/accumulator.h>
-#include <okid/correlation.h>
-#include <okid/steps/square_root.h>
+#include "accumulators.hpp"
 
-extern "C" {
-#include <unity.h>
-}
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -18,57 +13,33 @@ extern "C" void tearDown() {}
 
 namespace {
 
-using bytes_t = std::vector<unsigned char>;
+using okid_test::bytes_t, okid_test::sums, okid_test::correlations;
 
 constexpr size_t m = 3, count = 300; // the scan for what is missing goes 256 samples at a time
 
 /// Where a missing sample is tried: around every border, in each channel.
 const size_t places[] = {0, 1, 2, 7, 8, 9, 20, 254, 255, 256, 257, 298, 299};
 
-struct sums {
-    bytes_t block;
-    okid_accumulator_t* self = nullptr;
+okid_accumulator_config_t sums_of(okid_sample_t kind) {
+    okid_accumulator_config_t c = okid_accumulator_defaults(1, 2, 2);
+    c.sample = kind;
+    c.edges = 1;
+    c.saturated_missing = kind == OKID_SAMPLE_DOUBLE ? 0 : 1;
+    return c;
+}
 
-    explicit sums(okid_sample_t kind) {
-        okid_accumulator_config_t c = okid_accumulator_defaults(1, 2, 2);
-        c.sample = kind;
-        c.edges = 1;
-        c.saturated_missing = kind == OKID_SAMPLE_DOUBLE ? 0 : 1;
-        block.resize(okid_accumulator_memsize(&c));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&self, &c, block.data(), block.size()));
-    }
-    bytes_t file() const {
-        bytes_t out(okid_accumulator_serialised_size(self));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(self, out.data(), out.size()));
-        return out;
-    }
-    void gap() const { okid_accumulator_gap(self, 1); }
-};
-
-struct correlations {
-    bytes_t block;
-    okid_correlation_t* self = nullptr;
-
-    explicit correlations(okid_sample_t kind) {
-        okid_correlation_config_t c = okid_correlation_defaults(1, 2, 2);
-        c.sample = kind;
-        c.slots = 8;
-        c.buffer = 64;
-        c.saturated_missing = kind == OKID_SAMPLE_DOUBLE ? 0 : 1;
-        block.resize(okid_correlation_memsize(&c));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_create(&self, &c, block.data(), block.size()));
-    }
-    bytes_t file() const {
-        bytes_t out(okid_correlation_serialised_size(self));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_serialise(self, out.data(), out.size()));
-        return out;
-    }
-    void gap() const { okid_correlation_gap(self, 1); }
-};
+okid_correlation_config_t correlations_of(okid_sample_t kind) {
+    okid_correlation_config_t c = okid_correlation_defaults(1, 2, 2);
+    c.sample = kind;
+    c.slots = 8;
+    c.buffer = 64;
+    c.saturated_missing = kind == OKID_SAMPLE_DOUBLE ? 0 : 1;
+    return c;
+}
 
 /// @param expected  status of the call with the bad sample; what was saturated is counted by it alone
-template <class Object, class Number, class Add>
-void split_or_whole(okid_sample_t kind, const std::vector<Number>& bad, okid_status_t expected, const Add& add) {
+template <class Object, class Config, class Number, class Add>
+void split_or_whole(const Config& config, const std::vector<Number>& bad, okid_status_t expected, const Add& add) {
     std::vector<Number> good(m * count);
     for (size_t i = 0; i < good.size(); ++i) good[i] = static_cast<Number>(static_cast<int>(i * i % 201) - 100);
     for (const size_t at : places)
@@ -76,10 +47,10 @@ void split_or_whole(okid_sample_t kind, const std::vector<Number>& bad, okid_sta
             for (const Number value : bad) {
                 std::vector<Number> all = good;
                 all[at * m + c] = value;
-                const Object whole(kind), split(kind);
+                const Object whole(config), split(config);
                 TEST_ASSERT_EQUAL(expected, add(whole.self, all.data(), count));
                 TEST_ASSERT_EQUAL(OKID_OK, add(split.self, good.data(), at));
-                split.gap();
+                split.gap(1);
                 TEST_ASSERT_EQUAL(OKID_OK, add(split.self, good.data() + (at + 1) * m, count - at - 1));
                 bytes_t one = whole.file(), other = split.file();
                 if (expected == OKID_WARN_SATURATED) { // nothing else differs: without the count, and the checksum
@@ -99,28 +70,32 @@ template <class Number> std::vector<Number> no_numbers() {
 }
 
 void numbers() {
-    split_or_whole<sums>(OKID_SAMPLE_DOUBLE, no_numbers<double>(), OKID_WARN_MISSING, okid_accumulator_add);
-    split_or_whole<sums>(OKID_SAMPLE_DOUBLE, no_numbers<float>(), OKID_WARN_MISSING, okid_accumulator_add_f32);
-    split_or_whole<correlations>(OKID_SAMPLE_DOUBLE, no_numbers<double>(), OKID_WARN_MISSING, okid_correlation_add);
+    split_or_whole<sums>(sums_of(OKID_SAMPLE_DOUBLE), no_numbers<double>(), OKID_WARN_MISSING, okid_accumulator_add);
+    split_or_whole<sums>(sums_of(OKID_SAMPLE_DOUBLE), no_numbers<float>(), OKID_WARN_MISSING, okid_accumulator_add_f32);
+    split_or_whole<correlations>(correlations_of(OKID_SAMPLE_DOUBLE), no_numbers<double>(), OKID_WARN_MISSING,
+                                 okid_correlation_add);
 }
 
 void codes() {
     const std::vector<int16_t> of_words = {INT16_MAX, INT16_MIN};
     const std::vector<int32_t> of_24_bits = {(1 << 23) - 1, -(1 << 23)}, of_32_bits = {INT32_MAX, INT32_MIN};
-    split_or_whole<sums>(OKID_SAMPLE_INT16, of_words, OKID_WARN_SATURATED, okid_accumulator_add_i16);
-    split_or_whole<sums>(OKID_SAMPLE_INT24, of_24_bits, OKID_WARN_SATURATED, okid_accumulator_add_i32);
-    split_or_whole<sums>(OKID_SAMPLE_INT32, of_32_bits, OKID_WARN_SATURATED, okid_accumulator_add_i32);
-    split_or_whole<correlations>(OKID_SAMPLE_INT16, of_words, OKID_WARN_SATURATED, okid_correlation_add_i16);
-    split_or_whole<correlations>(OKID_SAMPLE_INT24, of_24_bits, OKID_WARN_SATURATED, okid_correlation_add_i32);
-    split_or_whole<correlations>(OKID_SAMPLE_INT32, of_32_bits, OKID_WARN_SATURATED, okid_correlation_add_i32);
+    split_or_whole<sums>(sums_of(OKID_SAMPLE_INT16), of_words, OKID_WARN_SATURATED, okid_accumulator_add_i16);
+    split_or_whole<sums>(sums_of(OKID_SAMPLE_INT24), of_24_bits, OKID_WARN_SATURATED, okid_accumulator_add_i32);
+    split_or_whole<sums>(sums_of(OKID_SAMPLE_INT32), of_32_bits, OKID_WARN_SATURATED, okid_accumulator_add_i32);
+    split_or_whole<correlations>(correlations_of(OKID_SAMPLE_INT16), of_words, OKID_WARN_SATURATED,
+                                 okid_correlation_add_i16);
+    split_or_whole<correlations>(correlations_of(OKID_SAMPLE_INT24), of_24_bits, OKID_WARN_SATURATED,
+                                 okid_correlation_add_i32);
+    split_or_whole<correlations>(correlations_of(OKID_SAMPLE_INT32), of_32_bits, OKID_WARN_SATURATED,
+                                 okid_correlation_add_i32);
 }
 
 /// The codes next to full scale are as good as any; a word beyond them is no code of 24 bits.
 void the_bounds_of_codes() {
     const std::vector<int32_t> fine = {(1 << 23) - 2, -(1 << 23) + 1, 0}, above = {1 << 23, 0, 0},
                                below = {0, 0, -(1 << 23) - 1};
-    const sums a(OKID_SAMPLE_INT24);
-    const correlations c(OKID_SAMPLE_INT24);
+    const sums a(sums_of(OKID_SAMPLE_INT24));
+    const correlations c(correlations_of(OKID_SAMPLE_INT24));
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add_i32(a.self, fine.data(), 1));
     TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_add_i32(c.self, fine.data(), 1));
     const bytes_t before[] = {a.file(), c.file()};
@@ -131,7 +106,7 @@ void the_bounds_of_codes() {
     TEST_ASSERT_TRUE(before[0] == a.file()); // nothing was absorbed
     TEST_ASSERT_TRUE(before[1] == c.file());
     const std::vector<int16_t> words = {INT16_MAX - 1, INT16_MIN + 1, 0};
-    const sums w(OKID_SAMPLE_INT16);
+    const sums w(sums_of(OKID_SAMPLE_INT16));
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add_i16(w.self, words.data(), 1));
 }
 
@@ -147,18 +122,16 @@ template <class Number, class Add> void factor_of(const std::vector<Number>& bad
             double gram[2][n * n];
             okid_accumulator_stats_t stats[2];
             for (int split = 0; split < 2; ++split) {
-                bytes_t block(okid_square_root_memsize(&c));
-                okid_square_root_t* self = nullptr;
-                TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&self, &c, block.data(), block.size()));
+                const okid_test::factors one(c);
                 if (split == 0) {
-                    TEST_ASSERT_EQUAL(OKID_WARN_MISSING, add(self, holed.data(), count));
+                    TEST_ASSERT_EQUAL(OKID_WARN_MISSING, add(one.self, holed.data(), count));
                 } else {
-                    TEST_ASSERT_EQUAL(OKID_OK, add(self, all.data(), at));
-                    okid_square_root_gap(self, 1);
-                    TEST_ASSERT_EQUAL(OKID_OK, add(self, all.data() + (at + 1) * m, count - at - 1));
+                    TEST_ASSERT_EQUAL(OKID_OK, add(one.self, all.data(), at));
+                    one.gap(1);
+                    TEST_ASSERT_EQUAL(OKID_OK, add(one.self, all.data() + (at + 1) * m, count - at - 1));
                 }
-                TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(self, OKID_DETREND_NONE, gram[split], nullptr));
-                okid_square_root_stats(self, &stats[split]);
+                TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(one.self, OKID_DETREND_NONE, gram[split], nullptr));
+                stats[split] = one.stats();
             }
             for (size_t i = 0; i < n * n; ++i) TEST_ASSERT_TRUE(gram[0][i] == gram[1][i]);
             TEST_ASSERT_EQUAL_MEMORY(&stats[1], &stats[0], sizeof stats[0]);

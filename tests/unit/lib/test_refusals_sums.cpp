@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Accumulators of all three kinds refuse each call that lacks one pointer, and what one of them was not created for.
+#include "accumulators.hpp"
 #include "refusals.hpp"
-
-#include <okid/accumulator.h>
-#include <okid/correlation.h>
-#include <okid/steps/square_root.h>
-
-#include <vector>
 
 extern "C" void setUp() {}
 extern "C" void tearDown() {}
 
 namespace {
 
-using bytes_t = std::vector<unsigned char>;
+using okid_test::bytes_t;
 
 enum { SAMPLES = 6, LAGS = 2 };
 const double numbers[2 * SAMPLES] = {1, 2, -1, 3, 0, 1, 2, -2, 1, 1, -3, 2};
@@ -21,45 +16,32 @@ const float floats[2 * SAMPLES] = {1, 2, -1, 3, 0, 1, 2, -2, 1, 1, -3, 2};
 const int16_t words[2 * SAMPLES] = {1, 2, -1, 3, 0, 1, 2, -2, 1, 1, -3, 2};
 const int32_t longs[2 * SAMPLES] = {1, 2, -1, 3, 0, 1, 2, -2, 1, 1, -3, 2};
 
-/// An accumulator of one input and one output.
-struct sums {
-    bytes_t block;
-    okid_accumulator_t* self = nullptr;
-
-    explicit sums(okid_sample_t sample, int64_t rows_of_slot = 0, int32_t slots = 0) {
+/// Accumulators of one input and one output.
+struct sums : okid_test::sums {
+    explicit sums(okid_sample_t sample, int32_t rows = 0, int32_t slots = 0)
+        : okid_test::sums(config_of(sample, rows, slots)) {}
+    static okid_accumulator_config_t config_of(okid_sample_t sample, int32_t rows, int32_t slots) {
         okid_accumulator_config_t c = okid_accumulator_defaults(1, 1, LAGS);
         c.sample = sample;
-        c.block = static_cast<decltype(c.block)>(rows_of_slot);
+        c.block = rows;
         c.slots = slots;
         c.edges = slots == 0;
-        block.resize(okid_accumulator_memsize(&c));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&self, &c, block.data(), block.size()));
+        return c;
     }
 };
 
-/// The correlations of one input and one output.
-struct correlations {
-    bytes_t block;
-    okid_correlation_t* self = nullptr;
-
-    explicit correlations(okid_sample_t sample) {
+struct correlations : okid_test::correlations {
+    explicit correlations(okid_sample_t sample) : okid_test::correlations(config_of(sample)) {}
+    static okid_correlation_config_t config_of(okid_sample_t sample) {
         okid_correlation_config_t c = okid_correlation_defaults(1, 1, LAGS);
         c.sample = sample;
         c.slots = 64;
-        block.resize(okid_correlation_memsize(&c));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_create(&self, &c, block.data(), block.size()));
+        return c;
     }
 };
 
-struct factors {
-    bytes_t block;
-    okid_square_root_t* self = nullptr;
-
-    factors() {
-        const okid_square_root_config_t c = okid_square_root_defaults(1, 1, LAGS);
-        block.resize(okid_square_root_memsize(&c));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&self, &c, block.data(), block.size()));
-    }
+struct factors : okid_test::factors {
+    factors() : okid_test::factors(okid_square_root_defaults(1, 1, LAGS)) {}
 };
 
 /// Samples may be missing where there are none.
@@ -281,17 +263,13 @@ void negative_gaps_are_none() {
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(a.self, numbers, LAGS));
     TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_add(c.self, numbers, LAGS));
     TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(r.self, numbers, LAGS));
-    okid_accumulator_gap(a.self, -1);
-    okid_correlation_gap(c.self, -1);
-    okid_square_root_gap(r.self, -1);
+    a.gap(-1);
+    c.gap(-1);
+    r.gap(-1);
     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(a.self, numbers, 1));
     TEST_ASSERT_EQUAL(OKID_OK, okid_correlation_add(c.self, numbers, 1));
     TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(r.self, numbers, 1));
-    okid_accumulator_stats_t stats[3];
-    okid_accumulator_stats(a.self, &stats[0]);
-    okid_correlation_stats(c.self, &stats[1]);
-    okid_square_root_stats(r.self, &stats[2]);
-    for (const okid_accumulator_stats_t& each : stats) {
+    for (const okid_accumulator_stats_t& each : {a.stats(), c.stats(), r.stats()}) {
         TEST_ASSERT_EQUAL_INT64(1, each.rows);
         TEST_ASSERT_EQUAL_INT64(0, each.gaps);
         TEST_ASSERT_EQUAL_INT64(0, each.missing);

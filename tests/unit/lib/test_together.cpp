@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Accumulators beside each other: counts of records put together and taken apart, files at any time of a record,
 // and both ways to the Gram matrix.
-#include <okid/accumulator.h>
-#include <okid/correlation.h>
-#include <okid/steps/square_root.h>
+#include "accumulators.hpp"
 
-extern "C" {
-#include <unity.h>
-}
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -16,9 +11,9 @@ extern "C" {
 extern "C" void setUp() {}
 extern "C" void tearDown() {}
 
-namespace {
+using namespace okid_test;
 
-using bytes_t = std::vector<unsigned char>;
+namespace {
 
 enum { M = 3, LAGS = 3 };
 
@@ -31,36 +26,6 @@ std::vector<double> noise(size_t count, std::uint64_t seed) {
     return out;
 }
 
-struct sums {
-    bytes_t block;
-    okid_accumulator_t* self = nullptr;
-
-    explicit sums(const okid_accumulator_config_t& c) : block(okid_accumulator_memsize(&c)) {
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&self, &c, block.data(), block.size()));
-    }
-    bytes_t file() const {
-        bytes_t out(okid_accumulator_serialised_size(self));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(self, out.data(), out.size()));
-        return out;
-    }
-    okid_accumulator_stats_t stats() const {
-        okid_accumulator_stats_t out;
-        okid_accumulator_stats(self, &out);
-        return out;
-    }
-};
-
-/// Growing; in blocks; a window; memory that fades.
-okid_accumulator_config_t shape_of(int shape, okid_sample_t kind) {
-    okid_accumulator_config_t c = okid_accumulator_defaults(1, M - 1, LAGS);
-    c.sample = kind;
-    c.edges = shape == 2 ? 0 : 1;
-    if (shape > 0) c.block = 5;
-    if (shape == 2) c.slots = 3;
-    if (shape == 3) c.forgetting = 0.99;
-    return c;
-}
-
 void expect_counts(const okid_accumulator_stats_t& a, const okid_accumulator_stats_t& b, int sign,
                    const okid_accumulator_stats_t& found) {
     TEST_ASSERT_EQUAL_INT64(a.samples + sign * b.samples, found.samples);
@@ -71,16 +36,16 @@ void expect_counts(const okid_accumulator_stats_t& a, const okid_accumulator_sta
 }
 
 void counts_add_up_and_are_taken_off() {
-    const okid_accumulator_config_t c = shape_of(0, OKID_SAMPLE_INT16);
+    const okid_accumulator_config_t c = shape_of(0, OKID_SAMPLE_INT16, 5);
     std::vector<int16_t> codes(60 * M);
     for (size_t i = 0; i < codes.size(); ++i) codes[i] = static_cast<int16_t>(i % 37 == 0 ? 32767 : 100 * (i % 7));
     const sums a(c), b(c);
     TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, okid_accumulator_add_i16(a.self, codes.data(), 20));
-    okid_accumulator_gap(a.self, 3);
+    a.gap(3);
     TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, okid_accumulator_add_i16(a.self, codes.data(), 40));
-    okid_accumulator_gap(a.self, 1);
+    a.gap(1);
     TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, okid_accumulator_add_i16(b.self, codes.data(), 15));
-    okid_accumulator_gap(b.self, 7);
+    b.gap(7);
     TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, okid_accumulator_add_i16(b.self, codes.data(), 9));
     const okid_accumulator_stats_t before = a.stats(), part = b.stats();
     TEST_ASSERT_TRUE(part.samples > 0 && part.missing > 0 && part.gaps > 0 && part.saturated > 0 && part.rows > 0);
@@ -99,7 +64,7 @@ void a_file_at_any_time_goes_on_as_the_record() {
     for (const okid_sample_t kind : {OKID_SAMPLE_DOUBLE, OKID_SAMPLE_INT16})
         for (int shape = 0; shape < 4; ++shape)
             for (size_t cut = 0; cut <= 40; ++cut) {
-                const okid_accumulator_config_t c = shape_of(shape, kind);
+                const okid_accumulator_config_t c = shape_of(shape, kind, 5);
                 const sums one(c), back(c);
                 const auto add = [&](const sums& to, size_t first, size_t count) {
                     return kind == OKID_SAMPLE_DOUBLE
@@ -107,7 +72,7 @@ void a_file_at_any_time_goes_on_as_the_record() {
                                : okid_accumulator_add_i16(to.self, words.data() + first * M, count);
                 };
                 TEST_ASSERT_EQUAL(OKID_OK, add(one, 0, cut));
-                if (cut % 5 == 4) okid_accumulator_gap(one.self, 2);
+                if (cut % 5 == 4) one.gap(2);
                 const bytes_t file = one.file();
                 TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_deserialise(back.self, file.data(), file.size()));
                 TEST_ASSERT_TRUE(file == back.file());
@@ -125,34 +90,30 @@ void both_ways_to_the_gram_matrix() {
     const double scale[M] = {2, -0.5, 3}, offset[M] = {1, 20, -7};
     for (const int32_t batch : {1, 5, 32})
         for (int shape = 0; shape < 4; ++shape) {
-            const okid_accumulator_config_t c = shape_of(shape, OKID_SAMPLE_DOUBLE);
+            const okid_accumulator_config_t c = shape_of(shape, OKID_SAMPLE_DOUBLE, 5);
             const sums a(c);
             okid_square_root_config_t r = okid_square_root_defaults(1, M - 1, LAGS);
             r.batch = batch;
             r.block = c.block;
             r.slots = c.slots;
             r.forgetting = c.forgetting;
-            bytes_t block(okid_square_root_memsize(&r));
-            okid_square_root_t* root = nullptr;
-            TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&root, &r, block.data(), block.size()));
+            const factors root(r);
             okid_accumulator_set_units(a.self, scale, offset);
-            okid_square_root_set_units(root, scale, offset);
+            okid_square_root_set_units(root.self, scale, offset);
             for (size_t first = 0; first < count; first += 50) {
                 TEST_ASSERT_TRUE(okid_accumulator_add(a.self, all.data() + first * M, 50) >= 0);
-                TEST_ASSERT_TRUE(okid_square_root_add(root, all.data() + first * M, 50) >= 0);
-                if (first == 150) okid_accumulator_gap(a.self, 4);
-                if (first == 150) okid_square_root_gap(root, 4);
+                TEST_ASSERT_TRUE(okid_square_root_add(root.self, all.data() + first * M, 50) >= 0);
+                if (first == 150) a.gap(4);
+                if (first == 150) root.gap(4);
                 for (const okid_detrend_t detrend : {OKID_DETREND_NONE, OKID_DETREND_MEAN}) {
                     double one[n * n], other[n * n], mean[M], other_mean[M];
                     TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a.self, detrend, one, mean));
-                    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(root, detrend, other, other_mean));
+                    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(root.self, detrend, other, other_mean));
                     for (size_t i = 0; i < n * n; ++i)
                         TEST_ASSERT_DOUBLE_WITHIN(1e-10 * (1 + std::abs(one[n + 1])), one[i], other[i]);
                     for (size_t i = 0; i < M; ++i) TEST_ASSERT_DOUBLE_WITHIN(1e-10, mean[i], other_mean[i]);
                 }
-                okid_accumulator_stats_t counts;
-                okid_square_root_stats(root, &counts);
-                expect_counts(a.stats(), {}, 1, counts);
+                expect_counts(a.stats(), {}, 1, root.stats());
             }
         }
 }
@@ -168,15 +129,13 @@ void factors_of_any_width() {
         okid_square_root_config_t r = okid_square_root_defaults(0, 1, lags);
         r.block = 7;
         r.slots = 4;
-        bytes_t block(okid_square_root_memsize(&r));
-        okid_square_root_t* root = nullptr;
-        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_create(&root, &r, block.data(), block.size()));
+        const factors root(r);
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(a.self, all.data(), all.size()));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(root, all.data(), all.size()));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(root.self, all.data(), all.size()));
         const auto n = static_cast<size_t>(lags + 1);
         std::vector<double> one(n * n), other(n * n);
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a.self, OKID_DETREND_NONE, one.data(), nullptr));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(root, OKID_DETREND_NONE, other.data(), nullptr));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_gram(root.self, OKID_DETREND_NONE, other.data(), nullptr));
         for (size_t i = 0; i < n * n; ++i) TEST_ASSERT_DOUBLE_WITHIN(1e-11 * one[0], one[i], other[i]);
     }
 }
