@@ -44,7 +44,7 @@ grid::grid(const live_config& config, grid_sink& sink)
     const std::int64_t room = std::llround(most_rows_bytes / row_bytes / 4);
     lag_ = std::clamp<std::int64_t>(std::llround(silence_patience_s * rate_hz_), window_, std::max(room, window_));
     mask_ = power_of_two(2 * lag_) - 1;
-    hold_ = std::clamp<std::int64_t>(std::llround(decision_s * rate_hz_), least_decision, lag_ / 4);
+    hold_ = std::min(std::max<std::int64_t>(std::llround(decision_s * rate_hz_), least_decision), lag_ / 4);
     most_held_ = static_cast<std::size_t>(
                      hold_ + std::min<std::int64_t>(lag_, most_late / static_cast<std::int64_t>(lanes_.size()))) +
                  64;

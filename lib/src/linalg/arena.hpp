@@ -3,15 +3,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-
-#ifdef __SANITIZE_ADDRESS__
-#define OKID_FENCED_ARENA
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define OKID_FENCED_ARENA
-#endif
-#endif
-#ifdef OKID_FENCED_ARENA
+#ifdef OKID_FENCES // a build of the tests under AddressSanitizer: what lies between two arrays must not be touched
 #include <sanitizer/asan_interface.h>
 #endif
 
@@ -19,20 +11,21 @@ namespace okid {
 
 class arena {
   public:
-    explicit arena(void* block = nullptr) : base_(reinterpret_cast<std::uintptr_t>(block)) {
+    /// `alone`: nobody else uses the block while these arrays are; else nothing is fenced.
+    explicit arena(void* block = nullptr, bool alone = true)
+        : base_(reinterpret_cast<std::uintptr_t>(block)), fence_(alone ? fence : 0) {
         if (base_ != 0) used_ = (alignment - base_ % alignment) % alignment;
     }
 
-    /// Room for `count` objects, aligned; nullptr while only counting. Under AddressSanitizer what lies between two
-    /// arrays must not be touched.
+    /// Room for `count` objects, aligned; nullptr while only counting.
     template <class T> T* take(std::size_t count) {
         const std::size_t at = used_, size = count * sizeof(T);
-        used_ += (size + fence + alignment - 1) / alignment * alignment;
+        used_ += (size + fence_ + alignment - 1) / alignment * alignment;
         if (base_ == 0) return nullptr;
         T* const out = reinterpret_cast<T*>(base_ + at);
-#ifdef OKID_FENCED_ARENA
+#ifdef OKID_FENCES
         ASAN_UNPOISON_MEMORY_REGION(out, size);
-        ASAN_POISON_MEMORY_REGION(reinterpret_cast<char*>(out) + size, used_ - at - size);
+        if (fence_ > 0) ASAN_POISON_MEMORY_REGION(reinterpret_cast<char*>(out) + size, used_ - at - size);
 #endif
         return out;
     }
@@ -42,13 +35,13 @@ class arena {
 
   private:
     static constexpr std::size_t alignment = 64;
-#ifdef OKID_FENCED_ARENA
-    static constexpr std::size_t fence = 64;
+#ifdef OKID_FENCES
+    static constexpr std::size_t fence = alignment;
 #else
     static constexpr std::size_t fence = 0;
 #endif
     std::uintptr_t base_;
-    std::size_t used_ = 0;
+    std::size_t fence_, used_ = 0;
 };
 
 } // namespace okid
