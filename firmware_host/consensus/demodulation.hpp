@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The amplitude of a vibration over time: at one frequency, block by block.
 #pragma once
+#include "result/judgement.hpp"
+
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstddef>
@@ -34,6 +37,21 @@ inline bool lasts(const std::vector<std::complex<double>>& amplitudes) {
     for (const auto& x : amplitudes)
         if (const double size = std::abs(x); !std::isnan(size)) sum += size, squares += size * size;
     return sum * sum >= static_cast<double>(amplitudes.size()) * squares / 2;
+}
+
+/// Is it struck now and then, and rings down in between? A vibration under steady random forces looks the same backwards in
+/// time: its amplitude falls as often as it rises. Loud steps count more. @param amplitudes  of short blocks
+inline bool rings_down(const std::vector<std::complex<double>>& amplitudes) {
+    double falls = 0, all = 0, squares = 0;
+    for (std::size_t i = 1; i < amplitudes.size(); ++i) {
+        const double before = std::abs(amplitudes[i - 1]), after = std::abs(amplitudes[i]);
+        const double weight = std::isnan(before + after) ? 0 : std::max(before, after);
+        falls += after < before ? weight : 0;
+        all += weight;
+        squares += weight * weight;
+    }
+    const double excess = all > 0 ? 2 * falls / all - 1 : 0; // by chance 1 / sqrt(steps)
+    return excess > judgement::falling && excess * excess * all * all > judgement::by_chance * squares;
 }
 
 } // namespace okid_host

@@ -57,6 +57,22 @@ double spread_over_mean(const std::vector<complex>& a) {
     return std::sqrt(square / static_cast<double>(a.size())) / mean;
 }
 
+/// Does an amplitude know two levels, on and off? That of a random vibration has all between them.
+bool switched(const std::vector<complex>& a) {
+    std::vector<complex> on;
+    std::vector<double> sizes;
+    for (const complex& x : a) sizes.push_back(std::abs(x));
+    std::nth_element(sizes.begin(), sizes.end() - sizes.size() / 10 - 1, sizes.end());
+    const double level = sizes[sizes.size() - sizes.size() / 10 - 1];
+    std::size_t off = 0;
+    for (const complex& x : a) {
+        if (std::abs(x) > judgement::on * level) on.push_back(x);
+        off += std::abs(x) < judgement::off * level;
+    }
+    return on.size() >= judgement::fewest_blocks && spread_over_mean(on) < judgement::steady_on &&
+           static_cast<double>(on.size() + off) >= judgement::on_or_off * static_cast<double>(a.size());
+}
+
 double strength(const std::vector<complex>& a) {
     double square = 0;
     for (const complex& x : a) square += std::norm(x);
@@ -74,14 +90,8 @@ bool near_multiple(double frequency_hz, double base, double tolerance) {
     return n >= 1 && std::abs(frequency_hz - n * base) < tolerance * base;
 }
 
-/// Does the response at n f follow the n-th power of that at f?
-bool follows(const record_level& level, std::size_t m, std::size_t channel, double base, int n) {
-    const auto block = static_cast<std::size_t>(judgement::product_periods * level.fs_hz / base) + 1;
-    const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
-                               b = amplitudes(level, m, channel, {1}, n * base, block);
-    if (a.size() < 2 * judgement::fewest_blocks || b.size() != a.size() ||
-        strength(a) < judgement::stronger * strength(b) || !lasts(a))
-        return false; // the phases of a single decay are those of its hit
+/// Is b in phase with the n-th power of a?
+bool in_phase(const std::vector<complex>& a, const std::vector<complex>& b, int n) {
     complex sum = 0;
     double both = 0;
     for (std::size_t i = 0; i < a.size(); ++i) {
@@ -90,6 +100,18 @@ bool follows(const record_level& level, std::size_t m, std::size_t channel, doub
         both += std::abs(b[i]) * std::abs(power);
     }
     return both > 0 && std::abs(sum) > judgement::in_phase * both;
+}
+
+/// Does the response at n f follow the n-th power of that at f?
+bool follows(const record_level& level, std::size_t m, std::size_t channel, double base, int n) {
+    const auto block = static_cast<std::size_t>(judgement::product_periods * level.fs_hz / base) + 1;
+    const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
+                               b = amplitudes(level, m, channel, {1}, n * base, block);
+    if (a.size() < 2 * judgement::fewest_blocks || b.size() != a.size() ||
+        strength(a) < judgement::stronger * strength(b) || !lasts(a))
+        return false; // the phases of a decay are those of its hit
+    const auto ring = static_cast<std::size_t>(judgement::ring_periods * level.fs_hz / base) + 1;
+    return !rings_down(amplitudes(level, m, channel, {1}, base, ring)) && in_phase(a, b, n);
 }
 
 const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
@@ -106,6 +128,21 @@ std::vector<complex> weights_along(std::vector<complex> shape) {
     const double most = std::abs(shape[largest(shape)]);
     for (complex& entry : shape) entry = std::conj(entry) * (most / square);
     return shape;
+}
+
+/// Is it the n-th multiple of a machine's tone? As strong as it may be, and however the machine wanders.
+bool of_machine(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& tone,
+                const consensus_mode& mode, int n) {
+    if (mode.damping_ratio > judgement::line_damping ||
+        std::find(tone.why.begin(), tone.why.end(), "tone") == tone.why.end() ||
+        !near_multiple(mode.frequency_hz, n * tone.frequency_hz, judgement::mains_tolerance))
+        return false;
+    const auto block = static_cast<std::size_t>(judgement::machine_periods * level.fs_hz / tone.frequency_hz) + 1;
+    const auto along = [&](const consensus_mode& one, double frequency_hz) {
+        return amplitudes(level, m, n_u, weights_along(one.shape), frequency_hz, block);
+    };
+    const std::vector<complex> a = along(tone, tone.frequency_hz), b = along(mode, n * tone.frequency_hz);
+    return a.size() >= 2 * judgement::fewest_blocks && a.size() == b.size() && in_phase(a, b, n);
 }
 
 /// Does the amplitude fall as a free vibration of this damping does? One of a line stays, whatever the record's length.
@@ -180,7 +217,8 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     if (at_rest && (strength(a) > judgement::loudest_silence ||
                     quieter_before(level, m, n_u, weights, mode.frequency_hz, strength(a))))
         return false;
-    if (!endless) return a.size() >= judgement::fewest_blocks && spread_over_mean(a) < judgement::steady;
+    if (!endless)
+        return a.size() >= judgement::fewest_blocks && (spread_over_mean(a) < judgement::steady || switched(a));
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= judgement::fewest_blocks * level.records.size()
@@ -300,9 +338,11 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
         }
         for (const consensus_mode& base : modes) {
             const int n = static_cast<int>(std::lround(mode.frequency_hz / base.frequency_hz));
-            if (n < 2 || n > judgement::most_multiple || base.agreement < judgement::least_agreement ||
-                std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
-                !follows(level, m, channel, base.frequency_hz, n))
+            if (n < 2 || n > judgement::most_multiple ||
+                (!of_machine(level, m, n_u, base, mode, n) &&
+                 (base.agreement < judgement::least_agreement ||
+                  std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
+                  !follows(level, m, channel, base.frequency_hz, n))))
                 continue;
             mode.why.emplace_back("harmonic");
             break;

@@ -44,6 +44,7 @@ struct strand {
     std::vector<series> all, left;              ///< a record each
     double power = 0, share_left = 1, peak = 0; ///< at its frequency; peak: of what the forces drive, over beside it
     double strength = 0;                        ///< amplitude as a displacement
+    bool rings = false;                         ///< down between hits that were not measured
 };
 
 /// Factors and how often each: {base, n}; n < 0: the conjugate.
@@ -173,7 +174,7 @@ double following(product_search& s, const std::vector<series>& records, const pr
     std::vector<complex> together(b.size(), 1);
     for (const auto& [i, n] : of) {
         const std::vector<complex>& a = s.amplitudes(i, block);
-        if (!lasts(a)) return 0; // the phases of a single decay are those of its hit
+        if (!lasts(a) || s.strands[i].rings) return 0; // the phases of a decay are those of its hit
         for (std::size_t t = 0; t < b.size(); ++t) together[t] *= std::pow(n > 0 ? a[t] : std::conj(a[t]), std::abs(n));
     }
     return coherence(b, together);
@@ -280,7 +281,12 @@ void fill(const record_work& work, product_search& s) {
             for (std::size_t t = 0; t < count; ++t) left[t] = residual[t * set.n_y + o];
         }
     }
-    for (std::size_t k = 0; k < s.modes.size(); ++k) weigh(s.modes[k], s.fs_hz, s.strands[k]);
+    for (std::size_t k = 0; k < s.modes.size(); ++k) {
+        const double cycles = s.modes[k].frequency_hz / s.fs_hz;
+        const auto ring = static_cast<std::size_t>(judgement::ring_periods / cycles) + 1;
+        weigh(s.modes[k], s.fs_hz, s.strands[k]);
+        s.strands[k].rings = !s.driven && rings_down(demodulated(s.strands[k].all, cycles, ring));
+    }
 }
 
 void doubt(const char* code, mode_verdict& verdict, listed_mode& mode) {

@@ -48,7 +48,10 @@ constexpr double nearly_all =
 constexpr double same_residues = 0.9; ///< MAC of the residues of two poles that are one mode, of responses
 
 // A line: a vibration that a machine keeps up, and no resonance.
-constexpr double steady = 0.25; ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)
+constexpr double steady = 0.25;   ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)
+constexpr double steady_on = 0.1; ///< … of a machine that goes on and off, while it is on
+constexpr double on = 0.5, off = 0.15;   ///< of its amplitude
+constexpr double on_or_off = 0.85;       ///< of the blocks; of a random vibration a half
 constexpr std::size_t fewest_blocks = 8; ///< below that a spread means nothing
 constexpr std::size_t line_blocks = 64;  ///< into which a record is cut
 constexpr double line_periods = 8;       ///< in a block, at least
@@ -71,11 +74,14 @@ constexpr int most_multiple = 5;             ///< of a vibration, looked at
 constexpr double multiple_frequency = 0.015; ///< relative distance from a multiple, a sum or a difference
 constexpr double in_phase =
     0.7; ///< coherence of phases; 1: always. Linear structures stay below 0.45; chance 1/sqrt(blocks)
-constexpr double stronger = 10;       ///< amplitude of the vibration over that of its multiple
-constexpr double product_periods = 6; ///< in a block, of the slowest factor
-constexpr double force_line = 10;     ///< power of a line of the force over that beside it
-constexpr double force_ends = 100;    ///< power of a force over that beyond the edge of its band
-constexpr double resonance_peak = 2;  ///< power of the responses, over that of the force, at a mode over beside it
+constexpr double ring_periods = 3; ///< in a block, to see a vibration ring down between hits
+constexpr double falling = 0.1; ///< steps down less steps up of an amplitude, of all; hits 0.2 and more, no hits 0.05
+constexpr double stronger = 10; ///< amplitude of the vibration over that of its multiple
+constexpr double product_periods = 6;  ///< in a block, of the slowest factor
+constexpr double machine_periods = 32; ///< in a block, to see a tone and its multiples above what surrounds them
+constexpr double force_line = 10;      ///< power of a line of the force over that beside it
+constexpr double force_ends = 100;     ///< power of a force over that beyond the edge of its band
+constexpr double resonance_peak = 2;   ///< power of the responses, over that of the force, at a mode over beside it
 
 // Distortion: products of stronger vibrations.
 constexpr std::size_t product_blocks = 16;    ///< to speak of a coherence
