@@ -205,8 +205,9 @@ void keep_picked(const std::vector<int>& numbers, std::vector<listed_pair>& foun
     found = std::move(picked);
 }
 
-/// Slow trends: a vibration that the record holds only a few times.
-void mark_slow(const record_work& work, double fs_hz, std::vector<consensus_mode>& modes) {
+/// At the ends of what a record shows: a vibration that it holds only a few times, and one whose half-power band reaches
+/// beyond the highest frequency, where what a converter folds back looks like a mode.
+void mark_ends(const record_work& work, double fs_hz, double top, std::vector<consensus_mode>& modes) {
     auto longest = static_cast<double>(work.before ? work.before->longest() : 0);
     double begun = static_cast<double>(work.before ? work.before->begun() : 0);
     for (const record_data& record : work.set.records) {
@@ -215,7 +216,8 @@ void mark_slow(const record_work& work, double fs_hz, std::vector<consensus_mode
     }
     const double seconds = longest / fs_hz;
     for (consensus_mode& mode : modes)
-        if (mode.frequency_hz * seconds < judgement::fewest_periods || mode.could == 0)
+        if (mode.frequency_hz * seconds < judgement::fewest_periods || mode.could == 0 ||
+            mode.frequency_hz * (1 + mode.damping_ratio) > top * fs_hz)
             mode.why.emplace_back("band_edge");
 }
 
@@ -271,7 +273,8 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     tell("looking with several methods, horizons and rates");
     auto runs = look_at(levels, 0, n_u, n_y, work.at_rest, options.threads);
     std::vector<bool> turned = turned_by(options.sensing);
-    const bool known = !turned.empty();
+    const bool known = std::any_of(options.sensing.begin(), options.sensing.end(),
+                                   [](int kind) { return kind != OKID_SENSE_ACCELERATION; });
     auto modes = find_agreement(runs, &turned);
     if (look_closer(levels, n_u, n_y, work.at_rest, options.threads, runs)) modes = find_agreement(runs, &turned);
     if (auto zoomed = zoomed_levels(levels, modes, n_u, n_y, work.at_rest); !zoomed.empty()) {
@@ -284,7 +287,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     }
     if (!known && !turned.empty()) remark_mixed(turned, options, work.context);
     mark_lines(levels, set.n_u, set.n_y, work.at_rest, modes);
-    mark_slow(work, options.fs_hz, modes);
+    mark_ends(work, options.fs_hz, levels.front().top, modes);
     keep_wanted(options, modes);
     modes = options.picks.empty() ? worth_telling(std::move(modes), options.all_modes)
                                   : picked_modes(options.picks, runs, modes);

@@ -33,6 +33,32 @@ inline analytic chance_amplitude(std::size_t count, double frequency_hz, double 
     return out;
 }
 
+/// Of a structure that is struck at these samples: each hit adds its size, in between it rings down.
+inline analytic struck(std::size_t count, double frequency_hz, double damping_ratio,
+                       const std::vector<std::pair<std::size_t, double>>& hits) {
+    analytic out(count);
+    const double keeps = std::exp(-2 * M_PI * damping_ratio * frequency_hz / sample_rate);
+    const double turn = 2 * M_PI * frequency_hz / sample_rate;
+    std::complex<double> a = 0;
+    auto next = hits.begin();
+    for (std::size_t t = 0; t < count; ++t, a *= keeps) {
+        for (; next != hits.end() && next->first == t; ++next)
+            a += std::polar(next->second, -turn * static_cast<double>(t)); // the phase of all is that of the hit
+        out[t] = a;
+    }
+    return out;
+}
+
+/// Every some seconds, of uneven sizes.
+inline std::vector<std::pair<std::size_t, double>> hits_in(std::size_t count, unsigned seed) {
+    std::vector<std::pair<std::size_t, double>> out;
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> apart(3, 6), size(0.6, 1.4);
+    for (double t = 1; t * sample_rate < static_cast<double>(count); t += apart(random))
+        out.emplace_back(static_cast<std::size_t>(t * sample_rate), size(random));
+    return out;
+}
+
 /// The vibration whose amplitude that is.
 inline analytic turning_at(double frequency_hz, analytic amplitude) {
     for (std::size_t t = 0; t < amplitude.size(); ++t)

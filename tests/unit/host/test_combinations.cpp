@@ -95,6 +95,19 @@ static void a_mode_at_a_product_stays_a_mode() {
     }
 }
 
+/// Hits that nobody measured put all modes in phase, again and again: that makes no products of them.
+static void modes_between_hits_are_no_products() {
+    const auto hits = hits_in(usual, 3);
+    for (const double hz : {20.02, 23.02, 30.02}) {
+        series out = white(usual, 0.001, 9);
+        add(out, 1, turning_at(10, struck(usual, 10, 0.004, hits)));
+        add(out, 0.8, turning_at(13, struck(usual, 13, 0.004, hits)));
+        add(out, 0.1, turning_at(hz, struck(usual, hz, 0.004, hits)));
+        const judged found = look({out}, {mode_at(10, 0.004), mode_at(13, 0.004), mode_at(hz, 0.004)});
+        TEST_ASSERT_TRUE(!found.taken_out && found.nonlinear().empty());
+    }
+}
+
 /// As displacements, whatever the sensor: at twice the frequency four times the amplitude are as strong.
 static void only_what_is_weaker_is_a_product() {
     TEST_ASSERT_TRUE(with_third(20, power_of(ten(), 2), 1).is(2, "harmonic"));
@@ -220,6 +233,7 @@ int main() {
     UNITY_BEGIN();
     RUN_TEST(products_of_stronger_vibrations_are_no_modes);
     RUN_TEST(a_mode_at_a_product_stays_a_mode);
+    RUN_TEST(modes_between_hits_are_no_products);
     RUN_TEST(only_what_is_weaker_is_a_product);
     RUN_TEST(a_product_stands_at_the_sum_of_frequencies);
     RUN_TEST(one_product_makes_others_likely);

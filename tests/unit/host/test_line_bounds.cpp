@@ -162,6 +162,60 @@ static void a_single_decay_has_no_harmonics() {
     TEST_ASSERT_EQUAL_STRING("", why({out}, {found_at(10, 0.0016), found_at(20, 0.0016)}).c_str());
 }
 
+/// Hits that nobody measured: all modes begin in phase at each, and the second one is no multiple for that.
+static void vibrations_between_hits_are_no_harmonics() {
+    const auto hits = hits_in(usual, 1);
+    series out = white(usual, 1e-5, 1);
+    add(out, 1, turning_at(10, struck(usual, 10, 0.004, hits)));
+    add(out, 0.05, turning_at(20.02, struck(usual, 20.02, 0.004, hits)));
+    TEST_ASSERT_EQUAL_STRING("", why({out}, {found_at(10, 0.004), found_at(20.02, 0.004)}).c_str());
+}
+
+/// On for a third of the time at one level; at levels that scatter it is no machine.
+static void a_tone_that_goes_on_and_off_is_a_line() {
+    for (const double scatter : {0.07, 0.14}) {
+        const series out = sine(20, usual, [scatter](std::size_t block) {
+            return block / 8 % 3 > 0 ? 0.01 : block % 2 ? 1 + scatter : 1 - scatter;
+        });
+        TEST_ASSERT_EQUAL_STRING(scatter < 0.1 ? "tone" : "", why({out}, {found_at(20, 0.005)}).c_str());
+    }
+    for (const std::size_t steps : {1, 2}) { // so many of eight between on and off
+        const series out = sine(20, usual, [steps](std::size_t block) {
+            return block % 8 < steps ? 0.3 : block / 8 % 2 ? 0.01 : 1.0;
+        });
+        TEST_ASSERT_EQUAL_STRING(steps == 1 ? "tone" : "", why({out}, {found_at(20, 0.005)}).c_str());
+    }
+    const series seldom = sine(20, usual, [](std::size_t block) { return block < 7 ? 1 : 0.01; });
+    TEST_ASSERT_EQUAL_STRING("", why({seldom}, {found_at(20, 0.005)}).c_str());
+}
+
+/// Of a machine whose speed wanders: as strong as the tone itself, within 0.003 and in phase with it.
+static void multiples_of_a_tone_are_harmonics() {
+    const std::size_t count = usual;
+    analytic tone(count), third(count);
+    double phase = 0;
+    for (std::size_t t = 0; t < count; ++t) {
+        phase += 2 * M_PI * 0.01 / sample_rate * std::sin(2 * M_PI * 0.05 * static_cast<double>(t) / sample_rate);
+        tone[t] = std::polar(1.0, phase);
+        third[t] = std::polar(1.5, 3 * phase);
+    }
+    const analytic chance = chance_amplitude(count, 30, 0.002, 2);
+    const auto at = [&](double listed_hz, double damping_ratio, bool of_tone) {
+        series out = white(count, 0.05, 3);
+        add(out, 1, turning_at(10, tone));
+        add(out, 1, turning_at(30, of_tone ? third : chance));
+        return why({out}, {found_at(10, 0.001), found_at(listed_hz, damping_ratio)});
+    };
+    TEST_ASSERT_EQUAL_STRING("tone", at(30, 0.002, true).c_str()); // it is one by itself
+    for (std::size_t t = 0; t < count; ++t) // no longer: the machine's load changes
+        third[t] *= 1 + 0.8 * std::sin(2 * M_PI * 0.03 * static_cast<double>(t) / sample_rate);
+    TEST_ASSERT_EQUAL_STRING("harmonic", at(30, 0.002, true).c_str());
+    TEST_ASSERT_EQUAL_STRING("harmonic", at(30.08, 0.002, true).c_str());
+    TEST_ASSERT_EQUAL_STRING("", at(30.1, 0.002, true).c_str());
+    TEST_ASSERT_EQUAL_STRING("", at(30, 0.011, true).c_str());
+    TEST_ASSERT_EQUAL_STRING("", at(30, 0.002, false).c_str());
+}
+
 int main() {
     UNITY_BEGIN();
     RUN_TEST(an_amplitude_that_hardly_scatters_is_a_line);
@@ -171,5 +225,8 @@ int main() {
     RUN_TEST(simple_parts_of_the_rate_are_pickup);
     RUN_TEST(multiples_of_a_vibration_are_harmonics);
     RUN_TEST(a_single_decay_has_no_harmonics);
+    RUN_TEST(vibrations_between_hits_are_no_harmonics);
+    RUN_TEST(a_tone_that_goes_on_and_off_is_a_line);
+    RUN_TEST(multiples_of_a_tone_are_harmonics);
     return UNITY_END();
 }
