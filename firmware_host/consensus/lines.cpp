@@ -218,7 +218,8 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
                     quieter_before(level, m, n_u, weights, mode.frequency_hz, strength(a))))
         return false;
     if (!endless)
-        return a.size() >= judgement::fewest_blocks && (spread_over_mean(a) < judgement::steady || switched(a));
+        return a.size() >= judgement::fewest_blocks &&
+               (spread_over_mean(a) < judgement::steady || (n_u == 0 && switched(a))); // a force may go on and off too
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= judgement::fewest_blocks * level.records.size()

@@ -14,7 +14,7 @@ RATE, OVER = 1000.0, 4
 
 
 def converted(x: Any) -> Any:
-    """As a delta-sigma converter does it: flat to 0.44 of the rate, shut from 0.56 on, so that the band between folds."""
+    """As a delta-sigma converter does it: flat to 0.44 of the rate, shut from 0.56 on: what is between folds."""
     kernel = firwin(169, 1 / OVER, window=("kaiser", 7.9))
     return upfirdn(kernel, x, down=OVER, axis=0)[: len(x) // OVER]
 

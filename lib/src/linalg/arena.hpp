@@ -3,7 +3,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#ifdef OKID_FENCES // a build of the tests under AddressSanitizer: what lies between two arrays must not be touched
+#ifdef OKID_FENCES // tests under AddressSanitizer: what lies between two arrays is touched by none
 #include <sanitizer/asan_interface.h>
 #endif
 
@@ -11,7 +11,7 @@ namespace okid {
 
 class arena {
   public:
-    /// `alone`: nobody else uses the block while these arrays are; else nothing is fenced.
+    /// `alone`: the block holds nothing else while these arrays are used; else there are no fences.
     explicit arena(void* block = nullptr, bool alone = true)
         : base_(reinterpret_cast<std::uintptr_t>(block)), fence_(alone ? fence : 0) {
         if (base_ != 0) used_ = (alignment - base_ % alignment) % alignment;

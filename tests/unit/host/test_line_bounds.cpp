@@ -207,7 +207,7 @@ static void multiples_of_a_tone_are_harmonics() {
         return why({out}, {found_at(10, 0.001), found_at(listed_hz, damping_ratio)});
     };
     TEST_ASSERT_EQUAL_STRING("tone", at(30, 0.002, true).c_str()); // it is one by itself
-    for (std::size_t t = 0; t < count; ++t) // no longer: the machine's load changes
+    for (std::size_t t = 0; t < count; ++t)                        // no longer: the machine's load changes
         third[t] *= 1 + 0.8 * std::sin(2 * M_PI * 0.03 * static_cast<double>(t) / sample_rate);
     TEST_ASSERT_EQUAL_STRING("harmonic", at(30, 0.002, true).c_str());
     TEST_ASSERT_EQUAL_STRING("harmonic", at(30.08, 0.002, true).c_str());
