@@ -158,11 +158,11 @@ okid_status_t okid_era_decompose(okid_era_t* self, const okid_real_t* markov) {
 okid_status_t okid::decompose_leading(okid_era_t* self, const okid_real_t* markov, int count, int past) {
     okid_era& e = *self;
     leading_triplets found(e.config, past, count);
-    arena counted(nullptr, false);
+    arena counted;
     found.lay_out(counted);
     if (correlated(e) || counted.bytes() > linalg::svd_work(e.height, e.breadth) * sizeof(okid_real_t))
         return okid_era_decompose(self, markov);
-    arena memory(e.work, false); // that of an SVD, which is not made
+    arena memory(e.work); // that of an SVD, which is not made
     found.lay_out(memory);
     if (!found.find(markov)) return okid_era_decompose(self, markov);
     const auto put = [](const double* from, int many, okid_real_t* to) {

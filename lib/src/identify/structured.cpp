@@ -42,7 +42,7 @@ size_t lay_out(const okid_observer_config_t& c, void* memory, structured_work* w
     const auto m = static_cast<size_t>(c.n_u + c.n_y), n = m * static_cast<size_t>(c.p + 1),
                ny = static_cast<size_t>(c.n_y), columns = std::min<size_t>(batch, ny);
     structured_work w{};
-    arena solving(memory, false);
+    arena solving(memory);
     w.scale = solving.take<double>(m);
     w.centre = solving.take<double>(m);
     w.sum = solving.take<double>(n);

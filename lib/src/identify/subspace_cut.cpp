@@ -65,9 +65,8 @@ void rank_cut::share(const subspace_sizes& z, arena& memory) {
         svd_ = svd.take<okid_real_t>(linalg::svd_work<okid_real_t>(z.h, z.w));
         return std::max(squares.bytes(), svd.bytes());
     };
-    const auto both = [](void* block) { return arena(block, false); };
-    char* block = memory.take<char>(carve(both(nullptr), both(nullptr)));
-    carve(both(block), both(block));
+    char* block = memory.take<char>(carve(arena(), arena()));
+    carve(arena(block), arena(block));
 }
 
 void rank_cut::lay_out(const subspace_sizes& z, bool weighted, bool right_side, arena& memory) {
