@@ -35,8 +35,9 @@ void check_different_outputs(const record_set& set, const record_options& option
 /// Are two records the same numbers?
 bool same_samples(const record_set& set, const record_data& one, const record_data& other);
 
-/// A record that is there twice counts twice, and the result looks surer than it is.
-void remark_repeated(const record_set& set, remarks& said);
+/// A record that is there twice counts twice, and the result looks surer than it is. Rows that a sensor is read in twice make
+/// images of every mode about multiples of its own rate.
+void remark_repeated(const record_set& set, double fs_hz, remarks& said);
 
 /// Of an output over all records: samples, and the sum of their squares about their mean.
 struct output_spread {
