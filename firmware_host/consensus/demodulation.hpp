@@ -39,19 +39,32 @@ inline bool lasts(const std::vector<std::complex<double>>& amplitudes) {
     return sum * sum >= static_cast<double>(amplitudes.size()) * squares / 2;
 }
 
-/// Is it struck now and then, and rings down in between? A vibration under steady random forces looks the same backwards in
-/// time: its amplitude falls as often as it rises. Loud steps count more. @param amplitudes  of short blocks
-inline bool rings_down(const std::vector<std::complex<double>>& amplitudes) {
-    double falls = 0, all = 0, squares = 0;
-    for (std::size_t i = 1; i < amplitudes.size(); ++i) {
-        const double before = std::abs(amplitudes[i - 1]), after = std::abs(amplitudes[i]);
-        const double weight = std::isnan(before + after) ? 0 : std::max(before, after);
-        falls += after < before ? weight : 0;
-        all += weight;
-        squares += weight * weight;
+/// Steps of an amplitude from block to block, loud ones count more: of a vibration under steady random forces, which looks the
+/// same backwards in time, as many go down as up. One that is struck now and then rings down in between.
+struct amplitude_steps {
+    double down = 0, all = 0, squares = 0;
+
+    /// @param unit  in which the amplitudes of this vibration count
+    void add(const std::vector<std::complex<double>>& amplitudes, double unit = 1) {
+        for (std::size_t i = 1; i < amplitudes.size(); ++i) {
+            const double before = std::abs(amplitudes[i - 1]), after = std::abs(amplitudes[i]);
+            const double weight = std::isnan(before + after) ? 0 : std::max(before, after) / unit;
+            down += after < before ? weight : 0;
+            all += weight;
+            squares += weight * weight;
+        }
     }
-    const double excess = all > 0 ? 2 * falls / all - 1 : 0; // by chance 1 / sqrt(steps)
-    return excess > judgement::falling && excess * excess * all * all > judgement::by_chance * squares;
+    [[nodiscard]] double excess() const { return all > 0 ? 2 * down / all - 1 : 0; } // by chance 1 / sqrt(steps)
+    [[nodiscard]] bool of_hits() const {
+        return excess() > judgement::falling && excess() * excess() * all * all > judgement::by_chance * squares;
+    }
+};
+
+/// @param amplitudes  of short blocks
+inline bool rings_down(const std::vector<std::complex<double>>& amplitudes) {
+    amplitude_steps steps;
+    steps.add(amplitudes);
+    return steps.of_hits();
 }
 
 } // namespace okid_host

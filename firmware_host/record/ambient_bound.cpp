@@ -5,8 +5,14 @@
 //          (Au, Mech. Syst. Signal Process. 48 (2014) 15-33; relative variances zeta/(4 pi f T) and 1/(2 pi zeta f T))
 #include "ambient_bound.hpp"
 
+#include "consensus/demodulation.hpp"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <complex>
+#include <limits>
+#include <vector>
 
 namespace okid_host {
 namespace {
@@ -41,6 +47,51 @@ double steady_samples(const record_set& set, const record_data& record) {
     return *most < steady * *least ? there[0] + there[1] + there[2] + there[3] : 0;
 }
 
+/// A vibration along a mode's shape, without its mean; NaN where an output is missing.
+std::vector<std::complex<double>> along(const record_set& set, const record_data& record, const listed_mode& mode) {
+    std::vector<std::complex<double>> out(record.count);
+    std::complex<double> mean = 0;
+    double there = 0;
+    for (std::size_t t = 0; t < record.count; ++t) {
+        const double* row = set.rows(record) + t * set.channels();
+        for (std::size_t k = 0; k < mode.shape.size(); ++k) out[t] += std::conj(mode.shape[k]) * row[k];
+        if (!std::isnan(out[t].real())) mean += out[t], ++there;
+    }
+    for (auto& x : out) x -= mean / std::max(there, 1.0);
+    return out;
+}
+
+/// Which modes are struck now and then: what follows a hit tells more than a steady force does. One mode
+/// or all together tell whether there are hits; beats hide them in blocks of one length and not in those of another.
+std::vector<bool> find_struck(const record_set& set, double fs_hz, const std::vector<listed_mode>& modes) {
+    std::vector<bool> out(modes.size());
+    bool hits = false;
+    std::array<amplitude_steps, 3> together;
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        const double f = modes[k].frequency_hz;
+        std::array<std::vector<std::complex<double>>, together.size()> amplitudes;
+        for (const record_data& record : set.records) {
+            const auto signal = along(set, record, modes[k]);
+            const auto at = [&](std::size_t t) { return signal[t]; };
+            double periods = judgement::ring_periods;
+            for (auto& of_length : amplitudes) {
+                demodulate(record.count, f / fs_hz, static_cast<std::size_t>(periods * fs_hz / f) + 1, at, of_length);
+                of_length.emplace_back(std::numeric_limits<double>::quiet_NaN()); // no step to the next record
+                periods *= 2;
+            }
+        }
+        for (std::size_t i = 0; i < together.size(); ++i) {
+            amplitude_steps own;
+            own.add(amplitudes[i]);
+            if (own.excess() > judgement::falling) out[k] = true;
+            hits = hits || (modes[k].in_model && own.of_hits());
+            if (own.all > 0 && modes[k].in_model) together[i].add(amplitudes[i], std::sqrt(own.squares));
+        }
+    }
+    for (const amplitude_steps& steps : together) hits = hits || steps.of_hits();
+    return hits ? out : std::vector<bool>(modes.size());
+}
+
 } // namespace
 
 void keep_to_ambient_bound(const record_set& set, double fs_hz, const std::vector<listed_mode>& modes,
@@ -51,9 +102,10 @@ void keep_to_ambient_bound(const record_set& set, double fs_hz, const std::vecto
         if (samples == 0) return;
         seconds += samples / fs_hz;
     }
+    const std::vector<bool> struck = find_struck(set, fs_hz, modes);
     for (std::size_t k = 0; k < modes.size() && k < sigma.frequency_hz.size(); ++k) {
         const double f = modes[k].frequency_hz, zeta = modes[k].damping_ratio, radians = 2 * M_PI * f * seconds;
-        if (!(zeta > 0)) continue;
+        if (!(zeta > 0) || struck[k]) continue;
         if (sigma.frequency_hz[k] < f * std::sqrt(zeta / (2 * radians)))
             sigma.frequency_hz[k] = f * std::sqrt(zeta / (2 * radians));
         if (sigma.damping_ratio[k] < std::sqrt(zeta / radians)) sigma.damping_ratio[k] = std::sqrt(zeta / radians);

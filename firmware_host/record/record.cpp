@@ -306,7 +306,9 @@ bool prepare(record_set records, const record_options& options, record_work& wor
     const missing_count missing = count_missing(work.set);
     work.set.complete = missing.samples == 0;
     work.context = describe_records(work.set, options, missing);
-    remark_repeated(work.set, options.fs_hz, work.context.warnings);
+    remark_repeated(work.set, work.context.warnings);
+    if (std::string text = repeated_rows(work.set, options.fs_hz); !text.empty())
+        work.context.warnings.emplace_back("rows_repeated", std::move(text));
     check_moving(work.set, options);
     check_different_outputs(work.set, options);
     std::vector<input_moments> about = moments_of(work.set);

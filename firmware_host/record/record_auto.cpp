@@ -288,9 +288,6 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     if (!known && !turned.empty()) remark_mixed(turned, options, work.context);
     mark_lines(levels, set.n_u, set.n_y, work.at_rest, modes);
     mark_ends(work, options.fs_hz, levels.front().top, modes);
-    if (std::any_of(work.context.warnings.begin(), work.context.warnings.end(),
-                    [](const auto& warning) { return warning.first == "rows_repeated"; }))
-        for (consensus_mode& mode : modes) mode.why.emplace_back("rows_repeated"); // or an image of one
     keep_wanted(options, modes);
     modes = options.picks.empty() ? worth_telling(std::move(modes), options.all_modes)
                                   : picked_modes(options.picks, runs, modes);
@@ -408,7 +405,9 @@ record_result identify_auto(record_set records, const record_options& given, con
     record_work work;
     work.set = std::move(records);
     remarks repeated;
-    remark_repeated(work.set, given.fs_hz, repeated);
+    remark_repeated(work.set, repeated);
+    if (const std::string text = repeated_rows(work.set, given.fs_hz); !text.empty())
+        throw failure(exit_no_model, fmt::format("no model: {}. Or look at one method with --method n4sid-cva", text));
     std::unique_ptr<older_samples> split;
     if (!before && given.hits.empty()) split = split_older(work.set, given);
     work.before = before && before->samples() > 0 ? before : split.get();

@@ -119,31 +119,6 @@ bool surely_later(const record_set& set, const std::vector<input_moments>& about
     return early < 0.49 * total; // of missing samples NaN: not sure
 }
 
-/// Rows whose outputs are all those of the row before.
-void remark_repeated_rows(const record_set& set, double fs_hz, remarks& said) {
-    const std::size_t m = set.channels();
-    std::vector<std::size_t> lengths; // of rows alike
-    for (const record_data& record : set.records) {
-        const double* row = set.rows(record) + set.n_u;
-        std::size_t length = 1;
-        for (std::size_t i = 1; i < record.count; ++i, ++length)
-            if (!std::equal(row + i * m, row + i * m + set.n_y, row + (i - 1) * m))
-                lengths.push_back(length), length = 0;
-    }
-    if (lengths.size() < fewest_new_rows) return;
-    const std::size_t rows = std::accumulate(lengths.begin(), lengths.end(), std::size_t{0});
-    const double each = static_cast<double>(rows) / static_cast<double>(lengths.size());
-    const auto regular = std::count_if(lengths.begin(), lengths.end(), [each](std::size_t length) {
-        return std::abs(static_cast<double>(length) - each) < 1; // of a clock beside a faster one
-    });
-    if (each < rows_each || static_cast<double>(regular) < regular_share * static_cast<double>(lengths.size())) return;
-    said.emplace_back("rows_repeated",
-                      fmt::format("{} of {} rows repeat all outputs of the row before: the sensor gives about {:.4g} "
-                                  "samples a second and is read {:.4g} times. Keep the rows that are new and give --fs "
-                                  "{:.4g}, or read it when it has a new sample",
-                                  rows - lengths.size(), rows, fs_hz / each, fs_hz, fs_hz / each));
-}
-
 } // namespace
 
 std::vector<input_moments> moments_of(const record_set& set) {
@@ -197,8 +172,31 @@ bool same_samples(const record_set& set, const record_data& one, const record_da
            std::memcmp(set.rows(one), set.rows(other), one.count * set.channels() * sizeof(double)) == 0;
 }
 
-void remark_repeated(const record_set& set, double fs_hz, remarks& said) {
-    remark_repeated_rows(set, fs_hz, said);
+std::string repeated_rows(const record_set& set, double fs_hz) {
+    const std::size_t m = set.channels();
+    std::vector<std::size_t> lengths; // of rows alike
+    for (const record_data& record : set.records) {
+        const double* row = set.rows(record) + set.n_u;
+        std::size_t length = 1;
+        for (std::size_t i = 1; i < record.count; ++i, ++length)
+            if (!std::equal(row + i * m, row + i * m + set.n_y, row + (i - 1) * m))
+                lengths.push_back(length), length = 0;
+    }
+    if (lengths.size() < fewest_new_rows) return {};
+    const std::size_t rows = std::accumulate(lengths.begin(), lengths.end(), std::size_t{0});
+    const double each = static_cast<double>(rows) / static_cast<double>(lengths.size());
+    const auto regular = std::count_if(lengths.begin(), lengths.end(), [each](std::size_t length) {
+        return std::abs(static_cast<double>(length) - each) < 1; // of a clock beside a faster one
+    });
+    if (each < rows_each || static_cast<double>(regular) < regular_share * static_cast<double>(lengths.size()))
+        return {};
+    return fmt::format("{} of {} rows repeat all outputs of the row before: the sensor gives about {:.4g} samples a "
+                       "second and is read {:.4g} times. Keep the rows that are new and give --fs {:.4g}, or read it "
+                       "when it has a new sample",
+                       rows - lengths.size(), rows, fs_hz / each, fs_hz, fs_hz / each);
+}
+
+void remark_repeated(const record_set& set, remarks& said) {
     if (set.records.size() < 2) return;
     std::size_t copies = 0;
     std::string first;

@@ -35,9 +35,12 @@ void check_different_outputs(const record_set& set, const record_options& option
 /// Are two records the same numbers?
 bool same_samples(const record_set& set, const record_data& one, const record_data& other);
 
-/// A record that is there twice counts twice, and the result looks surer than it is. Rows that a sensor is read in twice make
-/// images of every mode about multiples of its own rate.
-void remark_repeated(const record_set& set, double fs_hz, remarks& said);
+/// A record that is there twice counts twice, and the result looks surer than it is.
+void remark_repeated(const record_set& set, remarks& said);
+
+/// What is to be said of a sensor that is read more often than it samples, regularly: rows repeat the ones before them, and
+/// every mode has images about multiples of the sensor's own rate. Empty: there is nothing to say.
+std::string repeated_rows(const record_set& set, double fs_hz);
 
 /// Of an output over all records: samples, and the sum of their squares about their mean.
 struct output_spread {

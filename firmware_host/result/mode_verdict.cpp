@@ -14,7 +14,7 @@
 namespace okid_host {
 namespace {
 
-constexpr std::array<std::pair<const char*, const char*>, 12> words{{
+constexpr std::array<std::pair<const char*, const char*>, 11> words{{
     {"few_runs", "fewer than half of the runs that could see it found it"},
     {"noise_shape", "short-lived, complex or scattering: probably noise"},
     {"split", "too near to a stronger one of the same shape: probably the same mode"},
@@ -25,7 +25,6 @@ constexpr std::array<std::pair<const char*, const char*>, 12> words{{
     {"wide_sigma", "its standard deviation is too wide"},
     {"band_edge", "too slow for the record, or at the edge of the band or of the force"},
     {"overdamped", "damped too much to vibrate"},
-    {"rows_repeated", "or an image of a mode: the sensor was read more often than it samples"},
     {"narrow", "narrower than the lines of the responses show: its damping is not known"},
 }};
 
