@@ -130,11 +130,16 @@ std::vector<complex> weights_along(std::vector<complex> shape) {
     return shape;
 }
 
+bool is_called(const consensus_mode& mode, const char* name) {
+    return std::find(mode.why.begin(), mode.why.end(), name) != mode.why.end();
+}
+
+bool is_tone(const consensus_mode& mode) { return is_called(mode, "tone") || is_called(mode, "pickup"); }
+
 /// Is it the n-th multiple of a machine's tone? As strong as it may be, and however the machine wanders.
 bool of_machine(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& tone,
                 const consensus_mode& mode, int n) {
-    if (mode.damping_ratio > judgement::line_damping ||
-        std::find(tone.why.begin(), tone.why.end(), "tone") == tone.why.end() ||
+    if (mode.damping_ratio > judgement::line_damping || !is_called(tone, "tone") ||
         !near_multiple(mode.frequency_hz, n * tone.frequency_hz, judgement::mains_tolerance))
         return false;
     const auto block = static_cast<std::size_t>(judgement::machine_periods * level.fs_hz / tone.frequency_hz) + 1;
@@ -233,6 +238,54 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     return !decays(falling, rate * static_cast<double>(step) / level.fs_hz);
 }
 
+/// A tone that wanders is as wide as a mode, and runs give it a damping. But in blocks as short as the reciprocal of that
+/// width its amplitude stays. Only where what a block shows is at the mode's frequency, and no tone stands beside it.
+/// @param block  samples  @param tones_hz  that do not wander
+bool wanders(const record_level& level, std::size_t m, const consensus_mode& mode, std::size_t block,
+             const std::vector<double>& tones_hz) {
+    const double share = mode.frequency_hz / level.fs_hz, seconds = static_cast<double>(block) / level.fs_hz;
+    for (const double tone : tones_hz)
+        if (std::abs(tone - mode.frequency_hz) * seconds < 2) return false;
+    const std::vector<complex> weights = weights_along(mode.shape);
+    std::vector<complex> all;
+    complex turned = 0;
+    for (const sample_rows& rows : level.records) {
+        std::vector<complex> halves[2];
+        for (std::size_t half = 0; half < 2; ++half) {
+            const std::size_t first = half * (block / 2), count = rows.size() / m;
+            const auto along = [&](std::size_t t) {
+                complex sum = 0;
+                for (std::size_t c = 0; c < weights.size(); ++c) sum += weights[c] * rows[(first + t) * m + c];
+                return sum;
+            };
+            demodulate(count - std::min(first, count), share, block, along, halves[half]);
+            for (complex& x : halves[half]) x *= std::polar(1.0, -2 * M_PI * share * static_cast<double>(first));
+        }
+        for (std::size_t i = 0; i < halves[1].size(); ++i)
+            if (const complex step = halves[1][i] * std::conj(halves[0][i]); !std::isnan(step.real())) turned += step;
+        for (const complex& x : halves[0])
+            if (!std::isnan(x.real())) all.push_back(x);
+    }
+    const double bound =
+        std::min(judgement::wandering,
+                 judgement::of_chance - judgement::surely_steady / std::sqrt(static_cast<double>(all.size())));
+    return all.size() >= judgement::fewest_blocks && spread_over_mean(all) < bound &&
+           std::abs(std::arg(turned)) < M_PI * seconds * mode.damping_ratio * mode.frequency_hz;
+}
+
+bool wanders(const record_level& level, std::size_t m, const consensus_mode& mode,
+             const std::vector<double>& tones_hz) {
+    const double cycles = 1 / (2 * M_PI * mode.damping_ratio);
+    for (const double periods : {cycles, 2 * cycles})
+        if (wanders(
+                level, m, mode,
+                static_cast<std::size_t>(std::max(periods, judgement::line_periods) * level.fs_hz / mode.frequency_hz) +
+                    1,
+                tones_hz))
+            return true;
+    return false;
+}
+
 /// A line that the converter makes: at a simple part of the record's rate, in one output alone. Of one that is narrow the
 /// runs may disagree by more than its width: it is then as near as they tell.
 bool is_of_the_rate(double fs_hz, const consensus_mode& mode) {
@@ -321,18 +374,23 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
     const std::size_t m = n_u + n_y;
     level_spectra spectra(m);
     for (consensus_mode& mode : modes) {
+        const bool mains = near_multiple(mode.frequency_hz, 50, judgement::mains_tolerance) ||
+                           near_multiple(mode.frequency_hz, 60, judgement::mains_tolerance);
+        if (is_of_the_rate(levels[0].fs_hz, mode))
+            mode.why.emplace_back("pickup");
+        else if (is_line(seen_by(levels, mode.frequency_hz), m, n_u, at_rest, mode))
+            mode.why.emplace_back(mains ? "pickup" : "tone");
+    }
+    std::vector<double> tones_hz;
+    for (const consensus_mode& mode : modes)
+        if (is_tone(mode)) tones_hz.push_back(mode.frequency_hz);
+    for (consensus_mode& mode : modes)
+        if (n_u == 0 && !is_tone(mode) && wanders(seen_by(levels, mode.frequency_hz), m, mode, tones_hz))
+            mode.why.emplace_back("tone");
+    for (consensus_mode& mode : modes) {
+        if (is_tone(mode)) continue;
         const std::size_t channel = n_u + largest(mode.shape);
         const record_level& level = seen_by(levels, mode.frequency_hz);
-        if (is_of_the_rate(levels[0].fs_hz, mode)) {
-            mode.why.emplace_back("pickup");
-            continue;
-        }
-        if (is_line(level, m, n_u, at_rest, mode)) {
-            const bool mains = near_multiple(mode.frequency_hz, 50, judgement::mains_tolerance) ||
-                               near_multiple(mode.frequency_hz, 60, judgement::mains_tolerance);
-            mode.why.emplace_back(mains ? "pickup" : "tone");
-            continue;
-        }
         if (const of_force shown = shown_by_force(spectra, level, m, n_u, mode); shown != of_force::nothing) {
             mode.why.emplace_back(shown == of_force::peak ? "harmonic" : "band_edge");
             continue;

@@ -48,8 +48,11 @@ constexpr double nearly_all =
 constexpr double same_residues = 0.9; ///< MAC of the residues of two poles that are one mode, of responses
 
 // A line: a vibration that a machine keeps up, and no resonance.
-constexpr double steady = 0.25;   ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)
-constexpr double steady_on = 0.1; ///< … of a machine that goes on and off, while it is on
+constexpr double steady = 0.25;     ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)
+constexpr double of_chance = 0.52;  ///< … of a vibration under chance forces
+constexpr double surely_steady = 2; ///< times 1 / sqrt(blocks) less is no chance: five deviations
+constexpr double wandering = 0.4;   ///< … of a tone that wanders, at most
+constexpr double steady_on = 0.1;   ///< … of a machine that goes on and off, while it is on
 constexpr double on = 0.5, off = 0.15;   ///< of its amplitude
 constexpr double on_or_off = 0.85;       ///< of the blocks; of a random vibration a half
 constexpr std::size_t fewest_blocks = 8; ///< below that a spread means nothing

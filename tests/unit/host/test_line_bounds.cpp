@@ -5,6 +5,7 @@
 #include "narrow_bands.hpp"
 
 #include <functional>
+#include <tuple>
 #include <unity.h>
 
 using namespace okid_host;
@@ -75,17 +76,64 @@ void tearDown() {}
 static void an_amplitude_that_hardly_scatters_is_a_line() {
     for (const double spread : {0.23, 0.27}) {
         const series out = sine(20, usual, [spread](std::size_t block) { return block % 2 ? 1 + spread : 1 - spread; });
-        TEST_ASSERT_EQUAL_STRING(spread < 0.25 ? "tone" : "", why({out}, {found_at(20, 0.005)}).c_str());
+        TEST_ASSERT_EQUAL_STRING(spread < 0.25 ? "tone" : "", why({out}, {found_at(20, 0.0005)}).c_str());
     }
     series chance = white(usual, 1e-3, 1);
     add(chance, 1, turning_at(20, chance_amplitude(usual, 20, 0.005, 2)));
     TEST_ASSERT_EQUAL_STRING("", why({chance}, {found_at(20, 0.005)}).c_str());
 }
 
+/// In a record too short to tell whether it wanders.
 static void what_is_damped_more_than_a_hundredth_is_no_line() {
-    const series out = sine(20, usual, constant);
+    const series out = sine(20, 2'900, constant);
     TEST_ASSERT_EQUAL_STRING("tone", why({out}, {found_at(20, 0.0099)}).c_str());
     TEST_ASSERT_EQUAL_STRING("", why({out}, {found_at(20, 0.0101)}).c_str());
+}
+
+constexpr double wide = 0.0101;          ///< damping of a tone that wanders
+constexpr std::size_t width_of_it = 202; ///< samples of a block as short as half the reciprocal of its width
+
+/// A sine of 20 Hz whose amplitude is so much more for two blocks and less for two, so many in all.
+static series in_steps(double spread, std::size_t blocks) {
+    series out(width_of_it * blocks);
+    for (std::size_t t = 0; t < out.size(); ++t)
+        out[t] = (1 + (t / width_of_it / 2 % 2 ? spread : -spread)) *
+                 std::sin(2 * M_PI * 20 / sample_rate * static_cast<double>(t));
+    return out;
+}
+
+/// 0.4 in long records, 2 / sqrt(blocks) below what chance gives in short ones.
+static void an_amplitude_that_stays_in_blocks_as_short_as_its_width_is_a_tone() {
+    for (const auto& [spread, blocks, code] :
+         {std::tuple{0.39, 400, "tone"}, {0.41, 400, ""}, {0.26, 64, "tone"}, {0.28, 64, ""}})
+        TEST_ASSERT_EQUAL_STRING(
+            code, why({in_steps(spread, static_cast<std::size_t>(blocks))}, {found_at(20, wide)}).c_str());
+}
+
+static void a_tone_that_wanders_is_no_mode() {
+    std::mt19937 random(4);
+    std::normal_distribution<double> normal;
+    series tone = white(usual, 0.01, 5), chance = white(usual, 0.01, 5);
+    double away = 0, phase = 0;
+    for (double& x : tone) {
+        away = 0.998 * away + 0.0006 * normal(random); // 1 % of its frequency, for two seconds
+        phase += 2 * M_PI * 20 * (1 + away) / sample_rate;
+        x += std::sin(phase);
+    }
+    add(chance, 1, turning_at(20, chance_amplitude(usual, 20, wide, 2)));
+    TEST_ASSERT_EQUAL_STRING("tone", why({tone}, {found_at(20, wide)}).c_str());
+    TEST_ASSERT_EQUAL_STRING("", why({chance}, {found_at(20, wide)}).c_str());
+}
+
+/// Ten times as strong, listed or not.
+static void a_mode_beside_a_tone_stays() {
+    series out = sine(20.8, usual, [](std::size_t) { return 10; });
+    add(out, 1, turning_at(20, chance_amplitude(usual, 20, wide, 2)));
+    TEST_ASSERT_EQUAL_STRING("", why({out}, {found_at(20, wide)}).c_str());
+    TEST_ASSERT_EQUAL_STRING("", why({out}, {found_at(20.8, 0.0005), found_at(20, wide)}).c_str());
+    out = sine(20.1, usual, [](std::size_t) { return 10; }); // within its width: only what is listed helps
+    add(out, 1, turning_at(20, chance_amplitude(usual, 20, wide, 2)));
+    TEST_ASSERT_EQUAL_STRING("", why({out}, {found_at(20.1, 0.0005), found_at(20, wide)}).c_str());
 }
 
 /// Eight blocks of eight periods: 2,049 samples at 1 Hz.
@@ -220,6 +268,9 @@ int main() {
     UNITY_BEGIN();
     RUN_TEST(an_amplitude_that_hardly_scatters_is_a_line);
     RUN_TEST(what_is_damped_more_than_a_hundredth_is_no_line);
+    RUN_TEST(an_amplitude_that_stays_in_blocks_as_short_as_its_width_is_a_tone);
+    RUN_TEST(a_tone_that_wanders_is_no_mode);
+    RUN_TEST(a_mode_beside_a_tone_stays);
     RUN_TEST(eight_blocks_show_a_spread);
     RUN_TEST(lines_of_the_mains_are_pickup);
     RUN_TEST(simple_parts_of_the_rate_are_pickup);
