@@ -25,29 +25,49 @@ using complex = std::complex<double>;
 constexpr std::size_t averaged = 4;   // segments of a spectrum, at least
 constexpr std::size_t shortest = 128; // samples of a segment
 
-/// Amplitudes at a frequency, block by block, of channels with these weights from the first on; one record, whole blocks.
-std::vector<complex> amplitudes(const sample_rows& rows, double fs_hz, std::size_t m, std::size_t first_channel,
-                                const std::vector<complex>& weights, double frequency_hz, std::size_t block) {
+/// Amplitudes at a frequency, block by block from a sample on, of channels with these weights from the first on; one record,
+/// whole blocks. NaN where a sample is missing.
+std::vector<complex> amplitudes(const sample_rows& rows, double share, std::size_t m, std::size_t first_channel,
+                                const std::vector<complex>& weights, std::size_t block, std::size_t from = 0) {
     std::vector<complex> out;
     const auto along = [&](std::size_t t) {
         complex sum = 0;
-        for (std::size_t c = 0; c < weights.size(); ++c) sum += weights[c] * rows[t * m + first_channel + c];
+        for (std::size_t c = 0; c < weights.size(); ++c) sum += weights[c] * rows[(from + t) * m + first_channel + c];
         return sum;
     };
-    demodulate(rows.size() / m, frequency_hz / fs_hz, block, along, out);
-    out.erase(std::remove_if(out.begin(), out.end(), [](const complex& a) { return std::isnan(a.real()); }), out.end());
+    demodulate(rows.size() / m - std::min(from, rows.size() / m), share, block, along, out);
     return out;
 }
 
-/// The same of all records, one behind the other.
+std::vector<complex> complete(std::vector<complex> a) {
+    a.erase(std::remove_if(a.begin(), a.end(), [](const complex& x) { return std::isnan(x.real()); }), a.end());
+    return a;
+}
+
+/// The same of all records, one behind the other, without the blocks that miss a sample.
 std::vector<complex> amplitudes(const record_level& level, std::size_t m, std::size_t first_channel,
                                 const std::vector<complex>& weights, double frequency_hz, std::size_t block) {
     std::vector<complex> out;
     for (const sample_rows& rows : level.records) {
-        const auto of_record = amplitudes(rows, level.fs_hz, m, first_channel, weights, frequency_hz, block);
+        const auto of_record = complete(amplitudes(rows, frequency_hz / level.fs_hz, m, first_channel, weights, block));
         out.insert(out.end(), of_record.begin(), of_record.end());
     }
     return out;
+}
+
+/// How far from a frequency the power that blocks show is, in cycles of a block, 1 at most.
+double away(const record_level& level, std::size_t m, std::size_t first_channel, const std::vector<complex>& weights,
+            double frequency_hz, std::size_t block) {
+    const double share = frequency_hz / level.fs_hz;
+    const std::size_t half = block / 2;
+    complex turned = 0;
+    for (const sample_rows& rows : level.records) {
+        const auto first = amplitudes(rows, share, m, first_channel, weights, block),
+                   later = amplitudes(rows, share, m, first_channel, weights, block, half);
+        for (std::size_t i = 0; i < later.size(); ++i)
+            if (const complex step = later[i] * std::conj(first[i]); !std::isnan(step.real())) turned += step;
+    }
+    return std::abs(std::arg(turned * std::polar(1.0, -2 * M_PI * share * static_cast<double>(half)))) / M_PI;
 }
 
 double spread_over_mean(const std::vector<complex>& a) {
@@ -102,8 +122,24 @@ bool in_phase(const std::vector<complex>& a, const std::vector<complex>& b, int 
     return both > 0 && std::abs(sum) > judgement::in_phase * both;
 }
 
+/// Does a force come in hits, or releases, which have all frequencies at once, and rests in between? Vibrations are in phase
+/// after each.
+bool struck(const record_level& level, std::size_t m, std::size_t n_u, double frequency_hz, double other_hz,
+            std::size_t block) {
+    for (std::size_t k = 0; k < n_u; ++k) {
+        const auto a = amplitudes(level, m, k, {1}, frequency_hz, block),
+                   b = amplitudes(level, m, k, {1}, other_hz, block);
+        double both = 0;
+        for (std::size_t i = 0; i < a.size(); ++i) both += std::abs(a[i]) * std::abs(b[i]);
+        if (spread_over_mean(a) > judgement::of_hits &&
+            both > judgement::at_once * static_cast<double>(a.size()) * strength(a) * strength(b))
+            return true;
+    }
+    return false;
+}
+
 /// Does the response at n f follow the n-th power of that at f?
-bool follows(const record_level& level, std::size_t m, std::size_t channel, double base, int n) {
+bool follows(const record_level& level, std::size_t m, std::size_t n_u, std::size_t channel, double base, int n) {
     const auto block = static_cast<std::size_t>(judgement::product_periods * level.fs_hz / base) + 1;
     const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
                                b = amplitudes(level, m, channel, {1}, n * base, block);
@@ -111,7 +147,8 @@ bool follows(const record_level& level, std::size_t m, std::size_t channel, doub
         strength(a) < judgement::stronger * strength(b) || !lasts(a))
         return false; // the phases of a decay are those of its hit
     const auto ring = static_cast<std::size_t>(judgement::ring_periods * level.fs_hz / base) + 1;
-    return !rings_down(amplitudes(level, m, channel, {1}, base, ring)) && in_phase(a, b, n);
+    return !rings_down(amplitudes(level, m, channel, {1}, base, ring)) && in_phase(a, b, n) &&
+           !struck(level, m, n_u, base, n * base, block);
 }
 
 const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
@@ -208,6 +245,23 @@ bool quieter_before(const record_level& level, std::size_t m, std::size_t n_u, c
     return records > 0 && std::sqrt(square / records) < judgement::quieter * over_all;
 }
 
+/// Of the force that scatters least.
+double spread_of_force(const record_level& level, std::size_t m, std::size_t n_u, double frequency_hz,
+                       std::size_t block) {
+    double least = HUGE_VAL;
+    for (std::size_t k = 0; k < n_u; ++k)
+        least = std::min(least, spread_over_mean(amplitudes(level, m, k, {1}, frequency_hz, block)));
+    return least;
+}
+
+/// Under a periodic force, with as much of it beside this frequency, all amplitudes stay.
+bool by_steady_force(const record_level& level, std::size_t m, std::size_t n_u, double frequency_hz,
+                     std::size_t block) {
+    const double apart = 3 * level.fs_hz / static_cast<double>(block);
+    return spread_of_force(level, m, n_u, frequency_hz - apart, block) < judgement::steady &&
+           spread_of_force(level, m, n_u, frequency_hz + apart, block) < judgement::steady;
+}
+
 bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
     std::size_t longest = 0;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
@@ -224,7 +278,10 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
         return false;
     if (!endless)
         return a.size() >= judgement::fewest_blocks &&
-               (spread_over_mean(a) < judgement::steady || (n_u == 0 && switched(a))); // a force may go on and off too
+               (spread_over_mean(a) < judgement::steady ||
+                (n_u == 0 && switched(a))) && // a force may go on and off too
+               away(level, m, n_u, weights, mode.frequency_hz, block) < judgement::off_its_frequency &&
+               !by_steady_force(level, m, n_u, mode.frequency_hz, block);
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= judgement::fewest_blocks * level.records.size()
@@ -234,7 +291,7 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
                   longest / judgement::fewest_blocks);
     std::vector<std::vector<complex>> falling;
     for (const sample_rows& rows : level.records)
-        falling.push_back(amplitudes(rows, level.fs_hz, m, n_u, weights, mode.frequency_hz, step));
+        falling.push_back(complete(amplitudes(rows, mode.frequency_hz / level.fs_hz, m, n_u, weights, step)));
     return !decays(falling, rate * static_cast<double>(step) / level.fs_hz);
 }
 
@@ -243,34 +300,16 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
 /// @param block  samples  @param tones_hz  that do not wander
 bool wanders(const record_level& level, std::size_t m, const consensus_mode& mode, std::size_t block,
              const std::vector<double>& tones_hz) {
-    const double share = mode.frequency_hz / level.fs_hz, seconds = static_cast<double>(block) / level.fs_hz;
+    const double seconds = static_cast<double>(block) / level.fs_hz;
     for (const double tone : tones_hz)
         if (std::abs(tone - mode.frequency_hz) * seconds < 2) return false;
-    const std::vector<complex> weights = weights_along(mode.shape);
-    std::vector<complex> all;
-    complex turned = 0;
-    for (const sample_rows& rows : level.records) {
-        std::vector<complex> halves[2];
-        for (std::size_t half = 0; half < 2; ++half) {
-            const std::size_t first = half * (block / 2), count = rows.size() / m;
-            const auto along = [&](std::size_t t) {
-                complex sum = 0;
-                for (std::size_t c = 0; c < weights.size(); ++c) sum += weights[c] * rows[(first + t) * m + c];
-                return sum;
-            };
-            demodulate(count - std::min(first, count), share, block, along, halves[half]);
-            for (complex& x : halves[half]) x *= std::polar(1.0, -2 * M_PI * share * static_cast<double>(first));
-        }
-        for (std::size_t i = 0; i < halves[1].size(); ++i)
-            if (const complex step = halves[1][i] * std::conj(halves[0][i]); !std::isnan(step.real())) turned += step;
-        for (const complex& x : halves[0])
-            if (!std::isnan(x.real())) all.push_back(x);
-    }
+    const std::vector<complex> weights = weights_along(mode.shape),
+                               a = amplitudes(level, m, 0, weights, mode.frequency_hz, block);
     const double bound =
         std::min(judgement::wandering,
-                 judgement::of_chance - judgement::surely_steady / std::sqrt(static_cast<double>(all.size())));
-    return all.size() >= judgement::fewest_blocks && spread_over_mean(all) < bound &&
-           std::abs(std::arg(turned)) < M_PI * seconds * mode.damping_ratio * mode.frequency_hz;
+                 judgement::of_chance - judgement::surely_steady / std::sqrt(static_cast<double>(a.size())));
+    return a.size() >= judgement::fewest_blocks && spread_over_mean(a) < bound &&
+           away(level, m, 0, weights, mode.frequency_hz, block) < seconds * mode.damping_ratio * mode.frequency_hz;
 }
 
 bool wanders(const record_level& level, std::size_t m, const consensus_mode& mode,
@@ -354,7 +393,11 @@ of_force shown_by_force(level_spectra& spectra, const record_level& level, std::
     if (force.at >= judgement::force_line * std::max(force.below, force.above)) {
         const band_powers response = powers(n_u, m, 2);
         const double beside = std::max(response.below / force.below, response.above / force.above);
-        return flat(response.at / force.at, beside) ? of_force::peak : of_force::nothing;
+        const auto block =
+            std::max(static_cast<std::size_t>(judgement::line_periods * level.fs_hz / mode.frequency_hz) + 1,
+                     longest / judgement::line_blocks);
+        const bool runs = spread_of_force(level, m, n_u, mode.frequency_hz, block) < judgement::of_chance; // no dwell
+        return runs && flat(response.at / force.at, beside) ? of_force::peak : of_force::nothing;
     }
     if (f + 4 * width > level.top) return of_force::nothing; // where a filter ends the band of all channels
     const band_powers close = powers(0, n_u, 1);
@@ -401,7 +444,7 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
                 (!of_machine(level, m, n_u, base, mode, n) &&
                  (base.agreement < judgement::least_agreement ||
                   std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
-                  !follows(level, m, channel, base.frequency_hz, n))))
+                  !follows(level, m, n_u, channel, base.frequency_hz, n))))
                 continue;
             mode.why.emplace_back("harmonic");
             break;

@@ -45,6 +45,8 @@ struct strand {
     double power = 0, share_left = 1, peak = 0; ///< at its frequency; peak: of what the forces drive, over beside it
     double strength = 0;                        ///< amplitude as a displacement
     bool rings = false;                         ///< down between hits that were not measured
+    bool line =
+        false; ///< of a machine or the mains, with multiples of its own: nothing is to be learned of the structure
 };
 
 /// Factors and how often each: {base, n}; n < 0: the conjugate.
@@ -138,7 +140,8 @@ std::vector<std::size_t> bases_of(const product_search& s, std::size_t k, std::s
                (any && e < wandering && shape_mac(s.modes[a].shape, s.modes[b].shape) > one_shape);
     };
     for (const std::size_t i : order)
-        if (out.size() < most && (any || (i != k && s.strands[i].strength > s.strands[k].strength && !near(i, k))) &&
+        if (out.size() < most && !s.strands[i].line &&
+            (any || (i != k && s.strands[i].strength > s.strands[k].strength && !near(i, k))) &&
             std::none_of(out.begin(), out.end(), [&](std::size_t j) { return near(i, j); }))
             out.push_back(i);
     return out;
@@ -192,13 +195,23 @@ product followed(product_search& s, std::size_t k, double most, double tolerance
     return best;
 }
 
+bool multiple_of_line(const product_search& s, double frequency_hz) {
+    for (std::size_t k = 0; k < s.modes.size(); ++k) {
+        const double base = s.modes[k].frequency_hz;
+        if (s.strands[k].line &&
+            std::abs(frequency_hz - std::round(frequency_hz / base) * base) < judgement::mains_tolerance * frequency_hz)
+            return true;
+    }
+    return false;
+}
+
 /// The multiples and sums of the strongest vibrations at which some output moves in phase, listed as a mode or not.
 std::vector<product> distortions(product_search& s) {
     std::vector<product> out;
     const std::vector<std::size_t> bases = bases_of(s, s.modes.size(), most_mixed);
     each_product(bases, [&](const product& of) {
         const double f = frequency_of(of, s.modes);
-        if (f > highest * s.fs_hz || of.front().second > judgement::most_factors ||
+        if (f > highest * s.fs_hz || multiple_of_line(s, f) || of.front().second > judgement::most_factors ||
             std::any_of(of.begin(), of.end(), [](const auto& factor) { return factor.second < 0; }) ||
             std::any_of(s.modes.begin(), s.modes.end(), [f](const listed_mode& mode) {
                 return mode.in_model && std::abs(mode.frequency_hz / f - 1) < next_to;
@@ -282,6 +295,8 @@ void fill(const record_work& work, product_search& s) {
         }
     }
     for (std::size_t k = 0; k < s.modes.size(); ++k) {
+        for (const std::string& why : work.context.verdicts[k].why)
+            s.strands[k].line = s.strands[k].line || why == "tone" || why == "pickup";
         const double cycles = s.modes[k].frequency_hz / s.fs_hz;
         const auto ring = static_cast<std::size_t>(judgement::ring_periods / cycles) + 1;
         weigh(s.modes[k], s.fs_hz, s.strands[k]);
@@ -309,10 +324,11 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
     };
     const std::vector<product> more = distortions(s);
     const std::vector<std::size_t> first = bases_of(s, modes.size(), 1); // the strongest stays
+    if (first.empty()) return false;
     const auto look = [&](double least, double tolerance) {
         for (std::size_t k = 0; k < modes.size(); ++k) {
             const std::vector<std::string>& why = work.context.verdicts[k].why;
-            if (k == first.front() || std::find(why.begin(), why.end(), "harmonic") != why.end() ||
+            if (k == first.front() || s.strands[k].line || std::find(why.begin(), why.end(), "harmonic") != why.end() ||
                 (driven && s.strands[k].peak > judgement::resonance_peak &&
                  s.strands[k].share_left < judgement::left_alone))
                 continue;
