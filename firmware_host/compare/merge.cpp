@@ -38,9 +38,8 @@ struct merged_mode {
 
     /// More than half of the set-ups are sure of it, or half, and the others list it with a shape that is none of noise.
     bool most_have_it() const {
-        const auto listed = static_cast<std::size_t>(std::count_if(also.begin(), also.end(), [](const known_mode* one) {
-            return one && std::find(one->why.begin(), one->why.end(), "noise_shape") == one->why.end();
-        }));
+        const auto listed = static_cast<std::size_t>(std::count_if(
+            also.begin(), also.end(), [](const known_mode* one) { return one && !has_code(one->why, "noise_shape"); }));
         return 2 * count() > of.size() || (2 * count() == of.size() && count() + listed == of.size());
     }
 

@@ -16,6 +16,7 @@ namespace okid_host {
 template <class At>
 void demodulate(std::size_t count, double share, std::size_t block, const At& at,
                 std::vector<std::complex<double>>& out) {
+    if (block > count) return;
     std::vector<double> hann;
     for (std::size_t i = 0; i < block; ++i)
         hann.push_back((1 - std::cos(2 * M_PI * static_cast<double>(i) / static_cast<double>(block))) /
@@ -60,7 +61,7 @@ struct amplitude_steps {
     }
 };
 
-/// @param amplitudes  of short blocks
+/// Is a vibration struck now and then? @param amplitudes  of short blocks
 inline bool rings_down(const std::vector<std::complex<double>>& amplitudes) {
     amplitude_steps steps;
     steps.add(amplitudes);

@@ -10,8 +10,10 @@
 
 #include "demodulation.hpp"
 #include "result/judgement.hpp"
+#include "result/mode_verdict.hpp"
 #include "spectrum.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -122,42 +124,6 @@ bool in_phase(const std::vector<complex>& a, const std::vector<complex>& b, int 
     return both > 0 && std::abs(sum) > judgement::in_phase * both;
 }
 
-/// Does a force come in hits, or releases, which have all frequencies at once, and rests in between? Vibrations are in phase
-/// after each.
-bool struck(const record_level& level, std::size_t m, std::size_t n_u, double frequency_hz, double other_hz,
-            std::size_t block) {
-    for (std::size_t k = 0; k < n_u; ++k) {
-        const auto a = amplitudes(level, m, k, {1}, frequency_hz, block),
-                   b = amplitudes(level, m, k, {1}, other_hz, block);
-        double both = 0;
-        for (std::size_t i = 0; i < a.size(); ++i) both += std::abs(a[i]) * std::abs(b[i]);
-        if (spread_over_mean(a) > judgement::of_hits &&
-            both > judgement::at_once * static_cast<double>(a.size()) * strength(a) * strength(b))
-            return true;
-    }
-    return false;
-}
-
-/// Does the response at n f follow the n-th power of that at f?
-bool follows(const record_level& level, std::size_t m, std::size_t n_u, std::size_t channel, double base, int n) {
-    const auto block = static_cast<std::size_t>(judgement::product_periods * level.fs_hz / base) + 1;
-    const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
-                               b = amplitudes(level, m, channel, {1}, n * base, block);
-    if (a.size() < 2 * judgement::fewest_blocks || b.size() != a.size() ||
-        strength(a) < judgement::stronger * strength(b) || !lasts(a))
-        return false; // the phases of a decay are those of its hit
-    const auto ring = static_cast<std::size_t>(judgement::ring_periods * level.fs_hz / base) + 1;
-    return !rings_down(amplitudes(level, m, channel, {1}, base, ring)) && in_phase(a, b, n) &&
-           !struck(level, m, n_u, base, n * base, block);
-}
-
-const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
-    std::size_t k = 0; // the lowest rate that shows it: fewest samples
-    while (k + 1 < levels.size() && !levels[k + 1].zoomed && frequency_hz < levels[k + 1].top * levels[k + 1].fs_hz)
-        ++k;
-    return levels[k];
-}
-
 /// What the outputs are multiplied with to give the amplitude where the mode is largest.
 std::vector<complex> weights_along(std::vector<complex> shape) {
     double square = 0;
@@ -167,16 +133,67 @@ std::vector<complex> weights_along(std::vector<complex> shape) {
     return shape;
 }
 
-bool is_called(const consensus_mode& mode, const char* name) {
-    return std::find(mode.why.begin(), mode.why.end(), name) != mode.why.end();
+/// How much of a mode's amplitude the measured forces explain through its own pole, block by block: all of it where they
+/// excite it, chance where a machine does beside them.
+double explained_by_forces(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode,
+                           std::size_t block) {
+    const double share = mode.frequency_hz / level.fs_hz, zeta = std::min(mode.damping_ratio, 1.0);
+    const complex pole = std::exp(2 * M_PI * share * complex(-zeta, std::sqrt(1 - zeta * zeta)));
+    const std::vector<complex> weights = weights_along(mode.shape);
+    std::vector<complex> answer;
+    std::vector<std::vector<complex>> driven(n_u);
+    std::vector<complex> state;
+    for (const sample_rows& rows : level.records) {
+        const auto more = amplitudes(rows, share, m, n_u, weights, block);
+        answer.insert(answer.end(), more.begin(), more.end());
+        for (std::size_t k = 0; k < n_u; ++k) {
+            state.assign(rows.size() / m, 0);
+            complex now = 0;
+            for (std::size_t t = 0; t < state.size(); ++t) state[t] = now = pole * now + rows[t * m + k];
+            demodulate(state.size(), share, block, [&](std::size_t t) { return state[t]; }, driven[k]);
+        }
+    }
+    Eigen::MatrixXcd C(static_cast<Eigen::Index>(answer.size()), static_cast<Eigen::Index>(n_u));
+    Eigen::VectorXcd b(C.rows());
+    Eigen::Index complete = 0;
+    for (std::size_t i = 0; i < answer.size(); ++i) {
+        complex sum = answer[i];
+        for (std::size_t k = 0; k < n_u; ++k) sum += C(complete, static_cast<Eigen::Index>(k)) = driven[k][i];
+        b[complete] = answer[i];
+        complete += !std::isnan(sum.real()) && !std::isnan(sum.imag());
+    }
+    if (complete <= C.cols() || n_u == 0) return 0;
+    C.conservativeResize(complete, C.cols());
+    b.conservativeResize(complete);
+    return (C * C.colPivHouseholderQr().solve(b)).squaredNorm() / b.squaredNorm();
 }
 
-bool is_tone(const consensus_mode& mode) { return is_called(mode, "tone") || is_called(mode, "pickup"); }
+/// Does the response at n f follow the n-th power of that at f?
+bool follows(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode, double base,
+             int n) {
+    const std::size_t channel = n_u + largest(mode.shape);
+    const auto block = static_cast<std::size_t>(judgement::product_periods * level.fs_hz / base) + 1;
+    const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
+                               b = amplitudes(level, m, channel, {1}, n * base, block);
+    if (a.size() < 2 * judgement::fewest_blocks || b.size() != a.size() ||
+        strength(a) < judgement::stronger * strength(b) || !lasts(a))
+        return false; // the phases of a decay are those of its hit
+    const auto ring = static_cast<std::size_t>(judgement::ring_periods * level.fs_hz / base) + 1;
+    return !rings_down(amplitudes(level, m, channel, {1}, base, ring)) && in_phase(a, b, n) &&
+           explained_by_forces(level, m, n_u, mode, block) < judgement::explained;
+}
+
+const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
+    std::size_t k = 0; // the lowest rate that shows it: fewest samples
+    while (k + 1 < levels.size() && !levels[k + 1].zoomed && frequency_hz < levels[k + 1].top * levels[k + 1].fs_hz)
+        ++k;
+    return levels[k];
+}
 
 /// Is it the n-th multiple of a machine's tone? As strong as it may be, and however the machine wanders.
 bool of_machine(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& tone,
                 const consensus_mode& mode, int n) {
-    if (mode.damping_ratio > judgement::line_damping || !is_called(tone, "tone") ||
+    if (mode.damping_ratio > judgement::line_damping || !has_code(tone.why, "tone") ||
         !near_multiple(mode.frequency_hz, n * tone.frequency_hz, judgement::mains_tolerance))
         return false;
     const auto block = static_cast<std::size_t>(judgement::machine_periods * level.fs_hz / tone.frequency_hz) + 1;
@@ -254,14 +271,6 @@ double spread_of_force(const record_level& level, std::size_t m, std::size_t n_u
     return least;
 }
 
-/// Under a periodic force, with as much of it beside this frequency, all amplitudes stay.
-bool by_steady_force(const record_level& level, std::size_t m, std::size_t n_u, double frequency_hz,
-                     std::size_t block) {
-    const double apart = 3 * level.fs_hz / static_cast<double>(block);
-    return spread_of_force(level, m, n_u, frequency_hz - apart, block) < judgement::steady &&
-           spread_of_force(level, m, n_u, frequency_hz + apart, block) < judgement::steady;
-}
-
 bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
     std::size_t longest = 0;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
@@ -276,12 +285,12 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     if (at_rest && (strength(a) > judgement::loudest_silence ||
                     quieter_before(level, m, n_u, weights, mode.frequency_hz, strength(a))))
         return false;
+    const bool keeps_up = a.size() >= judgement::fewest_blocks &&
+                          (spread_over_mean(a) < judgement::steady || // a force may go on and off too
+                           (n_u == 0 && switched(a)));
     if (!endless)
-        return a.size() >= judgement::fewest_blocks &&
-               (spread_over_mean(a) < judgement::steady ||
-                (n_u == 0 && switched(a))) && // a force may go on and off too
-               away(level, m, n_u, weights, mode.frequency_hz, block) < judgement::off_its_frequency &&
-               !by_steady_force(level, m, n_u, mode.frequency_hz, block);
+        return keeps_up && away(level, m, n_u, weights, mode.frequency_hz, block) < judgement::off_its_frequency &&
+               explained_by_forces(level, m, n_u, mode, block) < judgement::explained;
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= judgement::fewest_blocks * level.records.size()
@@ -297,31 +306,26 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
 
 /// A tone that wanders is as wide as a mode, and runs give it a damping. But in blocks as short as the reciprocal of that
 /// width its amplitude stays. Only where what a block shows is at the mode's frequency, and no tone stands beside it.
-/// @param block  samples  @param tones_hz  that do not wander
-bool wanders(const record_level& level, std::size_t m, const consensus_mode& mode, std::size_t block,
-             const std::vector<double>& tones_hz) {
-    const double seconds = static_cast<double>(block) / level.fs_hz;
-    for (const double tone : tones_hz)
-        if (std::abs(tone - mode.frequency_hz) * seconds < 2) return false;
-    const std::vector<complex> weights = weights_along(mode.shape),
-                               a = amplitudes(level, m, 0, weights, mode.frequency_hz, block);
-    const double bound =
-        std::min(judgement::wandering,
-                 judgement::of_chance - judgement::surely_steady / std::sqrt(static_cast<double>(a.size())));
-    return a.size() >= judgement::fewest_blocks && spread_over_mean(a) < bound &&
-           away(level, m, 0, weights, mode.frequency_hz, block) < seconds * mode.damping_ratio * mode.frequency_hz;
-}
-
+/// @param tones_hz  that do not wander
 bool wanders(const record_level& level, std::size_t m, const consensus_mode& mode,
              const std::vector<double>& tones_hz) {
-    const double cycles = 1 / (2 * M_PI * mode.damping_ratio);
-    for (const double periods : {cycles, 2 * cycles})
-        if (wanders(
-                level, m, mode,
-                static_cast<std::size_t>(std::max(periods, judgement::line_periods) * level.fs_hz / mode.frequency_hz) +
-                    1,
-                tones_hz))
+    const std::vector<complex> weights = weights_along(mode.shape);
+    for (const double widths : {0.5, 1.0}) {
+        const double periods = std::max(widths / (M_PI * mode.damping_ratio), judgement::line_periods);
+        const double seconds = periods / mode.frequency_hz, most = static_cast<double>(level.samples) / level.fs_hz;
+        if (!(seconds * judgement::fewest_blocks < most)) return false;
+        const auto block = static_cast<std::size_t>(seconds * level.fs_hz) + 1;
+        const auto a = amplitudes(level, m, 0, weights, mode.frequency_hz, block);
+        const double chance =
+            judgement::of_chance - judgement::surely_steady / std::sqrt(static_cast<double>(a.size()));
+        const bool alone = std::none_of(tones_hz.begin(), tones_hz.end(), [&](double tone) {
+            return std::abs(tone - mode.frequency_hz) * seconds < 2; // what a Hann window of the block lets in
+        });
+        if (alone && a.size() >= judgement::fewest_blocks &&
+            spread_over_mean(a) < std::min(judgement::steady_wandering, chance) &&
+            away(level, m, 0, weights, mode.frequency_hz, block) < seconds * mode.damping_ratio * mode.frequency_hz)
             return true;
+    }
     return false;
 }
 
@@ -396,7 +400,7 @@ of_force shown_by_force(level_spectra& spectra, const record_level& level, std::
         const auto block =
             std::max(static_cast<std::size_t>(judgement::line_periods * level.fs_hz / mode.frequency_hz) + 1,
                      longest / judgement::line_blocks);
-        const bool runs = spread_of_force(level, m, n_u, mode.frequency_hz, block) < judgement::of_chance; // no dwell
+        const bool runs = spread_of_force(level, m, n_u, mode.frequency_hz, block) < judgement::of_hits; // no dwell
         return runs && flat(response.at / force.at, beside) ? of_force::peak : of_force::nothing;
     }
     if (f + 4 * width > level.top) return of_force::nothing; // where a filter ends the band of all channels
@@ -426,13 +430,12 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
     }
     std::vector<double> tones_hz;
     for (const consensus_mode& mode : modes)
-        if (is_tone(mode)) tones_hz.push_back(mode.frequency_hz);
+        if (is_tone(mode.why)) tones_hz.push_back(mode.frequency_hz);
     for (consensus_mode& mode : modes)
-        if (n_u == 0 && !is_tone(mode) && wanders(seen_by(levels, mode.frequency_hz), m, mode, tones_hz))
+        if (n_u == 0 && !is_tone(mode.why) && wanders(seen_by(levels, mode.frequency_hz), m, mode, tones_hz))
             mode.why.emplace_back("tone");
     for (consensus_mode& mode : modes) {
-        if (is_tone(mode)) continue;
-        const std::size_t channel = n_u + largest(mode.shape);
+        if (is_tone(mode.why)) continue;
         const record_level& level = seen_by(levels, mode.frequency_hz);
         if (const of_force shown = shown_by_force(spectra, level, m, n_u, mode); shown != of_force::nothing) {
             mode.why.emplace_back(shown == of_force::peak ? "harmonic" : "band_edge");
@@ -444,7 +447,7 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
                 (!of_machine(level, m, n_u, base, mode, n) &&
                  (base.agreement < judgement::least_agreement ||
                   std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
-                  !follows(level, m, n_u, channel, base.frequency_hz, n))))
+                  !follows(level, m, n_u, mode, base.frequency_hz, n))))
                 continue;
             mode.why.emplace_back("harmonic");
             break;

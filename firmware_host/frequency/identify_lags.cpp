@@ -277,7 +277,7 @@ void mark_unsteady(const lag_work& work, response_modes& found) {
         consensus_mode& mode = found.modes[k];
         const bool steady = found.sigma.frequency_hz[k] < steady_frequency * mode.frequency_hz &&
                             found.sigma.damping_ratio[k] < steady_damping * mode.damping_ratio;
-        const bool listed = std::find(mode.why.begin(), mode.why.end(), "wide_sigma") != mode.why.end();
+        const bool listed = has_code(mode.why, "wide_sigma");
         if (!steady && !listed && work.options.modes.empty()) mode.why.emplace_back("wide_sigma");
         if (mode.frequency_hz > top) mode.why.emplace_back("band_edge");
         seen += fmt::format("{}{:.4g} Hz ({})", seen.empty() ? "" : ", ", mode.frequency_hz, fmt::join(mode.why, ", "));

@@ -61,9 +61,9 @@ std::vector<std::complex<double>> along(const record_set& set, const record_data
     return out;
 }
 
-/// Which modes are struck now and then: what follows a hit tells more than a steady force does. One mode
-/// or all together tell whether there are hits; beats hide them in blocks of one length and not in those of another.
-std::vector<bool> find_struck(const record_set& set, double fs_hz, const std::vector<listed_mode>& modes) {
+/// Which modes ring down between hits: that tells more than a steady force does. One mode or all together show that there
+/// are hits; beats hide them in blocks of one length and not in those of another.
+std::vector<bool> ring_down(const record_set& set, double fs_hz, const std::vector<listed_mode>& modes) {
     std::vector<bool> out(modes.size());
     bool hits = false;
     std::array<amplitude_steps, 3> together;
@@ -102,13 +102,25 @@ void keep_to_ambient_bound(const record_set& set, double fs_hz, const std::vecto
         if (samples == 0) return;
         seconds += samples / fs_hz;
     }
-    const std::vector<bool> struck = find_struck(set, fs_hz, modes);
+    deviations raised = sigma;
+    bool any = false;
+    const auto raise = [&any](double& to, double least) { // of NaN nothing is known
+        if (!(to < least)) return;
+        to = least;
+        any = true;
+    };
     for (std::size_t k = 0; k < modes.size() && k < sigma.frequency_hz.size(); ++k) {
         const double f = modes[k].frequency_hz, zeta = modes[k].damping_ratio, radians = 2 * M_PI * f * seconds;
-        if (!(zeta > 0) || struck[k]) continue;
-        if (sigma.frequency_hz[k] < f * std::sqrt(zeta / (2 * radians)))
-            sigma.frequency_hz[k] = f * std::sqrt(zeta / (2 * radians));
-        if (sigma.damping_ratio[k] < std::sqrt(zeta / radians)) sigma.damping_ratio[k] = std::sqrt(zeta / radians);
+        if (!(zeta > 0)) continue;
+        raise(raised.frequency_hz[k], f * std::sqrt(zeta / (2 * radians)));
+        raise(raised.damping_ratio[k], std::sqrt(zeta / radians));
+    }
+    if (!any) return;
+    const std::vector<bool> struck = ring_down(set, fs_hz, modes);
+    for (std::size_t k = 0; k < modes.size() && k < sigma.frequency_hz.size(); ++k) {
+        if (struck[k]) continue;
+        sigma.frequency_hz[k] = raised.frequency_hz[k];
+        sigma.damping_ratio[k] = raised.damping_ratio[k];
     }
 }
 

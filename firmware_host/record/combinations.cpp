@@ -32,6 +32,7 @@ constexpr std::size_t most_bases = 5,
                       most_mixed = 3; ///< the strongest vibrations, to explain a mode and to look for more
 constexpr std::size_t most_outputs = 8;
 constexpr double resolved = 2;          ///< beats in a block under a Hann window: fewer, and one leaks into the other
+constexpr double endless = 1e12;        ///< samples of a block that no record holds
 constexpr double highest = 0.45;        ///< of the rate
 constexpr double two_vibrations = 0.03; ///< two vibrations
 constexpr double wandering = 0.15,
@@ -45,8 +46,7 @@ struct strand {
     double power = 0, share_left = 1, peak = 0; ///< at its frequency; peak: of what the forces drive, over beside it
     double strength = 0;                        ///< amplitude as a displacement
     bool rings = false;                         ///< down between hits that were not measured
-    bool line =
-        false; ///< of a machine or the mains, with multiples of its own: nothing is to be learned of the structure
+    bool line = false;                          ///< of a machine or the mains: its multiples are its own, no distortion
 };
 
 /// Factors and how often each: {base, n}; n < 0: the conjugate.
@@ -153,18 +153,29 @@ double frequency_of(const product& of, const std::vector<listed_mode>& modes) {
     });
 }
 
-/// Samples of a block that holds six periods of the slowest factor, and in which no factor looks like another or like their
-/// product: what leaks from one into the other moves in phase by itself.
+/// Distance from the nearest multiple of a line: those of one machine are in phase by themselves.
+double beside_lines(const product_search& s, double frequency_hz) {
+    double closest = INFINITY;
+    for (std::size_t k = 0; k < s.modes.size(); ++k)
+        for (int n = 1; s.strands[k].line && n <= judgement::most_multiple; ++n)
+            closest = std::min(closest, std::abs(frequency_hz - n * s.modes[k].frequency_hz));
+    return closest;
+}
+
+/// Samples of a block that holds six periods of the slowest factor, and in which no factor looks like another, like their
+/// product or like a line: what leaks from one into the other moves in phase by itself.
 std::size_t block_of(const product_search& s, const product& of) {
     std::vector<double> apart{frequency_of(of, s.modes)};
-    double slowest = INFINITY, closest = INFINITY;
+    double slowest = INFINITY, closest = beside_lines(s, apart.front());
     for (const auto& factor : of) {
         const double f = s.modes[factor.first].frequency_hz;
         slowest = std::min(slowest, f);
+        closest = std::min(closest, beside_lines(s, f));
         for (const double other : apart) closest = std::min(closest, std::abs(f - other));
         apart.push_back(f);
     }
-    return static_cast<std::size_t>(std::max(judgement::product_periods / slowest, resolved / closest) * s.fs_hz) + 1;
+    const double seconds = std::max(judgement::product_periods / slowest, resolved / closest);
+    return static_cast<std::size_t>(std::min(seconds * s.fs_hz, endless)) + 1;
 }
 
 /// How much records follow a product of vibrations; 0 where that is not known.
@@ -295,8 +306,7 @@ void fill(const record_work& work, product_search& s) {
         }
     }
     for (std::size_t k = 0; k < s.modes.size(); ++k) {
-        for (const std::string& why : work.context.verdicts[k].why)
-            s.strands[k].line = s.strands[k].line || why == "tone" || why == "pickup";
+        s.strands[k].line = is_tone(work.context.verdicts[k].why);
         const double cycles = s.modes[k].frequency_hz / s.fs_hz;
         const auto ring = static_cast<std::size_t>(judgement::ring_periods / cycles) + 1;
         weigh(s.modes[k], s.fs_hz, s.strands[k]);
@@ -328,7 +338,7 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
     const auto look = [&](double least, double tolerance) {
         for (std::size_t k = 0; k < modes.size(); ++k) {
             const std::vector<std::string>& why = work.context.verdicts[k].why;
-            if (k == first.front() || s.strands[k].line || std::find(why.begin(), why.end(), "harmonic") != why.end() ||
+            if (k == first.front() || s.strands[k].line || has_code(why, "harmonic") ||
                 (driven && s.strands[k].peak > judgement::resonance_peak &&
                  s.strands[k].share_left < judgement::left_alone))
                 continue;

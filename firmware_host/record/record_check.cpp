@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
-#include <numeric>
+#include <map>
 #include <string_view>
 #include <unordered_map>
 
@@ -21,6 +21,7 @@ namespace {
 constexpr std::size_t fewest_new_rows = 100;
 constexpr double rows_each = 1.25;     // of a new sample, on average: fewer may be chance
 constexpr double regular_share = 0.99; // of new samples, read once more or less than that; of chance 0.96
+
 /// The first number of a channel, NaN where it has none, and whether a later one differs.
 struct channel_movement {
     double first = NAN;
@@ -174,26 +175,24 @@ bool same_samples(const record_set& set, const record_data& one, const record_da
 
 std::string repeated_rows(const record_set& set, double fs_hz) {
     const std::size_t m = set.channels();
-    std::vector<std::size_t> lengths; // of rows alike
+    std::map<std::size_t, std::size_t> runs; // of rows alike: how many of each length
     for (const record_data& record : set.records) {
         const double* row = set.rows(record) + set.n_u;
         std::size_t length = 1;
         for (std::size_t i = 1; i < record.count; ++i, ++length)
-            if (!std::equal(row + i * m, row + i * m + set.n_y, row + (i - 1) * m))
-                lengths.push_back(length), length = 0;
+            if (!std::equal(row + i * m, row + i * m + set.n_y, row + (i - 1) * m)) ++runs[length], length = 0;
     }
-    if (lengths.size() < fewest_new_rows) return {};
-    const std::size_t rows = std::accumulate(lengths.begin(), lengths.end(), std::size_t{0});
-    const double each = static_cast<double>(rows) / static_cast<double>(lengths.size());
-    const auto regular = std::count_if(lengths.begin(), lengths.end(), [each](std::size_t length) {
-        return std::abs(static_cast<double>(length) - each) < 1; // of a clock beside a faster one
-    });
-    if (each < rows_each || static_cast<double>(regular) < regular_share * static_cast<double>(lengths.size()))
-        return {};
+    std::size_t fresh = 0, rows = 0, regular = 0;
+    for (const auto& [length, count] : runs) fresh += count, rows += length * count;
+    if (fresh < fewest_new_rows) return {};
+    const double each = static_cast<double>(rows) / static_cast<double>(fresh);
+    for (const auto& [length, count] : runs)
+        if (std::abs(static_cast<double>(length) - each) < 1) regular += count; // of a clock beside a faster one
+    if (each < rows_each || static_cast<double>(regular) < regular_share * static_cast<double>(fresh)) return {};
     return fmt::format("{} of {} rows repeat all outputs of the row before: the sensor gives about {:.4g} samples a "
                        "second and is read {:.4g} times. Keep the rows that are new and give --fs {:.4g}, or read it "
                        "when it has a new sample",
-                       rows - lengths.size(), rows, fs_hz / each, fs_hz, fs_hz / each);
+                       rows - fresh, rows, fs_hz / each, fs_hz, fs_hz / each);
 }
 
 void remark_repeated(const record_set& set, remarks& said) {

@@ -65,8 +65,7 @@ bool accounted_for(double f, double line_hz, const std::vector<listed_mode>& lis
     for (std::size_t k = 0; k < listed.size(); ++k) {
         const std::vector<std::string>& why = verdicts[k].why;
         const auto is_any = [&](std::initializer_list<const char*> codes) {
-            return std::any_of(codes.begin(), codes.end(),
-                               [&](const char* code) { return std::find(why.begin(), why.end(), code) != why.end(); });
+            return std::any_of(codes.begin(), codes.end(), [&](const char* code) { return has_code(why, code); });
         };
         const bool known = is_any({"tone", "pickup", "harmonic"}) || !is_any({"few_runs", "noise_shape"});
         const double width = 3 * std::max(line_hz, listed[k].damping_ratio * listed[k].frequency_hz);

@@ -51,21 +51,20 @@ constexpr double same_residues = 0.9; ///< MAC of the residues of two poles that
 constexpr double steady = 0.25;     ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)
 constexpr double of_chance = 0.52;  ///< … of a vibration under chance forces
 constexpr double surely_steady = 2; ///< times 1 / sqrt(blocks) less is no chance: five deviations
-constexpr double off_its_frequency =
-    0.5;                               ///< cycles of a block between a line and the power there: a leak of another line
-constexpr double wandering = 0.4;      ///< … of a tone that wanders, at most
-constexpr double steady_on = 0.1;      ///< … of a machine that goes on and off, while it is on
-constexpr double on = 0.5, off = 0.15; ///< of its amplitude
-constexpr double on_or_off = 0.85;     ///< of the blocks; of a random vibration a half
-constexpr std::size_t fewest_blocks = 8; ///< below that a spread means nothing
-constexpr std::size_t line_blocks = 64;  ///< into which a record is cut
-constexpr double line_periods = 8;       ///< in a block, at least
-constexpr double fall_periods = 3;       ///< … where a fall is looked for
-constexpr double line_damping = 0.01;    ///< a pole damped more is no line
-constexpr double unresolved_decays = 2;  ///< in the record: with fewer a decay and a line look the same
-constexpr double falls = 3;              ///< deviations of a slope: from here on an amplitude falls
-constexpr double as_damped = 2;          ///< factor between the fall of an amplitude and that of the mode's own damping
-constexpr double begun = 0.05;           ///< of the largest force: the first hit
+constexpr double steady_wandering = 0.4;  ///< … of a tone that wanders, at most
+constexpr double off_its_frequency = 0.5; ///< cycles of a block: where the power is so far off, another line leaks in
+constexpr double steady_on = 0.1;         ///< … of a machine that goes on and off, while it is on
+constexpr double on = 0.5, off = 0.15;    ///< of its amplitude
+constexpr double on_or_off = 0.85;        ///< of the blocks; of a random vibration a half
+constexpr std::size_t fewest_blocks = 8;  ///< below that a spread means nothing
+constexpr std::size_t line_blocks = 64;   ///< into which a record is cut
+constexpr double line_periods = 8;        ///< in a block, at least
+constexpr double fall_periods = 3;        ///< … where a fall is looked for
+constexpr double line_damping = 0.01;     ///< a pole damped more is no line
+constexpr double unresolved_decays = 2;   ///< in the record: with fewer a decay and a line look the same
+constexpr double falls = 3;               ///< deviations of a slope: from here on an amplitude falls
+constexpr double as_damped = 2; ///< factor between the fall of an amplitude and that of the mode's own damping
+constexpr double begun = 0.05;  ///< of the largest force: the first hit
 constexpr double loudest_silence =
     0.07; ///< of its usual amplitude: a line stronger would be seen in the silence before the force
 constexpr double quieter = 0.5;           ///< amplitude before the hits over that of the record
@@ -79,8 +78,9 @@ constexpr int most_multiple = 5;             ///< of a vibration, looked at
 constexpr double multiple_frequency = 0.015; ///< relative distance from a multiple, a sum or a difference
 constexpr double in_phase =
     0.7; ///< coherence of phases; 1: always. Linear structures stay below 0.45; chance 1/sqrt(blocks)
-constexpr double of_hits = 1;      ///< spread over mean of a force that mostly rests; 0.52 of a random one
-constexpr double at_once = 0.8;    ///< cosine between its amplitudes at two frequencies over blocks; of a sweep near 0
+constexpr double explained =
+    0.5;                      ///< of a mode's amplitude by the forces: they excite it, no machine and no product does
+constexpr double of_hits = 1; ///< spread over mean of a force that mostly rests; 0.52 of a random one
 constexpr double ring_periods = 3; ///< in a block, to see a vibration ring down between hits
 constexpr double falling = 0.1; ///< steps down less steps up of an amplitude, of all; hits 0.2 and more, no hits 0.05
 constexpr double stronger = 10; ///< amplitude of the vibration over that of its multiple

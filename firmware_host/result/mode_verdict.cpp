@@ -34,6 +34,12 @@ bool judged_by_agreement(const result_context& context) {
     return context.method == "auto" || context.method == "plscf" || context.method == "poser";
 }
 
+bool has_code(const std::vector<std::string>& why, const char* code) {
+    return std::find(why.begin(), why.end(), code) != why.end();
+}
+
+bool is_tone(const std::vector<std::string>& why) { return has_code(why, "tone") || has_code(why, "pickup"); }
+
 std::string why_text(const std::string& code) {
     const auto* at = std::find_if(words.begin(), words.end(), [&](const auto& one) { return code == one.first; });
     return at == words.end() ? code : at->second;
@@ -41,11 +47,10 @@ std::string why_text(const std::string& code) {
 
 std::string why_legend(const std::vector<mode_verdict>& verdicts) {
     std::string out;
-    for (const auto& [code, text] : words)
-        if (std::any_of(verdicts.begin(), verdicts.end(), [name = std::string(code)](const mode_verdict& one) {
-                return std::find(one.why.begin(), one.why.end(), name) != one.why.end();
-            }))
-            out += fmt::format("   {}: {}\n", code, text);
+    for (const auto& [name, text] : words)
+        if (std::any_of(verdicts.begin(), verdicts.end(),
+                        [code = name](const mode_verdict& one) { return has_code(one.why, code); }))
+            out += fmt::format("   {}: {}\n", name, text);
     return out;
 }
 

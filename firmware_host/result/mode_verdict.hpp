@@ -19,6 +19,11 @@ struct mode_verdict {
     bool picked = false;          ///< by hand
 };
 
+bool has_code(const std::vector<std::string>& why, const char* code);
+
+/// A line of a machine or of the mains, no resonance?
+bool is_tone(const std::vector<std::string>& why);
+
 /// What a code of `why` says, as a part of a sentence.
 std::string why_text(const std::string& code);
 

@@ -112,7 +112,7 @@ static void a_mode_stays_one_wherever_it_lies() {
     for (const double mode : {7.95, 8.3, 9.0, 9.1, 20.3}) TEST_ASSERT_EQUAL_UINT64(0, why(mode, mode, damping).size());
 }
 
-/// Noise below 20 Hz, as a shaker's controller makes it, one mode, and a second force that nobody measures, of the same band.
+/// Noise below 20 Hz, as a shaker's controller makes it, one mode, and a second force that is not measured, of the same band.
 static std::vector<record_level> driven_below_20_hz(double mode_hz) {
     std::mt19937 random(11);
     std::normal_distribution<double> normal;
@@ -214,12 +214,44 @@ static void a_part_of_the_rate_in_one_output_is_pickup() {
     TEST_ASSERT_EQUAL_UINT64(0, listed(level, false, {wide})[0].why.size());
 }
 
+/// Noise of two seconds, again and again: the amplitude of what it drives stays. As that of a machine does, which is not measured.
+static void what_a_repeated_force_explains_is_no_line() {
+    std::mt19937 random(12);
+    std::normal_distribution<double> normal;
+    std::vector<double> period(static_cast<std::size_t>(2 * fs));
+    for (double& x : period) x = normal(random);
+    for (const bool measured : {true, false}) {
+        record_level level = one_record();
+        const std::complex<double> of_mode = pole_of(24, 0.008);
+        std::complex<double> state = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const double force = period[i % period.size()];
+            state = of_mode * state + force;
+            level.records.front().insert(level.records.front().end(),
+                                         {measured ? force : normal(random), state.imag() + 0.1 * normal(random)});
+        }
+        std::vector<consensus_mode> modes = {pole(24, 0.008, 1)};
+        modes[0].shape = {1.0};
+        mark_lines({level}, 1, 1, false, modes);
+        TEST_ASSERT_EQUAL_UINT64(measured ? 0 : 1, modes[0].why.size());
+    }
+}
+
+/// A tone of 9 Hz, far stronger than the mode of 8 Hz, is in every block short enough for that mode.
+static void a_mode_beside_a_strong_tone_is_no_line() {
+    const record_level level = answered(8, 0.008, false, 9, 60, 13);
+    TEST_ASSERT_EQUAL_UINT64(0, listed(level, false, {pole(8, 0.008, -0.5)})[0].why.size());
+    TEST_ASSERT_EQUAL_STRING("tone", listed(level, false, {pole(9, 1e-4, 1)})[0].why[0].c_str());
+}
+
 int main() {
     UNITY_BEGIN();
     RUN_TEST(a_decay_is_no_line_however_short_the_record);
     RUN_TEST(a_weak_mode_that_begins_with_the_hit_is_no_line);
     RUN_TEST(a_part_of_the_rate_in_one_output_is_pickup);
     RUN_TEST(a_line_is_seen_along_its_shape);
+    RUN_TEST(what_a_repeated_force_explains_is_no_line);
+    RUN_TEST(a_mode_beside_a_strong_tone_is_no_line);
     RUN_TEST(what_rings_after_silence_is_no_line);
     RUN_TEST(a_multiple_of_the_drive_is_no_mode);
     RUN_TEST(a_mode_stays_one_wherever_it_lies);

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""Modes under measured forces that are not chance: dwells, releases, periodic forces, hits while a machine runs. The
+records are sums of modes, each by its own filter at eight times the rate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import okid
+import pytest
+from scipy import signal
+
+OVER = 8
+NOISE = 0.005  # of the standard deviation of an output
+
+
+class Sums:
+    """Modes f (Hz), zeta, their shapes at the sensors and at the force; responses to a force at OVER times the rate."""
+
+    def __init__(self, rate: float, f: list[float], damping: tuple[float, float], sensors: int, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.rate = rate
+        self.f = np.array(f) * (1 + 0.03 * self.rng.uniform(-1, 1, len(f)))
+        self.zeta = self.rng.uniform(*damping, len(f))
+        place = np.sort(self.rng.uniform(0.1, 0.95, sensors))
+        self.at = np.cos(np.pi * np.outer(place, np.arange(1, len(f) + 1)) + self.rng.uniform(0, 0.6, len(f)))
+        self.at += 0.15 * self.rng.standard_normal(self.at.shape)
+        self.at[0] = np.copysign(np.maximum(np.abs(self.at[0]), 0.15), self.at[0])  # the force is at no node
+
+    def lower(self, x: Any) -> Any:
+        taps = signal.firwin(20 * OVER + 1, 0.9 / OVER, window=("kaiser", 8))
+        return signal.upfirdn(taps, x, 1, OVER, axis=-1)[..., 10:][..., : x.shape[-1] // OVER]
+
+    def response(self, force: Any, at: Any) -> Any:
+        """Accelerations of the sensors under a force at these amplitudes of the modes."""
+        out = 0
+        for k, (f, zeta) in enumerate(zip(self.f, self.zeta, strict=True)):
+            w = 2 * np.pi * f
+            b, a, _ = signal.cont2discrete(([1, 0, 0], [1, 2 * zeta * w, w * w]), 1 / self.rate / OVER, method="foh")
+            out = out + np.outer(self.at[:, k], at[k] * signal.lfilter(np.ravel(b), a, force))
+        return out
+
+    def record(self, force: Any, more: Any = 0) -> tuple[Any, Any]:
+        y = self.lower(self.response(force, self.at[0]) + more)
+        u = self.lower(force)
+        noise = self.rng.standard_normal
+        return u + 1e-3 * np.abs(u).max() * noise(u.shape), (y + NOISE * y.std() * noise(y.shape)).T
+
+    def found(self, result: Any) -> list[float]:
+        """Of each mode: how far the nearest confident one is, relative."""
+        seen = np.array([mode.frequency_hz for mode in result.modes if mode.confident])
+        return [float(np.abs(seen / f - 1).min()) for f in self.f]
+
+
+def codes(result: Any) -> list[str]:
+    return [warning.code for warning in result.warnings]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_dwells_leave_the_modes(seed: int) -> None:
+    """A sine near one mode after the other, and rest; turbulence that is not measured."""
+    s = Sums(100, [4.1, 5.6, 8.2, 10.3, 14.5, 19.0, 24.0, 31.0], (0.015, 0.05), 4, seed)
+    t = np.arange(60 * 100 * OVER) / 100 / OVER
+    force = np.zeros(len(t))
+    for k, mode in enumerate([0, 1, 2, 4, 5, 6]):
+        on = (t >= 10 * k + 0.5) & (t < 10 * k + 5)
+        force[on] = 20 * np.sin(2 * np.pi * 1.01 * s.f[mode] * (t[on] - 10 * k))
+    b, a = signal.butter(1, 8 / (50 * OVER))
+    turbulence = sum(
+        s.response(0.5 * x / x.std(), s.rng.standard_normal(8))
+        for x in signal.lfilter(b, a, s.rng.standard_normal((3, len(t))))
+    )
+    u, y = s.record(force, turbulence)
+    result = okid.identify(u, y, fs=100)
+    assert max(s.found(result)) < 0.02
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_releases_leave_the_modes(seed: int) -> None:
+    """Pulled slowly and let go, three times: all modes ring from the same instant."""
+    s = Sums(50, [0.72, 1.05, 2.05, 2.9, 4.2, 6.1, 8.3], (0.004, 0.015), 2, seed)
+    t = np.arange(150 * 50 * OVER) / 50 / OVER
+    force = np.where(t % 50 < 12, 1000 * np.minimum(t % 50 / 8, 1), 0.0)
+    u, y = s.record(force)
+    result = okid.identify(u, y, fs=50)
+    assert max(s.found(result)) < 0.01
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_periodic_forces_leave_the_modes(seed: int) -> None:
+    """The same two seconds of noise again and again: all amplitudes stay."""
+    s = Sums(512, [11.0, 19.0, 31.0, 44.0, 60.0, 83.0, 110.0, 150.0], (0.006, 0.012), 3, seed)
+    period = s.rng.standard_normal(2 * 512 * OVER)
+    b, a = signal.butter(4, 200 / (256 * OVER))
+    force = signal.lfilter(b, a, np.tile(period, 12))
+    u, y = s.record(force)
+    result = okid.identify(u, y, fs=512)
+    assert max(s.found(result)) < 0.01
+    assert "nonlinear" not in codes(result)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_hits_beside_a_running_machine(seed: int) -> None:
+    """Its orders are in phase with each other, and say nothing of the structure."""
+    s = Sums(2048, [47.0, 70.0, 107.0, 138.0, 166.0, 212.0, 261.0, 318.0, 390.0], (0.006, 0.015), 3, seed)
+    t = np.arange(20 * 2048 * OVER) / 2048 / OVER
+    force = np.zeros(len(t))
+    for hit in 1 + 1.9 * np.arange(10) + 0.2 * s.rng.random(10):
+        on = (t >= hit) & (t < hit + 0.0012)
+        force[on] = 300 * np.sin(np.pi * (t[on] - hit) / 0.0012) ** 1.5
+    clean = s.response(force, s.at[0])
+    orders = zip([1, 2, 3, 4, 6, 8, 12], [1, 0.7, 0.3, 0.5, 0.4, 0.3, 0.2], strict=True)
+    machine = sum(
+        np.outer(0.02 * np.abs(clean).max() * size * s.rng.uniform(0.3, 1, 3), np.sin(2 * np.pi * 24.7 * n * t + n))
+        for n, size in orders
+    )
+    u, y = s.record(force, machine)
+    result = okid.identify(u, y, fs=2048)
+    assert max(s.found(result)) < 0.01
+    assert "nonlinear" not in codes(result)
