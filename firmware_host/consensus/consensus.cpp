@@ -362,7 +362,7 @@ void mark_full(const std::vector<cluster>& clusters, const std::vector<consensus
             const double share = run.zoom().folded(f) / run.fs_hz;
             return share >= 0 && share < 0.5;
         });
-        run.full = run.states > 0 && 2.0 * static_cast<double>(inside) > judgement::most_filled * run.states;
+        if (run.states > 0 && 2.0 * static_cast<double>(inside) > judgement::most_filled * run.states) run.full = true;
     }
 }
 

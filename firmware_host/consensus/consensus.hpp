@@ -43,7 +43,7 @@ struct consensus_run {
     std::vector<int> orders;
     int most_order = 64; ///< asked for
     int states = 0;      ///< of the highest order; 0: no limit
-    bool full = false;   ///< of modes: find_agreement() says so
+    bool full = false;   ///< of modes: too few states
     std::vector<run_pole> poles;
     std::vector<run_track> tracks;
 };

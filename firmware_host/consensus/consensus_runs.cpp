@@ -5,6 +5,7 @@
 #include "consensus_runs.hpp"
 
 #include "files/side_by_side.hpp"
+#include "result/judgement.hpp"
 #include "result/method.hpp"
 
 #include <algorithm>
@@ -69,6 +70,14 @@ int most_states(const consensus_run& run, int n_y, int most) {
     return std::min(most, held - held % 2);
 }
 
+/// Do past and future share more states than a run has? Their canonical correlations say so, also where modes overlap so much
+/// that with too few states hardly one of them is clear.
+bool shares_more(const okid_identified_t& model, const consensus_run& run) {
+    const auto filled = static_cast<int>(judgement::most_filled * run.states);
+    return run.method == OKID_METHOD_N4SID_CVA &&
+           filled<model.singular_count&& static_cast<double>(model.singular_values[filled])> judgement::surely_shared;
+}
+
 bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, consensus_run& run) {
     const std::size_t bytes = okid_identify_memsize(&config);
     const auto block = memory(bytes);
@@ -76,6 +85,7 @@ bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, co
     okid_identified_t model{};
     if (!block || !sums.sums || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK) return false;
     if (okid_identify_decompose(identifier, sums.sums, &model) != OKID_OK) return false;
+    run.full = shares_more(model, run);
     collect_poles(identifier, model, run);
     link_tracks(run);
     return true;

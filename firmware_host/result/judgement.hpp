@@ -23,6 +23,7 @@ constexpr double beats_seen =
     0.75;                         ///< of a mode and its neighbour within the horizon; with fewer a run sees one of both
 constexpr double decays_left = 2; ///< in a horizon: what has fallen to a seventh at its end still tells something there
 constexpr double most_filled = 0.75;     ///< of a run's states, by two for each mode: above, weak ones find no room
+constexpr double surely_shared = 0.95;   ///< canonical correlation at that many states: there are more
 constexpr std::size_t fewest_voters = 6; ///< runs with the longest horizons, which vote in any case
 
 // Agreement: found_in x EMAC x (1 + MPC)/2 / (1 + (scatter of damping / scatter_scale)^2).

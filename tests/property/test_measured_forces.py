@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Modes under measured forces that are not chance: dwells, releases, periodic forces, hits while a machine runs. The
+"""Modes under measured forces: dwells, releases, periodic forces, hits while a machine runs, many modes at once. The
 records are sums of modes, each by its own filter at eight times the rate."""
 
 from __future__ import annotations
@@ -119,3 +119,14 @@ def test_hits_beside_a_running_machine(seed: int) -> None:
     result = okid.identify(u, y, fs=2048)
     assert max(s.found(result)) < 0.01
     assert "nonlinear" not in codes(result)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_many_modes_that_overlap(seed: int) -> None:
+    """Forty modes need 80 states; a run has 64 at first, and as modes 3 to 8 % apart and damped by 1 to 3 % blend, few
+    of them are clear."""
+    s = Sums(512, [22 * 1.056**k for k in range(40)], (0.01, 0.03), 8, seed)
+    b, a = signal.butter(4, 220 / (256 * OVER))
+    u, y = s.record(signal.lfilter(b, a, s.rng.standard_normal(64 * 512 * OVER)))
+    result = okid.identify(u, y, fs=512)
+    assert max(s.found(result)) < 0.01
