@@ -70,12 +70,12 @@ int most_states(const consensus_run& run, int n_y, int most) {
     return std::min(most, held - held % 2);
 }
 
-/// Do past and future share more states than a run has? Their canonical correlations say so, also where modes overlap so much
-/// that with too few states hardly one of them is clear.
+/// Do past and future share more states than a run has? Their canonical correlations say so. Where modes overlap, a run with
+/// too few states shows hardly one of them clearly.
 bool shares_more(const okid_identified_t& model, const consensus_run& run) {
     const auto filled = static_cast<int>(judgement::most_filled * run.states);
-    return run.method == OKID_METHOD_N4SID_CVA &&
-           filled<model.singular_count&& static_cast<double>(model.singular_values[filled])> judgement::surely_shared;
+    if (run.method != OKID_METHOD_N4SID_CVA || model.singular_count <= filled) return false;
+    return static_cast<double>(model.singular_values[filled]) > judgement::surely_shared;
 }
 
 bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, consensus_run& run) {

@@ -137,6 +137,7 @@ std::vector<complex> weights_along(std::vector<complex> shape) {
 /// excite it, chance where a machine does beside them.
 double explained_by_forces(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode,
                            std::size_t block) {
+    if (n_u == 0) return 0;
     const double share = mode.frequency_hz / level.fs_hz, zeta = std::min(mode.damping_ratio, 1.0);
     const complex pole = std::exp(2 * M_PI * share * complex(-zeta, std::sqrt(1 - zeta * zeta)));
     const std::vector<complex> weights = weights_along(mode.shape);
@@ -162,7 +163,7 @@ double explained_by_forces(const record_level& level, std::size_t m, std::size_t
         b[complete] = answer[i];
         complete += !std::isnan(sum.real()) && !std::isnan(sum.imag());
     }
-    if (complete <= C.cols() || n_u == 0) return 0;
+    if (complete <= C.cols()) return 0;
     C.conservativeResize(complete, C.cols());
     b.conservativeResize(complete);
     return (C * C.colPivHouseholderQr().solve(b)).squaredNorm() / b.squaredNorm();

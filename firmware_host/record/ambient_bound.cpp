@@ -102,25 +102,17 @@ void keep_to_ambient_bound(const record_set& set, double fs_hz, const std::vecto
         if (samples == 0) return;
         seconds += samples / fs_hz;
     }
-    deviations raised = sigma;
-    bool any = false;
-    const auto raise = [&any](double& to, double least) { // of NaN nothing is known
-        if (!(to < least)) return;
-        to = least;
-        any = true;
-    };
+    std::vector<bool> rings; // of no mode known until a deviation lies below the bound
     for (std::size_t k = 0; k < modes.size() && k < sigma.frequency_hz.size(); ++k) {
         const double f = modes[k].frequency_hz, zeta = modes[k].damping_ratio, radians = 2 * M_PI * f * seconds;
+        const auto raise = [&](double& to, double least) {
+            if (!(to < least)) return; // of NaN nothing is known
+            if (rings.empty()) rings = ring_down(set, fs_hz, modes);
+            if (!rings[k]) to = least;
+        };
         if (!(zeta > 0)) continue;
-        raise(raised.frequency_hz[k], f * std::sqrt(zeta / (2 * radians)));
-        raise(raised.damping_ratio[k], std::sqrt(zeta / radians));
-    }
-    if (!any) return;
-    const std::vector<bool> struck = ring_down(set, fs_hz, modes);
-    for (std::size_t k = 0; k < modes.size() && k < sigma.frequency_hz.size(); ++k) {
-        if (struck[k]) continue;
-        sigma.frequency_hz[k] = raised.frequency_hz[k];
-        sigma.damping_ratio[k] = raised.damping_ratio[k];
+        raise(sigma.frequency_hz[k], f * std::sqrt(zeta / (2 * radians)));
+        raise(sigma.damping_ratio[k], std::sqrt(zeta / radians));
     }
 }
 

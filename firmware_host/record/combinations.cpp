@@ -153,12 +153,14 @@ double frequency_of(const product& of, const std::vector<listed_mode>& modes) {
     });
 }
 
-/// Distance from the nearest multiple of a line: those of one machine are in phase by themselves.
-double beside_lines(const product_search& s, double frequency_hz) {
+/// Distance from the nearest of the first multiples of a line: those of one machine are in phase by themselves.
+double beside_lines(const product_search& s, double frequency_hz, double multiples) {
     double closest = INFINITY;
-    for (std::size_t k = 0; k < s.modes.size(); ++k)
-        for (int n = 1; s.strands[k].line && n <= judgement::most_multiple; ++n)
-            closest = std::min(closest, std::abs(frequency_hz - n * s.modes[k].frequency_hz));
+    for (std::size_t k = 0; k < s.modes.size(); ++k) {
+        if (!s.strands[k].line) continue;
+        const double base = s.modes[k].frequency_hz, n = std::clamp(std::round(frequency_hz / base), 1.0, multiples);
+        closest = std::min(closest, std::abs(frequency_hz - n * base));
+    }
     return closest;
 }
 
@@ -166,11 +168,11 @@ double beside_lines(const product_search& s, double frequency_hz) {
 /// product or like a line: what leaks from one into the other moves in phase by itself.
 std::size_t block_of(const product_search& s, const product& of) {
     std::vector<double> apart{frequency_of(of, s.modes)};
-    double slowest = INFINITY, closest = beside_lines(s, apart.front());
+    double slowest = INFINITY, closest = beside_lines(s, apart.front(), judgement::most_multiple);
     for (const auto& factor : of) {
         const double f = s.modes[factor.first].frequency_hz;
         slowest = std::min(slowest, f);
-        closest = std::min(closest, beside_lines(s, f));
+        closest = std::min(closest, beside_lines(s, f, judgement::most_multiple));
         for (const double other : apart) closest = std::min(closest, std::abs(f - other));
         apart.push_back(f);
     }
@@ -206,23 +208,14 @@ product followed(product_search& s, std::size_t k, double most, double tolerance
     return best;
 }
 
-bool multiple_of_line(const product_search& s, double frequency_hz) {
-    for (std::size_t k = 0; k < s.modes.size(); ++k) {
-        const double base = s.modes[k].frequency_hz;
-        if (s.strands[k].line &&
-            std::abs(frequency_hz - std::round(frequency_hz / base) * base) < judgement::mains_tolerance * frequency_hz)
-            return true;
-    }
-    return false;
-}
-
 /// The multiples and sums of the strongest vibrations at which some output moves in phase, listed as a mode or not.
 std::vector<product> distortions(product_search& s) {
     std::vector<product> out;
     const std::vector<std::size_t> bases = bases_of(s, s.modes.size(), most_mixed);
     each_product(bases, [&](const product& of) {
         const double f = frequency_of(of, s.modes);
-        if (f > highest * s.fs_hz || multiple_of_line(s, f) || of.front().second > judgement::most_factors ||
+        if (f > highest * s.fs_hz || beside_lines(s, f, INFINITY) < judgement::mains_tolerance * f ||
+            of.front().second > judgement::most_factors ||
             std::any_of(of.begin(), of.end(), [](const auto& factor) { return factor.second < 0; }) ||
             std::any_of(s.modes.begin(), s.modes.end(), [f](const listed_mode& mode) {
                 return mode.in_model && std::abs(mode.frequency_hz / f - 1) < next_to;

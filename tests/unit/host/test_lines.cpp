@@ -214,7 +214,8 @@ static void a_part_of_the_rate_in_one_output_is_pickup() {
     TEST_ASSERT_EQUAL_UINT64(0, listed(level, false, {wide})[0].why.size());
 }
 
-/// Noise of two seconds, again and again: the amplitude of what it drives stays. As that of a machine does, which is not measured.
+/// Noise of two seconds, again and again: what it drives has a constant amplitude, as a machine has. Of the machine no force is
+/// measured.
 static void what_a_repeated_force_explains_is_no_line() {
     std::mt19937 random(12);
     std::normal_distribution<double> normal;
@@ -237,7 +238,7 @@ static void what_a_repeated_force_explains_is_no_line() {
     }
 }
 
-/// A tone of 9 Hz, far stronger than the mode of 8 Hz, is in every block short enough for that mode.
+/// A tone of 9 Hz, far stronger than the mode of 8 Hz, leaks into every block in which that mode is looked at.
 static void a_mode_beside_a_strong_tone_is_no_line() {
     const record_level level = answered(8, 0.008, false, 9, 60, 13);
     TEST_ASSERT_EQUAL_UINT64(0, listed(level, false, {pole(8, 0.008, -0.5)})[0].why.size());
