@@ -3,7 +3,8 @@
 // METHOD   the frequency of a mode in short blocks, as a straight line over the mode's power and over time. With a force: the
 //          correction of the pole that explains a block's residual best (one Gauss-Newton step, its own initial state free).
 //          Without: the turning of the mode's analytic signal; of a linear structure under Gaussian forces its mean does not
-//          depend on the envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line
+//          depend on the envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line; the blocks
+//          that weigh most, as those after the one hit that was clipped, must not decide alone
 #include "steadiness.hpp"
 
 #include "files/order_statistics.hpp"
@@ -26,6 +27,8 @@ constexpr double block_periods = 10;
 constexpr std::size_t least_block = 32; // samples
 constexpr double fewest_blocks = 12;    // of equal weight, to speak of a slope
 constexpr double sure = 7;              // slope over its deviation; the largest of linear modes is below 5
+constexpr double decisive = 0.2;        // of the effective number of blocks
+constexpr double borne_out = 5;         // deviations of the slope without them
 constexpr double worth_saying = 0.02;   // change over the half-power bandwidth
 constexpr double widest = 0.1;          // damping above: nothing repeats over a block
 constexpr double alone = 4;             // bandwidths to the next mode, without a force
@@ -89,6 +92,26 @@ slopes slopes_of(const std::vector<block_frequency>& over, double block_frequenc
     out.level_ratio = std::abs(slope[1]) / std::sqrt(scatter * inverse(1, 1));
     out.drift_ratio = std::abs(slope[2]) / std::sqrt(scatter * inverse(2, 2));
     return out;
+}
+
+/// Without the blocks that weigh most, a share of the effective number: a slope that they decide is theirs alone.
+std::vector<block_frequency> without_heaviest(std::vector<block_frequency> over) {
+    std::sort(over.begin(), over.end(), [](const auto& a, const auto& b) { return a.weight < b.weight; });
+    double total = 0, squares = 0;
+    for (const block_frequency& b : over) total += b.weight, squares += b.weight * b.weight;
+    const double heavy = decisive * total * total / squares;
+    over.resize(over.size() - std::min(over.size(), static_cast<std::size_t>(std::ceil(heavy))));
+    return over;
+}
+
+/// The slopes, each 0 where the rest of the blocks does not bear it out.
+slopes firm_slopes(const std::vector<block_frequency>& over, double block_frequency::* level) {
+    slopes found = slopes_of(over, level);
+    if (found.level_ratio < sure && found.drift_ratio < sure) return found;
+    const slopes rest = slopes_of(without_heaviest(over), level);
+    if (rest.level * found.level <= 0 || rest.level_ratio < borne_out) found.level_ratio = 0;
+    if (rest.drift * found.drift <= 0 || rest.drift_ratio < borne_out) found.drift_ratio = 0;
+    return found;
 }
 
 struct steady_search {
@@ -249,8 +272,8 @@ void remark_unsteady(const std::vector<listed_mode>& modes, double fs_hz, record
         const listed_mode& mode = *s.modes[k];
         if (mode.damping_ratio > widest || (driven && s.seen[k] < outstanding)) continue;
         const std::vector<block_frequency> over = driven ? forced[k] : turning(s, k);
-        slopes found = slopes_of(over, &block_frequency::power);
-        const slopes other = slopes_of(over, &block_frequency::motion);
+        slopes found = firm_slopes(over, &block_frequency::power);
+        const slopes other = firm_slopes(over, &block_frequency::motion);
         if (other.level_ratio > found.level_ratio) found = other;
         const double least = worth_saying * 2 * mode.damping_ratio;
         const auto text = [&](double change, double ratio) {

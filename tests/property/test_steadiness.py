@@ -13,6 +13,7 @@ import numpy as np
 import okid
 import pytest
 from laboratory import Laboratory, ambient, chain, forced
+from modal_sums import OVER, Sums
 from numpy.typing import NDArray
 from program import ROOT
 
@@ -109,4 +110,19 @@ def test_linear_and_swept(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     kind = forced_kinds.KINDS["sweep"]
     record = kind.make(np.random.default_rng([kind.number, seed, 13]))
     result = okid.identify(record.inputs, record.outputs, fs=record.rate, sigma_blocks=0)
+    assert not {w.code for w in result.warnings} & {"level_dependent", "time_varying"}
+
+
+@pytest.mark.parametrize(("gusts", "seed"), [(1.3, 16), (1.6, 15)])
+def test_linear_and_in_gusts(gusts: float, seed: int) -> None:
+    """Wind that swells and falls: the blocks of the one strongest gust weigh as much as all others together."""
+    s = Sums(10, [0.31, 0.66, 0.98, 1.35, 1.62, 2.1], (0.008, 0.018), 3, seed)
+    count = 1800 * 10 * OVER
+    swell = np.interp(np.arange(count), np.arange(21) * (count // 20), s.rng.standard_normal(21))
+    y = 0
+    for _ in range(3):
+        y = y + s.response(np.exp(gusts * swell) * s.rng.standard_normal(count), s.rng.standard_normal(6))
+    y = s.lower(y)
+    result = okid.identify(None, (y + 0.02 * y.std() * s.rng.standard_normal(y.shape)).T, fs=10, sigma_blocks=0)
+    assert sum(mode.confident for mode in result.modes) >= 5
     assert not {w.code for w in result.warnings} & {"level_dependent", "time_varying"}
