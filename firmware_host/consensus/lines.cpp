@@ -9,11 +9,12 @@
 #include "lines.hpp"
 
 #include "demodulation.hpp"
+#include "explained.hpp"
+#include "files/order_statistics.hpp"
 #include "result/judgement.hpp"
 #include "result/mode_verdict.hpp"
 #include "spectrum.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -101,6 +102,13 @@ double strength(const std::vector<complex>& a) {
     return std::sqrt(square / static_cast<double>(std::max<std::size_t>(a.size(), 1)));
 }
 
+/// The median of its sizes: at a hit all modes answer in the blocks of any.
+double usual(const std::vector<complex>& a) {
+    std::vector<double> sizes;
+    for (const complex& x : a) sizes.push_back(std::abs(x));
+    return sizes.empty() ? 0 : median(std::move(sizes));
+}
+
 std::size_t largest(const std::vector<complex>& shape) {
     const auto at = std::max_element(shape.begin(), shape.end(),
                                      [](const complex& a, const complex& b) { return std::norm(a) < std::norm(b); });
@@ -133,45 +141,19 @@ std::vector<complex> weights_along(std::vector<complex> shape) {
     return shape;
 }
 
-/// How much of a mode's amplitude the measured forces explain through its own pole, block by block: all of it where they
-/// excite it, chance where a machine does beside them.
-double explained_by_forces(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode,
-                           std::size_t block) {
-    if (n_u == 0) return 0;
-    const double share = mode.frequency_hz / level.fs_hz, zeta = std::min(mode.damping_ratio, 1.0);
-    const complex pole = std::exp(2 * M_PI * share * complex(-zeta, std::sqrt(1 - zeta * zeta)));
-    const std::vector<complex> weights = weights_along(mode.shape);
-    std::vector<complex> answer;
-    std::vector<std::vector<complex>> driven(n_u);
-    std::vector<complex> state;
+double explained(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode,
+                 const std::vector<consensus_mode>& modes, std::size_t block) {
+    std::vector<complex> seen;
     for (const sample_rows& rows : level.records) {
-        const auto more = amplitudes(rows, share, m, n_u, weights, block);
-        answer.insert(answer.end(), more.begin(), more.end());
-        for (std::size_t k = 0; k < n_u; ++k) {
-            state.assign(rows.size() / m, 0);
-            complex now = 0;
-            for (std::size_t t = 0; t < state.size(); ++t) state[t] = now = pole * now + rows[t * m + k];
-            demodulate(state.size(), share, block, [&](std::size_t t) { return state[t]; }, driven[k]);
-        }
+        const auto more = amplitudes(rows, mode.frequency_hz / level.fs_hz, m, n_u, weights_along(mode.shape), block);
+        seen.insert(seen.end(), more.begin(), more.end());
     }
-    Eigen::MatrixXcd C(static_cast<Eigen::Index>(answer.size()), static_cast<Eigen::Index>(n_u));
-    Eigen::VectorXcd b(C.rows());
-    Eigen::Index complete = 0;
-    for (std::size_t i = 0; i < answer.size(); ++i) {
-        complex sum = answer[i];
-        for (std::size_t k = 0; k < n_u; ++k) sum += C(complete, static_cast<Eigen::Index>(k)) = driven[k][i];
-        b[complete] = answer[i];
-        complete += !std::isnan(sum.real()) && !std::isnan(sum.imag());
-    }
-    if (complete <= C.cols()) return 0;
-    C.conservativeResize(complete, C.cols());
-    b.conservativeResize(complete);
-    return (C * C.colPivHouseholderQr().solve(b)).squaredNorm() / b.squaredNorm();
+    return explained_by_forces(level, m, n_u, at_rest, mode, modes, block, seen);
 }
 
 /// Does the response at n f follow the n-th power of that at f?
-bool follows(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode, double base,
-             int n) {
+bool follows(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode,
+             const std::vector<consensus_mode>& modes, double base, int n) {
     const std::size_t channel = n_u + largest(mode.shape);
     const auto block = static_cast<std::size_t>(judgement::product_periods * level.fs_hz / base) + 1;
     const std::vector<complex> a = amplitudes(level, m, channel, {1}, base, block),
@@ -181,7 +163,7 @@ bool follows(const record_level& level, std::size_t m, std::size_t n_u, const co
         return false; // the phases of a decay are those of its hit
     const auto ring = static_cast<std::size_t>(judgement::ring_periods * level.fs_hz / base) + 1;
     return !rings_down(amplitudes(level, m, channel, {1}, base, ring)) && in_phase(a, b, n) &&
-           explained_by_forces(level, m, n_u, mode, block) < judgement::explained;
+           explained(level, m, n_u, true, mode, modes, block) < judgement::explained;
 }
 
 const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
@@ -240,9 +222,10 @@ std::size_t quiet_samples(const sample_rows& rows, std::size_t m, std::size_t n_
     return out;
 }
 
-/// Is its amplitude less before the hits than over the records? That of a line is the same. Half a period of quiet at least.
+/// Is its amplitude less before the hits than in most of the blocks? That of a line is the same. Half a period of quiet at
+/// least.
 bool quieter_before(const record_level& level, std::size_t m, std::size_t n_u, const std::vector<complex>& weights,
-                    double frequency_hz, double over_all) {
+                    double frequency_hz, double usual_size) {
     const double half_period = level.fs_hz / frequency_hz / 2;
     if (n_u == 0) return false;
     double square = 0, records = 0;
@@ -260,7 +243,7 @@ bool quieter_before(const record_level& level, std::size_t m, std::size_t n_u, c
         square += std::norm(sum / static_cast<double>(count));
         ++records;
     }
-    return records > 0 && std::sqrt(square / records) < judgement::quieter * over_all;
+    return records > 0 && std::sqrt(square / records) < judgement::quieter * usual_size;
 }
 
 /// Of the force that scatters least.
@@ -272,7 +255,8 @@ double spread_of_force(const record_level& level, std::size_t m, std::size_t n_u
     return least;
 }
 
-bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode) {
+bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode,
+             const std::vector<consensus_mode>& modes) {
     std::size_t longest = 0;
     for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
     const double seconds = static_cast<double>(longest) / level.fs_hz;
@@ -283,15 +267,15 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     const std::size_t block = std::max(periods, longest / judgement::line_blocks);
     const std::vector<complex> weights = weights_along(mode.shape),
                                a = amplitudes(level, m, n_u, weights, mode.frequency_hz, block);
-    if (at_rest && (strength(a) > judgement::loudest_silence ||
-                    quieter_before(level, m, n_u, weights, mode.frequency_hz, strength(a))))
+    if (at_rest &&
+        (usual(a) > judgement::loudest_silence || quieter_before(level, m, n_u, weights, mode.frequency_hz, usual(a))))
         return false;
     const bool keeps_up = a.size() >= judgement::fewest_blocks &&
                           (spread_over_mean(a) < judgement::steady || // a force may go on and off too
                            (n_u == 0 && switched(a)));
     if (!endless)
         return keeps_up && away(level, m, n_u, weights, mode.frequency_hz, block) < judgement::off_its_frequency &&
-               explained_by_forces(level, m, n_u, mode, block) < judgement::explained;
+               explained(level, m, n_u, true, mode, modes, block) < judgement::explained;
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= judgement::fewest_blocks * level.records.size()
@@ -302,7 +286,8 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     std::vector<std::vector<complex>> falling;
     for (const sample_rows& rows : level.records)
         falling.push_back(complete(amplitudes(rows, mode.frequency_hz / level.fs_hz, m, n_u, weights, step)));
-    return !decays(falling, rate * static_cast<double>(step) / level.fs_hz);
+    return !decays(falling, rate * static_cast<double>(step) / level.fs_hz) &&
+           explained(level, m, n_u, false, mode, modes, step) < judgement::explained;
 }
 
 /// A tone that wanders is as wide as a mode, and runs give it a damping. But in blocks as short as the reciprocal of that
@@ -426,7 +411,7 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
                            near_multiple(mode.frequency_hz, 60, judgement::mains_tolerance);
         if (is_of_the_rate(levels[0].fs_hz, mode))
             mode.why.emplace_back("pickup");
-        else if (is_line(seen_by(levels, mode.frequency_hz), m, n_u, at_rest, mode))
+        else if (is_line(seen_by(levels, mode.frequency_hz), m, n_u, at_rest, mode, modes))
             mode.why.emplace_back(mains ? "pickup" : "tone");
     }
     std::vector<double> tones_hz;
@@ -448,7 +433,7 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
                 (!of_machine(level, m, n_u, base, mode, n) &&
                  (base.agreement < judgement::least_agreement ||
                   std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
-                  !follows(level, m, n_u, mode, base.frequency_hz, n))))
+                  !follows(level, m, n_u, mode, modes, base.frequency_hz, n))))
                 continue;
             mode.why.emplace_back("harmonic");
             break;

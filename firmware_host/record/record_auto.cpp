@@ -111,8 +111,8 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
             mode.damping_ratio = carried->damping_ratio;
         }
         mode.shape = carried->shape;
-        // of one output no shape and no force vouch for a mode: noise agrees by chance, but not from block to block
-        if (options.outputs.size() == 1 && options.inputs.empty() &&
+        // where no force vouches for a mode, nor a shape or nearly all runs do, noise agrees by chance, but not from block to block
+        if (options.inputs.empty() && (options.outputs.size() == 1 || mode.agreement < judgement::agreed_by_chance) &&
             carried->damping_std > judgement::widest_damping * mode.damping_ratio)
             mode.why.emplace_back("wide_sigma");
         if (carried->exact) continue;

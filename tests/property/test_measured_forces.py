@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Modes under measured forces: dwells, releases, periodic forces, hits while a machine runs, many modes at once."""
+"""Modes under measured forces: dwells, releases, periodic forces, hits while a machine runs, many modes at
+once, heavy damping, hardly any."""
 
 from __future__ import annotations
 
@@ -89,3 +90,45 @@ def test_many_modes_that_overlap(seed: int) -> None:
     u, y = s.record(signal.lfilter(b, a, s.rng.standard_normal(64 * 512 * OVER)))
     result = okid.identify(u, y, fs=512)
     assert max(s.found(result)) < 0.01
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_heavily_damped_modes(seed: int) -> None:
+    """They have died away long before the horizon of a run ends; one sensor, shapes say nothing."""
+    s = Sums(400, [18.0, 33.0, 51.0, 70.0, 92.0, 118.0], (0.06, 0.14), 1, seed)
+    u, y = s.record(s.rng.standard_normal(60 * 400 * OVER))
+    result = okid.identify(u, y, fs=400)
+    assert sum(far < 0.01 for far in s.found(result)) >= 4
+    assert sum(mode.confident for mode in result.modes) <= len(s.f)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_coupled_blades_that_ring_on(seed: int) -> None:
+    """They beat, and hardly decay while they are recorded; the first hit was before."""
+    s = Sums(1000, [27.0] * 6, (0.0008, 0.0012), 6, seed)
+    s.f = np.array([26.8, 27.06, 27.25, 27.5, 27.72, 28.0]) * (1 + 0.001 * s.rng.uniform(-1, 1, 6))
+    s.at = s.rng.standard_normal((6, 6))
+    s.at[0] = np.copysign(np.maximum(np.abs(s.at[0]), 0.3), s.at[0])
+    force = np.zeros(7 * 1000 * OVER)
+    for hit in (0.2, 4.1):
+        at = int(hit * 1000 * OVER)
+        force[at : at + 2 * OVER] = 100 * np.sin(np.pi * np.arange(2 * OVER) / 2 / OVER)
+    u, y = s.record(force)
+    result = okid.identify(u[1000:], y[1000:], fs=1000)
+    assert sum(far < 0.002 for far in s.found(result)) >= 5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_hum_beside_one_hit(seed: int) -> None:
+    """At the hit all modes answer at the frequency of the hum too."""
+    s = Sums(1024, [31.0, 58.0, 97.0, 122.0, 205.0, 301.0], (0.001, 0.006), 2, seed)
+    t = np.arange(8 * 1024 * OVER) / 1024 / OVER
+    force = np.zeros(len(t))
+    at = int(0.1 * 1024 * OVER)
+    force[at : at + 2 * OVER] = 100 * np.sin(np.pi * np.arange(2 * OVER) / 2 / OVER)
+    most = np.abs(s.response(force, s.at[0])).max()
+    hum = sum(1e-3 * size * np.sin(2 * np.pi * f * t + f) for f, size in ((50, 3), (150, 1), (250, 1)))
+    u, y = s.record(force, most * hum)
+    result = okid.identify(u, y, fs=1024)
+    assert max(s.found(result)) < 0.01
+    assert not [m for m in result.modes if m.confident and min(abs(m.frequency_hz - f) for f in (50, 150, 250)) < 0.3]

@@ -11,6 +11,7 @@
 #include "identify/era_correlation.hpp"
 #include "identify/era_leading.hpp"
 #include "identify/identify.hpp"
+#include "identify/order.hpp"
 #include "identify/triangular.hpp"
 #include "linalg/linalg.hpp"
 
@@ -240,13 +241,14 @@ okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_mo
         return OKID_ERR_NULL;
     const okid_era& e = *self;
     if (order < 1 || order > e.rank) return OKID_ERR_DIM;
-    const int ny = e.config.n_y, last = e.height - ny;
+    const int ny = e.config.n_y;
     constexpr okid_real_t quarter_pi = static_cast<okid_real_t>(0.78539816339744831);
     for (int k = 0; k < modes->count; ++k) {
         const size_t at = static_cast<size_t>(k) * static_cast<size_t>(order);
         const okid_real_t *re = modes->psi_re + at, *im = modes->psi_im + at;
-        okid_real_t power_re = 1, power_im = 0; // mu to the number of rows between the first and the last block
-        for (int n = 1; n < e.height / ny; ++n) {
+        const int steps = okid::telling_row(std::hypot(modes->mu_re[k], modes->mu_im[k]), e.height / ny - 1);
+        okid_real_t power_re = 1, power_im = 0; // mu to the number of rows between the two that are compared
+        for (int n = 0; n < steps; ++n) {
             const okid_real_t turned = power_re * modes->mu_re[k] - power_im * modes->mu_im[k];
             power_im = power_re * modes->mu_im[k] + power_im * modes->mu_re[k];
             power_re = turned;
@@ -256,7 +258,8 @@ okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_mo
             okid_real_t first_re = 0, first_im = 0, end_re = 0, end_im = 0;
             const okid_real_t* column = e.left + o;
             for (int i = 0; i < order; ++i, column += e.height) {
-                const okid_real_t root = std::sqrt(e.values[i]), first = root * column[0], end = root * column[last];
+                const okid_real_t root = std::sqrt(e.values[i]), first = root * column[0],
+                                  end = root * column[steps * ny];
                 first_re += first * re[i];
                 first_im += first * im[i];
                 end_re += end * re[i];

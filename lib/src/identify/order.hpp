@@ -21,6 +21,10 @@ gap_choice order_by_gap(const okid_real_t* values, int count, int largest);
 /// of a noise mode 0.06, so that many noise modes do not add up.
 okid_real_t consistency_score(const okid_real_t* emac, int count);
 
+/// The block row, 0 .. last, at which EMAC compares: the last, or that where a mode of this |mu| has fallen to a fiftieth of
+/// its amplitude. Beyond that nothing is left of it that noise does not hide.
+int telling_row(double size, int last);
+
 /// scores[k] belongs to order 2 (k + 1), unstable models 0. The smallest order near the best score; 0 when none scores.
 int order_by_score(const okid_real_t* scores, int count);
 

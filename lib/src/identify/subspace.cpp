@@ -7,6 +7,8 @@
 // WORKSPACE  see okid_subspace_memsize()
 #include "identify/subspace.hpp"
 
+#include "identify/order.hpp"
+
 #include <cmath>
 #include <new>
 
@@ -219,13 +221,16 @@ okid_status_t okid_subspace_emac(const okid_subspace_t* self, int32_t order, con
     constexpr double quarter_pi = 0.78539816339744831;
     for (int k = 0; k < modes->count; ++k) {
         const okid_real_t *re = modes->psi_re + okid::at(0, k, order), *im = modes->psi_im + okid::at(0, k, order);
-        const double steps = z.i - 1, radius = std::pow(std::hypot(modes->mu_re[k], modes->mu_im[k]), steps);
-        const double angle = steps * std::atan2(modes->mu_im[k], modes->mu_re[k]);
+        const double size = std::hypot(modes->mu_re[k], modes->mu_im[k]);
+        const int steps = by_states ? z.i - 1 : okid::telling_row(size, z.i - 1);
+        const double* row = end - static_cast<std::ptrdiff_t>(z.i - 1 - steps) * z.n_y;
+        const double radius = std::pow(size, steps);
+        const double angle = static_cast<double>(steps) * std::atan2(modes->mu_im[k], modes->mu_re[k]);
         double weighted = 0, total = 0;
         for (int o = 0; o < z.n_y; ++o) {
             double first_re = 0, first_im = 0, end_re = 0, end_im = 0;
             for (int j = 0; j < order; ++j) {
-                const double first = C[okid::at(o, j, z.n_y)], last = end[okid::at(o, j, ld)] / s.model.scale[j];
+                const double first = C[okid::at(o, j, z.n_y)], last = row[okid::at(o, j, ld)] / s.model.scale[j];
                 first_re += first * re[j];
                 first_im += first * im[j];
                 end_re += last * re[j];
