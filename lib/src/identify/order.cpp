@@ -15,7 +15,6 @@
 #include "linalg/linalg.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace okid {
 
@@ -30,11 +29,6 @@ gap_choice order_by_gap(const okid_real_t* values, int count, int largest) {
         if (ratio > best.ratio) best = gap_choice{n, ratio};
     }
     return best;
-}
-
-int telling_row(double size, int last) {
-    constexpr double decays = 4;
-    return size < 1 ? std::min(last, std::max(1, static_cast<int>(-decays / std::log(size)))) : last;
 }
 
 okid_real_t consistency_score(const okid_real_t* emac, int count) {

@@ -3,6 +3,9 @@
 #pragma once
 #include <okid/types.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace okid {
 
 struct gap_choice {
@@ -23,7 +26,10 @@ okid_real_t consistency_score(const okid_real_t* emac, int count);
 
 /// The block row, 0 .. last, at which EMAC compares: the last, or that where a mode of this |mu| has fallen to a fiftieth of
 /// its amplitude. Beyond that nothing is left of it that noise does not hide.
-int telling_row(double size, int last);
+inline int telling_row(double size, int last) {
+    constexpr double decays = 4;
+    return size < 1 ? std::min(last, std::max(1, static_cast<int>(-decays / std::log(size)))) : last;
+}
 
 /// scores[k] belongs to order 2 (k + 1), unstable models 0. The smallest order near the best score; 0 when none scores.
 int order_by_score(const okid_real_t* scores, int count);
