@@ -236,6 +236,11 @@ okid_status_t okid_era_realize_near(okid_era_t* self, int32_t order, const okid_
 }
 
 okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_modes_t* modes, okid_real_t* emac) {
+    return okid::era_emac(self, order, modes, emac, false);
+}
+
+okid_status_t okid::era_emac(const okid_era_t* self, int32_t order, const okid_modes_t* modes, okid_real_t* emac,
+                             bool while_it_lasts) {
     if (self == nullptr || modes == nullptr || modes->mu_re == nullptr || modes->mu_im == nullptr ||
         modes->psi_re == nullptr || modes->psi_im == nullptr || emac == nullptr)
         return OKID_ERR_NULL;
@@ -246,7 +251,9 @@ okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_mo
     for (int k = 0; k < modes->count; ++k) {
         const size_t at = static_cast<size_t>(k) * static_cast<size_t>(order);
         const okid_real_t *re = modes->psi_re + at, *im = modes->psi_im + at;
-        const int steps = okid::telling_row(std::hypot(modes->mu_re[k], modes->mu_im[k]), e.height / ny - 1);
+        const int end_row = e.height / ny - 1;
+        const int steps =
+            while_it_lasts ? okid::telling_row(std::hypot(modes->mu_re[k], modes->mu_im[k]), end_row) : end_row;
         okid_real_t power_re = 1, power_im = 0; // mu to the number of rows between the two that are compared
         for (int n = 0; n < steps; ++n) {
             const okid_real_t turned = power_re * modes->mu_re[k] - power_im * modes->mu_im[k];

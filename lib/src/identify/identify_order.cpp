@@ -59,7 +59,8 @@ bool without_dynamics(const okid_identify& s) {
     return s.n_u > 0;
 }
 
-okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t* out) {
+/// @param while_it_lasts  EMAC before a mode has died away, else at the end of the horizon, which automatic orders rest on
+okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t* out, bool while_it_lasts = false) {
     if (order < 1 || order > s.max_order) return OKID_ERR_DIM;
     okid_status_t status = s.by_subspace     ? realise_subspace(s, order, whole)
                            : s.by_covariance ? realise_covariance(s, order, whole)
@@ -74,8 +75,8 @@ okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t
     if (status != OKID_OK) return status;
     out->mode_count = modes.count;
     out->model_radius = modes.radius;
-    status = s.by_subspace ? okid_subspace_emac(s.subspace, order, s.C, &modes, s.emac)
-                           : okid_era_emac(s.era, order, &modes, s.emac);
+    status = s.by_subspace ? subspace_emac(s.subspace, order, s.C, &modes, s.emac, while_it_lasts)
+                           : era_emac(s.era, order, &modes, s.emac, while_it_lasts);
     if (status != OKID_OK) return status;
     for (int k = 0; k < out->mode_count; ++k) s.cmi[k] = s.emac[k] * s.mpc[k];
     if (!(out->model_radius < 1)) out->warnings |= OKID_NOTE_MODEL_UNSTABLE;
@@ -161,7 +162,7 @@ okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_ide
 
 okid_status_t okid_identify_poles(okid_identify_t* self, int32_t order, okid_identified_t* out) {
     if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
-    return okid::realise(*self, order, false, out);
+    return okid::realise(*self, order, false, out, true);
 }
 
 okid_status_t okid_identify_set_inputs(okid_identify_t* self, const okid_real_t* B, const okid_real_t* D,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    model order from the singular values of the Hankel matrix, or from how modes hold over the orders
 #pragma once
+#include <okid/steps/era.h>
+#include <okid/steps/subspace.h>
 #include <okid/types.h>
 
 #include <algorithm>
@@ -30,6 +32,13 @@ inline int telling_row(double size, int last) {
     constexpr double decays = 4;
     return size < 1 ? std::min(last, std::max(1, static_cast<int>(-decays / std::log(size)))) : last;
 }
+
+/// EMAC as okid_subspace_emac() and okid_era_emac() give it.
+/// @param while_it_lasts  at telling_row(), else at the end
+okid_status_t subspace_emac(const okid_subspace_t* self, int32_t order, const okid_real_t* C, const okid_modes_t* modes,
+                            okid_real_t* emac, bool while_it_lasts);
+okid_status_t era_emac(const okid_era_t* self, int32_t order, const okid_modes_t* modes, okid_real_t* emac,
+                       bool while_it_lasts);
 
 /// scores[k] belongs to order 2 (k + 1), unstable models 0. The smallest order near the best score; 0 when none scores.
 int order_by_score(const okid_real_t* scores, int count);

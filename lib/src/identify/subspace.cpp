@@ -209,6 +209,11 @@ okid_status_t okid_subspace_realize(okid_subspace_t* self, int32_t order, okid_r
 
 okid_status_t okid_subspace_emac(const okid_subspace_t* self, int32_t order, const okid_real_t* C,
                                  const okid_modes_t* modes, okid_real_t* emac) {
+    return okid::subspace_emac(self, order, C, modes, emac, false);
+}
+
+okid_status_t okid::subspace_emac(const okid_subspace_t* self, int32_t order, const okid_real_t* C,
+                                  const okid_modes_t* modes, okid_real_t* emac, bool while_it_lasts) {
     if (self == nullptr || C == nullptr || modes == nullptr || modes->mu_re == nullptr || modes->mu_im == nullptr ||
         modes->psi_re == nullptr || modes->psi_im == nullptr || emac == nullptr)
         return OKID_ERR_NULL;
@@ -222,7 +227,7 @@ okid_status_t okid_subspace_emac(const okid_subspace_t* self, int32_t order, con
     for (int k = 0; k < modes->count; ++k) {
         const okid_real_t *re = modes->psi_re + okid::at(0, k, order), *im = modes->psi_im + okid::at(0, k, order);
         const double size = std::hypot(modes->mu_re[k], modes->mu_im[k]);
-        const int steps = by_states ? z.i - 1 : okid::telling_row(size, z.i - 1);
+        const int steps = while_it_lasts && !by_states ? okid::telling_row(size, z.i - 1) : z.i - 1;
         const double* row = end - static_cast<std::ptrdiff_t>(z.i - 1 - steps) * z.n_y;
         const double radius = std::pow(size, steps);
         const double angle = static_cast<double>(steps) * std::atan2(modes->mu_im[k], modes->mu_re[k]);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // EMAC of modes in noise by its definition (Pappa, Elliott, Schenk 1993, output side): a block row of the identified
 // observability matrix against what eigenvalue and first block row predict, amplitude and phase, weighted by the shape.
-// It is the last row, or the one before a mode has fallen below exp(-4) of its amplitude.
+// It is the last row; for the poles of all orders the one before a mode has fallen below exp(-4) of its amplitude.
 #include "identify/identify.hpp"
+#include "identify/order.hpp"
 #include "identify/subspace.hpp"
 #include "tolerance.h"
 
@@ -54,10 +55,11 @@ struct analysed {
 };
 
 /// entry(row, o, j): of the observability matrix, whose first block row is C.
-template <class Entry> double emac_of(const analysed& a, int k, const numbers& C, int last, Entry entry) {
+template <class Entry>
+double emac_of(const analysed& a, int k, const numbers& C, int last, bool while_it_lasts, Entry entry) {
     const auto at = [](int i) { return static_cast<size_t>(i); };
     const complex mu(double(a.mu_re[at(k)]), double(a.mu_im[at(k)]));
-    int steps = 1;
+    int steps = while_it_lasts ? 1 : last;
     while (steps < last && std::pow(std::abs(mu), steps + 1) > std::exp(-4.0)) ++steps;
     earlier += steps < last;
     const complex turned = std::pow(mu, steps);
@@ -110,17 +112,20 @@ static void of_era() {
         TEST_ASSERT_EQUAL(OKID_OK, okid_era_decompose(era, markov.data()));
         TEST_ASSERT_EQUAL(OKID_OK, okid_era_realize(era, order, A.data(), B.data(), C.data(), nullptr, nullptr));
         const analysed a(A, C);
-        TEST_ASSERT_EQUAL(OKID_OK, okid_era_emac(era, order, &a.modes, emac.data()));
         const okid::era_view view = okid::view_of(era);
-        std::vector<double> all;
-        for (int k = 0; k < a.modes.count; ++k) {
-            all.push_back(emac_of(a, k, C, view.height / n_y - 1, [&](int row, int o, int j) {
-                return double(view.left[static_cast<size_t>(j * view.height + row * n_y + o)]) *
-                       std::sqrt(double(view.values[j]));
-            }));
-            TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-9, 1e-3), all.back(), double(emac[static_cast<size_t>(k)]));
+        for (const bool lasting : {false, true}) {
+            TEST_ASSERT_EQUAL(OKID_OK, lasting ? okid::era_emac(era, order, &a.modes, emac.data(), true)
+                                               : okid_era_emac(era, order, &a.modes, emac.data()));
+            std::vector<double> all;
+            for (int k = 0; k < a.modes.count; ++k) {
+                all.push_back(emac_of(a, k, C, view.height / n_y - 1, lasting, [&](int row, int o, int j) {
+                    return double(view.left[static_cast<size_t>(j * view.height + row * n_y + o)]) *
+                           std::sqrt(double(view.values[j]));
+                }));
+                TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-9, 1e-3), all.back(), double(emac[static_cast<size_t>(k)]));
+            }
+            are_of_both_kinds(all);
         }
-        are_of_both_kinds(all);
     }
     TEST_ASSERT_GREATER_THAN(0, earlier);
 }
@@ -157,16 +162,20 @@ static void of_moesp_and_cva() {
         TEST_ASSERT_EQUAL(
             OKID_OK, okid_subspace_realize(subspace, order, A.data(), nullptr, C.data(), nullptr, nullptr, nullptr));
         const analysed a(A, C);
-        TEST_ASSERT_EQUAL(OKID_OK, okid_subspace_emac(subspace, order, C.data(), &a.modes, emac.data()));
         const okid::subspace_view view = okid::view_of(subspace);
-        std::vector<double> all;
-        for (int k = 0; k < a.modes.count; ++k) {
-            all.push_back(emac_of(a, k, C, rows - 1, [&](int row, int o, int j) {
-                return view.gamma[static_cast<size_t>((j * rows + row) * n_y + o)];
-            }));
-            TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-9, 1e-3), all.back(), double(emac[static_cast<size_t>(k)]));
+        for (const bool lasting : {false, true}) {
+            TEST_ASSERT_EQUAL(OKID_OK, lasting
+                                           ? okid::subspace_emac(subspace, order, C.data(), &a.modes, emac.data(), true)
+                                           : okid_subspace_emac(subspace, order, C.data(), &a.modes, emac.data()));
+            std::vector<double> all;
+            for (int k = 0; k < a.modes.count; ++k) {
+                all.push_back(emac_of(a, k, C, rows - 1, lasting, [&](int row, int o, int j) {
+                    return view.gamma[static_cast<size_t>((j * rows + row) * n_y + o)];
+                }));
+                TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-9, 1e-3), all.back(), double(emac[static_cast<size_t>(k)]));
+            }
+            are_of_both_kinds(all);
         }
-        are_of_both_kinds(all);
     }
 }
 

@@ -84,9 +84,8 @@ OKID_NODISCARD OKID_API okid_status_t okid_era_realize(okid_era_t* self, int32_t
 OKID_NODISCARD OKID_API okid_status_t okid_era_realize_near(okid_era_t* self, int32_t order, const okid_real_t* markov,
                                                             okid_real_t* A, okid_real_t* C);
 
-/// EMAC of eigenvectors (Pappa, Elliott, Schenk 1993, output side): how well C A^k psi at a block row of the identified
-/// observability matrix agrees with its prediction from the first; 0..1 per eigenvector. The row is the last, or that where
-/// the mode has fallen to exp(-4) of its amplitude: later ones hold only noise of it.
+/// EMAC of eigenvectors (Pappa, Elliott, Schenk 1993, output side): how well C A^k psi at the last block row of the
+/// identified observability matrix agrees with its prediction from the first; 0..1 per eigenvector.
 /// @param modes  in, count, eigenvalues mu and eigenvectors psi of A, by okid_modal_analyse()
 /// @param emac   out, count numbers
 OKID_NODISCARD OKID_API okid_status_t okid_era_emac(const okid_era_t* self, int32_t order, const okid_modes_t* modes,

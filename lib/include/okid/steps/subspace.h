@@ -101,9 +101,8 @@ OKID_NODISCARD OKID_API okid_status_t okid_subspace_realize(okid_subspace_t* sel
                                                             okid_real_t* B, okid_real_t* C, okid_real_t* D,
                                                             okid_real_t* K, okid_real_t* innovation);
 
-/// EMAC of eigenvectors (Pappa, Elliott, Schenk 1993, output side): how well C A^k psi at a block row of the identified
-/// observability matrix agrees with its prediction from the first; 0..1 per eigenvector. The row is the last, or that where
-/// the mode has fallen to exp(-4) of its amplitude: later ones hold only noise of it. SSARX: the last.
+/// EMAC of eigenvectors (Pappa, Elliott, Schenk 1993, output side): how well C A^(i-1) psi agrees with the last block
+/// row of the identified observability matrix; 0..1 per eigenvector.
 /// @param C      in, n_y x n_z of the realization
 /// @param modes  in, count, eigenvalues mu and eigenvectors psi of its A, by okid_modal_analyse()
 /// @param emac   out, count numbers. @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM
