@@ -9,7 +9,7 @@
 #include "lines.hpp"
 
 #include "demodulation.hpp"
-#include "explained.hpp"
+#include "explained_by_forces.hpp"
 #include "files/order_statistics.hpp"
 #include "result/judgement.hpp"
 #include "result/mode_verdict.hpp"
@@ -141,14 +141,16 @@ std::vector<complex> weights_along(std::vector<complex> shape) {
     return shape;
 }
 
-double explained(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode,
+/// See explained_by_forces(); 0 without a force.
+double explained(const record_level& level, std::size_t m, std::size_t n_u, bool rings_on, const consensus_mode& mode,
                  const std::vector<consensus_mode>& modes, std::size_t block) {
+    if (n_u == 0) return 0;
     std::vector<complex> seen;
     for (const sample_rows& rows : level.records) {
         const auto more = amplitudes(rows, mode.frequency_hz / level.fs_hz, m, n_u, weights_along(mode.shape), block);
         seen.insert(seen.end(), more.begin(), more.end());
     }
-    return explained_by_forces(level, m, n_u, at_rest, mode, modes, block, seen);
+    return explained_by_forces(level, m, n_u, rings_on, mode, modes, block, seen);
 }
 
 /// Does the response at n f follow the n-th power of that at f?
@@ -163,7 +165,7 @@ bool follows(const record_level& level, std::size_t m, std::size_t n_u, const co
         return false; // the phases of a decay are those of its hit
     const auto ring = static_cast<std::size_t>(judgement::ring_periods * level.fs_hz / base) + 1;
     return !rings_down(amplitudes(level, m, channel, {1}, base, ring)) && in_phase(a, b, n) &&
-           explained(level, m, n_u, true, mode, modes, block) < judgement::explained;
+           explained(level, m, n_u, false, mode, modes, block) < judgement::explained;
 }
 
 const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
@@ -275,7 +277,7 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
                            (n_u == 0 && switched(a)));
     if (!endless)
         return keeps_up && away(level, m, n_u, weights, mode.frequency_hz, block) < judgement::off_its_frequency &&
-               explained(level, m, n_u, true, mode, modes, block) < judgement::explained;
+               explained(level, m, n_u, false, mode, modes, block) < judgement::explained;
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= judgement::fewest_blocks * level.records.size()
@@ -287,7 +289,7 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     for (const sample_rows& rows : level.records)
         falling.push_back(complete(amplitudes(rows, mode.frequency_hz / level.fs_hz, m, n_u, weights, step)));
     return !decays(falling, rate * static_cast<double>(step) / level.fs_hz) &&
-           explained(level, m, n_u, false, mode, modes, step) < judgement::explained;
+           explained(level, m, n_u, true, mode, modes, step) < judgement::explained;
 }
 
 /// A tone that wanders is as wide as a mode, and runs give it a damping. But in blocks as short as the reciprocal of that

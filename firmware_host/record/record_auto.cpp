@@ -111,7 +111,7 @@ std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, cons
             mode.damping_ratio = carried->damping_ratio;
         }
         mode.shape = carried->shape;
-        // where no force vouches for a mode, nor a shape or nearly all runs do, noise agrees by chance, but not from block to block
+        // without a force, and without a shape or most of the runs, noise agrees by chance, but not from block to block
         if (options.inputs.empty() && (options.outputs.size() == 1 || mode.agreement < judgement::agreed_by_chance) &&
             carried->damping_std > judgement::widest_damping * mode.damping_ratio)
             mode.why.emplace_back("wide_sigma");

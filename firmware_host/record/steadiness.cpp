@@ -3,8 +3,8 @@
 // METHOD   the frequency of a mode in short blocks, as a straight line over the mode's power and over time. With a force: the
 //          correction of the pole that explains a block's residual best (one Gauss-Newton step, its own initial state free).
 //          Without: the turning of the mode's analytic signal; of a linear structure under Gaussian forces its mean does not
-//          depend on the envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line; the blocks
-//          that weigh most, as those after the one hit that was clipped, must not decide alone
+//          depend on the envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line; a slope
+//          must remain without the blocks that weigh most, those of one gust or one hit
 #include "steadiness.hpp"
 
 #include "files/order_statistics.hpp"
@@ -27,8 +27,8 @@ constexpr double block_periods = 10;
 constexpr std::size_t least_block = 32; // samples
 constexpr double fewest_blocks = 12;    // of equal weight, to speak of a slope
 constexpr double sure = 7;              // slope over its deviation; the largest of linear modes is below 5
-constexpr double decisive = 0.2;        // of the effective number of blocks
-constexpr double borne_out = 5;         // deviations of the slope without them
+constexpr double decisive = 0.2;        // of the effective number of blocks: the heaviest
+constexpr double borne_out = 5;         // deviations of a slope, at least, without them
 constexpr double worth_saying = 0.02;   // change over the half-power bandwidth
 constexpr double widest = 0.1;          // damping above: nothing repeats over a block
 constexpr double alone = 4;             // bandwidths to the next mode, without a force
@@ -94,7 +94,7 @@ slopes slopes_of(const std::vector<block_frequency>& over, double block_frequenc
     return out;
 }
 
-/// Without the blocks that weigh most, a share of the effective number: a slope that they decide is theirs alone.
+/// The blocks without those that weigh most, so many of them as are a fifth of the effective number.
 std::vector<block_frequency> without_heaviest(std::vector<block_frequency> over) {
     std::sort(over.begin(), over.end(), [](const auto& a, const auto& b) { return a.weight < b.weight; });
     double total = 0, squares = 0;
@@ -104,7 +104,7 @@ std::vector<block_frequency> without_heaviest(std::vector<block_frequency> over)
     return over;
 }
 
-/// The slopes, each 0 where the rest of the blocks does not bear it out.
+/// The slopes; the ratio of one that does not remain without the heaviest blocks is 0.
 slopes firm_slopes(const std::vector<block_frequency>& over, double block_frequency::* level) {
     slopes found = slopes_of(over, level);
     if (found.level_ratio < sure && found.drift_ratio < sure) return found;

@@ -32,7 +32,7 @@ constexpr int fewest_runs = 3;          ///< of MOESP and CVA, which share their
 constexpr double least_found_in = 0.5;  ///< of the runs that vote
 constexpr double least_agreement = 0.5; ///< below: short-lived, complex or scattering
 constexpr double agreed_by_chance =
-    0.7; ///< below: without a force as many are false as true, if their damping is as unsure
+    0.7; ///< without a force; below, more modes are false than true if their damping is unsure too
 constexpr double scatter_scale = 0.6;   ///< relative scatter of damping over the runs that halves the agreement
 constexpr double overdamped = 0.2;      ///< damping ratio: above, a mode is listed and not believed
 constexpr double clear_vibration = 0.8; ///< agreement of a mode that all runs find
@@ -83,11 +83,12 @@ constexpr double in_phase =
     0.7; ///< coherence of phases; 1: always. Linear structures stay below 0.45; chance 1/sqrt(blocks)
 constexpr double explained =
     0.5;                    ///< of a mode's amplitude by the forces: they excite it, no machine and no product does
-constexpr double leaks = 2; ///< cycles of a block: a vibration that is no farther off shows in it …
-constexpr double one_to_a_block = 0.5;     ///< … and as one vibration with the other
-constexpr std::size_t blocks_a_number = 2; ///< at least, where forces are asked what they explain
-constexpr double goes_on = 0.1; ///< of it, not explained by what a record begins with: less is a tone, or one early hit
-constexpr double of_hits = 1;   ///< spread over mean of a force that mostly rests; 0.52 of a random one
+constexpr double leaks = 2; ///< cycles in a block: a vibration that is no farther off shows in it
+constexpr double one_to_a_block = 0.5;     ///< cycles in a block: two vibrations that are nearer look like one
+constexpr std::size_t blocks_a_number = 2; ///< at least, where it is found what forces explain
+constexpr double goes_on =
+    0.1; ///< of the amplitude, beside what a record begins with and what leaks in; a tone leaves less
+constexpr double of_hits = 1;      ///< spread over mean of a force that mostly rests; 0.52 of a random one
 constexpr double ring_periods = 3; ///< in a block, to see a vibration ring down between hits
 constexpr double falling = 0.1; ///< steps down less steps up of an amplitude, of all; hits 0.2 and more, no hits 0.05
 constexpr double stronger = 10; ///< amplitude of the vibration over that of its multiple

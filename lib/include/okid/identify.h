@@ -166,8 +166,9 @@ OKID_API int32_t okid_identify_max_order(const okid_identify_config_t* config);
 /// an n4sid method also the innovation and the Markov parameters.
 OKID_NODISCARD OKID_API okid_status_t okid_identify_order(okid_identify_t* self, int32_t order, okid_identified_t* out);
 
-/// The modes of another order only: A, C and the modes in `out` are replaced, B, D, K are not (many times cheaper). For
-/// okid_stabilization_add(); okid_identify_order() makes `out` whole again.
+/// The modes of another order only: A, C and the modes in `out` are replaced, B, D, K are not (many times cheaper). EMAC is
+/// that of the horizon until a mode has fallen to exp(-4) of its amplitude (SSARX: of all of it). For okid_stabilization_add();
+/// okid_identify_order() makes `out` whole again.
 OKID_NODISCARD OKID_API okid_status_t okid_identify_poles(okid_identify_t* self, int32_t order, okid_identified_t* out);
 
 /// Put other B and D into the n4sid model of the last run, where the record itself could be fitted

@@ -8,10 +8,10 @@
 // WORKSPACE  H, the factors and what the SVD asks for; an SVD of (r n_y) x (c n_u) and 2 r n_y c n_u k flop
 #include <okid/steps/era.h>
 
+#include "identify/emac.hpp"
 #include "identify/era_correlation.hpp"
 #include "identify/era_leading.hpp"
 #include "identify/identify.hpp"
-#include "identify/order.hpp"
 #include "identify/triangular.hpp"
 #include "linalg/linalg.hpp"
 
@@ -246,14 +246,12 @@ okid_status_t okid::era_emac(const okid_era_t* self, int32_t order, const okid_m
         return OKID_ERR_NULL;
     const okid_era& e = *self;
     if (order < 1 || order > e.rank) return OKID_ERR_DIM;
-    const int ny = e.config.n_y;
+    const int ny = e.config.n_y, last = e.height / ny - 1;
     constexpr okid_real_t quarter_pi = static_cast<okid_real_t>(0.78539816339744831);
     for (int k = 0; k < modes->count; ++k) {
         const size_t at = static_cast<size_t>(k) * static_cast<size_t>(order);
         const okid_real_t *re = modes->psi_re + at, *im = modes->psi_im + at;
-        const int end_row = e.height / ny - 1;
-        const int steps =
-            while_it_lasts ? okid::telling_row(std::hypot(modes->mu_re[k], modes->mu_im[k]), end_row) : end_row;
+        const int steps = while_it_lasts ? okid::telling_row(std::hypot(modes->mu_re[k], modes->mu_im[k]), last) : last;
         okid_real_t power_re = 1, power_im = 0; // mu to the number of rows between the two that are compared
         for (int n = 0; n < steps; ++n) {
             const okid_real_t turned = power_re * modes->mu_re[k] - power_im * modes->mu_im[k];

@@ -10,6 +10,7 @@
 #include <okid/steps/era.h>
 #include <okid/steps/subspace.h>
 
+#include "identify/emac.hpp"
 #include "identify/order.hpp"
 #include "linalg/linalg.hpp"
 
@@ -59,7 +60,7 @@ bool without_dynamics(const okid_identify& s) {
     return s.n_u > 0;
 }
 
-/// @param while_it_lasts  EMAC before a mode has died away, else at the end of the horizon, which automatic orders rest on
+/// @param while_it_lasts  of EMAC, see emac.hpp; automatic orders take the end of the horizon
 okid_status_t realise(okid_identify& s, int order, bool whole, okid_identified_t* out, bool while_it_lasts = false) {
     if (order < 1 || order > s.max_order) return OKID_ERR_DIM;
     okid_status_t status = s.by_subspace     ? realise_subspace(s, order, whole)

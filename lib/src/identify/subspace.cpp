@@ -7,7 +7,7 @@
 // WORKSPACE  see okid_subspace_memsize()
 #include "identify/subspace.hpp"
 
-#include "identify/order.hpp"
+#include "identify/emac.hpp"
 
 #include <cmath>
 #include <new>

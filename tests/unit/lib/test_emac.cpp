@@ -2,8 +2,8 @@
 // EMAC of modes in noise by its definition (Pappa, Elliott, Schenk 1993, output side): a block row of the identified
 // observability matrix against what eigenvalue and first block row predict, amplitude and phase, weighted by the shape.
 // It is the last row; for the poles of all orders the one before a mode has fallen below exp(-4) of its amplitude.
+#include "identify/emac.hpp"
 #include "identify/identify.hpp"
-#include "identify/order.hpp"
 #include "identify/subspace.hpp"
 #include "tolerance.h"
 

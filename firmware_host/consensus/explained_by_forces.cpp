@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  what measured forces explain of a mode
 // METHOD   least squares over blocks: the amplitude that the outputs show by the answers of poles to the forces
-#include "explained.hpp"
+#include "explained_by_forces.hpp"
 
 #include "demodulation.hpp"
 #include "result/judgement.hpp"
@@ -15,14 +15,13 @@ namespace {
 
 using complex = std::complex<double>;
 
-/// Of a mode's pole, block by block at a frequency: what it goes on with from the begin of each record, and its answers to each
-/// force.
+/// Of poles, block by block at one frequency: the free vibration from the begin of each record, and the answer to each force.
 struct pole_blocks {
     std::vector<std::vector<complex>> free, driven;
 
-    /// @param at_rest  nothing goes on
+    /// @param rings_on  else nothing is added to `free`
     void add(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode, double share,
-             std::size_t block, bool at_rest) {
+             std::size_t block, bool rings_on) {
         const double zeta = std::min(mode.damping_ratio, 1.0), own = mode.frequency_hz / level.fs_hz;
         const complex pole = std::exp(2 * M_PI * own * complex(-zeta, std::sqrt(1 - zeta * zeta)));
         std::vector<complex> state;
@@ -37,7 +36,7 @@ struct pole_blocks {
             const std::size_t before = driven[first].size();
             for (std::size_t k = 0; k < n_u; ++k)
                 run(rows, 0, [&](std::size_t t) { return rows[t * m + k]; }, driven[first + k]);
-            if (at_rest) continue;
+            if (!rings_on) continue;
             free.emplace_back(before);
             run(rows, 1, [](std::size_t) { return 0.0; }, free.back());
         }
@@ -45,21 +44,21 @@ struct pole_blocks {
     }
 };
 
-/// What of b these columns leave, a degree of freedom.
+/// The square of b that these columns leave, for each degree of freedom.
 double left_by(const Eigen::MatrixXcd& C, const Eigen::VectorXcd& b) {
-    const Eigen::VectorXcd by = C.cols() ? Eigen::VectorXcd(C * C.colPivHouseholderQr().solve(b)) : b - b;
-    return (b - by).squaredNorm() / static_cast<double>(b.size() - C.cols());
+    const auto freedom = static_cast<double>(b.size() - C.cols());
+    if (C.cols() == 0) return b.squaredNorm() / freedom;
+    return (b - C * C.colPivHouseholderQr().solve(b)).squaredNorm() / freedom;
 }
 
 } // namespace
 
-double explained_by_forces(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest,
+double explained_by_forces(const record_level& level, std::size_t m, std::size_t n_u, bool rings_on,
                            const consensus_mode& mode, const std::vector<consensus_mode>& modes, std::size_t block,
                            const std::vector<std::complex<double>>& seen) {
-    if (n_u == 0) return 0;
     const double share = mode.frequency_hz / level.fs_hz, cycle_hz = level.fs_hz / static_cast<double>(block);
     pole_blocks own, beside; // what a block does not part from the mode, and what leaks into it
-    own.add(level, m, n_u, mode, share, block, at_rest);
+    own.add(level, m, n_u, mode, share, block, rings_on);
     const std::size_t each = own.free.size() + n_u;
     std::size_t numbers = each;
     for (const consensus_mode& other : modes) {
@@ -67,7 +66,7 @@ double explained_by_forces(const record_level& level, std::size_t m, std::size_t
         if (&other == &mode || other.agreement < judgement::least_agreement || apart > judgement::leaks ||
             judgement::blocks_a_number * (numbers + each) >= seen.size())
             continue;
-        (apart < judgement::one_to_a_block ? own : beside).add(level, m, n_u, other, share, block, at_rest);
+        (apart < judgement::one_to_a_block ? own : beside).add(level, m, n_u, other, share, block, rings_on);
         numbers += each;
     }
     std::vector<std::vector<complex>> columns = own.free;
@@ -86,7 +85,7 @@ double explained_by_forces(const record_level& level, std::size_t m, std::size_t
     if (complete <= C.cols()) return 0;
     C.conservativeResize(complete, C.cols());
     b.conservativeResize(complete);
-    if (!at_rest) { // every block counts alike: at a hit all modes answer
+    if (rings_on) { // at a hit all modes answer, in its block alone
         Eigen::VectorXd size = b.cwiseAbs();
         std::sort(size.begin(), size.end());
         const Eigen::VectorXcd weight = (b.cwiseAbs().array() + size[complete / 2]).inverse().cast<complex>();
