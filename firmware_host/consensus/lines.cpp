@@ -58,19 +58,28 @@ std::vector<complex> amplitudes(const record_level& level, std::size_t m, std::s
     return out;
 }
 
-/// How far from a frequency the power that blocks show is, in cycles of a block, 1 at most.
-double away(const record_level& level, std::size_t m, std::size_t first_channel, const std::vector<complex>& weights,
-            double frequency_hz, std::size_t block) {
+/// Where the power that blocks show is, beside a frequency: its mean distance and how it scatters, in cycles of a block.
+struct track {
+    double away, scatter;
+};
+
+track track_beside(const record_level& level, std::size_t m, std::size_t first_channel,
+                   const std::vector<complex>& weights, double frequency_hz, std::size_t block) {
     const double share = frequency_hz / level.fs_hz;
     const std::size_t half = block / 2;
     complex turned = 0;
+    double all = 0;
     for (const sample_rows& rows : level.records) {
         const auto first = amplitudes(rows, share, m, first_channel, weights, block),
                    later = amplitudes(rows, share, m, first_channel, weights, block, half);
         for (std::size_t i = 0; i < later.size(); ++i)
-            if (const complex step = later[i] * std::conj(first[i]); !std::isnan(step.real())) turned += step;
+            if (const complex step = later[i] * std::conj(first[i]); !std::isnan(step.real())) {
+                turned += step;
+                all += std::abs(step);
+            }
     }
-    return std::abs(std::arg(turned * std::polar(1.0, -2 * M_PI * share * static_cast<double>(half)))) / M_PI;
+    const double mean = std::arg(turned * std::polar(1.0, -2 * M_PI * share * static_cast<double>(half)));
+    return {std::abs(mean) / M_PI, std::sqrt(2 * std::log(all / std::abs(turned))) / M_PI}; // of a circular normal
 }
 
 double spread_over_mean(const std::vector<complex>& a) {
@@ -272,11 +281,13 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     if (at_rest &&
         (usual(a) > judgement::loudest_silence || quieter_before(level, m, n_u, weights, mode.frequency_hz, usual(a))))
         return false;
-    const bool keeps_up = a.size() >= judgement::fewest_blocks &&
-                          (spread_over_mean(a) < judgement::steady || // a force may go on and off too
-                           (n_u == 0 && switched(a)));
+    bool keeps_up = a.size() >= judgement::fewest_blocks && spread_over_mean(a) < judgement::steady;
+    for (const std::size_t part : {1, 2, 4}) // a force may go on and off too
+        if (!keeps_up && n_u == 0 && block / part >= periods)
+            keeps_up = switched(amplitudes(level, m, n_u, weights, mode.frequency_hz, block / part));
     if (!endless)
-        return keeps_up && away(level, m, n_u, weights, mode.frequency_hz, block) < judgement::off_its_frequency &&
+        return keeps_up &&
+               track_beside(level, m, n_u, weights, mode.frequency_hz, block).away < judgement::off_its_frequency &&
                explained(level, m, n_u, false, mode, modes, block) < judgement::explained;
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
@@ -292,27 +303,31 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
            explained(level, m, n_u, true, mode, modes, step) < judgement::explained;
 }
 
-/// A tone that wanders is as wide as a mode, and runs give it a damping. But in blocks as short as the reciprocal of that
-/// width its amplitude stays. Only where what a block shows is at the mode's frequency, and no tone stands beside it.
-/// @param tones_hz  that do not wander
+/// A tone that wanders is as wide as a mode, and runs give it a damping, or two modes at the ends of its way. But in blocks as
+/// short as the reciprocal of that width its amplitude stays. Only where what blocks show is at the mode's frequency, and no tone
+/// stands beside it, or comes by there: a tone that does not wander stays away from a mode beside it.
+/// @param tones_hz  lines
 bool wanders(const record_level& level, std::size_t m, const consensus_mode& mode,
              const std::vector<double>& tones_hz) {
     const std::vector<complex> weights = weights_along(mode.shape);
-    for (const double widths : {0.5, 1.0}) {
+    for (const double widths : {0.25, 0.5, 1.0}) {
         const double periods = std::max(widths / (M_PI * mode.damping_ratio), judgement::line_periods);
         const double seconds = periods / mode.frequency_hz, most = static_cast<double>(level.samples) / level.fs_hz;
         if (!(seconds * judgement::fewest_blocks < most)) return false;
         const auto block = static_cast<std::size_t>(seconds * level.fs_hz) + 1;
         const auto a = amplitudes(level, m, 0, weights, mode.frequency_hz, block);
-        const double chance =
-            judgement::of_chance - judgement::surely_steady / std::sqrt(static_cast<double>(a.size()));
+        // Of a vibration as wide as this one, blocks that are shorter are not independent.
+        const double independent = std::min(1.0, 2 * widths) * static_cast<double>(a.size());
+        const double chance = judgement::of_chance - judgement::surely_steady / std::sqrt(independent);
+        if (a.size() < judgement::fewest_blocks ||
+            !(spread_over_mean(a) < std::min(judgement::steady_wandering, chance)))
+            continue;
+        const track way = track_beside(level, m, 0, weights, mode.frequency_hz, block);
+        const double width = seconds * mode.damping_ratio * mode.frequency_hz;
         const bool alone = std::none_of(tones_hz.begin(), tones_hz.end(), [&](double tone) {
             return std::abs(tone - mode.frequency_hz) * seconds < 2; // what a Hann window of the block lets in
         });
-        if (alone && a.size() >= judgement::fewest_blocks &&
-            spread_over_mean(a) < std::min(judgement::steady_wandering, chance) &&
-            away(level, m, 0, weights, mode.frequency_hz, block) < seconds * mode.damping_ratio * mode.frequency_hz)
-            return true;
+        if ((alone && way.away < width) || way.away < judgement::wanders_as_far * way.scatter) return true;
     }
     return false;
 }

@@ -19,7 +19,7 @@ std::size_t block_sums_held(const okid_accumulator_config_t& whole, int blocks);
 /// derivative, where that applies.
 struct live_jackknives {
     live_jackknives(const okid_identify_config_t& identify, const okid_accumulator_config_t& sums, bool analytic);
-    okid_jackknife_config_t config(int linear_form) const { return {identify, sums, linear_form}; }
+    okid_jackknife_config_t config(int linear_form) const { return {identify, sums, linear_form, 0}; }
     double bytes() const;
 
     okid_identify_config_t identify;

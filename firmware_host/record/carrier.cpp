@@ -212,7 +212,7 @@ std::vector<std::optional<carried_mode>> carry_at(const carrier_task& task, int 
         work.identifier = identifier;
         work.analytic = task.analytic;
         work.older = task.level.older;
-        replicates = leave_out_blocks(work, task.sums.sums, task.blocks);
+        replicates = leave_out_blocks(work, task.sums.sums, task.blocks, false);
     }
     for (mode_shift& mode : wanted) {
         zoom.fold(mode.frequency_hz, mode.damping_ratio);

@@ -284,7 +284,7 @@ std::vector<replicate_model> improve(const record_options& options, okid_accumul
         if (replicates.empty()) { // as without it: blocks of the records as they stand now
             okid_accumulator_t* centred = nullptr;
             const auto sums = accumulate(work.set, work.config, work.at_rest, centred);
-            replicates = leave_out_blocks(work, centred, options.sigma_blocks);
+            replicates = leave_out_blocks(work, centred, options.sigma_blocks, options.mass.wanted());
         }
     }
     if (from_record && options.mass.wanted() && !work.context.refined) fit_inputs(work.set, replicates);
@@ -398,7 +398,7 @@ record_result identify_records(record_set records, const record_options& options
     std::vector<replicate_model> replicates;
     if (options.refine != "yes") {
         tell(options, "leaving out one block after the other");
-        replicates = leave_out_blocks(work, accumulator, options.sigma_blocks);
+        replicates = leave_out_blocks(work, accumulator, options.sigma_blocks, options.mass.wanted());
     }
     if (options.detrend == "mean" && !own_means_first) remove_means(work.set); // the fit is about the record's mean
     replicates = improve(options, accumulator, std::move(replicates), work);

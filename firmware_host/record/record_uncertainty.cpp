@@ -125,8 +125,10 @@ okid_jackknife_t* begin_jackknife(okid_jackknife_config_t shape, int linear, con
 
 } // namespace
 
-std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accumulator_t* whole, int blocks) {
+std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accumulator_t* whole, int blocks,
+                                              bool inputs) {
     okid_jackknife_config_t shape{};
+    shape.modes_only = inputs ? 0 : 1;
     shape.identify = work.config;
     shape.identify.order = shape.identify.max_order = work.model.n_z;
     okid_accumulator_config(whole, &shape.sums);

@@ -30,8 +30,9 @@ struct replicate_model {
 struct record_work;
 
 /// Leave out each of so many equal blocks in turn. The records of `work` are what `whole` was fed with. Analytic: to first
-/// order, where the method has a derivative and its identifier was given `whole` last. Empty: too short.
-std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accumulator_t* whole, int blocks);
+/// order, where the method has a derivative and its identifier was given `whole` last. Inputs: B and D too. Empty: too short.
+std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accumulator_t* whole, int blocks,
+                                              bool inputs);
 
 /// Deviations of the modes, and of M, K, R where the plan wants them.
 deviations deviations_of(const okid_identified_t& model, const std::vector<replicate_model>& replicates,

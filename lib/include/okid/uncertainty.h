@@ -97,12 +97,13 @@ typedef struct okid_jackknife_config_t {
     okid_accumulator_config_t sums;  ///< of the whole: okid_accumulator_config(). edges = 1, slots = 0
     int32_t linear; ///< 1: the full model's change to first order in place of a model of the rest, at a fraction of
                     ///< the cost; not with OKID_HANKEL_INNOVATIONS and _LITERAL
+    int32_t modes_only; ///< 1: of MOESP, CVA and SSARX A and C are enough, B and D are 0: no M, K, R, at a fraction of the cost
 } okid_jackknife_config_t;
 
 /// Of an identifier and of the sums it is given.
 static inline okid_jackknife_config_t okid_jackknife_defaults(const okid_identify_config_t* identify,
                                                               const okid_accumulator_config_t* sums) {
-    const okid_jackknife_config_t config = {*identify, *sums, 0};
+    const okid_jackknife_config_t config = {*identify, *sums, 0, 0};
     return config;
 }
 

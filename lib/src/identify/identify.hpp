@@ -56,6 +56,7 @@ struct okid_identify {
     double *head, *tail, *sum; ///< of one run
     okid_real_t *theta, *innovation, *markov, *gain;
     int follow;                   ///< order of replicate(), 0: a full identification
+    bool modes_only;              ///< replicate(): A and C are enough
     bool poles_only;              ///< the caller needs only poles of orders up to max_order
     okid::followed_era* followed; ///< ERA of replicate() near a known model, or nullptr
     int width;                    ///< columns of a block of the Hankel matrix

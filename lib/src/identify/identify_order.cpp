@@ -144,8 +144,13 @@ okid_status_t realise_model(okid_identify& s, int order) {
     if (s.followed != nullptr) return s.followed->realise(s.era_config, s.markov, s.A, s.B, s.C);
     if (s.by_covariance) return realise_covariance(s, order, false);
     if (!s.by_subspace) return realise_era(s, order, false);
-    return okid_subspace_realize(s.subspace, order, s.A, s.n_u > 0 ? s.B : nullptr, s.C, s.n_u > 0 ? s.D : nullptr,
-                                 nullptr, nullptr);
+    const bool inputs = s.n_u > 0 && !s.modes_only;
+    if (!inputs) {
+        std::fill_n(s.B, order * s.n_u, okid_real_t{0});
+        std::fill_n(s.D, s.n_y * s.n_u, okid_real_t{0});
+    }
+    return okid_subspace_realize(s.subspace, order, s.A, inputs ? s.B : nullptr, s.C, inputs ? s.D : nullptr, nullptr,
+                                 nullptr);
 }
 
 okid_status_t choose_order(okid_identify& s, okid_identified_t* out) {

@@ -19,12 +19,6 @@ namespace okid {
 using linalg::multiply;
 using std::size_t;
 
-namespace {
-
-constexpr int chunk_columns = 8;
-
-} // namespace
-
 void projection::lay_out(const subspace_sizes& z, arena& memory) {
     const int n = z.top, p = z.n_y + n;
     width = z.a + z.w + z.n_y;
@@ -45,8 +39,7 @@ void projection::lay_out(const subspace_sizes& z, arena& memory) {
     solve = memory.take<double>(solve_work(std::max(z.h, width)));
     seen = memory.take<double>(area(n, z.i) * static_cast<size_t>(p));
     step = memory.take<double>(2 * area(n, n));
-    grams =
-        memory.take<double>(std::max(area(n, n) * static_cast<size_t>(z.i + 1), area(n, z.i) * static_cast<size_t>(p)));
+    across = memory.take<double>(area(n, z.i) * static_cast<size_t>(p));
     lagged = memory.take<double>(2 * area(n, n));
     equations = memory.take<double>(area(p * z.n_u, p * z.n_u));
     root = memory.take<double>(std::max({area(p, z.n_u), area(z.i), area(z.n_y)}));

@@ -19,22 +19,16 @@ using linalg::multiply;
 using std::size_t;
 
 namespace {
-constexpr int chunk_columns = 8;
 constexpr double equations_floor = 1e-13;
 } // namespace
 
-/// powers: C A^b; grams: S_b = sum over the first b of them; seen: Gamma^T T_k.
+/// powers: C A^b; seen: Gamma^T T_k.
 void projection::toeplitz_columns(const subspace_sizes& z, int order, const state_model& out) const {
     const int n = order;
     for (int c = 0; c < n; ++c) std::copy(out.C + at(0, c, z.n_y), out.C + at(z.n_y, c, z.n_y), powers + at(0, c, z.h));
-    std::fill(grams, grams + at(0, n, n), 0.0);
     for (int b = 0; b + 1 < z.i; ++b) {
         const double* block = powers + b * z.n_y;
-        const double* before = grams + at(0, b * n, n);
-        double* sum = grams + at(0, (b + 1) * n, n);
         multiply(false, false, z.n_y, n, n, 1, block, z.h, out.A, n, 0, powers + (b + 1) * z.n_y, z.h);
-        std::copy(before, before + at(0, n, n), sum);
-        multiply(true, false, n, n, z.n_y, 1, block, z.h, block, z.h, 1, sum, n);
     }
     double *below = step, *next = step + at(0, n, n); // Gamma^T of what stands below the identity in T_k
     std::fill(below, below + at(0, n, n), 0.0);
@@ -49,13 +43,15 @@ void projection::toeplitz_columns(const subspace_sizes& z, int order, const stat
     }
 }
 
-/// equations <- sum of T_k^T T_l x Gram of the inputs.
+/// equations <- sum of T_k^T T_l x Gram of the inputs. At one distance the states meet in the sum over k of A^lag^T (sum over
+/// b below i - 1 - k of (C A^b)^T C A^b) times the Gram at k: each (C A^b)^T C A^b once, with the sum of what it counts for.
 void projection::direct_part(const subspace_sizes& z, int order, const state_model& out) const {
     const int n = order, p = z.n_y + n, P = p * z.n_u;
     auto g = [&](int c, int k, int d, int l) { return autos[at(c * z.i + k, d * z.i + l, z.a)]; };
     auto block = [&](int c, int e, int d, int f) -> double& { return equations[at(c * p + e, d * p + f, P)]; };
     std::fill(equations, equations + at(0, P, P), 0.0);
-    double *sum = lagged, *spare = lagged + at(0, n, n), *weights = root; // free by now, i numbers
+    double *sum = lagged, *spare = lagged + at(0, n, n), *counted = across; // h x n
+    double* weights = root;                                                 // free by now, i numbers
     for (int c = 0; c < z.n_u; ++c)
         for (int d = 0; d < z.n_u; ++d) {
             double same = 0;
@@ -75,9 +71,14 @@ void projection::direct_part(const subspace_sizes& z, int order, const state_mod
                 std::swap(sum, spare);
                 for (int j = 0; lag == 0 && j < n; ++j) // distances above 0, the other way round
                     for (int r = 0; r < n; ++r) block(d, z.n_y + j, c, z.n_y + r) += sum[at(r, j, n)];
-                const int count = z.i - lag;
-                for (int b = 0; b < count; ++b) weights[b] = g(c, count - 1 - b, d, z.i - 1 - b);
-                multiply(false, false, n * n, 1, count, 1, grams, n * n, weights, count, 1, sum, n * n);
+                const int count = z.i - 1 - lag;
+                double all = 0;
+                for (int b = count - 1; b >= 0; --b) weights[b] = all += g(c, count - 1 - b, d, z.i - 2 - b);
+                for (int j = 0; j < n; ++j)
+                    for (int b = 0; b < count; ++b)
+                        for (int o = b * z.n_y; o < (b + 1) * z.n_y; ++o)
+                            counted[at(o, j, z.h)] = weights[b] * powers[at(o, j, z.h)];
+                if (count > 0) multiply(true, false, n, n, count * z.n_y, 1, counted, z.h, powers, z.h, 1, sum, n);
             }
             for (int j = 0; j < n; ++j)
                 for (int r = 0; r < n; ++r) block(c, z.n_y + r, d, z.n_y + j) += sum[at(r, j, n)];
@@ -85,17 +86,19 @@ void projection::direct_part(const subspace_sizes& z, int order, const state_mod
 }
 
 /// equations -= the same of Gamma^T T_k: columns of Gamma^T H L11 for all unknowns of an input, some columns of L11 at a time.
+/// across: each of the p transposed, i x n.
 void projection::projected_part(const subspace_sizes& z, const hankel_factor& f, int order) const {
     const int n = order, p = z.n_y + n, P = p * z.n_u;
-    double* across = grams; // free by now: each of the p transposed, i x n
     for (int e = 0; e < p; ++e)
         for (int r = 0; r < n; ++r)
             for (int k = 0; k < z.i; ++k) across[at(k, e * n + r, z.i)] = seen[at(r, e * z.i + k, n)];
     for (int first = 0; first < z.a; first += chunk_columns) {
         const int wide = std::min(chunk_columns, z.a - first), from = first / z.i; // channels before it: zeros
-        for (int c = from; c < z.n_u; ++c)
-            multiply(true, false, wide, n * p, z.i, 1, f.L + at(c * z.i, first, f.size), f.size, across, z.i, 0,
-                     chunk + at(0, c * p, n * wide), wide);
+        for (int c = from; c < z.n_u; ++c) {
+            const int zeros = std::max(0, first - c * z.i); // L11 is triangular
+            multiply(true, false, wide, n * p, z.i - zeros, 1, f.L + at(c * z.i + zeros, first, f.size), f.size,
+                     across + zeros, z.i, 0, chunk + at(0, c * p, n * wide), wide);
+        }
         for (int j = from * p; j < P; j += 64)
             multiply(true, false, P - j, std::min(64, P - j), n * wide, -1, chunk + at(0, j, n * wide), n * wide,
                      chunk + at(0, j, n * wide), n * wide, 1, equations + at(j, j, P), P);

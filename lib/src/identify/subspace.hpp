@@ -56,6 +56,8 @@ double condition_of(const okid_subspace_t* self);
 
 /// MOESP and CVA: the column space of the observability matrix.
 struct projection {
+    /// Of L11, at a time.
+    static constexpr int chunk_columns = 32;
     int width;                   ///< a + w + n_y: coordinates of U_f, W_p and y_i
     double *gamma, *core;        ///< orthonormal h x top; Gamma_^T Gamma-bar, top x top
     double *projected, *shifted; ///< Gamma^T L3, Gamma_^T (L3 one block later), top x width
@@ -65,9 +67,8 @@ struct projection {
     double *states, *later;      ///< X_i, X_(i+1), n x width
     double *outputs, *drive;     ///< y_i less what the model says, n_y x width; Gamma^T H, n x a
     double *gain, *solve;        ///< work of kalman_gain() and of the solves
-    double *seen, *step; ///< joint_inputs(): column e of Gamma^T T_k, k = 0.. (p of n x i); its recursion, n x n
-    double *grams,
-        *lagged; ///< sums of (C A^b)^T C A^b, i + 1 of n x n, then `seen` transposed; Horner scheme, two of n x n
+    double *seen, *step;       ///< joint_inputs(): column e of Gamma^T T_k, k = 0.. (p of n x i); its recursion, n x n
+    double *across, *lagged;   ///< `seen` transposed, before that C A^b times weights; Horner scheme, two of n x n
     double *equations, *root;  ///< p n_u x p n_u; its diagonal, and scratch
     double *chunk, *remainder; ///< columns of Gamma^T H L11 by unknown; (I - Gamma Gamma^T) cross
 

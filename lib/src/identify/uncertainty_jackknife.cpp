@@ -204,9 +204,8 @@ okid_status_t okid_jackknife_create(okid_jackknife_t** self, const okid_jackknif
     *self = s;
     if (config->linear != 0) return OKID_OK;
     const okid_status_t status = okid_accumulator_create(&s->rest, &s->config.sums, s->rest_block, s->rest_bytes);
-    return status != OKID_OK
-               ? status
-               : okid_identify_create(&s->identifier, &s->config.identify, s->identifier_block, s->identifier_bytes);
+    if (status != OKID_OK) return status;
+    return okid_identify_create(&s->identifier, &s->config.identify, s->identifier_block, s->identifier_bytes);
 }
 
 okid_status_t okid_jackknife_begin(okid_jackknife_t* self, okid_accumulator_t* whole, const okid_identified_t* full) {
@@ -214,6 +213,7 @@ okid_status_t okid_jackknife_begin(okid_jackknife_t* self, okid_accumulator_t* w
     okid_jackknife& s = *self;
     if (s.config.linear != 0) return OKID_ERR_MISMATCH;
     if (full->n_z < 1 || full->n_z > s.identifier->max_order) return OKID_ERR_DIM;
+    s.identifier->modes_only = s.config.modes_only != 0;
     okid_status_t status = okid_accumulator_copy(s.rest, whole); // does it fit?
     if (status == OKID_OK) status = okid_accumulator_energy(whole, s.config.identify.detrend, s.energy);
     s.whole = whole;

@@ -127,11 +127,44 @@ static void nothing_left_out_is_the_whole(void) {
     }
 }
 
+/// Where M, K, R are not asked for the subspace methods leave B and D alone: A and C are the same, to the bit.
+static void modes_only_leave_the_inputs_alone(void) {
+    make(0, 0.3);
+    for (int method = OKID_METHOD_N4SID_MOESP; method <= OKID_METHOD_N4SID_SSARX; ++method) {
+        setting_t s = prepare((okid_method_t)method, rig.n_u);
+        identified(&s, s.whole);
+        okid_model_t models[2];
+        void* blocks[2];
+        for (int only = 0; only < 2; ++only) {
+            okid_jackknife_config_t config = s.config;
+            config.linear = 0;
+            config.modes_only = only;
+            const size_t bytes = okid_jackknife_memsize(&config);
+            okid_jackknife_t* jackknife = NULL;
+            double share = 0;
+            blocks[only] = malloc(bytes);
+            TEST_ASSERT_EQUAL(OKID_OK, okid_jackknife_create(&jackknife, &config, blocks[only], bytes));
+            TEST_ASSERT_EQUAL(OKID_OK, okid_jackknife_begin(jackknife, s.whole, &s.full));
+            TEST_ASSERT_EQUAL(OKID_OK, okid_jackknife_delete(jackknife, s.part, 1, &models[only], &share));
+            TEST_ASSERT_TRUE(share > 0 && share < 1);
+        }
+        const size_t n = (size_t)models[0].n_z, n_u = (size_t)rig.n_u, n_y = (size_t)rig.n_y;
+        TEST_ASSERT_EQUAL(models[0].n_z, models[1].n_z);
+        TEST_ASSERT_EQUAL_MEMORY(models[0].A, models[1].A, n * n * sizeof(okid_real_t));
+        TEST_ASSERT_EQUAL_MEMORY(models[0].C, models[1].C, n_y * n * sizeof(okid_real_t));
+        for (size_t k = 0; k < n * n_u; ++k) TEST_ASSERT_TRUE(models[1].B[k] == 0 && models[0].B[k] != 0);
+        for (size_t k = 0; k < n_y * n_u; ++k) TEST_ASSERT_TRUE(models[1].D[k] == 0);
+        free(blocks[0]), free(blocks[1]);
+        setting_free(&s);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(okid_of_several_channels);
     RUN_TEST(subspace_methods_of_several_channels);
     RUN_TEST(without_forces);
     RUN_TEST(nothing_left_out_is_the_whole);
+    RUN_TEST(modes_only_leave_the_inputs_alone);
     return UNITY_END();
 }

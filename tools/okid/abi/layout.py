@@ -404,7 +404,7 @@ class Uncertainty(Structure):
 class JackknifeConfig(Structure):
     """okid_jackknife_config_t."""
 
-    _fields_ = [("identify", IdentifyConfig), ("sums", AccumulatorConfig), ("linear", c_int32)]
+    _fields_ = [("identify", IdentifyConfig), ("sums", AccumulatorConfig), ("linear", c_int32), ("modes_only", c_int32)]
 
 
 STRUCTS: dict[str, type[Structure]] = {
