@@ -95,9 +95,9 @@ typedef struct okid_jackknife okid_jackknife_t;
 typedef struct okid_jackknife_config_t {
     okid_identify_config_t identify; ///< of the full model; its `order` is not read
     okid_accumulator_config_t sums;  ///< of the whole: okid_accumulator_config(). edges = 1, slots = 0
-    int32_t linear; ///< 1: the full model's change to first order in place of a model of the rest, at a fraction of
-                    ///< the cost; not with OKID_HANKEL_INNOVATIONS and _LITERAL
-    int32_t modes_only; ///< 1: of MOESP, CVA and SSARX A and C are enough, B and D are 0: no M, K, R, at a fraction of the cost
+    int32_t linear;     ///< 1: the full model's change to first order in place of a model of the rest, at a fraction of
+                        ///< the cost; not with OKID_HANKEL_INNOVATIONS and _LITERAL
+    int32_t modes_only; ///< 1: of MOESP, CVA and SSARX A and C are enough: B and D are 0, at a fraction of the cost
 } okid_jackknife_config_t;
 
 /// Of an identifier and of the sums it is given.
