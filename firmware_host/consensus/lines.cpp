@@ -79,7 +79,8 @@ track track_beside(const record_level& level, std::size_t m, std::size_t first_c
             }
     }
     const double mean = std::arg(turned * std::polar(1.0, -2 * M_PI * share * static_cast<double>(half)));
-    return {std::abs(mean) / M_PI, std::sqrt(2 * std::log(all / std::abs(turned))) / M_PI}; // of a circular normal
+    return {std::abs(mean) / M_PI,
+            std::sqrt(2 * std::max(0.0, std::log(all / std::abs(turned)))) / M_PI}; // of a circular normal
 }
 
 double spread_over_mean(const std::vector<complex>& a) {
@@ -91,6 +92,7 @@ double spread_over_mean(const std::vector<complex>& a) {
 
 /// Does an amplitude know two levels, on and off? That of a random vibration has all between them.
 bool switched(const std::vector<complex>& a) {
+    if (a.size() < judgement::fewest_blocks) return false;
     std::vector<complex> on;
     std::vector<double> sizes;
     for (const complex& x : a) sizes.push_back(std::abs(x));
@@ -282,7 +284,8 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
         (usual(a) > judgement::loudest_silence || quieter_before(level, m, n_u, weights, mode.frequency_hz, usual(a))))
         return false;
     bool keeps_up = a.size() >= judgement::fewest_blocks && spread_over_mean(a) < judgement::steady;
-    for (const std::size_t part : {1, 2, 4}) // a force may go on and off too
+    if (!keeps_up && n_u == 0) keeps_up = switched(a); // a force may go on and off too
+    for (const std::size_t part : {2, 4})
         if (!keeps_up && n_u == 0 && block / part >= periods)
             keeps_up = switched(amplitudes(level, m, n_u, weights, mode.frequency_hz, block / part));
     if (!endless)

@@ -7,8 +7,7 @@
 // REFERENCE  paper eq. (87)-(94); N = (88) times L11, so that inputs count by how much they excite
 // NUMERICS   the printed solution (93) is a product of two pseudo-inverses, and not the least-squares one (trap 9);
 //            (88) as printed divides by L11: with coloured inputs what was not excited then decides
-// WORKSPACE  sums of C A^b (i n_z^2), columns of Gamma^T T_k; n_u^2 i n_z^2 (i + 2 n_z) + n_u^3 i n_z (n_z + n_y)^2
-//            flop
+// WORKSPACE  columns of Gamma^T T_k, twice; n_u^2 i n_z^2 (i n_y + 2 n_z) + n_u^3 i n_z (n_z + n_y)^2 flop
 #include "identify/subspace.hpp"
 
 #include <cmath>
