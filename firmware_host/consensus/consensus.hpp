@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Modes that several methods, horizons, rates and orders agree on: the numerics behind `--method auto`.
 #pragma once
+#include "owned_sums.hpp"
 #include "result/shape_mac.hpp"
 #include "zoom.hpp"
 
 #include <okid/identify.h>
 
 #include <complex>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -44,6 +46,8 @@ struct consensus_run {
     int most_order = 64; ///< asked for
     int states = 0;      ///< of the highest order; 0: no limit
     bool full = false;   ///< of modes: too few states
+    std::shared_ptr<const owned_sums>
+        sums; ///< of a long CVA run where no other run asks for more lags: for what follows
     std::vector<run_pole> poles;
     std::vector<run_track> tracks;
 };

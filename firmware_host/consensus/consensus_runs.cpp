@@ -26,6 +26,9 @@ constexpr int rows_of_outputs = 90, rows_of_crowds = 180;
 constexpr int most_unknowns = 450; ///< block rows x channels: the decomposition costs their third power
 constexpr double short_share = 0.6, middle_share = 0.8;
 constexpr int fewest_rows = 4;
+/// Orders for each state that past and future share beyond chance: a weak mode among strong ones shows above twice as many.
+/// What is higher holds noise alone and costs its third power.
+constexpr int orders_of_a_state = 3, fewest_most = 24;
 constexpr int enough_voters = 4, few_voters = 2; ///< runs that tell a mode from its neighbour, that found it
 constexpr double beats_wanted = 1.25;            ///< of both in the horizon: with room for the shorter ones
 constexpr double most_decays = 2;                ///< times in which the mode falls to 1 / e: what is over tells nothing
@@ -70,23 +73,65 @@ int most_states(const consensus_run& run, int n_y, int most) {
     return std::min(most, held - held % 2);
 }
 
-/// Do past and future share more states than a run has? Their canonical correlations say so. Where modes overlap, a run with
+/// Do past and future share more states than a run of CVA has? Their canonical correlations say so. Where modes overlap, a run with
 /// too few states shows hardly one of them clearly.
 bool shares_more(const okid_identified_t& model, const consensus_run& run) {
     const auto filled = static_cast<int>(judgement::most_filled * run.states);
-    if (run.method != OKID_METHOD_N4SID_CVA || model.singular_count <= filled) return false;
+    if (model.singular_count <= filled) return false;
     return static_cast<double>(model.singular_values[filled]) > judgement::surely_shared;
 }
 
-bool find_poles(const okid_identify_config_t& config, const owned_sums& sums, consensus_run& run) {
-    const std::size_t bytes = okid_identify_memsize(&config);
-    const auto block = memory(bytes);
+/// States that past and future share beyond chance: canonical correlations above the largest one of white noise, of so many
+/// numbers in the past and in the future of so many samples (Wachter 1980).
+int shared_states(const okid_identified_t& model, const consensus_run& run, long long samples) {
+    const double past = std::min(1.0, run.rows * (run.inputs + run.outputs) / static_cast<double>(samples)),
+                 future = std::min(1.0, run.rows * run.outputs / static_cast<double>(samples));
+    const double of_chance = std::sqrt(past * (1 - future)) + std::sqrt(future * (1 - past));
+    int out = 0;
+    while (out<model.singular_count&& static_cast<double>(model.singular_values[out])> of_chance) ++out;
+    return out;
+}
+
+/// Keeps the orders up to `most`; all of ERA on covariances, which weighs by amplitude: a weak mode stands behind the noise of strong
+/// ones.
+void keep_orders(consensus_run& run, int most) {
+    if (!is_subspace(run.method) && run.inputs == 0) return;
+    run.most_order = std::min(run.most_order, most);
+    while (run.orders.size() > 1 && run.orders.back() > most) run.orders.pop_back();
+}
+
+/// A run's decomposition, which a MOESP run of the same rows takes over from a CVA run.
+struct run_decomposition {
+    std::unique_ptr<std::byte[]> block;
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
-    if (!block || !sums.sums || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK) return false;
-    if (okid_identify_decompose(identifier, sums.sums, &model) != OKID_OK) return false;
-    run.full = shares_more(model, run);
-    collect_poles(identifier, model, run);
+    int rows = 0; ///< 0: none stands
+
+    bool take(const okid_identify_config_t& config, const owned_sums& sums) {
+        if (rows > 0 && rows == config.rows && config.method == OKID_METHOD_N4SID_MOESP)
+            return okid_identify_decompose_as(identifier, config.method, config.max_order, &model) == OKID_OK;
+        const std::size_t bytes = okid_identify_memsize(&config);
+        block = memory(bytes);
+        rows = 0;
+        if (!block || !sums.sums || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK ||
+            okid_identify_decompose(identifier, sums.sums, &model) != OKID_OK)
+            return false;
+        if (config.method == OKID_METHOD_N4SID_CVA) rows = config.rows;
+        return true;
+    }
+};
+
+/// @param most  highest order worth its time at this level; lowered by a CVA run
+bool find_poles(int n_u, int n_y, const owned_sums& sums, run_decomposition& of, consensus_run& run, int& most) {
+    keep_orders(run, most);
+    if (!of.take(run_config(run, n_u, n_y), sums)) return false;
+    if (run.method == OKID_METHOD_N4SID_CVA) {
+        run.full = shares_more(of.model, run);
+        const int shared = shared_states(of.model, run, okid_accumulator_rows(sums.sums));
+        most = std::min(most, std::max(fewest_most, orders_of_a_state * shared));
+        keep_orders(run, most);
+    }
+    collect_poles(of.identifier, of.model, run);
     link_tracks(run);
     return true;
 }
@@ -115,8 +160,8 @@ std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_
     const int middle = std::max(fewest_rows, static_cast<int>(std::lround(middle_share * rows)));
     std::vector<consensus_run> out;
     if (rows >= fewest_rows)
-        out = {run_of(OKID_METHOD_N4SID_MOESP, rows), run_of(OKID_METHOD_N4SID_MOESP, less),
-               run_of(OKID_METHOD_N4SID_CVA, rows), run_of(OKID_METHOD_N4SID_CVA, less),
+        out = {run_of(OKID_METHOD_N4SID_CVA, rows), run_of(OKID_METHOD_N4SID_MOESP, rows),
+               run_of(OKID_METHOD_N4SID_CVA, less), run_of(OKID_METHOD_N4SID_MOESP, less),
                run_of(OKID_METHOD_N4SID_SSARX, middle)};
     const int lags = std::max(lags_of_observer, rows_for_states(n_y, crowded));
     int p = n_u > 0 ? okid_identify_usable_p(n_u, n_y, lags, samples)
@@ -192,6 +237,13 @@ owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, boo
     return out;
 }
 
+std::shared_ptr<const owned_sums> sums_of(const consensus_run& run, const record_level& level, int n_u, int n_y,
+                                          bool at_rest) {
+    const okid_identify_config_t config = run_config(run, n_u, n_y);
+    const int lags = okid_identify_lags(&config);
+    return run.sums ? run.sums : std::make_shared<owned_sums>(level_sums(level, n_u, n_y, lags, at_rest));
+}
+
 namespace {
 
 /// Sums with fewer lags from those with more; none where that would leave out too many of the level's samples.
@@ -202,7 +254,8 @@ owned_sums shortened(const record_level& level, const owned_sums& longest, int l
     return with_fewer_lags(longest.sums, n_u, n_y, lags);
 }
 
-/// The runs of one level with their poles linked, those with the longest horizon first.
+/// The runs of one level with their poles linked, those with the horizon of the first one before the others: a CVA run, which
+/// knows how high orders are worth their time.
 std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const record_level& level, int n_u, int n_y,
                                      bool at_rest) {
     std::vector<int> lags;
@@ -210,19 +263,25 @@ std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const reco
         const okid_identify_config_t config = run_config(run, n_u, n_y);
         lags.push_back(okid_identify_lags(&config));
     }
-    std::vector<int> horizons = lags;
-    std::sort(horizons.begin(), horizons.end(), std::greater<>());
-    horizons.erase(std::unique(horizons.begin(), horizons.end()), horizons.end());
+    const std::set<int> sorted(lags.begin(), lags.end());
+    std::vector<int> horizons(sorted.rbegin(), sorted.rend());
     std::vector<consensus_run> out;
-    owned_sums longest, own;
+    if (horizons.empty()) return out;
+    const int longest = horizons.front();
+    std::stable_partition(horizons.begin(), horizons.end(), [&](int horizon) { return horizon == lags.front(); });
+    const auto all = std::make_shared<owned_sums>(level_sums(level, n_u, n_y, longest, at_rest));
+    owned_sums own;
+    int most = std::numeric_limits<int>::max();
     for (const int horizon : horizons) {
-        const bool first = horizon == horizons.front();
-        if (!first) own = shortened(level, longest, horizon, n_u, n_y);
-        owned_sums& sums = first ? longest : own;
-        if (!sums.sums) sums = level_sums(level, n_u, n_y, horizon, at_rest);
-        for (std::size_t i = 0; i < runs.size(); ++i)
-            if (lags[i] == horizon && find_poles(run_config(runs[i], n_u, n_y), sums, runs[i]))
-                out.push_back(std::move(runs[i]));
+        if (horizon != longest) own = shortened(level, *all, horizon, n_u, n_y);
+        if (horizon != longest && !own.sums) own = level_sums(level, n_u, n_y, horizon, at_rest);
+        run_decomposition of;
+        for (std::size_t i = 0; i < runs.size(); ++i) {
+            if (lags[i] != horizon) continue;
+            if (!find_poles(n_u, n_y, horizon == longest ? *all : own, of, runs[i], most)) continue;
+            if (i == 0 && horizon == longest) runs[i].sums = all;
+            out.push_back(std::move(runs[i]));
+        }
     }
     return out;
 }

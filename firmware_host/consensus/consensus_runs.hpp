@@ -26,6 +26,10 @@ int longest_lags(int n_u, int n_y);
 /// Sums of a level for runs with so many lags; none without memory.
 owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest);
 
+/// Those for a run of the level, which may have kept its own; none without memory.
+std::shared_ptr<const owned_sums> sums_of(const consensus_run& run, const record_level& level, int n_u, int n_y,
+                                          bool at_rest);
+
 /// All runs of the levels from `first` on with their poles linked. Runs that find no model are left out.
 /// @param threads  at a time, 0: all processors; the result is the same for any number
 std::vector<consensus_run> look_at(const std::vector<record_level>& levels, std::size_t first, int n_u, int n_y,

@@ -255,10 +255,9 @@ std::vector<std::optional<carried_mode>> carry(const record_level& level, int nu
         if (modes[i].level == number && modes[i].confident()) left.push_back(i);
     const consensus_run* run = long_run(runs, number);
     if (!run || left.empty()) return out;
-    const okid_identify_config_t config = run_config(*run, n_u, n_y);
-    const owned_sums sums = level_sums(level, n_u, n_y, okid_identify_lags(&config), at_rest);
-    if (!sums.sums) return out;
-    const carrier_task task{level, *run, sums, n_u, n_y, blocks, at_rest, analytic};
+    const auto sums = sums_of(*run, level, n_u, n_y, at_rest);
+    if (!sums->sums) return out;
+    const carrier_task task{level, *run, *sums, n_u, n_y, blocks, at_rest, analytic};
     std::vector<std::vector<carried_mode>> said(modes.size());
     std::vector<int> used;
     while (!left.empty() && used.size() < most_orders) {

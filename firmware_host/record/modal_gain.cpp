@@ -63,12 +63,19 @@ struct gain_search {
     std::vector<MatrixXd> C_of; ///< at all lags
     double cost = INFINITY;
 
+    bool stable(const MatrixXd& gain) const {
+        return gain.allFinite() && (A - gain * C).eigenvalues().cwiseAbs().maxCoeff() < 1;
+    }
+
     /// Take this gain if it is stable and predicts better.
     bool take(const MatrixXd& gain) {
-        if (!gain.allFinite() || !((A - gain * C).eigenvalues().cwiseAbs().maxCoeff() < 1)) return false;
+        if (!stable(gain)) return false;
         const MatrixXd real = gain * unit.cwiseInverse().asDiagonal();
         model.K = real.data();
-        std::vector<double> left = residuals(work.set, model);
+        return better(gain, residuals(work.set, model));
+    }
+
+    bool better(const MatrixXd& gain, std::vector<double> left) {
         const Index n_y = C.rows();
         for (std::size_t i = 0; i < left.size(); ++i) left[i] /= unit[static_cast<Index>(i) % n_y];
         const double now = covariances(left, n_y, 0)[0].diagonal().array().log().sum();
@@ -135,7 +142,9 @@ void find_gain(record_work& work) {
     refined_arrays& arrays = *work.refined;
     okid_identified_t& model = work.model;
     const Index n = model.n_z, n_y = model.n_y;
-    const std::vector<double> left = residuals(work.set, model);
+    const MatrixXd none = MatrixXd::Zero(n, n_y);
+    model.K = none.data();
+    const std::vector<double> left = residuals(work.set, model); // of the simulation
     const std::vector<MatrixXd> first = covariances(left, n_y, 0);
     if (n == 0 || first.empty() || !(first[0].diagonal().minCoeff() > 0) || !first[0].allFinite()) return;
     const VectorXd unit = first[0].diagonal().cwiseSqrt();
@@ -147,7 +156,7 @@ void find_gain(record_work& work) {
                        {},
                        {},
                        {}};
-    if (!search.take(MatrixXd::Zero(n, n_y))) return;
+    if (!search.stable(none) || !search.better(none, left)) return;
     if (search.take(search.start()))
         for (int k = 0; k < most_steps; ++k) {
             const MatrixXd step = search.whitening(), before = search.K;

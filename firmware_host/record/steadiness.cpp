@@ -133,35 +133,60 @@ std::vector<double> motion_of(const steady_search& s, const answered_record& rec
     return out;
 }
 
+/// Normal equations of a block for the change a of a pole and its own initial state b: left = Re(c p a) + Re(c s b) in each output,
+/// with p the answer to a change and s its free decay. What they share over the outputs is summed first.
+struct pole_equations {
+    Eigen::Matrix4d N = Eigen::Matrix4d::Zero(); ///< of Re a, Im a, Re b, Im b
+    Eigen::Vector4d h = Eigen::Vector4d::Zero();
+
+    /// One sample. squares: weighted sum of |c|^2, turned: of c^2, seen: of c left.
+    void add(complex p, complex s, double squares, complex turned, complex seen) {
+        const complex of[2] = {p, s};
+        for (int i = 0; i < 2; ++i) {
+            h[2 * i] += (seen * of[i]).real();
+            h[2 * i + 1] -= (seen * of[i]).imag();
+            for (int j = 0; j < 2; ++j) {
+                const complex A = squares * of[i] * std::conj(of[j]), B = turned * of[i] * of[j];
+                N(2 * i, 2 * j) += (A + B).real() / 2;
+                N(2 * i + 1, 2 * j + 1) += (A - B).real() / 2;
+                N(2 * i, 2 * j + 1) += (A - B).imag() / 2;
+                N(2 * j + 1, 2 * i) = N(2 * i, 2 * j + 1);
+            }
+        }
+    }
+};
+
 /// The correction of one pole over samples first … first + length - 1. @param moved  motion_of() the record
 block_frequency corrected(const steady_search& s, const answered_record& record, const std::vector<double>& moved,
                           std::size_t k, std::size_t first, std::size_t length, double time) {
     const complex mu = s.mu[k], turn = complex(0, 1) / s.fs_hz * mu;
-    Eigen::Matrix4d N = Eigen::Matrix4d::Zero();
-    Eigen::Vector4d h = Eigen::Vector4d::Zero();
+    pole_equations sums;
     complex p = 0, start = 1;
     double power = 0, motion = 0;
     const std::size_t n_y = s.set.n_y;
     for (std::size_t t = first; t < first + length; ++t) {
+        double squares = 0;
+        complex turned = 0, seen = 0;
         for (std::size_t o = 0; o < n_y; ++o) {
             const double left = record.left[t * n_y + o];
             if (std::isnan(left)) continue;
-            const complex c = s.modes[k]->shape[o], a = c * p, b = c * start;
-            const Eigen::Vector4d v(a.real(), -a.imag(), b.real(), -b.imag());
-            N += v * v.transpose() / (s.spread[o] * s.spread[o]);
-            h += v * left / (s.spread[o] * s.spread[o]);
+            const complex c = s.modes[k]->shape[o] / s.spread[o];
+            squares += std::norm(c);
+            turned += c * c;
+            seen += c * (left / s.spread[o]);
         }
+        sums.add(p, start, squares, turned, seen);
         const complex q = record.states[k][t];
         power += std::norm(q) / static_cast<double>(length);
         motion += moved[t];
         p = mu * p + turn * q;
         start *= mu;
     }
-    const Eigen::Vector4d size = N.diagonal().cwiseMax(1e-300).cwiseSqrt();
-    Eigen::Matrix4d scaled = size.cwiseInverse().asDiagonal() * N * size.cwiseInverse().asDiagonal();
+    const Eigen::Vector4d size = sums.N.diagonal().cwiseMax(1e-300).cwiseSqrt();
+    Eigen::Matrix4d scaled = size.cwiseInverse().asDiagonal() * sums.N * size.cwiseInverse().asDiagonal();
     scaled.diagonal().array() += 1e-9;
     const Eigen::Matrix4d inverse = scaled.inverse();
-    const Eigen::Vector4d x = inverse * h.cwiseQuotient(size);
+    const Eigen::Vector4d x = inverse * sums.h.cwiseQuotient(size);
     const double w = 2 * M_PI * s.modes[k]->frequency_hz;
     return {x[0] / size[0] / w, power, motion / static_cast<double>(length), time,
             size[0] * size[0] / inverse(0, 0) * w * w};

@@ -53,16 +53,16 @@ mode_inputs summed_inputs(const record_level& level, const std::vector<consensus
     const consensus_run* const run = long_run(runs, 0);
     if (!run || wanted.empty()) return out;
     okid_identify_config_t config = run_config(*run, n_u, n_y);
-    const owned_sums sums = level_sums(level, n_u, n_y, okid_identify_lags(&config), at_rest);
+    const auto sums = sums_of(*run, level, n_u, n_y, at_rest);
     const std::vector<int> orders = carrying_orders(*run, wanted);
-    if (!sums.sums || orders.empty()) return out;
+    if (!sums->sums || orders.empty()) return out;
     config.order = config.max_order = orders.front();
     const std::size_t bytes = okid_identify_memsize(&config);
     const std::unique_ptr<std::byte[]> block(bytes ? new (std::nothrow) std::byte[bytes] : nullptr);
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
     if (!block || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK ||
-        okid_identify_run(identifier, sums.sums, &model) < 0)
+        okid_identify_run(identifier, sums->sums, &model) < 0)
         return out;
     const Eigen::Map<const MatrixXd> A(model.A, model.n_z, model.n_z), B(model.B, model.n_z, n_u),
         C(model.C, n_y, model.n_z), D(model.D, n_y, n_u);

@@ -159,6 +159,14 @@ OKID_NODISCARD OKID_API okid_status_t okid_identify_run(okid_identify_t* self, o
 OKID_NODISCARD OKID_API okid_status_t okid_identify_decompose(okid_identify_t* self, okid_accumulator_t* accumulator,
                                                               okid_identified_t* out);
 
+/// After okid_identify_decompose() with n4sid-cva the same sums with n4sid-moesp, from the factor that stands: both project alike and
+/// weight otherwise. The identifier has this method from then on, and may go back.
+/// @param order  models will have, at most; one of a larger order decomposes again
+/// @param out    that of okid_identify_decompose(): its singular values become those of this method
+/// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_NUMERIC; OKID_ERR_MISMATCH: another method, nothing decomposed, order < 1
+OKID_NODISCARD OKID_API okid_status_t okid_identify_decompose_as(okid_identify_t* self, okid_method_t method,
+                                                                 int32_t order, okid_identified_t* out);
+
 /// Largest order that can be asked for.
 OKID_API int32_t okid_identify_max_order(const okid_identify_config_t* config);
 

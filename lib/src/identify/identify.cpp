@@ -7,6 +7,8 @@
 // WORKSPACE  (m(lags+1))^2 for the Gram matrix, the modules' own, all in the caller's block; no heap
 #include "identify/identify.hpp"
 
+#include "identify/subspace.hpp"
+
 #include <okid/modal.h>
 #include <okid/steps/era.h>
 #include <okid/steps/observer.h>
@@ -293,6 +295,19 @@ okid_status_t okid_identify_decompose(okid_identify_t* self, okid_accumulator_t*
     const okid_status_t status = take_sums(*self, accumulator, true, out);
     if (status == OKID_OK) point_to(*self, out);
     return status;
+}
+
+okid_status_t okid_identify_decompose_as(okid_identify_t* self, okid_method_t method, int32_t order,
+                                         okid_identified_t* out) {
+    if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
+    okid_identify_config_t other = self->config;
+    other.method = method;
+    if (!self->by_subspace || !self->poles_only || !valid(other) || !plan(other).by_subspace) return OKID_ERR_MISMATCH;
+    const okid_status_t status = okid::decompose_as(self->subspace, plan(other).subspace_config.method, order);
+    if (status != OKID_OK) return status;
+    self->config.method = method;
+    point_to(*self, out);
+    return OKID_OK;
 }
 
 okid_status_t okid_identify_run_factor(okid_identify_t* self, okid_square_root_t* square_root, okid_identified_t* out) {

@@ -108,6 +108,15 @@ void expect(okid_subspace_t* self, int order, bool condition) {
     self->hankel.tells_condition = condition;
 }
 
+okid_status_t decompose_as(okid_subspace_t* self, int32_t method, int order) {
+    const auto projects = [](int32_t one) { return one == OKID_SUBSPACE_MOESP || one == OKID_SUBSPACE_CVA; };
+    if (!projects(method) || !projects(self->config.method) || self->cut.carried == 0 || order < 1 ||
+        (method == OKID_SUBSPACE_CVA && self->cut.weight == nullptr))
+        return OKID_ERR_MISMATCH;
+    self->config.method = method;
+    return decompose(*self, std::min(order, self->sizes.top));
+}
+
 double condition_of(const okid_subspace_t* self) { return self->hankel.condition; }
 
 subspace_view view_of(const okid_subspace_t* self) {

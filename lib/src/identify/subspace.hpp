@@ -51,6 +51,9 @@ int orthonormalise(int rows, int columns, double* x, double* core, int top);
 /// Decompose for models up to this order only, 0: for all; one of a larger order decomposes again when it is asked for.
 /// condition: from_gram() tells it.
 void expect(okid_subspace_t* self, int order, bool condition);
+/// The factor that was decomposed last by the other projection, for models up to this order. @return OKID_ERR_MISMATCH: there is
+/// none, or no memory for the other one: that of CVA serves MOESP too
+okid_status_t decompose_as(okid_subspace_t* self, int32_t method, int order);
 /// Of the Gram matrix with unit diagonal that was decomposed last.
 double condition_of(const okid_subspace_t* self);
 

@@ -9,7 +9,7 @@
 //            leaves (s_j / s_i)^2 of that beyond the cut and rounding of eps s_1 / s_i. Taken where the last wanted
 //            value is above 3e-5 of the first and all that an order could need above 1e-6, never where the factor came
 //            from a QR of the data
-// WORKSPACE  (h^2 + (h + w) top) doubles and what the larger of the two decompositions takes; with k columns <= h/3
+// WORKSPACE  (h^2 + (h + w) top) doubles and what the larger of the two decompositions takes; with k columns <= 2 h/3
 //            2 h^2 w + 4/3 h^3 + 4 h w k flop, an SVD some 15 h^2 w
 #include "identify/subspace.hpp"
 
@@ -57,8 +57,7 @@ int orthonormalise(int rows, int columns, double* x, double* core, int top) {
 void rank_cut::share(const subspace_sizes& z, arena& memory) {
     const auto carve = [&](arena squares, arena svd) {
         square_ = squares.take<double>(area(z.h, z.h));
-        symmetric_ = squares.take<double>(area(z.h) + std::max(linalg::symmetric_work(z.h, z.top),
-                                                               linalg::symmetric_work(z.h, std::min(z.top, z.h / 3))));
+        symmetric_ = squares.take<double>(area(z.h) + linalg::symmetric_work(z.h, z.top));
         target_ = svd.take<okid_real_t>(area(z.h, z.w));
         left_ = svd.take<okid_real_t>(area(z.h, z.h));
         right_ = svd.take<okid_real_t>(area(z.h, z.w));

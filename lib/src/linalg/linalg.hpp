@@ -48,7 +48,8 @@ template <class Real = okid_real_t> std::size_t svd_work(int rows, int cols);
 template <class Real> int svd(int rows, int cols, Real* a, Real* u, Real* s, Real* vt, Real* work);
 
 /// Symmetric A (n x n, not zero, lower triangle; destroyed): its n eigenvalues, descending, and the eigenvectors of the k largest
-/// (n x k, ld n). Small eigenvalues have the absolute error of the large ones. work: symmetric_work(n, k) numbers.
+/// (n x k, ld n). Small eigenvalues have the absolute error of the large ones. work: symmetric_work(n, k) numbers,
+/// which suffice for fewer vectors too.
 std::size_t symmetric_work(int n, int k);
 int symmetric(int n, double* a, int k, double* values, double* vectors, double* work);
 

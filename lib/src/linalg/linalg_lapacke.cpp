@@ -9,7 +9,6 @@
 #include "condition.hpp"
 #include "francis.hpp"
 #include "inverse_iteration.hpp"
-#include "tridiagonal.h"
 
 #include <algorithm>
 #include <cblas.h>
@@ -186,8 +185,8 @@ bool wanted_pairs(int n, const Real* a, Real* re, Real* im, Real* vectors, Real*
     return true;
 }
 
-/// Up to here each of k vectors of n by inverse iteration costs less than all of them by divide and conquer.
-bool few(int n, int k) { return 3 * k <= n; }
+/// Up to here each of k vectors of n by itself costs less than all of them by divide and conquer.
+bool few(int n, int k) { return 3 * k <= 2 * n; }
 
 lapack_int syevd_query(int n, lapack_int* integers) {
     double wanted = 0, none = 0;
@@ -245,25 +244,30 @@ bool upright(int n, int k, const double* vectors, double* products) {
     return true;
 }
 
-constexpr int pad = OKID_TRIDIAGONAL_PAD;
+/// Of the reduction to tridiagonal form and of the way back.
+lapack_int few_query(int n, int k) {
+    double down = 0, back = 0, none = 0;
+    LAPACKE_dsytrd_work(layout, 'L', n, &none, n, &none, &none, &none, &down, -1);
+    LAPACKE_dormtr_work(layout, 'L', 'L', 'N', n, k, &none, n, &none, &none, n, &back, -1);
+    return std::max(whole(down), whole(back));
+}
 
-/// Doubles: the matrix and the vectors of its reduction; d, e, tau; work of one eigenvector after the other.
+/// Doubles: d, e, tau; what LAPACK takes; work of one eigenvector after the other.
 size_t few_work(int n, int k) {
-    const auto length = static_cast<size_t>(n), padded = length + pad;
-    return length * padded + 4 * padded + 3 * length +
+    const auto length = static_cast<size_t>(n);
+    return 3 * length + static_cast<size_t>(few_query(n, k)) +
            std::max(5 * length, static_cast<size_t>(k) * static_cast<size_t>(k)) + 4 * length;
 }
 
-/// Tridiagonal form, all its eigenvalues, the wanted eigenvectors each by itself; by inverse iteration where some are close.
-int symmetric_few(int n, const double* a, int k, double* values, double* vectors, double* work) {
-    const auto length = static_cast<size_t>(n), padded = length + pad;
-    std::fill(work, work + length * padded + 4 * padded, 0.0);
-    double *A = work, *spare = A + length * padded, *d = spare + 4 * padded, *e = d + length, *tau = e + length;
-    for (size_t c = 0; c < length; ++c) std::copy(a + c * length + c, a + (c + 1) * length, A + c * padded + c);
-    const okid_tridiagonal_t by = okid_tridiagonal_pick();
-    by.reduce(n, A, d, e, tau, spare);
+/// Tridiagonal form in the place of a, all its eigenvalues, the wanted eigenvectors each by itself; by inverse iteration where some
+/// are close.
+int symmetric_few(int n, double* a, int k, double* values, double* vectors, double* work) {
+    const auto length = static_cast<size_t>(n);
+    const lapack_int size = few_query(n, k);
+    double *d = work, *e = d + length, *tau = e + length, *blocks = tau + length, *own = blocks + size,
+           *behind = own + std::max(5 * length, static_cast<size_t>(k) * static_cast<size_t>(k));
+    if (LAPACKE_dsytrd_work(layout, 'L', n, a, n, d, e, tau, blocks, size) != 0) return 1;
     couple(n, d, e);
-    double *own = tau + length, *behind = own + std::max(5 * length, static_cast<size_t>(k) * static_cast<size_t>(k));
     std::copy(d, d + n, values);
     std::copy(e, e + n - 1, own);
     if (LAPACKE_dsterf_work(n, values, own) != 0) return 1;
@@ -279,7 +283,7 @@ int symmetric_few(int n, const double* a, int k, double* values, double* vectors
         if (LAPACKE_dstein_work(layout, n, d, e, k, values + n - k, block, end, vectors, n, own, integers, failed) != 0)
             return 1;
     }
-    by.reflect(n, A, tau, k, vectors);
+    if (LAPACKE_dormtr_work(layout, 'L', 'L', 'N', n, k, a, n, tau, vectors, n, blocks, size) != 0) return 1;
     reverse_columns(n, k, vectors);
     return 0;
 }
@@ -343,10 +347,11 @@ template <class Real> int svd(int rows, int cols, Real* a, Real* u, Real* s, Rea
 }
 
 size_t symmetric_work(int n, int k) {
-    if (few(n, k)) return few_work(n, k);
+    const size_t of_few = few_work(n, std::min(k, 2 * n / 3));
+    if (few(n, k)) return of_few;
     lapack_int integers = 0;
     const lapack_int size = syevd_query(n, &integers);
-    return static_cast<size_t>(size) + static_cast<size_t>(integers);
+    return std::max(of_few, static_cast<size_t>(size) + static_cast<size_t>(integers));
 }
 
 int symmetric(int n, double* a, int k, double* values, double* vectors, double* work) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    simulate and predict with a discrete state-space model
-// METHOD     plain recursions
+// METHOD     plain recursions; of A the band alone, which of a model in modal coordinates is three wide
 // REFERENCE  paper eq. (13), (15), (16), (20) with L = -K
 // NUMERICS   those of the numbers of the model
 // WORKSPACE  okid_model_workspace() numbers
@@ -9,7 +9,9 @@
 #include "model_fit.hpp"
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
+#include <cstdlib>
 
 using std::size_t;
 
@@ -17,21 +19,33 @@ namespace {
 
 bool sized(const okid_model_t& m) { return m.n_u >= 0 && m.n_y >= 1 && m.n_z >= 1; }
 
-/// y = M x + y, M rows x cols column-major.
-void add_product(int rows, int cols, const okid_real_t* M, const okid_real_t* x, okid_real_t* y) {
+/// y = M x + y, M rows x cols column-major, 0 farther than `band` from its diagonal.
+void add_product(int rows, int cols, const okid_real_t* M, const okid_real_t* x, okid_real_t* y, int band = INT_MAX) {
     for (int j = 0; j < cols; ++j) {
         const okid_real_t v = x[j];
         const okid_real_t* column = M + static_cast<size_t>(j) * static_cast<size_t>(rows);
-        for (int i = 0; i < rows; ++i) y[i] += column[i] * v;
+        const int last = band < rows - 1 - j ? j + band + 1 : rows;
+        for (int i = std::max(0, j - band); i < last; ++i) y[i] += column[i] * v;
     }
+}
+
+/// How far from its diagonal an n x n matrix goes.
+int band_of(int n, const okid_real_t* M) {
+    int out = 0;
+    for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i)
+            if (M[j * n + i] != 0) out = std::max(out, std::abs(i - j));
+    return out;
 }
 
 struct stepper {
     const okid_model_t& model;
     okid_real_t *x, *next;
+    int band;
     size_t z() const { return static_cast<size_t>(model.n_z); }
 
-    stepper(const okid_model_t& m, const okid_real_t* x0, okid_real_t* work) : model(m), x(work), next(work + m.n_z) {
+    stepper(const okid_model_t& m, const okid_real_t* x0, okid_real_t* work)
+        : model(m), x(work), next(work + m.n_z), band(band_of(m.n_z, m.A)) {
         if (x0 != nullptr)
             std::copy(x0, x0 + z(), x);
         else
@@ -44,7 +58,7 @@ struct stepper {
     }
     void step(const okid_real_t* u, const okid_real_t* correction) {
         std::fill(next, next + z(), okid_real_t{0});
-        add_product(model.n_z, model.n_z, model.A, x, next);
+        add_product(model.n_z, model.n_z, model.A, x, next, band);
         add_product(model.n_z, model.n_u, model.B, u, next);
         if (correction != nullptr) add_product(model.n_z, model.n_y, model.K, correction, next);
         std::swap(x, next);

@@ -94,6 +94,7 @@ static void of_an_identification(void) {
     REFUSES(3, okid_identify_create(given(0), given(1), given(2), 1));
     REFUSES(3, okid_identify_run(given(0), given(1), given(2)));
     REFUSES(3, okid_identify_decompose(given(0), given(1), given(2)));
+    REFUSES(2, okid_identify_decompose_as(given(0), OKID_METHOD_N4SID_MOESP, 2, given(1)));
     REFUSES(3, okid_identify_run_factor(given(0), given(1), given(2)));
     REFUSES(2, okid_identify_order(given(0), 1, given(1)));
     REFUSES(2, okid_identify_poles(given(0), 1, given(1)));

@@ -230,6 +230,59 @@ static void poles_need_no_whole_decomposition(void) {
     free(v);
 }
 
+/// MOESP from the factor that CVA left, and CVA again, are those from the sums, to the bit.
+static void one_factor_serves_both_projections(void) {
+    enum { N = 6000, ROWS = 12, MOST = 16, ORDER = 10 };
+    rig_t rig;
+    rig_make(&rig);
+    double* v = rig_record(&rig, N, 0.05, NULL, 2);
+    okid_identify_config_t c = {.n_u = RIG_NU, .n_y = RIG_NY, .rows = ROWS, .max_order = MOST, .order = 4};
+    c.fs_hz = RIG_FS;
+    const okid_method_t methods[] = {OKID_METHOD_N4SID_CVA, OKID_METHOD_N4SID_MOESP, OKID_METHOD_N4SID_CVA};
+    okid_identify_t *identifier[4], *both;
+    okid_identified_t own_found[4], one;
+    void* blocks[4];
+    c.method = methods[0];
+    const okid_accumulator_config_t a = {
+        .n_u = RIG_NU, .n_y = RIG_NY, .lags = okid_identify_lags(&c), .forgetting = 1, .edges = 1};
+    const size_t more = okid_accumulator_memsize(&a);
+    void* sums = malloc(more);
+    okid_accumulator_t* accumulator;
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_create(&accumulator, &a, sums, more));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
+    for (int i = 0; i < 4; ++i) {
+        c.method = i < 3 ? methods[i] : OKID_METHOD_N4SID_SSARX;
+        const size_t bytes = okid_identify_memsize(&c);
+        blocks[i] = malloc(bytes);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_identify_create(&identifier[i], &c, blocks[i], bytes));
+    }
+    both = identifier[0];
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_identify_decompose_as(both, OKID_METHOD_N4SID_MOESP, MOST, &one));
+    for (int i = 0; i < 3; ++i) {
+        TEST_ASSERT_EQUAL(OKID_OK, i == 0 ? okid_identify_decompose(both, accumulator, &one)
+                                          : okid_identify_decompose_as(both, methods[i], MOST, &one));
+        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_poles(both, ORDER, &one));
+        okid_identify_t* own = identifier[i > 0 ? i : 2];
+        TEST_ASSERT_EQUAL(OKID_OK, okid_identify_decompose(own, accumulator, &own_found[i]));
+        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_poles(own, ORDER, &own_found[i]));
+        TEST_ASSERT_EQUAL(own_found[i].mode_count, one.mode_count);
+        TEST_ASSERT_EQUAL_MEMORY(own_found[i].frequency_hz, one.frequency_hz,
+                                 (size_t)one.mode_count * sizeof *one.frequency_hz);
+        TEST_ASSERT_EQUAL_MEMORY(own_found[i].singular_values, one.singular_values, MOST * sizeof *one.singular_values);
+    }
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_identify_decompose_as(both, OKID_METHOD_N4SID_SSARX, MOST, &one));
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_identify_decompose_as(both, OKID_METHOD_OKID_ERA, MOST, &one));
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_identify_decompose_as(both, OKID_METHOD_N4SID_MOESP, 0, &one));
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_identify_decompose_as(identifier[1], methods[0], MOST, &one));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_identify_decompose(identifier[3], accumulator, &own_found[3]));
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_identify_decompose_as(identifier[3], methods[1], MOST, &own_found[3]));
+    TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(both, accumulator, &one)); // a whole model keeps no factor for it
+    TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_identify_decompose_as(both, methods[1], MOST, &one));
+    for (int i = 0; i < 4; ++i) free(blocks[i]);
+    free(sums);
+    free(v);
+}
+
 static void what_does_not_fit_is_refused(void) {
     create(2, 2, 0);
     put(1, 0.1, 0);
@@ -267,6 +320,7 @@ int main(void) {
     RUN_TEST(modes_are_found_and_noise_is_not);
     RUN_TEST(orders_of_a_record_give_its_modes);
     RUN_TEST(poles_need_no_whole_decomposition);
+    RUN_TEST(one_factor_serves_both_projections);
     RUN_TEST(what_does_not_fit_is_refused);
     return UNITY_END();
 }

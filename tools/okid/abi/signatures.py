@@ -199,6 +199,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_identify_run": (c_int, [opaque, opaque, POINTER(Identified)]),
     "okid_identify_run_factor": (c_int, [opaque, opaque, POINTER(Identified)]),
     "okid_identify_decompose": (c_int, [opaque, opaque, POINTER(Identified)]),
+    "okid_identify_decompose_as": (c_int, [opaque, c_int, c_int32, POINTER(Identified)]),
     "okid_identify_poles": (c_int, [opaque, c_int32, POINTER(Identified)]),
     "okid_stabilization_memsize": (c_size_t, [POINTER(StabilizationConfig)]),
     "okid_stabilization_create": (c_int, [POINTER(opaque), POINTER(StabilizationConfig), opaque, c_size_t]),
