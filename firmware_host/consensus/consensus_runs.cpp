@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <new>
 #include <numeric>
@@ -268,7 +267,8 @@ std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const reco
     std::vector<consensus_run> out;
     if (horizons.empty()) return out;
     const int longest = horizons.front();
-    std::stable_partition(horizons.begin(), horizons.end(), [&](int horizon) { return horizon == lags.front(); });
+    const auto own_horizon = std::find(horizons.begin(), horizons.end(), lags.front());
+    std::rotate(horizons.begin(), own_horizon, own_horizon + 1);
     const auto all = std::make_shared<owned_sums>(level_sums(level, n_u, n_y, longest, at_rest));
     owned_sums own;
     int most = std::numeric_limits<int>::max();
