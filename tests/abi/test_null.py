@@ -21,7 +21,8 @@ ROOT = Path(__file__).resolve().parents[2]
 HEADERS = [ROOT / "lib" / "include" / "okid", ROOT / "firmware_host" / "include"]
 PLAIN = {"int": ctypes.c_int, "int32_t": ctypes.c_int32, "uint32_t": ctypes.c_uint32, "int64_t": ctypes.c_int64,
          "uint64_t": ctypes.c_uint64, "size_t": ctypes.c_size_t, "double": ctypes.c_double,
-         "okid_real_t": ctypes.c_double, "okid_status_t": ctypes.c_int32, "okid_detrend_t": ctypes.c_int32}  # fmt: skip
+         "okid_real_t": ctypes.c_double, "okid_status_t": ctypes.c_int32, "okid_detrend_t": ctypes.c_int32,
+         "okid_method_t": ctypes.c_int32}  # fmt: skip
 TEXTS = {"okid_version", "okid_backend", "okid_status_text", "okid_warning_code", "okid_mkr_note"}  # without pointers
 COUNTS = {"unit", "capture_done", "result_array", "result_decomposition"}  # of okid_host: 0 is no success
 
