@@ -43,11 +43,11 @@ struct consensus_run {
     zoom_band zoom() const { return {fs_hz, band}; }
     double horizon_s() const { return rows / fs_hz; }
     std::vector<int> orders;
-    int most_order = 64; ///< asked for
-    int states = 0;      ///< of the highest order; 0: no limit
+    int most_order = 64; ///< asked for; lowered where past and future share little
+    int states = 0;      ///< that it has room for, of the highest order planned; 0: no limit
     bool full = false;   ///< of modes: too few states
-    std::shared_ptr<const owned_sums>
-        sums; ///< of a long CVA run where no other run asks for more lags: for what follows
+    /// Of a long CVA run where no other run asks for more lags, for what follows.
+    std::shared_ptr<const owned_sums> sums;
     std::vector<run_pole> poles;
     std::vector<run_track> tracks;
 };

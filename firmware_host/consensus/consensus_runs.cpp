@@ -27,7 +27,7 @@ constexpr double short_share = 0.6, middle_share = 0.8;
 constexpr int fewest_rows = 4;
 /// Orders for each state that past and future share beyond chance: a weak mode among strong ones shows above twice as many.
 /// What is higher holds noise alone and costs its third power.
-constexpr int orders_of_a_state = 3, fewest_most = 24;
+constexpr int orders_of_a_state = 3, fewest_most = 24, no_limit = std::numeric_limits<int>::max();
 constexpr int enough_voters = 4, few_voters = 2; ///< runs that tell a mode from its neighbour, that found it
 constexpr double beats_wanted = 1.25;            ///< of both in the horizon: with room for the shorter ones
 constexpr double most_decays = 2;                ///< times in which the mode falls to 1 / e: what is over tells nothing
@@ -87,12 +87,13 @@ int shared_states(const okid_identified_t& model, const consensus_run& run, long
                  future = std::min(1.0, run.rows * run.outputs / static_cast<double>(samples));
     const double of_chance = std::sqrt(past * (1 - future)) + std::sqrt(future * (1 - past));
     int out = 0;
-    while (out<model.singular_count&& static_cast<double>(model.singular_values[out])> of_chance) ++out;
+    const auto shared = [&](int k) { return static_cast<double>(model.singular_values[k]) > of_chance; };
+    while (out < model.singular_count && shared(out)) ++out;
     return out;
 }
 
-/// Keeps the orders up to `most`; all of ERA on covariances, which weighs by amplitude: a weak mode stands behind the noise of strong
-/// ones.
+/// Keeps the orders up to `most`; all of ERA without a force: slow modes of ambient records show in its high orders alone (of
+/// tests/kinds a tower's, a cable's, a chimney's).
 void keep_orders(consensus_run& run, int most) {
     if (!is_subspace(run.method) && run.inputs == 0) return;
     run.most_order = std::min(run.most_order, most);
@@ -120,14 +121,14 @@ struct run_decomposition {
     }
 };
 
-/// @param most  highest order worth its time at this level; lowered by a CVA run
+/// @param most  highest order worth its time at this level, no_limit until the first CVA run tells it
 bool find_poles(int n_u, int n_y, const owned_sums& sums, run_decomposition& of, consensus_run& run, int& most) {
     keep_orders(run, most);
     if (!of.take(run_config(run, n_u, n_y), sums)) return false;
     if (run.method == OKID_METHOD_N4SID_CVA) {
         run.full = shares_more(of.model, run);
         const int shared = shared_states(of.model, run, okid_accumulator_rows(sums.sums));
-        most = std::min(most, std::max(fewest_most, orders_of_a_state * shared));
+        if (most == no_limit) most = std::max(fewest_most, orders_of_a_state * shared);
         keep_orders(run, most);
     }
     collect_poles(of.identifier, of.model, run);
@@ -271,7 +272,7 @@ std::vector<consensus_run> run_level(std::vector<consensus_run> runs, const reco
     std::rotate(horizons.begin(), own_horizon, own_horizon + 1);
     const auto all = std::make_shared<owned_sums>(level_sums(level, n_u, n_y, longest, at_rest));
     owned_sums own;
-    int most = std::numeric_limits<int>::max();
+    int most = no_limit;
     for (const int horizon : horizons) {
         if (horizon != longest) own = shortened(level, *all, horizon, n_u, n_y);
         if (horizon != longest && !own.sums) own = level_sums(level, n_u, n_y, horizon, at_rest);

@@ -143,8 +143,7 @@ void find_gain(record_work& work) {
     okid_identified_t& model = work.model;
     const Index n = model.n_z, n_y = model.n_y;
     const MatrixXd none = MatrixXd::Zero(n, n_y);
-    model.K = none.data();
-    const std::vector<double> left = residuals(work.set, model); // of the simulation
+    const std::vector<double> left = residuals(work.set, model); // of the simulation: K of a modal model is 0 so far
     const std::vector<MatrixXd> first = covariances(left, n_y, 0);
     if (n == 0 || first.empty() || !(first[0].diagonal().minCoeff() > 0) || !first[0].allFinite()) return;
     const VectorXd unit = first[0].diagonal().cwiseSqrt();

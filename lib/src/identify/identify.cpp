@@ -293,6 +293,7 @@ okid_status_t okid_identify_run(okid_identify_t* self, okid_accumulator_t* accum
 okid_status_t okid_identify_decompose(okid_identify_t* self, okid_accumulator_t* accumulator, okid_identified_t* out) {
     if (self == nullptr || accumulator == nullptr || out == nullptr) return OKID_ERR_NULL;
     const okid_status_t status = take_sums(*self, accumulator, true, out);
+    self->poles_only = status == OKID_OK; // else no factor stands for another method
     if (status == OKID_OK) point_to(*self, out);
     return status;
 }

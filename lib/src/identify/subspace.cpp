@@ -113,8 +113,11 @@ okid_status_t decompose_as(okid_subspace_t* self, int32_t method, int order) {
     if (!projects(method) || !projects(self->config.method) || self->cut.carried == 0 || order < 1 ||
         (method == OKID_SUBSPACE_CVA && self->cut.weight == nullptr))
         return OKID_ERR_MISMATCH;
+    const int32_t before = self->config.method;
     self->config.method = method;
-    return decompose(*self, std::min(order, self->sizes.top));
+    const okid_status_t status = decompose(*self, std::min(order, self->sizes.top));
+    if (status != OKID_OK) self->config.method = before;
+    return status;
 }
 
 double condition_of(const okid_subspace_t* self) { return self->hankel.condition; }

@@ -177,7 +177,38 @@ static void orders_end_where_nothing_is_shared() {
     };
     TEST_ASSERT_TRUE(orders_to(noise_driven(20000)) == std::vector<int>(5, 24));
     TEST_ASSERT_TRUE(orders_to(noise_driven(20000, {})) == std::vector<int>(5, 24));
+    std::vector<pole> five(twelve.begin(), twelve.begin() + 5);
+    TEST_ASSERT_TRUE(orders_to(noise_driven(20000, five)) == std::vector<int>(5, 28)); // 30 is none of them
+    TEST_ASSERT_EQUAL_UINT64(5, orders_to(noise_driven(20000, twelve)).size());
     for (const int highest : orders_to(noise_driven(20000, twelve))) TEST_ASSERT_TRUE(highest == 64 || highest == 52);
+}
+
+/// The sums that the long CVA run keeps are those made anew from the level.
+static void sums_are_made_once() {
+    record_level level = noise_driven(4000);
+    sample_rows& rows = level.records[0];
+    sample_rows driven;
+    for (std::size_t i = 1; i < rows.size(); ++i)
+        driven.insert(driven.end(), {rows[i - 1], rows[i], rows[i] - rows[i - 1]});
+    level.records[0] = driven; // one force, two outputs
+    level.samples = static_cast<long long>(driven.size() / 3);
+    const auto runs = look_at({level}, 0, 1, 2, false, 1);
+    std::size_t kept = 0;
+    for (consensus_run run : runs) {
+        if (!run.sums) continue;
+        TEST_ASSERT_EQUAL(OKID_METHOD_N4SID_CVA, run.method);
+        const auto first = sums_of(run, level, 1, 2, false);
+        run.sums.reset();
+        const auto again = sums_of(run, level, 1, 2, false);
+        const okid_identify_config_t config = run_config(run, 1, 2);
+        const auto size = static_cast<std::size_t>(3 * (okid_identify_lags(&config) + 1));
+        std::vector<double> one(size * size), other(size * size);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(first->sums, OKID_DETREND_NONE, one.data(), nullptr));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(again->sums, OKID_DETREND_NONE, other.data(), nullptr));
+        TEST_ASSERT_TRUE(first != again && one == other);
+        ++kept;
+    }
+    TEST_ASSERT_EQUAL_UINT64(1, kept);
 }
 
 /// A level of which a subspace run is full is looked at again with twice the horizon, in place of its runs.
@@ -227,6 +258,7 @@ int main() {
     RUN_TEST(no_run_asks_for_more_lags_than_the_longest);
     RUN_TEST(runs_find_the_modes);
     RUN_TEST(orders_end_where_nothing_is_shared);
+    RUN_TEST(sums_are_made_once);
     RUN_TEST(crowded_levels_are_looked_at_closer);
     RUN_TEST(close_modes_are_looked_at_in_their_band);
     return UNITY_END();

@@ -165,7 +165,7 @@ void check_symmetric(int n, int k, const vec<double>& original, double scale) {
 
 void test_symmetric() {
     for (const int n : {1, 2, 3, 10, 70})
-        for (const int k : {1, std::max(1, n / 4), n}) {
+        for (const int k : {1, std::max(1, n / 4), std::max(1, 3 * n / 5), n}) {
             const vec<double> r = random_matrix<double>(n, n, static_cast<std::uint64_t>(n));
             vec<double> a(static_cast<size_t>(n * n));
             la::multiply(false, true, n, n, n, 1, r.data(), n, r.data(), n, 0, a.data(), n);
@@ -182,7 +182,7 @@ void test_symmetric_degenerate() {
     const vec<double> r = random_matrix<double>(n, 4, 6);
     vec<double> a(n * n, 0);
     la::multiply(false, true, n, n, 4, 1, r.data(), n, r.data(), n, 0, a.data(), n);
-    for (const int k : {4, 9, n}) check_symmetric(n, k, a, n);
+    for (const int k : {4, 9, 18, n}) check_symmetric(n, k, a, n);
     vec<double> many(n * n, 0), graded(n * n, 0), blocks(n * n, 0);
     for (int i = 0; i < n; ++i) {
         many[static_cast<size_t>(i * n + i)] = i % 3;
@@ -190,7 +190,7 @@ void test_symmetric_degenerate() {
         for (int j = i / 10 * 10; j < i / 10 * 10 + 10; ++j) // three times the same block
             blocks[static_cast<size_t>(i * n + j)] = 1.0 / (1 + std::abs(i - j));
     }
-    for (const int k : {5, n}) {
+    for (const int k : {5, 18, n}) {
         check_symmetric(n, k, many, 2);
         check_symmetric(n, k, graded, 1);
         check_symmetric(n, k, blocks, 1);
