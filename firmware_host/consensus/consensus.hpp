@@ -46,7 +46,7 @@ struct consensus_run {
     int most_order = 64; ///< asked for; lowered where past and future share little
     int states = 0;      ///< that it has room for, of the highest order planned; 0: no limit
     bool full = false;   ///< of modes: too few states
-    /// Of a long CVA run where no other run asks for more lags, for what follows.
+    /// Of the first run of a rate, where no other one asks for more lags: what follows need not sum again.
     std::shared_ptr<const owned_sums> sums;
     std::vector<run_pole> poles;
     std::vector<run_track> tracks;

@@ -303,8 +303,10 @@ okid_status_t okid_identify_decompose_as(okid_identify_t* self, okid_method_t me
     if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
     okid_identify_config_t other = self->config;
     other.method = method;
-    if (!self->by_subspace || !self->poles_only || !valid(other) || !plan(other).by_subspace) return OKID_ERR_MISMATCH;
-    const okid_status_t status = okid::decompose_as(self->subspace, plan(other).subspace_config.method, order);
+    if (!self->by_subspace || !self->poles_only || !valid(other)) return OKID_ERR_MISMATCH;
+    const okid_identify planned = plan(other);
+    if (!planned.by_subspace) return OKID_ERR_MISMATCH;
+    const okid_status_t status = okid::decompose_as(self->subspace, planned.subspace_config.method, order);
     if (status != OKID_OK) return status;
     self->config.method = method;
     point_to(*self, out);

@@ -44,8 +44,8 @@ struct stepper {
     int band;
     size_t z() const { return static_cast<size_t>(model.n_z); }
 
-    stepper(const okid_model_t& m, const okid_real_t* x0, okid_real_t* work)
-        : model(m), x(work), next(work + m.n_z), band(band_of(m.n_z, m.A)) {
+    stepper(const okid_model_t& m, size_t count, const okid_real_t* x0, okid_real_t* work)
+        : model(m), x(work), next(work + m.n_z), band(count > 1 ? band_of(m.n_z, m.A) : INT_MAX) {
         if (x0 != nullptr)
             std::copy(x0, x0 + z(), x);
         else
@@ -86,7 +86,7 @@ okid_status_t okid_model_simulate(const okid_model_t* model, const okid_real_t* 
                                   okid_real_t* y, okid_real_t* work) {
     if (model == nullptr || u == nullptr || y == nullptr || work == nullptr) return OKID_ERR_NULL;
     if (!sized(*model)) return OKID_ERR_DIM;
-    stepper s(*model, x0, work);
+    stepper s(*model, count, x0, work);
     okid_real_t* spare = work + 2 * model->n_z;
     for (size_t n = 0; n < count; ++n) {
         const okid_real_t* input = usable_input(u + n * static_cast<size_t>(model->n_u), model->n_u, spare);
@@ -101,7 +101,7 @@ okid_status_t okid_model_predict(const okid_model_t* model, const okid_real_t* u
     if (model == nullptr || model->K == nullptr || u == nullptr || y == nullptr || yhat == nullptr || work == nullptr)
         return OKID_ERR_NULL;
     if (!sized(*model)) return OKID_ERR_DIM;
-    stepper s(*model, x0, work);
+    stepper s(*model, count, x0, work);
     okid_real_t *spare = work + 2 * model->n_z, *innovation = spare + model->n_u;
     const auto ny = static_cast<size_t>(model->n_y);
     for (size_t n = 0; n < count; ++n) {
