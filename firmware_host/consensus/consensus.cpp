@@ -380,7 +380,7 @@ void judge_agreement(consensus_mode& mode) {
 
 std::vector<int> consensus_orders(int most) {
     std::vector<int> out;
-    for (int n = 4; n <= most; n += n < 24 ? 2 : 4) out.push_back(n);
+    for (int n = 4; n <= most; n += n < 24 ? 2 : n < 64 ? 4 : 8) out.push_back(n);
     return out;
 }
 

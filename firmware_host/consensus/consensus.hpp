@@ -71,7 +71,7 @@ struct consensus_mode {
     bool confident() const { return why.empty(); }
 };
 
-/// Orders of a run with room for `most` states: every second one up to 24, then every fourth.
+/// Orders of a run with room for `most` states: every second one up to 24, every fourth up to 64, then every eighth.
 std::vector<int> consensus_orders(int most);
 
 /// The poles of all orders of the identifier's last run().

@@ -146,8 +146,7 @@ std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& mod
     std::vector<std::optional<carried_mode>> out(wanted.size());
     std::optional<deviations> sigma;
     std::vector<std::vector<mode_shift>> moved;
-    if (!replicates.empty()) sigma = deviations_of(model, replicates, {});
-    for (const replicate_model& replicate : replicates) moved.push_back(modes_in(replicate.view(), model.dt));
+    if (!replicates.empty()) sigma = deviations_of(model, replicates, {}, &moved);
     const auto here =
         modes_in(model.frequency_hz, model.damping_ratio, model.shape_re, model.shape_im, model.mode_count, model.n_y);
     for (std::size_t i = 0; i < wanted.size(); ++i) {
@@ -196,12 +195,15 @@ std::vector<std::optional<carried_mode>> carry_at(const carrier_task& task, int 
     const auto block = carrier_memory(bytes);
     okid_identify_t* identifier = nullptr;
     okid_identified_t model{};
-    if (!block || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK ||
-        okid_identify_run(identifier, task.sums.sums, &model) < 0)
+    const auto find_poles = [&] { // neither B nor D nor K is asked for
+        return okid_identify_decompose(identifier, task.sums.sums, &model) >= 0 &&
+               okid_identify_poles(identifier, std::min(order, okid_identify_max_order(&config)), &model) >= 0;
+    };
+    if (!block || okid_identify_create(&identifier, &config, block.get(), bytes) != OKID_OK || !find_poles())
         return out;
     const bool nearly_singular = (model.warnings & OKID_NOTE_ILL_CONDITIONED) && model.observer_info.ridge <= 1e-10;
     const bool exact = nearly_singular && run_factor(task.level, config, task.at_rest, identifier, model);
-    if (nearly_singular && !exact && okid_identify_run(identifier, task.sums.sums, &model) < 0) return out;
+    if (nearly_singular && !exact && !find_poles()) return out;
     std::vector<replicate_model> replicates;
     if (task.blocks > 0) {
         record_work work;

@@ -230,25 +230,41 @@ std::vector<product> distortions(product_search& s) {
     return out;
 }
 
+/// Power spectra of a strand, and those that the forces give it.
+struct strand_powers {
+    std::vector<double> all, left, of_force;
+};
+
+strand_powers powers_of(const strand& one, bool driven, std::size_t size) {
+    strand_powers out{power_spectrum(one.all, 1, 0, size), {}, {}};
+    if (!driven) return out;
+    std::vector<series> by_force = one.all;
+    for (std::size_t r = 0; r < by_force.size(); ++r)
+        for (std::size_t t = 0; t < by_force[r].size(); ++t) by_force[r][t] -= one.left[r][t];
+    out.left = power_spectrum(one.left, 1, 0, size);
+    out.of_force = power_spectrum(by_force, 1, 0, size);
+    return out;
+}
+
 /// Powers at a mode's frequency of all of it and of what is left; is there a resonance in what the forces drive?
-void weigh(const listed_mode& mode, double fs_hz, strand& one) {
+/// @param known  spectra of this strand by their size
+void weigh(const listed_mode& mode, const product_search& s, std::map<std::size_t, strand_powers>& known, strand& one) {
     std::size_t longest = 0, size = shortest_spectrum;
     for (const series& x : one.all) longest = std::max(longest, x.size());
-    const double f = mode.frequency_hz / fs_hz;
+    const double f = mode.frequency_hz / s.fs_hz;
     while (8 * size <= longest && mode.damping_ratio * f * static_cast<double>(size) < 2) size *= 2;
     const double width = std::max(mode.damping_ratio * f, 2 / static_cast<double>(size));
-    std::vector<series> driven = one.all;
-    for (std::size_t r = 0; r < driven.size(); ++r)
-        for (std::size_t t = 0; t < driven[r].size(); ++t) driven[r][t] -= one.left[r][t];
-    const auto all = power_spectrum(one.all, 1, 0, size), left = power_spectrum(one.left, 1, 0, size),
-               of_force = power_spectrum(driven, 1, 0, size);
-    if (all.empty() || left.empty() || of_force.empty()) return;
+    const auto [at, fresh] = known.try_emplace(size);
+    if (fresh) at->second = powers_of(one, s.driven, size);
+    const auto& [all, left, of_force] = at->second;
+    if (all.empty() || (s.driven && (left.empty() || of_force.empty()))) return;
     one.power = mean_power(all, f - width, f + width);
+    one.strength = std::sqrt(one.power * width) / (mode.frequency_hz * mode.frequency_hz);
+    if (!s.driven) return;
     one.share_left = mean_power(left, f - width, f + width) / std::max(one.power, 1e-300);
     one.peak = mean_power(of_force, f - width, f + width) /
                std::max({mean_power(of_force, f - 4 * width, f - 2 * width),
                          mean_power(of_force, f + 2 * width, f + 4 * width), 1e-300});
-    one.strength = std::sqrt(one.power * width) / (mode.frequency_hz * mode.frequency_hz);
 }
 
 std::vector<double> weights_of_outputs(const record_set& set) {
@@ -298,11 +314,13 @@ void fill(const record_work& work, product_search& s) {
             for (std::size_t t = 0; t < count; ++t) left[t] = residual[t * set.n_y + o];
         }
     }
+    std::map<std::size_t, strand_powers> known; // of one output all strands are the same
     for (std::size_t k = 0; k < s.modes.size(); ++k) {
+        if (set.n_y > 1) known.clear();
         s.strands[k].line = is_tone(work.context.verdicts[k].why);
         const double cycles = s.modes[k].frequency_hz / s.fs_hz;
         const auto ring = static_cast<std::size_t>(judgement::ring_periods / cycles) + 1;
-        weigh(s.modes[k], s.fs_hz, s.strands[k]);
+        weigh(s.modes[k], s, known, s.strands[k]);
         s.strands[k].rings = !s.driven && rings_down(demodulated(s.strands[k].all, cycles, ring));
     }
 }

@@ -72,7 +72,7 @@ struct gain_search {
         if (!stable(gain)) return false;
         const MatrixXd real = gain * unit.cwiseInverse().asDiagonal();
         model.K = real.data();
-        return better(gain, residuals(work.set, model));
+        return better(gain, residuals(work.set, model, &work.states));
     }
 
     bool better(const MatrixXd& gain, std::vector<double> left) {
@@ -143,7 +143,8 @@ void find_gain(record_work& work) {
     okid_identified_t& model = work.model;
     const Index n = model.n_z, n_y = model.n_y;
     const MatrixXd none = MatrixXd::Zero(n, n_y);
-    const std::vector<double> left = residuals(work.set, model); // of the simulation: K of a modal model is 0 so far
+    const std::vector<double> left =
+        residuals(work.set, model, &work.states); // of the simulation: K of a modal model is 0 so far
     const std::vector<MatrixXd> first = covariances(left, n_y, 0);
     if (n == 0 || first.empty() || !(first[0].diagonal().minCoeff() > 0) || !first[0].allFinite()) return;
     const VectorXd unit = first[0].diagonal().cwiseSqrt();

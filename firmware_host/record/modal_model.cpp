@@ -102,11 +102,13 @@ void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, recor
     model.noise_level = NAN;
     put_modes(modes, arrays, model);
     put_states(modes, arrays, model);
+    work.states.clear();
     if (model.n_u == 0) return;
     const bool known = put_inputs(modes, work.inputs, arrays, model);
     const okid_status_t status =
-        known ? OKID_OK : fit_outputs(work.set, model.n_z, model.A, model.C, arrays.B, arrays.D);
+        known ? OKID_OK : fit_outputs(work.set, model.n_z, model.A, model.C, arrays.B, arrays.D, &work.states);
     if (status < 0) {
+        work.states.clear();
         std::fill(arrays.B.begin(), arrays.B.end(), 0.0);
         std::fill(arrays.D.begin(), arrays.D.end(), 0.0);
         work.context.warnings.emplace_back(

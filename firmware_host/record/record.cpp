@@ -277,7 +277,7 @@ std::vector<replicate_model> improve(const record_options& options, okid_accumul
         work.states = states;
         return replicates;
     }
-    fit_records(work.set, work.model, work.context, states.empty() ? nullptr : &states);
+    fit_records(work.set, work.model, work.context, &states);
     if (options.refine == "yes") {
         tell(options, "refining the model");
         replicates = refine_model(options.detrend != "none", work);

@@ -321,13 +321,13 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
         means = means_of(work.set);
         remove_means(work.set);
     }
-    const auto make_and_fit = [&] { // with a force the steps behind need the states it begins with
+    const auto make_model = [&] { // with a force the steps behind need the states it begins with
         make_modal_model(listed, options.fs_hz, work);
-        if (work.set.n_u > 0) fit_records(work.set, work.model, work.context);
+        if (work.set.n_u > 0) find_states(work.set, work.model, work.context, &work.states);
     };
-    make_and_fit();
-    if (!options.by_hand() && mark_combinations(listed, options.fs_hz, work)) make_and_fit();
-    if (refine_agreed(options, listed, work)) make_and_fit();
+    make_model();
+    if (!options.by_hand() && mark_combinations(listed, options.fs_hz, work)) make_model();
+    if (refine_agreed(options, listed, work)) make_model();
     remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);
     find_matrix_deviations(listed, options, work);
@@ -337,7 +337,7 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
     work.refined->mean = std::move(means);
     work.model.mean = work.refined->mean.data();
     find_gain(work);
-    fit_records(work.set, work.model, work.context);
+    fit_records(work.set, work.model, work.context, &work.states);
     if (!options.by_hand()) remark_unexplained(listed, options.fs_hz, work);
     if (work.force_is_older) {
         work.context.simulation_percent.reset();

@@ -39,10 +39,12 @@ std::vector<double> percent(const std::vector<double>& sums, std::size_t n_y, st
 struct fit_run {
     okid_model_t model;
     double radius;
-    std::vector<double> work, sums; ///< of okid_model_fit()
+    const std::vector<double>* known; ///< initial states, n_z numbers a record, or nullptr
+    std::vector<double> work, sums;   ///< of okid_model_fit()
 
-    fit_run(const okid_identified_t& of, bool predict)
+    fit_run(const okid_identified_t& of, bool predict, const std::vector<double>* states)
         : model{of.n_u, of.n_y, of.n_z, of.A, of.B, of.C, of.D, predict ? of.K : nullptr}, radius(of.model_radius),
+          known(states && !states->empty() ? states : nullptr),
           work(std::max(okid_model_workspace(&model), okid_model_fit_memsize(&model) / sizeof(double) + 1)),
           sums(5 * static_cast<std::size_t>(of.n_y)) {}
 
@@ -56,10 +58,15 @@ struct fit_run {
         }
     }
 
-    /// The least-squares initial state of a stretch; without inputs it begins at rest.
-    std::vector<double> begin(const record_set& set, const record_data& record, const stretch& piece) {
+    /// The least-squares initial state of a stretch of record r; without inputs it begins at rest.
+    std::vector<double> begin(const record_set& set, std::size_t r, const stretch& piece) {
+        const record_data& record = set.records[r];
         std::vector<double> x0(static_cast<std::size_t>(model.n_z));
         if (set.n_u == 0) return x0;
+        if (known && piece.count == record.count) {
+            std::copy_n(known->data() + r * x0.size(), x0.size(), x0.data());
+            return x0;
+        }
         const std::size_t used = initial_state_samples(radius, piece.count);
         take(set, set.rows(record) + piece.first * set.channels(), used);
         if (okid_model_initial_state(&model, u_.data(), y_.data(), used, x0.data(), work.data()) < 0)
@@ -68,9 +75,9 @@ struct fit_run {
     }
 
     /// What one-step prediction leaves of a stretch.
-    void left(const record_set& set, const record_data& record, const stretch& piece, double* out) {
-        const std::vector<double> x0 = begin(set, record, piece);
-        take(set, set.rows(record) + piece.first * set.channels(), piece.count);
+    void left(const record_set& set, std::size_t r, const stretch& piece, double* out) {
+        const std::vector<double> x0 = begin(set, r, piece);
+        take(set, set.rows(set.records[r]) + piece.first * set.channels(), piece.count);
         const double* u = u_.empty() ? y_.data() : u_.data(); // of no inputs no number is read
         if (okid_model_predict(&model, u, y_.data(), piece.count, x0.data(), out, work.data()) < 0)
             std::fill_n(out, y_.size(), std::numeric_limits<double>::quiet_NaN());
@@ -130,12 +137,23 @@ void tell_states(const std::vector<double>& states, int n_z, result_context& con
     for (auto at = states.begin(); at != states.end(); at += n_z) context.x0->emplace_back(at, at + n_z);
 }
 
-std::vector<double> residuals(const record_set& set, const okid_identified_t& found) {
-    fit_run run(found, true);
+void find_states(const record_set& set, const okid_identified_t& found, result_context& context,
+                 const std::vector<double>* known) {
+    fit_run run(found, false, known);
+    context.x0.emplace();
+    for (std::size_t r = 0; r < set.records.size(); ++r) {
+        const std::vector<stretch> pieces = stretches_of(set, set.records[r], shortest_of(found.n_z));
+        context.x0->push_back(pieces.empty() ? std::vector<double>(static_cast<std::size_t>(found.n_z))
+                                             : run.begin(set, r, pieces.front()));
+    }
+}
+
+std::vector<double> residuals(const record_set& set, const okid_identified_t& found, const std::vector<double>* known) {
+    fit_run run(found, true, known);
     std::vector<double> out(set.count() * set.n_y, std::numeric_limits<double>::quiet_NaN());
-    for (const record_data& record : set.records)
-        for (const stretch& piece : stretches_of(set, record, shortest_of(found.n_z)))
-            run.left(set, record, piece, out.data() + (record.first + piece.first) * set.n_y);
+    for (std::size_t r = 0; r < set.records.size(); ++r)
+        for (const stretch& piece : stretches_of(set, set.records[r], shortest_of(found.n_z)))
+            run.left(set, r, piece, out.data() + (set.records[r].first + piece.first) * set.n_y);
     return out;
 }
 
@@ -143,17 +161,13 @@ void fit_records(const record_set& set, const okid_identified_t& found, result_c
                  const std::vector<double>* known) {
     const bool predict = found.K && !(found.warnings & OKID_NOTE_PREDICTOR_UNSTABLE);
     const auto n_y = static_cast<std::size_t>(found.n_y), n_z = static_cast<std::size_t>(found.n_z);
-    fit_run run(found, predict);
+    fit_run run(found, predict, known);
     std::vector<std::vector<double>> states;
     for (const record_data& record : set.records) {
         std::vector<double> first(n_z, 0.0);
         bool begun = false;
         for (const stretch& piece : stretches_of(set, record, shortest_of(found.n_z))) {
-            const bool whole = known && piece.count == record.count;
-            const auto at = static_cast<std::ptrdiff_t>(states.size() * n_z);
-            const std::vector<double> x0 =
-                whole ? std::vector<double>(known->begin() + at, known->begin() + at + static_cast<std::ptrdiff_t>(n_z))
-                      : run.begin(set, record, piece);
+            const std::vector<double> x0 = run.begin(set, states.size(), piece);
             run.add(set, record, piece, x0);
             if (!begun) first = x0;
             begun = true;

@@ -23,12 +23,17 @@ okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const
                           std::vector<double>& D, std::vector<double>* x0 = nullptr);
 
 /// What the model's prediction leaves of each sample, n_y numbers, NaN where there is none to compare; from rest, or the
-/// initial state that fits a stretch best.
-std::vector<double> residuals(const record_set& set, const okid_identified_t& model);
+/// initial state that fits a stretch best. @param known  as of fit_records()
+std::vector<double> residuals(const record_set& set, const okid_identified_t& model,
+                              const std::vector<double>* known = nullptr);
+
+/// Fill x0 of the context alone. @param known  as of fit_records()
+void find_states(const record_set& set, const okid_identified_t& model, result_context& context,
+                 const std::vector<double>* known);
 
 /// Fill x0, simulation_percent and prediction_percent of the context. The records are in the model's own terms
 /// (detrended); missing inputs are taken as 0. Without inputs: prediction_percent only.
-/// @param known  initial states as fit_outputs() gives them: serve the records without missing inputs
+/// @param known  initial states as fit_outputs() gives them, or none: serve the records without missing inputs
 void fit_records(const record_set& set, const okid_identified_t& model, result_context& context,
                  const std::vector<double>* known = nullptr);
 

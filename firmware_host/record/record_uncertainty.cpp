@@ -170,12 +170,13 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
 }
 
 deviations deviations_of(const okid_identified_t& model, const std::vector<replicate_model>& replicates,
-                         const mass_plan& plan) {
+                         const mass_plan& plan, std::vector<std::vector<mode_shift>>* modes) {
     replicate_statistics statistics(model.n_u, model.n_y, model.n_z, plan, model.dt);
     statistics.begin(model_view(model));
     for (const replicate_model& replicate : replicates) {
         const okid_model_t view = replicate.view();
         statistics.add(replicate.found() ? &view : nullptr, replicate.share);
+        if (modes) modes->push_back(statistics.last());
     }
     return statistics.finish();
 }

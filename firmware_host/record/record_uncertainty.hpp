@@ -35,8 +35,9 @@ std::vector<replicate_model> leave_out_blocks(const record_work& work, okid_accu
                                               bool inputs);
 
 /// Deviations of the modes, and of M, K, R where the plan wants them.
+/// @param modes  out, of each replicate; may be nullptr
 deviations deviations_of(const okid_identified_t& model, const std::vector<replicate_model>& replicates,
-                         const mass_plan& plan);
+                         const mass_plan& plan, std::vector<std::vector<mode_shift>>* modes = nullptr);
 
 /// Does a horizon of 2 p, at the order and the ridge of the model, say something else than p by more than two standard
 /// deviations? Then a remark names the modes: the bias of a finite p, which no deviation sees. Nothing when `rows` regression

@@ -48,9 +48,10 @@ struct record_work {
     bool analytic = false;               ///< deviations out of what it holds, see leave_out_blocks()
     okid_identified_t realised{};        ///< what it gave, before any refinement
     std::unique_ptr<refined_arrays> refined;
-    std::vector<double> states;                  ///< initial ones of fits that are left for later; else empty
-    std::vector<mode_carrier> carriers;          ///< auto: of each listed mode
-    std::vector<double> scale;                   ///< auto: of each channel
+    std::vector<double> states;         ///< initial ones of the model where they are known; a method by name: of
+                                        ///< fits that are left for later
+    std::vector<mode_carrier> carriers; ///< auto: of each listed mode
+    std::vector<double> scale;          ///< auto: of each channel
     std::vector<std::vector<mode_shift>> shifts; ///< auto: of each listed mode, a block each; empty: not known
 };
 

@@ -21,7 +21,7 @@ void check_statistics(okid_status_t status) {
 }
 
 replicate_statistics::replicate_statistics(int n_u, int n_y, int most_states, const mass_plan& plan, double dt)
-    : dt_(dt), mkr_(plan.wanted() ? std::make_unique<mkr_arguments>(plan, dt) : nullptr) {
+    : dt_(dt), n_y_(n_y), mkr_(plan.wanted() ? std::make_unique<mkr_arguments>(plan, dt) : nullptr) {
     const okid_replicates_config_t config{n_u, n_y, most_states, mkr_ ? &mkr_->config : nullptr};
     const std::size_t bytes = okid_replicates_memsize(&config);
     block_ = std::make_unique<std::byte[]>(bytes);
@@ -34,6 +34,12 @@ void replicate_statistics::begin(const okid_model_t& full) {
 
 void replicate_statistics::add(const okid_model_t* replicate, double share) {
     check_statistics(okid_replicates_add(replicates_, replicate, share));
+}
+
+std::vector<mode_shift> replicate_statistics::last() const {
+    okid_modes_t modes{};
+    check_statistics(okid_replicates_last(replicates_, &modes));
+    return modes_in(modes.frequency_hz, modes.damping_ratio, modes.shape_re, modes.shape_im, modes.count, n_y_);
 }
 
 deviations replicate_statistics::finish() {

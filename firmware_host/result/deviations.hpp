@@ -24,6 +24,12 @@ struct deviations {
     double alpha = NAN, beta = NAN;
 };
 
+/// A mode, or how far it moves without one block; shapes with the largest entry of the whole's held.
+struct mode_shift {
+    double frequency_hz = 0, damping_ratio = 0;
+    std::vector<std::complex<double>> shape;
+};
+
 /// Collects replicates of one model after the other. All memory at the start.
 class replicate_statistics {
   public:
@@ -32,10 +38,12 @@ class replicate_statistics {
 
     void begin(const okid_model_t& full);
     void add(const okid_model_t* replicate, double share);
+    std::vector<mode_shift> last() const; ///< modes of what was added last
     deviations finish();
 
   private:
     double dt_;
+    int n_y_;
     std::unique_ptr<mkr_arguments> mkr_;
     std::unique_ptr<std::byte[]> block_;
     okid_replicates_t* replicates_ = nullptr;
@@ -50,12 +58,6 @@ void check_statistics(okid_status_t status);
 
 /// The model alone.
 okid_model_t model_view(const okid_identified_t& model);
-
-/// A mode, or how far it moves without one block; shapes with the largest entry of the whole's held.
-struct mode_shift {
-    double frequency_hz = 0, damping_ratio = 0;
-    std::vector<std::complex<double>> shape;
-};
 
 /// The modes of a model of any method; none where it has none.
 std::vector<mode_shift> modes_in(const double* frequency, const double* damping, const double* re, const double* im,

@@ -13,6 +13,7 @@
 
 #include <okid/identify.h>
 #include <okid/mkr.h>
+#include <okid/modal.h>
 #include <okid/model.h>
 
 #ifdef __cplusplus
@@ -82,6 +83,11 @@ OKID_NODISCARD OKID_API okid_status_t okid_replicates_begin(okid_replicates_t* s
 ///         OKID_ERR_DIM (also a share out of range). Cost of okid_modal_analyse() and okid_mkr_identify()
 OKID_NODISCARD OKID_API okid_status_t okid_replicates_add(okid_replicates_t* self, const okid_model_t* replicate,
                                                           double share);
+
+/// The modes of the replicate that was added last, which add() has found, in the order of okid_modal_analyse(); none of NULL.
+/// @param out  views into the object, valid until the next add(); eigenvalues and eigenvectors are NULL
+/// @return OKID_OK, OKID_ERR_NULL
+OKID_NODISCARD OKID_API okid_status_t okid_replicates_last(const okid_replicates_t* self, okid_modes_t* out);
 
 /// Standard deviations of what was added so far; more may be added after it.
 /// @return OKID_OK; OKID_WARN_MODEL: some are NaN; OKID_ERR_NULL

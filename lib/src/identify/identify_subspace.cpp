@@ -53,12 +53,12 @@ okid_status_t decompose_subspace_gram(okid_identify& s, okid_accumulator_t* accu
     if (status == OKID_OK) status = check_constant_gram(s, s.n, out);
     if (status != OKID_OK) return status;
     okid_subspace_info_t info;
-    expect(s.subspace, s.poles_only ? 0 : s.follow > 0 ? s.follow : s.config.order, s.follow == 0 && !s.poles_only);
+    expect(s.subspace, s.poles_only ? 0 : s.follow > 0 ? s.follow : s.config.order, s.follow == 0);
     status = okid_subspace_decompose(s.subspace, s.gram, out->regression_rows, &info);
     out->observer_info.channel = info.channel;
     if (status != OKID_OK) return status;
     const double condition = info.ridge > rounding_ridge ? no_pivot : condition_of(s.subspace);
-    note(s, info, s.follow > 0 || s.poles_only ? 0 : condition, out);
+    note(s, info, s.follow > 0 ? 0 : condition, out);
     return status;
 }
 

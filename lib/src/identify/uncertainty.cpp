@@ -253,7 +253,7 @@ okid_status_t okid_replicates_begin(okid_replicates_t* self, const okid_model_t*
     if (!fits(s, *full) || !(dt > 0) || !std::isfinite(dt)) return OKID_ERR_DIM;
     const size_t modes = static_cast<size_t>(s.modes), shapes = modes * static_cast<size_t>(s.config.n_y);
     s.dt = dt;
-    s.replicates = s.models = 0;
+    s.replicates = s.models = s.other.count = 0;
     s.alpha_sum = s.beta_sum = moments{};
     s.mkr_tally = tally{};
     std::fill(s.mode_tally, s.mode_tally + modes, tally{});
@@ -276,6 +276,7 @@ okid_status_t okid_replicates_add(okid_replicates_t* self, const okid_model_t* r
     okid_replicates& s = *self;
     if (!(share > 0) || !(share < 1) || (replicate != nullptr && !fits(s, *replicate))) return OKID_ERR_DIM;
     ++s.replicates;
+    s.other.count = 0;
     if (replicate == nullptr || find_modes(s, *replicate, s.other) != OKID_OK) return OKID_WARN_MODEL;
     ++s.models;
     match_modes(s);
@@ -290,6 +291,19 @@ okid_status_t okid_replicates_add(okid_replicates_t* self, const okid_model_t* r
     if (!find_matrices(s, *replicate, found, pdc)) return OKID_WARN_MODEL;
     add_matrices(s, found, pdc, share);
     return complete ? OKID_OK : OKID_WARN_MODEL;
+}
+
+okid_status_t okid_replicates_last(const okid_replicates_t* self, okid_modes_t* out) {
+    if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
+    const mode_list& found = self->other;
+    *out = okid_modes_t{};
+    out->count = found.count;
+    out->frequency_hz = found.frequency;
+    out->damping_ratio = found.damping;
+    out->mpc = found.mpc;
+    out->shape_re = found.re;
+    out->shape_im = found.im;
+    return OKID_OK;
 }
 
 okid_status_t okid_replicates_finish(okid_replicates_t* self, okid_uncertainty_t* out) {

@@ -122,6 +122,9 @@ static void orders_stay_within_the_horizon() {
     TEST_ASSERT_EQUAL(OKID_HANKEL_SYSTEM, run_config(runs[0], 1, 1).hankel);
     TEST_ASSERT_TRUE(consensus_orders(33) == std::vector<int>({4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28, 32}));
     TEST_ASSERT_TRUE(consensus_orders(3).empty());
+    const std::vector<int> many = consensus_orders(130);
+    TEST_ASSERT_TRUE(std::vector<int>(many.end() - 10, many.end()) ==
+                     std::vector<int>({60, 64, 72, 80, 88, 96, 104, 112, 120, 128}));
 }
 
 static void no_run_asks_for_more_lags_than_the_longest() {

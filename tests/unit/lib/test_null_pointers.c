@@ -126,6 +126,7 @@ static void of_deviations(void) {
         if (missing != 1) TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_replicates_add(given(0), &model, 0.1));
     }
     REFUSES(2, okid_replicates_finish(given(0), given(1)));
+    REFUSES(2, okid_replicates_last(given(0), given(1)));
     REFUSES(3, okid_jackknife_create(given(0), given(1), given(2), 1));
     REFUSES(3, okid_jackknife_begin(given(0), given(1), given(2)));
     REFUSES(4, okid_jackknife_begin_linear(given(0), given(1), given(2), given(3)));

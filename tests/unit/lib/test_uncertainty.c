@@ -381,7 +381,12 @@ static void deviations_are_those_of_the_formula(void) {
     TEST_ASSERT_EQUAL(RIG_MODES, out.mode_count);
     TEST_ASSERT_EQUAL(G, out.models);
     const double limit = TOLERANCE(1e-9, 5e-3);
+    okid_modes_t last;
+    TEST_ASSERT_EQUAL(OKID_OK, okid_replicates_last(r, &last));
+    TEST_ASSERT_EQUAL(RIG_MODES, last.count);
     for (int k = 0; k < RIG_MODES; ++k) {
+        const double moved = last.frequency_hz[k] - rig_frequency[k];
+        TEST_ASSERT_TRUE(fabs(moved - f[k][G - 1]) < TOLERANCE(1e-9, 1e-3));
         TEST_ASSERT_EQUAL(G, out.used[k]);
         TEST_ASSERT_TRUE(fabs(out.frequency_std_hz[k] / expected(f[k], share, G) - 1) < limit);
         TEST_ASSERT_TRUE(fabs(out.damping_ratio_std[k] / expected(zeta[k], share, G) - 1) < limit);
