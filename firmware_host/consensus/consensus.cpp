@@ -241,19 +241,24 @@ bool sharp(const consensus_run& run, double f) {
            f * run.horizon_s() >= judgement::periods_sharp;
 }
 
-/// Root mean square distance of the subspace runs of the mode's level from its values.
+/// Distances of the subspace runs of the mode's level from its values: root mean square and median.
 void set_scatter(const std::vector<consensus_run>& runs, const std::vector<member>& seen, consensus_mode& mode) {
-    double count = 0, f = 0, zeta = 0;
+    std::vector<std::pair<double, double>> away;
+    double f = 0, zeta = 0;
     for (const member& m : seen) {
         const consensus_run& run = runs[static_cast<std::size_t>(m.run)];
         if (run.level != mode.level || !is_subspace(run.method)) continue;
-        ++count;
-        f += std::pow(m.found->frequency_hz - mode.frequency_hz, 2);
-        zeta += std::pow(m.found->damping_ratio - mode.damping_ratio, 2);
+        away.emplace_back(std::abs(m.found->frequency_hz - mode.frequency_hz),
+                          std::abs(m.found->damping_ratio - mode.damping_ratio));
+        f += away.back().first * away.back().first;
+        zeta += away.back().second * away.back().second;
     }
-    if (count == 0) return;
+    if (away.empty()) return;
+    const auto count = static_cast<double>(away.size());
     mode.frequency_scatter_hz = std::sqrt(f / count);
     mode.damping_scatter = std::sqrt(zeta / count);
+    mode.frequency_apart_hz = median_of(away, [](const auto& one) { return one.first; });
+    mode.damping_apart = median_of(away, [](const auto& one) { return one.second; });
 }
 
 /// Frequency, damping, shape and level from the runs that are sharp there, else from all that see it.

@@ -57,6 +57,7 @@ struct consensus_mode {
     double frequency_hz = 0, damping_ratio = 0, mpc = 0, emac = 0;
     double damping_spread = 0;                            ///< relative, robust, over the runs
     double frequency_scatter_hz = 0, damping_scatter = 0; ///< of the subspace runs of its level about the values
+    double frequency_apart_hz = 0, damping_apart = 0;     ///< their median distance from the values
     int hits = 0, could = 0;                              ///< runs that found it, of those that could have seen it
     double found_in = 0;                                  ///< hits / could
     double agreement = 0;                                 ///< 0..1: found_in, consistency, phase and scatter together

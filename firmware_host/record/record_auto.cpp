@@ -11,6 +11,7 @@
 #include "consensus/quantity.hpp"
 #include "error.hpp"
 #include "files/side_by_side.hpp"
+#include "fit_deviation.hpp"
 #include "modal_gain.hpp"
 #include "modal_model.hpp"
 #include "modal_refine.hpp"
@@ -148,6 +149,7 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
         modes.push_back(
             {mode.frequency_hz, mode.damping_ratio, mode.mpc, mode.emac, std::move(shape), mode.confident()});
         context.verdicts.push_back(verdict_of(mode));
+        work.apart.emplace_back(mode.frequency_apart_hz, mode.damping_apart);
         work.carriers.push_back(carried ? carried->by : mode_carrier());
         auto& shifts = work.shifts.emplace_back(carried ? carried->shifts : std::vector<mode_shift>());
         for (mode_shift& shift : shifts)
@@ -328,6 +330,7 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
     make_model();
     if (!options.by_hand() && mark_combinations(listed, options.fs_hz, work)) make_model();
     if (refine_agreed(options, listed, work)) make_model();
+    deviations_by_fit(listed, work);
     remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);
     find_matrix_deviations(listed, options, work);

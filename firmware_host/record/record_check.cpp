@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::size_t fewest_new_rows = 100;
 constexpr double rows_each = 1.25;     // of a new sample, on average: fewer may be chance
+constexpr std::size_t mute = 10;       // times as long as the middle one: a stretch in which nothing was measured
 constexpr double regular_share = 0.99; // of new samples, read once more or less than that; of chance 0.96
 
 /// The first number of a channel, NaN where it has none, and whether a later one differs.
@@ -182,8 +183,13 @@ std::string repeated_rows(const record_set& set, double fs_hz) {
         for (std::size_t i = 1; i < record.count; ++i, ++length)
             if (!std::equal(row + i * m, row + i * m + set.n_y, row + (i - 1) * m)) ++runs[length], length = 0;
     }
-    std::size_t fresh = 0, rows = 0, regular = 0;
-    for (const auto& [length, count] : runs) fresh += count, rows += length * count;
+    std::size_t all = 0, below = 0, middle = 0, fresh = 0, rows = 0, regular = 0;
+    for (const auto& [length, count] : runs) all += count;
+    for (const auto& [length, count] : runs) { // from the shortest on
+        if (2 * below < all) middle = length;
+        below += count;
+        if (length <= mute * middle) fresh += count, rows += length * count;
+    }
     if (fresh < fewest_new_rows) return {};
     const double each = static_cast<double>(rows) / static_cast<double>(fresh);
     for (const auto& [length, count] : runs)

@@ -52,7 +52,8 @@ struct record_work {
                                         ///< fits that are left for later
     std::vector<mode_carrier> carriers; ///< auto: of each listed mode
     std::vector<double> scale;          ///< auto: of each channel
-    std::vector<std::vector<mode_shift>> shifts; ///< auto: of each listed mode, a block each; empty: not known
+    std::vector<std::pair<double, double>> apart; ///< auto: of each listed mode, see consensus_mode
+    std::vector<std::vector<mode_shift>> shifts;  ///< auto: of each listed mode, a block each; empty: not known
 };
 
 /// input_dofs and output_dofs, where they are said.

@@ -50,6 +50,17 @@ def test_named_methods_say_so_too() -> None:
     assert "rows_repeated" in codes(okid.identify(None, polled, fs=200.0, method="n4sid-cva", order=6))
 
 
+@pytest.mark.parametrize("mutes", [1, 4])
+def test_stretches_in_which_nothing_was_measured_are_no_repeats(mutes: int) -> None:
+    y = vibration(8000)
+    for k in range(mutes):
+        y[1000 + k * 7000 // mutes :][: 3000 // mutes] = 0.0
+    found = [m.frequency_hz for m in okid.identify(None, y, fs=SENSOR).modes if m.confident]
+    whole = [m.frequency_hz for m in okid.identify(None, vibration(8000), fs=SENSOR).modes if m.confident]
+    assert len(found) == 3
+    assert found == pytest.approx(whole, rel=3e-3)
+
+
 def test_coarse_samples_that_are_equal_by_chance_are_no_repeats() -> None:
     y = vibration(6000)[:, :1]
     coarse = np.round(y / y.std())
