@@ -16,11 +16,11 @@ GAIN = np.array([1.0, -0.7, 0.9, 1.1, -0.8, 0.6])  # of the acceleration, by a u
 
 
 def clean_record() -> Any:
-    """Force and acceleration of a hit of 0.35 ms at 30 ms in one second: simulated at 8 times the rate, filtered alike."""
+    """Force and acceleration of a hit of 0.35 ms at 30 ms in one second: at 8 times the rate, then filtered alike."""
     t = np.arange(int(FS * FINE)) / (FS * FINE)
     force = np.where((t >= 0.03) & (t < 0.03035), 100 * np.sin(np.pi * (t - 0.03) / 0.00035), 0.0)
     response = np.zeros_like(force)
-    for f, zeta, gain in zip(FREQUENCY, DAMPING, GAIN):
+    for f, zeta, gain in zip(FREQUENCY, DAMPING, GAIN, strict=True):
         w = 2 * np.pi * f
         A, B = np.array([[0, 1], [-w * w, -2 * zeta * w]]), np.array([[0], [gain]])
         C, D = np.array([[-w * w, -2 * zeta * w]]), np.array([[gain]])

@@ -233,6 +233,7 @@ SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "okid_replicates_create": (c_int, [POINTER(opaque), POINTER(ReplicatesConfig), opaque, c_size_t]),
     "okid_replicates_begin": (c_int, [opaque, _model, c_double]),
     "okid_replicates_add": (c_int, [opaque, _model, c_double]),
+    "okid_replicates_last": (c_int, [opaque, POINTER(Modes)]),
     "okid_replicates_finish": (c_int, [opaque, POINTER(Uncertainty)]),
     "okid_jackknife_memsize": (c_size_t, [POINTER(JackknifeConfig)]),
     "okid_jackknife_create": (c_int, [POINTER(opaque), POINTER(JackknifeConfig), opaque, c_size_t]),
