@@ -50,10 +50,11 @@ consensus_run run_of(okid_method_t method, int rows) {
 /// Block rows, or lags, with which rows x outputs is what a run's states ask for.
 int rows_for_states(int n_y, bool crowded) { return ((crowded ? rows_of_crowds : rows_of_outputs) + n_y - 1) / n_y; }
 
-/// Block rows that so many samples bear.
-int rows_of(int n_u, int n_y, long long samples, bool crowded) {
-    // Ten samples an unknown of one output; what more than three outputs have in common is estimated from all of them.
-    const long long borne = samples * std::max(3, n_y) / 30 / (n_y + 2LL * n_u);
+/// Block rows that so many samples bear. @param alone  no lower rate has longer horizons
+int rows_of(int n_u, int n_y, long long samples, bool crowded, bool alone = false) {
+    // Ten samples an unknown of one output; what more than three outputs have in common is estimated from all of them. A record
+    // that is too short for a lower rate makes do with a third: of 12 periods, horizons of 4 rows show no mode.
+    const long long borne = samples * std::max(3, n_y) / (alone ? 10 : 30) / (n_y + 2LL * n_u);
     const int wanted = std::max(long_rows, rows_for_states(n_y, crowded));
     return static_cast<int>(std::min<long long>({wanted, borne, std::max(6, most_unknowns / (n_u + n_y))}));
 }
@@ -155,7 +156,7 @@ void place_run(consensus_run& run, const record_level& level, int number, int n_
 std::vector<consensus_run> plan_runs(int n_u, int n_y, int number, const record_level& level, bool crowded) {
     const int m = n_u + n_y;
     const long long samples = level.samples;
-    const int rows = rows_of(n_u, n_y, samples, crowded);
+    const int rows = rows_of(n_u, n_y, samples, crowded, number == 0 && samples < 2 * fewest_samples);
     const int less = std::max(fewest_rows, static_cast<int>(std::lround(short_share * rows)));
     const int middle = std::max(fewest_rows, static_cast<int>(std::lround(middle_share * rows)));
     std::vector<consensus_run> out;

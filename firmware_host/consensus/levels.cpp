@@ -14,11 +14,10 @@
 namespace okid_host {
 namespace {
 
-constexpr long long fewest_samples = 700; // fewer carry no run of any method
-constexpr double top_decimated = 0.42;    // inside the pass band of the filter
-constexpr double top_full = 0.48;         // where the record has no filter of its own
-constexpr double edge_power = 0.1;        // of the usual power, above top_decimated: less means an anti-alias filter
-constexpr double no_power = 1e-3;         // of the usual power, below: nothing is excited there
+constexpr double top_decimated = 0.42; // inside the pass band of the filter
+constexpr double top_full = 0.48;      // where the record has no filter of its own
+constexpr double edge_power = 0.1;     // of the usual power, above top_decimated: less means an anti-alias filter
+constexpr double no_power = 1e-3;      // of the usual power, below: nothing is excited there
 constexpr double band_step = 0.02;
 constexpr double most_cut_off =
     0.1; // of the energy, at the beginning: a decay that is over by then has no narrow bands

@@ -25,7 +25,8 @@ struct record_level {
     std::vector<double> scale; ///< of each channel, where there are older ones: what one unit of the records is
 };
 
-constexpr std::size_t most_levels = 7; ///< the record's own rate and six halves
+constexpr std::size_t most_levels = 7;    ///< the record's own rate and six halves
+constexpr long long fewest_samples = 700; ///< of a lower rate: fewer carry no run of any method
 
 /// The weights of the linear-phase filter before a rate that is so many times lower.
 std::vector<double> decimation_weights(int factor);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  standard deviations of modes that one event of the record tells of
-// METHOD   a model without the block of the only hit knows nothing of a mode, and its distance from the whole says nothing. There
-//          the deviation is that of a least-squares fit (Cramer-Rao): the record's motion q of each mode, its derivative d by the
-//          pole, free shapes and D, so d counts less what these explain; the noise is what the model leaves, as it correlates
-//          with d beside the mode's frequency (at the frequency itself the fit has left nothing). How far the middle one of the
-//          runs is away comes on top
+// METHOD   a model without the block of the only hit knows nothing of a mode: that it stands elsewhere means nothing. The deviation
+//          is then that of a least-squares fit (Cramer-Rao bound). Its regressors are the motion q of each mode, whose factors are
+//          the shapes, the forces, whose factor is D, and d, the derivative of q by the pole. The noise is what the model leaves,
+//          correlated with d beside the mode's frequency; at the frequency itself the fit has left nothing. The median distance
+//          of the runs from the values is added, as a root of squares
 #include "fit_deviation.hpp"
 
 #include "modal_answer.hpp"
@@ -14,6 +14,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 namespace okid_host {
 namespace {
@@ -46,13 +48,12 @@ bool has_event(const record_set& set) {
                        [](const auto& of_block) { return largest_share(of_block) > most_of_one_block; });
 }
 
-/// What a fit of the poles knows, summed over the records.
+/// What a fit of shapes, D and poles knows, summed over the records.
 struct fit_sums {
     const record_work& work;
     std::vector<const listed_mode*> modes;
     MatrixXd gram;                             ///< of Re q, Im q of each mode, the forces, Re d, Im d of each mode
     std::vector<std::vector<double>> of_block; ///< energy of d, of each mode
-    std::vector<double> energy;                ///< of d, of each mode
     std::vector<VectorXd> heard,
         noise; ///< of each mode and output: energy of d where it was measured, power of what is left
 
@@ -98,7 +99,7 @@ struct fit_sums {
         const std::size_t n_y = work.set.n_y;
         const double half = 2 * M_PI * modes[k]->frequency_hz * modes[k]->damping_ratio * work.model.dt;
         double loudest = 0;
-        for (const complex& one : d) energy[k] += std::norm(one), loudest = std::max(loudest, std::norm(one));
+        for (const complex& one : d) loudest = std::max(loudest, std::norm(one));
         std::size_t end = record.count;
         while (end > 0 && std::norm(d[end - 1]) <= silent * loudest) --end;
         for (std::size_t t = 0; t < end; ++t)
@@ -120,22 +121,71 @@ struct fit_sums {
     }
 };
 
-/// Covariance of the real and imaginary part of the pole of mode k. @param free  Gram matrix of d less what is linear explains
-Eigen::Matrix2d of_pole(const fit_sums& sums, const MatrixXd& free, std::size_t k) {
-    const Index n = free.rows();
+/// A symmetric matrix with a unit diagonal: what it was divided by is the square of `size`.
+struct scaled_matrix {
+    VectorXd size;
+    MatrixXd values;
+
+    explicit scaled_matrix(const MatrixXd& given) : size(given.diagonal().cwiseMax(1e-300).cwiseSqrt()) {
+        const VectorXd unit = size.cwiseInverse();
+        values = unit.asDiagonal() * given * unit.asDiagonal();
+    }
+};
+
+/// The Gram matrix of d less what shapes and D explain of it, and the inverse of theirs.
+struct fit_information {
+    MatrixXd of_poles;
+    VectorXd of_shapes; ///< its diagonal
+
+    explicit fit_information(const fit_sums& sums) {
+        const scaled_matrix gram(sums.gram.selfadjointView<Eigen::Lower>());
+        const Index linear = sums.linear(), poles = gram.size.size() - linear;
+        const auto explained = gram.values.topLeftCorner(linear, linear).ldlt();
+        const MatrixXd across = gram.values.topRightCorner(linear, poles);
+        const VectorXd back = gram.size.tail(poles);
+        of_poles = back.asDiagonal() *
+                   (gram.values.bottomRightCorner(poles, poles) - across.transpose() * explained.solve(across)) *
+                   back.asDiagonal();
+        of_shapes = explained.solve(MatrixXd::Identity(linear, linear)).diagonal().array() /
+                    gram.size.head(linear).array().square();
+    }
+};
+
+/// Covariance of the real and imaginary part of the pole of mode k. @param noise  variance of a sample of each output
+Eigen::Matrix2d of_pole(const fit_sums& sums, const MatrixXd& of_poles, const VectorXd& noise, std::size_t k) {
+    const Index n = of_poles.rows();
     MatrixXd known = MatrixXd::Zero(n, n), turn = MatrixXd::Zero(n, n);
-    for (Index o = 0; o < sums.noise[k].size(); ++o) {
+    for (Index o = 0; o < noise.size(); ++o) {
         for (std::size_t i = 0; i < sums.modes.size(); ++i) {
             const complex c = sums.modes[i]->shape[static_cast<std::size_t>(o)];
             const auto at = static_cast<Index>(2 * i);
             turn.block<2, 2>(at, at) << c.real(), -c.imag(), -c.imag(), -c.real(); // Re(c d (a + ib))
         }
-        known += turn.transpose() * free * turn / sums.noise[k][o];
+        known += turn.transpose() * of_poles * turn / noise[o];
     }
-    const VectorXd unit = known.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    const MatrixXd inverse = (unit.asDiagonal() * known * unit.asDiagonal()).ldlt().solve(MatrixXd::Identity(n, n));
+    const scaled_matrix scaled(known);
+    const MatrixXd inverse = scaled.values.ldlt().solve(MatrixXd::Identity(n, n));
     const auto at = static_cast<Index>(2 * k);
-    return unit.segment<2>(at).asDiagonal() * inverse.block<2, 2>(at, at) * unit.segment<2>(at).asDiagonal();
+    const Eigen::Vector2d unit = scaled.size.segment<2>(at).cwiseInverse();
+    return unit.asDiagonal() * inverse.block<2, 2>(at, at) * unit.asDiagonal();
+}
+
+/// Deviations of f (Hz) and zeta; 0 or NaN: not known.
+std::pair<double, double> of_values(const listed_mode& mode, const Eigen::Matrix2d& pole) {
+    const double zeta = mode.damping_ratio, side = std::sqrt(1 - zeta * zeta), omega = 2 * M_PI * mode.frequency_hz;
+    const Eigen::Vector2d by_f = Eigen::Vector2d(-zeta, side) / (2 * M_PI),
+                          by_zeta = -side * Eigen::Vector2d(side, zeta) / omega;
+    return {std::sqrt(by_f.dot(pole * by_f)), std::sqrt(by_zeta.dot(pole * by_zeta))};
+}
+
+/// Deviation of an entry of the shape, whose largest is 1, the poles held. @param of_entry  inverse of the Gram matrix of its factor
+double of_shape(const listed_mode& mode, const VectorXd& noise, double of_entry, std::size_t o) {
+    std::size_t top = 0;
+    for (std::size_t i = 1; i < mode.shape.size(); ++i)
+        if (std::abs(mode.shape[i]) > std::abs(mode.shape[top])) top = i;
+    if (o == top) return 0;
+    return std::sqrt(of_entry *
+                     (noise[static_cast<Index>(o)] + std::norm(mode.shape[o]) * noise[static_cast<Index>(top)]));
 }
 
 } // namespace
@@ -143,60 +193,39 @@ Eigen::Matrix2d of_pole(const fit_sums& sums, const MatrixXd& free, std::size_t 
 void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work) {
     result_context& context = work.context;
     if (work.set.n_u == 0 || !context.sigma || !context.x0 || context.refined || work.before) return;
-    fit_sums sums{work, {}, {}, {}, {}, {}, {}};
+    deviations& sigma = *context.sigma;
+    fit_sums sums{work, {}, {}, {}, {}, {}};
     std::vector<std::size_t> place; // in the list, of a mode of the model
     bool missing = false;
     for (std::size_t i = 0; i < listed.size(); ++i) {
         if (!listed[i].in_model) continue;
         sums.modes.push_back(&listed[i]);
         place.push_back(i);
-        missing = missing || std::isnan(context.sigma->frequency_hz[i]);
+        missing = missing || std::isnan(sigma.frequency_hz[i]);
     }
     if (place.empty() || (!missing && !has_event(work.set))) return;
     const std::size_t n_y = work.set.n_y;
-    const Index linear = sums.linear(), poles = static_cast<Index>(2 * place.size());
-    sums.gram = MatrixXd::Zero(linear + poles, linear + poles);
+    const Index size = sums.linear() + static_cast<Index>(2 * place.size());
+    sums.gram = MatrixXd::Zero(size, size);
     sums.of_block.assign(place.size(), std::vector<double>(event_blocks));
     sums.heard = sums.noise = std::vector<VectorXd>(place.size(), VectorXd::Zero(static_cast<Index>(n_y)));
-    sums.energy.assign(place.size(), 0);
     for (std::size_t r = 0; r < work.set.records.size(); ++r) sums.add(r);
-    const MatrixXd whole = sums.gram.selfadjointView<Eigen::Lower>();
-    const VectorXd unit = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    const MatrixXd scaled = unit.asDiagonal() * whole * unit.asDiagonal();
-    const auto explained = scaled.topLeftCorner(linear, linear).ldlt();
-    const MatrixXd across = scaled.topRightCorner(linear, poles);
-    const VectorXd back = unit.tail(poles).cwiseInverse();
-    const MatrixXd free = back.asDiagonal() *
-                          (scaled.bottomRightCorner(poles, poles) - across.transpose() * explained.solve(across)) *
-                          back.asDiagonal();
-    const MatrixXd of_shapes = explained.solve(MatrixXd::Identity(linear, linear));
+    const fit_information information(sums);
     for (std::size_t k = 0; k < place.size(); ++k) {
         const std::size_t i = place[k];
-        if (!std::isnan(context.sigma->frequency_hz[i]) && largest_share(sums.of_block[k]) < most_of_one_block)
-            continue;
+        const std::vector<double>& of_block = sums.of_block[k];
+        if (!std::isnan(sigma.frequency_hz[i]) && largest_share(of_block) < most_of_one_block) continue;
         if (!(sums.heard[k].minCoeff() > 0) || !(sums.noise[k].minCoeff() > 0)) continue;
-        sums.noise[k].array() *=
-            sums.energy[k] / sums.heard[k].array().square(); // variance of a sample; all were measured
-        const Eigen::Matrix2d pole = of_pole(sums, free, k);
-        const double zeta = listed[i].damping_ratio, side = std::sqrt(1 - zeta * zeta),
-                     omega = 2 * M_PI * listed[i].frequency_hz;
-        const Eigen::Vector2d by_f = Eigen::Vector2d(-zeta, side) / (2 * M_PI),
-                              by_zeta = -side * Eigen::Vector2d(side, zeta) / omega;
-        const double f = by_f.dot(pole * by_f), damping = by_zeta.dot(pole * by_zeta);
-        if (!(f > 0) || !(damping > 0) || !std::isfinite(f) || !std::isfinite(damping)) continue;
-        context.sigma->frequency_hz[i] = std::hypot(std::sqrt(f), work.apart[i].first);
-        context.sigma->damping_ratio[i] = std::hypot(std::sqrt(damping), work.apart[i].second);
-        const auto at = static_cast<Index>(2 * k);
-        const double of_entry =
-            (of_shapes(at, at) * unit[at] * unit[at] + of_shapes(at + 1, at + 1) * unit[at + 1] * unit[at + 1]) / 2;
-        std::size_t top = 0;
-        for (std::size_t o = 1; o < n_y; ++o)
-            if (std::abs(listed[i].shape[o]) > std::abs(listed[i].shape[top])) top = o;
-        for (std::size_t o = 0; o < n_y; ++o) {
-            const double here = sums.noise[k][static_cast<Index>(o)], there = sums.noise[k][static_cast<Index>(top)];
-            const double entry = o == top ? 0 : std::sqrt(of_entry * (here + std::norm(listed[i].shape[o]) * there));
-            context.sigma->shape_re[i * n_y + o] = context.sigma->shape_im[i * n_y + o] = entry;
-        }
+        // as if all samples had been measured: fewer tell less
+        const double energy = std::accumulate(of_block.begin(), of_block.end(), 0.0);
+        const VectorXd noise = energy * sums.noise[k].array() / sums.heard[k].array().square();
+        const auto [f, zeta] = of_values(listed[i], of_pole(sums, information.of_poles, noise, k));
+        if (!(f > 0) || !(zeta > 0) || !std::isfinite(f) || !std::isfinite(zeta)) continue;
+        sigma.frequency_hz[i] = std::hypot(f, work.apart[i].first);
+        sigma.damping_ratio[i] = std::hypot(zeta, work.apart[i].second);
+        const double of_entry = information.of_shapes.segment<2>(static_cast<Index>(2 * k)).mean();
+        for (std::size_t o = 0; o < n_y; ++o)
+            sigma.shape_re[i * n_y + o] = sigma.shape_im[i * n_y + o] = of_shape(listed[i], noise, of_entry, o);
     }
 }
 

@@ -273,7 +273,7 @@ std::vector<replicate_model> improve(const record_options& options, okid_accumul
     if (from_record && !(work.model.model_radius < 1)) reflect_growing(work, replicates);
     const std::vector<double> states = from_record ? fit_inputs(work) : std::vector<double>{};
     if (!states.empty() && fits_can_wait(options, accumulator, work)) {
-        tell_states(states, work.model.n_z, work.context);
+        find_states(work.set, work.model, work.context, &states);
         work.states = states;
         return replicates;
     }

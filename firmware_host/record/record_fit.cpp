@@ -132,11 +132,6 @@ std::vector<stretch> stretches_of(const record_set& set, const record_data& reco
     return out;
 }
 
-void tell_states(const std::vector<double>& states, int n_z, result_context& context) {
-    context.x0.emplace();
-    for (auto at = states.begin(); at != states.end(); at += n_z) context.x0->emplace_back(at, at + n_z);
-}
-
 void find_states(const record_set& set, const okid_identified_t& found, result_context& context,
                  const std::vector<double>* known) {
     fit_run run(found, false, known);

@@ -14,9 +14,6 @@ struct stretch {
 /// tell their initial state from the noise, are left out; a record without missing inputs is one stretch.
 std::vector<stretch> stretches_of(const record_set& set, const record_data& record, std::size_t least);
 
-/// x0 of the context, from n_z numbers a record.
-void tell_states(const std::vector<double>& states, int n_z, result_context& context);
-
 /// B (n_z x n_u) and D (n_y x n_u) that make the simulated outputs of A and C fit the records best; x0, where given, gets
 /// the initial state that goes with them, n_z numbers a record.
 okid_status_t fit_outputs(const record_set& set, int n_z, const double* A, const double* C, std::vector<double>& B,

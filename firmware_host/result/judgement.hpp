@@ -54,8 +54,9 @@ constexpr double same_residues = 0.9; ///< MAC of the residues of two poles that
 constexpr double steady = 0.25;     ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)
 constexpr double of_chance = 0.52;  ///< … of a vibration under chance forces
 constexpr double surely_steady = 2; ///< times 1 / sqrt(blocks) less is no chance: five deviations
-constexpr double steady_wandering = 0.4;  ///< … of a tone that wanders, at most
-constexpr double wanders_as_far = 2;      ///< times the scatter of its frequency: it comes by there
+constexpr double steady_wandering =
+    0.3;                             ///< … of a tone that wanders, at most: 0.2 seen, 0.35 of a mode under even blows
+constexpr double wanders_as_far = 2; ///< times the scatter of its frequency: it comes by there
 constexpr double off_its_frequency = 0.5; ///< cycles of a block: where the power is so far off, another line leaks in
 constexpr double steady_on = 0.1;         ///< … of a machine that goes on and off, while it is on
 constexpr double on = 0.5, off = 0.15;    ///< of its amplitude

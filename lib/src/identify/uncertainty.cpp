@@ -131,8 +131,13 @@ bool fits(const okid_replicates& s, const okid_model_t& m) {
     return m.n_u == s.config.n_u && m.n_y == s.config.n_y && m.n_z >= 1 && m.n_z <= s.config.n_z;
 }
 
+okid_modes_t view_of(const mode_list& list) {
+    return {list.count, 0,       list.frequency, list.damping, list.mpc, list.re,
+            list.im,    nullptr, nullptr,        nullptr,      nullptr};
+}
+
 okid_status_t find_modes(okid_replicates& s, const okid_model_t& m, mode_list& out) {
-    okid_modes_t modes{0, 0, out.frequency, out.damping, out.mpc, out.re, out.im, nullptr, nullptr, nullptr, nullptr};
+    okid_modes_t modes = view_of(out);
     const okid_status_t status = okid_modal_analyse(&m, s.dt, &modes, s.modal_work, s.modal_bytes);
     out.count = modes.count;
     return status;
@@ -295,14 +300,7 @@ okid_status_t okid_replicates_add(okid_replicates_t* self, const okid_model_t* r
 
 okid_status_t okid_replicates_last(const okid_replicates_t* self, okid_modes_t* out) {
     if (self == nullptr || out == nullptr) return OKID_ERR_NULL;
-    const mode_list& found = self->other;
-    *out = okid_modes_t{};
-    out->count = found.count;
-    out->frequency_hz = found.frequency;
-    out->damping_ratio = found.damping;
-    out->mpc = found.mpc;
-    out->shape_re = found.re;
-    out->shape_im = found.im;
+    *out = view_of(self->other);
     return OKID_OK;
 }
 

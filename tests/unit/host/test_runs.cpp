@@ -21,9 +21,9 @@ record_level with(long long samples) {
     return out;
 }
 
-std::vector<int> rows_of(int n_u, int n_y, long long samples, bool crowded = false) {
+std::vector<int> rows_of(int n_u, int n_y, long long samples, bool crowded = false, int level = 1) {
     std::vector<int> out;
-    for (const consensus_run& run : plan_runs(n_u, n_y, 0, with(samples), crowded)) out.push_back(run.rows);
+    for (const consensus_run& run : plan_runs(n_u, n_y, level, with(samples), crowded)) out.push_back(run.rows);
     return out;
 }
 
@@ -109,9 +109,19 @@ static void few_samples_bear_short_horizons() {
     TEST_ASSERT_EQUAL_UINT64(5, rows_of(0, 1, 79).size()); // without OKID-ERA
 }
 
+/// A record with less than 1,400 samples has no lower rate: a third of them for each unknown.
+static void a_record_without_a_lower_rate_has_longer_horizons() {
+    TEST_ASSERT_EQUAL_INT(23, rows_of(8, 2, 1399, false, 0)[0]); // 18 unknowns a block row
+    TEST_ASSERT_EQUAL_INT(7, rows_of(8, 2, 1400, false, 0)[0]);
+    TEST_ASSERT_EQUAL_INT(7, rows_of(8, 2, 1399)[0]);
+    TEST_ASSERT_EQUAL_INT(90, rows_of(1, 1, 900, false, 0)[0]);
+    TEST_ASSERT_EQUAL_UINT64(5, rows_of(1, 1, 40, false, 0).size()); // without OKID-ERA
+    TEST_ASSERT_TRUE(rows_of(1, 1, 39, false, 0).empty());
+}
+
 /// States are even, and as many as the Hankel matrix holds: of projections a block row less than of lags.
 static void orders_stay_within_the_horizon() {
-    const auto runs = plan_runs(1, 1, 0, with(900), false);
+    const auto runs = plan_runs(1, 1, 1, with(900), false);
     TEST_ASSERT_EQUAL_INT(28, run_config(runs[0], 1, 1).max_order); // 29 states
     TEST_ASSERT_EQUAL_INT(28, runs[0].states);
     TEST_ASSERT_EQUAL_INT(runs[5].rows - runs[5].rows % 2, run_config(runs[5], 1, 1).max_order);
@@ -259,6 +269,7 @@ int main() {
     UNITY_BEGIN();
     RUN_TEST(horizons_hold_the_modes);
     RUN_TEST(few_samples_bear_short_horizons);
+    RUN_TEST(a_record_without_a_lower_rate_has_longer_horizons);
     RUN_TEST(orders_stay_within_the_horizon);
     RUN_TEST(no_run_asks_for_more_lags_than_the_longest);
     RUN_TEST(runs_find_the_modes);
