@@ -126,23 +126,22 @@ std::string about_file(std::string text, const std::string& path, const std::str
     return text;
 }
 
-void convert_file(const std::string& path, const std::string& group, const std::string& table) {
+/// @param quiet  without notes on what was taken for what. @return what it remarked
+std::string convert_file(const std::string& path, const std::string& group, const std::string& table, bool quiet) {
     if (access(path.c_str(), R_OK) != 0) throw failure(exit_usage, fmt::format("{}: {}", path, std::strerror(errno)));
     const std::string program = find_converter();
     if (program.empty())
         throw failure(exit_usage, fmt::format("{}: {}, which reads this format, is neither beside okid nor in PATH: "
                                               "pip install okid",
                                               path, converter));
-    std::vector<std::string> arguments{"--quiet"};
+    std::vector<std::string> arguments;
+    if (quiet) arguments.emplace_back("--quiet");
     if (!group.empty()) arguments.push_back("--group=" + group);
     arguments.insert(arguments.end(), {"--", path, table});
     auto [code, said] = run_program(program, arguments);
     if (stop_requested()) throw failure(exit_interrupted, "interrupted; no file is left half-written");
     const std::string begin = std::string(converter) + ": ";
-    if (code == exit_ok) {
-        if (!said.empty()) say("{}", said);
-        return;
-    }
+    if (code == exit_ok) return about_file(said, path, table);
     while (!said.empty() && said.back() == '\n') said.pop_back();
     if (said.rfind(begin, 0) == 0) said.erase(0, begin.size());
     throw failure(code == exit_interrupted ? exit_interrupted : exit_usage,
@@ -179,30 +178,46 @@ bool is_foreign(const std::string& path) {
 
 } // namespace
 
-nameless_table::nameless_table(const std::string& path, const std::string& group) {
+nameless_table::nameless_table(const std::string& path, const std::string& group, bool quiet) {
     const stop_waits until_it_has_no_name;
     const own_folder folder;
-    convert_file(path, group, folder.table());
+    remarks_ = convert_file(path, group, folder.table(), quiet);
     fd_ = open_input(folder.table(), "a table");
 }
 
 nameless_table::~nameless_table() { close(fd_); }
 
+std::string nameless_table::take_remarks() { return std::exchange(remarks_, {}); }
+
 std::string nameless_table::path() const { return fmt::format("/proc/self/fd/{}", fd_); }
 
-std::string record_files::table_of(const std::string& path) {
-    auto& table = tables_[path];
-    if (!table) table = std::make_unique<nameless_table>(path, group_);
-    return table->path();
+template <class Read> auto record_files::from_table(const std::string& path, Read reader, bool quiet) {
+    auto& kept = tables_[path];
+    if (!kept) kept = std::make_unique<nameless_table>(path, group_, quiet);
+    const std::string table = kept->path();
+    try {
+        auto read = reader(table);
+        if (const std::string notes = kept->take_remarks(); !notes.empty()) say("{}", notes);
+        return read;
+    } catch (const failure& fault) {
+        throw failure(fault.code, about_file(fault.what(), path, table), fault.status);
+    }
 }
 
 template <class Read> auto record_files::as_table(const std::string& path, Read reader) {
-    if (!is_foreign(path)) return reader(path);
-    const std::string table = table_of(path);
+    if (is_foreign(path) || tables_.count(path) > 0) return from_table(path, reader, true);
     try {
-        return reader(table);
-    } catch (const failure& fault) {
-        throw failure(fault.code, about_file(fault.what(), path, table), fault.status);
+        return reader(path);
+    } catch (const foreign_table& own) {
+        std::error_code ignored;
+        if (find_converter().empty() || !std::filesystem::is_regular_file(path, ignored)) throw;
+        try {
+            return from_table(path, reader, false);
+        } catch (const failure& fault) {
+            tables_.erase(path);
+            if (fault.code == exit_interrupted) throw;
+        }
+        throw;
     }
 }
 

@@ -19,8 +19,7 @@ namespace okid_host {
 namespace {
 
 /// Comments and names; leaves the reader at the first row.
-csv_header read_head(line_reader& reader, const std::string& path) {
-    csv_header header;
+void read_head(line_reader& reader, const std::string& path, csv_header& header) {
     std::string_view line;
     while (reader.next(line)) {
         const std::size_t start = line.find_first_not_of(" \t");
@@ -31,7 +30,7 @@ csv_header read_head(line_reader& reader, const std::string& path) {
             continue;
         }
         read_csv_names(path, reader.number(), line, header);
-        return header;
+        return;
     }
     throw failure(exit_usage,
                   fmt::format("{}: no line of column names, expected names and then rows of numbers", path));
@@ -42,15 +41,25 @@ csv_header read_head(line_reader& reader, const std::string& path) {
 std::vector<std::string> read_csv_columns(const std::string& path) {
     if (is_npy(path)) return read_npy_columns(path);
     line_reader reader(path);
-    return read_head(reader, path).names;
+    csv_header header;
+    read_head(reader, path, header);
+    std::string_view row;
+    const std::size_t width = header.names.size();
+    if (!header.fs_hz && reader.next(row) && (width == 1 || cells_of(row, header.separator) != width))
+        throw foreign_table(exit_usage,
+                            fmt::format("{}, line {}: found a title, expected column names", path, header.line));
+    return header.names;
 }
 
-/// "time_s", and what loggers write: "Time [s]", "t (s)".
-static bool is_time_in_seconds(const std::string& name) {
-    if (name == "time_s") return true;
-    std::string small = lower_case(name);
-    small.erase(std::remove(small.begin(), small.end(), ' '), small.end());
-    return small == "time[s]" || small == "time(s)" || small == "t[s]" || small == "t(s)";
+/// The column of the time: one that says it is in seconds before one that has no unit. @param asked  channels
+static std::optional<std::size_t> find_time(const std::vector<std::string>& names,
+                                            const std::vector<std::string>& asked) {
+    for (const time_name wanted : {time_name::in_seconds, time_name::without_unit})
+        for (std::size_t i = 0; i < names.size(); ++i)
+            if (name_of_time(names[i]) == wanted &&
+                (wanted == time_name::in_seconds || std::find(asked.begin(), asked.end(), names[i]) == asked.end()))
+                return i;
+    return {};
 }
 
 /// A column of another name that may be meant as the time.
@@ -59,7 +68,7 @@ static std::string time_like(const std::vector<std::string>& names) {
         const std::string small = lower_case(name);
         if (small.rfind("time", 0) == 0 && small.find("ms") != std::string::npos)
             return fmt::format(" (\"{}\" is not in seconds: give the rate with --fs)", printable(name));
-        if (small == "t" || small.rfind("time", 0) == 0)
+        if (small.rfind("time", 0) == 0)
             return fmt::format(" (is \"{}\" the time in seconds? Then call it time_s)", printable(name));
     }
     return "";
@@ -77,10 +86,10 @@ void check_columns(const std::string& path, const std::vector<std::string>& colu
     }
 }
 
-csv_record read_csv(const std::string& path, const csv_request& asked) {
-    if (is_npy(path)) return read_npy(path, asked);
+/// @param header  becomes that of the file, as far as it goes
+static csv_record read_table(const std::string& path, const csv_request& asked, csv_header& header) {
     line_reader reader(path);
-    const csv_header header = read_head(reader, path);
+    read_head(reader, path, header);
     csv_request request = asked;
     if (asked.whole)
         std::copy_if(header.names.begin(), header.names.end(), std::back_inserter(request.columns),
@@ -91,15 +100,16 @@ csv_record read_csv(const std::string& path, const csv_request& asked) {
     out.comments = header.comments;
     out.said_fs_hz = header.fs_hz;
     row_parser rows(path, header, request, out);
-    const auto time = std::find_if(header.names.begin(), header.names.end(), is_time_in_seconds);
-    const bool use_time = !request.fs_hz && !header.fs_hz && time != header.names.end();
-    if (use_time && !request.whole) rows.want_time(static_cast<std::size_t>(time - header.names.begin()));
+    const auto time = find_time(header.names, asked.columns);
+    const bool use_time = !request.fs_hz && !header.fs_hz && time;
+    if (use_time && !request.whole) rows.want_time(*time);
     if (!request.fs_hz && !header.fs_hz && !use_time && !request.whole)
-        throw failure(exit_usage,
-                      fmt::format("{}: no sample rate{}{}; expected --fs HZ, a line \"# fs_hz: 1024\" above the column "
-                                  "names, or a column time_s (exports of loggers: okid-convert {} OUT.csv)",
-                                  path, header.fs_remark.empty() ? "" : " (" + header.fs_remark + ")",
-                                  time_like(header.names), path));
+        throw foreign_table(
+            exit_usage,
+            fmt::format("{}: no sample rate{}{}; expected --fs HZ, a line \"# fs_hz: 1024\" above the column "
+                        "names, or a column time_s (exports of loggers: okid-convert {} OUT.csv)",
+                        path, header.fs_remark.empty() ? "" : " (" + header.fs_remark + ")", time_like(header.names),
+                        path));
     rows.read(reader, request);
     if (out.count == 0)
         throw failure(exit_usage,
@@ -109,12 +119,23 @@ csv_record read_csv(const std::string& path, const csv_request& asked) {
     if (!use_time) return out;
     if (!request.whole) return out.fs_hz = rows.rate_of_time(), out;
     try { // without a rate a record can still be looked at
-        rows.take_times(static_cast<std::size_t>(time - header.names.begin()));
+        rows.take_times(*time);
         out.fs_hz = rows.rate_of_time();
     } catch (const failure& fault) {
         out.rate_remark = fault.what();
     }
     return out;
+}
+
+csv_record read_csv(const std::string& path, const csv_request& asked) {
+    if (is_npy(path)) return read_npy(path, asked);
+    csv_header header;
+    try {
+        return read_table(path, asked, header);
+    } catch (const foreign_table& fault) {
+        if (header.fs_hz) throw failure(fault.code, fault.what());
+        throw;
+    }
 }
 
 } // namespace okid_host

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  one CSV record in memory: the columns asked for, NaN where a sample is missing.
 #pragma once
+#include "error.hpp"
+
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -25,7 +27,13 @@ struct csv_record {
     std::vector<double> samples;             ///< columns x count, column-major: one sample after the other
     std::size_t first_line = 0;              ///< line number of the first sample
     std::vector<std::string> comments;       ///< the lines above the names, as they stand
-    std::string rate_remark;                 ///< why a time_s column gives no rate (`whole` only)
+    std::string rate_remark;                 ///< why the time gives no rate (`whole` only)
+};
+
+/// A table that says no rate in okid's own way and whose head, first row or time is not as read_csv() has it: another program
+/// may have written it.
+struct foreign_table : failure {
+    using failure::failure;
 };
 
 /// Read a record. Throws `failure` (exit 2) naming file, line, column, what was found and what was expected.

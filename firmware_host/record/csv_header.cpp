@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "csv_header.hpp"
 
+#include "csv.hpp"
 #include "error.hpp"
 #include "files/file_kind.hpp"
 #include "files/nearest_name.hpp"
@@ -118,27 +119,35 @@ void read_csv_names(const std::string& path, std::size_t number, std::string_vie
     for (std::size_t i = 0; i < line.size(); ++i) {
         const auto byte = static_cast<unsigned char>(line[i]);
         if ((byte < 0x20 && byte != '\t' && byte != '\r') || byte == 0x7f)
-            throw failure(exit_usage, fmt::format("{}, line {}: byte 0x{:02x} at position {}: this is not a text file; "
-                                                  "expected a CSV with a line of column names",
-                                                  path, number, byte, i + 1));
+            throw foreign_table(exit_usage,
+                                fmt::format("{}, line {}: byte 0x{:02x} at position {}: this is not a text file; "
+                                            "expected a CSV with a line of column names",
+                                            path, number, byte, i + 1));
     }
     header.line = number;
     header.separator = find_separator(line);
     bool open_quote = false;
     header.names = split_quoted(line, header.separator, open_quote);
     if (open_quote)
-        throw failure(exit_usage, fmt::format("{}, line {}: a quoted column name has no closing quote", path, number));
+        throw foreign_table(exit_usage,
+                            fmt::format("{}, line {}: a quoted column name has no closing quote", path, number));
     std::unordered_set<std::string> seen;
     for (std::size_t i = 0; i < header.names.size(); ++i) {
         const std::string& name = header.names[i];
         if (!name.empty() && !seen.insert(name).second)
-            throw failure(exit_usage, fmt::format("{}, line {}, column {}: the name \"{}\" stands twice, expected a "
-                                                  "different name for each column",
-                                                  path, number, i + 1, printable(name)));
+            throw foreign_table(exit_usage,
+                                fmt::format("{}, line {}, column {}: the name \"{}\" stands twice, expected a "
+                                            "different name for each column",
+                                            path, number, i + 1, printable(name)));
     }
     header.looks_like_numbers = std::any_of(header.names.begin(), header.names.end(), is_number) &&
                                 std::all_of(header.names.begin(), header.names.end(),
                                             [](const std::string& n) { return n.empty() || is_number(n); });
+}
+
+std::size_t cells_of(std::string_view line, char separator) {
+    bool open_quote = false;
+    return split_quoted(line, separator, open_quote).size();
 }
 
 std::size_t find_csv_column(const std::string& path, const csv_header& header, const std::string& name) {
@@ -152,17 +161,16 @@ std::size_t find_csv_column(const std::string& path, const csv_header& header, c
                                    printable(name), did_you_mean(name, header.names), list_names(header.names));
     const file_kind kind = kind_of_text(fmt::format("{}", fmt::join(header.names, ",")));
     if (kind == file_kind::can_log)
-        text = fmt::format(
-            "{}: it looks like a log of CAN frames, expected a CSV: okid convert {} FILE.csv -c CONFIG.toml "
-            "makes one, okid replay identifies the log itself",
-            path, path);
-    else if (kind != file_kind::unknown && kind != file_kind::csv)
-        text =
-            fmt::format("{}: it looks like {}, expected a CSV: comment lines with #, a line of column names, numbers",
-                        path, file_kind_name(kind));
-    else if (header.looks_like_numbers)
-        text += ". That line holds numbers: the file needs a line of column names first";
-    throw failure(exit_usage, text);
+        throw failure(exit_usage,
+                      fmt::format("{}: it looks like a log of CAN frames, expected a CSV: okid convert {} "
+                                  "FILE.csv -c CONFIG.toml makes one, okid replay identifies the log itself",
+                                  path, path));
+    if (kind != file_kind::unknown && kind != file_kind::csv)
+        throw failure(exit_usage, fmt::format("{}: it looks like {}, expected a CSV: comment lines with #, a line of "
+                                              "column names, numbers",
+                                              path, file_kind_name(kind)));
+    if (header.looks_like_numbers) text += ". That line holds numbers: the file needs a line of column names first";
+    throw foreign_table(exit_usage, text);
 }
 
 bool has_column(const std::vector<std::string>& columns, const std::string& name) {
@@ -195,6 +203,15 @@ std::vector<std::string> split_names(const std::string& option, const std::strin
                           fmt::format("{}: found an empty name in \"{}\", expected names with commas between", option,
                                       printable(list, 80)));
     return names;
+}
+
+time_name name_of_time(const std::string& name) {
+    std::string small = lower_case(name);
+    small.erase(std::remove(small.begin(), small.end(), ' '), small.end());
+    if (small == "t" || small == "time") return time_name::without_unit;
+    const bool seconds = small == "time_s" || small == "t_s" || small == "time[s]" || small == "time(s)" ||
+                         small == "t[s]" || small == "t(s)";
+    return seconds ? time_name::in_seconds : time_name::none;
 }
 
 } // namespace okid_host

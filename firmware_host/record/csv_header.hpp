@@ -25,6 +25,9 @@ void read_csv_comment(const std::string& path, std::size_t number, std::string_v
 /// Take in the line of names. Throws on duplicate names, an open quote or bytes that are not text.
 void read_csv_names(const std::string& path, std::size_t number, std::string_view line, csv_header& header);
 
+/// How many cells a line has.
+std::size_t cells_of(std::string_view line, char separator);
+
 /// Index of a column by its name, or by its name without the unit (`acc1` for `acc1 [g]`); throws with the nearest name.
 std::size_t find_csv_column(const std::string& path, const csv_header& header, const std::string& name);
 
@@ -36,5 +39,10 @@ std::string unit_of_name(const std::string& name);
 
 /// The names of an option, `a,b,"c,d"`; throws on an empty one.
 std::vector<std::string> split_names(const std::string& option, const std::string& list);
+
+enum class time_name { none, without_unit, in_seconds };
+
+/// Does a column of this name hold the time? "time_s" and "Time [s]" say so, with their unit; "t" and "time" without one.
+time_name name_of_time(const std::string& name);
 
 } // namespace okid_host

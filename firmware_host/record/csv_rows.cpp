@@ -18,6 +18,7 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <limits>
+#include <optional>
 
 namespace okid_host {
 namespace {
@@ -87,10 +88,14 @@ void row_parser::take_times(std::size_t column) {
     for (std::size_t i = 0; i < out_.count; ++i) take_time(out_.first_line + i, i, out_.samples[i * width_ + at]);
 }
 
+void row_parser::bad_row(std::size_t number, const std::string& what) const {
+    if (number == header_.line + 1) throw foreign_table(exit_usage, what); // a line of units; a title above the names
+    throw failure(exit_usage, what);
+}
+
 void row_parser::bad_cell(std::size_t number, std::size_t field, std::string_view found, const char* expected) const {
-    throw failure(exit_usage,
-                  fmt::format("{}, line {}, column {} ({}): found \"{}\", expected {}", path_, number, field + 1,
-                              printable(header_.names[field]), printable(std::string(found)), expected));
+    bad_row(number, fmt::format("{}, line {}, column {} ({}): found \"{}\", expected {}", path_, number, field + 1,
+                                printable(header_.names[field]), printable(std::string(found)), expected));
 }
 
 void row_parser::empty_line_between(std::size_t number) const {
@@ -123,10 +128,9 @@ void row_parser::ragged(std::size_t number, std::string_view line) const {
     const char* const end = begin + line.size();
     for (const char* at = end_of_field(begin, end); at < end; at = end_of_field(at + 1, end)) ++cells;
     const bool halves = header_.separator == ',' && header_.names.size() > 1 && cells == 2 * header_.names.size();
-    throw failure(exit_usage,
-                  fmt::format("{}, line {}: found {} cell{}, expected {} as in the header (line {}){}", path_, number,
-                              cells, cells == 1 ? "" : "s", header_.names.size(), header_.line,
-                              halves ? ". Decimal commas need semicolons between the cells" : ""));
+    bad_row(number, fmt::format("{}, line {}: found {} cell{}, expected {} as in the header (line {}){}", path_, number,
+                                cells, cells == 1 ? "" : "s", header_.names.size(), header_.line,
+                                halves ? ". Decimal commas need semicolons between the cells" : ""));
 }
 
 /// A cell that is not simply a number: blanks, quotes, empty, nan, decimal comma; anything else is an error.
@@ -302,20 +306,83 @@ void row_parser::read(line_reader& reader, const csv_request& request) {
     if (time_column_ >= 0) times_.resize(out_.count);
 }
 
+/// The decimal place that holds the last digit of every stamp; 0 where that is none of the first nine.
+static double last_place(const std::vector<double>& times) {
+    double place = 1;
+    for (int digits = 0; digits <= 9; ++digits, place /= 10)
+        if (std::all_of(times.begin(), times.end(), [place](double time) {
+                return std::abs(time - std::round(time / place) * place) < 1e-3 * place;
+            }))
+            return place;
+    return 0;
+}
+
+static bool is_uneven(double found, double mean) { return !(found > 0) || std::abs(found - mean) > 0.05 * mean; }
+
+/// How far stamps stray from a line of this slope, from the lowest to the highest; the first counts from 0.
+static double spread_about(const std::vector<double>& times, double step) {
+    double low = 0, high = 0;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+        const double off = times[i] - times[0] - step * static_cast<double>(i);
+        low = std::min(low, off), high = std::max(high, off);
+    }
+    return high - low;
+}
+
+/// The rate of even samples whose stamps were rounded: some line holds them all within one of their last digit. A missing row
+/// moves all that follow by a step, which 100 rows show; a few of them may by chance look as if rounded, ten do not. The rate has
+/// as few digits as the stamps allow.
+static std::optional<double> rate_of_rounded(const std::vector<double>& times) {
+    const auto steps = static_cast<double>(times.size() - 1);
+    const double place = last_place(times), duration = times.back() - times.front(),
+                 per_step = place * steps / duration;
+    if (place == 0 || !(duration > 0) || steps < 100 * std::max(1.0, per_step * per_step)) return {};
+    if (!std::is_sorted(times.begin(), times.end())) return {};
+    int uneven = 0;
+    for (std::size_t i = 1; i < times.size(); ++i) uneven += is_uneven(times[i] - times[i - 1], duration / steps);
+    if (uneven < 10) return {};
+    double low = (duration - place) / steps, high = (duration + place) / steps;
+    const double most = 1.001 * place + 4e-16 * std::abs(times.back());
+    while (high - low > 1e-9 * place / steps) { // the spread is convex in the slope
+        const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+        const double at_a = spread_about(times, a), at_b = spread_about(times, b);
+        if (std::min(at_a, at_b) <= most) {
+            low = high = at_a < at_b ? a : b;
+            break;
+        }
+        (at_a < at_b ? high : low) = at_a < at_b ? b : a;
+    }
+    if (spread_about(times, low) > most) return {};
+    double rate = 1 / low;
+    for (int digits = 2; digits <= 12; ++digits) {
+        rate = std::strtod(fmt::format("{:.{}g}", 1 / low, digits).c_str(), nullptr);
+        if (spread_about(times, 1 / rate) <= most) break;
+    }
+    return rate;
+}
+
 double row_parser::rate_of_time() const {
     const std::size_t n = times_.size();
     if (n < 2) throw failure(exit_usage, fmt::format("{}: one row has no sample rate; give --fs HZ", path_));
+    const std::string& name = header_.names[static_cast<std::size_t>(time_column_)];
     const double step = (times_.back() - times_.front()) / static_cast<double>(n - 1);
     for (std::size_t i = 1; i < n; ++i) {
         const double found = times_[i] - times_[i - 1];
-        if (found > 0 && std::abs(found - step) <= 0.05 * step) continue;
-        throw failure(
+        if (!is_uneven(found, step)) continue;
+        if (const auto rate = rate_of_rounded(times_)) return *rate;
+        throw foreign_table(
             exit_usage,
-            fmt::format("{}, line {}, column {} (time_s): found a step of {:.6g} s, expected {:.6g} s as on average: "
-                        "the samples are not evenly spaced, or rows are missing, or the stamps are rounded. Put a row "
-                        "of empty cells where a sample is missing; give --fs HZ if the samples were evenly spaced",
-                        path_, out_.first_line + i, time_column_ + 1, found, step));
+            fmt::format("{}, line {}, column {} ({}): found a step of {:.6g} s, expected {:.6g} s as on average: "
+                        "the samples are not evenly spaced, or rows are missing. Put a row of empty cells where a "
+                        "sample is missing; give --fs HZ if the samples were evenly spaced",
+                        path_, out_.first_line + i, time_column_ + 1, printable(name), found, step));
     }
+    if (name_of_time(name) == time_name::without_unit && last_place(times_) == 1)
+        throw foreign_table(exit_usage,
+                            fmt::format("{}, column {} ({}): found whole numbers without a unit, which may be "
+                                        "milliseconds or a count; expected --fs HZ, or the name time_s where "
+                                        "they are seconds",
+                                        path_, time_column_ + 1, printable(name)));
     return std::strtod(fmt::format("{:.9g}", 1.0 / step).c_str(), nullptr); // stamps carry no more digits than that
 }
 

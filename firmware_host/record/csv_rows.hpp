@@ -15,12 +15,13 @@ class row_parser {
     /// Which columns are wanted, and their units into `out`. Throws `failure` (exit 2).
     row_parser(const std::string& path, const csv_header& header, const csv_request& request, csv_record& out);
 
-    /// Read the time stamps too; the column is time_s.
+    /// Read the time stamps too, of this column.
     void want_time(std::size_t column);
     /// The time stamps of a column that was read as samples.
     void take_times(std::size_t column);
     /// All rows that are left. Throws `failure` (exit 2) at the first line that is wrong.
     void read(line_reader& reader, const csv_request& request);
+    /// Of even samples, their stamps rounded or not. Throws `failure` (exit 2).
     double rate_of_time() const;
 
   private:
@@ -42,6 +43,7 @@ class row_parser {
     const char* odd_cell(piece& one, std::size_t number, std::size_t field, const char* begin, const char* end,
                          double& value) const;
     [[noreturn]] void empty_line_between(std::size_t number) const;
+    [[noreturn]] void bad_row(std::size_t number, const std::string& what) const;
     [[noreturn]] void bad_cell(std::size_t number, std::size_t field, std::string_view found,
                                const char* expected) const;
     [[noreturn]] void ragged(std::size_t number, std::string_view line) const;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "line_reader.hpp"
 
+#include "csv.hpp"
 #include "error.hpp"
 #include "files/input_file.hpp"
 
@@ -43,7 +44,8 @@ void line_reader::check_first_bytes() {
     };
     if (starts("\xEF\xBB\xBF", 3)) begin_ = searched_ = 3;
     if (starts("\xFF\xFE", 2) || starts("\xFE\xFF", 2))
-        throw failure(exit_usage, fmt::format("{}: is UTF-16 text, expected UTF-8: save it as \"CSV UTF-8\"", path_));
+        throw foreign_table(exit_usage,
+                            fmt::format("{}: is UTF-16 text, expected UTF-8: save it as \"CSV UTF-8\"", path_));
     if (starts("\x1F\x8B", 2) || starts("PK\x03\x04", 4))
         throw failure(exit_usage, fmt::format("{}: is a compressed file or a spreadsheet, expected CSV text", path_));
     const std::size_t look = end_ < 4096 ? end_ : 4096;

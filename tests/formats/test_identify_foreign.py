@@ -64,6 +64,60 @@ def test_the_same_modes(folder: Path, ending: str) -> None:
     assert list((folder / "temporary").iterdir()) == []
 
 
+def rows_of_a_logger(*, unit: float = 1.0, mark: str = ",", missing: tuple[int, ...] = ()) -> list[str]:
+    """Time stamps and the samples, to the last bit; `unit` in s."""
+    data = np.hstack(shaken_frame())
+    rows = ([f"{k / 1000.0 / unit:.6g}", *map(repr, row)] for k, row in enumerate(data.tolist()))
+    return [mark.join(cells) for k, cells in enumerate(rows) if k not in missing]
+
+
+LOGGERS = {
+    "a title": ["Recorder 7,serial 1234", "", "Time," + ",".join(NAMES), *rows_of_a_logger()],
+    "units below": ["Time," + ",".join(NAMES), "(s),(N),(m/s2),(m/s2),(m/s2)", *rows_of_a_logger()],
+    "milliseconds": ["Time [ms]," + ",".join(NAMES), *rows_of_a_logger(unit=1e-3)],
+    "comma": ["Zeit [s];" + ";".join(NAMES), *(row.replace(".", ",") for row in rows_of_a_logger(mark=";"))],
+}
+
+
+@pytest.mark.parametrize("kind", LOGGERS)
+def test_a_csv_that_another_program_wrote(folder: Path, kind: str) -> None:
+    path = folder / "logger.csv"
+    path.write_text("\n".join(LOGGERS[kind]) + "\n", encoding="utf-16" if kind == "a title" else "utf-8")
+    write_csv(folder / "frame.csv", frame())
+    assert modes_of(path, *CHOSEN) == modes_of(folder / "frame.csv", *CHOSEN)
+    said = okid("identify", path, *CHOSEN, "--json", "-", status=0).stderr
+    assert "okid-convert: note: " in said and "1000 Hz" in said and "samples.csv" not in said, said
+    listed = okid("identify", path, status=2).stderr
+    assert all(name in listed for name in NAMES), listed
+
+
+def test_rows_that_the_time_shows_missing(folder: Path) -> None:
+    (folder / "run.csv").write_text(
+        "\n".join(["t," + ",".join(NAMES), *rows_of_a_logger(missing=(700, 701, 702))]) + "\n"
+    )
+    (folder / "frame.csv").write_text("\n".join(["t," + ",".join(NAMES), *rows_of_a_logger()]) + "\n")
+    done = okid("identify", folder / "run.csv", *CHOSEN, "--json", "-", status=0)
+    assert "3 samples are missing by the time" in done.stderr
+    whole, parted = modes_of(folder / "frame.csv", *CHOSEN), json.loads(done.stdout)["modes"]
+    assert [one["confident"] for one in parted] == [one["confident"] for one in whole]
+    assert [one["frequency_hz"] for one in parted] == pytest.approx([one["frequency_hz"] for one in whole], rel=1e-3)
+
+
+def test_what_okid_convert_cannot_read_either(folder: Path) -> None:
+    rows = rows_of_a_logger()
+    rows[50] += ",1"
+    (folder / "ragged.csv").write_text("\n".join(["time_s," + ",".join(NAMES), *rows]) + "\n")
+    (folder / "no_rate.csv").write_text("u,y\n" + "1.5,2.5\n-3.5,4.5\n" * 50)
+    for name, options, part in (
+        ("ragged.csv", CHOSEN, "line 52: found 6 cells, expected 5"),
+        ("no_rate.csv", ("--inputs", "u", "--outputs", "y"), "no sample rate; expected --fs HZ"),
+        ("no_rate.csv", ("--inputs", "u", "--outputs", "x"), 'no column "x"'),
+    ):
+        said = okid("identify", folder / name, *options, status=2).stderr
+        assert said.startswith(f"okid: {folder / name}") and part in said and said.count("\n") == 1, said
+    assert list((folder / "temporary").iterdir()) == []
+
+
 def test_files_that_no_writer_of_ours_made(folder: Path) -> None:
     u, y = shaken_frame()
     scipy.io.savemat(folder / "lab.mat", {"Fs": 1000.0, "hammer": u[:, 0], "acc": y})

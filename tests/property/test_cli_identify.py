@@ -244,8 +244,10 @@ def test_rate_of_a_time_column(tmp_path: Path) -> None:
 
 def test_uneven_time_column(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
-    path.write_text(timed([n / 100 + (0.01 if n >= 300 else 0) for n in range(600)]))
-    refused(identify(path), 2, "line 302", "time_s", "0.02")
+    path.write_text(timed([n / 100 + (0.004 if n % 7 == 5 else 0) for n in range(600)]))
+    refused(identify(path), 2, "line 7", "time_s", "0.014")
+    path.write_text(timed([n / 100 + (0.01 if n >= 300 else 0) for n in range(600)]))  # a row is missing
+    assert result_of(identify(path, "--order", 4, "--json", "-"))["gaps"] == 1
 
 
 def test_missing_cells_are_gaps(record: Path, tmp_path: Path) -> None:

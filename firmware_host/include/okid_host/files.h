@@ -40,7 +40,7 @@ typedef struct okid_host_csv okid_host_csv_t;
 OKID_HOST_API int32_t okid_host_csv_read(const char* path, okid_host_csv_t** out);
 
 /** {"names": [..], "units": [..] ("" = the name has none), "fs_hz": number or null, "comments": the lines above the names,
- * "rate_remark": why a column time_s gives no rate, or ""}. */
+ * "rate_remark": why the time gives no rate, or ""}. */
 OKID_HOST_API const char* okid_host_csv_json(const okid_host_csv_t* self);
 
 /** The samples, row by row, NaN = missing. @param rows, columns  how many */

@@ -192,6 +192,40 @@ void time_column() {
     refused("time_s,a,b\n2,1,2\n", "one row");
 }
 
+/// Rows `at` of a record at `fs`, their stamps with so many decimals. @param first  of the stamps, s
+std::string stamped(const char* name, double fs, int decimals, int rows, int left_out = -1, double first = 0) {
+    std::string text = std::string(name) + ",a,b\n";
+    char line[64];
+    for (int i = 0; i < rows; ++i) {
+        if (i == left_out) continue;
+        std::snprintf(line, sizeof line, "%.*f,%d,%d\n", decimals, first + i / fs, i % 7, i % 5);
+        text += line;
+    }
+    return text;
+}
+
+void names_of_a_time() {
+    for (const char* name : {"time_s", "Time [s]", "t (s)", "time", "Time", "t", "T", "t_s"})
+        TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(250, take(stamped(name, 250, 4, 99)).fs_hz, name);
+    TEST_ASSERT_EQUAL_DOUBLE(4, take("t,time_s,b\n21.5,0,2\n21.6,.25,3\n21.9,.5,4\n", {"b"}).fs_hz);
+    refused("t,b\n0.1,2\n0.2,3\n", "no sample rate", {"t", "b"}); // a channel: torque, temperature
+    refused("Time,a,b\n0,1,2\n1,3,4\n2,5,6\n", "whole numbers without a unit");
+    TEST_ASSERT_EQUAL_DOUBLE(1, take("time_s,a,b\n0,1,2\n1,3,4\n2,5,6\n").fs_hz);
+    refused("Time [ms],a,b\n0,1,2\n1,3,4\n", "is not in seconds");
+}
+
+void rounded_stamps() {
+    for (const double fs : {1024.0, 1000.0, 800.0, 512.0, 333.25, 1707.0})
+        for (const double first : {0.0, 1764402555.123})
+            TEST_ASSERT_DOUBLE_WITHIN(1e-7 * fs, fs, take(stamped("time_s", fs, 3, 20000, -1, first)).fs_hz);
+    for (const int row : {40, 150, 299}) refused(stamped("time_s", 1024, 3, 400, row), "missing");
+    refused(stamped("time_s", 1024, 3, 90), "evenly spaced"); // too few to tell
+    refused(stamped("time_s", 100, 2, 600, 300), "missing");  // as 99.83 Hz would be, rounded
+    std::string jitter = "time_s,a,b\n";
+    for (int i = 0; i < 1000; ++i) jitter += std::to_string(i / 1000.0 + 3e-4 * (i * i % 17 / 17.0)) + ",1,2\n";
+    refused(jitter, "evenly spaced");
+}
+
 void refusals() {
     refused("", "empty");
     refused("\n\n", "no line of column names");
@@ -276,6 +310,8 @@ int main(void) {
     RUN_TEST(a_long_line);
     RUN_TEST(rate_lines);
     RUN_TEST(time_column);
+    RUN_TEST(names_of_a_time);
+    RUN_TEST(rounded_stamps);
     RUN_TEST(refusals);
     RUN_TEST(files_that_cannot_be_opened);
     RUN_TEST(units_and_names);

@@ -50,11 +50,11 @@ def _read_csv(path: str | Path) -> Record:
             if not is_plain(path):
                 return read_logger(path)
         raise
-    if record.fs_hz is None and not record.remarks:  # a time_s that is uneven has its remark
+    if record.fs_hz is None:  # uneven stamps, of which there is a remark, may show rows to be missing
         try:
             found = read_logger(path)
         except InputError as fault:
-            record.remarks.append(f"no sample rate: {str(fault).removeprefix(f'{path}: ')}")
+            record.remarks = record.remarks or [f"no sample rate: {str(fault).removeprefix(f'{path}: ')}"]
             return record
         return found if found.fs_hz is not None or not is_plain(path) else record
     return record

@@ -284,14 +284,13 @@ def _grid(layout: _Layout, times: Real) -> tuple[float, NDArray[np.int64]]:
         row = int(np.argmax(steps <= 0.0))
         raise InputError(f"line {layout.first + row + 2}: the time does not rise; give the rate with --fs")
     rounding, step = _resolution(times), float(np.mean(steps[steps < 1.6 * np.median(steps)]))
-    number = np.arange(len(times))
-    for rows in (number, np.concatenate([[0], np.cumsum(np.maximum(1, np.round(steps / step)).astype(np.int64))])):
-        slope, start = np.polyfit(rows, times - times[0], 1)
-        off = np.abs(times - times[0] - start - slope * rows)
-        allowed = max(0.25 * slope, min(rounding, slope))
-        if np.all(off <= allowed):
-            break
-    else:
+    whole = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(steps / step)).astype(np.int64))])
+    fits = []
+    for numbers in (np.arange(len(times)), whole):
+        slope, start = np.polyfit(numbers, times - times[0], 1)
+        fits.append((np.abs(times - times[0] - start - slope * numbers), float(slope), numbers))
+    off, slope, rows = min(fits, key=lambda fit: float(np.max(fit[0])))  # where both fit, the first: no row is missing
+    if np.any(off > max(0.25 * slope, min(rounding, slope))):
         row = int(np.argmax(off))
         raise InputError(
             f"line {layout.first + row + 1}: {off[row]:.3g} s away from even steps of {slope:.6g} s; okid does not "
