@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  records at several rates
 // METHOD   halved again and again behind the linear-phase filter of fir_kernel.hpp, the same for forces and responses: what
-//          lies between both stays the structure. A sample whose filter meets a missing one is missing
+//          lies between both stays the structure. Short gaps are bridged first (gap_bridge.hpp); a sample whose filter meets a
+//          missing one is missing
 #include "levels.hpp"
 
 #include "fir_kernel.hpp"
+#include "gap_bridge.hpp"
 #include "spectrum.hpp"
 
 #include <Eigen/Dense>
@@ -126,20 +128,28 @@ std::vector<record_level> make_levels(std::vector<sample_rows> records, std::siz
     std::vector<record_level> out(1);
     out[0].fs_hz = fs_hz;
     out[0].records = std::move(records);
+    normalise(out[0].records, m, scale);
+    out[0].bridged = bridge_gaps(out[0].records, m);
     if (decimate > 1) {
         const Eigen::VectorXd first = weights_of(fir_kernel(decimate, 1));
-        for (sample_rows& rows : out[0].records)
-            rows = thinned(first, static_cast<std::size_t>(decimate), rows, m, at_rest);
+        const std::vector<sample_rows> before = out[0].filtered();
+        out[0].bridged.clear();
+        out[0].records.clear();
+        for (const sample_rows& rows : before)
+            out[0].records.push_back(thinned(first, static_cast<std::size_t>(decimate), rows, m, at_rest));
         out[0].fs_hz /= decimate;
+        std::vector<double> again;
+        normalise(out[0].records, m, again);
+        for (std::size_t k = 0; k < m; ++k) scale[k] *= again[k];
     }
-    normalise(out[0].records, m, scale);
     out[0].top = decimate > 1 ? top_decimated : top_of(out[0].records, n_u, m);
     out[0].samples = complete(out[0].records, m);
     while (out.size() < most_levels) {
         record_level next;
         next.fs_hz = out.back().fs_hz / 2;
         next.top = std::min(top_decimated, 2 * out.back().top);
-        for (const sample_rows& rows : out.back().records) next.records.push_back(thinned(half, 2, rows, m, at_rest));
+        for (const sample_rows& rows : out.back().filtered())
+            next.records.push_back(thinned(half, 2, rows, m, at_rest));
         next.samples = complete(next.records, m);
         if (next.samples < fewest_samples) break;
         out.push_back(std::move(next));
@@ -164,7 +174,7 @@ record_level zoomed_level(const record_level& first, std::size_t m, int factor, 
                                         : weights_of(fir_kernel(factor, 1));
     const auto settles = static_cast<std::size_t>(weights.size()) / 2;
     if (!at_rest && share_before(first.records, m, settles) > most_cut_off) return out;
-    for (const sample_rows& rows : first.records)
+    for (const sample_rows& rows : first.filtered())
         out.records.push_back(thinned(weights, static_cast<std::size_t>(factor), rows, m, at_rest));
     out.samples = complete(out.records, m);
     if (out.samples < fewest_samples) out.records.clear();

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  what a stream or a long file leaves behind of samples that are no longer kept
 // METHOD   a quarter of the samples kept goes at a time, screened beside the next quarter, each channel less its mean over both,
-//          through the filters of all rates into sums
+//          through the filters of all rates, for which short gaps are bridged, into sums
 #include "older_samples.hpp"
 
 #include "consensus/consensus_runs.hpp"
+#include "consensus/gap_bridge.hpp"
 #include "error.hpp"
 #include "record.hpp"
 #include "record_rest.hpp"
@@ -84,14 +85,15 @@ void older_samples::begin_record(bool at_rest) {
     }
 }
 
-void older_samples::add(const double* row) {
+/// @param bridged  the row for the filters of lower rates
+void older_samples::add(const double* row, const double* bridged) {
     const bool there = std::all_of(row, row + n_u_ + n_y_, [](double x) { return !std::isnan(x); });
     counts_.missing += !there;
     counts_.gaps += !there && !counts_.in_gap;
     counts_.in_gap = !there;
     ++counts_.samples;
     ++counts_.length;
-    chain_.add(row, [this](std::size_t k, const double* of_rate) { levels_[k].add(of_rate); });
+    chain_.add(row, bridged, [this](std::size_t k, const double* of_rate) { levels_[k].add(of_rate); });
 }
 
 std::size_t older_samples::take(const record_set& newest) {
@@ -106,11 +108,17 @@ std::size_t older_samples::take(const record_set& newest) {
         for (const record_data& record : clean.records) remove_lines(clean.rows(record), m, record.count);
     remove_means(clean);
     counts_.screened += complete(raw, 0, count) - complete(clean, 0, count);
+    std::vector<sample_rows> rows;
+    for (const record_data& record : clean.records)
+        rows.emplace_back(clean.rows(record), clean.rows(record) + record.count * m);
+    const std::vector<sample_rows> without_gaps = bridge_gaps(rows, m);
+    const std::vector<sample_rows>& bridged = without_gaps.empty() ? rows : without_gaps;
     for (std::size_t r = 0; r < clean.records.size() && clean.records[r].first < count; ++r) {
         const record_data& record = clean.records[r];
         if (!counts_.within) begin_record(begins_at_rest_ || begins_at_rest(clean, record));
         const std::size_t last = std::min(record.first + record.count, count);
-        for (std::size_t n = record.first; n < last; ++n) add(clean.samples.data() + n * m);
+        for (std::size_t n = record.first; n < last; ++n)
+            add(clean.samples.data() + n * m, bridged[r].data() + (n - record.first) * m);
         counts_.within = last < newest.records[r].first + newest.records[r].count;
     }
     return count;
@@ -169,7 +177,7 @@ void older_samples::add_counts(const missing_count& newest, std::size_t judged, 
     missing_count all = newest;
     all.samples += counts_.missing - counts_.screened;
     all.gaps = to.gaps;
-    if (all.samples > 0) said.push_back(missing_samples(all, to.samples));
+    if (all.samples > 0) said.push_back(missing_samples(all, to.samples, true));
     if (counts_.screened > 0)
         said.emplace_back(
             "screened", fmt::format("{} of the {} samples before the newest {} had an output that was clipped, frozen, "

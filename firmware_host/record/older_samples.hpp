@@ -55,7 +55,7 @@ class older_samples {
 
   private:
     void begin_record(bool at_rest);
-    void add(const double* row);
+    void add(const double* row, const double* bridged);
 
     std::size_t n_u_, n_y_;
     std::vector<std::string> outputs_;

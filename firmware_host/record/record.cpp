@@ -364,7 +364,8 @@ result_context describe_records(const record_set& set, const record_options& opt
     context.detrend = options.detrend;
     context.start = options.start;
     describe_dofs(options, context);
-    if (missing.samples) context.warnings.push_back(missing_samples(missing, static_cast<long long>(total)));
+    if (missing.samples)
+        context.warnings.push_back(missing_samples(missing, static_cast<long long>(total), options.method == "auto"));
     return context;
 }
 
