@@ -8,6 +8,7 @@
 #include "error.hpp"
 #include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
+#include "record/foreign_table.hpp"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 // PURPOSE  short gaps bridged before the filters of lower rates
 // METHOD   the mean of the missing samples given the others of a window of rows, for a Gaussian process that has the covariances
 //          of the records: x_M = -Q_MM^-1 Q_MO x_O with Q the inverse of the covariance matrix (linear prediction of all channels
-//          from both sides). What it misses of a sample is independent of what it says: noise, no bias
+//          from both sides). Its errors are uncorrelated with what it puts in: they add noise, and no bias
 #include "gap_bridge.hpp"
 
 #include "owned_sums.hpp"
@@ -18,10 +18,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t longest_window = 40, shortest_window = 4, most_of_window = 400; // of a window
-constexpr std::size_t rows_of_gap = 4;                                                // of a window, for a row of a gap
-constexpr double most_missing = 0.1;                                                  // of the rows, in short gaps
-constexpr double least_power = 1e-9;                                                  // of the power of a channel
+constexpr std::size_t longest_window = 40, shortest_window = 4, most_of_window = 400; // rows, rows, numbers
+constexpr std::size_t rows_of_gap = 4; // of a window, to each row of the longest gap
+constexpr double most_missing = 0.1;   // of the rows, in short gaps
+constexpr double least_power = 1e-9;   // of the power of a channel, added to it
 
 bool is_missing(const double* row, std::size_t m) {
     return std::any_of(row, row + m, [](double x) { return std::isnan(x); });

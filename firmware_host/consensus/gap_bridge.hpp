@@ -5,8 +5,9 @@
 
 namespace okid_host {
 
-/// Records whose short gaps hold what the samples around them tell: gaps of up to ten samples, fewer where there are many
-/// channels. Their channels have no mean. Empty where there is nothing to bridge, or more than a tenth of the samples is missing so.
+/// The records (rows of m channels without a mean) with their short gaps filled from the samples around them: gaps of up to ten
+/// samples, fewer where there are more than ten channels. Empty where no gap is short, where the short ones make up more than a
+/// tenth of the rows, or where unbroken rows are too few to tell. Cost: O(m) a row without a gap, else O(40 m^2).
 std::vector<sample_rows> bridge_gaps(const std::vector<sample_rows>& records, std::size_t m);
 
 } // namespace okid_host

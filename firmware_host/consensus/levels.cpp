@@ -132,11 +132,11 @@ std::vector<record_level> make_levels(std::vector<sample_rows> records, std::siz
     out[0].bridged = bridge_gaps(out[0].records, m);
     if (decimate > 1) {
         const Eigen::VectorXd first = weights_of(fir_kernel(decimate, 1));
-        const std::vector<sample_rows> before = out[0].filtered();
+        std::vector<sample_rows> slower;
+        for (const sample_rows& rows : out[0].filtered())
+            slower.push_back(thinned(first, static_cast<std::size_t>(decimate), rows, m, at_rest));
+        out[0].records = std::move(slower);
         out[0].bridged.clear();
-        out[0].records.clear();
-        for (const sample_rows& rows : before)
-            out[0].records.push_back(thinned(first, static_cast<std::size_t>(decimate), rows, m, at_rest));
         out[0].fs_hz /= decimate;
         std::vector<double> again;
         normalise(out[0].records, m, again);

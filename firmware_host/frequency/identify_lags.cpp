@@ -235,14 +235,10 @@ void find_deviations(lag_work& work, std::size_t lags, response_modes& found) {
 /// The modes that are lines of machines in this set-up, by the rule of the default; their codes.
 std::vector<consensus_mode> lines_in(const lag_work& work, const set_up& one, const response_modes& found) {
     const record_set& set = one.set;
-    std::vector<sample_rows> rows;
     bool at_rest = struck(work);
-    for (const record_data& record : set.records) {
-        rows.emplace_back(set.rows(record), set.rows(record) + record.count * set.channels());
-        at_rest = at_rest && begins_at_rest(set, record);
-    }
+    for (const record_data& record : set.records) at_rest = at_rest && begins_at_rest(set, record);
     std::vector<double> scale;
-    const auto levels = make_levels(std::move(rows), set.n_u, set.n_y, work.options.fs_hz, at_rest, 1, scale);
+    const auto levels = make_levels(set.rows_of_each(), set.n_u, set.n_y, work.options.fs_hz, at_rest, 1, scale);
     std::vector<consensus_mode> out = found.modes;
     for (std::size_t k = 0; k < out.size(); ++k) {
         out[k].why.clear();

@@ -7,6 +7,7 @@
 #include "csv_rows.hpp"
 #include "error.hpp"
 #include "files/nearest_name.hpp"
+#include "foreign_table.hpp"
 #include "line_reader.hpp"
 #include "npy.hpp"
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  one CSV record in memory: the columns asked for, NaN where a sample is missing.
 #pragma once
-#include "error.hpp"
-
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -30,14 +28,8 @@ struct csv_record {
     std::string rate_remark;                 ///< why the time gives no rate (`whole` only)
 };
 
-/// A table that says no rate in okid's own way and whose head, first row or time is not as read_csv() has it: another program
-/// may have written it.
-struct foreign_table : failure {
-    using failure::failure;
-};
-
-/// Read a record. Throws `failure` (exit 2) naming file, line, column, what was found and what was expected.
-/// Columns that were not asked for are skipped unread. A name that ends in .npy is an array (npy.hpp).
+/// Read a record. Throws `failure` (exit 2; foreign_table.hpp is a kind of it) naming file, line, column, what was found and what
+/// was expected. Columns that were not asked for are skipped unread. A name that ends in .npy is an array (npy.hpp).
 csv_record read_csv(const std::string& path, const csv_request& request);
 
 /// Throws (exit 2) where one of the first `checked` columns of `count` rows is missing throughout.

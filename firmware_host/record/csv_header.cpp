@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "csv_header.hpp"
 
-#include "csv.hpp"
 #include "error.hpp"
 #include "files/file_kind.hpp"
 #include "files/nearest_name.hpp"
+#include "foreign_table.hpp"
 
 #include <algorithm>
 #include <array>

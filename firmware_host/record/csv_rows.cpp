@@ -10,6 +10,7 @@
 #include "files/memory_bound.hpp"
 #include "files/nearest_name.hpp"
 #include "files/side_by_side.hpp"
+#include "foreign_table.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -341,21 +342,20 @@ static std::optional<double> rate_of_rounded(const std::vector<double>& times) {
     int uneven = 0;
     for (std::size_t i = 1; i < times.size(); ++i) uneven += is_uneven(times[i] - times[i - 1], duration / steps);
     if (uneven < 10) return {};
-    double low = (duration - place) / steps, high = (duration + place) / steps;
+    double low = (duration - place) / steps, high = (duration + place) / steps, step = duration / steps;
     const double most = 1.001 * place + 4e-16 * std::abs(times.back());
-    while (high - low > 1e-9 * place / steps) { // the spread is convex in the slope
+    while (spread_about(times, step) > most) { // it is convex in the slope
+        if (high - low < 1e-9 * place / steps) return {};
         const double a = low + (high - low) / 3, b = high - (high - low) / 3;
-        const double at_a = spread_about(times, a), at_b = spread_about(times, b);
-        if (std::min(at_a, at_b) <= most) {
-            low = high = at_a < at_b ? a : b;
-            break;
-        }
-        (at_a < at_b ? high : low) = at_a < at_b ? b : a;
+        if (spread_about(times, a) < spread_about(times, b))
+            high = b;
+        else
+            low = a;
+        step = (low + high) / 2;
     }
-    if (spread_about(times, low) > most) return {};
-    double rate = 1 / low;
+    double rate = 1 / step;
     for (int digits = 2; digits <= 12; ++digits) {
-        rate = std::strtod(fmt::format("{:.{}g}", 1 / low, digits).c_str(), nullptr);
+        rate = std::strtod(fmt::format("{:.{}g}", 1 / step, digits).c_str(), nullptr);
         if (spread_about(times, 1 / rate) <= most) break;
     }
     return rate;

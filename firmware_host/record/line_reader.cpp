@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "line_reader.hpp"
 
-#include "csv.hpp"
 #include "error.hpp"
 #include "files/input_file.hpp"
+#include "foreign_table.hpp"
 
 #include <cerrno>
 #include <cstring>

@@ -108,17 +108,13 @@ std::size_t older_samples::take(const record_set& newest) {
         for (const record_data& record : clean.records) remove_lines(clean.rows(record), m, record.count);
     remove_means(clean);
     counts_.screened += complete(raw, 0, count) - complete(clean, 0, count);
-    std::vector<sample_rows> rows;
-    for (const record_data& record : clean.records)
-        rows.emplace_back(clean.rows(record), clean.rows(record) + record.count * m);
-    const std::vector<sample_rows> without_gaps = bridge_gaps(rows, m);
-    const std::vector<sample_rows>& bridged = without_gaps.empty() ? rows : without_gaps;
+    const std::vector<sample_rows> bridged = bridge_gaps(clean.rows_of_each(), m);
     for (std::size_t r = 0; r < clean.records.size() && clean.records[r].first < count; ++r) {
         const record_data& record = clean.records[r];
         if (!counts_.within) begin_record(begins_at_rest_ || begins_at_rest(clean, record));
         const std::size_t last = std::min(record.first + record.count, count);
-        for (std::size_t n = record.first; n < last; ++n)
-            add(clean.samples.data() + n * m, bridged[r].data() + (n - record.first) * m);
+        const double *const rows = clean.rows(record), *const filtered = bridged.empty() ? rows : bridged[r].data();
+        for (std::size_t n = 0; n < last - record.first; ++n) add(rows + n * m, filtered + n * m);
         counts_.within = last < newest.records[r].first + newest.records[r].count;
     }
     return count;
@@ -180,9 +176,10 @@ void older_samples::add_counts(const missing_count& newest, std::size_t judged, 
     if (all.samples > 0) said.push_back(missing_samples(all, to.samples, true));
     if (counts_.screened > 0)
         said.emplace_back(
-            "screened", fmt::format("{} of the {} samples before the newest {} had an output that was clipped, frozen, "
-                                    "dropped to zero or a spike: left out as gaps, nothing is interpolated",
-                                    counts_.screened, counts_.samples, judged));
+            "screened",
+            fmt::format("{} of the {} samples before the newest {} had an output that was clipped, frozen, "
+                        "dropped to zero or a spike: left out as gaps, nothing is interpolated at their rate",
+                        counts_.screened, counts_.samples, judged));
 }
 
 std::vector<std::byte> older_samples::state() const {

@@ -264,12 +264,10 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
     };
     const record_set& set = work.set;
     const auto n_u = static_cast<int>(set.n_u), n_y = static_cast<int>(set.n_y);
-    std::vector<sample_rows> rows;
-    for (const record_data& record : set.records)
-        rows.emplace_back(set.rows(record), set.rows(record) + record.count * set.channels());
     tell("making streams of lower rates");
     std::vector<double> scale;
-    auto levels = make_levels(std::move(rows), set.n_u, set.n_y, options.fs_hz, work.at_rest, options.decimate, scale);
+    auto levels =
+        make_levels(set.rows_of_each(), set.n_u, set.n_y, options.fs_hz, work.at_rest, options.decimate, scale);
     if (work.before) work.before->lend_sums(scale, levels);
     const double lowest_hz = periods_of_horizon * levels.back().fs_hz;
     tell("looking with several methods, horizons and rates");

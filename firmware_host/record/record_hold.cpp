@@ -15,9 +15,7 @@ constexpr double falling = 0.25; // power just below Nyquist over the usual: an 
 } // namespace
 
 bool falls_to_nyquist(const record_set& set) {
-    std::vector<std::vector<double>> rows;
-    for (const record_data& record : set.records)
-        rows.emplace_back(set.rows(record), set.rows(record) + record.count * set.channels());
+    const std::vector<std::vector<double>> rows = set.rows_of_each();
     for (std::size_t k = 0; k < set.n_u; ++k) {
         const std::vector<double> power = power_spectrum(rows, set.channels(), k, hold_spectrum);
         if (!power.empty() && mean_power(power, 0.47, 0.5) < falling * median_power(power, 0.1, 0.4)) return true;

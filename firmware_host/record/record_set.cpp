@@ -44,6 +44,12 @@ bool all_measured(const double* x, std::size_t count) {
     return std::all_of(measured(sum[0] + sum[1]) ? x + i : x, x + count, measured);
 }
 
+std::vector<std::vector<double>> record_set::rows_of_each() const {
+    std::vector<std::vector<double>> out;
+    for (const record_data& record : records) out.emplace_back(rows(record), rows(record) + record.count * channels());
+    return out;
+}
+
 void record_set::add(std::string path, const double* from, std::size_t rows) {
     records.push_back({std::move(path), count(), rows});
     samples.insert(samples.end(), from, from + rows * channels());

@@ -24,6 +24,7 @@ struct record_set {
     std::size_t count() const { return channels() ? samples.size() / channels() : 0; }
     double* rows(const record_data& record) { return samples.data() + record.first * channels(); }
     const double* rows(const record_data& record) const { return samples.data() + record.first * channels(); }
+    std::vector<std::vector<double>> rows_of_each() const; ///< record, copied
     /// Another record of `rows` samples, copied.
     void add(std::string path, const double* from, std::size_t rows);
     /// Another record: samples begin .. end-1 of these rows.

@@ -277,7 +277,8 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
         if (found[k].dead && !none) say(fmt::format("output \"{}\" {}{}", outputs[k], never_moves, lost_words));
         for (const auto& [kind, faults] : found[k].of_kind)
             say(fault_text(outputs[k], faults) +
-                (found[k].lost && !none ? lost_words : ": left out as gaps, nothing is interpolated"));
+                (found[k].lost && !none ? lost_words
+                                        : ": left out as gaps, nothing is interpolated at the record's rate"));
     }
     for (std::size_t k = 0; k < outputs.size() && !none; ++k)
         if (found[k].sparse)

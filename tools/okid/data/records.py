@@ -298,9 +298,9 @@ def read_csv(path: str | Path) -> Record:
     semicolon or tab, decimal comma with semicolon.
 
     `nan` and empty cells are missing samples. The rate comes from a `fs_hz` or `sample_rate_hz` comment, else from a
-    `time_s` column with even steps. Names stand as in the header; units come from them ("a [g]", "a_g") or from a
-    `# units:` comment. What write_csv() said about the record is taken over. InputError names file, line and column
-    of the first fault.
+    column `time_s`, `Time [s]`, `time` or `t` with even steps. Names stand as in the header; units come from them
+    ("a [g]", "a_g") or from a `# units:` comment. What write_csv() said about the record is taken over. InputError
+    names file, line and column of the first fault.
     """
     about, samples = host.csv(path)
     names, comments = about["names"], about["comments"]
