@@ -37,7 +37,7 @@ hit_line line_of(const record_set& set, const record_data& record, const std::ve
     window.rate_hz = options.fs_hz;
     window.channels = &channels;
     window.sign = span.sign;
-    window.unit = options.hit_unit.empty() ? "" : " " + options.hit_unit;
+    window.unit = channels[0].unit.empty() ? "" : " " + channels[0].unit;
     if (options.band) window.spectrum_hz = std::min(options.band->second, options.fs_hz / 2);
     const hit_verdict found = judge_hit(window);
     hit_line out;
@@ -53,8 +53,9 @@ hit_line line_of(const record_set& set, const record_data& record, const std::ve
 
 std::vector<hit_channel> channels_of_hit(const record_options& options) {
     std::vector<hit_channel> out;
-    for (const std::string& name : options.inputs) out.push_back({name, true, true});
-    for (const std::string& name : options.outputs) out.push_back({name, false, false}); // a gap is left out
+    for (const std::string& name : options.inputs) out.push_back({name, true, "", true});
+    for (const std::string& name : options.outputs) out.push_back({name, false, "", false}); // a gap is left out
+    for (std::size_t c = 0; c < std::min(out.size(), options.hit_units.size()); ++c) out[c].unit = options.hit_units[c];
     return out;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <complex>
 #include <fmt/format.h>
+#include <map>
 
 namespace okid_host {
 namespace {
@@ -180,17 +181,23 @@ class hit_judge {
         return std::sqrt(std::max(0.0, squares / n - mean * mean));
     }
 
-    /// Is the structure still ringing from what was before? The rms before the hit against that behind it.
+    /// Is the structure still ringing from what was before? The rms before the hit against that behind it: of the same channel or,
+    /// where that is more, of the one of the same quantity that the hit moved most. A sensor that hardly moves shows its noise.
     bool find_motion() {
-        const std::size_t count = hit_.before;
+        const std::size_t quiet = hit_.before * 7 / 8, end = std::min(hit_.count, 2 * hit_.before);
+        std::map<std::string, double> most;
+        for (std::size_t c = 0; c < channels_.size(); ++c) {
+            double& largest = most[channels_[c].unit];
+            largest = std::fmax(largest, channels_[c].force ? 0 : rms(c, hit_.before, end));
+        }
         for (std::size_t c = 0; c < channels_.size(); ++c) {
             if (channels_[c].force) continue;
-            const double was = rms(c, 0, count * 7 / 8), is = rms(c, count, std::min(hit_.count, 2 * count));
-            if (was > most_motion * is)
+            const double share = rms(c, 0, quiet) / most[channels_[c].unit];
+            if (share > most_motion)
                 return refuse("moving",
                               fmt::format("{} still moved before the hit, by {:.0f} % of what the hit caused (rms): "
                                           "wait longer, or strike harder",
-                                          channels_[c].name, 100 * was / is));
+                                          channels_[c].name, 100 * share));
         }
         return false;
     }

@@ -16,6 +16,7 @@ namespace okid_host {
 struct hit_channel {
     std::string name;
     bool force = false;
+    std::string unit;                        ///< sensors of one unit are compared
     bool complete = true;                    ///< a missing sample spoils the hit
     double low = -INFINITY, high = INFINITY; ///< limits of its code
 };

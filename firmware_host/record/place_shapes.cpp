@@ -69,6 +69,7 @@ class placer {
         if (shapes_.dofs.size() < 2) return;
         for (std::size_t k = 0; k < modes_.size(); ++k) add(k);
         say_points();
+        scale_masses();
         work_.context.placed = std::move(shapes_);
     }
 
@@ -149,6 +150,17 @@ class placer {
         }
         shapes_.modal_mass.push_back(clear ? mass.kg() : NAN);
         shapes_.modal_mass_std.push_back(shapes_.modal_mass.back() * deviation / mass.power);
+    }
+
+    /// Those that came with M, K and R are of shapes whose largest entry is at a sensor: here it is at a place.
+    void scale_masses() {
+        for (std::size_t k = 0; k < work_.context.modal_masses.size(); ++k) {
+            modal_mass& one = work_.context.modal_masses[k];
+            const double factor = shapes_.modal_mass[k] / one.kg;
+            for (double* value : {&one.kg, &one.stiffness, &one.damping, &one.stiffness_std, &one.damping_std})
+                *value *= factor;
+            one.kg_std = shapes_.modal_mass_std[k];
+        }
     }
 
     /// At a drive point every mode moves with the force.

@@ -48,7 +48,7 @@ struct record_options {
     bool by_hand() const { return !modes.empty() || !picks.empty(); }
     std::vector<int> sensing;                       ///< okid_sensing_t of each output; empty: all are accelerations
     bool judge_hits = false, keep_all_hits = false; ///< are bad hits sought; are they used nevertheless
-    std::string hit_unit;                           ///< of their force
+    std::vector<std::string> hit_units;             ///< of the channels, the force first; empty: not known
     mass_plan placed;      ///< of hits: the places struck and those of the sensors, when these are given
     std::vector<int> hits; ///< where each record was struck, from 1 (-3: at 3, reversed); empty: not given
     std::function<void(const char* stage)> stage; ///< called with what begins; may be empty

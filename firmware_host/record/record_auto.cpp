@@ -33,6 +33,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <fmt/ranges.h>
 
 namespace okid_host {
@@ -257,6 +258,17 @@ void take_inputs_from_sums(const std::vector<listed_pair>& found, const record_l
         work.inputs.residues.push_back(mode.confident() ? std::move(of_wanted.residues[next++]) : Eigen::MatrixXcd());
 }
 
+/// Of what follows hits: a line is one only where the same records with their force and the silence before it say so, too.
+void keep_lines_of(const record_set& struck, const record_options& options, const std::vector<consensus_mode>& unmarked,
+                   std::vector<consensus_mode>& modes) {
+    std::vector<double> scale;
+    std::vector<consensus_mode> other = unmarked;
+    mark_lines(make_levels(struck.rows_of_each(), struck.n_u, struck.n_y, options.fs_hz, true, options.decimate, scale),
+               struck.n_u, struck.n_y, true, other);
+    for (std::size_t k = 0; k < modes.size(); ++k)
+        if (other[k].why == unmarked[k].why) modes[k].why = unmarked[k].why;
+}
+
 /// Everything up to the modes, their standard deviations and the shapes.
 std::vector<listed_mode> find_modes_agreed(const record_options& options, record_work& work) {
     const auto tell = [&](const char* stage) {
@@ -286,7 +298,9 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
         modes = find_agreement(runs, &turned);
     }
     if (!known && !turned.empty()) remark_mixed(turned, options, work.context);
+    const std::vector<consensus_mode> unmarked = modes;
     mark_lines(levels, set.n_u, set.n_y, work.at_rest, modes);
+    if (work.struck) keep_lines_of(*work.struck, options, unmarked, modes);
     mark_ends(work, options.fs_hz, levels.front().top, modes);
     keep_wanted(options, modes);
     modes = options.picks.empty() ? worth_telling(std::move(modes), options.all_modes)
@@ -370,31 +384,68 @@ record_options without_outputs(record_options options, const std::vector<bool>& 
     return options;
 }
 
-/// Of records struck at different places: poles and shapes from what follows the hits, B and D from those of each place.
-std::vector<listed_mode> find_struck(const record_options& options, record_work& work) {
-    record_options seen = options;
-    record_set decays = free_decays(work.set);
-    work.context.inputs = place_names(options.inputs.front(), options.hits);
-    if (decays.records.empty()) { // the force never rests
-        work.set = one_column_a_place(work.set, options.hits);
-        seen.inputs = work.context.inputs;
-        return find_modes_agreed(seen, work);
+/// What one set of records shows of a structure that was struck.
+struct blow_look {
+    record_work work;
+    std::vector<listed_mode> listed; ///< empty: `fault`
+    std::exception_ptr fault;
+
+    std::ptrdiff_t believed() const {
+        return std::count_if(listed.begin(), listed.end(), [](const listed_mode& mode) { return mode.in_model; });
     }
-    seen.inputs.clear();
-    const bool at_rest = std::exchange(work.at_rest, false);
-    record_set struck = std::exchange(work.set, std::move(decays));
-    std::vector<listed_mode> listed = find_modes_agreed(seen, work);
-    make_modal_model(listed, options.fs_hz, work);
+};
+
+blow_look look_at_blows(record_set set, record_options options, const record_work& about) {
+    blow_look out;
+    if (set.n_u == 0) out.work.struck = &about.set;
+    if (set.n_u == 0) options.inputs.clear();
+    out.work.at_rest = set.n_u > 0; // nothing moved before
+    out.work.context = about.context;
+    out.work.set = std::move(set);
+    try {
+        out.listed = find_modes_agreed(options, out.work);
+    } catch (const failure&) {
+        out.fault = std::current_exception();
+    }
+    return out;
+}
+
+/// Of records struck at different places: poles and shapes from all together, B and D from those of each place. A force that rests
+/// is looked at twice. What follows it needs no input a place, so that many light modes and places do no harm; with it modes are
+/// seen that die away soon, and the silence before it shows that a mode is no tone: that look counts where it believes more modes.
+std::vector<listed_mode> find_struck(const record_options& options, record_work& work) {
+    record_options seen = options, plain;
+    seen.inputs = work.context.inputs = place_names(options.inputs.front(), options.hits);
+    record_set struck = std::exchange(work.set, one_column_a_place(work.set, options.hits));
+    if (!are_blows(struck)) return find_modes_agreed(seen, work);
+    plain = seen;
+    plain.modes.clear();
+    plain.picks.clear();
+    blow_look best = look_at_blows(free_decays(struck), plain, work), forced = look_at_blows(work.set, plain, work);
+    if (forced.believed() > best.believed()) best = std::move(forced);
+    if (best.listed.empty()) std::rethrow_exception(best.fault);
+    if (options.by_hand()) best.listed = find_modes_agreed(seen, best.work); // the numbers are those of this look
+    const bool at_rest = work.at_rest;
+    work = std::move(best.work);
+    work.struck = nullptr;
+    work.set = {};
+    work.set.n_y = struck.n_y;
+    make_modal_model(best.listed, options.fs_hz, work);
     work.set = std::move(struck);
     work.at_rest = at_rest;
-    if (options.detrend != "none") remove_means(work.set);
-    fit_places(listed, options.hits, options.fs_hz, work);
-    return listed;
+    if (options.detrend != "none") {
+        remove_means(work.set);
+        rest_forces(work.set);
+    }
+    fit_places(best.listed, options.hits, options.fs_hz, work);
+    remark_low_fit(*work.context.simulation_percent, true, work.context);
+    return best.listed;
 }
 
 /// Of records struck at different places: M, K and R where there is a mode for each, and shapes over the places.
 void find_placed(const std::vector<listed_mode>& listed, const record_options& options, record_work& work) {
     record_options wanted = options;
+    wanted.modes_without_matrices = true; // the places were given for the shapes
     wanted.mass = matrices_of_places(listed, options, work.context.warnings);
     find_matrices_agreed(wanted, work);
     if (work.set.n_u == 1) place_shapes(listed, options, work); // else the force never rests

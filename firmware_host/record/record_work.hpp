@@ -39,6 +39,7 @@ struct record_work {
     okid_identify_config_t config{};
     okid_identified_t model{};
     result_context context;
+    const record_set* struck = nullptr;    ///< auto: the records of which `set` is what follows the hits
     const older_samples* before = nullptr; ///< auto: what is known of the samples before those of `set`
     bool force_is_older = false;           ///< … and they have the force: B and D come from sums
     mode_inputs inputs;                    ///< then, of each listed mode; no residues: not known

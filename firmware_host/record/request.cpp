@@ -282,7 +282,7 @@ void take_record_units(const std::vector<std::string>& units, record_options& op
             if (plan->wanted()) take_units(units, *plan, options.said);
         return;
     }
-    if (!units.empty()) options.hit_unit = units[0];
+    options.hit_units = units;
     if (!options.placed.wanted()) return;
     std::vector<std::string> placed = units; // one column a place
     if (!units.empty()) placed.insert(placed.begin(), options.placed.inputs.size() - 1, units[0]);

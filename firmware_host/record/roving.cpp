@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  records struck at different places, and records that contradict each other
-// METHOD   poles and sensor shapes are common to all records and come from the free decays; B and D are those of each place
+// METHOD   poles and sensor shapes are common to all records; B and D are those of each place
 //          (residue_fit). Records contradict when B and D of all together leave far more of one than its own do
 #include "roving.hpp"
 
@@ -33,13 +33,6 @@ std::size_t index_of(const std::vector<int>& places, int hit) {
 
 hit_span span_of(const record_set& set, const record_data& record) {
     return find_hit(set.rows(record), record.count, set.channels());
-}
-
-/// Every record is one hit and what follows it: then nothing moves before, however short the time before the hit.
-bool are_blows(const record_set& set) {
-    return set.n_u == 1 && std::all_of(set.records.begin(), set.records.end(), [&](const record_data& record) {
-               return span_of(set, record).free >= least_free;
-           });
 }
 
 /// The records of one place, with the force's sign as the place has it.
@@ -110,6 +103,12 @@ std::string contradiction_text(const record_set& set, const std::vector<residue_
 
 } // namespace
 
+bool are_blows(const record_set& set) {
+    return set.n_u == 1 && std::all_of(set.records.begin(), set.records.end(), [&](const record_data& record) {
+               return span_of(set, record).free >= least_free;
+           });
+}
+
 std::vector<int> hit_places(const std::vector<int>& hits) {
     std::vector<int> out;
     for (const int hit : hits) out.push_back(std::abs(hit));
@@ -142,10 +141,22 @@ record_set one_column_a_place(const record_set& set, const std::vector<int>& hit
     return out;
 }
 
+void rest_forces(record_set& blows) {
+    for (const record_data& record : blows.records) {
+        const hit_span span = span_of(blows, record);
+        const std::size_t length = span.end - span.begin, m = blows.channels();
+        double* force = blows.rows(record);
+        double sum = 0, count = 0;
+        for (std::size_t i = 0; i < record.count; ++i)
+            if ((i + length < span.begin || i >= span.end + length) && !std::isnan(force[i * m]))
+                sum += force[i * m], ++count;
+        for (std::size_t i = 0; count > 0 && i < record.count; ++i) force[i * m] -= sum / count;
+    }
+}
+
 record_set free_decays(const record_set& set) {
     record_set out;
     out.n_y = set.n_y;
-    if (!are_blows(set)) return {};
     for (const record_data& record : set.records) {
         const std::size_t first = span_of(set, record).end;
         std::vector<double> rows;

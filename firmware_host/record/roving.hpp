@@ -21,7 +21,13 @@ record_set one_column_a_place(const record_set& set, const std::vector<int>& hit
 /// Their names: "force@3".
 std::vector<std::string> place_names(const std::string& force, const std::vector<int>& hits);
 
-/// What follows the last sample of each hit, outputs alone; empty where that is less than 30 % of what follows its beginning.
+/// Every record is one hit and what follows it: then nothing moves before, however short the time before the hit.
+bool are_blows(const record_set& set);
+
+/// The force of each is zero where it does not act: the mean of a pulse is no offset.
+void rest_forces(record_set& blows);
+
+/// What follows the last sample of each hit, outputs alone.
 record_set free_decays(const record_set& set);
 
 /// B, D and fits of a modal model of which each place has its own records.
