@@ -17,7 +17,7 @@ typedef struct okid_watch_config_t {
     int32_t n_u;       ///< inputs, 0..4096
     int32_t n_y;       ///< outputs, 1..4096
     int32_t max_order; ///< states of a model, at most; 1..4096
-    int32_t lead;      ///< samples until a predictor has found its state, >= 0: the lags of the observer
+    int32_t lead;      ///< samples from which a predictor finds its state, >= 0: the lags of the observer
     int32_t block;     ///< samples judged together; 0 = 32
     int32_t learn;     ///< blocks that teach what errors are usual; 0 = 16, at most 1024
     int32_t confirm;   ///< consecutive blocks with high errors that are a change; 0 = 3

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE    tell within a few blocks that a structure is no longer the one a model was identified from
 // METHOD     one-step predictor of the model; mean square of its whitened errors over blocks against the median of blocks
-//            learned after the model was made; the same divided by the mean square of the outputs; several blocks in a row
+//            learned after the model was made; the same divided by the mean square of the outputs; several blocks in a row.
+//            At the start and behind a gap the state is off by d: of `lead` errors e_k = C F^k d + white, F = A - K C, least
+//            squares give d, and the state F^lead d; a lightly damped F alone would need hundreds of samples to forget it
 // REFERENCE  innovations of the predictor, paper eq. (20) with L = -K; as a test of a model: Mehra, Peschon (1971)
 // NUMERICS   a mean over N = block n_y squares scatters by sqrt(2/N): three times the usual is five deviations at N = 32, and
 //            needs three blocks in a row. Medians: a spike among the blocks that teach does no harm
-// WORKSPACE  per model n_z (n_z + m) + n_y (n_z + m + n_y) numbers, two models; no work but per sample
+// WORKSPACE  per model n_z (3 n_z + m) + n_y (n_z + m + n_y + lead) numbers, two models; 5 n_z^2 beside them
 #include <okid/watch.h>
 
 #include "identify/triangular.hpp"
@@ -14,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 using std::size_t;
 
@@ -23,12 +26,14 @@ namespace {
 /// A model at work: x+ = step [x; u; e], yhat = look [x; u].
 struct predictor {
     int32_t order = 0; ///< 0 = none
-    int32_t skip = 0;  ///< samples until its errors count
+    int32_t skip = 0;  ///< samples until its state is found and its errors count
     int32_t taught = 0, count = 0;
     bool high = false;                         ///< the error of the sample before
     double error = 0, power = 0;               ///< sums over the block in hand
     double usual_error = 0, usual_share = 0;   ///< share: error / power of the outputs
     okid_real_t *step, *look, *weight, *state; ///< weight: inverse innovation covariance; state: [x; u; e]
+    okid_real_t *forget, *find;                ///< F = A - K C; transpose of the map from sums of errors to the state
+    okid_real_t* heard;                        ///< weighted errors since the start or a gap, newest last
     double *mean, *errors, *shares;            ///< what the blocks taught
 };
 
@@ -39,6 +44,7 @@ struct okid_watch {
     okid_watch_config_t config;
     okid::predictor at_work, next;
     okid_real_t *outputs, *weighted, *scratch;
+    okid_real_t *gramian, *power, *seen; ///< of states: n_z x n_z
     double* sorted;
     int32_t high;
     double ratio;
@@ -50,7 +56,7 @@ using okid::area;
 using okid::predictor;
 using okid::linalg::multiply;
 
-constexpr double ridge = 1e-9; // on the diagonal of the innovation covariance
+constexpr double ridge = 1e-9; // on the diagonals of the innovation covariance and of what errors tell of the state
 constexpr double spike = 25;   // mean square of an error, in usual ones: beyond lies a spike
 
 size_t lay_out(okid_watch& s, okid::arena& memory) {
@@ -61,12 +67,18 @@ size_t lay_out(okid_watch& s, okid::arena& memory) {
         each->look = memory.take<okid_real_t>(area(c.n_y, c.max_order + c.n_u));
         each->weight = memory.take<okid_real_t>(area(c.n_y, c.n_y));
         each->state = memory.take<okid_real_t>(area(all));
+        each->forget = memory.take<okid_real_t>(area(c.max_order, c.max_order));
+        each->find = memory.take<okid_real_t>(area(c.max_order, c.max_order));
+        each->heard = memory.take<okid_real_t>(area(c.n_y, c.lead));
         each->mean = memory.take<double>(area(c.n_u + c.n_y));
         each->errors = memory.take<double>(area(c.learn));
         each->shares = memory.take<double>(area(c.learn));
     }
     for (okid_real_t** each : {&s.outputs, &s.weighted}) *each = memory.take<okid_real_t>(area(c.n_y));
-    s.scratch = memory.take<okid_real_t>(std::max(area(c.n_y, c.n_y), area(c.max_order)));
+    for (okid_real_t** each : {&s.gramian, &s.power, &s.seen})
+        *each = memory.take<okid_real_t>(area(c.max_order, c.max_order));
+    s.scratch =
+        memory.take<okid_real_t>(std::max(area(c.n_y, c.n_y), 2 * area(c.max_order, std::max(c.max_order, c.n_y))));
     s.sorted = memory.take<double>(area(c.learn));
     return memory.bytes();
 }
@@ -99,6 +111,61 @@ bool invert(okid_watch& s, const okid_real_t* innovation, okid_real_t* weight) {
     if (okid::linalg::cholesky(n, s.scratch, n) != 0) return false;
     okid::linalg::cholesky_solve(n, s.scratch, n, weight, n, n);
     return std::all_of(weight, weight + area(n, n), [](okid_real_t x) { return std::isfinite(x); });
+}
+
+/// Errors of a stretch give the state at its begin with the information `gramian`, and `power` of it is left behind it.
+/// The stretch there grows by another one in front; `first` and `passed` are of that.
+void join(okid_watch& s, int n, const okid_real_t* first, const okid_real_t* passed) {
+    okid_real_t *half = s.scratch, *next = s.scratch + area(n, n);
+    multiply(false, false, n, n, n, 1, s.gramian, n, passed, n, 0, half, n);
+    multiply(true, false, n, n, n, 1, passed, n, half, n, 0, next, n);
+    for (size_t i = 0; i < area(n, n); ++i) next[i] += first[i];
+    multiply(false, false, n, n, n, 1, s.power, n, passed, n, 0, half, n);
+    std::copy(next, next + area(n, n), s.gramian);
+    std::copy(half, half + area(n, n), s.power);
+}
+
+/// The map from `lead` errors to the state behind them; zero where they do not tell it.
+void prepare_find(okid_watch& s, predictor& p) {
+    const int n = p.order, n_y = s.config.n_y;
+    const okid_real_t* gain = p.step + area(n, n + s.config.n_u);
+    std::copy(p.step, p.step + area(n, n), p.forget);
+    multiply(false, false, n, n, n_y, -1, gain, n, p.look, n_y, 1, p.forget, n);
+    multiply(false, false, n_y, n, n_y, 1, p.weight, n_y, p.look, n_y, 0, s.scratch, n_y);
+    multiply(true, false, n, n, n_y, 1, p.look, n_y, s.scratch, n_y, 0, s.seen, n);
+    std::fill(s.gramian, s.gramian + area(n, n), okid_real_t{0});
+    std::fill(s.power, s.power + area(n, n), okid_real_t{0});
+    for (int i = 0; i < n; ++i) s.power[area(i, n + 1)] = 1;
+    int bit = 1;
+    while (bit <= s.config.lead / 2) bit *= 2;
+    for (; bit > 0; bit /= 2) {
+        join(s, n, s.gramian, s.power);
+        if ((s.config.lead & bit) != 0) join(s, n, s.seen, p.forget);
+    }
+    const okid_real_t least =
+        std::max(static_cast<okid_real_t>(ridge), 8 * std::numeric_limits<okid_real_t>::epsilon());
+    okid_real_t most = 0;
+    for (int i = 0; i < n; ++i) most = std::max(most, s.gramian[area(i, n + 1)]);
+    for (int i = 0; i < n; ++i) s.gramian[area(i, n + 1)] += least * most;
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) p.find[area(i, n) + area(j)] = s.power[area(j, n) + area(i)];
+    const bool known = okid::linalg::cholesky(n, s.gramian, n) == 0;
+    if (known) okid::linalg::cholesky_solve(n, s.gramian, n, p.find, n, n);
+    if (!known || !std::all_of(p.find, p.find + area(n, n), [](okid_real_t x) { return std::isfinite(x); }))
+        std::fill(p.find, p.find + area(n, n), okid_real_t{0});
+}
+
+/// `lead` errors are there: the state is set to what they tell.
+void find_state(okid_watch& s, predictor& p) {
+    const int n = p.order, n_y = s.config.n_y;
+    okid_real_t *sum = s.scratch, *next = s.scratch + n;
+    std::fill(sum, sum + n, okid_real_t{0});
+    for (int k = s.config.lead; k-- > 0;) {
+        multiply(true, false, n, 1, n, 1, p.forget, n, sum, n, 0, next, n);
+        multiply(true, false, n, 1, n_y, 1, p.look, n_y, p.heard + area(k, n_y), n_y, 1, next, n);
+        std::swap(sum, next);
+    }
+    multiply(true, false, n, 1, n, 1, p.find, n, sum, n, 1, p.state, n);
 }
 
 double mean_square(const okid_watch& s, const predictor& p, const okid_real_t* v) {
@@ -134,7 +201,10 @@ bool advance(okid_watch& s, predictor& p, const okid_real_t* sample) {
         s.outputs[i] = static_cast<okid_real_t>(sample[c.n_u + i] - p.mean[c.n_u + i]);
         e[i] = s.outputs[i] - e[i];
     }
-    if (p.skip > 0) {
+    const bool lost = p.skip > 0;
+    if (lost) {
+        multiply(false, false, c.n_y, 1, c.n_y, 1, p.weight, c.n_y, e, c.n_y, 0, p.heard + area(c.lead - p.skip, c.n_y),
+                 c.n_y);
         --p.skip;
     } else {
         const double error = mean_square(s, p, e), most = spike * p.usual_error;
@@ -148,6 +218,7 @@ bool advance(okid_watch& s, predictor& p, const okid_real_t* sample) {
     }
     multiply(false, false, n, 1, seen + c.n_y, 1, p.step, n, p.state, seen + c.n_y, 0, s.scratch, n);
     std::copy(s.scratch, s.scratch + n, p.state);
+    if (lost && p.skip == 0) find_state(s, p);
     return p.count == c.block;
 }
 
@@ -232,6 +303,7 @@ okid_status_t okid_watch_set_model(okid_watch_t* self, const okid_identified_t* 
     p.order = n;
     p.taught = 0;
     p.usual_error = 0;
+    prepare_find(*self, p);
     rest(c, p);
     return OKID_OK;
 }
