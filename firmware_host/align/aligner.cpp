@@ -205,7 +205,7 @@ std::int64_t aligner::time_ns(std::int64_t index) const {
 grid_bus_counts aligner::bus(std::size_t index) const {
     grid_bus_counts out = reference_->bus(index);
     for (const auto& node : nodes_) {
-        const grid_bus_counts& more = node->samples().bus(index);
+        const grid_bus_counts more = node->samples().bus(index);
         out.received += more.received;
         out.out_of_order += more.out_of_order;
         out.too_late += more.too_late;

@@ -243,6 +243,7 @@ void grid::emit_front() {
             ++l.received;
         } else {
             extend_gap(l, next_, 1);
+            l.gap_alone += slot(next_) > 0;
         }
     }
     const std::int64_t index = next_++;
@@ -281,7 +282,7 @@ void grid::close_gap(lane& l, bool resumed) {
         }
     if (!resumed && (l.loss & DRV_LOSS_LINK)) gap.cause = gap_cause::link_down;
     buses_[l.bus].lost[static_cast<std::size_t>(gap.cause)] += static_cast<std::uint64_t>(gap.count);
-    l.gap_count = 0;
+    l.gap_count = l.gap_alone = 0;
     for (const std::size_t channel : l.channels) {
         gap.channel = channel;
         sink_.on_gap(gap);
@@ -300,6 +301,15 @@ void grid::finish() {
     drain(true);
     for (lane& l : lanes_)
         if (l.gap_count) close_gap(l, false);
+}
+
+/// A silence that lasts counts as lost by now.
+grid_bus_counts grid::bus(std::size_t index) const {
+    grid_bus_counts out = buses_[index];
+    for (const lane& l : lanes_)
+        if (l.bus == index && stalled(l))
+            out.lost[static_cast<std::size_t>(gap_cause::stall)] += static_cast<std::uint64_t>(l.gap_count);
+    return out;
 }
 
 grid_channel_counts grid::channel(std::size_t index) const {

@@ -102,7 +102,7 @@ class grid {
     bool started() const { return anchored_; }
     /// The earliest time stamp of a sample the sink was just given.
     std::int64_t time_ns(std::int64_t index) const { return times_[static_cast<std::size_t>(index & mask_)]; }
-    const grid_bus_counts& bus(std::size_t index) const { return buses_[index]; }
+    grid_bus_counts bus(std::size_t index) const;
     grid_channel_counts channel(std::size_t index) const;
     /// Channels of which no frame was ever received.
     std::vector<std::size_t> silent_channels() const;
@@ -184,6 +184,7 @@ class grid {
         std::int64_t passed = std::numeric_limits<std::int64_t>::min();
         // The gap that is open.
         std::int64_t gap_first = -1, gap_count = 0;
+        std::int64_t gap_alone = 0; ///< of its samples, those that other lanes have
         std::int64_t expected = 0, received = 0;
         std::array<cause_mark, 64> marks{};
         std::size_t mark_count = 0;
@@ -270,6 +271,7 @@ class grid {
     void emit_front();
     void skip_to(std::int64_t index);
     void extend_gap(lane& l, std::int64_t first, std::int64_t count);
+    bool stalled(const lane& l) const { return static_cast<double>(l.gap_alone) > rate_hz_; }
     void close_gap(lane& l, bool resumed);
 
     double* row(std::int64_t index) { return values_.data() + static_cast<std::size_t>(index & mask_) * width_; }

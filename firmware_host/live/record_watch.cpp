@@ -85,7 +85,7 @@ void record_watch::finish() {
     grid_.finish();
     std::string report;
     for (std::size_t i = 0; i < config_.buses.size(); ++i) {
-        const auto& lost = grid_.bus(i).lost;
+        const auto lost = grid_.bus(i).lost;
         const std::uint64_t missing = std::accumulate(lost.begin(), lost.end(), std::uint64_t{0});
         report += fmt::format(
             "bus {}: {} frames of the channels, {} missing ({} dropped by the socket, {} by the driver)\n",

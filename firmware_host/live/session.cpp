@@ -70,9 +70,9 @@ session::session(const live_config& config, const session_options& options)
                           options.listener && options.listener->wants_events()
                               ? [to = options.listener](const std::string& line) { to->on_event(line); }
                               : std::function<void(const std::string&)>()}),
-      grid_(config, *this), check_(config), maker_(config), stream_(maker_.sums()), trigger_(config),
-      hammer_(config, stream_.sums().lags()), losses_(config.buses.size()), health_(config.buses.size()),
-      clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
+      grid_(config, *this), silence_(config.channels.size(), config.rate_hz), check_(config), maker_(config),
+      stream_(maker_.sums()), trigger_(config), hammer_(config, stream_.sums().lags()), losses_(config.buses.size()),
+      health_(config.buses.size()), clocks_(config.buses.size()), busy_s_(config.buses.size(), 0.0),
       update_samples_(samples_of(config.identification.update_s, config.rate_hz)), rate_(config.rate_hz),
       updates_(maker_, options.live && options.identify, config.n_u + config.n_y, options.most_waiting) {
     if (options.live || (!options.events.empty() && options.events != "-")) catch_hangups();
@@ -159,6 +159,7 @@ void session::on_sample(std::int64_t index, const double* row) {
     now_ = index + 1;
     rate_.add(index, grid_.time_ns(index));
     if (options_.listener) options_.listener->on_sample(index, row);
+    silence_.add(index, row, [this](std::size_t channel, std::int64_t first) { tell_silent(channel, first); });
     if (!options_.identify) return;
     if (feed_ && !relief_.stands(overload_step::pictures))
         send_samples(feed_->add(index, row, virtual_ ? virtual_->add(index, row) : nullptr));
@@ -181,6 +182,7 @@ void session::on_missing(std::int64_t index, std::int64_t count) {
     if (count <= 0) return;
     now_ = index + count;
     if (options_.listener) options_.listener->on_missing(index, count);
+    silence_.add_missing(index);
     if (!options_.identify) return;
     if (feed_) send_samples(feed_->end_block());
     if (virtual_) bridge(index, count);

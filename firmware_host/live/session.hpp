@@ -11,6 +11,7 @@
 #include "publish/sample_feed.hpp"
 #include "relief.hpp"
 #include "result/result.hpp"
+#include "silence_watch.hpp"
 #include "stream_target.hpp"
 #include "update_thread.hpp"
 #include "virtual_channels.hpp"
@@ -78,6 +79,7 @@ class session : public stream_target, private grid_sink {
     void start(std::int64_t time_ns);
     void begin(std::int64_t until);
     void strike();
+    void tell_silent(std::size_t channel, std::int64_t first);
     void update(std::int64_t samples);
     void await(std::int64_t samples);
     void hand_over(std::int64_t samples);
@@ -105,6 +107,7 @@ class session : public stream_target, private grid_sink {
     std::optional<virtual_channels> virtual_;
     std::optional<sample_feed> feed_;
     aligner grid_;
+    silence_watch silence_;
     stream_check check_;
     update_maker maker_;
     stream& stream_; ///< of maker_: only before and after the thread

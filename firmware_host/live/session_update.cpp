@@ -3,6 +3,7 @@
 #include "session.hpp"
 
 #include "acquire/host_time.hpp"
+#include "error.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -76,6 +77,20 @@ void session::alive(bool caught_up) {
     case overload_step::publishing: publisher_.only_urgent(now > before); break;
     }
     if (now > before || step != overload_step::updates) overload(step, now > before); // updates: when one was in time
+}
+
+/// Its gap is reported when it ends, which may be never.
+void session::tell_silent(std::size_t channel, std::int64_t first) {
+    const channel_config& its = config_.channels[channel];
+    const std::string text = fmt::format("nothing of \"{}\" since {:.3f} s", its.name, seconds(first));
+    tell({{"type", "bus"},
+          {"t", seconds(now_)},
+          {"bus", config_.buses[its.bus].name},
+          {"event", "silent"},
+          {"channel", its.name},
+          {"first", first},
+          {"text", text}});
+    if (options_.live) say("okid: warning: {}\n", text);
 }
 
 /// A step of relief.hpp, or back. Updates are left out besides when mathematics alone is too slow.

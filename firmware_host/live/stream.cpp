@@ -102,6 +102,8 @@ stream_update stream::update(std::int64_t now) {
     stream_update out;
     out.changed = take_change(now);
     out.rows = identifier_.rows();
+    const std::int64_t samples = identifier_.stats().samples;
+    const bool fed = std::exchange(samples_seen_, samples) != samples;
     settled_ = false;
     if (out.rows < needed()) {
         settling_.reset();
@@ -118,7 +120,8 @@ stream_update stream::update(std::int64_t now) {
         out.sigma = identifier_.sigma({});
         give_tracks(tracks_, signed_tracks_);
         out.tracks = &signed_tracks_;
-        out.settled = settled_ = settling_.add(model(), *out.tracks, out.sigma ? out.sigma->frequency_hz : unknown);
+        const bool rests = settling_.add(model(), *out.tracks, out.sigma ? out.sigma->frequency_hz : unknown);
+        out.settled = settled_ = rests && fed; // without a complete sample since the last update it only repeats itself
     }
     if (baseline) look_for_baseline(out);
     return out;

@@ -105,6 +105,7 @@ class stream {
     int looks_ = 0;            ///< obliged updates in a row
     std::int64_t look_at_ = 0; ///< the next one, in samples that ever came
     bool settled_ = false;
+    std::int64_t samples_seen_ = -1; ///< complete ones, by the last update
     std::int64_t changed_at_ = 0, restarted_at_ = 0, restarts_reported_ = 0;
 };
 

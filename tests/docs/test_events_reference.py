@@ -85,6 +85,8 @@ def test_causes_kinds_and_reasons_are_those_of_the_source() -> None:
     watch = (ROOT / "firmware_host" / "acquire" / "bus_watch.cpp").read_text()
     capture = (ROOT / "firmware_host" / "live" / "capture.cpp").read_text()
     told = set(re.findall(r'bus_event\(bus, "(\w+)"', capture))
+    session = (ROOT / "firmware_host" / "live" / "session_update.cpp").read_text()
+    told |= set(re.findall(r'\{"event", "(\w+)"\}', session))
     assert told and kinds == told | set(re.findall(r'push_back\(\s*\{"(\w+)"', watch))
     records = {code for cells in rows(text["record"], "event | means") for code in codes(cells[0])}
     recorder = (ROOT / "firmware_host" / "journal" / "recorder.cpp").read_text()

@@ -268,7 +268,7 @@ static void a_gap_is_no_change_though_the_predictor_forgets_slowly(void) {
         okid_watch_gap(self);
         TEST_ASSERT_EQUAL_INT(-1, slow_feed(self, &slow, 600));
     }
-    slow.angle *= 1.02; // and a change that a gap hides is told behind it
+    slow.angle *= 1.02; // and a change that a gap hides is noticed behind it
     okid_watch_gap(self);
     const int delay = slow_feed(self, &slow, 600);
     TEST_ASSERT_GREATER_THAN(0, delay);
