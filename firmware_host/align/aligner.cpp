@@ -193,6 +193,11 @@ void aligner::set_limit(std::int64_t count) {
         limit_ = count;
 }
 
+void aligner::set_link(std::size_t bus, bool down) {
+    reference_->set_link(bus, down);
+    for (auto& node : nodes_) node->set_link(bus, down);
+}
+
 std::int64_t aligner::emitted() const {
     return decimator_ ? decimator_->emitted() : nodes_.empty() ? reference_->emitted() : gaps_.rows();
 }

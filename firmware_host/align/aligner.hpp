@@ -21,7 +21,7 @@ namespace okid_host {
 struct clock_skew {
     std::size_t channel = 0;
     double us = 0, std_us = 0; ///< what the smooth place is off the fit by now, and σ of both fits
-    double rate_ppm = 0;       ///< by which the node's second is longer than the reference's
+    double rate_ppm = 0;       ///< by which the node's second is longer than the reference's: a fast clock is negative
 };
 
 class aligner : private grid_sink, private cause_source {
@@ -34,6 +34,8 @@ class aligner : private grid_sink, private cause_source {
     void finish();
     /// Let no sample from `count` on go out.
     void set_limit(std::int64_t count);
+    /// The interface of a bus went down, or is up.
+    void set_link(std::size_t bus, bool down);
     std::int64_t emitted() const; ///< samples given to the sink, missing ones included
     /// The earliest time stamp of a sample the sink was just given.
     std::int64_t time_ns(std::int64_t index) const;

@@ -46,6 +46,7 @@ class free_node : private grid_sink {
 
     void push(const drv_frame_t& frame) { grid_.push(frame); }
     void finish() { grid_.finish(); }
+    void set_link(std::size_t bus, bool down) { grid_.set_link(bus, down); }
     bool settled() const { return clock_.settled(); }
 
     enum class verdict { wait, missing, found };

@@ -37,7 +37,7 @@ const char* gap_cause_name(gap_cause cause) {
 
 grid::grid(const live_config& config, grid_sink& sink)
     : sink_(sink), rate_hz_(config.rate_hz), period_ns_(1e9 / config.rate_hz), channels_(config.channels),
-      width_(config.channels.size()), buses_(config.buses.size()) {
+      width_(config.channels.size()), buses_(config.buses.size()), down_(config.buses.size()) {
     build_lanes(config);
     window_ = std::clamp<std::int64_t>(std::llround(rate_hz_ / 4), 4 * reorder_, 4096);
     const double row_bytes = 8.0 * static_cast<double>(width_ + 2) + static_cast<double>(lanes_.size());
@@ -268,19 +268,26 @@ void grid::extend_gap(lane& l, std::int64_t first, std::int64_t count) {
     l.expected += count;
 }
 
-/// The cause is what was known when the lane jumped over the gap.
+/// Of a gap that has not ended.
+gap_cause grid::silent_cause(const lane& l) const {
+    return down_[l.bus] || (l.loss & DRV_LOSS_LINK) ? gap_cause::link_down : gap_cause::stall;
+}
+
+/// The cause is what was known when the lane jumped over the gap, or that it was silent while others were not.
 void grid::close_gap(lane& l, bool resumed) {
     grid_gap gap;
     gap.first = l.gap_first;
     gap.count = l.gap_count;
     gap.last = gap.first + gap.count - 1;
-    gap.cause = resumed || gap.count <= reorder_ ? gap_cause::sequence : gap_cause::stall;
+    gap.cause = gap_cause::sequence;
     for (const cause_mark& mark : l.marks)
         if (mark.first <= gap.last && mark.last >= gap.first) {
             gap.cause = mark.cause;
             gap.within = mark.within;
         }
-    if (!resumed && (l.loss & DRV_LOSS_LINK)) gap.cause = gap_cause::link_down;
+    if (gap.cause == gap_cause::sequence && (stalled(l) || (!resumed && gap.count > reorder_)))
+        gap.cause = gap_cause::stall;
+    if (!resumed && silent_cause(l) == gap_cause::link_down) gap.cause = gap_cause::link_down;
     buses_[l.bus].lost[static_cast<std::size_t>(gap.cause)] += static_cast<std::uint64_t>(gap.count);
     l.gap_count = l.gap_alone = 0;
     for (const std::size_t channel : l.channels) {
@@ -308,7 +315,7 @@ grid_bus_counts grid::bus(std::size_t index) const {
     grid_bus_counts out = buses_[index];
     for (const lane& l : lanes_)
         if (l.bus == index && stalled(l))
-            out.lost[static_cast<std::size_t>(gap_cause::stall)] += static_cast<std::uint64_t>(l.gap_count);
+            out.lost[static_cast<std::size_t>(silent_cause(l))] += static_cast<std::uint64_t>(l.gap_count);
     return out;
 }
 

@@ -98,6 +98,8 @@ class grid {
 
     /// Let no sample from `count` on go out.
     void set_limit(std::int64_t count) { limit_ = count; }
+    /// The interface of a bus went down, or is up.
+    void set_link(std::size_t bus, bool down) { down_[bus] = down; }
     std::int64_t emitted() const { return next_; } ///< samples given to the sink, missing ones included
     bool started() const { return anchored_; }
     /// The earliest time stamp of a sample the sink was just given.
@@ -272,6 +274,7 @@ class grid {
     void skip_to(std::int64_t index);
     void extend_gap(lane& l, std::int64_t first, std::int64_t count);
     bool stalled(const lane& l) const { return static_cast<double>(l.gap_alone) > rate_hz_; }
+    gap_cause silent_cause(const lane& l) const;
     void close_gap(lane& l, bool resumed);
 
     double* row(std::int64_t index) { return values_.data() + static_cast<std::size_t>(index & mask_) * width_; }
@@ -308,6 +311,7 @@ class grid {
     std::int64_t all_heard_ns_ = 0;                 ///< when the last lane was heard for the first time
     std::vector<std::pair<int, drv_frame_t>> held_; ///< frames before the grid begins
     std::vector<grid_bus_counts> buses_;
+    std::vector<bool> down_; ///< of each bus
 };
 
 } // namespace okid_host

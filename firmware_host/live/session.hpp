@@ -51,7 +51,10 @@ class session : public stream_target, private grid_sink {
 
     void frame(const drv_frame_t& frame) override;
     void set_losses(std::size_t bus, const device_losses& losses) override { losses_[bus] = losses; }
-    void set_health(std::size_t bus, const bus_health& health) override { health_[bus] = health; }
+    void set_health(std::size_t bus, const bus_health& health) override {
+        health_[bus] = health;
+        grid_.set_link(bus, health.counts.link_is_down != 0);
+    }
     void bus_event(std::size_t bus, const char* kind, const std::string& text) override;
     void record_event(const std::string& kind, const std::string& text) override;
     void trigger_edge(std::int64_t time_ns) override;

@@ -79,9 +79,10 @@ void session::alive(bool caught_up) {
     if (now > before || step != overload_step::updates) overload(step, now > before); // updates: when one was in time
 }
 
-/// Its gap is reported when it ends, which may be never.
+/// Its gap is reported when it ends, which may be never. Where the interface is down, that has been said.
 void session::tell_silent(std::size_t channel, std::int64_t first) {
     const channel_config& its = config_.channels[channel];
+    if (health_[its.bus] && health_[its.bus]->counts.link_is_down) return;
     const std::string text = fmt::format("nothing of \"{}\" since {:.3f} s", its.name, seconds(first));
     tell({{"type", "bus"},
           {"t", seconds(now_)},

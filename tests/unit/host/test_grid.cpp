@@ -188,6 +188,41 @@ static void test_causes() {
     TEST_ASSERT_EQUAL_INT64(0, by[gap_cause::sequence]);
 }
 
+/// For more than a second while another goes on: a stall, whether it comes back in its place or from zero. Where all are
+/// silent frames were lost, and where it stays silent while its interface is down that is the cause.
+static void test_a_silence_has_a_cause() {
+    for (const bool restarts : {false, true})
+        for (const bool other : {true, false})
+            for (const int lost : {900, 1000, 1001, 3000}) {
+                stream s(lanes_of(2, 16));
+                for (int n = 0; n < 5000; ++n)
+                    for (std::size_t m = 0; m < 2; ++m) {
+                        const bool away = n >= 500 && n < 500 + lost && (m == 1 || !other);
+                        if (!away)
+                            s.send(m, n, restarts && m == 1 && n >= 500 ? -static_cast<std::uint64_t>(500 + lost) : 0);
+                    }
+                s.on.finish();
+                const bool stalls = lost > 1000 && other;
+                for (const grid_gap& gap : s.out.gaps)
+                    TEST_ASSERT_TRUE(gap.cause == (stalls ? gap_cause::stall : gap_cause::sequence));
+                TEST_ASSERT_EQUAL_INT64(other ? lost : 2 * lost, s.out.marked());
+            }
+    for (const bool down : {false, true}) {
+        stream s(lanes_of(2, 16, 1000, 2));
+        for (int n = 0; n < 9000; ++n) {
+            s.send(0, n, 0);
+            if (n < 500) s.send(1, n, 0);
+            if (n == 600) s.on.set_link(1, down);
+        }
+        const auto which = static_cast<std::size_t>(down ? gap_cause::link_down : gap_cause::stall);
+        TEST_ASSERT_GREATER_THAN_UINT64(8000, s.on.bus(1).lost[which]); // while it lasts
+        s.on.finish();
+        TEST_ASSERT_EQUAL_UINT64(8499, s.on.bus(1).lost[which]); // the last sample was cut by the end
+        TEST_ASSERT_EQUAL_UINT64(1, s.out.gaps.size());
+        TEST_ASSERT_TRUE(s.out.gaps[0].cause == (down ? gap_cause::link_down : gap_cause::stall));
+    }
+}
+
 static void test_a_damaged_counter_moves_nothing() {
     stream s(lanes_of(2, 16));
     for (int n = 0; n < 1000; ++n)
@@ -334,6 +369,7 @@ int main(void) {
     RUN_TEST(test_counter_wraps_many_times);
     RUN_TEST(test_unrelated_counters_are_aligned_by_time);
     RUN_TEST(test_causes);
+    RUN_TEST(test_a_silence_has_a_cause);
     RUN_TEST(test_a_damaged_counter_moves_nothing);
     RUN_TEST(test_a_sender_that_starts_anew_is_taken_up);
     RUN_TEST(test_cadence_with_jitter_and_losses);
