@@ -26,6 +26,7 @@ hammer::hammer(const live_config& config, std::int64_t lags)
         one.name = config.channels[c].name;
         one.force = config.channels[c].role == channel_role::force;
         one.unit = config.channels[c].unit;
+        one.scale = std::abs(layout.scale);
         if (layout.value != DRV_VALUE_INTEGER || layout.length > 32) continue;
         one.high = std::ldexp(1.0, layout.length - (layout.is_signed ? 1 : 0)) - 1;
         one.low = layout.is_signed ? -one.high - 1 : -1; // 0 of an unsigned code is no limit

@@ -53,8 +53,8 @@ hit_line line_of(const record_set& set, const record_data& record, const std::ve
 
 std::vector<hit_channel> channels_of_hit(const record_options& options) {
     std::vector<hit_channel> out;
-    for (const std::string& name : options.inputs) out.push_back({name, true, "", true});
-    for (const std::string& name : options.outputs) out.push_back({name, false, "", false}); // a gap is left out
+    for (const std::string& name : options.inputs) out.push_back({name, true, "", 1, true});
+    for (const std::string& name : options.outputs) out.push_back({name, false, "", 1, false}); // a gap is left out
     for (std::size_t c = 0; c < std::min(out.size(), options.hit_units.size()); ++c) out[c].unit = options.hit_units[c];
     return out;
 }

@@ -188,11 +188,11 @@ class hit_judge {
         std::map<std::string, double> most;
         for (std::size_t c = 0; c < channels_.size(); ++c) {
             double& largest = most[channels_[c].unit];
-            largest = std::fmax(largest, channels_[c].force ? 0 : rms(c, hit_.before, end));
+            largest = std::fmax(largest, channels_[c].force ? 0 : channels_[c].scale * rms(c, hit_.before, end));
         }
         for (std::size_t c = 0; c < channels_.size(); ++c) {
             if (channels_[c].force) continue;
-            const double share = rms(c, 0, quiet) / most[channels_[c].unit];
+            const double share = channels_[c].scale * rms(c, 0, quiet) / most[channels_[c].unit];
             if (share > most_motion)
                 return refuse("moving",
                               fmt::format("{} still moved before the hit, by {:.0f} % of what the hit caused (rms): "

@@ -17,6 +17,7 @@ struct hit_channel {
     std::string name;
     bool force = false;
     std::string unit;                        ///< sensors of one unit are compared
+    double scale = 1;                        ///< units a number
     bool complete = true;                    ///< a missing sample spoils the hit
     double low = -INFINITY, high = INFINITY; ///< limits of its code
 };

@@ -390,8 +390,14 @@ struct blow_look {
     std::vector<listed_mode> listed; ///< empty: `fault`
     std::exception_ptr fault;
 
-    std::ptrdiff_t believed() const {
-        return std::count_if(listed.begin(), listed.end(), [](const listed_mode& mode) { return mode.in_model; });
+    /// Modes in the model whose damping is known to a half.
+    std::size_t believed() const {
+        std::size_t out = 0;
+        for (std::size_t k = 0; k < listed.size(); ++k)
+            out += listed[k].in_model &&
+                   !(work.context.sigma &&
+                     work.context.sigma->damping_ratio[k] > judgement::widest_damping * listed[k].damping_ratio);
+        return out;
     }
 };
 

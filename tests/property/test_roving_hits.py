@@ -19,17 +19,26 @@ Real = NDArray[np.float64]
 FS, COUNT = 256.0, 4096
 
 
-def blows(places: list[int], at_places: Real, at_sensors: Real, f: Real, z: Real, noise: float = 0.005) -> list[Real]:
+def blows(
+    places: list[int],
+    at_places: Real,
+    at_sensors: Real,
+    f: Real,
+    z: Real,
+    noise: float = 0.005,
+    fs: float = FS,
+    count: int = COUNT,
+) -> list[Real]:
     """A record (samples, force and sensors) a blow: four samples of force after a short silence, its free decay."""
     rng = np.random.default_rng(5)
     records = []
     for place in places:
-        force = np.zeros((8 * COUNT, 1))
+        force = np.zeros((8 * count, 1))
         first = int(rng.integers(40, 60))
         force[first : first + 4, 0] = rng.uniform(50, 150) * np.array([0.3, 1.0, 0.8, 0.2])
-        motion = respond(np.sign(place) * force, at_places[[abs(place) - 1]], at_sensors, f, z, FS)[:COUNT]
+        motion = respond(np.sign(place) * force, at_places[[abs(place) - 1]], at_sensors, f, z, fs)[:count]
         motion = motion + noise * motion.std(0) * rng.standard_normal(motion.shape)
-        records.append(np.hstack([force[:COUNT] + 0.02 * rng.standard_normal((COUNT, 1)), motion]))
+        records.append(np.hstack([force[:count] + 0.02 * rng.standard_normal((count, 1)), motion]))
     return records
 
 
@@ -40,8 +49,8 @@ def structure() -> tuple[Real, Real, Real]:
     return np.array([9.0, 15.5, 24.0, 37.0, 52.0, 71.0]), rng.uniform(0.004, 0.01, 6), rng.standard_normal((9, 6))
 
 
-def identify(records: list[Real], **more: object) -> okid.Result:
-    return okid.identify([r[:, :1] for r in records], [r[:, 1:] for r in records], fs=FS, **more)  # type: ignore[arg-type]
+def identify(records: list[Real], fs: float = FS, **more: object) -> okid.Result:
+    return okid.identify([r[:, :1] for r in records], [r[:, 1:] for r in records], fs=fs, **more)  # type: ignore[arg-type]
 
 
 def test_each_place_is_an_input(structure: tuple[Real, Real, Real]) -> None:
@@ -97,6 +106,32 @@ def test_matrices_of_a_roving_hammer() -> None:
     assert result.mkr is not None
     for found, truth in ((result.mkr.M, rig.M), (result.mkr.K, rig.K)):
         assert np.linalg.norm(found - truth) / np.linalg.norm(truth) < 0.005
+
+
+def test_heavily_damped_modes_are_seen_with_the_force() -> None:
+    """The modes fill a tenth of the records. Their masses are those of the shapes over the places, M and K or no."""
+    f, z = np.array([29.3, 78.7, 119.0, 159.2, 194.7]), np.array([0.061, 0.0436, 0.0531, 0.0583, 0.0565])
+    shapes = np.sin(np.outer(np.arange(1, 6), np.arange(1, 6)) * np.pi / 6)
+    result = identify(
+        blows([1, 2, 3, 4, 5] * 3, shapes, shapes[[0, 4]], f, z, 0.003, fs=1024, count=1536),
+        fs=1024, hit_dofs=[1, 2, 3, 4, 5] * 3, output_dofs=[1, 5],
+    )  # fmt: skip
+    modes = result.confident_modes
+    assert [mode.frequency_hz for mode in modes] == pytest.approx(f, rel=2e-3)
+    assert [mode.damping_ratio for mode in modes] == pytest.approx(z, rel=0.03)
+    for k, mode in enumerate(modes):
+        shape = shapes[:, k] / shapes[np.argmax(np.abs(mode.shape)), k]
+        np.testing.assert_allclose(mode.shape.real, shape, atol=0.02)
+        assert mode.modal_mass == pytest.approx(1 / shapes[np.argmax(np.abs(mode.shape)), k] ** 2, rel=0.03)
+
+
+def test_a_light_mode_in_a_short_window_is_no_tone() -> None:
+    """Its amplitude hardly falls in 0.32 s, but it was silent before each hit."""
+    f, z = np.array([90.0, 110.0, 421.0, 790.0]), np.array([0.0005, 0.001, 0.002, 0.0015])
+    shapes = np.sin(np.outer(np.arange(1, 5), np.arange(1, 5)) * np.pi / 5)
+    records = blows([1, 2, 3, 4] * 2, shapes, shapes[[0]], f, z, 0.003, fs=6400, count=2048)
+    result = identify(records, fs=6400, hit_dofs=[1, 2, 3, 4] * 2, output_dofs=[1])
+    assert [mode.frequency_hz for mode in result.confident_modes] == pytest.approx(f, rel=1e-3)
 
 
 @pytest.mark.parametrize("method", [None, "n4sid-moesp"])
