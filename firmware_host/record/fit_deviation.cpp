@@ -203,7 +203,8 @@ void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work
         place.push_back(i);
         missing = missing || std::isnan(sigma.frequency_hz[i]);
     }
-    if (place.empty() || (!missing && !has_event(work.set))) return;
+    const bool event = has_event(work.set);
+    if (place.empty() || (!missing && !event)) return;
     const std::size_t n_y = work.set.n_y;
     const Index size = sums.linear() + static_cast<Index>(2 * place.size());
     sums.gram = MatrixXd::Zero(size, size);
@@ -214,13 +215,15 @@ void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work
     for (std::size_t k = 0; k < place.size(); ++k) {
         const std::size_t i = place[k];
         const std::vector<double>& of_block = sums.of_block[k];
-        if (!std::isnan(sigma.frequency_hz[i]) && largest_share(of_block) < most_of_one_block) continue;
+        const bool of_event = event && largest_share(of_block) >= most_of_one_block;
+        if (!std::isnan(sigma.frequency_hz[i]) && !of_event) continue;
         if (!(sums.heard[k].minCoeff() > 0) || !(sums.noise[k].minCoeff() > 0)) continue;
         // as if all samples had been measured: fewer tell less
         const double energy = std::accumulate(of_block.begin(), of_block.end(), 0.0);
         const VectorXd noise = energy * sums.noise[k].array() / sums.heard[k].array().square();
         const auto [f, zeta] = of_values(listed[i], of_pole(sums, information.of_poles, noise, k));
-        if (!(f > 0) || !(zeta > 0) || !std::isfinite(f) || !std::isfinite(zeta)) continue;
+        // a run through the model ends where a force is missing, which may be too early to tell anything
+        if (!(f > 0) || !(zeta > 0) || !(f < 0.5 / work.model.dt) || !(zeta < 1)) continue;
         sigma.frequency_hz[i] = std::hypot(f, work.apart[i].first);
         sigma.damping_ratio[i] = std::hypot(zeta, work.apart[i].second);
         const double of_entry = information.of_shapes.segment<2>(static_cast<Index>(2 * k)).mean();
