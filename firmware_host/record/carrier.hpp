@@ -41,4 +41,10 @@ std::vector<std::optional<carried_mode>> carry(const record_level& level, int nu
                                                const std::vector<consensus_mode>& modes, int n_u, int n_y, bool at_rest,
                                                int blocks, bool analytic);
 
+using listed_pair = std::pair<consensus_mode, std::optional<carried_mode>>;
+
+/// Standard deviations and, of nearly noise-free records, sharper values, from one carrier for each rate.
+std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, const std::vector<consensus_run>& runs,
+                                   const std::vector<consensus_mode>& modes, const record_options& options, bool rest);
+
 } // namespace okid_host

@@ -10,12 +10,13 @@
 namespace okid_host {
 namespace {
 
-constexpr double pulse_share = 0.1; // of the peak: what belongs to a pulse
-constexpr double hit_lasts = 0.05;  // of the peak: the force still acts
-constexpr double beyond_noise = 5;  // deviations of the force that noise does not reach
-constexpr double least_peak = 20;   // in deviations of the force before the hit
-constexpr double most_motion = 0.1; // rms before the hit, of that after it
-constexpr double band_share = 0.1;  // of the greatest amplitude: -20 dB
+constexpr double pulse_share = 0.1;  // of the peak: what belongs to a pulse
+constexpr double hit_lasts = 0.05;   // of the peak: the force still acts
+constexpr double beyond_noise = 5;   // deviations of the force that noise does not reach
+constexpr double least_peak = 20;    // in deviations of the force before the hit
+constexpr double most_motion = 0.1;  // rms before the hit, of that after it
+constexpr double hardly_moves = 0.2; // of the rms of the sensor of its unit that moves most: noise is seen there
+constexpr double band_share = 0.1;   // of the greatest amplitude: -20 dB
 constexpr std::size_t hit_lines = 128;
 constexpr std::size_t flat_top = 3; // samples that are exactly equal at an extreme: an amplifier at its limit,
 constexpr double flat_ratio = 3;    // … if they are so many times those just beside it,
@@ -181,18 +182,18 @@ class hit_judge {
         return std::sqrt(std::max(0.0, squares / n - mean * mean));
     }
 
-    /// Is the structure still ringing from what was before? The rms before the hit against that behind it: of the same channel or,
-    /// where that is more, of the one of the same quantity that the hit moved most. A sensor that hardly moves shows its noise.
+    /// Is the structure still ringing from what was before? The rms before the hit against that behind it. A sensor that hardly
+    /// moves shows its noise: there it is a share of what the sensor of the same unit shows that moves most.
     bool find_motion() {
         const std::size_t quiet = hit_.before * 7 / 8, end = std::min(hit_.count, 2 * hit_.before);
+        const auto moved = [&](std::size_t c) { return channels_[c].scale * rms(c, hit_.before, end); };
         std::map<std::string, double> most;
-        for (std::size_t c = 0; c < channels_.size(); ++c) {
-            double& largest = most[channels_[c].unit];
-            largest = std::fmax(largest, channels_[c].force ? 0 : channels_[c].scale * rms(c, hit_.before, end));
-        }
+        for (std::size_t c = 0; c < channels_.size(); ++c)
+            if (!channels_[c].force) most[channels_[c].unit] = std::fmax(most[channels_[c].unit], moved(c));
         for (std::size_t c = 0; c < channels_.size(); ++c) {
             if (channels_[c].force) continue;
-            const double share = channels_[c].scale * rms(c, 0, quiet) / most[channels_[c].unit];
+            const double share =
+                channels_[c].scale * rms(c, 0, quiet) / std::fmax(moved(c), hardly_moves * most[channels_[c].unit]);
             if (share > most_motion)
                 return refuse("moving",
                               fmt::format("{} still moved before the hit, by {:.0f} % of what the hit caused (rms): "

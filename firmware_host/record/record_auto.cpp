@@ -10,7 +10,6 @@
 #include "consensus/lines.hpp"
 #include "consensus/quantity.hpp"
 #include "error.hpp"
-#include "files/side_by_side.hpp"
 #include "fit_deviation.hpp"
 #include "modal_gain.hpp"
 #include "modal_model.hpp"
@@ -41,8 +40,6 @@ namespace {
 
 constexpr double periods_of_horizon = 0.025; // 0.75 of a period in 30 samples
 
-using listed_pair = std::pair<consensus_mode, std::optional<carried_mode>>;
-
 std::vector<consensus_mode> worth_telling(std::vector<consensus_mode> modes, bool all) {
     const auto chance = [all](const consensus_mode& mode) {
         return !mode.confident() && (all ? std::max(mode.agreement, mode.found_in) < judgement::worth_listing
@@ -50,79 +47,6 @@ std::vector<consensus_mode> worth_telling(std::vector<consensus_mode> modes, boo
     };
     modes.erase(std::remove_if(modes.begin(), modes.end(), chance), modes.end());
     return modes;
-}
-
-/// A force that is held over a sample is not held over two: the shapes of a lower rate are bent by a percent or so. Those
-/// of modes that the record's own rate sees are taken there, of nearly noise-free records frequency and damping too.
-void shapes_at_own_rate(const std::vector<record_level>& levels, const std::vector<consensus_run>& runs,
-                        std::vector<consensus_mode> modes, const record_options& options, bool rest,
-                        std::vector<listed_pair>& carried) {
-    if (std::none_of(modes.begin(), modes.end(), [](const consensus_mode& mode) { return mode.level > 0; })) return;
-    for (consensus_mode& mode : modes) mode.level = 0; // one order for all of them
-    const auto found = carry(levels[0], 0, runs, modes, static_cast<int>(options.inputs.size()),
-                             static_cast<int>(options.outputs.size()), rest,
-                             options.mass.wanted() ? options.sigma_blocks : 0, options.analytic);
-    for (std::size_t i = 0; i < found.size(); ++i) {
-        auto& to = carried[i].second;
-        if (!found[i] || !to || carried[i].first.level == 0) continue;
-        to->shape = found[i]->shape;
-        if (found[i]->exact) {
-            to->exact = true;
-            to->frequency_hz = found[i]->frequency_hz;
-            to->damping_ratio = found[i]->damping_ratio;
-        }
-        if (to->shifts.size() != found[i]->shifts.size()) continue;
-        for (std::size_t b = 0; b < to->shifts.size(); ++b) to->shifts[b].shape = found[i]->shifts[b].shape;
-    }
-}
-
-/// Two clusters that one model of all modes of their rate has as a single pole are one mode: the weaker is doubtful.
-void mark_doubles(std::vector<listed_pair>& found) {
-    for (auto& [mode, carried] : found)
-        for (const auto& [other, its] : found)
-            if (carried && its && other.level == mode.level && other.agreement > mode.agreement &&
-                carried->frequency_hz == its->frequency_hz && carried->damping_ratio == its->damping_ratio) {
-                mode.why.emplace_back("split");
-                carried.reset();
-            }
-}
-
-/// Standard deviations and, of nearly noise-free records, sharper values, from one carrier for each rate.
-std::vector<listed_pair> carry_all(const std::vector<record_level>& levels, const std::vector<consensus_run>& runs,
-                                   const std::vector<consensus_mode>& modes, const record_options& options, bool rest) {
-    std::vector<listed_pair> out;
-    for (const consensus_mode& mode : modes) out.emplace_back(mode, std::nullopt);
-    std::vector<std::vector<std::optional<carried_mode>>> found(levels.size());
-    side_by_side(levels.size(), options.threads, [&](std::size_t k) {
-        const bool any = std::any_of(modes.begin(), modes.end(), [&](const consensus_mode& mode) {
-            return mode.confident() && mode.level == static_cast<int>(k);
-        });
-        if (any)
-            found[k] = carry(levels[k], static_cast<int>(k), runs, modes, static_cast<int>(options.inputs.size()),
-                             static_cast<int>(options.outputs.size()), rest, options.sigma_blocks, options.analytic);
-    });
-    for (const auto& of_level : found)
-        for (std::size_t i = 0; i < of_level.size(); ++i)
-            if (of_level[i]) out[i].second = of_level[i];
-    mark_doubles(out);
-    if (!options.inputs.empty()) shapes_at_own_rate(levels, runs, modes, options, rest, out);
-    for (auto& [mode, carried] : out) {
-        if (!carried) continue;
-        if (carried->exact) {
-            mode.frequency_hz = carried->frequency_hz;
-            mode.damping_ratio = carried->damping_ratio;
-        }
-        mode.shape = carried->shape;
-        // without a force, and without a shape or most of the runs, noise agrees by chance, but not from block to block
-        if (options.inputs.empty() && (options.outputs.size() == 1 || mode.agreement < judgement::agreed_by_chance) &&
-            carried->damping_std > judgement::widest_damping * mode.damping_ratio)
-            mode.why.emplace_back("wide_sigma");
-        if (carried->exact) continue;
-        // what a model leaves out moves each method elsewhere, and no block of the record shows it
-        carried->frequency_std_hz = std::hypot(carried->frequency_std_hz, mode.frequency_scatter_hz);
-        carried->damping_std = std::hypot(carried->damping_std, mode.damping_scatter);
-    }
-    return out;
 }
 
 /// The shape in the units of the outputs; `largest` is what its entries were divided by.
