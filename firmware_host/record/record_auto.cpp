@@ -185,12 +185,14 @@ void take_inputs_from_sums(const std::vector<listed_pair>& found, const record_l
 /// Of what follows hits: a line is one only where the same records with their force and the silence before it say so, too.
 void keep_lines_of(const record_set& struck, const record_options& options, const std::vector<consensus_mode>& unmarked,
                    std::vector<consensus_mode>& modes) {
+    const auto same = [](const consensus_mode& a, const consensus_mode& b) { return a.why == b.why; };
+    if (std::equal(modes.begin(), modes.end(), unmarked.begin(), same)) return;
     std::vector<double> scale;
     std::vector<consensus_mode> other = unmarked;
     mark_lines(make_levels(struck.rows_of_each(), struck.n_u, struck.n_y, options.fs_hz, true, options.decimate, scale),
                struck.n_u, struck.n_y, true, other);
     for (std::size_t k = 0; k < modes.size(); ++k)
-        if (other[k].why == unmarked[k].why) modes[k].why = unmarked[k].why;
+        if (same(other[k], unmarked[k])) modes[k].why = unmarked[k].why;
 }
 
 /// Everything up to the modes, their standard deviations and the shapes.
@@ -334,7 +336,8 @@ blow_look look_at_blows(record_set set, record_options options, const record_wor
     out.work.set = std::move(set);
     try {
         out.listed = find_modes_agreed(options, out.work);
-    } catch (const failure&) {
+    } catch (const failure& why) {
+        if (why.code != exit_no_model) throw;
         out.fault = std::current_exception();
     }
     return out;

@@ -52,9 +52,9 @@ OKID_NODISCARD OKID_API okid_status_t okid_watch_create(okid_watch_t** self, con
 ///         covariance not positive definite); the model at work stays on an error
 OKID_NODISCARD OKID_API okid_status_t okid_watch_set_model(okid_watch_t* self, const okid_identified_t* model);
 
-/// A sample in the units of the model, inputs first. O(n_z (n_z + m)). Errors are high when their mean square over a block is
-/// `ratio` times the usual one, and also in proportion to the mean square of the outputs: noise that grows with the
-/// excitation (ambient records) is no change, and neither is excitation that ends.
+/// A sample in the units of the model, inputs first. O(n_z (n_z + m)); the last of `lead` behind a gap: `lead` times that. Errors
+/// are high when their mean square over a block is `ratio` times the usual one, and also in proportion to the mean square of
+/// the outputs: noise that grows with the excitation (ambient records) is no change, and neither is excitation that ends.
 /// @return 1: a change; `confirm` * `block` samples ago it began. The watch is idle then, until it is given a model. Else 0
 OKID_API int32_t okid_watch_add(okid_watch_t* self, const okid_real_t* sample);
 
