@@ -249,9 +249,10 @@ void add_table(CLI::App& command, identify_arguments& given) {
             command.add_option(option.typed(), value, option.help)->type_name(option.shape);
     }
     command
-        .add_option("--places", given.places,
-                    "--hit-dofs from the names of the files: a regular expression whose one group is the number of the "
-                    "place, as 'P(\\d+)_' of P07_1.csv")
+        .add_option(
+            "--places", given.places,
+            "--hit-dofs from the names of the files: a regular expression whose group is the number of the "
+            "place, as 'P(\\d+)_' of P07_1.csv; a second one is its sign, as 'P(\\d+)[XYZ]([+-]?)_' of P07Z-_1.csv")
         ->type_name("REGEX");
 }
 

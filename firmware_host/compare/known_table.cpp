@@ -146,17 +146,32 @@ std::optional<placed_shapes> placed_in(const json& from, const known_result& kno
     return out;
 }
 
+long long whole(double number) { return std::abs(number) < 1e9 ? static_cast<long long>(number) : 0; }
+
 std::vector<hit_line> hits_in(const json& from) {
     std::vector<hit_line> out;
     for (const json& one : list_at(from, "hits")) {
         if (!one.is_object()) continue;
         hit_line& hit = out.emplace_back();
         hit.file = text_at(one, "file");
-        const double place = number_at(one, "place");
-        hit.place = std::abs(place) < 1e9 ? static_cast<int>(place) : 0;
+        hit.place = static_cast<int>(whole(number_at(one, "place")));
         hit.accepted = flag_at(one, "accepted");
         hit.fault = text_at(one, "reason");
         hit.text = text_at(one, "text");
+        if (const std::vector<json> range = list_at(one, "range"); range.size() == 2)
+            hit.first = whole(number_or_nan(range[0])), hit.end = whole(number_or_nan(range[1]));
+    }
+    return out;
+}
+
+std::vector<set_up_line> set_ups_in(const json& from) {
+    std::vector<set_up_line> out;
+    for (const json& one : list_at(from, "set_ups")) {
+        if (!one.is_object()) continue;
+        set_up_line& line = out.emplace_back();
+        line.name = text_at(one, "name");
+        for (const json& output : list_at(one, "outputs"))
+            if (output.is_string()) line.outputs.push_back(output.get<std::string>());
     }
     return out;
 }
@@ -241,6 +256,7 @@ result_context context_of(const json& raw, const known_result& known) {
     out.mass = mass_in(raw);
     out.placed = placed_in(raw, known);
     out.hits = hits_in(raw);
+    out.set_ups = set_ups_in(raw);
     out.warnings = known.warnings;
     return out;
 }

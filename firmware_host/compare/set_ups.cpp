@@ -14,6 +14,7 @@
 #include "result/drive_mass.hpp"
 #include "result/hold.hpp"
 #include "result/method.hpp"
+#include "struck_set_ups.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -291,6 +292,7 @@ record_result identify_set_ups(std::vector<set_up> set_ups, const record_options
     if (options.method == lag_method) return identify_set_ups_together(std::move(set_ups), options, references);
     if (!options.modes.empty()) throw failure(exit_usage, "--modes of set-ups belongs to --method plscf");
     set_ups = joined(std::move(set_ups));
+    if (references.empty() && are_struck(set_ups, options)) return identify_struck(std::move(set_ups), options);
     if (set_ups.size() > 1) return set_up_merger(options, references).run(std::move(set_ups));
     return identify_records(std::move(set_ups.front().set), options);
 }

@@ -42,6 +42,10 @@ hit_line line_of(const record_set& set, const record_data& record, const std::ve
     const hit_verdict found = judge_hit(window);
     hit_line out;
     out.file = file_name(record.path);
+    if (record.part) {
+        out.first = static_cast<long long>(record.from);
+        out.end = static_cast<long long>(record.from + record.count);
+    }
     out.fault = found.fault;
     out.text = found.text + (found.note.empty() ? "" : "; " + found.note);
     out.peak = found.peak;
@@ -108,7 +112,7 @@ void say_left_out(const std::vector<hit_line>& hits, remarks& said) {
     std::size_t count = 0;
     for (const hit_line& hit : hits)
         if (!hit.accepted && ++count <= most_hits_named)
-            names.push_back(fmt::format("{}: {}, {}", hit.file, hit.fault, hit.text));
+            names.push_back(fmt::format("{}: {}, {}", hit.name(), hit.fault, hit.text));
     if (count == 0) return;
     said.emplace_back(
         "hits_left_out",
@@ -130,7 +134,7 @@ void say_left_out(const std::vector<hit_line>& hits, remarks& said) {
     std::vector<std::string> counted;
     for (const auto& [fault, count] : faults) counted.push_back(fmt::format("{} {}", count, fault));
     throw failure(exit_no_model, fmt::format("no hit was accepted: {}; of {}: {}. --keep-all takes them",
-                                             fmt::join(counted, ", "), hits.front().file, hits.front().text));
+                                             fmt::join(counted, ", "), hits.front().name(), hits.front().text));
 }
 
 /// The places that are left, and M, K and R if they still have a force or a sensor each.
@@ -145,17 +149,54 @@ void keep_places(record_options& options) {
     if (options.mass.wanted() && !plan_fault(options.mass).empty()) options.mass = {};
 }
 
+bool most_rest(const std::vector<hit_span>& spans) {
+    const auto resting =
+        std::count_if(spans.begin(), spans.end(), [](const hit_span& one) { return one.free >= least_free; });
+    return 2 * static_cast<std::size_t>(resting) >= spans.size();
+}
+
 } // namespace
+
+bool are_hits(const record_set& records) {
+    std::vector<hit_span> spans;
+    for (const record_data& record : records.records) {
+        const double* force = records.rows(record);
+        spans.push_back(find_hit(force, record.count, records.channels()));
+        if (!find_cuts(force, record.count, records.channels()).empty()) spans.back().free = 1;
+    }
+    return most_rest(spans);
+}
+
+void cut_at_hits(record_set& records, std::vector<int>& places) {
+    std::vector<std::vector<std::size_t>> cuts;
+    std::size_t more = 0;
+    for (const record_data& record : records.records) {
+        cuts.push_back(find_cuts(records.rows(record), record.count, records.channels()));
+        more += cuts.back().size();
+    }
+    if (more == 0) return;
+    std::vector<record_data> parts;
+    std::vector<int> of_parts;
+    for (std::size_t r = 0; r < cuts.size(); ++r) {
+        const record_data& whole = records.records[r];
+        std::size_t from = 0;
+        cuts[r].push_back(whole.count);
+        for (const std::size_t end : cuts[r]) {
+            parts.push_back({whole.path, whole.first + from, end - from, from, cuts[r].size() > 1});
+            of_parts.push_back(places[r]);
+            from = end;
+        }
+    }
+    records.records = std::move(parts);
+    places = std::move(of_parts);
+}
 
 std::vector<hit_line> choose_hits(record_set& records, record_options& options) {
     std::vector<hit_channel> channels = channels_of_hit(options);
     std::vector<hit_span> spans;
-    std::size_t resting = 0;
-    for (const record_data& record : records.records) {
+    for (const record_data& record : records.records)
         spans.push_back(find_hit(records.rows(record), record.count, records.channels()));
-        resting += spans.back().free >= least_free;
-    }
-    if (2 * resting < spans.size()) return {};
+    if (!most_rest(spans)) return {};
     const force_limit limit = limit_of(records, spans);
     if (limit.sure) channels.front().high = limit.at, channels.front().low = -limit.at;
     std::vector<hit_line> hits;
@@ -189,10 +230,12 @@ std::string places_of_names(const std::string& expression, const std::vector<std
     } catch (const std::regex_error& fault) {
         throw failure(exit_usage, fmt::format("--places: \"{}\" is no regular expression", printable(expression)));
     }
-    if (wanted.mark_count() != 1)
-        throw failure(exit_usage, fmt::format("--places: \"{}\" has {} groups, expected one, around the number of the "
-                                              "place, as in P(\\d+)_",
-                                              printable(expression), wanted.mark_count()));
+    if (wanted.mark_count() != 1 && wanted.mark_count() != 2)
+        throw failure(exit_usage,
+                      fmt::format("--places: \"{}\" has {} groups, expected one, around the number of the place, as in "
+                                  "P(\\d+)_, or a second for its sign, as in P(\\d+)[XYZ]([+-]?)_",
+                                  printable(expression), wanted.mark_count()));
+    std::map<std::string, std::string> directions; // of each place
     std::vector<std::string> out;
     for (const std::string& path : paths) {
         if (!std::filesystem::is_regular_file(path))
@@ -202,11 +245,30 @@ std::string places_of_names(const std::string& expression, const std::vector<std
         if (!std::regex_search(name, found, wanted))
             throw failure(exit_usage,
                           fmt::format("--places: \"{}\" does not match the file name {}", printable(expression), path));
-        const std::string place = found[1];
+        const std::string place = found[1], sign = wanted.mark_count() > 1 ? found[2].str() : "";
         if (whole_number(fmt::format("--places, {}", path), place, -10000, 10000) == 0)
             throw failure(exit_usage,
                           fmt::format("--places, {}: found \"{}\", expected a number from 1", path, printable(place)));
-        out.push_back(place);
+        if (!sign.empty() && sign != "+" && sign != "-")
+            throw failure(exit_usage, fmt::format("--places, {}: found \"{}\" for the sign, expected + or - or nothing",
+                                                  path, printable(sign)));
+        out.push_back(sign == "-" ? "-" + place : place);
+        static const std::regex direction("^([XYZxyz])([+-]?)[_.]");
+        const std::string behind(found[1].second, name.cend());
+        std::smatch seen;
+        if (!std::regex_search(behind, seen, direction)) continue;
+        if (seen[2] == "-" && wanted.mark_count() == 1)
+            throw failure(
+                exit_usage,
+                fmt::format("--places, {}: a direction with a sign stands behind place {}: take the sign into "
+                            "a second group, as in P(\\d+)[XYZ]([+-]?)_",
+                            path, place));
+        const auto [known, first] = directions.emplace(place, seen[1]);
+        if (known->second != seen[1])
+            throw failure(exit_usage,
+                          fmt::format("--places, {}: place {} is struck in {}, in an earlier file in {}: each "
+                                      "direction needs a number of its own, give them with --hit-dofs",
+                                      path, place, seen[1].str(), known->second));
     }
     return fmt::format("{}", fmt::join(out, ","));
 }

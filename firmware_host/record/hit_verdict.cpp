@@ -21,9 +21,12 @@ constexpr std::size_t hit_lines = 128;
 constexpr std::size_t flat_top = 3; // samples that are exactly equal at an extreme: an amplifier at its limit,
 constexpr double flat_ratio = 3;    // … if they are so many times those just beside it,
 constexpr double flat_steps = 10;   // … within so many steps of the numbers. A smooth top of three has two within three
-constexpr double still_rings = 0.01;   // of the largest amplitude, at the end,
-constexpr double over_silence = 3;     // … and of that before the hit
-constexpr std::size_t ring_parts = 16; // of what follows a hit, for its amplitude
+constexpr double still_rings = 0.01;     // of the largest amplitude, at the end,
+constexpr double over_silence = 3;       // … and of that before the hit
+constexpr std::size_t ring_parts = 16;   // of what follows a hit, for its amplitude
+constexpr double one_hit = 0.25;         // of the longest time between hits: pulses closer are a hit and its double
+constexpr double longest_pulse = 0.1;    // of the time to the next hit
+constexpr std::size_t silence_parts = 8; // of the time since the hit before, that are kept before a hit
 
 /// The judgement of one hit.
 class hit_judge {
@@ -251,31 +254,86 @@ class hit_judge {
 
 hit_verdict judge_hit(const hit_window& hit) { return hit_judge(hit).verdict(); }
 
+namespace {
+
+/// The force of a record about its middle.
+class force_shape {
+  public:
+    force_shape(const double* force, std::size_t count, std::size_t stride) : force_(force), stride_(stride) {
+        std::vector<double> about;
+        for (std::size_t i = 0; i < count; ++i)
+            if (!std::isnan(force[i * stride])) about.push_back(force[i * stride]);
+        if (about.empty()) return;
+        base_ = upper_median(about);
+        for (double& x : about) {
+            if (std::abs(x - base_) > std::abs(peak_)) peak_ = x - base_;
+            x = std::abs(x - base_);
+        }
+        noise_ = 1.4826 * upper_median(about);
+    }
+
+    double peak() const { return peak_; }
+    bool any_hit() const { return std::abs(peak_) > least_peak * noise_; }
+    bool is_peak(std::size_t i) const { return force_[i * stride_] - base_ == peak_; }
+    bool beyond(std::size_t i, double share) const {
+        return std::abs(force_[i * stride_] - base_) > std::max(share * std::abs(peak_), beyond_noise * noise_);
+    }
+
+  private:
+    const double* force_;
+    std::size_t stride_;
+    double base_ = 0, noise_ = 0, peak_ = 0;
+};
+
+} // namespace
+
 hit_span find_hit(const double* force, std::size_t count, std::size_t stride) {
     hit_span out;
     out.end = count;
-    std::vector<double> about;
-    for (std::size_t i = 0; i < count; ++i)
-        if (!std::isnan(force[i * stride])) about.push_back(force[i * stride]);
-    if (about.empty()) return out;
-    const double base = upper_median(about);
-    double peak = 0;
-    for (double& x : about) {
-        if (std::abs(x - base) > std::abs(peak)) peak = x - base;
-        x = std::abs(x - base);
-    }
-    const double noise = 1.4826 * upper_median(about), largest = std::abs(peak);
-    out.sign = peak < 0 ? -1 : 1;
-    if (!(largest > least_peak * noise)) { // no hit to be seen: where it would be
-        while (force[out.begin * stride] - base != peak) ++out.begin;
+    const force_shape shape(force, count, stride);
+    if (shape.peak() == 0) return out;
+    out.sign = shape.peak() < 0 ? -1 : 1;
+    if (!shape.any_hit()) { // no hit to be seen: where it would be
+        while (!shape.is_peak(out.begin)) ++out.begin;
         return out;
     }
-    const auto beyond = [&](std::size_t i, double share) {
-        return std::abs(force[i * stride] - base) > std::max(share * largest, beyond_noise * noise);
-    };
-    while (out.begin + 1 < count && !beyond(out.begin, pulse_share)) ++out.begin;
-    while (out.end > out.begin + 1 && !beyond(out.end - 1, hit_lasts)) --out.end;
+    while (out.begin + 1 < count && !shape.beyond(out.begin, pulse_share)) ++out.begin;
+    while (out.end > out.begin + 1 && !shape.beyond(out.end - 1, hit_lasts)) --out.end;
     out.free = static_cast<double>(count - out.end) / static_cast<double>(count - out.begin);
+    return out;
+}
+
+std::vector<std::size_t> find_cuts(const double* force, std::size_t count, std::size_t stride) {
+    struct pulse {
+        std::size_t begin, end;
+    };
+    const force_shape shape(force, count, stride);
+    if (!shape.any_hit()) return {};
+    std::vector<pulse> pulses;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!shape.beyond(i, pulse_share)) continue;
+        if (pulses.empty() || pulses.back().end < i) pulses.push_back({i, i});
+        pulses.back().end = i + 1;
+    }
+    const auto apart = [&](std::size_t k) {
+        return (k + 1 < pulses.size() ? pulses[k + 1].begin : count) - pulses[k].begin;
+    };
+    std::size_t longest = 0;
+    for (std::size_t k = 0; k < pulses.size(); ++k) longest = std::max(longest, apart(k));
+    std::vector<pulse> hits; // those soon after another belong to it
+    for (std::size_t k = 0; k < pulses.size(); ++k) {
+        if (hits.empty() ||
+            static_cast<double>(pulses[k].begin - hits.back().begin) >= one_hit * static_cast<double>(longest))
+            hits.push_back(pulses[k]);
+        hits.back().end = pulses[k].end;
+    }
+    pulses = std::move(hits);
+    std::vector<std::size_t> out;
+    for (std::size_t k = 0; k < pulses.size(); ++k) {
+        if (static_cast<double>(pulses[k].end - pulses[k].begin) > longest_pulse * static_cast<double>(apart(k)))
+            return {};
+        if (k > 0) out.push_back(pulses[k].begin - apart(k - 1) / silence_parts);
+    }
     return out;
 }
 

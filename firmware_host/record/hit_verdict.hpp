@@ -62,6 +62,10 @@ struct hit_span {
 /// Of `count` samples, `stride` numbers apart; NaN is missing.
 hit_span find_hit(const double* force, std::size_t count, std::size_t stride);
 
+/// Where a record of several hits, each short beside the time to the next, is cut: shortly before each but the first. Pulses that
+/// soon follow another are one hit. Empty: there is one, or the force never rests.
+std::vector<std::size_t> find_cuts(const double* force, std::size_t count, std::size_t stride);
+
 constexpr double least_free = 0.3; ///< of what follows the beginning of a hit
 
 } // namespace okid_host

@@ -374,6 +374,7 @@ record_result identify_records(record_set records, const record_options& options
     if (options.judge_hits) {
         record_options good = options;
         good.judge_hits = false;
+        cut_at_hits(records, good.hits);
         std::vector<hit_line> hits = choose_hits(records, good);
         record_result out = identify_records(std::move(records), good);
         out.context.hits = std::move(hits);

@@ -11,6 +11,8 @@ namespace okid_host {
 struct record_data {
     std::string path;                 ///< its name in messages
     std::size_t first = 0, count = 0; ///< in samples
+    std::size_t from = 0;             ///< of a part of a longer record: its first sample there
+    bool part = false;
 };
 
 /// Measured records in one block: rows [u; y], inputs then outputs, sample by sample, NaN = missing.

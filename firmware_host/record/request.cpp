@@ -247,7 +247,8 @@ record_options check_request(const record_request& given) {
     options.hits = check_hit_dofs(given);
     options.judge_hits = !options.hits.empty();
     options.keep_all_hits = given.keep_all;
-    if (given.keep_all && options.hits.empty()) usage("--keep-all belongs to --hit-dofs and --places");
+    if (given.keep_all && options.hits.empty() && !given.set_ups)
+        usage("--keep-all belongs to --hit-dofs, --places and --setups");
     options.sensing = check_sensing(given.sensing, options.outputs.size());
     options.mass = check_dofs(given, options, options.sensing);
     if (!options.hits.empty()) {
@@ -277,12 +278,12 @@ double check_rate(const std::string& text) {
 
 void take_record_units(const std::vector<std::string>& units, record_options& options) {
     remark_exchanged(units, options, options.said);
+    options.hit_units = units;
     if (options.hits.empty()) {
         for (mass_plan* plan : {&options.mass, &options.placed})
             if (plan->wanted()) take_units(units, *plan, options.said);
         return;
     }
-    options.hit_units = units;
     if (!options.placed.wanted()) return;
     std::vector<std::string> placed = units; // one column a place
     if (!units.empty()) placed.insert(placed.begin(), options.placed.inputs.size() - 1, units[0]);

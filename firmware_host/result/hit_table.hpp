@@ -13,6 +13,9 @@ struct hit_line {
     bool accepted = true;
     std::string fault, text; ///< fault "": none was found
     double peak = 0, duration_s = 0, band_hz = 0;
+    long long first = 0, end = 0; ///< of several hits in one file: samples first .. end-1; end 0: the whole file
+
+    std::string name() const; ///< the file, with the samples where it holds several: "P03.csv[3072:6144]"
 };
 
 /// "hits" of okid.result/1.

@@ -332,7 +332,7 @@ std::string result_table(const okid_identified_t& model, const result_context& c
                                                context.fs_hz, static_cast<double>(context.samples) / context.fs_hz);
     std::string out = fmt::format("{}: {} to {}, {}", context.method, counted(model.n_u, "input"),
                                   counted(model.n_y, "output"), what);
-    const bool set_ups = merged || (fractions && context.records > 1);
+    const bool set_ups = merged || !context.set_ups.empty() || (fractions && context.records > 1);
     if (set_ups || !context.responses) out += ", " + counted(context.records, set_ups ? "set-up" : "record");
     if (context.gaps) out += ", " + counted(context.gaps, "gap");
     const std::string horizon = merged      ? "modes of the set-ups paired by frequency and shape"

@@ -20,7 +20,7 @@ from okid.report.material import Source, is_struck
 from okid.report.measured import Measured, channels_of, measure, measured_from, open_record
 from okid.report.other_kinds import check_kind
 from okid.report.provenance import source_of
-from okid.report.struck import files_beside, fitted_again, hits_of_files, measure_hits
+from okid.report.struck import files_beside, fitted_again, hits_of_files, hits_of_records, measure_hits
 
 MOST_SOURCES = 6  # files that are named one by one
 Given = str | Path | Record | Frf
@@ -61,11 +61,11 @@ def _sources(paths: Sequence[Path], kind: str) -> list[Source]:
 
 
 def _hits(result: Loaded, given: Sequence[Given]) -> Measured:
-    hits = result.raw["hits"]
+    hits = hits_of_records(result)
     if all(isinstance(one, Record) for one in given):
         if len(given) != len(hits):
             raise InputError(f"record has {len(given)} records, the result {len(hits)} hits: expected one for each")
-        records = [(hit, one, str(hit["file"])) for hit, one in zip(hits, given, strict=True)]
+        records = [(hit, one, str(hit["file"])) for own, one in zip(hits, given, strict=True) for hit in own]
         return measure_hits(result, records)  # type: ignore[arg-type]
     paths = [Path(one) for one in given if isinstance(one, str | Path)]
     if len(paths) < len(given):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def is_struck(result: Loaded) -> bool:
     """Is it of hits in files, each with its place?"""
-    return bool(result.raw.get("hits")) and all(struck_at(name) for name in result.inputs)
+    return bool(result.raw.get("hits") and result.inputs) and all(struck_at(name) for name in result.inputs)
 
 
 class Source(NamedTuple):

@@ -14,6 +14,7 @@ from okid.report import drawings, page
 from okid.report.material import Material
 from okid.report.page import count_of
 from okid.report.response_fit import explained_percent, reach_hz, synthesised_at
+from okid.report.struck import name_of_hit
 from okid.result import figures
 from okid.result.shape_places import struck_at
 
@@ -53,7 +54,7 @@ def _hit_rows(hits: list[dict[str, Any]], unit: str) -> tuple[list[str], list[li
         "what was seen",
     ]
     rows = [
-        [str(hit.get("place", "–")), str(hit.get("file", "–")), shown(hit.get("peak"), ".4g"),
+        [str(hit.get("place", "–")), name_of_hit(hit), shown(hit.get("peak"), ".4g"),
          shown(hit.get("duration_s"), ".2f", 1e3), shown(hit.get("band_hz"), ".4g"), _verdict(hit),
          _seen(hit)]
         for hit in hits

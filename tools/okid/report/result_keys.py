@@ -28,7 +28,7 @@ _MODE = dict.fromkeys(MODE_NUMBERS, "number?") | {
 }  # fmt: skip
 _HIT = {
     "file": "text", "place": "number", "accepted": "flag", "reason": "text?", "text": "text?", "peak": "number?",
-    "duration_s": "number?", "band_hz": "number?",
+    "duration_s": "number?", "band_hz": "number?", "range": "numbers?",
 }  # fmt: skip
 _SET_UP = {"name": "text", "outputs": "names"}
 _FIT = {"simulation_percent": "by name?", "prediction_percent": "by name?"}

@@ -39,9 +39,26 @@ def _names(hits: Sequence[dict[str, Any]]) -> list[str]:
     return [Path(str(hit.get("file"))).name for hit in hits]
 
 
+def name_of_hit(hit: dict[str, Any]) -> str:
+    """The file, with the samples where it holds several hits: P03.csv[3072:6144]."""
+    first, end = hit.get("range") or (0, 0)
+    return f"{hit['file']}[{int(first)}:{int(end)}]" if end else str(hit["file"])
+
+
+def hits_of_records(result: Loaded) -> list[list[dict[str, Any]]]:
+    """The hits of each record that was given: one, or several with their range in it."""
+    out: list[list[dict[str, Any]]] = []
+    for hit in result.raw["hits"]:
+        if (hit.get("range") or [0])[0] == 0:
+            out.append([])
+        out[-1].append(hit)
+    return out
+
+
 def files_beside(result: Loaded, folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
     """The files of the accepted hits in the first of these folders that has any, and the names of those not there."""
-    names = [name for hit, name in zip(result.raw["hits"], _names(result.raw["hits"]), strict=True) if hit["accepted"]]
+    wanted = [hits for hits in hits_of_records(result) if any(hit["accepted"] for hit in hits)]
+    names = [_names(hits)[0] for hits in wanted]
     inside = (inner for one in folders for inner in sorted(one.glob("*/")) if inner.is_dir())
     for folder in chain(folders, inside):
         found = [folder / name for name in names if (folder / name).is_file()]
@@ -51,18 +68,18 @@ def files_beside(result: Loaded, folders: Sequence[Path]) -> tuple[list[Path], l
 
 
 def hits_of_files(result: Loaded, paths: Sequence[Path]) -> list[tuple[dict[str, Any], Path]]:
-    """Each file with its hit, by its name; where hits share a name by their order. InputError names what fits not."""
-    hits = result.raw["hits"]
-    names, given = _names(hits), [path.name for path in paths]
+    """Each hit with its file, by its name; where records share one by their order. InputError names what fits not."""
+    records = hits_of_records(result)
+    names, given = [_names(hits)[0] for hits in records], [path.name for path in paths]
     if given == names:
-        return list(zip(hits, paths, strict=True))
+        return [(hit, path) for hits, path in zip(records, paths, strict=True) for hit in hits]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(
             f"--record: the result has several hits of the name {twice}, expected all {len(names)} files in the order "
             "of the identification"
         )
-    by_name = dict(zip(names, hits, strict=True))
+    by_name = dict(zip(names, records, strict=True))
     for k, path in enumerate(paths):
         if path.name not in by_name:
             raise InputError(
@@ -71,7 +88,7 @@ def hits_of_files(result: Loaded, paths: Sequence[Path]) -> list[tuple[dict[str,
             )
         if path.name in given[:k]:
             raise InputError(f"{path}: is the second file of this name, expected each hit once")
-    return [(by_name[path.name], path) for path in paths]
+    return [(hit, path) for path in paths for hit in by_name[path.name]]
 
 
 def _read(result: Loaded, records: Sequence[tuple[dict[str, Any], Record, str]]) -> Iterator[tuple[Hit, Record]]:
@@ -85,9 +102,10 @@ def _read(result: Loaded, records: Sequence[tuple[dict[str, Any], Record, str]])
         place = int(hit["place"])
         if abs(place) not in columns:
             raise InputError(f"{source}: the result has no input for place {abs(place)}")
-        samples = own.samples.copy()
+        first, end = hit.get("range") or (0, len(own.samples))
+        samples = own.samples[int(first) : int(end)].copy()
         samples[:, 0] *= 1.0 if place > 0 else -1.0
-        yield Hit(str(hit["file"]), columns[abs(place)], samples), own
+        yield Hit(name_of_hit(hit), columns[abs(place)], samples), own
 
 
 def _of_place(model: Model, column: int) -> Model:
@@ -169,11 +187,11 @@ def measure_hits(result: Loaded, records: Sequence[tuple[dict[str, Any], Record,
     good = sum(bool(hit["accepted"]) for hit in result.raw["hits"])
     counts = [sum(hit.column == k for hit in hits) for k in range(len(result.inputs))]
     source = f"{len(hits)} of {good} good hits, {hits[0].file} to {hits[-1].file}"
-    part = f"the first {length / result.fs:.3g} s of each" if any(len(one.samples) > length for one in own) else ""
+    part = f"the first {length / result.fs:.3g} s of each" if any(len(one.samples) > length for one in hits) else ""
     excerpt = excerpt_of(result, answered, [hit.file for hit in hits])
     return Measured(
         responses, "", None if again is None else again.stabilization(), fit_of(answered, result.outputs), source,
-        None, covariance, excerpt, white, np.sum([np.sum(~np.isfinite(one.samples), axis=0) for one in own], axis=0),
-        sum(len(one.samples) for one in own), part, own[0], _factors(answered, len(result.outputs)), [], simulated,
+        None, covariance, excerpt, white, np.sum([np.sum(~np.isfinite(one.samples), axis=0) for one in hits], axis=0),
+        sum(len(one.samples) for one in hits), part, own[0], _factors(answered, len(result.outputs)), [], simulated,
         Struck(counts, coherence), None if again is None else again.confident_modes,
     )  # fmt: skip

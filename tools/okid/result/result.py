@@ -93,7 +93,7 @@ class Result:
     refinement: Refinement | None  # with refine=True
     skew: Skew | None  # with refine=True and degrees of freedom
     shape_dofs: list[int] | None  # of a roving hammer: the place of each entry of a shape; None: the outputs
-    hits: list[dict[str, Any]]  # of a roving hammer: file, place, accepted, reason, text, peak, duration_s, band_hz
+    hits: list[dict[str, Any]]  # of a hammer test: file, place, accepted, reason, text, peak, duration_s ...
     _source: Any = field(repr=False, compare=False)
 
     @classmethod
