@@ -251,8 +251,8 @@ void add_table(CLI::App& command, identify_arguments& given) {
     command
         .add_option(
             "--places", given.places,
-            "--hit-dofs from the names of the files: a regular expression whose group is the number of the "
-            "place, as 'P(\\d+)_' of P07_1.csv; a second one is its sign, as 'P(\\d+)[XYZ]([+-]?)_' of P07Z-_1.csv")
+            "--hit-dofs from the names of the files: a regular expression whose group is the number of the place, as "
+            "'P(\\d+)_' of P07_1.csv, and a second one its sign")
         ->type_name("REGEX");
 }
 
@@ -272,7 +272,7 @@ void add_other_files(CLI::App& command, identify_arguments& given) {
         "--setups", given.set_ups,
         "every file is a set-up of one structure, with those of the --outputs that it has: one set of modes, shapes "
         "scaled at the outputs in common (else at the force). Each set-up is identified by itself and the modes are "
-        "merged; --method plscf fits all together");
+        "merged; hits of one hammer, or all with --method plscf, together");
     command
         .add_option("--references", given.references,
                     "the outputs that scale the shapes of --setups (default: all that every file has)")

@@ -71,7 +71,7 @@ std::vector<identify_option> make_options() {
          "roving hammer: where each record was struck, one number a record in their order (-3: at 3, direction "
          "reversed). Each place becomes an input of its own"},
         {"keep-all", kind::flag, &asked::keep_all, "", of::all, 0,
-         "use the bad hits of --hit-dofs and --places too (a double hit, an overload ...)"},
+         "use the bad hits of --hit-dofs, --places and --setups too (a double hit, an overload ...)"},
         {"refine", kind::answer, &asked::refine, "auto|yes|no", of::all, everywhere,
          "improve the model by maximum likelihood: with noise at the sensors no unbiased estimate is more exact. Needs "
          "--inputs. --refine=auto, the default of method auto: if the noise is white and every mode keeps its "

@@ -50,6 +50,7 @@ def everything(rig: pathlib.Path) -> list[dict[str, Any]]:
     assert agreed.returncode == 0, agreed.stderr
     picked = package.identify(u, y, fs=250.0, method="auto", picks=[17.3, 40.0], stabilization=True, sigma="none")
     hits = [beam.record(beam.Hit(place, 100.0, 0.0015), np.random.default_rng(place)) for place in (1, 2)]
+    hits[0] = np.vstack([hits[0], hits[0]])  # two hits in one record
     sides = [hit[:, :1] for hit in hits], [hit[:, 1:] for hit in hits]
     struck = package.identify(*sides, fs=beam.FS, hit_dofs=[1, 2], output_dofs=[1, 5])
     parts = [package.identify(u, y[:, order], fs=250.0, p=12, output_names=names)

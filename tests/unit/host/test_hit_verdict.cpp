@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which hits are accepted: a sensor that hardly moves shows its noise, a structure that moves is waited for.
+// Which hits are accepted: a sensor that hardly moves shows its noise, a structure that moves is waited for. Where a record of
+// several is cut.
 #include "record/hit_verdict.hpp"
 
 #include <cmath>
@@ -58,6 +59,46 @@ void test_a_structure_that_rings_is_waited_for() {
     TEST_ASSERT_EQUAL_STRING("moving", fault_of(hit(0.02, 0.2), channels("m/s^2")).c_str());
 }
 
+/// A noisy force with pulses of so many samples at these places.
+std::vector<double> struck_at(const std::vector<std::size_t>& places, std::size_t length = 4) {
+    std::mt19937 random(5);
+    std::normal_distribution<double> noise(0, 0.02);
+    std::vector<double> out;
+    for (std::size_t n = 0; n < count; ++n) out.push_back(3 + noise(random)); // 3: it is not balanced
+    for (const std::size_t first : places)
+        for (std::size_t n = 0; n < length; ++n) out[first + n] -= 80; // and reads negative
+    return out;
+}
+
+std::vector<std::size_t> cuts_of(const std::vector<double>& force) { return find_cuts(force.data(), force.size(), 1); }
+
+void test_a_record_is_cut_before_each_hit_but_the_first() {
+    TEST_ASSERT_EQUAL(0, cuts_of(struck_at({100})).size());
+    const std::vector<std::size_t> found = cuts_of(struck_at({100, 900, 1540}));
+    TEST_ASSERT_EQUAL(2, found.size());
+    TEST_ASSERT_EQUAL(900 - 800 / 8, found[0]); // an eighth of the time since the hit before stays before it
+    TEST_ASSERT_EQUAL(1540 - 640 / 8, found[1]);
+}
+
+void test_a_second_pulse_soon_after_the_first_is_the_same_hit() {
+    const std::size_t first = 100,
+                      rest = count - first; // the longest time between two is d, or what follows the second
+    const auto two = [&](std::size_t d) { return cuts_of(struck_at({first, first + d})).size(); };
+    TEST_ASSERT_EQUAL(0, two(rest / 5 - 8));
+    TEST_ASSERT_EQUAL(1, two(rest / 5 + 8));
+}
+
+void test_a_force_that_pushes_is_no_hit() {
+    TEST_ASSERT_EQUAL(1, cuts_of(struck_at({100, 1100}, 80)).size());
+    TEST_ASSERT_EQUAL(0, cuts_of(struck_at({100, 1100}, 120)).size()); // more than a tenth of the time to the next
+    std::vector<double> shaker = struck_at({});
+    std::mt19937 random(6);
+    std::normal_distribution<double> force(0, 50);
+    for (double& x : shaker) x += force(random);
+    TEST_ASSERT_EQUAL(0, cuts_of(shaker).size());
+    TEST_ASSERT_EQUAL(0, cuts_of(std::vector<double>(100, NAN)).size());
+}
+
 } // namespace
 
 void setUp(void) {}
@@ -68,5 +109,8 @@ int main(void) {
     RUN_TEST(test_noise_of_a_sensor_that_hardly_moves_is_no_motion);
     RUN_TEST(test_a_sensor_of_another_unit_is_judged_by_itself);
     RUN_TEST(test_a_structure_that_rings_is_waited_for);
+    RUN_TEST(test_a_record_is_cut_before_each_hit_but_the_first);
+    RUN_TEST(test_a_second_pulse_soon_after_the_first_is_the_same_hit);
+    RUN_TEST(test_a_force_that_pushes_is_no_hit);
     return UNITY_END();
 }

@@ -45,7 +45,7 @@ def identify_setups(
     `y`: of each set-up (N, n_y), with `output_names` of each; one name is one sensor that stays where it is. Set-ups
     with the same names are records of one set-up. `references`: the outputs that scale the shapes (default: all that
     every set-up has). `u` None: ambient, which may excite every set-up another way. With `u` (N, n_u) of each set-up,
-    forces at the same places, no reference is needed.
+    forces at the same places, no reference is needed; hits of one force are identified together, by reciprocity.
     `method`: "auto" or a named one identifies each set-up by itself and merges the modes (PoSER): frequency and damping
     are means weighted by their variances, *_std that of the mean, wider where set-ups contradict; `found_in` is the
     share of set-ups. "plscf" fits all set-ups together from their correlations (PreGER), *_std is the scatter between
