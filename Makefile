@@ -6,7 +6,7 @@ JOBS ?= 2
 # A program built with coverage or sanitizers lives in its own folder; everything a user runs is in build/.
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build build-tests demo check test test-slow test-programs test-realtime test-wheel test-controller test-distribution test-embedded test-languages test-package package docs docs-pictures score bench bench-quick bench-check bench-peers \
+.PHONY: help setup build build-tests demo check test test-long test-slow test-programs test-realtime test-wheel test-controller test-distribution test-embedded test-languages test-package package docs docs-pictures score bench bench-quick bench-check bench-peers \
 	fuzz lint format sanitize sanitize-all coverage sbom audit clean
 
 help: ## this list
@@ -33,11 +33,15 @@ build-tests:
 	@cmake --preset release -DOKID_BUILD_TESTS=ON --log-level=WARNING >/dev/null
 	@cmake --build build -j$(JOBS) -- --quiet
 
-test: build-tests ## everything that proves the product, real vcan included; judges okid, never the machine
+test: build-tests ## what proves the product in minutes, real vcan included; judges okid, never the machine
 	@tests/run
 
-test-slow: ## the same with more seeds, more frames, longer loads
+test-long: build-tests ## the rest of it: tests that take over a second each
+	@tests/run long
+
+test-slow: ## both with more seeds, more frames, longer loads
 	@OKID_SLOW=1 $(MAKE) --no-print-directory test
+	@OKID_SLOW=1 $(MAKE) --no-print-directory test-long
 
 test-programs: build-tests ## with large programs of others: Chromium, InfluxDB, Mosquitto, shells, an emulated CAN controller
 	@tools/setup.sh programs

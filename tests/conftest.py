@@ -16,10 +16,14 @@ import pytest
 
 MARKS = (
     "programs: needs a large program of others (browser, database, broker, shells, emulator): make test-programs",
+    "long: takes over a second, named in tests/long: make test-long",
     "realtime: judges the clock on the wall, or how busy the processors are: make test-realtime",
 )
 
-sys.path.insert(0, str(Path(__file__).resolve().parent / "support"))
+TESTS = Path(__file__).resolve().parent
+LONG = {line for line in (TESTS / "long").read_text(encoding="utf-8").splitlines() if not line.startswith("#")}
+
+sys.path.insert(0, str(TESTS / "support"))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before anything imports NumPy, and for what tests start
 os.environ["OKID_PROGRESS"] = "0"  # a busy machine would have lines of progress on stderr
 
@@ -40,6 +44,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "chromium" in getattr(item, "fixturenames", ()):
             item.add_marker("programs")
+        if not LONG.isdisjoint((item.nodeid.partition("::")[0], item.nodeid.partition("[")[0])):
+            item.add_marker("long")
 
 
 @pytest.fixture(scope="session")
