@@ -69,6 +69,9 @@ class struck_merger {
         for (const int place : hit_places(own.hits))
             own.placed.inputs.push_back({own.inputs.front(), place, false, OKID_SENSE_ACCELERATION, force_.si});
         own.said = said_;
+        if (!are_blows(records))
+            throw failure(exit_no_model,
+                          "no model: the force of a hit that --keep-all takes never rests. Leave it out");
         return over_outputs(identify_records(std::move(records), own));
     }
 

@@ -111,6 +111,19 @@ def test_without_places_the_shapes_are_those_of_the_outputs(tmp_path: Path) -> N
     assert "9 of 9 hits at 1 place were used" in (tmp_path / "r.html").read_text()
 
 
+def test_a_kept_hit_that_never_rests_is_refused_in_one_line(tmp_path: Path) -> None:
+    files = set_ups(tmp_path, False)
+    head = files[4].read_text().split("\n", 2)[:2]
+    rows = np.loadtxt(files[4], delimiter=",", skiprows=2)
+    top = int(rows[:, 0].argmax())
+    rows[top:, 0] += 15.0 * np.random.default_rng(2).standard_normal(len(rows) - top)
+    np.savetxt(files[4], rows, delimiter=",", header="\n".join(head), comments="", fmt="%.7g")
+    done = okid("identify", *files, "--setups", *OUTPUTS, "--json", tmp_path / "r.json", status=0)
+    assert "8 of 9 hits used" in done.stdout and "s1_1.csv  left out" in done.stdout
+    kept = okid("identify", *files, "--setups", *OUTPUTS, "--keep-all", status=3)
+    assert "--keep-all takes never rests" in kept.stderr and kept.stderr.count("\n") == 1
+
+
 def test_python_gives_the_same(tmp_path: Path) -> None:
     files = set_ups(tmp_path, True)
     okid("identify", *files, "--setups", *OUTPUTS, "--json", tmp_path / "r.json", status=0)
