@@ -25,6 +25,8 @@ LONG = {line for line in (TESTS / "long").read_text(encoding="utf-8").splitlines
 
 sys.path.insert(0, str(TESTS / "support"))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before anything imports NumPy, and for what tests start
+# The list of fonts that another checkout has left in the home folder may name fonts that are gone with it.
+os.environ.setdefault("MPLCONFIGDIR", str(TESTS.parent / "build" / "matplotlib"))
 os.environ["OKID_PROGRESS"] = "0"  # a busy machine would have lines of progress on stderr
 
 # Under nohup, or behind an & of a script, these are ignored, and what the tests start would inherit that.

@@ -343,7 +343,6 @@ class merger {
         describe_set_ups(work.context);
         work.set.n_y = names_.size();
         std::vector<listed_mode> listed;
-        std::vector<mode_shape> shapes;
         deviations sigma;
         int blocks = 0;
         for (const known_result& one : results_)
@@ -360,12 +359,11 @@ class merger {
             sigma.frequency_hz.push_back(frequency.deviation);
             sigma.damping_ratio.push_back(damping.deviation);
             sigma.shape_re.insert(sigma.shape_re.end(), names_.size(), NAN);
-            shapes.push_back(whole_shape(mode));
-            mode_shape states = shapes.back();
+            mode_shape shape = whole_shape(mode), states = shape;
             for (auto& entry : states)
                 if (!there(entry)) entry = 0;
             listed.push_back({frequency.value, damping.value, shape_collinearity(states, {}), median_emac(mode),
-                              std::move(states), !mode.doubtful});
+                              std::move(shape), !mode.doubtful});
             mode_verdict& verdict = work.context.verdicts.emplace_back();
             verdict.found_in = static_cast<double>(mode.count()) / static_cast<double>(results_.size());
             verdict.confident = !mode.doubtful && mode.most_have_it();
@@ -376,10 +374,6 @@ class merger {
         if (std::any_of(sigma.frequency_hz.begin(), sigma.frequency_hz.end(), [](double one) { return one > 0; }))
             work.context.sigma = std::move(sigma);
         make_modal_model(listed, work.context.fs_hz, work);
-        for (std::size_t k = 0; k < shapes.size(); ++k)
-            for (std::size_t i = 0; i < names_.size(); ++i)
-                if (!there(shapes[k][i]))
-                    work.refined->shape_re[k * names_.size() + i] = work.refined->shape_im[k * names_.size() + i] = NAN;
         record_result out;
         out.model = kept_model(work.model);
         out.context = std::move(work.context);

@@ -206,40 +206,26 @@ class set_up_merger {
     /// Shapes at the degrees of freedom, in their order; modal masses from the drive points. Whatever its sensors measure, a
     /// set-up has its shapes in one quantity.
     void place(record_result& out) const {
-        const mass_plan& plan = options_.placed;
-        placed_shapes shapes;
-        std::map<int, std::size_t> output_at;
-        for (std::size_t o = 0; o < plan.outputs.size(); ++o)
-            if (plan.outputs[o].dof > 0) output_at.emplace(plan.outputs[o].dof, o);
-        for (const auto& [dof, o] : output_at) shapes.dofs.push_back(dof);
         const okid_identified_t& model = out.model.view();
+        std::vector<std::vector<complex>> shapes;
         for (int k = 0; k < model.mode_count; ++k) {
-            std::vector<complex> whole(options_.outputs.size(), NAN);
+            shapes.emplace_back(options_.outputs.size(), NAN);
             for (int o = 0; o < model.n_y; ++o) {
                 const auto at = std::find(options_.outputs.begin(), options_.outputs.end(),
                                           out.context.outputs[static_cast<std::size_t>(o)]);
-                whole[static_cast<std::size_t>(at - options_.outputs.begin())] = {model.shape_re[k * model.n_y + o],
-                                                                                  model.shape_im[k * model.n_y + o]};
+                shapes.back()[static_cast<std::size_t>(at - options_.outputs.begin())] = {
+                    model.shape_re[k * model.n_y + o], model.shape_im[k * model.n_y + o]};
             }
-            complex most = 0;
-            for (const auto& [dof, o] : output_at) {
-                whole[o] *= (plan.outputs[o].reversed ? -1.0 : 1.0) * plan.outputs[o].si;
-                if (std::abs(whole[o]) > std::abs(most)) most = whole[o];
-            }
-            for (const auto& [dof, o] : output_at) {
-                whole[o] /= most;
-                shapes.re.push_back(whole[o].real());
-                shapes.im.push_back(whole[o].imag());
-                shapes.re_std.push_back(NAN);
-                shapes.im_std.push_back(NAN);
-            }
-            shapes.modal_mass.push_back(mass_of(model.frequency_hz[k], whole));
         }
-        out.context.placed = std::move(shapes);
+        std::vector<complex> largest;
+        placed_shapes placed = over_dofs(options_.placed.outputs, shapes, nullptr, largest);
+        for (std::size_t k = 0; k < shapes.size(); ++k)
+            placed.modal_mass.push_back(mass_of(model.frequency_hz[k], shapes[k], largest[k]));
+        out.context.placed = std::move(placed);
     }
 
-    /// Of a shape over the outputs, from all set-ups with a sensor at a force.
-    double mass_of(double frequency_hz, const std::vector<complex>& shape) const {
+    /// Of a shape over the outputs whose largest entry in SI units is given, from all set-ups with a sensor at a force.
+    double mass_of(double frequency_hz, const std::vector<complex>& shape, complex largest) const {
         const mass_plan& plan = options_.placed;
         drive_mass mass;
         for (const one_set_up& one : found_)
@@ -251,9 +237,9 @@ class set_up_merger {
                     for (std::size_t o = 0; o < one.at.size(); ++o) {
                         const mass_channel &force = plan.inputs[i], &sensor = plan.outputs[one.at[o]];
                         if (force.dof == 0 || force.dof != sensor.dof) continue;
-                        const double unit = (force.reversed == sensor.reversed ? 1 : -1) * sensor.si / force.si;
-                        mass.add(shape[one.at[o]], unit * mode.shape[o] * one.b[k][i] *
-                                                       drive_factor(lambda, 1 / options_.fs_hz, one.hold));
+                        mass.add(in_si(sensor, shape[one.at[o]]) / largest,
+                                 in_si(sensor, mode.shape[o]) * one.b[k][i] / in_si(force, 1) *
+                                     drive_factor(lambda, 1 / options_.fs_hz, one.hold));
                     }
             }
         return mass.kg();

@@ -184,27 +184,23 @@ class struck_merger {
         deviations none, &sigma = work.context.sigma ? *work.context.sigma : none;
         sigma.shape_re.assign(n * count, NAN);
         sigma.shape_im.assign(n * count, NAN);
+        std::vector<std::vector<std::complex<double>>> over(count, std::vector<std::complex<double>>(n, NAN));
         std::vector<listed_mode> listed;
         for (std::size_t k = 0; k < count; ++k) {
-            std::vector<std::complex<double>> shape(n);
             for (std::size_t o = 0; o < n; ++o) {
                 const auto at = std::lower_bound(shapes.dofs.begin(), shapes.dofs.end(), place_[o]);
                 if (at == shapes.dofs.end() || *at != place_[o]) continue;
                 const auto j = k * places + static_cast<std::size_t>(at - shapes.dofs.begin());
-                shape[o] = {shapes.re[j], shapes.im[j]};
+                over[k][o] = {shapes.re[j], shapes.im[j]};
                 sigma.shape_re[k * n + o] = shapes.re_std[j];
                 sigma.shape_im[k * n + o] = shapes.im_std[j];
             }
             listed.push_back(
-                {model.frequency_hz[k], model.damping_ratio[k], model.mpc[k], model.emac[k], std::move(shape), true});
+                {model.frequency_hz[k], model.damping_ratio[k], model.mpc[k], model.emac[k], over[k], true});
         }
         make_modal_model(listed, options_.fs_hz, work);
-        for (std::size_t k = 0; k < count; ++k)
-            for (std::size_t o = 0; o < n; ++o)
-                if (listed[k].shape[o] == 0.0)
-                    work.refined->shape_re[k * n + o] = work.refined->shape_im[k * n + o] = NAN;
         describe(work.context);
-        if (options_.placed.wanted()) place(listed, shapes, work.context);
+        if (options_.placed.wanted()) place(over, shapes, work.context);
         record_result out;
         out.model = kept_model(work.model);
         out.context = std::move(work.context);
@@ -226,35 +222,20 @@ class struck_merger {
         to.modal_masses.clear();
     }
 
-    /// Over the degrees of freedom, ascending, in SI units and with their signs; the largest entry is 1.
-    void place(const std::vector<listed_mode>& modes, const placed_shapes& from, result_context& to) const {
-        placed_shapes shapes;
-        std::map<int, std::size_t> output_at;
-        for (std::size_t o = 0; o < sensors_.size(); ++o)
-            if (sensors_[o].dof > 0) output_at.emplace(sensors_[o].dof, o);
-        for (const auto& [dof, o] : output_at) shapes.dofs.push_back(dof);
-        for (std::size_t k = 0; k < modes.size(); ++k) {
-            std::complex<double> most = 0;
-            const auto entry = [&](std::size_t o) {
-                return modes[k].shape[o] * ((sensors_[o].reversed ? -1 : 1) * sensors_[o].si);
-            };
-            for (const auto& [dof, o] : output_at)
-                if (std::abs(entry(o)) > std::abs(most)) most = entry(o);
-            double drive = NAN;
-            for (const auto& [dof, o] : output_at) {
-                const bool known = modes[k].shape[o] != 0.0;
-                const auto at = k * sensors_.size() + o;
-                const double unit = sensors_[o].si / std::abs(most);
-                shapes.re.push_back(known ? (entry(o) / most).real() : NAN);
-                shapes.im.push_back(known ? (entry(o) / most).imag() : NAN);
-                shapes.re_std.push_back(to.sigma ? unit * to.sigma->shape_re[at] : NAN);
-                shapes.im_std.push_back(to.sigma ? unit * to.sigma->shape_im[at] : NAN);
-                if (dof == force_.dof) drive = unit * unit;
-            }
-            shapes.modal_mass.push_back(drive * from.modal_mass[k]);
-            shapes.modal_mass_std.push_back(drive * from.modal_mass_std[k]);
+    /// The modal masses of `from` are those of the shapes over the outputs.
+    void place(const std::vector<std::vector<std::complex<double>>>& over_outputs, const placed_shapes& from,
+               result_context& to) const {
+        std::vector<std::complex<double>> largest;
+        const deviations* sigma = to.sigma ? &*to.sigma : nullptr;
+        placed_shapes placed = over_dofs(sensors_, over_outputs, sigma, largest);
+        const auto drive = std::find_if(sensors_.begin(), sensors_.end(),
+                                        [&](const mass_channel& one) { return one.dof == force_.dof; });
+        for (std::size_t k = 0; k < largest.size(); ++k) {
+            const double unit = drive == sensors_.end() ? NAN : std::norm(drive->si / largest[k]);
+            placed.modal_mass.push_back(unit * from.modal_mass[k]);
+            placed.modal_mass_std.push_back(unit * from.modal_mass_std[k]);
         }
-        to.placed = std::move(shapes);
+        to.placed = std::move(placed);
     }
 
     const record_options& options_;

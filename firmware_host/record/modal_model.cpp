@@ -51,8 +51,10 @@ void put_states(const std::vector<listed_mode>& modes, refined_arrays& to, okid_
         to.A[b * n + a] = -mu.imag();
         to.A[a * n + b] = mu.imag();
         for (std::size_t i = 0; i < n_y; ++i) {
-            to.C[a * n_y + i] = in[k]->shape[i].real();
-            to.C[b * n_y + i] = -in[k]->shape[i].imag();
+            const std::complex<double> entry = in[k]->shape[i];
+            if (std::isnan(entry.real())) continue; // not measured: 0
+            to.C[a * n_y + i] = entry.real();
+            to.C[b * n_y + i] = -entry.imag();
         }
         model.model_radius = std::max(model.model_radius, std::abs(mu));
     }

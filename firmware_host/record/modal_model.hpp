@@ -16,7 +16,7 @@ mode_verdict verdict_of(const consensus_mode& mode);
 /// A mode as it goes into a model and into the result.
 struct listed_mode {
     double frequency_hz, damping_ratio, mpc, emac;
-    std::vector<std::complex<double>> shape; ///< in units of the outputs, largest entry 1
+    std::vector<std::complex<double>> shape; ///< in units of the outputs, largest entry 1; NaN: not measured
     bool in_model;
 };
 

@@ -4,7 +4,9 @@
 #include "json_number.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
+#include <map>
 
 namespace okid_host {
 namespace {
@@ -12,6 +14,36 @@ namespace {
 constexpr std::size_t most_columns = 10; // more modes would not stand side by side on a screen
 
 } // namespace
+
+std::complex<double> in_si(const mass_channel& sensor, std::complex<double> entry) {
+    return (sensor.reversed ? -sensor.si : sensor.si) * entry;
+}
+
+placed_shapes over_dofs(const std::vector<mass_channel>& sensors,
+                        const std::vector<std::vector<std::complex<double>>>& shapes, const deviations* sigma,
+                        std::vector<std::complex<double>>& largest) {
+    std::map<int, std::size_t> output_at;
+    for (std::size_t o = 0; o < sensors.size(); ++o)
+        if (sensors[o].dof > 0) output_at.emplace(sensors[o].dof, o);
+    placed_shapes out;
+    for (const auto& [dof, o] : output_at) out.dofs.push_back(dof);
+    for (std::size_t k = 0; k < shapes.size(); ++k) {
+        std::complex<double> most = 0;
+        for (const auto& [dof, o] : output_at)
+            if (const auto entry = in_si(sensors[o], shapes[k][o]); std::abs(entry) > std::abs(most)) most = entry;
+        for (const auto& [dof, o] : output_at) {
+            const std::complex<double> entry = in_si(sensors[o], shapes[k][o]) / most;
+            const double unit = sensors[o].si / std::abs(most);
+            const std::size_t at = k * sensors.size() + o;
+            out.re.push_back(entry.real());
+            out.im.push_back(entry.imag());
+            out.re_std.push_back(sigma ? unit * sigma->shape_re[at] : NAN);
+            out.im_std.push_back(sigma ? unit * sigma->shape_im[at] : NAN);
+        }
+        largest.push_back(most);
+    }
+    return out;
+}
 
 void put_shape_json(const placed_shapes& shapes, std::size_t mode, nlohmann::ordered_json& to) {
     const std::size_t n = shapes.dofs.size();

@@ -20,11 +20,3 @@ def test_every_line_is_a_test() -> None:
         assert not function or function in [
             one.name for one in ast.walk(tree) if isinstance(one, ast.FunctionDef)
         ], line
-
-
-def test_what_needs_the_kernel_runs_there() -> None:
-    """The long tier runs by the clock on the wall."""
-    virtual = [line for line in (ROOT / "tests" / "kernel" / "virtual").read_text().splitlines() if line[:1] != "#"]
-    assert not [
-        line for line in LINES if any(line == one or line.startswith((one + "/", one + "::")) for one in virtual)
-    ]
