@@ -359,7 +359,8 @@ class merger {
             sigma.frequency_hz.push_back(frequency.deviation);
             sigma.damping_ratio.push_back(damping.deviation);
             sigma.shape_re.insert(sigma.shape_re.end(), names_.size(), NAN);
-            mode_shape shape = whole_shape(mode), states = shape;
+            mode_shape shape = whole_shape(mode);
+            mode_shape states = shape;
             for (auto& entry : states)
                 if (!there(entry)) entry = 0;
             listed.push_back({frequency.value, damping.value, shape_collinearity(states, {}), median_emac(mode),
