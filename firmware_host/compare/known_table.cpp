@@ -45,6 +45,13 @@ std::vector<json> list_at(const json& from, const char* key) {
     return at == from.end() || !at->is_array() ? std::vector<json>() : at->get<std::vector<json>>();
 }
 
+std::vector<std::string> texts_at(const json& from, const char* key) {
+    std::vector<std::string> out;
+    for (const json& one : list_at(from, key))
+        if (one.is_string()) out.push_back(one.get<std::string>());
+    return out;
+}
+
 /// Column-major; empty where the file has no matrix.
 std::vector<double> square_at(const json& from, const char* key, std::size_t n) {
     const std::vector<json> rows = list_at(from, key);
@@ -167,11 +174,7 @@ std::vector<hit_line> hits_in(const json& from) {
 std::vector<set_up_line> set_ups_in(const json& from) {
     std::vector<set_up_line> out;
     for (const json& one : list_at(from, "set_ups")) {
-        if (!one.is_object()) continue;
-        set_up_line& line = out.emplace_back();
-        line.name = text_at(one, "name");
-        for (const json& output : list_at(one, "outputs"))
-            if (output.is_string()) line.outputs.push_back(output.get<std::string>());
+        if (one.is_object()) out.push_back({text_at(one, "name"), texts_at(one, "outputs")});
     }
     return out;
 }
@@ -180,8 +183,7 @@ mode_verdict verdict_in(const json& mode) {
     mode_verdict out;
     out.confident = flag_at(mode, "confident");
     out.found_in = number_at(mode, "found_in");
-    for (const json& code : list_at(mode, "why"))
-        if (code.is_string()) out.why.push_back(code.get<std::string>());
+    out.why = texts_at(mode, "why");
     return out;
 }
 

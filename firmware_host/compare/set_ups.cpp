@@ -21,7 +21,6 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <functional>
-#include <map>
 
 namespace okid_host {
 namespace {

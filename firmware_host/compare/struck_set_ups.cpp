@@ -17,7 +17,6 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <functional>
-#include <map>
 #include <set>
 #include <utility>
 

@@ -70,8 +70,9 @@ def _hits(result: Loaded, given: Sequence[Given]) -> Measured:
     paths = [Path(one) for one in given if isinstance(one, str | Path)]
     if len(paths) < len(given):
         raise InputError("record has files beside what is in memory, expected the files of the hits, or records alone")
-    matched = hits_of_files(result, paths)
-    return measure_hits(result, [(hit, open_record(p), str(p)) for hit, p in matched if hit["accepted"]])
+    matched = [(hit, path) for hit, path in hits_of_files(result, paths) if hit["accepted"]]
+    opened = {path: open_record(path) for path in dict.fromkeys(path for _, path in matched)}
+    return measure_hits(result, [(hit, opened[path], str(path)) for hit, path in matched])
 
 
 def _responses(result: Loaded, given: Sequence[Given]) -> Measured:

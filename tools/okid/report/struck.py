@@ -39,17 +39,24 @@ def _names(hits: Sequence[dict[str, Any]]) -> list[str]:
     return [Path(str(hit.get("file"))).name for hit in hits]
 
 
+def range_of_hit(hit: dict[str, Any]) -> tuple[int, int] | None:
+    """Its samples in a record of several hits, (first, end); None: the record is the hit."""
+    given = hit.get("range") or []
+    return (int(given[0]), int(given[1])) if len(given) == 2 else None
+
+
 def name_of_hit(hit: dict[str, Any]) -> str:
     """The file, with the samples where it holds several hits: P03.csv[3072:6144]."""
-    first, end = hit.get("range") or (0, 0)
-    return f"{hit['file']}[{int(first)}:{int(end)}]" if end else str(hit["file"])
+    part = range_of_hit(hit)
+    return f"{hit['file']}[{part[0]}:{part[1]}]" if part else str(hit["file"])
 
 
 def hits_of_records(result: Loaded) -> list[list[dict[str, Any]]]:
     """The hits of each record that was given: one, or several with their range in it."""
     out: list[list[dict[str, Any]]] = []
     for hit in result.raw["hits"]:
-        if (hit.get("range") or [0])[0] == 0:
+        first, _ = range_of_hit(hit) or (0, 0)
+        if first == 0 or not out:
             out.append([])
         out[-1].append(hit)
     return out
@@ -102,8 +109,8 @@ def _read(result: Loaded, records: Sequence[tuple[dict[str, Any], Record, str]])
         place = int(hit["place"])
         if abs(place) not in columns:
             raise InputError(f"{source}: the result has no input for place {abs(place)}")
-        first, end = hit.get("range") or (0, len(own.samples))
-        samples = own.samples[int(first) : int(end)].copy()
+        first, end = range_of_hit(hit) or (0, len(own.samples))
+        samples = own.samples[first:end].copy()
         samples[:, 0] *= 1.0 if place > 0 else -1.0
         yield Hit(name_of_hit(hit), columns[abs(place)], samples), own
 
