@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  samples a second by their time stamps
 // METHOD   an arrival is never early, and may be late by a burst or a stall: of each stretch of samples the earliest is kept,
-//          at most 64 of them (two become one when they are full); the edge of their lower hull over the middle is the line
+//          at most 64 of them (two become one when they are full); the edge of their lower hull over the middle is the line;
+//          a step of the stamps against the numbers is taken out
 #pragma once
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -17,8 +20,13 @@ class rate_meter {
     void add(std::int64_t index, std::int64_t time_ns) {
         if (time_ns == 0) return;
         if (count_ == 0) origin_ = {index, 0}, origin_ns_ = time_ns;
-        const double late_s =
+        double late_s =
             static_cast<double>(time_ns - origin_ns_) * 1e-9 - static_cast<double>(index - origin_.index) * period_s_;
+        if (std::abs(late_s - newest_s_) > std::max(jump_s, jump_samples * period_s_)) {
+            origin_ns_ += static_cast<std::int64_t>((late_s - newest_s_) * 1e9);
+            late_s = newest_s_;
+        }
+        newest_s_ = late_s;
         if (count_ > 0 && index < end_) {
             if (late_s < points_[count_ - 1].late_s) points_[count_ - 1] = {index, late_s};
             return;
@@ -44,6 +52,7 @@ class rate_meter {
     }
 
   private:
+    static constexpr double jump_s = 10, jump_samples = 100; ///< no late arrival: the clock was set, or a sender rested
     struct point {
         std::int64_t index = 0;
         double late_s = 0; ///< of a stream at the nominal rate
@@ -63,6 +72,7 @@ class rate_meter {
     double period_s_;
     std::array<point, 64> points_{};
     std::size_t count_ = 0;
+    double newest_s_ = 0;
     std::int64_t width_ = 50, end_ = 0, origin_ns_ = 0;
     point origin_;
 };

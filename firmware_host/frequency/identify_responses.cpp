@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  modes and a modal model from measured frequency responses
-// METHOD   response_modes.hpp; model: these modes in discrete time at 2.56 times the highest line, B and D by least squares on
+// METHOD   response_modes.hpp; modal masses: the residues at drive points; model: these modes in discrete time at 2.56 times the highest line, B and D by least squares on
 //          the responses
 #include "identify_responses.hpp"
 
@@ -10,6 +10,7 @@
 #include "record/modal_model.hpp"
 #include "record/record_refine.hpp"
 #include "response_modes.hpp"
+#include "result/drive_mass.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -137,12 +138,85 @@ void fit_responses(const response_set& set, record_work& work) {
     work.context.simulation_percent = percent;
 }
 
+/// Forces and sensors at one place, where no places are given: by their names, "3z" beside "-3z" too.
+mass_plan places_by_name(const response_set& set, const std::vector<int>& sensing) {
+    const auto place = [](const std::string& name) { return name.substr(name[0] == '-' || name[0] == '+'); };
+    mass_plan out;
+    for (const std::string& name : set.inputs)
+        out.inputs.push_back(
+            {name, static_cast<int>(out.inputs.size()) + 1, name[0] == '-', OKID_SENSE_ACCELERATION, 1});
+    for (std::size_t o = 0; o < set.outputs.size(); ++o) {
+        mass_channel& one = out.outputs.emplace_back();
+        one.name = set.outputs[o];
+        one.reversed = one.name[0] == '-';
+        if (!sensing.empty()) one.sensing = sensing[o];
+        for (const mass_channel& input : out.inputs)
+            if (place(input.name) == place(one.name)) one.dof = input.dof;
+    }
+    return out;
+}
+
+/// Modal mass, stiffness and damping from the residues at drive points, with what their noise and that of the damping ratio,
+/// which goes with their size, leave open. @param zeta_share  deviation of the damping ratio over it
+modal_mass mass_of(const residue_shape& mode, const mass_plan& plan, complex pole, double zeta_share) {
+    modal_mass out;
+    if (mode.residues.size() == 0) return out; // not refined
+    std::vector<complex> shape;
+    for (std::size_t o = 0; o < mode.shape.size(); ++o)
+        shape.push_back(mode.shape[o] * plan.outputs[o].si * to_displacement(pole, plan.outputs[o].sensing));
+    const auto top =
+        std::max_element(shape.begin(), shape.end(), [](complex a, complex b) { return std::norm(a) < std::norm(b); }) -
+        shape.begin();
+    const auto share = [&](Index o, Index i) { return mode.variance(o, i) / std::norm(mode.residues(o, i)); };
+    drive_mass found;
+    double variance = 0;
+    for (std::size_t k = 0; k < shape.size(); ++k)
+        for (std::size_t j = 0; j < plan.inputs.size(); ++j) {
+            const mass_channel &output = plan.outputs[k], &input = plan.inputs[j];
+            if (output.dof < 1 || output.dof != input.dof) continue;
+            const auto o = static_cast<Index>(k), i = static_cast<Index>(j);
+            const complex psi = shape[k] / shape[static_cast<std::size_t>(top)];
+            const complex residue = mode.residues(o, i) * output.si / input.si * to_displacement(pole, output.sensing);
+            const double sign = output.reversed == input.reversed ? 1 : -1;
+            found.add(psi, sign * complex(0, 2 * pole.imag()) * residue);
+            variance += std::pow(std::norm(psi), 4) * (share(o, i) + (o == top ? 0 : 4 * share(top, i)));
+        }
+    const complex mass = found.complex_kg();
+    if (!std::isfinite(mass.real()) || !std::isfinite(mass.imag())) return out;
+    out.phase_deg = std::arg(mass) * 180 / M_PI;
+    if (!(mass.real() > 0)) return out; // another quantity than --sensing, or a polarity
+    const double noise = std::sqrt(variance) / found.power;
+    out.kg = mass.real();
+    out.stiffness = out.kg * std::norm(pole);
+    out.damping = -2 * pole.real() * out.kg;
+    out.kg_std = out.kg * std::hypot(noise, zeta_share);
+    out.stiffness_std = out.stiffness * std::hypot(noise, zeta_share);
+    out.damping_std = out.damping * noise; // residue over damping ratio is the height of the peak
+    return out;
+}
+
+/// Of modes with the poles of the structure, without those of a window.
+std::vector<modal_mass> masses_of(const response_set& set, const record_options& options,
+                                  const std::vector<listed_mode>& modes, const std::vector<residue_shape>& shapes,
+                                  const deviations& sigma) {
+    const mass_plan plan = options.mass.wanted() ? options.mass : places_by_name(set, options.sensing);
+    std::vector<modal_mass> out;
+    const bool any = std::any_of(plan.inputs.begin(), plan.inputs.end(), [&](const mass_channel& input) {
+        return std::any_of(plan.outputs.begin(), plan.outputs.end(),
+                           [&](const mass_channel& output) { return output.dof > 0 && output.dof == input.dof; });
+    });
+    if (!any) return out;
+    for (std::size_t k = 0; k < modes.size(); ++k)
+        out.push_back(mass_of(shapes[k], plan, continuous_pole(modes[k].frequency_hz, modes[k].damping_ratio),
+                              sigma.damping_ratio[k] / modes[k].damping_ratio));
+    return out;
+}
+
 void find_matrices(const record_options& options, record_work& work) {
     work.context.warnings.insert(work.context.warnings.end(), options.said.begin(), options.said.end());
     if (!options.mass.wanted()) return;
     mass_plan plan = options.mass;
     plan.hold = "band";
-    work.context.modal_masses = modal_masses_of(work.model, plan);
     work.context.mass = find_mass_matrices(work.model, plan, work.context.warnings);
 }
 
@@ -172,14 +246,15 @@ record_options options_of(const response_set& set, record_request given, bool tu
 }
 
 /// Modes, deviations and model into the result; the window's decay goes out of the poles last.
-void make_result(const response_set& set, double constant_s, response_modes&& found, record_work& work) {
+void make_result(const response_set& set, const record_options& options, double constant_s, response_modes&& found,
+                 record_work& work) {
     auto& [modes, shapes, sigma, stable] = found;
     work.context.stable = std::move(stable);
     std::vector<listed_mode> listed;
     for (std::size_t k = 0; k < modes.size(); ++k) {
-        residue_shape& own = shapes[k];
-        listed.push_back({modes[k].frequency_hz, modes[k].damping_ratio, modes[k].mpc, NAN, std::move(own.shape),
-                          modes[k].confident()});
+        const residue_shape& own = shapes[k];
+        listed.push_back(
+            {modes[k].frequency_hz, modes[k].damping_ratio, modes[k].mpc, NAN, own.shape, modes[k].confident()});
         sigma.shape_re.insert(sigma.shape_re.end(), own.scatter.begin(), own.scatter.end());
     }
     sigma.shape_im = sigma.shape_re;
@@ -193,6 +268,7 @@ void make_result(const response_set& set, double constant_s, response_modes&& fo
         listed[k].damping_ratio = modes[k].damping_ratio;
         work.context.verdicts.push_back(verdict_of(modes[k]));
     }
+    work.context.modal_masses = masses_of(set, options, listed, shapes, *work.context.sigma);
     if (!(constant_s > 0)) return;
     std::vector<double> B = work.refined->B, D = work.refined->D; // they go with the windowed poles as well
     make_modal_model(listed, work.context.fs_hz, work);
@@ -224,8 +300,8 @@ record_result identify_responses(const response_set& measured, const response_re
             "reciprocity", "more inputs than outputs: by reciprocity the outputs of this result are the places that "
                            "were struck, its inputs the sensors");
     const joint_responses all{{set}, set.outputs, set.outputs, 1 / finest_spacing(measured.frequency_hz)};
-    make_result(set, constant_s, find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization),
-                work);
+    make_result(set, options, constant_s,
+                find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization), work);
     find_matrices(options, work);
     describe_dofs(options, work.context);
     record_result result;

@@ -28,7 +28,9 @@ constexpr int most_halvings = 5;
 constexpr double farthest_step = 0.5;                   // of the decay rate
 constexpr double least_gain = 1e-7;                     // of the cost
 constexpr double farthest = 0.02;                       // in frequency, from the start
-constexpr Index correlated_lines = 6, local_lags = 2;   // lines
+constexpr Index correlated_lines = 64, local_lags = 2;  // lines; an exponential window makes many alike
+constexpr std::size_t full_lines = 6;                   // that count as if they stood in one place
+constexpr double chance_level = 2;                      // deviations of a correlation that is none
 constexpr Index residual_powers = 5, lowest_power = -2; // of s
 constexpr Index noise_reach = 10;                       // lines to either side over which their noise is taken
 constexpr double quietest_line = 1e-3;                  // of the mean noise
@@ -51,8 +53,8 @@ struct problem {
     VectorXd root; // one over the noise of each line, rms 1
     // Weighted, parts below each other:
     MatrixXd y, Q, left, coefficients;
-    VectorXd unit_variance; // of each coefficient
-    MatrixXd slopes, gram;  // along the poles, the residues eliminated
+    MatrixXd inverse;      // coefficients = inverse Q^T y
+    MatrixXd slopes, gram; // along the poles, the residues eliminated
 };
 
 problem make_problem(const response_set& set, double window_s, double sample_s) {
@@ -121,8 +123,7 @@ double fit_linear(const std::vector<complex>& poles, const VectorXd& weight, pro
     all.left = all.y - all.Q * along;
     const auto R = qr.matrixQR().topRows(A.cols()).triangularView<Eigen::Upper>();
     all.coefficients = size.cwiseInverse().asDiagonal() * MatrixXd(R.solve(along));
-    const MatrixXd inverse = R.solve(MatrixXd::Identity(A.cols(), A.cols()));
-    all.unit_variance = inverse.rowwise().squaredNorm().cwiseQuotient(size.cwiseAbs2());
+    all.inverse = size.cwiseInverse().asDiagonal() * MatrixXd(R.solve(MatrixXd::Identity(A.cols(), A.cols())));
     return all.left.colwise().squaredNorm().dot(weight);
 }
 
@@ -200,33 +201,50 @@ std::vector<complex> moved(const std::vector<complex>& start, const std::vector<
     return out;
 }
 
-/// How much neighbouring lines repeat each other: 1 for white noise.
-double repetition(const problem& all) {
+/// How much the lines of what is left repeat those that are so many lower, from 0 on; as far as it is no chance.
+std::vector<complex> repetition(const problem& all) {
     const Index lines = all.s.size();
     const VectorXd power = all.left.colwise().squaredNorm().cwiseMax(1e-300).cwiseInverse();
     const auto sum = [&](Index lag) {
-        double out = 0;
-        for (const Index half : {Index{0}, lines})
-            out += all.left.middleRows(half, lines - lag)
-                       .cwiseProduct(all.left.middleRows(half + lag, lines - lag))
-                       .colwise()
-                       .sum()
-                       .dot(power);
-        return out;
+        const auto of = [&](Index first, Index second) {
+            return all.left.middleRows(first, lines - lag)
+                .cwiseProduct(all.left.middleRows(second + lag, lines - lag))
+                .colwise()
+                .sum()
+                .dot(power);
+        };
+        return complex(of(0, 0) + of(lines, lines), of(0, lines) - of(lines, 0));
     };
-    const double whole = sum(0);
-    double out = 1;
-    for (Index lag = 1; lag <= std::min(correlated_lines, lines - 1); ++lag) {
-        const double here = sum(lag);
-        if (!(here > 0)) break;
-        out += 2 * here / whole;
+    const double whole = sum(0).real(), chance = chance_level / std::sqrt(static_cast<double>(all.left.size()));
+    std::vector<complex> out{1};
+    for (Index lag = 1; lag <= std::min(correlated_lines, lines / 4); ++lag) {
+        out.push_back(sum(lag) / whole);
+        if (!(std::abs(out.back()) > chance)) break;
     }
     return out;
 }
 
-/// How much more than white noise of its mean level moves a pole: what is left near it, along its residues, and how much its lines
-/// repeat each other. @param repeated  of all lines
-double local_noise(const problem& all, complex pole, const VectorXd& weight, Index k, double repeated) {
+/// By how much noise that repeats itself moves a sum over the lines more than white noise. @param row  what of each line, parts
+/// below each other
+double repeated_along(const VectorXd& row, const std::vector<complex>& repeats) {
+    const Index lines = row.size() / 2;
+    Eigen::VectorXcd along(lines);
+    along.real() = row.head(lines), along.imag() = row.tail(lines);
+    double out = 1, few = 1;
+    for (std::size_t m = 1; m < repeats.size(); ++m) {
+        const auto lag = static_cast<Index>(m);
+        const complex own = along.head(lines - lag).dot(along.tail(lines - lag));
+        out += 2 * (own * std::conj(repeats[m])).real() / row.squaredNorm();
+        if (m <= full_lines)
+            few += 2 * std::max(0.0, repeats[m].real()); // what is left as a wave turns against the row
+    }
+    return std::max(out, few);
+}
+
+/// How much more than white noise of its mean level moves a pole, and its residues: what is left near it, along its residues, and
+/// how much lines repeat each other. @param repeats  of all lines
+std::pair<double, double> local_noise(const problem& all, complex pole, const VectorXd& weight, Index k,
+                                      const std::vector<complex>& repeats) {
     const Index lines = all.s.size();
     Eigen::VectorXcd along(weight.size());
     for (Index c = 0; c < weight.size(); ++c)
@@ -239,15 +257,18 @@ double local_noise(const problem& all, complex pole, const VectorXd& weight, Ind
     double found = 0, expected = 0;
     Eigen::Array<double, local_lags + 1, 1> products = Eigen::Array<double, local_lags + 1, 1>::Zero();
     for (Index l = 0; l < lines; ++l) {
-        const double near = std::norm(all.root[l] / (all.s[l] - pole));
-        found += near * (re[l] * re[l] + im[l] * im[l]);
+        const double share = std::norm(all.root[l] / (all.s[l] - pole));
+        found += share * (re[l] * re[l] + im[l] * im[l]);
         for (Index lag = 0; lag <= std::min(local_lags, lines - 1 - l); ++lag)
-            products[lag] += near * (re[l] * re[l + lag] + im[l] * im[l + lag]);
-        expected += near * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
+            products[lag] += share * (re[l] * re[l + lag] + im[l] * im[l + lag]);
+        expected += share * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
     }
     const double power = 2 * along.cwiseAbs2().cwiseQuotient(weight).sum();
     const double alike = 2 * (products / std::max(products[0], 1e-300)).max(0.0).sum() - 1;
-    return std::max(repeated, alike) * std::max(1.0, found / std::max(expected * power, 1e-300));
+    const double near = std::max(1.0, found / std::max(expected * power, 1e-300));
+    const VectorXd of_pole = own * inverse.col(0), of_residue = all.Q * all.inverse.row(2 * k).transpose();
+    return {std::max(repeated_along(of_pole, repeats), alike) * near,
+            std::max(repeated_along(of_residue, repeats), alike) * near};
 }
 
 /// One part of a pole as the mean over places that may differ by more than their noise. @param moves  by which each moves the mean
@@ -284,7 +305,7 @@ void meet_places(const std::vector<complex>& poles, const problem& all, const Ve
     const Eigen::LDLT<MatrixXd> factor(N);
     if (factor.info() != Eigen::Success || !factor.isPositive()) return;
     const MatrixXd inverse = factor.solve(MatrixXd::Identity(N.rows(), N.cols()));
-    const double repeated = repetition(all);
+    const std::vector<complex> repeats = repetition(all);
     const Index count = *std::max_element(places.begin(), places.end()) + 1;
     for (std::size_t m = 0; m < poles.size(); ++m) {
         const auto k = static_cast<Index>(m);
@@ -299,8 +320,9 @@ void meet_places(const std::vector<complex>& poles, const problem& all, const Ve
             of_place.col(place) += moves.col(c);
             share[place] += weight[c] * (rows * own).trace() / 2;
         }
-        Eigen::Matrix2d covariance =
-            local_noise(all, poles[m], weight, k, repeated) * inverse.block<2, 2>(2 * k, 2 * k);
+        const auto [of_pole, of_residues] = local_noise(all, poles[m], weight, k, repeats);
+        out.more_noise[k] = of_residues;
+        Eigen::Matrix2d covariance = of_pole * inverse.block<2, 2>(2 * k, 2 * k);
         const double re = meet(of_place.row(0), share, covariance(0, 0)),
                      im = meet(of_place.row(1), share, covariance(1, 1));
         out.poles[m] += all.w_high * complex(re, im);
@@ -346,8 +368,9 @@ modal_fit fit_modes(const response_set& set, const std::vector<Index>& places, s
     }
     out.variance = weight.cwiseInverse();
     out.unlikeliness = out.variance.array().log().mean() - 2 * all.root.array().log().mean();
-    out.unit_variance =
-        all.w_high * all.w_high * Eigen::Map<const VectorXd, 0, Eigen::InnerStride<2>>(all.unit_variance.data(), n);
+    out.unit_variance.resize(n);
+    for (Index k = 0; k < n; ++k) out.unit_variance[k] = all.w_high * all.w_high * all.inverse.row(2 * k).squaredNorm();
+    out.more_noise = VectorXd::Ones(n);
     meet_places(poles, all, weight, places, N, b, out);
     return out;
 }

@@ -13,6 +13,7 @@ struct modal_fit {
     Eigen::MatrixXcd residues;               ///< a row a pole, columns as those of response_set::H
     Eigen::VectorXd variance;                ///< of the noise of each response, of its real and imaginary part
     Eigen::VectorXd unit_variance;           ///< of the real part of a pole's residues for a noise of 1
+    Eigen::VectorXd more_noise;              ///< than unit_variance has: near a pole, and as lines repeat each other
     double unlikeliness = 0;                 ///< mean logarithm of the variance of what is left
     std::vector<Eigen::Matrix2d> covariance; ///< of Re, Im of each pole; empty: not known
 };

@@ -82,7 +82,8 @@ std::vector<residue_matrix> residues_of(const joint_responses& from, const modal
         residue_matrix one{MatrixXcd(set.n_y(), set.n_u()), MatrixXd(set.n_y(), set.n_u()), {}};
         for (Index c = 0; c < set.H.cols(); ++c) {
             one.R(c % set.n_y(), c / set.n_y()) = fit.residues(k, first + c);
-            one.variance(c % set.n_y(), c / set.n_y()) = fit.variance[first + c] * fit.unit_variance[k];
+            one.variance(c % set.n_y(), c / set.n_y()) =
+                fit.variance[first + c] * fit.unit_variance[k] * fit.more_noise[k];
         }
         first += set.H.cols();
         out.push_back(std::move(one));
@@ -120,7 +121,7 @@ residue_shape shape_of(const joint_responses& from, const modal_fit& fit, Index 
     for (std::size_t j = 0; j < all.size(); ++j) {
         const residue_matrix& one = all[j];
         power += one.R.squaredNorm();
-        noise += 2 * one.variance.sum();
+        noise += 2 * one.variance.sum() / fit.more_noise[k];
         const double drive = std::max(one.drive.squaredNorm(), 1e-300);
         for (Index o = 0; o < one.R.rows(); ++o) {
             const Index to = place_in(from.outputs, from.sets[j].outputs[static_cast<std::size_t>(o)]);
@@ -132,6 +133,8 @@ residue_shape shape_of(const joint_responses& from, const modal_fit& fit, Index 
     }
     residue_shape out;
     out.strength = std::sqrt(power / noise);
+    out.residues = all.front().R;
+    out.variance = all.front().variance;
     Index largest = 0;
     (void)(sum.cwiseAbs().array() / weight.array().max(1e-300)).maxCoeff(&largest);
     const complex unit = sum[largest] / weight[largest];

@@ -28,7 +28,9 @@ std::vector<std::string> common_outputs(const std::vector<response_set>& sets);
 struct residue_shape {
     std::vector<std::complex<double>> shape;
     std::vector<double> scatter;
-    double strength = 0; ///< over the noise
+    double strength = 0;       ///< over the noise
+    Eigen::MatrixXcd residues; ///< of the first set-up: outputs x inputs
+    Eigen::MatrixXd variance;  ///< of a part of each
 };
 
 struct response_modes {

@@ -2,7 +2,7 @@
 // PURPOSE  bad samples found before they become modes
 // METHOD   clipped: far more samples at the very extreme than just below it; frozen: one value for longer than the channel ever
 //          keeps one, while it moves before and after; dropped: the same at zero, between two jumps; spikes: single samples far
-//          beyond all neighbours
+//          beyond all neighbours, and beyond what the record does about them
 #include "screening.hpp"
 
 #include "files/order_statistics.hpp"
@@ -26,7 +26,8 @@ constexpr std::size_t frozen_run = 32, zero_run = 6;
 constexpr double usual_runs = 8;     // times the longest of all but the rarest thousandth of runs
 constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
 constexpr double spike_spreads = 15, spike_ratio = 5;
-constexpr std::size_t spike_reach = 6;
+constexpr double spreads_around = 8; // about it, where a record that dies away is livelier than as a whole
+constexpr std::size_t spike_reach = 6, beside_spike = 64;
 constexpr double struck_share = 0.1;      // of the largest force
 constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
 constexpr std::string_view never_moves = "never moves";
@@ -144,14 +145,19 @@ force_times times_of_forces(const record_set& set, const record_data& record) {
     return out;
 }
 
+/// How far samples first .. last-1 are off a value, as the deviation of a normal distribution; 0 of fewer than 100.
+double usual_distance(const output_view& y, std::size_t first, std::size_t last, double centre) {
+    std::vector<double> values;
+    for (std::size_t i = first; i < last; ++i)
+        if (!std::isnan(y.at(i))) values.push_back(std::abs(y.at(i) - centre));
+    return values.size() < 100 ? 0 : 1.4826 * upper_median(values);
+}
+
 void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& found) {
     std::vector<double> values;
     for (std::size_t i = 0; i < y.size(); ++i)
         if (!std::isnan(y.at(i))) values.push_back(y.at(i));
-    if (values.size() < 100) return;
-    const double centre = upper_median(values);
-    for (double& v : values) v = std::abs(v - centre);
-    const double spread = 1.4826 * upper_median(values);
+    const double centre = upper_median(values), spread = usual_distance(y, 0, y.size(), centre);
     if (!(spread > 0)) return;
     for (std::size_t i = spike_reach; i + spike_reach < y.size(); ++i) {
         const double here = std::abs(y.at(i) - centre);
@@ -159,7 +165,10 @@ void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& f
         double beside = 0;
         for (std::size_t d = 2; d <= spike_reach; ++d)
             beside = std::fmax(beside, std::fmax(std::abs(y.at(i - d) - centre), std::abs(y.at(i + d) - centre)));
-        if (here > spike_ratio * beside) found.samples.push_back(i);
+        if (!(here > spike_ratio * beside)) continue;
+        const std::size_t last = std::min(y.size(), std::max(i + beside_spike, 2 * beside_spike) + 1);
+        const std::size_t first = last > 2 * beside_spike ? last - 2 * beside_spike - 1 : 0;
+        if (here > spreads_around * usual_distance(y, first, last, centre)) found.samples.push_back(i);
     }
 }
 

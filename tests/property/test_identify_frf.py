@@ -104,6 +104,65 @@ def test_deviations_cover_the_errors() -> None:
     assert 0.7 < float(np.sqrt(np.mean(np.square(ratios)))) < 1.4
 
 
+def _rms(values: list[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _real(shape: NDArray[np.complex128]) -> Real:
+    return np.asarray((shape / shape[np.argmax(np.abs(shape))]).real, dtype=np.float64)
+
+
+@pytest.mark.parametrize("sensor", ["3z", "-3z"])
+def test_modal_masses_where_names_say_that_force_and_sensor_share_a_place(sensor: str) -> None:
+    """A roving hammer, one accelerometer: mass by the whole mass matrix, which the residues do not have."""
+    M, R, K = _structure(4, 6)
+    _, _, shapes = truth = _truth(M, R, K)
+    line = np.arange(0.25, 1.1 * truth[0][-1], 0.25)
+    names = [f"{k + 1}z" for k in range(6)]
+    clean, off = _responses(M, R, K, line, [2], list(range(6))) * (-1 if sensor[0] == "-" else 1), []
+    for seed in range(6):
+        result = okid.identify_frf(Frf.of(line, _noisy(clean, 0.01, seed), names, [sensor]))
+        for k, mode in _paired(result, truth[0]):
+            shape = _real(shapes[k])
+            mass = shape @ M @ shape
+            assert mode.modal_mass is not None and mode.modal_mass_std is not None
+            if mode.modal_mass_std < 0.1 * mass:  # others do not move the third place
+                assert mode.modal_mass == pytest.approx(mass, rel=0.2)
+                off.append((mode.modal_mass - mass) / mode.modal_mass_std)
+    assert len(off) >= 24
+    assert 0.5 < _rms(off) < 1.5
+    for sensing in ("displacement", "velocity"):  # what was not measured gives no mass
+        wrong = okid.identify_frf(Frf.of(line, clean, names, [sensor]), sensing=sensing)
+        assert all(mode.modal_mass is None or sensing == "velocity" for mode in wrong.modes)
+    assert all(m.modal_mass is None for m in okid.identify_frf(Frf.of(line, clean, names, ["7z"])).modes)
+
+
+def test_deviations_of_shapes_under_an_exponential_window() -> None:
+    """Noise of samples that grow quieter: its lines repeat each other, and so do those of what ends with the record."""
+    M, R, K = _structure(9, 4)
+    f_true, _, shapes = _truth(M, R, K)
+    step, count, constant = 1.0 / 2048.0, 8192, 0.3
+    t = np.arange(count) * step
+    w = 2 * np.pi * np.arange(1, count // 2 + 1) / (count * step)
+    h = np.array([np.linalg.inv(K - one**2 * M + 1j * one * R)[:, 0] for one in w])
+    answer = np.fft.irfft(np.vstack([np.linalg.inv(K)[:1, :], h]), axis=0)
+    off: list[float] = []
+    for seed in range(8):
+        noise = 0.01 * np.std(answer, axis=0) * np.random.default_rng(seed).normal(size=answer.shape)
+        lines = np.fft.rfft((answer + noise) * np.exp(-t / constant)[:, None], axis=0)
+        kept = lines[: 4 * int(f_true[-1] * count * step) // 3]
+        measured = Frf.of(np.arange(len(kept)) / (count * step), kept)
+        for k, mode in _paired(okid.identify_frf(measured, sensing="displacement", exponential=constant), f_true):
+            assert mode.shape_re_std is not None
+            off += [
+                (found - true) / std
+                for found, true, std in zip(np.real(mode.shape), _real(shapes[k]), mode.shape_re_std, strict=True)
+                if found != 1.0
+            ]
+    assert len(off) >= 80
+    assert 0.6 < _rms(off) < 1.6
+
+
 def test_matrices_of_a_known_structure() -> None:
     M, R, K = _structure(5, 3)
     f_true = _truth(M, R, K)[0]

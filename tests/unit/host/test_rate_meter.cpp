@@ -46,6 +46,16 @@ void test_stalls() {
     TEST_ASSERT_DOUBLE_WITHIN(0.05, 1000, measured(1000, 1000, 30, behind(13, 17)));
 }
 
+void test_a_clock_that_is_set() {
+    for (const double by_s : {3600.0, -3600.0, 12.0})
+        for (const int at : {100, 15000, 29000}) {
+            rate_meter meter(1000);
+            for (int n = 0; n < 30000; ++n)
+                meter.add(n, 1700000000000000000 + static_cast<std::int64_t>((n / 1001.0 + (n < at ? 0 : by_s)) * 1e9));
+            TEST_ASSERT_DOUBLE_WITHIN(0.05, 1001, meter.rate_hz());
+        }
+}
+
 void test_too_little() {
     rate_meter meter(1000);
     TEST_ASSERT_EQUAL_DOUBLE(0, meter.rate_hz());
@@ -60,6 +70,7 @@ int main() {
     RUN_TEST(test_punctual);
     RUN_TEST(test_bursts);
     RUN_TEST(test_stalls);
+    RUN_TEST(test_a_clock_that_is_set);
     RUN_TEST(test_too_little);
     return UNITY_END();
 }

@@ -179,6 +179,19 @@ static void a_hit_is_no_spike() {
     }
 }
 
+/// A pulse that runs along a beam after a hit is as narrow as a spike; the record about it is as lively, and dies away.
+static void a_peak_of_a_lively_stretch_is_no_spike() {
+    for (const std::size_t at : {10U, 700U, 1990U})
+        for (const double lively : {1.5, 2.5}) { // about it 8 x 0.667 x lively = 8.0 or 13.3
+            column y = moving();
+            const std::size_t last = std::min<std::size_t>(2000, std::max<std::size_t>(at + 64, 128) + 1);
+            for (std::size_t i = last - 129; i < last; ++i) y[i] = moving(129)[i - (last - 129)] * lively;
+            for (std::size_t d = 2; d <= 6; ++d) y[at - d] = y[at + d] = 0.1;
+            y[at] = 12;
+            TEST_ASSERT_EQUAL_UINT64(lively < 2 ? 1 : 0, screened(y).missing.size());
+        }
+}
+
 /// Each spike costs the 60 samples behind it too: of 1940 samples with clean lags nine cost 28 %, ten 31 %.
 static void an_output_that_loses_three_tenths_goes() {
     for (const std::size_t count : {9U, 10U}) {
@@ -272,6 +285,7 @@ int main() {
     RUN_TEST(at_rest_is_not_frozen);
     RUN_TEST(a_spike_is_fifteen_spreads_out);
     RUN_TEST(a_hit_is_no_spike);
+    RUN_TEST(a_peak_of_a_lively_stretch_is_no_spike);
     RUN_TEST(an_output_that_loses_three_tenths_goes);
     RUN_TEST(an_output_that_costs_the_others_three_tenths_goes);
     RUN_TEST(an_output_that_never_moves_goes);
