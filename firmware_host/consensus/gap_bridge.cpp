@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  short gaps bridged before the filters of lower rates
+// PURPOSE  short gaps bridged: each would cost all rows that look back on it
 // METHOD   the mean of the missing samples given the others of a window of rows, for a Gaussian process that has the covariances
 //          of the records: x_M = -Q_MM^-1 Q_MO x_O with Q the inverse of the covariance matrix (linear prediction of all channels
 //          from both sides). Its errors are uncorrelated with what it puts in: they add noise, and no bias

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Short gaps for the filters of lower rates: a lost sample would cost each of them all that it looks at.
+// Short gaps: a lost sample would cost every row of lags, and of the filters of lower rates, that looks at it.
 #pragma once
 #include "levels.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  records at several rates
 // METHOD   halved again and again behind the linear-phase filter of fir_kernel.hpp, the same for forces and responses: what
-//          lies between both stays the structure. Short gaps are bridged first (gap_bridge.hpp); a sample whose filter meets a
+//          lies between both stays the structure. Short gaps are bridged (gap_bridge.hpp); a sample whose filter meets a
 //          missing one is missing
 #include "levels.hpp"
 
@@ -129,14 +129,14 @@ std::vector<record_level> make_levels(std::vector<sample_rows> records, std::siz
     out[0].fs_hz = fs_hz;
     out[0].records = std::move(records);
     normalise(out[0].records, m, scale);
-    out[0].bridged = bridge_gaps(out[0].records, m);
+    if (std::vector<sample_rows> bridged = bridge_gaps(out[0].records, m); !bridged.empty())
+        out[0].records = std::move(bridged);
     if (decimate > 1) {
         const Eigen::VectorXd first = weights_of(fir_kernel(decimate, 1));
         std::vector<sample_rows> slower;
-        for (const sample_rows& rows : out[0].filtered())
+        for (const sample_rows& rows : out[0].records)
             slower.push_back(thinned(first, static_cast<std::size_t>(decimate), rows, m, at_rest));
         out[0].records = std::move(slower);
-        out[0].bridged.clear();
         out[0].fs_hz /= decimate;
         std::vector<double> again;
         normalise(out[0].records, m, again);
@@ -148,8 +148,7 @@ std::vector<record_level> make_levels(std::vector<sample_rows> records, std::siz
         record_level next;
         next.fs_hz = out.back().fs_hz / 2;
         next.top = std::min(top_decimated, 2 * out.back().top);
-        for (const sample_rows& rows : out.back().filtered())
-            next.records.push_back(thinned(half, 2, rows, m, at_rest));
+        for (const sample_rows& rows : out.back().records) next.records.push_back(thinned(half, 2, rows, m, at_rest));
         next.samples = complete(next.records, m);
         if (next.samples < fewest_samples) break;
         out.push_back(std::move(next));
@@ -174,7 +173,7 @@ record_level zoomed_level(const record_level& first, std::size_t m, int factor, 
                                         : weights_of(fir_kernel(factor, 1));
     const auto settles = static_cast<std::size_t>(weights.size()) / 2;
     if (!at_rest && share_before(first.records, m, settles) > most_cut_off) return out;
-    for (const sample_rows& rows : first.filtered())
+    for (const sample_rows& rows : first.records)
         out.records.push_back(thinned(weights, static_cast<std::size_t>(factor), rows, m, at_rest));
     out.samples = complete(out.records, m);
     if (out.samples < fewest_samples) out.records.clear();

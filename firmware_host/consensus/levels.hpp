@@ -20,9 +20,6 @@ struct record_level {
     bool zoomed = false;
     zoom_band zoom() const { return {fs_hz, band}; }
     std::vector<sample_rows> records;
-    std::vector<sample_rows> bridged; ///< the records without short gaps, of the first level; empty: they have none
-    /// What the filters of lower rates get.
-    const std::vector<sample_rows>& filtered() const { return bridged.empty() ? records : bridged; }
     long long samples = 0;               ///< complete ones, older ones with them
     const level_memory* older = nullptr; ///< sums of the samples before the records, in units of the channels
     std::vector<double> scale; ///< of each channel, where there are older ones: what one unit of the records is

@@ -22,14 +22,11 @@ class rate_chain {
     }
 
     /// A row of m numbers, NaN = missing. Calls use(k, row) for every rate k that has a row with it.
-    template <class Use> void add(const double* row, Use&& use) { add(row, row, use); }
-    /// @param bridged  the same for the filters, where a short gap is no gap
-    template <class Use> void add(const double* row, const double* bridged, Use&& use) {
+    template <class Use> void add(const double* row, Use&& use) {
         for (std::size_t k = 0; k < rates_.size(); ++k) {
-            const bool unfiltered = rates_[k].weights.empty();
-            bridged = into_filter(rates_[k], bridged);
-            if (!bridged) return;
-            use(k, unfiltered ? row : bridged);
+            row = into_filter(rates_[k], row);
+            if (!row) return;
+            use(k, row);
         }
     }
     /// Another record begins, behind as much silence as each filter looks back, or behind nothing.

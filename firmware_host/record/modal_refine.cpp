@@ -47,10 +47,11 @@ void take_refined(const std::vector<std::optional<carried_mode>>& found, std::ve
     }
 }
 
-/// The agreement rests on all samples, a refinement on those that are kept. Of half of them its deviations grow by 1.4; those of
+/// The agreement rests on all samples, a refinement on those that are kept, and where no
+/// force is missing. Of half of them its deviations grow by 1.4; those of
 /// the agreement were up to 4 times as wide as its own (six masses, 600,000 samples, 2 % noise at the sensors).
 bool keeps_enough(const record_work& work) {
-    return static_cast<double>(work.set.count()) >= enough_of_all * static_cast<double>(work.context.samples);
+    return static_cast<double>(refinable_samples(work)) >= enough_of_all * static_cast<double>(work.context.samples);
 }
 
 /// The likelihood is that of a force that is held between samples. One behind an anti-alias filter is not: on simulated
@@ -73,7 +74,7 @@ bool refine_agreed(const record_options& options, std::vector<listed_mode>& list
     if (work.force_is_older) return reject("the newest samples have too little of the force");
     if (!keeps_enough(work))
         return reject(
-            fmt::format("it could use the newest {} of {} samples alone", work.set.count(), work.context.samples));
+            fmt::format("it could use {} of {} samples alone", refinable_samples(work), work.context.samples));
     if (options.refine == "auto" && !is_held(options, work.set)) return false;
     if (options.stage) options.stage("refining the modes");
     const bool constants = options.detrend != "none";

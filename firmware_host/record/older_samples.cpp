@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  what a stream or a long file leaves behind of samples that are no longer kept
 // METHOD   a quarter of the samples kept goes at a time, screened beside the next quarter, each channel less its mean over both,
-//          through the filters of all rates, for which short gaps are bridged, into sums
+//          its short gaps bridged, through the filters of all rates into sums
 #include "older_samples.hpp"
 
 #include "consensus/consensus_runs.hpp"
@@ -85,7 +85,7 @@ void older_samples::begin_record(bool at_rest) {
     }
 }
 
-/// @param bridged  the row for the filters of lower rates
+/// @param bridged  the row where a short gap is no gap
 void older_samples::add(const double* row, const double* bridged) {
     const bool there = std::all_of(row, row + n_u_ + n_y_, [](double x) { return !std::isnan(x); });
     counts_.missing += !there;
@@ -93,7 +93,7 @@ void older_samples::add(const double* row, const double* bridged) {
     counts_.in_gap = !there;
     ++counts_.samples;
     ++counts_.length;
-    chain_.add(row, bridged, [this](std::size_t k, const double* of_rate) { levels_[k].add(of_rate); });
+    chain_.add(bridged, [this](std::size_t k, const double* of_rate) { levels_[k].add(of_rate); });
 }
 
 std::size_t older_samples::take(const record_set& newest) {
@@ -113,8 +113,8 @@ std::size_t older_samples::take(const record_set& newest) {
         const record_data& record = clean.records[r];
         if (!counts_.within) begin_record(begins_at_rest_ || begins_at_rest(clean, record));
         const std::size_t last = std::min(record.first + record.count, count);
-        const double *const rows = clean.rows(record), *const filtered = bridged.empty() ? rows : bridged[r].data();
-        for (std::size_t n = 0; n < last - record.first; ++n) add(rows + n * m, filtered + n * m);
+        const double *const rows = clean.rows(record), *const whole = bridged.empty() ? rows : bridged[r].data();
+        for (std::size_t n = 0; n < last - record.first; ++n) add(rows + n * m, whole + n * m);
         counts_.within = last < newest.records[r].first + newest.records[r].count;
     }
     return count;

@@ -256,6 +256,13 @@ void find_markov(const okid_model_t& m, int count, std::vector<double>& out) {
     }
 }
 
+std::size_t refinable_samples(const record_work& work) {
+    const driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)));
+    std::size_t out = 0;
+    for (const std::int32_t count : runs.counts) out += size_of(count);
+    return out;
+}
+
 double whiteness_nearby(bool constants, const record_work& work) {
     constexpr std::size_t glance = 20000;
     driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)), glance);

@@ -87,13 +87,13 @@ missing_count count_missing(const record_set& set) {
     return out;
 }
 
-std::pair<std::string, std::string> missing_samples(const missing_count& missing, long long samples, bool lower_rates) {
-    const char* const beside =
-        lower_rates ? "short gaps bridged for rates below the record's own" : "nothing was interpolated";
+std::pair<std::string, std::string> missing_samples(const missing_count& missing, long long samples, bool bridged) {
     return {"missing_samples",
-            fmt::format("{} of {} samples are missing in {} gap{}: left out, {}; the lags restart "
-                        "after each gap",
-                        missing.samples, samples, missing.gaps, missing.gaps == 1 ? "" : "s", beside)};
+            fmt::format("{} of {} samples are missing in {} gap{}: {}", missing.samples, samples, missing.gaps,
+                        missing.gaps == 1 ? "" : "s",
+                        bridged
+                            ? "short ones are bridged from the samples around them, the lags restart after the others"
+                            : "left out, nothing was interpolated; the lags restart after each gap")};
 }
 
 std::vector<long long> complete_runs(const record_set& set) {

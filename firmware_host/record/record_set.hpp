@@ -45,10 +45,9 @@ struct missing_count {
     std::size_t beyond_record = 0, beyond_sample = 0, beyond_channel = 0;
 };
 missing_count count_missing(const record_set& set);
-/// What is to be said of them, of so many samples: (code, text). @param lower_rates  there are some, before whose filters short
-/// gaps are bridged
+/// What is to be said of them, of so many samples: (code, text). @param bridged  short gaps were
 std::pair<std::string, std::string> missing_samples(const missing_count& missing, long long samples,
-                                                    bool lower_rates = false);
+                                                    bool bridged = false);
 
 /// Lengths of the unbroken runs of complete samples.
 std::vector<long long> complete_runs(const record_set& set);

@@ -287,7 +287,7 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
         for (const auto& [kind, faults] : found[k].of_kind)
             say(fault_text(outputs[k], faults) +
                 (found[k].lost && !none ? lost_words
-                                        : ": left out as gaps, nothing is interpolated at the record's rate"));
+                                        : ": left out as gaps"));
     }
     for (std::size_t k = 0; k < outputs.size() && !none; ++k)
         if (found[k].sparse)
