@@ -211,6 +211,18 @@ int longest_lags(int n_u, int n_y) {
     return out;
 }
 
+namespace {
+
+/// Where sums of older samples are in units of the channels, what is made of all is in those of the level.
+void set_units(const record_level& level, const owned_sums& of) {
+    if (level.older == nullptr || !of.sums) return;
+    std::vector<double> units;
+    for (const double one : level.scale) units.push_back(1 / one);
+    okid_accumulator_set_units(of.sums, units.data(), nullptr);
+}
+
+} // namespace
+
 owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, bool at_rest) {
     okid_accumulator_config_t shape = okid_accumulator_defaults(n_u, n_y, lags);
     shape.edges = 1;
@@ -219,8 +231,6 @@ owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, boo
     const std::vector<double> silence(at_rest ? static_cast<std::size_t>(lags) * m : 0);
     const bool alone = level.older == nullptr;
     sample_rows in_units;
-    std::vector<double> units(m, 1.0);
-    for (std::size_t c = 0; c < m && !alone; ++c) units[c] = 1 / level.scale[c];
     for (const auto& rows : level.records) {
         if (!out.sums) break;
         in_units = alone ? sample_rows() : rows;
@@ -233,7 +243,7 @@ owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, boo
         if (status < 0) out.sums = nullptr;
     }
     if (alone || !out.sums) return out;
-    okid_accumulator_set_units(out.sums, units.data(), nullptr);
+    set_units(level, out);
     if (!level.older->take(out.sums)) out.sums = nullptr;
     return out;
 }
@@ -252,7 +262,9 @@ owned_sums shortened(const record_level& level, const owned_sums& longest, int l
     if (!longest.sums ||
         static_cast<double>(okid_accumulator_rows(longest.sums)) < least_kept * static_cast<double>(level.samples))
         return {};
-    return with_fewer_lags(longest.sums, n_u, n_y, lags);
+    owned_sums out = with_fewer_lags(longest.sums, n_u, n_y, lags);
+    set_units(level, out);
+    return out;
 }
 
 /// The runs of one level with their poles linked, those with the horizon of the first one before the others: a CVA run, which

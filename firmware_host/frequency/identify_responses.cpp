@@ -26,6 +26,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double rate_over_band = 2.56; // of the model, as analysers sample
+constexpr double far_off = 45;          // degrees, of a residue at a drive point: what does not move with its force
 
 /// The columns of the outputs and inputs chosen by name, all by default.
 response_set choose(const response_set& from, const record_request& wanted) {
@@ -184,7 +185,7 @@ modal_mass mass_of(const residue_shape& mode, const mass_plan& plan, complex pol
     const complex mass = found.complex_kg();
     if (!std::isfinite(mass.real()) || !std::isfinite(mass.imag())) return out;
     out.phase_deg = std::arg(mass) * 180 / M_PI;
-    if (!(mass.real() > 0)) return out; // another quantity than --sensing, or a polarity
+    if (std::abs(out.phase_deg) > far_off) return out; // another quantity than --sensing, or a polarity
     const double noise = std::sqrt(variance) / found.power;
     out.kg = mass.real();
     out.stiffness = out.kg * std::norm(pole);
@@ -193,6 +194,20 @@ modal_mass mass_of(const residue_shape& mode, const mass_plan& plan, complex pol
     out.stiffness_std = out.stiffness * std::hypot(noise, zeta_share);
     out.damping_std = out.damping * noise; // residue over damping ratio is the height of the peak
     return out;
+}
+
+/// Every drive point moves against its force, or beside it.
+void remark_turned(const std::vector<modal_mass>& masses, const std::string& sensing, remarks& said) {
+    const auto turned = [](const modal_mass& one) { return std::abs(one.phase_deg) > far_off; };
+    const auto known = [](const modal_mass& one) { return std::isfinite(one.phase_deg); };
+    if (std::any_of(masses.begin(), masses.end(), known) &&
+        std::none_of(masses.begin(), masses.end(), [&](const auto& one) { return known(one) && !turned(one); }))
+        said.emplace_back(
+            "drive_point_polarity",
+            fmt::format("where a force and a sensor share a place, they do not move together in any mode: "
+                        "one of them is reversed (-3z instead of 3z), or the responses are not of the "
+                        "quantity \"{}\" (--sensing). There is no modal mass",
+                        sensing));
 }
 
 /// Of modes with the poles of the structure, without those of a window.
@@ -302,6 +317,7 @@ record_result identify_responses(const response_set& measured, const response_re
     const joint_responses all{{set}, set.outputs, set.outputs, 1 / finest_spacing(measured.frequency_hz)};
     make_result(set, options, constant_s,
                 find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization), work);
+    remark_turned(work.context.modal_masses, asked.wanted.sensing, work.context.warnings);
     find_matrices(options, work);
     describe_dofs(options, work.context);
     record_result result;

@@ -25,7 +25,7 @@ using Eigen::VectorXd;
 
 constexpr Index most_states = 100;   // of the companion matrix: its poles cost the third power
 constexpr Index most_references = 8; // inputs whose poles are sought together
-constexpr Index largest_degree = 64, least_degree = 12;
+constexpr Index largest_degree = 100, least_degree = 12;
 constexpr int degrees_looked_at = 12;
 constexpr Index narrowest_band = 160;     // lines
 constexpr Index narrowings = 2;           // halvings of the band

@@ -259,8 +259,8 @@ enum part_bits : unsigned { part_re = 1, part_im = 2, part_db = 4, part_mag = 8,
 unsigned split_column(const std::string& name, response& to) {
     const std::size_t colon = name.rfind(':'), slash = name.find('/');
     if (colon == name.npos || slash == name.npos || slash > colon) return 0;
-    to.output = name.substr(0, slash);
-    to.input = name.substr(slash + 1, colon - slash - 1);
+    to.output = trimmed(std::string_view(name).substr(0, slash));
+    to.input = trimmed(std::string_view(name).substr(slash + 1, colon - slash - 1));
     const auto at = std::find(part_names.begin(), part_names.end(), name.substr(colon + 1));
     return at == part_names.end() ? 0 : 1U << (at - part_names.begin());
 }

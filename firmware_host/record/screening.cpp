@@ -2,7 +2,7 @@
 // PURPOSE  bad samples found before they become modes
 // METHOD   clipped: far more samples at the very extreme than just below it; frozen: one value for longer than the channel ever
 //          keeps one, while it moves before and after; dropped: the same at zero, between two jumps; spikes: single samples far
-//          beyond all neighbours, and beyond what the record does about them
+//          beyond all neighbours; two or three beyond what the record does about them, too
 #include "screening.hpp"
 
 #include "files/order_statistics.hpp"
@@ -26,7 +26,7 @@ constexpr std::size_t frozen_run = 32, zero_run = 6;
 constexpr double usual_runs = 8;     // times the longest of all but the rarest thousandth of runs
 constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
 constexpr double spike_spreads = 15, spike_ratio = 5;
-constexpr double spreads_around = 8; // about it, where a record that dies away is livelier than as a whole
+constexpr double spreads_around = 8; // of one of two or three samples: a pulse that runs along a beam is as narrow
 constexpr std::size_t spike_reach = 6, beside_spike = 64;
 constexpr double struck_share = 0.1;      // of the largest force
 constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
@@ -166,6 +166,11 @@ void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& f
         for (std::size_t d = 2; d <= spike_reach; ++d)
             beside = std::fmax(beside, std::fmax(std::abs(y.at(i - d) - centre), std::abs(y.at(i + d) - centre)));
         if (!(here > spike_ratio * beside)) continue;
+        const double next = std::fmax(std::abs(y.at(i - 1) - centre), std::abs(y.at(i + 1) - centre));
+        if (here > spike_ratio * next) {
+            found.samples.push_back(i);
+            continue;
+        }
         const std::size_t last = std::min(y.size(), std::max(i + beside_spike, 2 * beside_spike) + 1);
         const std::size_t first = last > 2 * beside_spike ? last - 2 * beside_spike - 1 : 0;
         if (here > spreads_around * usual_distance(y, first, last, centre)) found.samples.push_back(i);
@@ -285,9 +290,7 @@ screened_outputs screen_outputs(record_set& set, const std::vector<std::string>&
     for (std::size_t k = 0; k < outputs.size(); ++k) {
         if (found[k].dead && !none) say(fmt::format("output \"{}\" {}{}", outputs[k], never_moves, lost_words));
         for (const auto& [kind, faults] : found[k].of_kind)
-            say(fault_text(outputs[k], faults) +
-                (found[k].lost && !none ? lost_words
-                                        : ": left out as gaps"));
+            say(fault_text(outputs[k], faults) + (found[k].lost && !none ? lost_words : ": left out as gaps"));
     }
     for (std::size_t k = 0; k < outputs.size() && !none; ++k)
         if (found[k].sparse)

@@ -186,8 +186,10 @@ static void a_peak_of_a_lively_stretch_is_no_spike() {
             column y = moving();
             const std::size_t last = std::min<std::size_t>(2000, std::max<std::size_t>(at + 64, 128) + 1);
             for (std::size_t i = last - 129; i < last; ++i) y[i] = moving(129)[i - (last - 129)] * lively;
-            for (std::size_t d = 2; d <= 6; ++d) y[at - d] = y[at + d] = 0.1;
+            for (std::size_t d = 1; d <= 6; ++d) y[at - d] = y[at + d] = 0.1;
             y[at] = 12;
+            TEST_ASSERT_EQUAL_UINT64(1, screened(y).missing.size()); // a single sample
+            y[at + 1] = 5;
             TEST_ASSERT_EQUAL_UINT64(lively < 2 ? 1 : 0, screened(y).missing.size());
         }
 }
