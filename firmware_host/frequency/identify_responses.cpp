@@ -8,6 +8,7 @@
 #include "files/nearest_name.hpp"
 #include "record/identify_options.hpp"
 #include "record/modal_model.hpp"
+#include "record/record_check.hpp"
 #include "record/record_refine.hpp"
 #include "response_modes.hpp"
 #include "result/drive_mass.hpp"
@@ -47,6 +48,7 @@ response_set choose(const response_set& from, const record_request& wanted) {
     response_set set;
     set.frequency_hz = from.frequency_hz;
     set.set_ups = from.set_ups;
+    set.quantity = from.quantity;
     for (const Index i : in) set.inputs.push_back(from.inputs[static_cast<std::size_t>(i)]);
     for (const Index o : out) set.outputs.push_back(from.outputs[static_cast<std::size_t>(o)]);
     set.H.resize(from.lines(), set.n_y() * set.n_u());
@@ -197,7 +199,9 @@ modal_mass mass_of(const residue_shape& mode, const mass_plan& plan, complex pol
 }
 
 /// Every drive point moves against its force, or beside it.
-void remark_turned(const std::vector<modal_mass>& masses, const std::string& sensing, remarks& said) {
+/// @param of_file  the quantity that the file tells
+void remark_turned(const std::vector<modal_mass>& masses, const std::string& sensing, const std::string& of_file,
+                   remarks& said) {
     const auto turned = [](const modal_mass& one) { return std::abs(one.phase_deg) > far_off; };
     const auto known = [](const modal_mass& one) { return std::isfinite(one.phase_deg); };
     if (std::any_of(masses.begin(), masses.end(), known) &&
@@ -206,8 +210,8 @@ void remark_turned(const std::vector<modal_mass>& masses, const std::string& sen
             "drive_point_polarity",
             fmt::format("where a force and a sensor share a place, they do not move together in any mode: "
                         "one of them is reversed (-3z instead of 3z), or the responses are not of the "
-                        "quantity \"{}\" (--sensing). There is no modal mass",
-                        sensing));
+                        "quantity \"{}\" (--sensing{}). There is no modal mass",
+                        sensing, of_file.empty() ? "" : "; the file says " + of_file));
 }
 
 /// Of modes with the poles of the structure, without those of a window.
@@ -277,6 +281,7 @@ void make_result(const response_set& set, const record_options& options, double 
     work.set.n_y = set.outputs.size();
     make_modal_model(listed, work.context.fs_hz, work);
     fit_responses(set, work);
+    remark_noisy_output(work.context);
     for (std::size_t k = 0; k < modes.size(); ++k) {
         take_window_out(constant_s, "narrow", modes[k]);
         listed[k].frequency_hz = modes[k].frequency_hz;
@@ -317,7 +322,9 @@ record_result identify_responses(const response_set& measured, const response_re
     const joint_responses all{{set}, set.outputs, set.outputs, 1 / finest_spacing(measured.frequency_hz)};
     make_result(set, options, constant_s,
                 find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization), work);
-    remark_turned(work.context.modal_masses, asked.wanted.sensing, work.context.warnings);
+    remark_turned(work.context.modal_masses, asked.wanted.sensing, set.quantity, work.context.warnings);
+    for (const std::string& unit : measured.other_units)
+        work.context.warnings.emplace_back("unit_converted", fmt::format("{}: all numbers are in SI units here", unit));
     find_matrices(options, work);
     describe_dofs(options, work.context);
     record_result result;

@@ -32,6 +32,7 @@ constexpr Index narrowings = 2;           // halvings of the band
 constexpr double edge_of_band = 0.08;     // of a narrower one: its poles answer for what lies outside
 constexpr double ridge = 1e-10;           // of the mean power: without noise more coefficients fit than are needed
 constexpr double smallest_weighed = 1e-3; // of the largest response: below it the weight rises no more
+constexpr double least_signal = 0.01;     // share of it in an output that is noise
 
 /// The responses at unit rms, lines weighted, and their Fourier sums over the axis of the fraction.
 struct fraction_sums {
@@ -182,8 +183,10 @@ void add_poles(const fraction_sums& sums, Index n, bool lowest, const reduced_eq
     }
 }
 
-/// Runs over the lines of one band: weights of the lines (of the whole band three, else one), both normalisations.
-std::vector<consensus_run> fit_band(MatrixXcd H, Index n_y, const std::vector<double>& f, bool whole) {
+/// Runs over the lines of one band: weights of the lines (of the whole band three, else one), both normalisations. @param noise
+/// share of it in each output: one that measures nothing must not rule the poles
+std::vector<consensus_run> fit_band(MatrixXcd H, Index n_y, const std::vector<double>& f, const VectorXd& noise,
+                                    bool whole) {
     const Index n_u = H.cols() / n_y, lines = H.rows();
     const auto unit = [](double norm) { return norm > 0 ? norm : 1.0; };
     for (Index i = 0; i < n_u; ++i) H.middleCols(n_y * i, n_y) /= unit(H.middleCols(n_y * i, n_y).norm());
@@ -191,7 +194,7 @@ std::vector<consensus_run> fit_band(MatrixXcd H, Index n_y, const std::vector<do
     for (Index o = 0; o < n_y; ++o) {
         double power = 0;
         for (Index i = 0; i < n_u; ++i) power += H.col(o + n_y * i).squaredNorm();
-        scale_y[o] = unit(std::sqrt(power));
+        scale_y[o] = unit(std::sqrt(power / std::max(1 - noise[o], least_signal)));
         for (Index i = 0; i < n_u; ++i) H.col(o + n_y * i) /= scale_y[o];
     }
     const Index most = whole ? largest_degree : largest_degree / 2;
@@ -225,6 +228,7 @@ std::vector<consensus_run> fit_matrix_fractions(const response_set& set) {
     MatrixXcd H(lines, n_y * n_u);
     for (Index i = 0; i < n_u; ++i)
         H.middleCols(n_y * i, n_y) = set.H.middleCols(n_y * chosen[static_cast<std::size_t>(i)], n_y);
+    const VectorXd noise = noise_shares(set);
     std::vector<consensus_run> runs;
     for (Index part = 0; part <= narrowings && (part == 0 || (lines >> part) >= narrowest_band); ++part)
         for (Index width = lines >> part, first = 0; first + width <= lines; first += std::max<Index>(1, width / 2)) {
@@ -233,7 +237,7 @@ std::vector<consensus_run> fit_matrix_fractions(const response_set& set) {
             const double edge = edge_of_band * (band.back() - band.front());
             const double bottom = first == 0 ? 0 : band.front() + edge,
                          top = first + width + width / 2 > lines ? set.frequency_hz.back() : band.back() - edge;
-            for (consensus_run& run : fit_band(H.middleRows(first, width), n_y, band, part == 0)) {
+            for (consensus_run& run : fit_band(H.middleRows(first, width), n_y, band, noise, part == 0)) {
                 run.fs_hz = set.frequency_hz.back();
                 run.bottom = bottom / run.fs_hz;
                 run.top = top / run.fs_hz;

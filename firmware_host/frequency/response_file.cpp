@@ -10,6 +10,7 @@
 #include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
 #include "files/order_statistics.hpp"
+#include "files/units.hpp"
 #include "record/csv.hpp"
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include <complex>
 #include <cstring>
 #include <fmt/format.h>
+#include <set>
 #include <string_view>
 
 namespace okid_host {
@@ -37,6 +39,8 @@ struct response {
     std::vector<double> frequency_hz;
     std::vector<complex> values;
     std::vector<double> coherence; ///< empty: the file has none
+    std::string quantity = {};     ///< "": the file does not say
+    std::set<std::string> other_units = {};
 };
 
 /// Lines at which even the better responses have no coherence become NaN.
@@ -59,7 +63,10 @@ void strike_incoherent(const std::vector<response>& all, Eigen::MatrixXcd& H) {
 response_set set_of(const std::string& path, const std::vector<response>& all) {
     response_set out;
     out.frequency_hz = all.front().frequency_hz;
+    out.quantity = all.front().quantity;
     for (const response& one : all) {
+        if (one.quantity != out.quantity) out.quantity.clear();
+        out.other_units.insert(one.other_units.begin(), one.other_units.end());
         (void)place_of(out.outputs, one.output);
         (void)place_of(out.inputs, one.input);
         if (one.frequency_hz.size() != out.frequency_hz.size() ||
@@ -180,6 +187,26 @@ std::vector<double> read_binary(lines_of& from, bool wide, bool big, std::size_t
     return out;
 }
 
+/// What the axes of a data set say: the quantity, and units that are not those of SI. @param axis  a line of the header
+const unit_rule* unit_of(const std::string& axis) {
+    constexpr std::size_t first = 46, width = 21;
+    return find_unit(std::string(trimmed(std::string_view(axis).substr(std::min(first, axis.size()), width))));
+}
+
+void read_axes(const std::string& numerator, const std::string& denominator, int kind, response& to) {
+    constexpr int displacement = 8, velocity = 11, acceleration = 12;
+    to.quantity = kind == displacement   ? "displacement"
+                  : kind == velocity     ? "velocity"
+                  : kind == acceleration ? "acceleration"
+                                         : "";
+    for (const std::string* axis : {&numerator, &denominator}) {
+        const unit_rule* unit = unit_of(*axis);
+        if (!unit || unit->factor == 1 || role_of_unit(unit->name).empty()) continue;
+        for (complex& value : to.values) value *= axis == &numerator ? unit->factor : 1 / unit->factor;
+        to.other_units.insert(fmt::format("{} = {:.10g} {}", unit->name, unit->factor, unit->si));
+    }
+}
+
 /// A data set 58 behind its first line; nothing for other functions than responses and coherences.
 void read_function(lines_of& from, std::string_view head, std::vector<response>& to,
                    std::vector<response>& coherences) {
@@ -221,6 +248,7 @@ void read_function(lines_of& from, std::string_view head, std::vector<response>&
         else
             one.values.emplace_back(x[row - 2], x[row - 1]);
     }
+    if (function == response_function) read_axes(lines[8], lines[9], static_cast<int>(at(8, 0, 10)), one);
     (function == coherence_function ? coherences : to).push_back(std::move(one));
 }
 

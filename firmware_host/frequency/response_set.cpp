@@ -63,7 +63,10 @@ response_set join_set_ups(const std::vector<response_set>& sets, const std::vect
     response_set out;
     out.frequency_hz = sets.front().frequency_hz;
     out.set_ups = static_cast<int>(sets.size());
+    out.quantity = sets.front().quantity;
     for (std::size_t k = 0; k < sets.size(); ++k) {
+        if (sets[k].quantity != out.quantity) out.quantity.clear();
+        out.other_units.insert(sets[k].other_units.begin(), sets[k].other_units.end());
         check_lines(sets.front(), sets[k], names.front(), names[k]);
         for (const std::string& name : sets[k].inputs) (void)place_of(out.inputs, name);
         for (const std::string& name : sets[k].outputs) (void)place_of(out.outputs, name);
@@ -113,10 +116,12 @@ response_set cut_band(const response_set& from, double low_hz, double high_hz) {
     return chosen_lines(from, kept);
 }
 
-response_set without_noise_lines(const response_set& from) {
-    const Index lines = from.lines(), reach = std::max(judging_reach, lines / 50);
-    Eigen::MatrixXd signal(lines, from.H.cols()), noise = signal;
-    signal = from.H.cwiseAbs2();
+namespace {
+
+/// Power of each response that does not follow from the lines beside, as if all of it were noise.
+Eigen::MatrixXd noise_of(const response_set& from) {
+    const Index lines = from.lines();
+    Eigen::MatrixXd noise(lines, from.H.cols());
     for (Index l = 0; l < lines; ++l) {
         const Index at = std::clamp(l, lines_apart, lines - 1 - lines_apart);
         const auto f = [&](Index line) { return from.frequency_hz[static_cast<std::size_t>(line)]; };
@@ -126,6 +131,24 @@ response_set without_noise_lines(const response_set& from) {
                 .cwiseAbs2() /
             (1 + (1 - share) * (1 - share) + share * share);
     }
+    return noise;
+}
+
+} // namespace
+
+Eigen::VectorXd noise_shares(const response_set& from) {
+    const Eigen::MatrixXd signal = from.H.cwiseAbs2(), noise = noise_of(from);
+    Eigen::VectorXd out = Eigen::VectorXd::Zero(from.n_y());
+    for (Index c = 0; c < from.H.cols(); ++c)
+        out[c % from.n_y()] +=
+            std::min(1.0, share_of(noise.col(c), 0.5) / std::max(share_of(signal.col(c), 0.5), 1e-300)) /
+            static_cast<double>(from.n_u());
+    return out;
+}
+
+response_set without_noise_lines(const response_set& from) {
+    const Index lines = from.lines(), reach = std::max(judging_reach, lines / 50);
+    const Eigen::MatrixXd signal = from.H.cwiseAbs2(), noise = noise_of(from);
     std::vector<Index> kept;
     for (Index l = 0; l < lines; ++l) {
         const Index first = std::max<Index>(0, l - reach), count = std::min(lines, l + reach + 1) - first;

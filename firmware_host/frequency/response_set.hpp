@@ -2,6 +2,7 @@
 // PURPOSE  measured frequency responses in memory: of a file, of several set-ups of one structure, or of a caller
 #pragma once
 #include <Eigen/Dense>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@ struct response_set {
     std::vector<std::string> inputs, outputs;
     Eigen::MatrixXcd H; ///< lines x (outputs x inputs): output o of input i is column o + n_y i
     int set_ups = 1;
+    std::string quantity; ///< of the outputs, as the file says: displacement, velocity, acceleration; "": it does not
+    std::set<std::string> other_units; ///< that numbers came in, "g = 9.80665 m/s^2": they are in SI units here
 
     Eigen::Index lines() const { return H.rows(); }
     Eigen::Index n_y() const { return static_cast<Eigen::Index>(outputs.size()); }
@@ -35,6 +38,10 @@ response_set cut_band(const response_set& from, double low_hz, double high_hz);
 /// Lines at which the responses are more than noise: those of neighbouring lines do not follow from each other where a force
 /// has no power or a sensor is below its range. Throws (exit 3) where fewer than 32 stay.
 response_set without_noise_lines(const response_set& from);
+
+/// Of each output, the share of noise in the power of its middle line, by how little neighbouring lines follow from each
+/// other: 1 of an output that measures nothing.
+Eigen::VectorXd noise_shares(const response_set& from);
 
 /// Outputs and inputs exchanged (Maxwell's reciprocity): what a roving hammer measures, as roving sensors would.
 response_set exchanged(const response_set& from);
