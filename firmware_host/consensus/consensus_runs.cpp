@@ -213,12 +213,12 @@ int longest_lags(int n_u, int n_y) {
 
 namespace {
 
-/// Where sums of older samples are in units of the channels, what is made of all is in those of the level.
-void set_units(const record_level& level, const owned_sums& of) {
-    if (level.older == nullptr || !of.sums) return;
-    std::vector<double> units;
-    for (const double one : level.scale) units.push_back(1 / one);
-    okid_accumulator_set_units(of.sums, units.data(), nullptr);
+/// Those of the level, where sums of older samples are in units of the channels; empty: there are none.
+std::vector<double> units_of(const record_level& level) {
+    std::vector<double> out;
+    if (level.older)
+        for (const double one : level.scale) out.push_back(1 / one);
+    return out;
 }
 
 } // namespace
@@ -243,7 +243,7 @@ owned_sums level_sums(const record_level& level, int n_u, int n_y, int lags, boo
         if (status < 0) out.sums = nullptr;
     }
     if (alone || !out.sums) return out;
-    set_units(level, out);
+    okid_accumulator_set_units(out.sums, units_of(level).data(), nullptr);
     if (!level.older->take(out.sums)) out.sums = nullptr;
     return out;
 }
@@ -262,9 +262,7 @@ owned_sums shortened(const record_level& level, const owned_sums& longest, int l
     if (!longest.sums ||
         static_cast<double>(okid_accumulator_rows(longest.sums)) < least_kept * static_cast<double>(level.samples))
         return {};
-    owned_sums out = with_fewer_lags(longest.sums, n_u, n_y, lags);
-    set_units(level, out);
-    return out;
+    return with_fewer_lags(longest.sums, n_u, n_y, lags, units_of(level));
 }
 
 /// The runs of one level with their poles linked, those with the horizon of the first one before the others: a CVA run, which

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <new>
+#include <vector>
 
 namespace okid_host {
 
@@ -22,8 +23,10 @@ struct owned_sums {
     }
 };
 
-/// The rows of `from`, a window or not, as sums with fewer lags; none without memory.
-inline owned_sums with_fewer_lags(okid_accumulator_t* from, int n_u, int n_y, int lags) {
+/// The rows of `from`, a window or not, as sums with fewer lags; none without memory. @param units  of the channels, which are not
+/// taken from there; empty: as they are
+inline owned_sums with_fewer_lags(okid_accumulator_t* from, int n_u, int n_y, int lags,
+                                  const std::vector<double>& units) {
     okid_accumulator_config_t held{}, shape = okid_accumulator_defaults(n_u, n_y, lags);
     okid_accumulator_config(from, &held);
     shape.edges = 1;
@@ -32,7 +35,10 @@ inline owned_sums with_fewer_lags(okid_accumulator_t* from, int n_u, int n_y, in
     const okid_status_t status = held.slots > 0
                                      ? okid_accumulator_take_slots(out.sums, from, 0, okid_accumulator_slots(from))
                                      : okid_accumulator_merge(out.sums, from);
-    if (status < 0) out.sums = nullptr;
+    if (status < 0)
+        out.sums = nullptr;
+    else if (!units.empty())
+        okid_accumulator_set_units(out.sums, units.data(), nullptr);
     return out;
 }
 

@@ -29,10 +29,12 @@ int32_t okid_host_identify_responses(const char* options, size_t lines, const do
         record_request& wanted = asked.wanted;
         std::string set_ups;
         face::option_places places = face::places_of(wanted, of_responses);
-        places.texts.insert(places.texts.end(), {{"set_ups", &set_ups}, {"exponential", &asked.exponential}});
+        response_set set;
+        places.texts.insert(places.texts.end(),
+                            {{"set_ups", &set_ups}, {"exponential", &asked.exponential}, {"quantity", &set.quantity}});
+        places.lists.emplace_back("other_units", &set.other_units);
         places.flags.emplace_back("all_modes", &asked.all_modes);
         face::read_options(options, places);
-        response_set set;
         set.inputs = wanted.inputs;
         set.outputs = wanted.outputs;
         if (!set_ups.empty()) set.set_ups = static_cast<int>(whole_number("set_ups", set_ups, 1, 1000000));
@@ -55,8 +57,11 @@ int32_t okid_host_responses_read(const char* const* paths, int32_t count, okid_h
         made->set = read_set_ups(std::vector<std::string>(paths, paths + count));
         for (Eigen::Index l = 0; l < made->set.lines(); ++l)
             for (Eigen::Index c = 0; c < made->set.H.cols(); ++c) made->values.push_back(made->set.H(l, c));
-        const nlohmann::json about = {
-            {"inputs", made->set.inputs}, {"outputs", made->set.outputs}, {"set_ups", made->set.set_ups}};
+        const nlohmann::json about = {{"inputs", made->set.inputs},
+                                      {"outputs", made->set.outputs},
+                                      {"set_ups", made->set.set_ups},
+                                      {"quantity", made->set.quantity},
+                                      {"other_units", made->set.other_units}};
         made->json = about.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
         *out = made.release();
     });

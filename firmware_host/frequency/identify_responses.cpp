@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  modes and a modal model from measured frequency responses
-// METHOD   response_modes.hpp; modal masses: the residues at drive points; model: these modes in discrete time at 2.56 times the highest line, B and D by least squares on
-//          the responses
+// METHOD   response_modes.hpp; modal masses: the residues at drive points; model: these modes in discrete time at 2.56 times the
+//          highest line, B and D by least squares on the responses
 #include "identify_responses.hpp"
 
 #include "error.hpp"
@@ -161,51 +161,43 @@ mass_plan places_by_name(const response_set& set, const std::vector<int>& sensin
 
 /// Modal mass, stiffness and damping from the residues at drive points, with what their noise and that of the damping ratio,
 /// which goes with their size, leave open. @param zeta_share  deviation of the damping ratio over it
-modal_mass mass_of(const residue_shape& mode, const mass_plan& plan, complex pole, double zeta_share) {
-    modal_mass out;
-    if (mode.residues.size() == 0) return out; // not refined
+modal_mass mass_of(const residue_shape& mode, const mass_plan& plan, const std::vector<drive_pair>& pairs, complex pole,
+                   double zeta_share) {
+    if (mode.residues.size() == 0) return {}; // not refined
     std::vector<complex> shape;
     for (std::size_t o = 0; o < mode.shape.size(); ++o)
         shape.push_back(mode.shape[o] * plan.outputs[o].si * to_displacement(pole, plan.outputs[o].sensing));
-    const auto top =
-        std::max_element(shape.begin(), shape.end(), [](complex a, complex b) { return std::norm(a) < std::norm(b); }) -
-        shape.begin();
-    const auto share = [&](Index o, Index i) { return mode.variance(o, i) / std::norm(mode.residues(o, i)); };
+    const std::size_t top = largest_entry(shape);
+    const auto share = [&](std::size_t output, std::size_t input) {
+        const auto o = static_cast<Index>(output), i = static_cast<Index>(input);
+        return mode.variance(o, i) / std::norm(mode.residues(o, i));
+    };
     drive_mass found;
     double variance = 0;
-    for (std::size_t k = 0; k < shape.size(); ++k)
-        for (std::size_t j = 0; j < plan.inputs.size(); ++j) {
-            const mass_channel &output = plan.outputs[k], &input = plan.inputs[j];
-            if (output.dof < 1 || output.dof != input.dof) continue;
-            const auto o = static_cast<Index>(k), i = static_cast<Index>(j);
-            const complex psi = shape[k] / shape[static_cast<std::size_t>(top)];
-            const complex residue = mode.residues(o, i) * output.si / input.si * to_displacement(pole, output.sensing);
-            const double sign = output.reversed == input.reversed ? 1 : -1;
-            found.add(psi, sign * complex(0, 2 * pole.imag()) * residue);
-            variance += std::pow(std::norm(psi), 4) * (share(o, i) + (o == top ? 0 : 4 * share(top, i)));
-        }
-    const complex mass = found.complex_kg();
-    if (!std::isfinite(mass.real()) || !std::isfinite(mass.imag())) return out;
-    out.phase_deg = std::arg(mass) * 180 / M_PI;
-    if (std::abs(out.phase_deg) > far_off) return out; // another quantity than --sensing, or a polarity
+    for (const auto& [o, i, sign] : pairs) {
+        const mass_channel &output = plan.outputs[o], &input = plan.inputs[i];
+        const complex psi = shape[o] / shape[top],
+                      residue = mode.residues(static_cast<Index>(o), static_cast<Index>(i)) * output.si / input.si *
+                                to_displacement(pole, output.sensing);
+        found.add(psi, sign * complex(0, 2 * pole.imag()) * residue);
+        variance += std::pow(std::norm(psi), 4) * (share(o, i) + (o == top ? 0 : 4 * share(top, i)));
+    }
+    modal_mass out = mass_of_pole(pole, found.complex_kg());
+    if (std::abs(out.phase_deg) > far_off)
+        out.kg = out.stiffness = out.damping = NAN; // another quantity, or a polarity
     const double noise = std::sqrt(variance) / found.power;
-    out.kg = mass.real();
-    out.stiffness = out.kg * std::norm(pole);
-    out.damping = -2 * pole.real() * out.kg;
     out.kg_std = out.kg * std::hypot(noise, zeta_share);
     out.stiffness_std = out.stiffness * std::hypot(noise, zeta_share);
     out.damping_std = out.damping * noise; // residue over damping ratio is the height of the peak
     return out;
 }
 
-/// Every drive point moves against its force, or beside it.
-/// @param of_file  the quantity that the file tells
+/// Said where every drive point moves against its force, or a quarter of a period beside it. @param of_file  the quantity that the file tells
 void remark_turned(const std::vector<modal_mass>& masses, const std::string& sensing, const std::string& of_file,
                    remarks& said) {
-    const auto turned = [](const modal_mass& one) { return std::abs(one.phase_deg) > far_off; };
     const auto known = [](const modal_mass& one) { return std::isfinite(one.phase_deg); };
-    if (std::any_of(masses.begin(), masses.end(), known) &&
-        std::none_of(masses.begin(), masses.end(), [&](const auto& one) { return known(one) && !turned(one); }))
+    const auto together = [](const modal_mass& one) { return std::abs(one.phase_deg) <= far_off; };
+    if (std::any_of(masses.begin(), masses.end(), known) && std::none_of(masses.begin(), masses.end(), together))
         said.emplace_back(
             "drive_point_polarity",
             fmt::format("where a force and a sensor share a place, they do not move together in any mode: "
@@ -220,13 +212,10 @@ std::vector<modal_mass> masses_of(const response_set& set, const record_options&
                                   const deviations& sigma) {
     const mass_plan plan = options.mass.wanted() ? options.mass : places_by_name(set, options.sensing);
     std::vector<modal_mass> out;
-    const bool any = std::any_of(plan.inputs.begin(), plan.inputs.end(), [&](const mass_channel& input) {
-        return std::any_of(plan.outputs.begin(), plan.outputs.end(),
-                           [&](const mass_channel& output) { return output.dof > 0 && output.dof == input.dof; });
-    });
-    if (!any) return out;
+    const std::vector<drive_pair> pairs = drive_pairs(plan);
+    if (pairs.empty()) return out;
     for (std::size_t k = 0; k < modes.size(); ++k)
-        out.push_back(mass_of(shapes[k], plan, continuous_pole(modes[k].frequency_hz, modes[k].damping_ratio),
+        out.push_back(mass_of(shapes[k], plan, pairs, continuous_pole(modes[k].frequency_hz, modes[k].damping_ratio),
                               sigma.damping_ratio[k] / modes[k].damping_ratio));
     return out;
 }

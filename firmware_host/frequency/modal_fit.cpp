@@ -236,7 +236,7 @@ double repeated_along(const VectorXd& row, const std::vector<complex>& repeats) 
         const complex own = along.head(lines - lag).dot(along.tail(lines - lag));
         out += 2 * (own * std::conj(repeats[m])).real() / row.squaredNorm();
         if (m <= full_lines)
-            few += 2 * std::max(0.0, repeats[m].real()); // what is left as a wave turns against the row
+            few += 2 * std::max(0.0, repeats[m].real()); // at the mode alone: elsewhere the row may cancel it
     }
     return std::max(out, few);
 }

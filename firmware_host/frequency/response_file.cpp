@@ -19,7 +19,6 @@
 #include <complex>
 #include <cstring>
 #include <fmt/format.h>
-#include <set>
 #include <string_view>
 
 namespace okid_host {
@@ -40,7 +39,7 @@ struct response {
     std::vector<complex> values;
     std::vector<double> coherence; ///< empty: the file has none
     std::string quantity = {};     ///< "": the file does not say
-    std::set<std::string> other_units = {};
+    std::vector<std::string> other_units = {};
 };
 
 /// Lines at which even the better responses have no coherence become NaN.
@@ -66,7 +65,7 @@ response_set set_of(const std::string& path, const std::vector<response>& all) {
     out.quantity = all.front().quantity;
     for (const response& one : all) {
         if (one.quantity != out.quantity) out.quantity.clear();
-        out.other_units.insert(one.other_units.begin(), one.other_units.end());
+        for (const std::string& unit : one.other_units) (void)place_of(out.other_units, unit);
         (void)place_of(out.outputs, one.output);
         (void)place_of(out.inputs, one.input);
         if (one.frequency_hz.size() != out.frequency_hz.size() ||
@@ -203,7 +202,7 @@ void read_axes(const std::string& numerator, const std::string& denominator, int
         const unit_rule* unit = unit_of(*axis);
         if (!unit || unit->factor == 1 || role_of_unit(unit->name).empty()) continue;
         for (complex& value : to.values) value *= axis == &numerator ? unit->factor : 1 / unit->factor;
-        to.other_units.insert(fmt::format("{} = {:.10g} {}", unit->name, unit->factor, unit->si));
+        to.other_units.push_back(fmt::format("{} = {:.10g} {}", unit->name, unit->factor, unit->si));
     }
 }
 

@@ -66,7 +66,7 @@ response_set join_set_ups(const std::vector<response_set>& sets, const std::vect
     out.quantity = sets.front().quantity;
     for (std::size_t k = 0; k < sets.size(); ++k) {
         if (sets[k].quantity != out.quantity) out.quantity.clear();
-        out.other_units.insert(sets[k].other_units.begin(), sets[k].other_units.end());
+        for (const std::string& unit : sets[k].other_units) (void)place_of(out.other_units, unit);
         check_lines(sets.front(), sets[k], names.front(), names[k]);
         for (const std::string& name : sets[k].inputs) (void)place_of(out.inputs, name);
         for (const std::string& name : sets[k].outputs) (void)place_of(out.outputs, name);

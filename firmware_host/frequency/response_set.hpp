@@ -2,7 +2,6 @@
 // PURPOSE  measured frequency responses in memory: of a file, of several set-ups of one structure, or of a caller
 #pragma once
 #include <Eigen/Dense>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -14,7 +13,7 @@ struct response_set {
     Eigen::MatrixXcd H; ///< lines x (outputs x inputs): output o of input i is column o + n_y i
     int set_ups = 1;
     std::string quantity; ///< of the outputs, as the file says: displacement, velocity, acceleration; "": it does not
-    std::set<std::string> other_units; ///< that numbers came in, "g = 9.80665 m/s^2": they are in SI units here
+    std::vector<std::string> other_units; ///< that numbers came in, "g = 9.80665 m/s^2": they are in SI units here
 
     Eigen::Index lines() const { return H.rows(); }
     Eigen::Index n_y() const { return static_cast<Eigen::Index>(outputs.size()); }

@@ -87,9 +87,7 @@ owned_sums followed_modes::shortened(const group& of) const {
     const int lags = okid_identify_lags(&of.config);
     okid_accumulator_config(sums_[of.rate].sums, &held);
     if (held.lags == lags) return {};
-    owned_sums out = with_fewer_lags(sums_[of.rate].sums, n_u_, n_y_, lags);
-    if (out.sums) okid_accumulator_set_units(out.sums, units_.data(), nullptr);
-    return out;
+    return with_fewer_lags(sums_[of.rate].sums, n_u_, n_y_, lags, units_);
 }
 
 /// What the carrier of a group says of its modes.

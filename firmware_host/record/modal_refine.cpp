@@ -47,11 +47,11 @@ void take_refined(const std::vector<std::optional<carried_mode>>& found, std::ve
     }
 }
 
-/// The agreement rests on all samples, a refinement on those that are kept, and where no
-/// force is missing. Of half of them its deviations grow by 1.4; those of
-/// the agreement were up to 4 times as wide as its own (six masses, 600,000 samples, 2 % noise at the sensors).
-bool keeps_enough(const record_work& work) {
-    return static_cast<double>(refinable_samples(work)) >= enough_of_all * static_cast<double>(work.context.samples);
+/// The agreement rests on all samples, a refinement on those that are kept, in long stretches without a missing force. Of half of
+/// them its deviations grow by 1.4; those of the agreement were up to 4 times as wide as its own (six masses, 600,000 samples,
+/// 2 % noise at the sensors).
+bool is_enough(std::size_t samples, const record_work& work) {
+    return static_cast<double>(samples) >= enough_of_all * static_cast<double>(work.context.samples);
 }
 
 /// The likelihood is that of a force that is held between samples. One behind an anti-alias filter is not: on simulated
@@ -72,9 +72,8 @@ bool refine_agreed(const record_options& options, std::vector<listed_mode>& list
         return false;
     };
     if (work.force_is_older) return reject("the newest samples have too little of the force");
-    if (!keeps_enough(work))
-        return reject(
-            fmt::format("it could use {} of {} samples alone", refinable_samples(work), work.context.samples));
+    if (const std::size_t samples = refinable_samples(work); !is_enough(samples, work))
+        return reject(fmt::format("it could use {} of {} samples alone", samples, work.context.samples));
     if (options.refine == "auto" && !is_held(options, work.set)) return false;
     if (options.stage) options.stage("refining the modes");
     const bool constants = options.detrend != "none";

@@ -25,20 +25,30 @@ constexpr double lost_percent = 0.5;  ///< a loss of prediction worth a remark
 
 std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
 
-/// Stretches without a missing input, the longest where there are too many, one after the other; `most` samples of them.
+/// Samples of the shortest stretch that serves.
+std::size_t shortest_run(const record_work& work) { return std::max<std::size_t>(20, 2 * size_of(work.model.n_z)); }
+
+/// Stretches without a missing input, the longest first, where there are too many those alone.
+std::vector<std::pair<const record_data*, stretch>> longest_stretches(const record_work& work) {
+    std::vector<std::pair<const record_data*, stretch>> all;
+    for (const record_data& record : work.set.records)
+        for (const stretch& piece : stretches_of(work.set, record, shortest_run(work)))
+            all.emplace_back(&record, piece);
+    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { // then as they came
+        if (a.second.count != b.second.count) return a.second.count > b.second.count;
+        return a.first != b.first ? a.first < b.first : a.second.first < b.second.first;
+    });
+    all.resize(std::min(all.size(), most_runs));
+    return all;
+}
+
+/// These stretches one after the other; `most` samples of them.
 struct driven_runs : sample_runs {
-    driven_runs(const record_set& set, std::size_t least, std::size_t most = SIZE_MAX) {
-        std::vector<std::pair<const record_data*, stretch>> all;
-        for (const record_data& record : set.records)
-            for (const stretch& piece : stretches_of(set, record, least)) all.emplace_back(&record, piece);
-        std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { // longest first, then as they came
-            if (a.second.count != b.second.count) return a.second.count > b.second.count;
-            return a.first != b.first ? a.first < b.first : a.second.first < b.second.first;
-        });
-        all.resize(std::min(all.size(), most_runs));
-        for (const auto& [record, piece] : all) {
+    explicit driven_runs(const record_work& work, std::size_t most = SIZE_MAX) {
+        const record_set& set = work.set;
+        for (const auto& [record, piece] : longest_stretches(work)) {
             const std::size_t count = std::min(piece.count, most);
-            if (count < least) break;
+            if (count < shortest_run(work)) break;
             most -= count;
             counts.push_back(static_cast<std::int32_t>(count));
             const double* rows = set.rows(*record) + piece.first * set.channels();
@@ -257,22 +267,21 @@ void find_markov(const okid_model_t& m, int count, std::vector<double>& out) {
 }
 
 std::size_t refinable_samples(const record_work& work) {
-    const driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)));
     std::size_t out = 0;
-    for (const std::int32_t count : runs.counts) out += size_of(count);
+    for (const auto& [record, piece] : longest_stretches(work)) out += piece.count;
     return out;
 }
 
 double whiteness_nearby(bool constants, const record_work& work) {
     constexpr std::size_t glance = 20000;
-    driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)), glance);
+    driven_runs runs(work, glance);
     std::vector<double> filter;
     const auto one = refine_runs(runs, work.model, constants, 2, noise_colour::any, filter);
     return one->status < 0 ? INFINITY : one->found.whiteness;
 }
 
 likeliest_model likeliest(bool constants, const record_work& work, noise_colour colour) {
-    driven_runs runs(work.set, std::max<std::size_t>(20, 2 * size_of(work.model.n_z)));
+    driven_runs runs(work);
     std::vector<double> filter;
     const auto one = refine_runs(runs, work.model, constants, 0, colour, filter);
     likeliest_model out = outcome(*one, work.model);

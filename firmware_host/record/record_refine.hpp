@@ -24,7 +24,7 @@ struct likeliest_model {
 /// samples; infinite where there is none.
 double whiteness_nearby(bool constants, const record_work& work);
 
-/// Samples that a refinement has: of the longest stretches in which no force is missing.
+/// Samples that a refinement has: of the 32 longest stretches in which no force is missing.
 std::size_t refinable_samples(const record_work& work);
 
 enum class noise_colour { white, any };

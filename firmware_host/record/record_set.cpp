@@ -89,11 +89,12 @@ missing_count count_missing(const record_set& set) {
 
 std::pair<std::string, std::string> missing_samples(const missing_count& missing, long long samples, bool bridged) {
     return {"missing_samples",
-            fmt::format("{} of {} samples are missing in {} gap{}: {}", missing.samples, samples, missing.gaps,
-                        missing.gaps == 1 ? "" : "s",
-                        bridged
-                            ? "short ones are bridged from the samples around them, the lags restart after the others"
-                            : "left out, nothing was interpolated; the lags restart after each gap")};
+            fmt::format(
+                "{} of {} samples are missing in {} gap{}: {}", missing.samples, samples, missing.gaps,
+                missing.gaps == 1 ? "" : "s",
+                bridged ? "short ones are bridged from the samples around them if they are a tenth of all at most, the "
+                          "lags restart after the others"
+                        : "left out, nothing was interpolated; the lags restart after each gap")};
 }
 
 std::vector<long long> complete_runs(const record_set& set) {

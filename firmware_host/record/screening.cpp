@@ -145,19 +145,22 @@ force_times times_of_forces(const record_set& set, const record_data& record) {
     return out;
 }
 
-/// How far samples first .. last-1 are off a value, as the deviation of a normal distribution; 0 of fewer than 100.
-double usual_distance(const output_view& y, std::size_t first, std::size_t last, double centre) {
-    std::vector<double> values;
+std::vector<double> measured(const output_view& y, std::size_t first, std::size_t last) {
+    std::vector<double> out;
     for (std::size_t i = first; i < last; ++i)
-        if (!std::isnan(y.at(i))) values.push_back(std::abs(y.at(i) - centre));
+        if (!std::isnan(y.at(i))) out.push_back(y.at(i));
+    return out;
+}
+
+/// How far values are off one of them, as the deviation of a normal distribution; 0 of fewer than 100.
+double usual_distance(std::vector<double> values, double centre) {
+    for (double& v : values) v = std::abs(v - centre);
     return values.size() < 100 ? 0 : 1.4826 * upper_median(values);
 }
 
 void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& found) {
-    std::vector<double> values;
-    for (std::size_t i = 0; i < y.size(); ++i)
-        if (!std::isnan(y.at(i))) values.push_back(y.at(i));
-    const double centre = upper_median(values), spread = usual_distance(y, 0, y.size(), centre);
+    std::vector<double> values = measured(y, 0, y.size());
+    const double centre = upper_median(values), spread = usual_distance(std::move(values), centre);
     if (!(spread > 0)) return;
     for (std::size_t i = spike_reach; i + spike_reach < y.size(); ++i) {
         const double here = std::abs(y.at(i) - centre);
@@ -167,13 +170,10 @@ void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& f
             beside = std::fmax(beside, std::fmax(std::abs(y.at(i - d) - centre), std::abs(y.at(i + d) - centre)));
         if (!(here > spike_ratio * beside)) continue;
         const double next = std::fmax(std::abs(y.at(i - 1) - centre), std::abs(y.at(i + 1) - centre));
-        if (here > spike_ratio * next) {
-            found.samples.push_back(i);
-            continue;
-        }
         const std::size_t last = std::min(y.size(), std::max(i + beside_spike, 2 * beside_spike) + 1);
         const std::size_t first = last > 2 * beside_spike ? last - 2 * beside_spike - 1 : 0;
-        if (here > spreads_around * usual_distance(y, first, last, centre)) found.samples.push_back(i);
+        if (here > spike_ratio * next || here > spreads_around * usual_distance(measured(y, first, last), centre))
+            found.samples.push_back(i);
     }
 }
 

@@ -21,20 +21,35 @@ constexpr double farthest = 0.1, least_mac = 0.5; // of a mode from the one it i
 constexpr double least_share = 0.75;              // of the information in the replicates that had the mode
 constexpr std::size_t fewest = 3;
 
-std::size_t largest(const std::vector<complex>& shape) {
+} // namespace
+
+std::size_t largest_entry(const std::vector<complex>& shape) {
     return static_cast<std::size_t>(
         std::max_element(shape.begin(), shape.end(), [](complex a, complex b) { return std::norm(a) < std::norm(b); }) -
         shape.begin());
 }
 
-} // namespace
-
-modal_mass_statistics::modal_mass_statistics(const mass_plan& plan, double dt) : plan_(plan), dt_(dt) {
+std::vector<drive_pair> drive_pairs(const mass_plan& plan) {
+    std::vector<drive_pair> out;
     for (std::size_t o = 0; o < plan.outputs.size(); ++o)
         for (std::size_t i = 0; i < plan.inputs.size(); ++i)
             if (plan.outputs[o].dof > 0 && plan.outputs[o].dof == plan.inputs[i].dof)
-                points_.push_back({o, i, plan.outputs[o].reversed == plan.inputs[i].reversed ? 1.0 : -1.0});
+                out.push_back({o, i, plan.outputs[o].reversed == plan.inputs[i].reversed ? 1.0 : -1.0});
+    return out;
 }
+
+modal_mass mass_of_pole(complex pole, complex complex_kg) {
+    modal_mass out;
+    if (!std::isfinite(complex_kg.real()) || !std::isfinite(complex_kg.imag())) return out;
+    out.kg = complex_kg.real();
+    out.stiffness = out.kg * std::norm(pole);
+    out.damping = -2 * pole.real() * out.kg;
+    out.phase_deg = std::arg(complex_kg) * 180 / M_PI;
+    return out;
+}
+
+modal_mass_statistics::modal_mass_statistics(const mass_plan& plan, double dt)
+    : plan_(plan), dt_(dt), points_(drive_pairs(plan)) {}
 
 std::vector<modal_mass_statistics::driven_mode> modal_mass_statistics::modes_in(const okid_model_t& model) const {
     using Eigen::MatrixXd;
@@ -64,17 +79,10 @@ std::vector<modal_mass_statistics::driven_mode> modal_mass_statistics::modes_in(
 
 modal_mass modal_mass_statistics::mass_of(const driven_mode& mode, std::size_t top) const {
     drive_mass found;
-    for (const drive_point& point : points_)
+    for (const drive_pair& point : points_)
         found.add(mode.shape[point.output] / mode.shape[top],
                   point.sign * mode.shape[point.output] * mode.force[point.input]);
-    modal_mass out;
-    const complex mass = found.complex_kg();
-    if (!std::isfinite(mass.real()) || !std::isfinite(mass.imag()) || !(found.power > 0)) return out;
-    out.kg = mass.real();
-    out.stiffness = out.kg * std::norm(mode.pole);
-    out.damping = -2 * mode.pole.real() * out.kg;
-    out.phase_deg = std::arg(mass) * 180 / M_PI;
-    return out;
+    return found.power > 0 ? mass_of_pole(mode.pole, found.complex_kg()) : modal_mass();
 }
 
 void modal_mass_statistics::begin(const okid_identified_t& full) {
@@ -105,7 +113,7 @@ void modal_mass_statistics::add(const okid_model_t& replicate, double share) {
             if (alike >= least_mac && apart < least) least = apart, best = &other;
         }
         if (!best) continue;
-        const modal_mass mass = mass_of(*best, largest(own.shape));
+        const modal_mass mass = mass_of(*best, largest_entry(own.shape));
         if (std::isfinite(mass.kg)) replicates_[k].push_back({share, mass});
     }
 }
@@ -116,7 +124,7 @@ std::vector<modal_mass> modal_mass_statistics::finish() const {
     for (std::size_t k = 0; k < full_.size(); ++k) {
         modal_mass& one = out.emplace_back();
         if (full_[k].shape.empty()) continue;
-        one = mass_of(full_[k], largest(full_[k].shape));
+        one = mass_of(full_[k], largest_entry(full_[k].shape));
         double share = 0, weight = 0, left = 0;
         for (const estimate& other : replicates_[k]) {
             share += other.share;

@@ -18,6 +18,19 @@ struct modal_mass {
     double kg_std = NAN, stiffness_std = NAN, damping_std = NAN;
 };
 
+/// Of a plan, an output and an input at one degree of freedom; sign: -1 where one of them is reversed.
+struct drive_pair {
+    std::size_t output, input;
+    double sign;
+};
+std::vector<drive_pair> drive_pairs(const mass_plan& plan);
+
+/// Of a pole, from what its drive points say (drive_mass.hpp); all NaN where that is no number.
+modal_mass mass_of_pole(std::complex<double> pole, std::complex<double> complex_kg);
+
+/// The entry that a shape is divided by.
+std::size_t largest_entry(const std::vector<std::complex<double>>& shape);
+
 /// Collects the masses of one model and of the same without one block each (the jackknife of okid/uncertainty.h).
 class modal_mass_statistics {
   public:
@@ -33,10 +46,6 @@ class modal_mass_statistics {
     std::vector<modal_mass> finish() const;
 
   private:
-    struct drive_point {
-        std::size_t output, input;
-        double sign;
-    };
     /// A pole of a model: its displacements at the sensors and what each force does to it.
     struct driven_mode {
         std::complex<double> pole;
@@ -51,7 +60,7 @@ class modal_mass_statistics {
 
     mass_plan plan_;
     double dt_;
-    std::vector<drive_point> points_;
+    std::vector<drive_pair> points_;
     std::vector<driven_mode> full_;                 ///< of each mode of the full model; no shape: not found
     std::vector<std::vector<estimate>> replicates_; ///< of each of them
 };

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import okid
 import pytest
+import systems
 from numpy.typing import NDArray
 from okid.frf import Frf
 from program import okid as program
@@ -139,10 +140,52 @@ def test_modal_masses_where_names_say_that_force_and_sensor_share_a_place(sensor
 
 
 def _chain(n: int, top_hz: float) -> tuple[Real, Real, Real]:
-    """Equal springs between slowly growing masses, damping of both."""
-    M, K = np.diag(np.linspace(1.0, 1.6, n)), 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
-    K *= (np.pi * top_hz) ** 2
+    """Slowly growing masses on equal springs, damping of both."""
+    M, K = systems.chain(list(np.linspace(1.0, 1.6, n)), [(np.pi * top_hz) ** 2] * n)
     return M, 3.0 * M + 1e-5 * K, K
+
+
+def test_a_place_that_measures_nothing_is_named_and_rules_no_pole() -> None:
+    """All but the weak first mode are found; where the noise counts as much as a response, four are."""
+    M, R, K = _chain(8, 150.0)
+    f_true, _, shapes = _truth(M, R, K)
+    line = np.arange(0.25, 1.2 * f_true[-1], 0.25)
+    h = _noisy(np.tile(_responses(M, R, K, line, list(range(8)), [0]), (1, 2, 1)), 0.003, 8)
+    dead, r = 5, np.random.default_rng(1)
+    h[:, dead, 0] = np.mean(np.abs(h)) * (r.normal(size=len(line)) + 1j * r.normal(size=len(line)))
+    result = okid.identify_frf(Frf.of(line, h))
+    found = _paired(result, f_true)
+    assert [k for k, _ in found][-7:] == list(range(1, 8)) and len(result.confident_modes) == len(found)
+    for k, mode in found:
+        assert okid.modal.mac(np.delete(mode.shape, dead), np.delete(np.tile(shapes[k], 2), dead)) > 0.999
+    noisy = [w.text for w in result.warnings if w.code == "noisy_output"]
+    assert len(noisy) == 1 and '"y6"' in noisy[0]
+
+
+@pytest.mark.parametrize("unit", ["g", "mm/s^2", "m/s^2", "furlong"])
+def test_units_of_a_universal_file(tmp_path: Path, unit: str) -> None:
+    """What stands beside the axis counts, for the program as for Python; what is no unit changes nothing."""
+    factor = {"g": 9.80665, "mm/s^2": 1e-3}.get(unit, 1.0)
+    M, R, K = _chain(3, 60.0)
+    line = np.arange(0.25, 1.5 * _truth(M, R, K)[0][-1], 0.25)
+    h = _responses(M, R, K, line, [0, 1, 2], [0])
+    path = tmp_path / "h.uff"
+    okid.write_frf(path, Frf.of(line, h / factor, ["1z"], ["1z", "2z", "3z"]))
+    first, *sets = path.read_bytes().split(b"    58b")
+    for k, text in enumerate(sets):
+        header = text.split(b"\n", 11)  # line 9: kind, exponents, name and unit of the ordinate
+        header[9] = f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':20s} {unit:20s}".encode()
+        sets[k] = b"\n".join(header)
+    path.write_bytes(b"    58b".join([first, *sets]))
+    program("identify", path, "--frf", "--json", tmp_path / "r.json", status=0)
+    done = okid.Result.from_dict(json.loads((tmp_path / "r.json").read_text(encoding="utf-8")))
+    whole = okid.identify_frf(Frf.of(line, h, ["1z"], ["1z", "2z", "3z"]))
+    for other in (done, okid.identify_frf(path)):
+        masses = [mode.modal_mass for mode in other.modes]
+        assert masses == pytest.approx([mode.modal_mass for mode in whole.modes], rel=1e-4)
+        assert [w.code for w in other.warnings].count("unit_converted") == (factor != 1.0)
+    wrong = okid.identify_frf(path, sensing="velocity")
+    assert "the file says acceleration" in next(w.text for w in wrong.warnings if w.code == "drive_point_polarity")
 
 
 def test_many_modes_in_a_small_part_of_the_lines() -> None:

@@ -24,6 +24,7 @@ class Frf(NamedTuple):
     frequency_hz (F,), response (F, n_y, n_u), coherence (F, n_y): multiple coherence of each output with all inputs,
     NaN where there are not more averages than inputs. averages: segments used, 0 = not known. resolution_hz: line
     spacing. inputs, outputs: names, () = u1 .., y1 ..; set_ups: measurements of one structure that it is joined from.
+    quantity: what a file says the outputs are; other_units: that its numbers came in, they are in SI units here.
     """
 
     frequency_hz: Real
@@ -34,6 +35,8 @@ class Frf(NamedTuple):
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     set_ups: int = 1
+    quantity: str = ""
+    other_units: tuple[str, ...] = ()
 
     @classmethod
     def of(

@@ -46,7 +46,8 @@ def _read_tables(paths: Sequence[str | Path]) -> Frf:
         frequency = np.array((ctypes.c_double * lines).from_address(f.value or 0))
         flat = np.array((ctypes.c_double * (2 * lines * n_u * n_y)).from_address(h.value or 0)).view(np.complex128)
         response = np.ascontiguousarray(flat.reshape(lines, n_u, n_y).transpose(0, 2, 1))
-        return Frf.of(frequency, response, about["inputs"], about["outputs"], about["set_ups"])
+        whole = Frf.of(frequency, response, about["inputs"], about["outputs"], about["set_ups"])
+        return whole._replace(quantity=about["quantity"], other_units=tuple(about["other_units"]))
     finally:
         host.library().okid_host_responses_delete(made)
 

@@ -67,6 +67,7 @@ def identify_frf(
         "inputs": inputs, "outputs": outputs, "sensing": sensing, "input_dofs": input_dofs, "output_dofs": output_dofs,
         "band": None if band is None else ":".join(map(str, band)), "modes": modes, "all_modes": all_modes,
         "exponential": exponential, "set_ups": responses.set_ups, "stabilization": stabilization,
+        "quantity": responses.quantity or None, "other_units": list(responses.other_units) or None,
     }  # fmt: skip
     handle, rows = ctypes.c_void_p(), np.ascontiguousarray(h.transpose(0, 2, 1))
     f = np.ascontiguousarray(f)
