@@ -300,7 +300,8 @@ void make_model(lag_work& work, const response_modes& found, record_work& to) {
     if (work.set_ups.size() == 1) to.set = std::move(work.set_ups.front().set);
     make_modal_model(listed, work.options.fs_hz, to);
     if (work.set_ups.size() > 1) return;
-    if (!struck(work) && to.context.sigma) keep_to_ambient_bound(to.set, work.options.fs_hz, listed, *to.context.sigma);
+    if (!struck(work) && to.context.sigma)
+        keep_to_ambient_bound(to.set, work.options.fs_hz, listed, {}, *to.context.sigma);
     if (struck(work)) fit_records(to.set, to.model, to.context);
     find_gain(to);
     fit_records(to.set, to.model, to.context);

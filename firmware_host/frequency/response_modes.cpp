@@ -32,6 +32,7 @@ using Eigen::MatrixXd;
 
 constexpr std::size_t middle_of_whole_band = 2;                   // among the runs of fit_matrix_fractions()
 constexpr int first_steps = 2, window_steps = 5, last_steps = 12; // of the poles
+constexpr std::ptrdiff_t lines_about = 2;                         // a frequency, to either side
 constexpr double neighbours = 0.02;                               // in frequency: poles that compete for one resonance
 
 /// The columns of all set-ups side by side, each an output of its own.
@@ -55,15 +56,25 @@ response_set side_by_side_columns(const joint_responses& from, std::vector<Index
     return out;
 }
 
+/// Of the lines about a frequency: stepped sines have finer ones where the structure rings.
+double spacing_at(const std::vector<double>& line, double hz) {
+    const auto at = std::lower_bound(line.begin(), line.end(), hz) - line.begin();
+    const auto last = static_cast<std::ptrdiff_t>(line.size()) - 1;
+    const std::ptrdiff_t low = std::clamp<std::ptrdiff_t>(at - lines_about, 0, last - 1),
+                         high = std::clamp<std::ptrdiff_t>(at + lines_about - 1, low + 1, last);
+    return (line[static_cast<std::size_t>(high)] - line[static_cast<std::size_t>(low)]) /
+           static_cast<double>(high - low);
+}
+
 /// What the numbers of a mode say against it, whatever the runs agree on.
 void mark_doubtful(const response_set& set, std::vector<consensus_mode>& modes) {
     const std::vector<double>& f = set.frequency_hz;
-    const double line = (f.back() - f.front()) / static_cast<double>(set.lines() - 1);
     for (consensus_mode& mode : modes) {
-        if (mode.frequency_hz * mode.damping_ratio < judgement::narrowest * line) mode.why.emplace_back("narrow");
+        if (mode.frequency_hz * mode.damping_ratio < judgement::narrowest * spacing_at(f, mode.frequency_hz))
+            mode.why.emplace_back("narrow");
         if (mode.damping_ratio > judgement::overdamped) mode.why.emplace_back("overdamped");
-        if (mode.frequency_hz < f.front() + judgement::edge_lines * line ||
-            mode.frequency_hz > f.back() - judgement::edge_lines * line)
+        if (mode.frequency_hz < f.front() + judgement::edge_lines * spacing_at(f, f.front()) ||
+            mode.frequency_hz > f.back() - judgement::edge_lines * spacing_at(f, f.back()))
             mode.why.emplace_back("band_edge");
     }
 }

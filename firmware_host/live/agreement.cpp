@@ -65,13 +65,14 @@ double agreement_bytes(const stream_config& config) {
 agreement::agreement(const stream_config& config)
     : where_(config.where), m_(config.channels()), options_(options_of(config)),
       window_(config.wanted.window_s.has_value()), most_(kept_samples(config)), starts_{0}, hits_(config.hits),
-      missing_(m_, NAN), followed_(config, window_of(config)) {
+      missing_(m_, NAN), followed_(config, window_of(config)), usual_(levels_of(records())), next_(m_) {
     if (keeps_sums(config)) older_ = std::make_unique<older_samples>(options_);
     rows_.reserve(static_cast<std::size_t>(window_ ? most_ + most_ / 4 + 1 : older_ ? most_ : 0) * m_);
 }
 
 void agreement::push(const double* row) {
     if (came_ - begin_ == most_) {
+        feed_to(begin_ + 1); // of a window shorter than what judges a spike
         begin_ += older_ ? static_cast<std::int64_t>(older_->take(records())) : 1;
         while (starts_.size() > 1 && starts_[1] <= begin_) starts_.erase(starts_.begin()), ++gone_;
         if (older_ || begin_ - base_ > most_ / 4) {
@@ -94,27 +95,43 @@ void agreement::add(const double* row) {
         in_gap_ = true;
     }
     push(row);
-    followed_.add(row);
+    if (came_ == judge_after_) {
+        usual_ = levels_of(records());
+        judge_after_ *= 2;
+    }
+    feed_to(came_ - static_cast<std::int64_t>(about_a_spike));
+}
+
+/// Samples before this one go to the followed modes, which nothing else screens.
+void agreement::feed_to(std::int64_t sample) {
+    for (fed_ = std::max(fed_, begin_); fed_ < sample; ++fed_) {
+        const std::int64_t first = std::max(starts_.back(), begin_);
+        without_spikes(at(first), static_cast<std::size_t>(came_ - first), static_cast<std::size_t>(fed_ - first),
+                       usual_, next_.data());
+        followed_.add(next_.data());
+    }
 }
 
 void agreement::add_missing(std::int64_t count) {
-    followed_.add_missing(count);
-    if (count == 0) {
-        if (starts_.back() < came_) starts_.push_back(came_);
-        in_gap_ = false;
-        return;
+    const std::int64_t end = came_;
+    if (count > 0) {
+        counts_.missing += count;
+        counts_.gaps += !in_gap_;
     }
-    counts_.missing += count;
-    counts_.gaps += !in_gap_;
-    in_gap_ = true;
     for (std::int64_t k = std::min(count, most_); k > 0; --k) push(missing_.data());
+    feed_to(end);
+    if (const std::int64_t left = count - (fed_ - end); count == 0 || left > 0) // else they went through a short window
+        followed_.add_missing(left);
+    fed_ = came_;
+    in_gap_ = count > 0;
+    if (count == 0 && starts_.back() < came_) starts_.push_back(came_);
 }
 
 void agreement::forget() {
     rows_.clear();
     base_ = begin_ = forgotten_ = came_;
     starts_ = {came_};
-    run_at_ = came_;
+    run_at_ = fed_ = came_;
     in_gap_ = false;
     followed_.reset();
     if (older_) older_ = std::make_unique<older_samples>(options_);
@@ -178,6 +195,7 @@ okid_status_t agreement::run(const mass_plan& mass) {
     try {
         record_set set = records();
         place_hits(set, mass);
+        usual_ = levels_of(set);
         found_ = identify_records(std::move(set), options_, older_.get());
         found_.context.x0.reset(); // a stream's samples give no more of the result than its sums
         found_.context.simulation_percent.reset();

@@ -9,6 +9,7 @@
 #include "followed_modes.hpp"
 #include "record/older_samples.hpp"
 #include "record/record.hpp"
+#include "record/screening.hpp"
 #include "stream_config.hpp"
 #include "stream_state.hpp"
 
@@ -30,6 +31,8 @@ std::int64_t kept_samples(const stream_config& config);
 double agreement_bytes(const stream_config& config);
 
 class agreement {
+    static constexpr std::int64_t first_judged = 256; ///< samples after which spikes show
+
   public:
     explicit agreement(const stream_config& config);
 
@@ -79,6 +82,7 @@ class agreement {
     void push(const double* row);
     const double* at(std::int64_t sample) const { return rows_.data() + static_cast<std::size_t>(sample - base_) * m_; }
     record_set records() const;
+    void feed_to(std::int64_t sample);
     void place_hits(const record_set& set, const mass_plan& mass);
 
     std::string where_;
@@ -97,6 +101,10 @@ class agreement {
     std::int64_t run_at_ = 0, decided_on_ = 0; ///< samples that had come, that were kept, at the last run()
     bool asked_ = false;
     followed_modes followed_;
+    std::int64_t fed_ = 0; ///< samples that followed_ has, behind those that came by what judges a spike
+    usual_levels usual_;   ///< of the samples kept, at the last run() or when twice as many had come
+    std::int64_t judge_after_ = first_judged;
+    std::vector<double> next_; ///< one row, for followed_
     kept_model model_;
     std::optional<deviations> sigma_;
     std::optional<std::pair<std::int64_t, bool>> run_of_; ///< samples and whether M, K, R were wanted

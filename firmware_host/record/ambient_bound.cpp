@@ -95,24 +95,34 @@ std::vector<bool> ring_down(const record_set& set, double fs_hz, const std::vect
 } // namespace
 
 void keep_to_ambient_bound(const record_set& set, double fs_hz, const std::vector<listed_mode>& modes,
-                           deviations& sigma) {
+                           const std::vector<widening>& wider, deviations& sigma) {
     double seconds = 0;
+    bool throughout = true;
     for (const record_data& record : set.records) {
         const double samples = steady_samples(set, record);
-        if (samples == 0) return;
+        throughout = throughout && samples > 0;
         seconds += samples / fs_hz;
     }
-    std::vector<bool> rings; // of no mode known until a deviation lies below the bound
+    std::vector<bool> rings; // of no mode known until a deviation is to be raised
     for (std::size_t k = 0; k < modes.size() && k < sigma.frequency_hz.size(); ++k) {
-        const double f = modes[k].frequency_hz, zeta = modes[k].damping_ratio, radians = 2 * M_PI * f * seconds;
+        const double f = modes[k].frequency_hz, zeta = modes[k].damping_ratio;
+        const widening by = k < wider.size() ? wider[k] : widening();
         const auto raise = [&](double& to, double least) {
-            if (!(to < least)) return; // of NaN nothing is known
+            if (!(to < least)) return false; // of NaN nothing is known
             if (rings.empty()) rings = ring_down(set, fs_hz, modes);
             if (!rings[k]) to = least;
+            return !rings[k];
         };
-        if (!(zeta > 0)) continue;
-        raise(sigma.frequency_hz[k], f * std::sqrt(zeta / (2 * radians)));
-        raise(sigma.damping_ratio[k], std::sqrt(zeta / radians));
+        const double radians = throughout && zeta > 0 ? 2 * M_PI * f * seconds : INFINITY;
+        const bool wide_f = raise(sigma.frequency_hz[k],
+                                  std::max(f * std::sqrt(zeta / (2 * radians)), sigma.frequency_hz[k] * by.frequency)),
+                   wide_zeta = raise(sigma.damping_ratio[k],
+                                     std::max(std::sqrt(zeta / radians), sigma.damping_ratio[k] * by.damping));
+        if (!wide_f && !wide_zeta) continue;
+        const double of_shape = std::sqrt(by.frequency * by.damping);
+        const std::size_t n_y = modes[k].shape.size();
+        for (std::vector<double>* each : {&sigma.shape_re, &sigma.shape_im})
+            for (std::size_t i = k * n_y; i < (k + 1) * n_y && i < each->size(); ++i) (*each)[i] *= of_shape;
     }
 }
 

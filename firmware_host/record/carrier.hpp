@@ -4,6 +4,7 @@
 #include "consensus/consensus_runs.hpp"
 #include "record.hpp"
 #include "record_uncertainty.hpp"
+#include "uneven_blocks.hpp"
 
 #include <optional>
 #include <vector>
@@ -17,6 +18,7 @@ struct carried_mode {
     std::vector<std::complex<double>> shape;        ///< as the level has it, largest entry 1
     std::vector<double> shape_re_std, shape_im_std; ///< empty: not known
     std::vector<mode_shift> shifts;                 ///< a block each, empty: not known
+    widening wider;                                 ///< of ambient vibration: what the deviations lack
     bool exact = false;                             ///< from the QR factor of nearly noise-free records
     mode_carrier by;
 };

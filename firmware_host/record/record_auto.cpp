@@ -76,6 +76,7 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
         context.verdicts.push_back(verdict_of(mode));
         work.apart.emplace_back(mode.frequency_apart_hz, mode.damping_apart);
         work.carriers.push_back(carried ? carried->by : mode_carrier());
+        work.wider.push_back(carried ? carried->wider : widening());
         auto& shifts = work.shifts.emplace_back(carried ? carried->shifts : std::vector<mode_shift>());
         for (mode_shift& shift : shifts)
             for (std::size_t i = 0; i < n_y; ++i) shift.shape[i] *= scale[n_u + i] / largest;
@@ -426,7 +427,7 @@ record_result identify_auto(record_set records, const record_options& given, con
     if (work.set.n_u == 0 && work.context.sigma)
         keep_to_ambient_bound(
             work.set, options.fs_hz * static_cast<double>(work.set.count()) / static_cast<double>(work.context.samples),
-            listed, *work.context.sigma);
+            listed, work.wider, *work.context.sigma);
     if (options.stage) options.stage("simulating the model");
     const bool placed = work.model.n_u > 0; // by find_struck
     if (!placed) make_models(listed, options, work);

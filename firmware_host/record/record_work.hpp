@@ -5,6 +5,7 @@
 #include "record.hpp"
 #include "record_uncertainty.hpp"
 #include "summed_inputs.hpp"
+#include "uneven_blocks.hpp"
 
 #include <cstddef>
 #include <memory>
@@ -54,6 +55,7 @@ struct record_work {
     std::vector<mode_carrier> carriers; ///< auto: of each listed mode
     std::vector<double> scale;          ///< auto: of each channel
     std::vector<std::pair<double, double>> apart; ///< auto: of each listed mode, see consensus_mode
+    std::vector<widening> wider;                  ///< auto: of each listed mode, see carried_mode
     std::vector<std::vector<mode_shift>> shifts;  ///< auto: of each listed mode, a block each; empty: not known
 };
 

@@ -27,7 +27,7 @@ constexpr double usual_runs = 8;     // times the longest of all but the rarest 
 constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
 constexpr double spike_spreads = 15, spike_ratio = 5;
 constexpr double spreads_around = 8; // of one of two or three samples: a pulse that runs along a beam is as narrow
-constexpr std::size_t spike_reach = 6, beside_spike = 64;
+constexpr std::size_t spike_reach = 6, beside_spike = about_a_spike;
 constexpr double struck_share = 0.1;      // of the largest force
 constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
 constexpr std::string_view never_moves = "never moves";
@@ -39,14 +39,21 @@ struct stretch_of_equal {
     double value;
 };
 
-/// One output of one record.
-struct output_view {
-    const record_data& record;
-    double* first;
-    std::size_t stride;
+/// One output in rows.
+struct samples_view {
+    const double* first;
+    std::size_t stride, count;
     double at(std::size_t i) const { return first[i * stride]; }
-    void drop(std::size_t i) const { first[i * stride] = NAN; }
-    std::size_t size() const { return record.count; }
+    std::size_t size() const { return count; }
+};
+
+/// One output of one record.
+struct output_view : samples_view {
+    const record_data& record;
+    double* own;
+    output_view(const record_data& of, double* rows, std::size_t channels)
+        : samples_view{rows, channels, of.count}, record(of), own(rows) {}
+    void drop(std::size_t i) const { own[i * stride] = NAN; }
 };
 
 std::vector<stretch_of_equal> equal_stretches(const output_view& y) {
@@ -145,7 +152,7 @@ force_times times_of_forces(const record_set& set, const record_data& record) {
     return out;
 }
 
-std::vector<double> measured(const output_view& y, std::size_t first, std::size_t last) {
+std::vector<double> measured(const samples_view& y, std::size_t first, std::size_t last) {
     std::vector<double> out;
     for (std::size_t i = first; i < last; ++i)
         if (!std::isnan(y.at(i))) out.push_back(y.at(i));
@@ -158,23 +165,24 @@ double usual_distance(std::vector<double> values, double centre) {
     return values.size() < 100 ? 0 : 1.4826 * upper_median(values);
 }
 
+bool is_spike(const samples_view& y, std::size_t i, double centre, double spread) {
+    const double here = std::abs(y.at(i) - centre);
+    if (!(here > spike_spreads * spread) || i < spike_reach || i + spike_reach >= y.size()) return false;
+    double beside = 0;
+    for (std::size_t d = 2; d <= spike_reach; ++d)
+        beside = std::fmax(beside, std::fmax(std::abs(y.at(i - d) - centre), std::abs(y.at(i + d) - centre)));
+    if (!(here > spike_ratio * beside)) return false;
+    const double next = std::fmax(std::abs(y.at(i - 1) - centre), std::abs(y.at(i + 1) - centre));
+    const std::size_t last = std::min(y.size(), std::max(i + beside_spike, 2 * beside_spike) + 1);
+    const std::size_t first = last > 2 * beside_spike ? last - 2 * beside_spike - 1 : 0;
+    return here > spike_ratio * next || here > spreads_around * usual_distance(measured(y, first, last), centre);
+}
+
 void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& found) {
     std::vector<double> values = measured(y, 0, y.size());
     const double centre = upper_median(values), spread = usual_distance(std::move(values), centre);
-    if (!(spread > 0)) return;
-    for (std::size_t i = spike_reach; i + spike_reach < y.size(); ++i) {
-        const double here = std::abs(y.at(i) - centre);
-        if (!(here > spike_spreads * spread) || struck[i]) continue;
-        double beside = 0;
-        for (std::size_t d = 2; d <= spike_reach; ++d)
-            beside = std::fmax(beside, std::fmax(std::abs(y.at(i - d) - centre), std::abs(y.at(i + d) - centre)));
-        if (!(here > spike_ratio * beside)) continue;
-        const double next = std::fmax(std::abs(y.at(i - 1) - centre), std::abs(y.at(i + 1) - centre));
-        const std::size_t last = std::min(y.size(), std::max(i + beside_spike, 2 * beside_spike) + 1);
-        const std::size_t first = last > 2 * beside_spike ? last - 2 * beside_spike - 1 : 0;
-        if (here > spike_ratio * next || here > spreads_around * usual_distance(measured(y, first, last), centre))
-            found.samples.push_back(i);
-    }
+    for (std::size_t i = 0; spread > 0 && i < y.size(); ++i)
+        if (!struck[i] && is_spike(y, i, centre, spread)) found.samples.push_back(i);
 }
 
 /// Samples with so many complete ones behind them, as if this output stood alone.
@@ -257,7 +265,7 @@ output_faults faults_of(record_set& set, std::size_t output, const std::vector<f
     std::size_t before = 0;
     for (std::size_t r = 0; r < set.records.size(); ++r) {
         const record_data& record = set.records[r];
-        const output_view view{record, set.rows(record) + set.n_u + output, set.channels()};
+        const output_view view(record, set.rows(record) + set.n_u + output, set.channels());
         before += usable(view);
         for (fault& found : screen(view, forces[r])) out.of_kind[found.kind].push_back(std::move(found));
         out.usable += usable(view);
@@ -267,6 +275,39 @@ output_faults faults_of(record_set& set, std::size_t output, const std::vector<f
 }
 
 } // namespace
+
+usual_levels levels_of(const record_set& set) {
+    usual_levels out;
+    for (std::size_t k = 0; k < set.channels(); ++k) {
+        std::vector<double> values;
+        for (std::size_t n = 0; n < set.count(); ++n)
+            if (const double x = set.samples[n * set.channels() + k]; !std::isnan(x)) values.push_back(x);
+        if (k < set.n_u) {
+            double largest = 0, beyond = 0;
+            for (const double x : values) largest = std::max(largest, std::abs(x));
+            for (const double x : values) beyond += std::abs(x) > struck_share * largest;
+            const bool rests = beyond * resting_share <= static_cast<double>(values.size());
+            out.pulse.push_back(rests ? struck_share * largest : INFINITY);
+            continue;
+        }
+        out.centre.push_back(values.empty() ? 0 : upper_median(values));
+        out.spread.push_back(usual_distance(std::move(values), out.centre.back()));
+    }
+    return out;
+}
+
+void without_spikes(const double* rows, std::size_t count, std::size_t at, const usual_levels& usual, double* row) {
+    const std::size_t n_u = usual.pulse.size(), m = n_u + usual.centre.size();
+    std::copy_n(rows + at * m, m, row);
+    for (std::size_t o = 0; o < usual.centre.size(); ++o) {
+        const samples_view y{rows + n_u + o, m, count};
+        if (!(usual.spread[o] > 0) || !is_spike(y, at, usual.centre[o], usual.spread[o])) continue;
+        bool struck = false;
+        for (std::size_t i = at - spike_reach; i <= at + spike_reach; ++i)
+            for (std::size_t k = 0; k < n_u; ++k) struck = struck || std::abs(rows[i * m + k]) > usual.pulse[k];
+        if (!struck) row[n_u + o] = NAN;
+    }
+}
 
 screened_outputs screen_outputs(record_set& set, const std::vector<std::string>& outputs) {
     screened_outputs out;

@@ -162,6 +162,33 @@ def test_a_place_that_measures_nothing_is_named_and_rules_no_pole() -> None:
     assert len(noisy) == 1 and '"y6"' in noisy[0]
 
 
+def test_stepped_sines_of_a_free_structure() -> None:
+    """Receptances with finer lines where it rings: rigid motion has a million times the power, noise goes
+    with the response. All modes are found, as sharply as the lines show them, and the model explains them."""
+    M, K = np.diag([2.0, 1.0, 1.5, 1.0, 1.2, 3.0]), np.zeros((6, 6))
+    for a, k in enumerate([2e6, 1e6, 1.5e6, 8e5, 1e6]):
+        K[a : a + 2, a : a + 2] += k * np.array([[1, -1], [-1, 1]])
+    R = 1.0 * M + 4e-6 * K
+    f_true, zeta_true, _ = _truth(M, R, K)
+    f_true, zeta_true = f_true[-5:], zeta_true[-5:]
+    coarse = np.arange(4.0, 1.2 * f_true[-1], 4.0)
+    fine = [f * (1 + np.linspace(-4.0, 4.0, 41) * zeta) for f, zeta in zip(f_true, zeta_true, strict=True)]
+    line = np.unique(np.concatenate([coarse, *fine]).round(4))
+    shares = []
+    for seed in range(3):
+        r = np.random.default_rng(seed)
+        h = _responses(M, R, K, line, list(range(6)), [0]) / -((2 * np.pi * line[:, None, None]) ** 2)
+        h *= 1 + 0.005 * (r.normal(size=h.shape) + 1j * r.normal(size=h.shape))
+        result = okid.identify_frf(Frf.of(line, h), sensing="displacement")
+        assert len(result.confident_modes) == 5
+        for k, mode in _paired(result, f_true):
+            assert mode.frequency_std_hz < 2e-3 * mode.damping_ratio * f_true[k] * 5
+            shares.append((mode.frequency_hz - f_true[k]) / mode.frequency_std_hz)
+            shares.append((mode.damping_ratio - zeta_true[k]) / mode.damping_ratio_std)
+        assert min(result.to_dict()["fit"]["simulation_percent"].values()) > 80.0
+    assert 0.4 < np.sqrt(np.mean(np.square(shares))) < 1.8
+
+
 @pytest.mark.parametrize("unit", ["g", "mm/s^2", "m/s^2", "furlong"])
 def test_units_of_a_universal_file(tmp_path: Path, unit: str) -> None:
     """What stands beside the axis counts, for the program as for Python; what is no unit changes nothing."""

@@ -177,3 +177,16 @@ def test_ten_gaps_do_not_swell_the_deviations(memory: str, seed: int) -> None:
                 one.frequency_std_hz < 5 * other.frequency_std_hz
                 and one.damping_ratio_std < 5 * other.damping_ratio_std
             )
+
+
+@pytest.mark.parametrize("method", ["auto", "n4sid-cva"])
+def test_settled_once_three_updates_agree(method: str) -> None:
+    force, answer = okid.demo_record(4000)
+    session, said = okid.Session(1, 3, fs=1000.0, method=method, order="auto" if method == "auto" else 6), []
+    for first in range(0, 4000, 500):
+        session.feed(np.hstack([force, answer])[first : first + 500])
+        session.modes()
+        said.append(session.settled)
+    assert not any(said[:2]) and all(said[-3:])
+    session.reset()
+    assert not session.settled

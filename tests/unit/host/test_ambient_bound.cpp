@@ -16,12 +16,14 @@ constexpr double zeta = 0.01;
 
 const std::vector<listed_mode> modes = {mode_at(10, zeta), mode_at(11.5, zeta), mode_at(23, zeta)};
 
-/// What becomes of deviations of zero.
-deviations bounded(const series& output) {
+/// What becomes of deviations.
+deviations bounded(const series& output, double before = 0, const std::vector<widening>& wider = {}) {
     deviations sigma;
-    sigma.frequency_hz.assign(modes.size(), 0);
-    sigma.damping_ratio.assign(modes.size(), 0);
-    keep_to_ambient_bound(record_of({output}), sample_rate, modes, sigma);
+    sigma.frequency_hz.assign(modes.size(), before);
+    sigma.damping_ratio.assign(modes.size(), before);
+    sigma.shape_re.assign(modes.size(), before);
+    sigma.shape_im.assign(modes.size(), before);
+    keep_to_ambient_bound(record_of({output}), sample_rate, modes, wider, sigma);
     return sigma;
 }
 
@@ -81,6 +83,21 @@ void missing_samples_are_left_out(void) {
     TEST_ASSERT_TRUE(bounded(output).damping_ratio[0] > 0);
 }
 
+/// A storm: no bound, because its length is not that of the record, but what the blocks said of the modes.
+void where_the_power_changes_deviations_are_widened(void) {
+    series output = driven();
+    for (std::size_t t = 12'000; t < 16'000; ++t) output[t] *= 30;
+    const std::vector<widening> wider = {{2, 3}, {1, 1}, {4, 1}};
+    const deviations sigma = bounded(output, 1e-9, wider);
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1e-9 * wider[k].frequency, sigma.frequency_hz[k]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1e-9 * wider[k].damping, sigma.damping_ratio[k]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1e-9 * std::sqrt(wider[k].frequency * wider[k].damping), sigma.shape_re[k]);
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(1e-9,
+                             bounded(hit({10, 11.5, 23}), 1e-9, wider).frequency_hz[0]); // a hit tells by its energy
+}
+
 } // namespace
 
 void setUp(void) {}
@@ -92,5 +109,6 @@ int main(void) {
     RUN_TEST(what_rings_down_between_hits_has_no_bound);
     RUN_TEST(beside_hits_a_mode_of_chance_forces_keeps_it);
     RUN_TEST(missing_samples_are_left_out);
+    RUN_TEST(where_the_power_changes_deviations_are_widened);
     return UNITY_END();
 }

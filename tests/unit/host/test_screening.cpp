@@ -71,6 +71,27 @@ column held(double value, std::size_t count, std::size_t first = 500, column y =
     return y;
 }
 
+/// Row by row, as a stream goes: what is a spike in the record is one there, away from its ends, and beside a force that
+/// otherwise rests it is an answer.
+void spikes_of_single_rows(void) {
+    column y = moving();
+    y[700] = 40;
+    y[1200] = -35;
+    y[1990] = 50; // within what judges it, but not to be judged at an end
+    record_set set = set_of(y);
+    for (std::size_t i = 0; i < y.size(); ++i) set.samples[3 * i] = i == 1198 ? 100 : 0.1 * static_cast<double>(i % 2);
+    const usual_levels usual = levels_of(set);
+    TEST_ASSERT_EQUAL_DOUBLE(10, usual.pulse[0]);
+    column row(3), gone;
+    for (std::size_t i = 0; i < y.size(); ++i) {
+        without_spikes(set.samples.data(), y.size(), i, usual, row.data());
+        TEST_ASSERT_TRUE(row[0] == set.samples[3 * i] && row[2] == set.samples[3 * i + 2]);
+        if (is_nan(row[1])) gone.push_back(static_cast<double>(i));
+    }
+    TEST_ASSERT_EQUAL_INT(2, static_cast<int>(gone.size()));
+    TEST_ASSERT_TRUE(gone[0] == 700 && gone[1] == 1990);
+}
+
 } // namespace
 
 void setUp() {}
@@ -296,5 +317,6 @@ int main() {
     RUN_TEST(the_only_output_is_not_left_out);
     RUN_TEST(an_output_that_rests_in_one_record_is_missing_there);
     RUN_TEST(channels_of_outputs_that_go_are_taken_out);
+    RUN_TEST(spikes_of_single_rows);
     return UNITY_END();
 }
