@@ -322,8 +322,8 @@ int32_t okid_host_stream_stats(okid_host_stream_t* self, okid_host_stream_counts
         face::given(self, out);
         identifier& sums = self->stream.sums();
         const okid_accumulator_stats_t counts = sums.stats();
-        *out = {counts.samples, counts.missing, counts.gaps,     counts.saturated,
-                counts.rows,    counts.dropped, sums.restarts(), static_cast<std::int64_t>(sums.sums_bytes()),
+        *out = {counts.samples,  counts.missing,        counts.gaps,     counts.saturated,
+                counts.rows,     counts.dropped,        sums.restarts(), static_cast<std::int64_t>(sums.sums_bytes()),
                 sums.unknowns(), self->stream.settled()};
     });
 }

@@ -97,14 +97,14 @@ void put_inputs(Index n_u, std::vector<double> B, std::vector<double> D, record_
     model.markov = arrays.markov.data();
 }
 
-/// Of each line and output: what makes its response one of acceleration. Where a structure is free, receptances are all
-/// rigid motion at the lowest lines.
-MatrixXd to_accelerations(const response_set& set, const std::vector<int>& sensing) {
+/// Of each line and output: the power of an acceleration over that of what is measured. Where a structure is free, receptances
+/// are all rigid motion at the lowest lines.
+MatrixXd acceleration_powers(const response_set& set, const std::vector<int>& sensing) {
     MatrixXd out(set.lines(), set.n_y());
     for (Index l = 0; l < set.lines(); ++l)
         for (Index o = 0; o < set.n_y(); ++o)
             out(l, o) = std::pow(set.frequency_hz[static_cast<std::size_t>(l)] / set.frequency_hz.back(),
-                                 OKID_SENSE_ACCELERATION - sensing[static_cast<std::size_t>(o)]);
+                                 2 * (OKID_SENSE_ACCELERATION - sensing[static_cast<std::size_t>(o)]));
     return out;
 }
 
@@ -112,10 +112,10 @@ MatrixXd to_accelerations(const response_set& set, const std::vector<int>& sensi
 void fit_responses(const response_set& set, const std::vector<int>& sensing, record_work& work) {
     const Index n = work.model.n_z, n_y = set.n_y(), n_u = set.n_u(), lines = set.lines();
     const Eigen::Map<const MatrixXd> A(work.model.A, n, n), C(work.model.C, n_y, n);
-    const MatrixXd unit_power = to_accelerations(set, sensing).cwiseAbs2();
+    const MatrixXd powers = acceleration_powers(set, sensing);
     VectorXd weight(n_y), energy = VectorXd::Zero(n_y), left = VectorXd::Zero(n_y);
     for (Index o = 0; o < n_y; ++o) {
-        for (Index i = 0; i < n_u; ++i) energy[o] += unit_power.col(o).dot(set.H.col(o + n_y * i).cwiseAbs2());
+        for (Index i = 0; i < n_u; ++i) energy[o] += powers.col(o).dot(set.H.col(o + n_y * i).cwiseAbs2());
         weight[o] = energy[o] > 0 ? 1 / energy[o] : 0;
     }
     std::vector<Eigen::MatrixXcd> X; // C (z I - A)^-1 at each line
@@ -130,15 +130,15 @@ void fit_responses(const response_set& set, const std::vector<int>& sensing, rec
             x.middleCols<2>(k) = C.middleCols<2>(k) * inverse / (d * d - A(k, k + 1) * A(k + 1, k));
         }
         x.rightCols(n_y).setIdentity();
-        const Eigen::MatrixXcd scaled = weight.cwiseProduct(unit_power.row(l).transpose()).asDiagonal() * x;
+        const Eigen::MatrixXcd scaled = weight.cwiseProduct(powers.row(l).transpose()).asDiagonal() * x;
         N += (x.adjoint() * scaled).real();
         for (Index i = 0; i < n_u; ++i)
             b.col(i) += (scaled.adjoint() * set.H.row(l).segment(n_y * i, n_y).transpose()).real();
         X.push_back(std::move(x));
     }
-    const VectorXd size = N.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const VectorXd unit = N.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     const MatrixXd found =
-        size.asDiagonal() * MatrixXd((size.asDiagonal() * N * size.asDiagonal()).ldlt().solve(size.asDiagonal() * b));
+        unit.asDiagonal() * MatrixXd((unit.asDiagonal() * N * unit.asDiagonal()).ldlt().solve(unit.asDiagonal() * b));
     std::vector<double> B, D;
     for (Index i = 0; i < n_u; ++i) {
         B.insert(B.end(), found.col(i).data(), found.col(i).data() + n);
@@ -146,7 +146,7 @@ void fit_responses(const response_set& set, const std::vector<int>& sensing, rec
         for (Index l = 0; l < lines; ++l)
             left += (set.H.row(l).segment(n_y * i, n_y).transpose() - X[static_cast<std::size_t>(l)] * found.col(i))
                         .cwiseAbs2()
-                        .cwiseProduct(unit_power.row(l).transpose());
+                        .cwiseProduct(powers.row(l).transpose());
     }
     put_inputs(n_u, std::move(B), std::move(D), work);
     std::vector<double> percent;

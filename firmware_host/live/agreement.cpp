@@ -65,7 +65,7 @@ double agreement_bytes(const stream_config& config) {
 agreement::agreement(const stream_config& config)
     : where_(config.where), m_(config.channels()), options_(options_of(config)),
       window_(config.wanted.window_s.has_value()), most_(kept_samples(config)), starts_{0}, hits_(config.hits),
-      missing_(m_, NAN), followed_(config, window_of(config)), usual_(levels_of(records())), next_(m_) {
+      missing_(m_, NAN), followed_(config, window_of(config)), usual_(usual_of(records())), next_(m_) {
     if (keeps_sums(config)) older_ = std::make_unique<older_samples>(options_);
     rows_.reserve(static_cast<std::size_t>(window_ ? most_ + most_ / 4 + 1 : older_ ? most_ : 0) * m_);
 }
@@ -96,7 +96,7 @@ void agreement::add(const double* row) {
     }
     push(row);
     if (came_ == judge_after_) {
-        usual_ = levels_of(records());
+        usual_ = usual_of(records());
         judge_after_ *= 2;
     }
     feed_to(came_ - static_cast<std::int64_t>(about_a_spike));
@@ -195,7 +195,7 @@ okid_status_t agreement::run(const mass_plan& mass) {
     try {
         record_set set = records();
         place_hits(set, mass);
-        usual_ = levels_of(set);
+        usual_ = usual_of(set);
         found_ = identify_records(std::move(set), options_, older_.get());
         found_.context.x0.reset(); // a stream's samples give no more of the result than its sums
         found_.context.simulation_percent.reset();

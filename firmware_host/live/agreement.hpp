@@ -102,7 +102,7 @@ class agreement {
     bool asked_ = false;
     followed_modes followed_;
     std::int64_t fed_ = 0; ///< samples that followed_ has, behind those that came by what judges a spike
-    usual_levels usual_;   ///< of the samples kept, at the last run() or when twice as many had come
+    usual_values usual_;   ///< of the samples kept, at the last run() or when twice as many had come
     std::int64_t judge_after_ = first_judged;
     std::vector<double> next_; ///< one row, for followed_
     kept_model model_;

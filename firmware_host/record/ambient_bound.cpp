@@ -107,18 +107,15 @@ void keep_to_ambient_bound(const record_set& set, double fs_hz, const std::vecto
     for (std::size_t k = 0; k < modes.size() && k < sigma.frequency_hz.size(); ++k) {
         const double f = modes[k].frequency_hz, zeta = modes[k].damping_ratio;
         const widening by = k < wider.size() ? wider[k] : widening();
-        const auto raise = [&](double& to, double least) {
-            if (!(to < least)) return false; // of NaN nothing is known
-            if (rings.empty()) rings = ring_down(set, fs_hz, modes);
-            if (!rings[k]) to = least;
-            return !rings[k];
-        };
         const double radians = throughout && zeta > 0 ? 2 * M_PI * f * seconds : INFINITY;
-        const bool wide_f = raise(sigma.frequency_hz[k],
-                                  std::max(f * std::sqrt(zeta / (2 * radians)), sigma.frequency_hz[k] * by.frequency)),
-                   wide_zeta = raise(sigma.damping_ratio[k],
-                                     std::max(std::sqrt(zeta / radians), sigma.damping_ratio[k] * by.damping));
-        if (!wide_f && !wide_zeta) continue;
+        double &of_f = sigma.frequency_hz[k], &of_zeta = sigma.damping_ratio[k];
+        const double least_f = std::max(f * std::sqrt(zeta / (2 * radians)), of_f * by.frequency),
+                     least_zeta = std::max(std::sqrt(zeta / radians), of_zeta * by.damping);
+        if (!(of_f < least_f) && !(of_zeta < least_zeta)) continue; // of NaN nothing is known
+        if (rings.empty()) rings = ring_down(set, fs_hz, modes);
+        if (rings[k]) continue;
+        if (of_f < least_f) of_f = least_f;
+        if (of_zeta < least_zeta) of_zeta = least_zeta;
         const double of_shape = std::sqrt(by.frequency * by.damping);
         const std::size_t n_y = modes[k].shape.size();
         for (std::vector<double>* each : {&sigma.shape_re, &sigma.shape_im})

@@ -151,15 +151,16 @@ std::vector<std::optional<carried_mode>> carried_by(const okid_identified_t& mod
     if (!replicates.empty()) sigma = deviations_of(model, replicates, {}, &moved);
     const auto here =
         modes_in(model.frequency_hz, model.damping_ratio, model.shape_re, model.shape_im, model.mode_count, model.n_y);
-    std::vector<double> shares;
-    for (const replicate_model& one : replicates) shares.push_back(one.share);
+    std::vector<double> shares; // of what no force moves
+    if (model.n_u == 0)
+        for (const replicate_model& one : replicates) shares.push_back(one.share);
     for (std::size_t i = 0; i < wanted.size(); ++i) {
         const int k = place_of(here, wanted[i]);
         if (k < 0) continue;
         out[i] = carried(model, sigma, k);
         out[i]->mpc = model.mpc[k];
         out[i]->shifts = shifts_of(here[static_cast<std::size_t>(k)], moved);
-        if (model.n_u == 0) out[i]->wider = widening_of(out[i]->shifts, shares);
+        out[i]->wider = widening_of(out[i]->shifts, shares);
     }
     return out;
 }

@@ -41,8 +41,8 @@ struct stretch_of_equal {
 
 /// One output in rows.
 struct samples_view {
-    const double* first;
-    std::size_t stride, count;
+    const double* first = nullptr;
+    std::size_t stride = 1, count = 0;
     double at(std::size_t i) const { return first[i * stride]; }
     std::size_t size() const { return count; }
 };
@@ -134,20 +134,35 @@ struct force_times {
     std::size_t resting = 0;  ///< samples before the first force
 };
 
+/// Where a pulse begins, and whether the force rests between its pulses.
+struct force_level {
+    double pulse = 0;
+    bool rests = false;
+};
+
+force_level level_of(const samples_view& force) {
+    double largest = 0;
+    for (std::size_t i = 0; i < force.size(); ++i) largest = std::fmax(largest, std::abs(force.at(i)));
+    force_level out{struck_share * largest};
+    std::size_t beyond = 0;
+    for (std::size_t i = 0; i < force.size(); ++i) beyond += std::abs(force.at(i)) > out.pulse;
+    out.rests = beyond * resting_share <= force.size();
+    return out;
+}
+
 force_times times_of_forces(const record_set& set, const record_data& record) {
     force_times out{std::vector<bool>(record.count, false), set.n_u > 0 ? record.count : 0};
-    const double* rows = set.rows(record);
-    const std::vector<double> largest = largest_of(set, record);
     for (std::size_t k = 0; k < set.n_u; ++k) {
-        std::vector<std::size_t> pulse;
-        for (std::size_t i = 0; i < record.count; ++i)
-            if (std::abs(rows[i * set.channels() + k]) > struck_share * largest[k]) pulse.push_back(i);
-        if (!pulse.empty()) out.resting = std::min(out.resting, pulse.front());
-        if (pulse.size() * resting_share > record.count) continue;
-        for (const std::size_t i : pulse)
+        const samples_view force{set.rows(record) + k, set.channels(), record.count};
+        const force_level level = level_of(force);
+        for (std::size_t i = 0; i < force.size(); ++i) {
+            if (!(std::abs(force.at(i)) > level.pulse)) continue;
+            out.resting = std::min(out.resting, i);
+            if (!level.rests) break;
             for (std::size_t j = i > spike_reach ? i - spike_reach : 0; j < std::min(record.count, i + spike_reach + 1);
                  ++j)
                 out.struck[j] = true;
+        }
     }
     return out;
 }
@@ -165,6 +180,13 @@ double usual_distance(std::vector<double> values, double centre) {
     return values.size() < 100 ? 0 : 1.4826 * upper_median(values);
 }
 
+/// Centre NaN of none, spread 0 of few.
+std::pair<double, double> centre_and_spread(const samples_view& y) {
+    std::vector<double> values = measured(y, 0, y.size());
+    const double centre = upper_median(values);
+    return {centre, usual_distance(std::move(values), centre)};
+}
+
 bool is_spike(const samples_view& y, std::size_t i, double centre, double spread) {
     const double here = std::abs(y.at(i) - centre);
     if (!(here > spike_spreads * spread) || i < spike_reach || i + spike_reach >= y.size()) return false;
@@ -179,8 +201,7 @@ bool is_spike(const samples_view& y, std::size_t i, double centre, double spread
 }
 
 void find_spikes(const output_view& y, const std::vector<bool>& struck, fault& found) {
-    std::vector<double> values = measured(y, 0, y.size());
-    const double centre = upper_median(values), spread = usual_distance(std::move(values), centre);
+    const auto [centre, spread] = centre_and_spread(y);
     for (std::size_t i = 0; spread > 0 && i < y.size(); ++i)
         if (!struck[i] && is_spike(y, i, centre, spread)) found.samples.push_back(i);
 }
@@ -276,27 +297,23 @@ output_faults faults_of(record_set& set, std::size_t output, const std::vector<f
 
 } // namespace
 
-usual_levels levels_of(const record_set& set) {
-    usual_levels out;
+usual_values usual_of(const record_set& set) {
+    usual_values out;
     for (std::size_t k = 0; k < set.channels(); ++k) {
-        std::vector<double> values;
-        for (std::size_t n = 0; n < set.count(); ++n)
-            if (const double x = set.samples[n * set.channels() + k]; !std::isnan(x)) values.push_back(x);
+        const samples_view channel{set.samples.data() + k, set.channels(), set.count()};
         if (k < set.n_u) {
-            double largest = 0, beyond = 0;
-            for (const double x : values) largest = std::max(largest, std::abs(x));
-            for (const double x : values) beyond += std::abs(x) > struck_share * largest;
-            const bool rests = beyond * resting_share <= static_cast<double>(values.size());
-            out.pulse.push_back(rests ? struck_share * largest : INFINITY);
-            continue;
+            const force_level level = level_of(channel);
+            out.pulse.push_back(level.rests ? level.pulse : INFINITY);
+        } else {
+            const auto [centre, spread] = centre_and_spread(channel);
+            out.centre.push_back(centre);
+            out.spread.push_back(spread);
         }
-        out.centre.push_back(values.empty() ? 0 : upper_median(values));
-        out.spread.push_back(usual_distance(std::move(values), out.centre.back()));
     }
     return out;
 }
 
-void without_spikes(const double* rows, std::size_t count, std::size_t at, const usual_levels& usual, double* row) {
+void without_spikes(const double* rows, std::size_t count, std::size_t at, const usual_values& usual, double* row) {
     const std::size_t n_u = usual.pulse.size(), m = n_u + usual.centre.size();
     std::copy_n(rows + at * m, m, row);
     for (std::size_t o = 0; o < usual.centre.size(); ++o) {

@@ -13,18 +13,18 @@ struct screened_outputs {
     remarks said;           ///< one `screened` for each output and kind of fault, with place and count
 };
 
-/// What outputs usually do, and what a force that otherwise rests does in a pulse.
-struct usual_levels {
-    std::vector<double> centre, spread,
-        pulse; ///< of each output, and of each force; spread 0: not known, pulse inf: none
+/// What the channels of a stream usually do.
+struct usual_values {
+    std::vector<double> centre, spread; ///< of each output; spread 0: not known
+    std::vector<double> pulse;          ///< of each force, beyond it a hit; infinite: it does not rest in between
 };
-usual_levels levels_of(const record_set& set);
+usual_values usual_of(const record_set& set);
 
 /// Samples about one that say whether it is a spike.
 constexpr std::size_t about_a_spike = 64;
 
 /// A row with its outputs that are spikes missing. @param rows  `count` of them, in which it stands at `at`
-void without_spikes(const double* rows, std::size_t count, std::size_t at, const usual_levels& usual, double* row);
+void without_spikes(const double* rows, std::size_t count, std::size_t at, const usual_values& usual, double* row);
 
 /// Bad samples of the outputs become missing (NaN, nothing is interpolated). Forces are not looked at: a hammer's is silent and
 /// spikes by nature.

@@ -163,8 +163,8 @@ def test_a_place_that_measures_nothing_is_named_and_rules_no_pole() -> None:
 
 
 def test_stepped_sines_of_a_free_structure() -> None:
-    """Receptances with finer lines where it rings: rigid motion has a million times the power, noise goes
-    with the response. All modes are found, as sharply as the lines show them, and the model explains them."""
+    """Receptances with finer lines where it rings, and noise that goes with them: at the first line rigid motion has at
+    least 900 times the power of the last mode. All modes are found, and the model explains the responses."""
     M, K = np.diag([2.0, 1.0, 1.5, 1.0, 1.2, 3.0]), np.zeros((6, 6))
     for a, k in enumerate([2e6, 1e6, 1.5e6, 8e5, 1e6]):
         K[a : a + 2, a : a + 2] += k * np.array([[1, -1], [-1, 1]])
@@ -182,7 +182,7 @@ def test_stepped_sines_of_a_free_structure() -> None:
         result = okid.identify_frf(Frf.of(line, h), sensing="displacement")
         assert len(result.confident_modes) == 5
         for k, mode in _paired(result, f_true):
-            assert mode.frequency_std_hz < 2e-3 * mode.damping_ratio * f_true[k] * 5
+            assert mode.frequency_std_hz < 0.01 * mode.damping_ratio * f_true[k]
             shares.append((mode.frequency_hz - f_true[k]) / mode.frequency_std_hz)
             shares.append((mode.damping_ratio - zeta_true[k]) / mode.damping_ratio_std)
         assert min(result.to_dict()["fit"]["simulation_percent"].values()) > 80.0

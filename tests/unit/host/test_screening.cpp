@@ -80,7 +80,7 @@ void spikes_of_single_rows(void) {
     y[1990] = 50; // within what judges it, but not to be judged at an end
     record_set set = set_of(y);
     for (std::size_t i = 0; i < y.size(); ++i) set.samples[3 * i] = i == 1198 ? 100 : 0.1 * static_cast<double>(i % 2);
-    const usual_levels usual = levels_of(set);
+    const usual_values usual = usual_of(set);
     TEST_ASSERT_EQUAL_DOUBLE(10, usual.pulse[0]);
     column row(3), gone;
     for (std::size_t i = 0; i < y.size(); ++i) {
