@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <tuple>
 
 namespace okid_host {
@@ -200,10 +201,11 @@ bool of_machine(const record_level& level, std::size_t m, std::size_t n_u, const
     return a.size() >= 2 * judgement::fewest_blocks && a.size() == b.size() && in_phase(a, b, n);
 }
 
-/// Does the amplitude fall as a free vibration of this damping does? One of a line stays, whatever the record's length.
+/// Does the amplitude fall as a free vibration of this damping does? One of a line stays, whatever the record's length. None:
+/// there are too few blocks to say.
 /// @param records  blocks under a Hann window, of each record; they have one slope, each its own height
 /// @param decay    of the amplitude from one block to the next, by the mode's damping (natural logarithm)
-bool decays(const std::vector<std::vector<complex>>& records, double decay) {
+std::optional<bool> decays(const std::vector<std::vector<complex>>& records, double decay) {
     double sxx = 0, sxy = 0, syy = 0, free = -1; // degrees of freedom
     for (const std::vector<complex>& a : records) {
         const auto n = static_cast<double>(a.size());
@@ -217,7 +219,7 @@ bool decays(const std::vector<std::vector<complex>>& records, double decay) {
         }
         if (!a.empty()) free += n - 1;
     }
-    if (free < 2) return false;
+    if (free < 2) return std::nullopt;
     const double slope = sxy / sxx, sigma = std::sqrt(std::max(0.0, syy - slope * sxy) / free / sxx);
     return -slope > judgement::falls * sigma && -slope > decay / judgement::as_damped &&
            -slope < decay * judgement::as_damped;
@@ -302,7 +304,8 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
     std::vector<std::vector<complex>> falling;
     for (const sample_rows& rows : level.records)
         falling.push_back(complete(amplitudes(rows, mode.frequency_hz / level.fs_hz, m, n_u, weights, step)));
-    return !decays(falling, rate * static_cast<double>(step) / level.fs_hz) &&
+    const std::optional<bool> falls = decays(falling, rate * static_cast<double>(step) / level.fs_hz);
+    return !falls.value_or(mode.damping_ratio > judgement::line_damping) &&
            explained(level, m, n_u, true, mode, modes, step) < judgement::explained;
 }
 

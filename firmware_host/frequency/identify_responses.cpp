@@ -8,6 +8,7 @@
 #include "files/nearest_name.hpp"
 #include "record/identify_options.hpp"
 #include "record/modal_model.hpp"
+#include "record/noisy_outputs.hpp"
 #include "record/record_check.hpp"
 #include "record/record_refine.hpp"
 #include "response_modes.hpp"
@@ -283,7 +284,7 @@ void make_result(const response_set& set, const record_options& options, double 
     work.set.n_y = set.outputs.size();
     make_modal_model(listed, work.context.fs_hz, work);
     fit_responses(set, options.sensing, work);
-    remark_noisy_output(work.context);
+    remark_noisy_outputs(work.context);
     for (std::size_t k = 0; k < modes.size(); ++k) {
         take_window_out(constant_s, "narrow", modes[k]);
         listed[k].frequency_hz = modes[k].frequency_hz;

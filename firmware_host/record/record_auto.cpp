@@ -14,6 +14,7 @@
 #include "modal_gain.hpp"
 #include "modal_model.hpp"
 #include "modal_refine.hpp"
+#include "noisy_outputs.hpp"
 #include "older_samples.hpp"
 #include "picks.hpp"
 #include "place_shapes.hpp"
@@ -268,6 +269,9 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
     };
     make_model();
     if (!options.by_hand() && mark_combinations(listed, options.fs_hz, work)) make_model();
+    if (!options.by_hand() && work.set.n_u > 0 && !work.force_is_older &&
+        mark_of_noisy_outputs(listed, options.fs_hz, work))
+        make_model();
     if (refine_agreed(options, listed, work)) make_model();
     deviations_by_fit(listed, work);
     remark_unsteady(listed, options.fs_hz, work);
@@ -286,7 +290,7 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
         work.context.prediction_percent.reset();
         return;
     }
-    remark_noisy_output(work.context);
+    remark_noisy_outputs(work.context);
     remark_low_fit(*work.context.prediction_percent, false, work.context); // a simulation has only the modes listed
 }
 

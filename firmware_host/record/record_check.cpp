@@ -327,24 +327,6 @@ void remark_low_fit(const std::vector<double>& percent, bool simulated, result_c
                     simulated ? ", a force that is not measured, columns exchanged, or an order too low" : ""));
 }
 
-void remark_noisy_output(result_context& context) {
-    constexpr double least_left = 0.15; // share of an output's amplitude
-    constexpr double times_more = 5;    // than of the middle one; up to 2.2 among good sensors of measured records
-    if (!context.simulation_percent || context.simulation_percent->size() < 3) return;
-    const auto left_of = [&](std::size_t k) { return 1 - (*context.simulation_percent)[k] / 100; };
-    std::vector<double> left;
-    for (std::size_t k = 0; k < context.simulation_percent->size(); ++k) left.push_back(left_of(k));
-    if (std::any_of(left.begin(), left.end(), [](double x) { return std::isnan(x); })) return;
-    const double middle = in_order(left, (left.size() - 1) / 2);
-    for (std::size_t k = 0; k < left.size() && k < context.outputs.size(); ++k)
-        if (left_of(k) > least_left && left_of(k) > times_more * middle)
-            context.warnings.emplace_back(
-                "noisy_output",
-                fmt::format("output \"{}\" is much noisier than the rest: the model leaves {:.0f} % of it, "
-                            "{:.1f} % of the middle one. Look at its sensor, range and cable",
-                            context.outputs[k], 100 * left_of(k), 100 * middle));
-}
-
 void remark_exchanged(const std::vector<std::string>& units, const record_options& options, remarks& said) {
     const auto is_force = [&](std::size_t column, const std::string& name) {
         const unit_rule* rule = column < units.size() && !units[column].empty() ? find_unit(units[column]) : nullptr;

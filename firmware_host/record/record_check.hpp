@@ -62,9 +62,6 @@ void check_explains(const result_context& context);
 /// Outputs that the model hardly follows, simulated or predicted one sample ahead: adds the remark fit_low.
 void remark_low_fit(const std::vector<double>& percent, bool simulated, result_context& context);
 
-/// An output of which the simulation leaves far more than of the others: adds the remark noisy_output.
-void remark_noisy_output(result_context& context);
-
 /// A force among the outputs and another quantity among the inputs, by unit or name: adds the remark exchanged.
 void remark_exchanged(const std::vector<std::string>& units, const record_options& options, remarks& said);
 

@@ -22,6 +22,7 @@ constexpr std::size_t clean_lags = 60; // what a long horizon needs in one piece
 constexpr double extreme_bin = 0.01;   // of the range, just below the extreme
 constexpr double extreme_ratio = 3;    // at the extreme over just below it; 2.4 for a sampled sine
 constexpr std::size_t fewest_extreme = 10;
+constexpr std::size_t parts = 16, shortest_part = 500; // samples; of a record, each may have a range of its own
 constexpr std::size_t frozen_run = 32, zero_run = 6;
 constexpr double usual_runs = 8;     // times the longest of all but the rarest thousandth of runs
 constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
@@ -80,9 +81,15 @@ struct fault {
     const record_data* record = nullptr;
 };
 
-/// Samples at one extreme, where they are a flat top: far more than just below it, and than at the next value below it.
-void find_clipped(const output_view& y, double extreme, double range, const std::vector<stretch_of_equal>& runs,
-                  fault& found) {
+/// Some stretches that follow each other.
+struct stretches_view {
+    std::vector<stretch_of_equal>::const_iterator first, last;
+    auto begin() const { return first; }
+    auto end() const { return last; }
+};
+
+/// Is an extreme of these stretches a flat top: far more samples than just below it, and than at the next value below it?
+bool is_flat(const stretches_view& runs, double extreme, double range) {
     double next = NAN;
     for (const stretch_of_equal& run : runs)
         if (run.value != extreme && !(std::abs(run.value - extreme) > std::abs(next - extreme))) next = run.value;
@@ -94,10 +101,32 @@ void find_clipped(const output_view& y, double extreme, double range, const std:
             below += run.count;
         if (run.value == next) at_next += run.count;
     }
-    if (at < fewest_extreme || static_cast<double>(at) < extreme_ratio * static_cast<double>(std::max(below, at_next)))
-        return;
-    for (std::size_t i = 0; i < y.size(); ++i)
-        if (y.at(i) == extreme) found.samples.push_back(i);
+    return at >= fewest_extreme &&
+           static_cast<double>(at) >= extreme_ratio * static_cast<double>(std::max(below, at_next));
+}
+
+/// Flat tops of a record, and of parts of it in which the channel moves as usual: a range that is changed later leaves them
+/// below the extreme. What is at the same value in the parts beside is flat as well.
+void find_clipped(const output_view& y, const std::vector<stretch_of_equal>& runs, double usual, fault& found) {
+    const auto at = [&](std::size_t sample) {
+        return std::lower_bound(runs.begin(), runs.end(), sample,
+                                [](const stretch_of_equal& run, std::size_t i) { return run.first < i; });
+    };
+    const auto look = [&](std::size_t first, std::size_t last, std::size_t beside) {
+        const stretches_view part{at(first), at(last)};
+        if (part.first == part.last) return;
+        const auto lower = [](const stretch_of_equal& a, const stretch_of_equal& b) { return a.value < b.value; };
+        const auto [low, high] = std::minmax_element(part.begin(), part.end(), lower);
+        const std::size_t from = first - std::min(first, beside), to = std::min(y.size(), last + beside);
+        for (const double extreme : {low->value, high->value})
+            if (is_flat(part, extreme, high->value - low->value))
+                for (std::size_t i = from; i < to; ++i)
+                    if (y.at(i) == extreme) found.samples.push_back(i);
+    };
+    look(0, y.size(), 0);
+    const std::size_t length = y.size() / parts;
+    for (std::size_t first = 0; length >= shortest_part && first + length <= y.size(); first += length)
+        if (spread_of(y, first, first + length) > moving_share * usual) look(first, first + length, length);
 }
 
 /// The channel moves beside a stretch as it usually does.
@@ -246,23 +275,26 @@ std::string fault_text(const std::string& output, const std::vector<fault>& foun
 
 /// Faults of one output of one record; their samples become missing.
 std::vector<fault> screen(const output_view& y, const force_times& forces) {
-    const std::vector<stretch_of_equal> runs = equal_stretches(y);
+    std::vector<stretch_of_equal> runs = equal_stretches(y);
     if (runs.size() == 1 && y.size() >= frozen_run) { // of one of several records: is_dead() has seen the others
         for (std::size_t i = 0; i < y.size(); ++i) y.drop(i);
         return {{never_moves, {}, &y.record}};
     }
     if (runs.size() < 3) return {};
+    fault clipped{"clipped", {}}, frozen{"frozen at one value", {}}, zeros{"dropped to zero", {}}, spikes{"spikes", {}};
+    find_spikes(y, forces.struck, spikes);
+    for (const std::size_t i : spikes.samples) y.drop(i); // no flat top is below a spike
+    runs = equal_stretches(y);
     double low = INFINITY, high = -INFINITY;
     for (const stretch_of_equal& run : runs) low = std::min(low, run.value), high = std::max(high, run.value);
-    fault clipped{"clipped", {}}, frozen{"frozen at one value", {}}, zeros{"dropped to zero", {}}, spikes{"spikes", {}};
-    find_clipped(y, high, high - low, runs, clipped);
-    find_clipped(y, low, high - low, runs, clipped);
-    find_frozen(y, runs, forces.resting, spread_of(y, 0, y.size()), low, high, frozen, zeros);
-    find_spikes(y, forces.struck, spikes);
+    const double usual = spread_of(y, 0, y.size());
+    find_clipped(y, runs, usual, clipped);
+    find_frozen(y, runs, forces.resting, usual, low, high, frozen, zeros);
     std::vector<fault> out;
     for (fault* found : {&clipped, &frozen, &zeros, &spikes}) {
         if (found->samples.empty()) continue;
         std::sort(found->samples.begin(), found->samples.end());
+        found->samples.erase(std::unique(found->samples.begin(), found->samples.end()), found->samples.end());
         for (const std::size_t i : found->samples) y.drop(i);
         found->record = &y.record;
         out.push_back(std::move(*found));

@@ -31,7 +31,7 @@ constexpr double decisive = 0.2;        // of the effective number of blocks: th
 constexpr double borne_out = 5;         // deviations of a slope, at least, without them
 constexpr double worth_saying = 0.02;   // change over the half-power bandwidth
 constexpr double widest = 0.1;          // damping above: nothing repeats over a block
-constexpr double alone = 4;             // bandwidths to the next mode, without a force
+constexpr double alone = 4;             // bandwidths to the next mode or tone, without a force
 constexpr double outstanding = 2;       // a mode over what the model leaves: below, that is mostly something else
 constexpr double throughout = 0.5;      // of the time, in which the middle 90 % of the evidence on a drift lie
 
@@ -117,6 +117,7 @@ slopes firm_slopes(const std::vector<block_frequency>& over, double block_freque
 struct steady_search {
     const record_set& set;
     std::vector<const listed_mode*> modes; ///< those in the model
+    std::vector<double> tones;             ///< Hz, of machines and the mains
     std::vector<complex> mu;
     double fs_hz;
     std::vector<double> spread; ///< of each output's residual
@@ -244,10 +245,12 @@ double share_seen(double decay, std::size_t width, std::size_t apart) {
 std::vector<block_frequency> turning(const steady_search& s, std::size_t k) {
     std::vector<block_frequency> out;
     const listed_mode& mode = *s.modes[k];
+    const auto beside = [&mode](double hz) {
+        return std::abs(hz - mode.frequency_hz) < alone * 2 * mode.damping_ratio * mode.frequency_hz;
+    };
     for (std::size_t i = 0; i < s.modes.size(); ++i)
-        if (i != k &&
-            std::abs(s.modes[i]->frequency_hz - mode.frequency_hz) < alone * 2 * mode.damping_ratio * mode.frequency_hz)
-            return out;
+        if (i != k && beside(s.modes[i]->frequency_hz)) return out;
+    if (std::any_of(s.tones.begin(), s.tones.end(), beside)) return out; // its phase runs through the mode's
     const auto width =
         std::max(least_block, static_cast<std::size_t>(s.fs_hz / (2 * mode.damping_ratio * mode.frequency_hz)));
     const std::size_t apart = width / 4;
@@ -282,11 +285,15 @@ std::vector<block_frequency> turning(const steady_search& s, std::size_t k) {
 } // namespace
 
 void remark_unsteady(const std::vector<listed_mode>& modes, double fs_hz, record_work& work) {
-    steady_search s{work.set, {}, {}, fs_hz, {}, {}};
-    for (const listed_mode& mode : modes) {
-        if (!mode.in_model) continue;
-        s.modes.push_back(&mode);
-        s.mu.push_back(discrete_pole(mode, 1 / fs_hz));
+    steady_search s{work.set, {}, {}, {}, fs_hz, {}, {}};
+    const std::vector<mode_verdict>& verdicts = work.context.verdicts;
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        if (!modes[k].in_model) {
+            if (k < verdicts.size() && is_tone(verdicts[k].why)) s.tones.push_back(modes[k].frequency_hz);
+            continue;
+        }
+        s.modes.push_back(&modes[k]);
+        s.mu.push_back(discrete_pole(modes[k], 1 / fs_hz));
     }
     const bool driven = work.set.n_u > 0;
     if (driven && (!work.context.x0 || work.model.n_u != static_cast<int>(work.set.n_u))) return;

@@ -110,6 +110,12 @@ constexpr double by_chance = 12; ///< blocks times coherence squared: phases of 
 constexpr double left_alone = 0.8; ///< of the power at a mode: the force has no part in it
 constexpr double undriven = 0.5;   ///< … where the structure is known not to be linear
 
+// Outputs that the model explains far less than the others.
+constexpr double noisy_left = 0.15; ///< of an output's amplitude, in a simulation
+constexpr double noisier = 5;       ///< times the share of the middle one; 2.2 among good sensors of measured records
+constexpr std::size_t fewest_to_compare = 3; ///< outputs
+constexpr double in_a_noisy_output = 0.8;    ///< of the power of a shape; of modes of the structure 0.65 and less
+
 // Frequency responses.
 constexpr double least_strength = 2; ///< of a residue matrix over its noise
 constexpr double narrowest = 0.25;   ///< half a resonance's width in lines: below it no damping shows

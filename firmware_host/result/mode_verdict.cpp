@@ -14,7 +14,7 @@
 namespace okid_host {
 namespace {
 
-constexpr std::array<std::pair<const char*, const char*>, 11> words{{
+constexpr std::array<std::pair<const char*, const char*>, 12> words{{
     {"few_runs", "fewer than half of the runs that could see it found it"},
     {"noise_shape", "short-lived, complex or scattering: probably noise"},
     {"split", "too near to a stronger one of the same shape: probably the same mode"},
@@ -22,6 +22,7 @@ constexpr std::array<std::pair<const char*, const char*>, 11> words{{
     {"pickup", "a steady line at a multiple of the mains frequency"},
     {"harmonic", "a multiple, sum or difference of stronger vibrations, or a multiple of the drive"},
     {"undriven", "a structure that is not linear, and no resonance in what the forces drive there"},
+    {"noisy_output", "seen nearly alone by an output that the model explains far less than the others"},
     {"wide_sigma", "its standard deviation is too wide"},
     {"band_edge", "too slow for the record, or at the edge of the band or of the force"},
     {"overdamped", "damped too much to vibrate"},

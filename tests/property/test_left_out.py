@@ -89,6 +89,27 @@ def test_a_noisy_output_is_named() -> None:
     assert said[0] == [] and len(said[1]) == 1 and said[1][0].startswith('output "y3" is much noisier than the rest')
 
 
+@pytest.mark.parametrize("fault", ["polarity", "gain", "noise", "clipped early"])
+def test_a_sensor_that_fails_half_way_adds_no_mode(fault: str) -> None:
+    """Its part of each mode is no mode by itself: all modes of the structure are found, and no other is believed."""
+    lab = forced(14, count=10000)
+    y = lab.samples[:, lab.n_u :].copy()
+    bad, spread = y[:, 2], y[:, 2].std()
+    if fault == "polarity":
+        bad[5000:] *= -1
+    elif fault == "gain":
+        bad[5000:] *= 2
+    elif fault == "noise":
+        bad[5000:] = spread * np.random.default_rng(1).standard_normal(5000)
+    else:
+        bad[:5000] = np.clip(bad[:5000], -spread, spread)
+    result = okid.identify(lab.samples[:, : lab.n_u], y, fs=lab.fs, output_names=NAMES, sigma_blocks=0)
+    said = " ".join(w.text for w in result.warnings if w.code in {"noisy_output", "screened"})
+    assert 'output "y2"' in said
+    found = [mode.frequency_hz for mode in result.confident_modes]
+    np.testing.assert_allclose(found, lab.frequency_hz, rtol=2e-3)
+
+
 def test_a_sensor_that_dies_between_records_costs_no_record() -> None:
     """Five records, one with a dead sensor, another that holds no number of another one: no record is lost for it."""
     lab = forced(21, count=10000)

@@ -200,6 +200,19 @@ static void a_decay_is_no_line_however_short_the_record() {
     TEST_ASSERT_EQUAL_UINT64(1, listed(line, false, {pole(3, 5e-4, 1)})[0].why.size());
 }
 
+/// Of a mode that dies within three periods no more than one block a hit is left: nothing says that it is a line.
+static void a_damped_mode_of_hits_is_no_line() {
+    record_level level = one_record();
+    level.records.clear();
+    for (int hit = 0; hit < 15; ++hit) {
+        std::complex<double> state = 1.0 + 0.05 * hit;
+        sample_rows& rows = level.records.emplace_back();
+        for (int i = 0; i < 96; ++i, state *= pole_of(4, 0.04))
+            rows.insert(rows.end(), {state.imag(), -0.5 * state.imag()});
+    }
+    TEST_ASSERT_EQUAL_UINT64(0, listed(level, false, {pole(4, 0.04, -0.5)})[0].why.size());
+}
+
 /// A simple part of the rate in one output of two is the converter's; in both, or elsewhere, it is not.
 static void a_part_of_the_rate_in_one_output_is_pickup() {
     const record_level level = answered(24, 0.02, false, 7, 0, 8);
@@ -248,6 +261,7 @@ static void a_mode_beside_a_strong_tone_is_no_line() {
 int main() {
     UNITY_BEGIN();
     RUN_TEST(a_decay_is_no_line_however_short_the_record);
+    RUN_TEST(a_damped_mode_of_hits_is_no_line);
     RUN_TEST(a_weak_mode_that_begins_with_the_hit_is_no_line);
     RUN_TEST(a_part_of_the_rate_in_one_output_is_pickup);
     RUN_TEST(a_line_is_seen_along_its_shape);

@@ -129,6 +129,29 @@ static void clipped_is_three_times_what_is_just_below() {
     }
 }
 
+static void a_flat_top_below_a_spike_is_one() {
+    column y = moving();
+    put(y, 1, 10);
+    y[700] = 40;
+    const outcome one = screened(y);
+    TEST_ASSERT_TRUE(says(one, "clipped (10 samples") && says(one, "spikes (1 sample, the first is number 700)"));
+    TEST_ASSERT_EQUAL_UINT64(11, one.missing.size());
+}
+
+/// The range was smaller at first: parts of 500 samples have their own extremes, and lend them to their neighbours.
+static void a_flat_top_of_a_part_is_one() {
+    for (const std::size_t count : {7999U, 8000U}) {
+        column y = moving(count);
+        std::size_t clipped = 0;
+        for (std::size_t i = 2200; i < 3300; ++i)
+            if (y[i] > 0.6) y[i] = 0.6, ++clipped;
+        TEST_ASSERT_EQUAL_UINT64(count == 8000 ? clipped : 0, screened(y).missing.size());
+    }
+    column y = moving(8000); // a quiet part shows the steps of its converter, three samples of four on one of two
+    for (std::size_t i = 2000; i < 4000; ++i) y[i] = i % 5 ? 0.1 : 0.0;
+    TEST_ASSERT_TRUE(screened(y).missing.empty());
+}
+
 static void thirty_two_equal_samples_are_frozen() {
     TEST_ASSERT_TRUE(screened(held(0.33, 31)).missing.empty());
     const outcome one = screened(held(0.33, 32));
@@ -303,6 +326,8 @@ int main() {
     RUN_TEST(a_sound_output_is_left_alone);
     RUN_TEST(ten_samples_at_an_extreme_are_clipped);
     RUN_TEST(clipped_is_three_times_what_is_just_below);
+    RUN_TEST(a_flat_top_below_a_spike_is_one);
+    RUN_TEST(a_flat_top_of_a_part_is_one);
     RUN_TEST(thirty_two_equal_samples_are_frozen);
     RUN_TEST(eight_zeros_are_a_drop);
     RUN_TEST(a_slow_channel_keeps_its_values_longer);

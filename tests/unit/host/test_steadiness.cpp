@@ -135,6 +135,24 @@ static void what_cannot_be_judged_is_not() {
     TEST_ASSERT_FALSE(of_force(with_time(2 * width), 0.05, 0.3, 0.7).drift());
 }
 
+/// A pump a bandwidth away, eight times as strong as the mode: the louder both are together, the more it turns the phase.
+static void a_tone_beside_a_mode_is_no_law_of_its_level() {
+    series output = moving(long_enough, steady);
+    for (std::size_t t = 0; t < output.size(); ++t)
+        output[t] += 6 * std::cos(2 * M_PI * 10.2 / sample_rate * static_cast<double>(t));
+    listed_mode tone = mode_at(10.2, 1e-5);
+    tone.in_model = false;
+    const auto with = [&](const char* code) {
+        judged out;
+        out.work.set = record_of({output});
+        out.work.context.verdicts = {{true, 1, {}, false}, {false, 1, {code}, false}};
+        remark_unsteady({mode_at(10, 0.01), tone}, sample_rate, out.work);
+        return out.level();
+    };
+    TEST_ASSERT_TRUE(with("few_runs"));
+    TEST_ASSERT_FALSE(with("tone"));
+}
+
 /// Twelve blocks of ten periods of one weight, 256 samples each.
 static void few_blocks_show_no_slope() {
     TEST_ASSERT_FALSE(of_force(with_time(width), 1e-5, 0, 1, 11 * 256).drift());
@@ -148,6 +166,7 @@ int main() {
     RUN_TEST(a_frequency_drifts);
     RUN_TEST(a_small_change_is_not_worth_a_word);
     RUN_TEST(what_cannot_be_judged_is_not);
+    RUN_TEST(a_tone_beside_a_mode_is_no_law_of_its_level);
     RUN_TEST(few_blocks_show_no_slope);
     return UNITY_END();
 }
