@@ -82,6 +82,18 @@ void check_targets(const identify_arguments& given) {
         usage(fmt::format("--json and --model both name {}, expected two files", given.json));
 }
 
+/// A channel has one unit in all records. @param everywhere  it needs one in all of them, or in none
+void check_units(const csv_record& record, const std::vector<std::string>& units, bool everywhere,
+                 const std::string& first) {
+    const auto said = [](const std::string& unit) { return unit.empty() ? "has no unit" : "is in " + printable(unit); };
+    for (std::size_t c = 0; c < units.size(); ++c) {
+        const std::string &own = record.units[c], &wanted = units[c];
+        if (own == wanted || (!everywhere && (own.empty() || wanted.empty()))) continue;
+        usage(fmt::format("{}: \"{}\" {}, in {} it {}; expected one unit: convert one of the files, or leave it out",
+                          record.path, printable(record.columns[c]), said(own), first, said(wanted)));
+    }
+}
+
 /// @param outputs  those of options.outputs that the records have
 /// @param units  becomes those of the first record
 record_set read_records(const identify_arguments& given, record_files& files, const std::vector<std::string>& outputs,
@@ -106,9 +118,7 @@ record_set read_records(const identify_arguments& given, record_files& files, co
                                       fmt::format("--fs {:g} is used, {} says {:g} Hz: every frequency "
                                                   "scales with it",
                                                   *request.fs_hz, path, *record.said_fs_hz));
-        if ((options.mass.wanted() || !options.hits.empty()) && record.units != units)
-            usage(fmt::format("{}: the units in the header are not those of {}, expected the same", path,
-                              given.records.front()));
+        check_units(record, units, options.mass.wanted() || !options.hits.empty(), given.records.front());
         if (std::abs(record.fs_hz - options.fs_hz) > 1e-6 * options.fs_hz)
             usage(fmt::format(
                 "{}: found a sample rate of {} Hz, expected {} Hz as in {}: only records of one rate can be merged",
@@ -128,8 +138,9 @@ void keep_units(const std::vector<std::string>& outputs, const std::string& path
                                 : std::find(options.outputs.begin(), options.outputs.end(), outputs[c - n_u]);
         std::string& known = all[c < n_u ? c : n_u + static_cast<std::size_t>(at - options.outputs.begin())];
         if (!known.empty() && !own[c].empty() && known != own[c])
-            usage(fmt::format("{}: \"{}\" is in {}, in an earlier file in {}; expected one unit for a sensor", path,
-                              printable(c < n_u ? options.inputs[c] : outputs[c - n_u]), printable(own[c]),
+            usage(fmt::format("{}: \"{}\" is in {}, in an earlier file in {}; expected one unit for a sensor: convert "
+                              "one of the files, or leave it out",
+                              path, printable(c < n_u ? options.inputs[c] : outputs[c - n_u]), printable(own[c]),
                               printable(known)));
         if (!own[c].empty()) known = own[c];
     }

@@ -8,6 +8,7 @@
 #include "error.hpp"
 #include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
+#include "record/csv_header.hpp"
 #include "record/foreign_table.hpp"
 
 #include <algorithm>
@@ -177,6 +178,18 @@ bool is_foreign(const std::string& path) {
     return std::find(foreign_endings.begin(), foreign_endings.end(), own) != foreign_endings.end();
 }
 
+/// Does the table that a file was converted to have a column that its own first line lacks? Then that line is no head.
+bool has_other_columns(const std::string& path, const std::string& table) {
+    std::vector<std::string> own;
+    try {
+        own = read_csv_columns(path);
+    } catch (const failure&) {
+        return true;
+    }
+    const std::vector<std::string> found = read_csv_columns(table);
+    return std::any_of(found.begin(), found.end(), [&own](const std::string& name) { return !has_column(own, name); });
+}
+
 } // namespace
 
 nameless_table::nameless_table(const std::string& path, const std::string& group, bool quiet) {
@@ -215,8 +228,9 @@ template <class Read> auto record_files::as_table(const std::string& path, Read 
         try {
             return from_table(path, reader, false);
         } catch (const failure& fault) {
+            const bool read = tables_[path] && has_other_columns(path, tables_[path]->path());
             tables_.erase(path);
-            if (fault.code == exit_interrupted) throw;
+            if (read || fault.code == exit_interrupted) throw;
         }
         throw;
     }

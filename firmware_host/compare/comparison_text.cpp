@@ -65,7 +65,8 @@ std::string cell(double value, const char* form, int width) {
 }
 
 std::string shift_cells(const value_shift& of) {
-    return cell(of.percent(), "{:+.4f}", 11) + cell(of.deviation_percent(), "±{:.2g}", 10) + cell(of.z, "{:+.1f}", 8);
+    return cell(of.percent(), "{:+.4f}", 11) + cell(of.deviation_percent(), "±{:.2g}", 10) +
+           cell(of.z, std::abs(of.z) < 1e4 ? "{:+.1f}" : "{:+.0e}", 8);
 }
 
 std::string only_text(const char* where, const known_result& of, const std::vector<std::size_t>& modes) {

@@ -9,7 +9,6 @@
 #include "record/identify_options.hpp"
 #include "record/modal_model.hpp"
 #include "record/noisy_outputs.hpp"
-#include "record/record_check.hpp"
 #include "record/record_refine.hpp"
 #include "response_modes.hpp"
 #include "result/drive_mass.hpp"

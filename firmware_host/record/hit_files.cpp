@@ -239,7 +239,11 @@ std::string places_of_names(const std::string& expression, const std::vector<std
     std::vector<std::string> out;
     for (const std::string& path : paths) {
         if (!std::filesystem::is_regular_file(path))
-            throw failure(exit_usage, fmt::format("{}: no such file, expected the records of the hits", path));
+            throw failure(exit_usage, fmt::format("{}: {}", path,
+                                                  std::filesystem::is_directory(path)
+                                                      ? "is a folder, expected the files in it: give them as " +
+                                                            (std::filesystem::path(path) / "*.csv").string()
+                                                      : "no such file, expected the records of the hits"));
         const std::string name = file_name(path).substr(0, longest_name);
         std::smatch found;
         if (!std::regex_search(name, found, wanted))

@@ -59,6 +59,7 @@ void remark_noisy_outputs(result_context& context) {
 }
 
 bool mark_of_noisy_outputs(std::vector<listed_mode>& modes, double fs_hz, record_work& work) {
+    if (work.set.n_y < judgement::fewest_to_compare) return false;
     std::vector<std::pair<std::size_t, std::size_t>> alone = shown_by_one(modes, work);
     if (alone.empty()) return false;
     std::vector<listed_mode> listed = modes; // what doubtful ones explain is no noise

@@ -6,7 +6,6 @@
 #include "screening.hpp"
 
 #include "files/order_statistics.hpp"
-#include "record_check.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -40,7 +39,7 @@ struct stretch_of_equal {
     double value;
 };
 
-/// One output in rows.
+/// One channel in rows.
 struct samples_view {
     const double* first = nullptr;
     std::size_t stride = 1, count = 0;
@@ -284,7 +283,7 @@ std::vector<fault> screen(const output_view& y, const force_times& forces) {
     fault clipped{"clipped", {}}, frozen{"frozen at one value", {}}, zeros{"dropped to zero", {}}, spikes{"spikes", {}};
     find_spikes(y, forces.struck, spikes);
     for (const std::size_t i : spikes.samples) y.drop(i); // no flat top is below a spike
-    runs = equal_stretches(y);
+    if (!spikes.samples.empty()) runs = equal_stretches(y);
     double low = INFINITY, high = -INFINITY;
     for (const stretch_of_equal& run : runs) low = std::min(low, run.value), high = std::max(high, run.value);
     const double usual = spread_of(y, 0, y.size());

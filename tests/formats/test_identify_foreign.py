@@ -108,10 +108,16 @@ def test_what_okid_convert_cannot_read_either(folder: Path) -> None:
     rows[50] += ",1"
     (folder / "ragged.csv").write_text("\n".join(["time_s," + ",".join(NAMES), *rows]) + "\n")
     (folder / "no_rate.csv").write_text("u,y\n" + "1.5,2.5\n-3.5,4.5\n" * 50)
+    (folder / "no_head.csv").write_text("1.5,2.5\n-3.5,4.5\n" * 50)
+    (folder / "logger.csv").write_text(
+        "\n".join(["Operator: A", "Date: today", "time_s," + ",".join(NAMES), *rows_of_a_logger()]) + "\n"
+    )
     for name, options, part in (
         ("ragged.csv", CHOSEN, "line 52: found 6 cells, expected 5"),
         ("no_rate.csv", ("--inputs", "u", "--outputs", "y"), "no sample rate; expected --fs HZ"),
         ("no_rate.csv", ("--inputs", "u", "--outputs", "x"), 'no column "x"'),
+        ("logger.csv", ("--inputs", "u", "--outputs", "y"), f"no column \"u\"; the columns are: {', '.join(NAMES)}"),
+        ("no_head.csv", ("--fs", "9", "--inputs", "c1", "--outputs", "d"), "the columns are: c1, c2"),
     ):
         said = okid("identify", folder / name, *options, status=2).stderr
         assert said.startswith(f"okid: {folder / name}") and part in said and said.count("\n") == 1, said

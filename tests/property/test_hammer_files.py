@@ -147,7 +147,10 @@ def test_bad_input(tmp_path: Path) -> None:
     assert "--keep-all belongs to" in refused(*paths, "--keep-all")
     other = tmp_path / "P1_2.csv"
     other.write_text(paths[0].read_text().replace("[m/s^2]", "[g]"))
-    assert "P1_2.csv: the units in the header" in refused(*paths, other, *PLACES)
+    assert 'P1_2.csv: "Acc1" is in g, in ' in (units := refused(*paths, other, *PLACES))
+    assert "it is in m/s^2; expected one unit: convert one of the files" in units
+    assert units == refused(*paths, other)  # merged as records too
+    assert f"{tmp_path}: is a folder, expected the files in it" in refused(tmp_path, *PLACES)
     other.write_text(paths[0].read_text().replace("2048", "1024"))
     assert "P1_2.csv: found a sample rate of 1024" in refused(*paths, other, *PLACES)
     other.write_text("no record\n")

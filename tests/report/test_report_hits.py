@@ -114,6 +114,31 @@ def test_records_named_by_the_result(folder: Path, tmp_path: Path, capsys: pytes
     assert same[0] == same[1]
 
 
+def test_hits_in_a_folder_beside(folder: Path, tmp_path: Path) -> None:
+    """Two tests of one structure, whose files have the same names: which one is asked, not guessed."""
+    shutil.copy(folder / "all.json", tmp_path / "all.json")
+    alone = set()
+    for name in ("after", "before"):
+        shutil.copytree(folder, tmp_path / name)
+        assert report.main([str(tmp_path / "all.json")]) == 0
+        page = unescape((tmp_path / "all.html").read_text())
+        alone.add(re.sub(str(tmp_path), "", "".join(re.findall(r"\(files of their names are in .*?\)", page)[:1])))
+        assert ("hits (files of their names" in page) == (name == "before")
+    assert alone == {"", "(files of their names are in /after and in /before: --record says which)"}
+
+
+def test_hits_of_numpy(folder: Path, tmp_path: Path) -> None:
+    """Files that `okid identify` reads are read by the report."""
+    paths = []
+    for path in sorted(folder.glob("P0[1-3]_*.csv")):
+        paths.append(tmp_path / f"{path.stem}.npy")
+        np.save(paths[-1], okid.read_csv(path).samples)
+    channels = ["--inputs", "c1", "--outputs", "c2,c3", "--places", r"P(\d+)_", "--output-dofs", "1,5"]
+    program("identify", *paths, *channels, "--fs", str(beam.FS), "--json", tmp_path / "all.json", status=0)
+    assert report.main([str(tmp_path / "all.json")]) == 0
+    assert "6 of 6 hits at 3 places were used" in unescape((tmp_path / "all.html").read_text())
+
+
 def test_files_that_do_not_belong(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = [folder / "all.json", "--out", tmp_path / "o.html", "--record"]
     records = sorted(folder.glob("P*.csv"))

@@ -154,9 +154,8 @@ def take_records(result: Loaded, record: Given | Sequence[Given] | None, source:
     given = listed(record)
     absent = ""
     if not given and is_struck(result) and source is not None:
-        found, lost = files_beside(result, [Path(source).parent, Path()])
-        given = [] if lost else list(found)
-        absent = f"the files of the hits are not beside it ({lost[0]} ..)" if lost else ""
+        found, absent = files_beside(result, [Path(source).parent, Path()])
+        given = list(found)
     if not given:
         return Taken(None, [], absent)
     if result.raw.get("set_ups"):

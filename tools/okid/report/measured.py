@@ -81,7 +81,7 @@ class Measured:
 
 def open_record(path: str | Path) -> Record:
     """A record of any format the package reads, by the extension of its name."""
-    if Path(path).suffix.lower() == ".csv":
+    if Path(path).suffix.lower() in (".csv", ".npy"):
         return read_csv(path)
     from okid.formats import read_record  # brings the libraries of the formats with it
 

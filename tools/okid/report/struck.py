@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,16 +61,25 @@ def hits_of_records(result: Loaded) -> list[list[dict[str, Any]]]:
     return out
 
 
-def files_beside(result: Loaded, folders: Sequence[Path]) -> tuple[list[Path], list[str]]:
-    """The files of the accepted hits in the first of these folders that has any, and the names of those not there."""
+def files_beside(result: Loaded, folders: Sequence[Path]) -> tuple[list[Path], str]:
+    """The files of the accepted hits, in the first of these folders that has any, else in the only folder inside them
+    that has; none: why not. Tests of one structure name their files alike: of two folders none is taken."""
     wanted = [hits for hits in hits_of_records(result) if any(hit["accepted"] for hit in hits)]
     names = [_names(hits)[0] for hits in wanted]
-    inside = (inner for one in folders for inner in sorted(one.glob("*/")) if inner.is_dir())
-    for folder in chain(folders, inside):
-        found = [folder / name for name in names if (folder / name).is_file()]
-        if found and len(set(names)) == len(names):
-            return found, [name for name in names if not (folder / name).is_file()]
-    return [], names
+    if len(set(names)) < len(names):
+        return [], "several hits have one name: --record gives their files in the order of the identification"
+    inside = {inner.resolve(): inner for one in folders for inner in sorted(one.glob("*/")) if inner.is_dir()}
+    here = [one for one in folders if any((one / name).is_file() for name in names)]
+    there = [one for one in inside.values() if any((one / name).is_file() for name in names)]
+    if not here and len(there) > 1:
+        return [], f"files of their names are in {there[0]} and in {there[1]}: --record says which"
+    folder = next(iter(here + there), None)
+    if folder is None:
+        return [], f"the files of the hits are not beside it ({names[0]} ..)"
+    lost = [name for name in names if not (folder / name).is_file()]
+    if lost:
+        return [], f"not all files of the hits are in {folder} ({lost[0]} ..)"
+    return [folder / name for name in names], ""
 
 
 def hits_of_files(result: Loaded, paths: Sequence[Path]) -> list[tuple[dict[str, Any], Path]]:
