@@ -187,18 +187,28 @@ const record_level& seen_by(const std::vector<record_level>& levels, double freq
     return levels[k];
 }
 
-/// Is it the n-th multiple of a machine's tone? As strong as it may be, and however the machine wanders.
-bool of_machine(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& tone,
-                const consensus_mode& mode, int n) {
-    if (mode.damping_ratio > judgement::line_damping || !has_code(tone.why, "tone") ||
-        !near_multiple(mode.frequency_hz, n * tone.frequency_hz, judgement::mains_tolerance))
-        return false;
-    const auto block = static_cast<std::size_t>(judgement::machine_periods * level.fs_hz / tone.frequency_hz) + 1;
+/// Is a vibration the n-th multiple of another of the same machine, one of both a tone? As strong as it may be, and however
+/// the machine wanders.
+bool of_machine(const std::vector<record_level>& levels, std::size_t m, std::size_t n_u, const consensus_mode& base,
+                const consensus_mode& over, int n) {
+    if (!near_multiple(over.frequency_hz, n * base.frequency_hz, judgement::mains_tolerance)) return false;
+    const record_level& level = seen_by(levels, over.frequency_hz);
+    const auto block = static_cast<std::size_t>(judgement::machine_periods * level.fs_hz / base.frequency_hz) + 1;
     const auto along = [&](const consensus_mode& one, double frequency_hz) {
         return amplitudes(level, m, n_u, weights_along(one.shape), frequency_hz, block);
     };
-    const std::vector<complex> a = along(tone, tone.frequency_hz), b = along(mode, n * tone.frequency_hz);
+    const std::vector<complex> a = along(base, base.frequency_hz), b = along(over, n * base.frequency_hz);
     return a.size() >= 2 * judgement::fewest_blocks && a.size() == b.size() && in_phase(a, b, n);
+}
+
+/// Is it a multiple of a tone, or a tone a multiple of it?
+bool of_tone(const std::vector<record_level>& levels, std::size_t m, std::size_t n_u, const consensus_mode& mode,
+             const consensus_mode& tone) {
+    if (mode.damping_ratio > judgement::line_damping || !has_code(tone.why, "tone")) return false;
+    const bool above = mode.frequency_hz > tone.frequency_hz;
+    const consensus_mode &base = above ? tone : mode, &over = above ? mode : tone;
+    const int n = static_cast<int>(std::lround(over.frequency_hz / base.frequency_hz));
+    return n >= 2 && n <= judgement::most_multiple && of_machine(levels, m, n_u, base, over, n);
 }
 
 /// Does the amplitude fall as a free vibration of this damping does? One of a line stays, whatever the record's length. None:
@@ -452,11 +462,10 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
         }
         for (const consensus_mode& base : modes) {
             const int n = static_cast<int>(std::lround(mode.frequency_hz / base.frequency_hz));
-            if (n < 2 || n > judgement::most_multiple ||
-                (!of_machine(level, m, n_u, base, mode, n) &&
-                 (base.agreement < judgement::least_agreement ||
-                  std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
-                  !follows(level, m, n_u, mode, modes, base.frequency_hz, n))))
+            if (!of_tone(levels, m, n_u, mode, base) &&
+                (n < 2 || n > judgement::most_multiple || base.agreement < judgement::least_agreement ||
+                 std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
+                 !follows(level, m, n_u, mode, modes, base.frequency_hz, n)))
                 continue;
             mode.why.emplace_back("harmonic");
             break;

@@ -11,6 +11,7 @@
 #include "consensus/quantity.hpp"
 #include "error.hpp"
 #include "fit_deviation.hpp"
+#include "looks.hpp"
 #include "modal_gain.hpp"
 #include "modal_model.hpp"
 #include "modal_refine.hpp"
@@ -18,6 +19,7 @@
 #include "older_samples.hpp"
 #include "picks.hpp"
 #include "place_shapes.hpp"
+#include "quiet_pieces.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_matrices.hpp"
@@ -33,7 +35,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <fmt/ranges.h>
 
 namespace okid_host {
@@ -191,8 +192,10 @@ void keep_lines_of(const record_set& struck, const record_options& options, cons
     if (std::equal(modes.begin(), modes.end(), unmarked.begin(), same)) return;
     std::vector<double> scale;
     std::vector<consensus_mode> other = unmarked;
-    mark_lines(make_levels(struck.rows_of_each(), struck.n_u, struck.n_y, options.fs_hz, true, options.decimate, scale),
-               struck.n_u, struck.n_y, true, other);
+    const bool at_rest = struck.n_u > 0;
+    mark_lines(
+        make_levels(struck.rows_of_each(), struck.n_u, struck.n_y, options.fs_hz, at_rest, options.decimate, scale),
+        struck.n_u, struck.n_y, at_rest, other);
     for (std::size_t k = 0; k < modes.size(); ++k)
         if (same(other[k], unmarked[k])) modes[k].why = unmarked[k].why;
 }
@@ -315,27 +318,12 @@ record_options without_outputs(record_options options, const std::vector<bool>& 
     return options;
 }
 
-/// What one set of records shows of a structure that was struck.
-struct blow_look {
-    record_work work;
-    std::vector<listed_mode> listed; ///< empty: `fault`
-    std::exception_ptr fault;
-
-    /// Modes in the model whose damping is known to a half.
-    std::size_t believed() const {
-        std::size_t out = 0;
-        for (std::size_t k = 0; k < listed.size(); ++k)
-            out += listed[k].in_model &&
-                   !(work.context.sigma &&
-                     work.context.sigma->damping_ratio[k] > judgement::widest_damping * listed[k].damping_ratio);
-        return out;
-    }
-};
-
-blow_look look_at_blows(record_set set, record_options options, const record_work& about) {
-    blow_look out;
-    if (set.n_u == 0) out.work.struck = &about.set;
+/// @param struck  the records of which `set` is what follows a blow, or nothing
+one_look look_once(record_set set, record_options options, const record_work& about, const record_set* struck) {
+    one_look out;
     if (set.n_u == 0) options.inputs.clear();
+    out.work.struck = struck;
+    out.work.before = struck ? nullptr : about.before;
     out.work.at_rest = set.n_u > 0; // nothing moved before
     out.work.context = about.context;
     out.work.set = std::move(set);
@@ -348,21 +336,27 @@ blow_look look_at_blows(record_set set, record_options options, const record_wor
     return out;
 }
 
+/// The options by which two sets of records are compared: nothing is picked by hand.
+record_options unpicked(record_options options) {
+    options.modes.clear();
+    options.picks.clear();
+    return options;
+}
+
 /// Of records struck at different places: poles and shapes from all together, B and D from those of each place. A force that rests
 /// is looked at twice. What follows it needs no input a place, so that many light modes and places do no harm; with it modes are
 /// seen that die away soon, and the silence before it shows that a mode is no tone: that look counts where it believes more modes.
 std::vector<listed_mode> find_struck(const record_options& options, record_work& work) {
-    record_options seen = options, plain;
+    record_options seen = options;
     seen.inputs = work.context.inputs = place_names(options.inputs.front(), options.hits);
     record_set struck = std::exchange(work.set, one_column_a_place(work.set, options.hits));
     if (!are_blows(struck)) return find_modes_agreed(seen, work);
-    plain = seen;
-    plain.modes.clear();
-    plain.picks.clear();
-    blow_look best = look_at_blows(free_decays(struck), plain, work), forced = look_at_blows(work.set, plain, work);
+    one_look best = look_once(free_decays(struck), unpicked(seen), work, &work.set),
+             forced = look_once(work.set, unpicked(seen), work, nullptr);
     if (forced.believed() > best.believed()) best = std::move(forced);
+    if (options.by_hand())
+        best = look_once(std::move(best.work.set), seen, work, best.work.struck); // numbers of this look
     if (best.listed.empty()) std::rethrow_exception(best.fault);
-    if (options.by_hand()) best.listed = find_modes_agreed(seen, best.work); // the numbers are those of this look
     const bool at_rest = work.at_rest;
     work = std::move(best.work);
     work.struck = nullptr;
@@ -377,6 +371,32 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
     }
     fit_places(best.listed, options.hits, options.fs_hz, work);
     remark_low_fit(*work.context.simulation_percent, true, work.context);
+    return best.listed;
+}
+
+/// Of records without a force. Where the power rises and falls by far, a train that passes drives the structure at frequencies of
+/// its own, and what follows it is a free decay: those alone count where they know the modes far better.
+std::vector<listed_mode> find_ambient(const record_options& options, record_work& work) {
+    const record_set pieces = after_events(work.set);
+    if (pieces.records.empty()) return find_modes_agreed(options, work);
+    one_look whole = look_once(work.set, unpicked(options), work, nullptr),
+             decays = look_once(pieces, unpicked(options), work, &work.set);
+    std::vector<std::string> alone;
+    const double ratio = deviations_over(decays, whole, alone);
+    one_look& best = ratio < judgement::sharper ? decays : whole;
+    if (options.by_hand()) best = look_once(std::move(best.work.set), options, work, best.work.struck);
+    if (best.listed.empty()) std::rethrow_exception(best.fault);
+    if (&best == &decays)
+        best.work.context.warnings.emplace_back(
+            "free_decays",
+            fmt::format(
+                "{} times the power falls by 20 dB and more, as after a train or a blow. What follows, {:.0f} of "
+                "{:.0f} s, knows the modes {:.1f} times as well as the whole: modes and fits are of that alone{}{}",
+                pieces.records.size(), static_cast<double>(pieces.count()) / options.fs_hz,
+                static_cast<double>(work.set.count()) / options.fs_hz, 1 / ratio,
+                alone.empty() ? "" : ". Seen in the whole only: ", fmt::join(alone, ", ")));
+    work = std::move(best.work);
+    work.struck = nullptr;
     return best.listed;
 }
 
@@ -427,7 +447,9 @@ record_result identify_auto(record_set records, const record_options& given, con
     if (work.at_rest) work.context.start = "rest";
     if (options.detrend == "linear") detrend_linear(work.set, options);
     const bool roving = !options.hits.empty();
-    const std::vector<listed_mode> listed = roving ? find_struck(options, work) : find_modes_agreed(options, work);
+    const std::vector<listed_mode> listed = roving              ? find_struck(options, work)
+                                            : work.set.n_u == 0 ? find_ambient(options, work)
+                                                                : find_modes_agreed(options, work);
     if (work.set.n_u == 0 && work.context.sigma)
         keep_to_ambient_bound(
             work.set, options.fs_hz * static_cast<double>(work.set.count()) / static_cast<double>(work.context.samples),

@@ -116,6 +116,13 @@ constexpr double noisier = 5;       ///< times the share of the middle one; 2.2 
 constexpr std::size_t fewest_to_compare = 3; ///< outputs
 constexpr double in_a_noisy_output = 0.8;    ///< of the power of a shape; of modes of the structure 0.65 and less
 
+// Free decays in a record without a force (trains over a bridge); each alone shows whether it is one.
+constexpr double fall_of_power = 100; ///< after an event, from its greatest power: an hour of wind or traffic has less
+constexpr double still_driven = 10;   ///< of the greatest power a tenth and more is of what acts
+constexpr double sharper = 0.5; ///< deviations, over those of the whole record: 0.03 to 0.3 after trains, 0.8 to 1.1
+                                ///< of cars on a road
+constexpr double shared_modes = 0.5; ///< of those of the whole record the decays show, too
+
 // Frequency responses.
 constexpr double least_strength = 2; ///< of a residue matrix over its noise
 constexpr double narrowest = 0.25;   ///< half a resonance's width in lines: below it no damping shows

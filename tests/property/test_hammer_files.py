@@ -32,6 +32,15 @@ def shape_of(mode: dict[str, Any]) -> Any:
     return np.array(mode["shape_re"]) + 1j * np.array(mode["shape_im"])
 
 
+def test_modes_picked_by_their_number(tmp_path: Path) -> None:
+    """Those of the table, with the deviations they have there."""
+    rng = np.random.default_rng(3)
+    records = {f"P{k}_1.csv": beam.record(beam.Hit(k, 100.0, 0.0015), rng, 0.002) for k in range(1, 7)}
+    every, picked = (identified(tmp_path, records, *more)[0]["modes"] for more in ((), ("--modes", "1,3")))
+    keys = ("frequency_hz", "frequency_std_hz", "damping_ratio_std", "found_in")
+    assert [[m[key] for key in keys] for m in picked] == [[every[k][key] for key in keys] for k in (0, 2)]
+
+
 def some(*faults: str) -> dict[str, Any]:
     """Good hits at places 1, 2 and 3, and one more at place 2 for each fault."""
     rng = np.random.default_rng(7)
