@@ -390,7 +390,7 @@ std::vector<listed_mode> find_ambient(const record_options& options, record_work
         best.work.context.warnings.emplace_back(
             "free_decays",
             fmt::format(
-                "{} times the power falls by 20 dB and more, as after a train or a blow. What follows, {:.0f} of "
+                "{} times the power falls by 20 dB and more, as after a train or a hit. What follows, {:.0f} of "
                 "{:.0f} s, knows the modes {:.1f} times as well as the whole: modes and fits are of that alone{}{}",
                 pieces.records.size(), static_cast<double>(pieces.count()) / options.fs_hz,
                 static_cast<double>(work.set.count()) / options.fs_hz, 1 / ratio,

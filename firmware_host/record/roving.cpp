@@ -6,6 +6,7 @@
 
 #include "error.hpp"
 #include "hit_verdict.hpp"
+#include "moved_outputs.hpp"
 #include "record_check.hpp"
 #include "record_fit.hpp"
 #include "record_refine.hpp"
@@ -264,6 +265,8 @@ std::vector<listed_mode> modes_of(const okid_identified_t& model) {
 
 void remark_contradiction(const std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz,
                           record_work& work) {
+    if (const std::string text = moved_outputs_text(modes, work.context.sigma, fs_hz, work.set); !text.empty())
+        work.context.warnings.emplace_back("records_contradict", text);
     if (work.set.records.size() < 2 || work.set.n_u == 0) return;
     const auto sums = sum_residues(modes, fs_hz, work.set, work.at_rest || are_blows(work.set));
     for (const int place : hits.empty() ? std::vector<int>{0} : hit_places(hits)) {

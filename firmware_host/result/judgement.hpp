@@ -123,6 +123,12 @@ constexpr double sharper = 0.5; ///< deviations, over those of the whole record:
                                 ///< of cars on a road
 constexpr double shared_modes = 0.5; ///< of those of the whole record the decays show, too
 
+// Records without a force that are no repeats.
+constexpr double one_shape = 0.8;       ///< of the power at a mode: two close modes mix otherwise in each record
+constexpr double moved_shape = 0.5;     ///< MAC of two records: below, sensors were at other places
+constexpr std::size_t fewest_moved = 2; ///< modes; of one a change of the wind may be the reason
+constexpr double surely_apart = 4;      ///< deviations between the frequencies of two modes
+
 // Frequency responses.
 constexpr double least_strength = 2; ///< of a residue matrix over its noise
 constexpr double narrowest = 0.25;   ///< half a resonance's width in lines: below it no damping shows

@@ -154,6 +154,37 @@ def test_free_decays_of_a_pipe(tmp_path: Path) -> None:
     assert found["records"] == 2
 
 
+def contradictions(result: package.Result) -> list[str]:
+    return [one.text for one in result.warnings if one.code == "records_contradict"]
+
+
+def test_channels_at_other_places_are_no_repeats() -> None:
+    """Files whose columns have the names of channels are repeats by their names; their sensors were moved all the same."""
+    for s, seconds in ((site.plate(), 20), (site.footbridge(), 120)):
+        first, second = site.ambient(s, seconds, 1), site.ambient(s, seconds, 2)
+        for places, moved in (([0, 1, 2, 3], False), ([0, 3, 5, 7], True)):
+            said = contradictions(package.identify(None, [first[:, :4], second[:, places]], fs=s.fs))
+            assert len(said) == moved
+            assert all("record 1" in text and "sensors at other places" in text for text in said)
+
+
+def test_another_wind_does_not_move_sensors() -> None:
+    """A chimney has two modes at nearly one frequency; each record shows that to which its wind turns."""
+    height, way = np.repeat([0.3, 0.6, 1.0], 2), np.tile([0, 1], 3)
+    frequency = np.array([0.6, 0.609, 2.9, 2.943])
+    shapes = np.array([np.sin((2 * (k // 2) + 1) * np.pi / 2 * height) * (way == k % 2) for k in range(4)]).T
+    s, records = site.Structure(12.0, frequency, np.full(4, 0.01), shapes, np.full(4, 1e4)), []
+    for seed, turn in enumerate((10, 80)):
+        rng = np.random.default_rng(seed)
+        along, across = rng.standard_normal((2, 1500 * 12 * site.FINER, 3)) * np.array([1, 0.3])[:, None, None]
+        c, d = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+        force = np.stack([c * along - d * across, d * along + c * across], axis=2).reshape(len(along), 6)
+        y = s.sampled(s.respond(force, np.eye(6)))
+        records.append(y + 0.02 * y.std() * rng.standard_normal(y.shape))
+    found = package.identify(None, records, fs=s.fs)
+    assert len(found.confident_modes) == 4 and not contradictions(found), found.table()
+
+
 def test_python_gives_what_the_command_gives(tmp_path: Path) -> None:
     files = footbridge(tmp_path)
     told = run(tmp_path, files, "--outputs", "P1,P4,P7,P2,P3,P5,P6,P8")
