@@ -159,7 +159,7 @@ def contradictions(result: package.Result) -> list[str]:
 
 
 def test_channels_at_other_places_are_no_repeats() -> None:
-    """Files whose columns have the names of channels are repeats by their names; their sensors were moved all the same."""
+    """Files whose columns have the names of channels are repeats by their names; the sensors were moved."""
     for s, seconds in ((site.plate(), 20), (site.footbridge(), 120)):
         first, second = site.ambient(s, seconds, 1), site.ambient(s, seconds, 2)
         for places, moved in (([0, 1, 2, 3], False), ([0, 3, 5, 7], True)):

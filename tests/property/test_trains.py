@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Trains over a bridge, nobody measures their forces: the passing axles drive it at frequencies of their own, and what
-follows is a free decay. The modes are those of the decays; of cars, which come all the time, those of the whole record."""
+follows is a free decay. The modes are those of the decays; of cars, which come all the time, those of the record."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def shapes(at: NDArray[np.float64], side: float) -> NDArray[np.float64]:
 
 
 def passing(seconds: float, axles: list[tuple[float, float, float, float]], seed: int) -> NDArray[np.float64]:
-    """Accelerations in m/s^2 under axles (time at the bridge in s, speed in m/s, force in N, side), wind and 1e-3 of noise."""
+    """Accelerations in m/s^2 under axles (time at the bridge in s, speed in m/s, force in N, side), wind and noise."""
     rng = np.random.default_rng(seed)
     step, count = 1 / FS / OVER, int(seconds * FS) * OVER
     force = 50 * rng.standard_normal((len(TRUE), count)) * np.sqrt(OVER)
@@ -81,7 +81,10 @@ def test_modes_are_those_of_what_follows_the_trains() -> None:
         assert len(found) == len(TRUE) and not unmatched(found, TRUE[:, 0]), result.table()
         for mode, (hz, zeta) in zip(found, TRUE, strict=True):
             assert abs(mode.damping_ratio / zeta - 1) < 0.25, (seed, hz)
-            z += [(mode.frequency_hz - hz) / mode.frequency_std_hz, (mode.damping_ratio - zeta) / mode.damping_ratio_std]
+            z += [
+                (mode.frequency_hz - hz) / mode.frequency_std_hz,
+                (mode.damping_ratio - zeta) / mode.damping_ratio_std,
+            ]
         [remark] = [w.text for w in result.warnings if w.code == "free_decays"]
         assert remark.startswith("5 times the power falls by 20 dB and more")
     assert np.sqrt(np.mean(np.square(z))) < 2 and np.max(np.abs(z)) < 5
