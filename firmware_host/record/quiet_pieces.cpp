@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  the free decays in a record of which nobody measured the forces: trains over a bridge, steps, blows
+// PURPOSE  the free decays in a record of unmeasured forces: trains over a bridge, steps, hits
 // METHOD   the power in short blocks; a rise and a fall of 20 dB is an event, whatever is less belongs to it
 #include "quiet_pieces.hpp"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Trains over a bridge, nobody measures their forces: the passing axles drive it at frequencies of their own, and what
+"""Trains over a bridge, their forces unmeasured: the passing axles drive it at frequencies of their own, and what
 follows is a free decay. The modes are those of the decays; of cars, which come all the time, those of the record."""
 
 from __future__ import annotations
