@@ -201,14 +201,26 @@ bool of_machine(const std::vector<record_level>& levels, std::size_t m, std::siz
     return a.size() >= 2 * judgement::fewest_blocks && a.size() == b.size() && in_phase(a, b, n);
 }
 
+/// Does a vibration answer hits, measured or not? Then it is in phase with whatever else answers them.
+bool answers_hits(const record_level& level, std::size_t m, std::size_t n_u, const consensus_mode& mode,
+                  const std::vector<consensus_mode>& modes) {
+    const auto of_periods = [&](double periods) {
+        return static_cast<std::size_t>(periods * level.fs_hz / mode.frequency_hz) + 1;
+    };
+    return rings_down(amplitudes(level, m, n_u, weights_along(mode.shape), mode.frequency_hz,
+                                 of_periods(judgement::ring_periods))) ||
+           explained(level, m, n_u, false, mode, modes, of_periods(judgement::machine_periods)) >= judgement::explained;
+}
+
 /// Is it a multiple of a tone, or a tone a multiple of it?
 bool of_tone(const std::vector<record_level>& levels, std::size_t m, std::size_t n_u, const consensus_mode& mode,
-             const consensus_mode& tone) {
+             const consensus_mode& tone, const std::vector<consensus_mode>& modes) {
     if (mode.damping_ratio > judgement::line_damping || !has_code(tone.why, "tone")) return false;
     const bool above = mode.frequency_hz > tone.frequency_hz;
     const consensus_mode &base = above ? tone : mode, &over = above ? mode : tone;
     const int n = static_cast<int>(std::lround(over.frequency_hz / base.frequency_hz));
-    return n >= 2 && n <= judgement::most_multiple && of_machine(levels, m, n_u, base, over, n);
+    return n >= 2 && n <= judgement::most_multiple && of_machine(levels, m, n_u, base, over, n) &&
+           !answers_hits(seen_by(levels, mode.frequency_hz), m, n_u, mode, modes);
 }
 
 /// Does the amplitude fall as a free vibration of this damping does? One of a line stays, whatever the record's length. None:
@@ -462,7 +474,7 @@ void mark_lines(const std::vector<record_level>& levels, std::size_t n_u, std::s
         }
         for (const consensus_mode& base : modes) {
             const int n = static_cast<int>(std::lround(mode.frequency_hz / base.frequency_hz));
-            if (!of_tone(levels, m, n_u, mode, base) &&
+            if (!of_tone(levels, m, n_u, mode, base, modes) &&
                 (n < 2 || n > judgement::most_multiple || base.agreement < judgement::least_agreement ||
                  std::abs(mode.frequency_hz / (n * base.frequency_hz) - 1) > judgement::multiple_frequency ||
                  !follows(level, m, n_u, mode, modes, base.frequency_hz, n)))

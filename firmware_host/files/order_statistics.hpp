@@ -27,6 +27,12 @@ inline double median(std::vector<double> values) {
     return (high + in_order(values, values.size() / 2 - 1)) / 2;
 }
 
+/// How far values are off one of them, as the deviation of a normal distribution; 0 of fewer than 100.
+inline double usual_distance(std::vector<double> values, double centre) {
+    for (double& v : values) v = std::abs(v - centre);
+    return values.size() < 100 ? 0 : 1.4826 * upper_median(values);
+}
+
 /// One of the values, with this share (0 to 1) of the others below it; there must be one.
 template <class Number> Number quantile(std::vector<Number> values, double share) {
     return in_order(values, static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));

@@ -301,9 +301,11 @@ void make_result(const response_set& set, const record_options& options, double 
 
 record_result identify_responses(const response_set& measured, const response_request& asked) {
     response_set set = choose(measured, asked.wanted);
-    const bool turned = set.n_u() > set.n_y() && asked.wanted.sensing.find(',') == std::string::npos;
+    record_request wanted = asked.wanted;
+    if (wanted.sensing.empty()) wanted.sensing = set.quantity.empty() ? "acceleration" : set.quantity;
+    const bool turned = set.n_u() > set.n_y() && wanted.sensing.find(',') == std::string::npos;
     if (turned) set = exchanged(set);
-    const record_options options = options_of(set, asked.wanted, turned);
+    const record_options options = options_of(set, wanted, turned);
     const double constant_s = time_constant(asked.exponential);
     set = options.band ? cut_band(set, options.band->first, options.band->second)
                        : without_noise_lines(cut_band(set, 0, INFINITY));
@@ -324,7 +326,7 @@ record_result identify_responses(const response_set& measured, const response_re
     const joint_responses all{{set}, set.outputs, set.outputs, 1 / finest_spacing(measured.frequency_hz)};
     make_result(set, options, constant_s,
                 find_response_modes(all, asked.all_modes, options.modes, asked.wanted.stabilization), work);
-    remark_turned(work.context.modal_masses, asked.wanted.sensing, set.quantity, work.context.warnings);
+    remark_turned(work.context.modal_masses, wanted.sensing, set.quantity, work.context.warnings);
     for (const std::string& unit : measured.other_units)
         work.context.warnings.emplace_back("unit_converted", fmt::format("{}: all numbers are in SI units here", unit));
     find_matrices(options, work);

@@ -12,6 +12,7 @@
 #include "files/order_statistics.hpp"
 #include "files/units.hpp"
 #include "record/csv.hpp"
+#include "record/csv_header.hpp"
 
 #include <algorithm>
 #include <array>
@@ -186,10 +187,20 @@ std::vector<double> read_binary(lines_of& from, bool wide, bool big, std::size_t
     return out;
 }
 
+/// Into SI units: a response in `upper` over `lower`.
+void take_units(const std::string& upper, const std::string& lower, response& to) {
+    for (const std::string* name : {&upper, &lower}) {
+        const unit_rule* unit = find_unit(*name);
+        if (!unit || unit->factor == 1 || role_of_unit(unit->name).empty()) continue;
+        for (complex& value : to.values) value *= name == &upper ? unit->factor : 1 / unit->factor;
+        to.other_units.push_back(fmt::format("{} = {:.10g} {}", unit->name, unit->factor, unit->si));
+    }
+}
+
 /// What the axes of a data set say: the quantity, and units that are not those of SI. @param axis  a line of the header
-const unit_rule* unit_of(const std::string& axis) {
+std::string unit_of(const std::string& axis) {
     constexpr std::size_t first = 46, width = 21;
-    return find_unit(std::string(trimmed(std::string_view(axis).substr(std::min(first, axis.size()), width))));
+    return std::string(trimmed(std::string_view(axis).substr(std::min(first, axis.size()), width)));
 }
 
 void read_axes(const std::string& numerator, const std::string& denominator, int kind, response& to) {
@@ -198,12 +209,7 @@ void read_axes(const std::string& numerator, const std::string& denominator, int
                   : kind == velocity     ? "velocity"
                   : kind == acceleration ? "acceleration"
                                          : "";
-    for (const std::string* axis : {&numerator, &denominator}) {
-        const unit_rule* unit = unit_of(*axis);
-        if (!unit || unit->factor == 1 || role_of_unit(unit->name).empty()) continue;
-        for (complex& value : to.values) value *= axis == &numerator ? unit->factor : 1 / unit->factor;
-        to.other_units.push_back(fmt::format("{} = {:.10g} {}", unit->name, unit->factor, unit->si));
-    }
+    take_units(unit_of(numerator), unit_of(denominator), to);
 }
 
 /// A data set 58 behind its first line; nothing for other functions than responses and coherences.
@@ -279,17 +285,53 @@ response_set read_universal(const std::string& path) {
     return set_of(path, found);
 }
 
-constexpr std::array<const char*, 6> part_names{"re", "im", "db", "mag", "deg", "coh"};
 enum part_bits : unsigned { part_re = 1, part_im = 2, part_db = 4, part_mag = 8, part_deg = 16, part_coh = 32 };
+struct part_name {
+    const char* name;
+    part_bits part;
+};
+/// As this program and as analysers write them.
+constexpr std::array<part_name, 14> part_names{{{"re", part_re},
+                                                {"real", part_re},
+                                                {"im", part_im},
+                                                {"imag", part_im},
+                                                {"imaginary", part_im},
+                                                {"db", part_db},
+                                                {"mag", part_mag},
+                                                {"magnitude", part_mag},
+                                                {"amplitude", part_mag},
+                                                {"deg", part_deg},
+                                                {"phase", part_deg},
+                                                {"phase_deg", part_deg},
+                                                {"coh", part_coh},
+                                                {"coherence", part_coh}}};
 
-/// "OUT/IN:re" taken apart. @return the bit of its part; 0: it is none
-unsigned split_column(const std::string& name, response& to) {
+/// A column of a table: "OUT/IN:re", or "re" in a file of one response; units behind the names, or behind the part "[g/N]".
+struct table_column {
+    std::string output = "output", input = "input", upper, lower; ///< names, and units of the two
+    unsigned part = 0;                                            ///< 0: it is none
+    double factor = 1;                                            ///< to degrees
+};
+
+table_column split_column(const std::string& name) {
+    table_column out;
     const std::size_t colon = name.rfind(':'), slash = name.find('/');
-    if (colon == name.npos || slash == name.npos || slash > colon) return 0;
-    to.output = trimmed(std::string_view(name).substr(0, slash));
-    to.input = trimmed(std::string_view(name).substr(slash + 1, colon - slash - 1));
-    const auto at = std::find(part_names.begin(), part_names.end(), name.substr(colon + 1));
-    return at == part_names.end() ? 0 : 1U << (at - part_names.begin());
+    const bool named = colon != name.npos && slash != name.npos && slash < colon;
+    const std::string last = named ? name.substr(colon + 1) : name, unit = unit_of_name(last);
+    const std::string part = lower_case(base_of_name(last));
+    const auto at =
+        std::find_if(part_names.begin(), part_names.end(), [&](const part_name& one) { return one.name == part; });
+    if (at != part_names.end()) out.part = at->part;
+    if (named) {
+        const std::string upper(trimmed(std::string_view(name).substr(0, slash))),
+            lower(trimmed(std::string_view(name).substr(slash + 1, colon - slash - 1)));
+        out.output = base_of_name(upper), out.upper = unit_of_name(upper);
+        out.input = base_of_name(lower), out.lower = unit_of_name(lower);
+    }
+    if (const std::size_t over = unit.find('/'); over != unit.npos)
+        out.upper = unit.substr(0, over), out.lower = unit.substr(over + 1);
+    if (unit == "rad") out.factor = 180 / M_PI;
+    return out;
 }
 
 response_set read_table(const std::string& path) {
@@ -304,27 +346,35 @@ response_set read_table(const std::string& path) {
                         "OUT/IN:db (20 log10) or OUT/IN:mag and OUT/IN:deg; OUT/IN:coh where there is a coherence",
                         path, what));
     };
-    if (table.columns.front() != "frequency_hz")
+    const std::string first = lower_case(base_of_name(table.columns.front())),
+                      unit_of_lines = lower_case(unit_of_name(table.columns.front()));
+    if ((first != "frequency_hz" && first != "frequency" && first != "freq") ||
+        (!unit_of_lines.empty() && unit_of_lines != "hz"))
         fail(fmt::format("the first column is \"{}\"", printable(table.columns.front())));
     std::vector<response> all;
-    std::vector<unsigned> given; // of each
+    std::vector<std::pair<std::string, std::string>> units; // of each
+    std::vector<unsigned> given;                            // of each
     for (std::size_t c = 1; c < width; ++c) {
-        response one;
-        const unsigned part = split_column(table.columns[c], one);
-        if (part == 0) fail(fmt::format("found the column \"{}\"", printable(table.columns[c])));
-        auto at = std::find_if(all.begin(), all.end(),
-                               [&](const response& x) { return x.output == one.output && x.input == one.input; });
-        if (at == all.end()) at = all.insert(all.end(), std::move(one)), at->values.resize(table.count, complex(0, 0));
-        given.resize(all.size());
-        given[static_cast<std::size_t>(at - all.begin())] |= part;
+        const table_column own = split_column(table.columns[c]);
+        if (own.part == 0) fail(fmt::format("found the column \"{}\"", printable(table.columns[c])));
+        const auto same = [&own](const response& x) { return x.output == own.output && x.input == own.input; };
+        const auto k = static_cast<std::size_t>(std::find_if(all.begin(), all.end(), same) - all.begin());
+        if (k == all.size()) {
+            all.push_back({own.output, own.input, {}, std::vector<complex>(table.count), {}});
+            units.emplace_back();
+            given.push_back(0);
+        }
+        response& one = all[k];
+        if (own.part != part_coh) units[k] = {own.upper, own.lower};
+        given[k] |= own.part;
         for (std::size_t l = 0; l < table.count; ++l) {
             const double x = table.samples[l * width + c];
-            if (part == part_coh)
-                at->coherence.push_back(x);
-            else if (part == part_im || part == part_deg)
-                at->values[l] += complex(0, x);
+            if (own.part == part_coh)
+                one.coherence.push_back(x);
+            else if (own.part == part_im || own.part == part_deg)
+                one.values[l] += complex(0, own.factor * x);
             else
-                at->values[l] += part == part_db ? std::pow(10, x / 20) : x;
+                one.values[l] += own.part == part_db ? std::pow(10, x / 20) : x;
         }
     }
     if (all.empty() || table.count == 0) fail("no response");
@@ -333,6 +383,10 @@ response_set read_table(const std::string& path) {
             for (complex& x : all[k].values) x = x.real() * std::polar(1.0, x.imag() * M_PI / 180);
         else if (own != (part_re | part_im))
             fail(fmt::format("{}/{} has not both of its two parts", printable(all[k].output), printable(all[k].input)));
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        take_units(units[k].first, units[k].second, all[k]);
+        if (const std::string role = role_of_unit(units[k].first); role != "force") all[k].quantity = role;
+    }
     for (response& one : all)
         for (std::size_t l = 0; l < table.count; ++l) one.frequency_hz.push_back(table.samples[l * width]);
     return set_of(path, all);

@@ -78,12 +78,12 @@ bool is_number(const std::string& text) {
     return error == std::errc{} && end == text.data() + text.size();
 }
 
+} // namespace
+
 std::string base_of_name(const std::string& name) {
     const std::size_t at = name.find_first_of("[(");
     return at == std::string::npos ? name : std::string(trim(std::string_view(name).substr(0, at)));
 }
-
-} // namespace
 
 void read_csv_comment(const std::string& path, std::size_t number, std::string_view line, csv_header& header) {
     const std::string text = lower_case(std::string(line));

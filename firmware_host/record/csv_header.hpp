@@ -34,6 +34,9 @@ std::size_t find_csv_column(const std::string& path, const csv_header& header, c
 /// Is one of these columns called so, with or without its unit?
 bool has_column(const std::vector<std::string>& columns, const std::string& name);
 
+/// "acc1" of `acc1 [g]` and `acc1 (g)`.
+std::string base_of_name(const std::string& name);
+
 /// "g" of `acc1 [g]`, `acc1 (g)` and `acc1_g`; "" when the name carries no known unit.
 std::string unit_of_name(const std::string& name);
 

@@ -60,7 +60,9 @@ std::vector<identify_option> make_options() {
          "as "
          "a hammer test with a short pre-trigger does"},
         {"sensing", kind::text, &asked::sensing, "acceleration|velocity|displacement", of::all, sides,
-         "what the outputs measure (default acceleration): one kind, or one per output with commas between"},
+         "what the outputs measure (default acceleration, of --frf what the file says): one kind, or one per output "
+         "with "
+         "commas between"},
         {"input-dofs", kind::text, &asked::input_dofs, "LIST", of::all, sides,
          "where each force acts: numbers of degrees of freedom from 1 (-3: at 3, polarity reversed). With "
          "--output-dofs: "

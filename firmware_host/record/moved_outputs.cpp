@@ -75,59 +75,81 @@ bool side_by_side(const listed_mode& a, const listed_mode& b) {
     return std::abs(a.frequency_hz - b.frequency_hz) < judgement::most_widths * width;
 }
 
-/// Two modes, and no one listed twice: their frequencies tell, or a file shows two shapes.
-bool are_two_modes(double apart_hz, double deviation_hz, const file_shapes& a, const file_shapes& b) {
-    if (apart_hz > judgement::surely_apart * deviation_hz) return true; // never of NaN
-    for (std::size_t r = 0; r < a.size(); ++r)
-        if (mac_of(a[r].second, b[r].second) < judgement::same_shape) return true;
-    return false;
-}
+/// Of all modes, how the files move at them. Sensors that were moved list a mode twice, side by side.
+class listed_shapes {
+  public:
+    listed_shapes(const std::vector<listed_mode>& modes, const std::optional<deviations>& sigma, double fs_hz,
+                  const record_set& set)
+        : modes_(modes) {
+        std::vector<double> unit;
+        for (const output_spread& one : spreads_of(set))
+            unit.push_back(one.squares > 0 ? std::sqrt(one.count / one.squares) : 0);
+        if (sigma && sigma->frequency_hz.size() == modes.size()) deviation_hz_ = sigma->frequency_hz;
+        deviation_hz_.resize(modes.size(), NAN);
+        for (const listed_mode& mode : modes)
+            shapes_.push_back(mode.in_model && mode.damping_ratio > 0 ? shapes_of_files(set, mode, fs_hz, unit)
+                                                                      : file_shapes());
+    }
+
+    const file_shapes& of(std::size_t k) const { return shapes_[k]; }
+
+    /// Is it one mode, and not the second entry of one that was counted?
+    bool counts(std::size_t k) const {
+        if (shapes_[k].empty()) return false;
+        for (std::size_t i = 0; i < modes_.size(); ++i)
+            if (i != k && !shapes_[i].empty() && side_by_side(modes_[i], modes_[k]) && (i < k || are_two(i, k)))
+                return false;
+        return true;
+    }
+
+  private:
+    /// Their frequencies tell, or a file shows two shapes.
+    bool are_two(std::size_t i, std::size_t k) const {
+        const double apart_hz = std::abs(modes_[i].frequency_hz - modes_[k].frequency_hz);
+        if (apart_hz > judgement::surely_apart * std::hypot(deviation_hz_[i], deviation_hz_[k]))
+            return true; // never of NaN
+        for (std::size_t r = 0; r < shapes_[k].size(); ++r)
+            if (mac_of(shapes_[i][r].second, shapes_[k][r].second) < judgement::same_shape) return true;
+        return false;
+    }
+
+    const std::vector<listed_mode>& modes_;
+    std::vector<double> deviation_hz_;
+    std::vector<file_shapes> shapes_;
+};
 
 } // namespace
 
 std::string moved_outputs_text(const std::vector<listed_mode>& modes, const std::optional<deviations>& sigma,
                                double fs_hz, const record_set& set) {
     if (set.n_u > 0 || set.n_y < judgement::fewest_to_compare || set.records.size() < 2) return "";
-    std::vector<double> unit;
-    for (const output_spread& one : spreads_of(set))
-        unit.push_back(one.squares > 0 ? std::sqrt(one.count / one.squares) : 0);
     struct compared {
+        std::string path;
         std::size_t seen = 0, other = 0;
         double least = 1;
     };
+    const listed_shapes listed(modes, sigma, fs_hz, set);
     std::vector<compared> files;
-    std::vector<std::string> paths;
-    std::vector<file_shapes> all;
-    for (const listed_mode& mode : modes)
-        all.push_back(mode.in_model && mode.damping_ratio > 0 ? shapes_of_files(set, mode, fs_hz, unit)
-                                                              : file_shapes());
     for (std::size_t k = 0; k < modes.size(); ++k) {
-        bool clear = !all[k].empty();
-        for (std::size_t i = 0; i < modes.size() && clear; ++i)
-            if (i != k && !all[i].empty() && side_by_side(modes[i], modes[k]))
-                clear =
-                    i > k && !are_two_modes(std::abs(modes[i].frequency_hz - modes[k].frequency_hz),
-                                            sigma ? std::hypot(sigma->frequency_hz[i], sigma->frequency_hz[k]) : NAN,
-                                            all[i], all[k]);
-        if (!clear) continue;
-        files.resize(all[k].size());
+        if (!listed.counts(k)) continue;
+        const file_shapes& shapes = listed.of(k);
+        files.resize(shapes.size());
         for (std::size_t r = 0; r < files.size(); ++r) {
-            const double mac = mac_of(all[k][0].second, all[k][r].second);
+            files[r].path = shapes[r].first;
+            const double mac = mac_of(shapes[0].second, shapes[r].second);
             if (std::isnan(mac)) continue;
             ++files[r].seen;
             files[r].other += mac < judgement::moved_shape;
             files[r].least = std::min(files[r].least, mac);
         }
-        paths.clear();
-        for (const auto& [path, shape] : all[k]) paths.push_back(path);
     }
-    for (std::size_t r = 0; r < files.size(); ++r)
-        if (files[r].other >= judgement::fewest_moved && 3 * files[r].other >= files[r].seen)
+    for (const compared& file : files)
+        if (file.other >= judgement::fewest_moved && 3 * file.other >= file.seen)
             return fmt::format(
                 "{} moves otherwise than {} at {} of {} modes (MAC down to {:.2f}). Were the sensors at other "
                 "places? Then an output needs the name of its place, not of its channel, and --setups. Or "
                 "the wind turned, and the structure has two modes at each frequency",
-                paths[r], paths[0], files[r].other, files[r].seen, files[r].least);
+                file.path, files[0].path, file.other, file.seen, file.least);
     return "";
 }
 

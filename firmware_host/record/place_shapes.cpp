@@ -208,7 +208,7 @@ class placer {
 mass_plan matrices_of_places(const std::vector<listed_mode>& modes, const record_options& options, remarks& said) {
     const auto found = std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; });
     if (options.mass.wanted() && found >= options.mass.size()) return options.mass;
-    if (options.mass.wanted())
+    if (options.mass.wanted() && 2 * found >= options.mass.size()) // places for shapes alone are many more than modes
         said.emplace_back(
             "mkr_failed",
             fmt::format("no M, K and R: they need a mode for each of {} degrees of freedom, {} were found",

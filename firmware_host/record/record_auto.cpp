@@ -319,12 +319,13 @@ record_options without_outputs(record_options options, const std::vector<bool>& 
 }
 
 /// @param struck  the records of which `set` is what follows a blow, or nothing
-one_look look_once(record_set set, record_options options, const record_work& about, const record_set* struck) {
+one_look look_once(record_set set, bool at_rest, record_options options, const record_work& about,
+                   const record_set* struck) {
     one_look out;
     if (set.n_u == 0) options.inputs.clear();
     out.work.struck = struck;
     out.work.before = struck ? nullptr : about.before;
-    out.work.at_rest = set.n_u > 0; // nothing moved before
+    out.work.at_rest = at_rest;
     out.work.context = about.context;
     out.work.set = std::move(set);
     try {
@@ -343,6 +344,11 @@ record_options unpicked(record_options options) {
     return options;
 }
 
+/// The same look again, its modes by their numbers.
+one_look picked_in(record_work seen, const record_options& options, const record_work& about) {
+    return look_once(std::move(seen.set), seen.at_rest, options, about, seen.struck);
+}
+
 /// Of records struck at different places: poles and shapes from all together, B and D from those of each place. A force that rests
 /// is looked at twice. What follows it needs no input a place, so that many light modes and places do no harm; with it modes are
 /// seen that die away soon, and the silence before it shows that a mode is no tone: that look counts where it believes more modes.
@@ -351,11 +357,10 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
     seen.inputs = work.context.inputs = place_names(options.inputs.front(), options.hits);
     record_set struck = std::exchange(work.set, one_column_a_place(work.set, options.hits));
     if (!are_blows(struck)) return find_modes_agreed(seen, work);
-    one_look best = look_once(free_decays(struck), unpicked(seen), work, &work.set),
-             forced = look_once(work.set, unpicked(seen), work, nullptr);
+    one_look best = look_once(free_decays(struck), false, unpicked(seen), work, &work.set),
+             forced = look_once(work.set, true, unpicked(seen), work, nullptr); // nothing moved before
     if (forced.believed() > best.believed()) best = std::move(forced);
-    if (options.by_hand())
-        best = look_once(std::move(best.work.set), seen, work, best.work.struck); // numbers of this look
+    if (options.by_hand()) best = picked_in(std::move(best.work), seen, work);
     if (best.listed.empty()) std::rethrow_exception(best.fault);
     const bool at_rest = work.at_rest;
     work = std::move(best.work);
@@ -374,30 +379,42 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
     return best.listed;
 }
 
-/// Of records without a force. Where the power rises and falls by far, a train that passes drives the structure at frequencies of
-/// its own, and what follows it is a free decay: those alone count where they know the modes far better.
-std::vector<listed_mode> find_ambient(const record_options& options, record_work& work) {
-    const record_set pieces = after_events(work.set);
-    if (pieces.records.empty()) return find_modes_agreed(options, work);
-    one_look whole = look_once(work.set, unpicked(options), work, nullptr),
-             decays = look_once(pieces, unpicked(options), work, &work.set);
+/// Of records, and of a part of them that stands for them where it knows the modes far better.
+/// @param seen  the look at the part. @param said  code and words of why it was taken
+std::vector<listed_mode> find_in_part(one_look seen, const record_options& options, const char* code,
+                                      const std::string& said, record_work& work) {
+    one_look whole = look_once(work.set, work.at_rest, unpicked(options), work, nullptr);
     std::vector<std::string> alone;
-    const double ratio = deviations_over(decays, whole, alone);
-    one_look& best = ratio < judgement::sharper ? decays : whole;
-    if (options.by_hand()) best = look_once(std::move(best.work.set), options, work, best.work.struck);
+    const double ratio = deviations_over(seen, whole, alone);
+    one_look& best = ratio < judgement::sharper ? seen : whole;
+    if (options.by_hand()) best = picked_in(std::move(best.work), options, work);
     if (best.listed.empty()) std::rethrow_exception(best.fault);
-    if (&best == &decays)
+    if (&best == &seen)
         best.work.context.warnings.emplace_back(
-            "free_decays",
-            fmt::format(
-                "{} times the power falls by 20 dB and more, as after a train or a hit. What follows, {:.0f} of "
-                "{:.0f} s, knows the modes {:.1f} times as well as the whole: modes and fits are of that alone{}{}",
-                pieces.records.size(), static_cast<double>(pieces.count()) / options.fs_hz,
-                static_cast<double>(work.set.count()) / options.fs_hz, 1 / ratio,
-                alone.empty() ? "" : ". Seen in the whole only: ", fmt::join(alone, ", ")));
+            code, fmt::format("{} knows the modes {:.1f} times as well: modes and fits are of that alone{}{}", said,
+                              1 / ratio, alone.empty() ? "" : ". Seen otherwise only: ", fmt::join(alone, ", ")));
     work = std::move(best.work);
     work.struck = nullptr;
     return best.listed;
+}
+
+/// Without a force: where the power rises and falls by far, a train that passes drives the structure at frequencies of its own,
+/// and what follows it is a free decay. With one that rests between its hits: its channel may say noise there.
+std::vector<listed_mode> find_modes(const record_options& options, record_work& work) {
+    const record_set pieces = after_events(work.set);
+    if (!pieces.records.empty())
+        return find_in_part(look_once(pieces, false, unpicked(options), work, &work.set), options, "free_decays",
+                            fmt::format("{} times the power falls by 20 dB and more, as after a train or a hit. What "
+                                        "follows, {:.0f} of {:.0f} s,",
+                                        pieces.records.size(), static_cast<double>(pieces.count()) / options.fs_hz,
+                                        static_cast<double>(work.set.count()) / options.fs_hz),
+                            work);
+    record_set quiet = work.set.n_u > 0 && !work.before ? work.set : record_set();
+    if (rest_between_hits(quiet))
+        return find_in_part(look_once(std::move(quiet), work.at_rest, unpicked(options), work, nullptr), options,
+                            "force_window",
+                            "between its hits the force rests. The record without what its channel says there", work);
+    return find_modes_agreed(options, work);
 }
 
 /// Of records struck at different places: M, K and R where there is a mode for each, and shapes over the places.
@@ -447,9 +464,7 @@ record_result identify_auto(record_set records, const record_options& given, con
     if (work.at_rest) work.context.start = "rest";
     if (options.detrend == "linear") detrend_linear(work.set, options);
     const bool roving = !options.hits.empty();
-    const std::vector<listed_mode> listed = roving              ? find_struck(options, work)
-                                            : work.set.n_u == 0 ? find_ambient(options, work)
-                                                                : find_modes_agreed(options, work);
+    const std::vector<listed_mode> listed = roving ? find_struck(options, work) : find_modes(options, work);
     if (work.set.n_u == 0 && work.context.sigma)
         keep_to_ambient_bound(
             work.set, options.fs_hz * static_cast<double>(work.set.count()) / static_cast<double>(work.context.samples),

@@ -228,8 +228,9 @@ std::vector<output_spread> spreads_of(const record_set& set) {
         double sum = 0;
         for (std::size_t i = set.n_u + o; i < set.samples.size(); i += set.channels())
             if (const double y = set.samples[i]; !std::isnan(y)) sum += y, ++out[o].count;
+        out[o].mean = sum / out[o].count;
         for (std::size_t i = set.n_u + o; i < set.samples.size(); i += set.channels())
-            if (const double y = set.samples[i] - sum / out[o].count; !std::isnan(y)) out[o].squares += y * y;
+            if (const double y = set.samples[i] - out[o].mean; !std::isnan(y)) out[o].squares += y * y;
     }
     return out;
 }

@@ -44,7 +44,7 @@ std::string repeated_rows(const record_set& set, double fs_hz);
 
 /// Of an output over all records: samples, and the sum of their squares about their mean.
 struct output_spread {
-    double count = 0, squares = 0;
+    double count = 0, mean = 0, squares = 0;
 };
 std::vector<output_spread> spreads_of(const record_set& set);
 

@@ -4,6 +4,9 @@
 #include "files/order_statistics.hpp"
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
+#include <vector>
 
 namespace okid_host {
 namespace {
@@ -11,6 +14,11 @@ namespace {
 constexpr double silence_share = 0.03; // of the spread after the hit
 constexpr double begun = 0.05;         // of the largest force
 constexpr std::size_t fewest_silent = 3;
+constexpr double struck_share = 0.1;      // of the largest force
+constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
+constexpr double of_one_sign = 0.5;       // of a hit's sum of magnitudes, its sum; a burst of noise has none
+constexpr double audible = 5;             // of the usual distance from rest: above, a force acts
+constexpr std::size_t about_a_hit = 4;    // samples, or as many as the longest hit has
 
 /// Spread of a channel over samples first .. last-1 of a record.
 double spread_within(const record_set& set, const record_data& record, std::size_t channel, std::size_t first,
@@ -30,6 +38,38 @@ double middle_of(const record_set& set, const record_data& record, std::size_t c
     return values.empty() ? 0 : upper_median(values);
 }
 
+/// Samples of a force that differ from rest by more than `least`, in stretches.
+std::vector<std::pair<std::size_t, std::size_t>> stretches_beyond(const std::vector<double>& force, double least) {
+    std::vector<std::pair<std::size_t, std::size_t>> out;
+    for (std::size_t i = 0; i < force.size(); ++i) {
+        if (!(std::abs(force[i]) > least)) continue;
+        if (out.empty() || out.back().second < i) out.emplace_back(i, i);
+        out.back().second = i + 1;
+    }
+    return out;
+}
+
+/// Where a force acts, if it acts in hits alone; else empty. @param force  less what it rests at, NaN: missing
+std::vector<bool> acting(const std::vector<double>& force) {
+    const force_level level = level_of(force.data(), 1, force.size());
+    std::vector<double> known;
+    std::copy_if(force.begin(), force.end(), std::back_inserter(known), [](double x) { return !std::isnan(x); });
+    const double least = audible * usual_distance(std::move(known), 0);
+    if (!level.rests || !(level.pulse > least)) return {};
+    std::size_t longest = about_a_hit;
+    for (const auto& [first, end] : stretches_beyond(force, level.pulse)) {
+        double sum = 0, all = 0;
+        for (std::size_t i = first; i < end; ++i) sum += force[i], all += std::abs(force[i]);
+        if (std::abs(sum) < of_one_sign * all) return {};
+        longest = std::max(longest, end - first);
+    }
+    std::vector<bool> out(force.size());
+    for (const auto& [first, end] : stretches_beyond(force, least))
+        std::fill(out.begin() + static_cast<std::ptrdiff_t>(first - std::min(first, longest)),
+                  out.begin() + static_cast<std::ptrdiff_t>(std::min(force.size(), end + longest)), true);
+    return out;
+}
+
 /// The sample at which the force of a record sets in.
 std::size_t onset(const record_set& set, const record_data& record) {
     std::size_t first = record.count;
@@ -47,6 +87,16 @@ std::size_t onset(const record_set& set, const record_data& record) {
 
 } // namespace
 
+force_level level_of(const double* force, std::size_t stride, std::size_t count) {
+    double largest = 0;
+    for (std::size_t i = 0; i < count; ++i) largest = std::fmax(largest, std::abs(force[i * stride]));
+    force_level out{struck_share * largest};
+    std::size_t beyond = 0;
+    for (std::size_t i = 0; i < count; ++i) beyond += std::abs(force[i * stride]) > out.pulse;
+    out.rests = beyond * resting_share <= count;
+    return out;
+}
+
 bool begins_at_rest(const record_set& set, const record_data& record) {
     const std::size_t hit = onset(set, record);
     if (hit < fewest_silent || hit >= record.count) return false;
@@ -55,6 +105,22 @@ bool begins_at_rest(const record_set& set, const record_data& record) {
         if (spread_within(set, record, k, 0, hit) > silence_share * spread_within(set, record, k, hit, last))
             return false;
     return true;
+}
+
+bool rest_between_hits(record_set& set) {
+    bool changed = false;
+    for (const record_data& record : set.records)
+        for (std::size_t k = 0; k < set.n_u; ++k) {
+            double* const column = set.rows(record) + k;
+            const double rest = middle_of(set, record, k);
+            std::vector<double> force(record.count);
+            for (std::size_t i = 0; i < record.count; ++i) force[i] = column[i * set.channels()] - rest;
+            const std::vector<bool> acts = acting(force);
+            for (std::size_t i = 0; i < acts.size(); ++i)
+                if (!acts[i] && !std::isnan(force[i]) && force[i] != 0)
+                    column[i * set.channels()] = rest, changed = true;
+        }
+    return changed;
 }
 
 bool begin_at_rest(const record_set& set, const record_options& options) {

@@ -1,14 +1,25 @@
 // SPDX-License-Identifier: MIT
-// Records that begin in silence, before their force sets in.
+// Forces that rest: before they set in, and between hits.
 #pragma once
 #include "record.hpp"
 
 namespace okid_host {
+
+/// Where a pulse begins, and whether the force rests between its pulses.
+struct force_level {
+    double pulse = 0;
+    bool rests = false;
+};
+force_level level_of(const double* force, std::size_t stride, std::size_t count);
 
 /// Is a record silent before its force sets in?
 bool begins_at_rest(const record_set& set, const record_data& record);
 
 /// Do all records begin at rest? Asked for, or silent before the force sets in.
 bool begin_at_rest(const record_set& set, const record_options& options);
+
+/// A force that acts in hits alone is constant between them: what its channel says there is noise, and no input. Unless the
+/// channel has no reach to zero frequency: then it says there how it comes back to rest. @return was there any to be put to rest?
+bool rest_between_hits(record_set& set);
 
 } // namespace okid_host

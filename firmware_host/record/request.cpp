@@ -249,7 +249,7 @@ record_options check_request(const record_request& given) {
     options.keep_all_hits = given.keep_all;
     if (given.keep_all && options.hits.empty() && !given.set_ups)
         usage("--keep-all belongs to --hit-dofs, --places and --setups");
-    options.sensing = check_sensing(given.sensing, options.outputs.size());
+    options.sensing = check_sensing(given.sensing.empty() ? "acceleration" : given.sensing, options.outputs.size());
     options.mass = check_dofs(given, options, options.sensing);
     if (!options.hits.empty()) {
         options.placed = options.mass;

@@ -12,7 +12,7 @@ namespace okid_host {
 struct record_request {
     std::vector<std::string> inputs, outputs; ///< names of the channels
     std::string method, hankel = "system", order = "auto", hold, detrend = "mean", start = "moving";
-    std::string sensing = "acceleration", input_dofs, output_dofs; ///< lists with commas between
+    std::string sensing, input_dofs, output_dofs; ///< lists with commas between; no sensing: acceleration
     std::string fs, p, rows, max_order, sigma, sigma_blocks;
     std::string band, decimate, modes, picks, threads; ///< of method auto
     std::string hit_dofs;                              ///< one number a record

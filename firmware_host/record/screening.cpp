@@ -6,6 +6,7 @@
 #include "screening.hpp"
 
 #include "files/order_statistics.hpp"
+#include "record_rest.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -28,8 +29,6 @@ constexpr double moving_share = 0.3; // of the usual spread, before and after a 
 constexpr double spike_spreads = 15, spike_ratio = 5;
 constexpr double spreads_around = 8; // of one of two or three samples: a pulse that runs along a beam is as narrow
 constexpr std::size_t spike_reach = 6, beside_spike = about_a_spike;
-constexpr double struck_share = 0.1;      // of the largest force
-constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
 constexpr std::string_view never_moves = "never moves";
 constexpr const char* lost_words =
     ": the whole output is left out, its shape entries are empty. Look at its sensor, range and cable";
@@ -162,27 +161,11 @@ struct force_times {
     std::size_t resting = 0;  ///< samples before the first force
 };
 
-/// Where a pulse begins, and whether the force rests between its pulses.
-struct force_level {
-    double pulse = 0;
-    bool rests = false;
-};
-
-force_level level_of(const samples_view& force) {
-    double largest = 0;
-    for (std::size_t i = 0; i < force.size(); ++i) largest = std::fmax(largest, std::abs(force.at(i)));
-    force_level out{struck_share * largest};
-    std::size_t beyond = 0;
-    for (std::size_t i = 0; i < force.size(); ++i) beyond += std::abs(force.at(i)) > out.pulse;
-    out.rests = beyond * resting_share <= force.size();
-    return out;
-}
-
 force_times times_of_forces(const record_set& set, const record_data& record) {
     force_times out{std::vector<bool>(record.count, false), set.n_u > 0 ? record.count : 0};
     for (std::size_t k = 0; k < set.n_u; ++k) {
         const samples_view force{set.rows(record) + k, set.channels(), record.count};
-        const force_level level = level_of(force);
+        const force_level level = level_of(force.first, force.stride, force.size());
         for (std::size_t i = 0; i < force.size(); ++i) {
             if (!(std::abs(force.at(i)) > level.pulse)) continue;
             out.resting = std::min(out.resting, i);
@@ -200,12 +183,6 @@ std::vector<double> measured(const samples_view& y, std::size_t first, std::size
     for (std::size_t i = first; i < last; ++i)
         if (!std::isnan(y.at(i))) out.push_back(y.at(i));
     return out;
-}
-
-/// How far values are off one of them, as the deviation of a normal distribution; 0 of fewer than 100.
-double usual_distance(std::vector<double> values, double centre) {
-    for (double& v : values) v = std::abs(v - centre);
-    return values.size() < 100 ? 0 : 1.4826 * upper_median(values);
 }
 
 /// Centre NaN of none, spread 0 of few.
@@ -333,7 +310,7 @@ usual_values usual_of(const record_set& set) {
     for (std::size_t k = 0; k < set.channels(); ++k) {
         const samples_view channel{set.samples.data() + k, set.channels(), set.count()};
         if (k < set.n_u) {
-            const force_level level = level_of(channel);
+            const force_level level = level_of(channel.first, channel.stride, channel.size());
             out.pulse.push_back(level.rests ? level.pulse : INFINITY);
         } else {
             const auto [centre, spread] = centre_and_spread(channel);

@@ -116,12 +116,13 @@ constexpr double noisier = 5;       ///< times the share of the middle one; 2.2 
 constexpr std::size_t fewest_to_compare = 3; ///< outputs
 constexpr double in_a_noisy_output = 0.8;    ///< of the power of a shape; of modes of the structure 0.65 and less
 
-// Free decays in a record without a force (trains over a bridge); each alone shows whether it is one.
-constexpr double fall_of_power = 100; ///< after an event, from its greatest power: an hour of wind or traffic has less
+// A part of a record for the whole: the free decays after events (trains over a bridge), a force without the noise of its rest.
+constexpr double fall_of_power = 100; ///< from the greatest of an event; cars on a road have it too, `sharper` decides
 constexpr double still_driven = 10;   ///< of the greatest power a tenth and more is of what acts
-constexpr double sharper = 0.5; ///< deviations, over those of the whole record: 0.03 to 0.3 after trains, 0.8 to 1.1
-                                ///< of cars on a road
-constexpr double shared_modes = 0.5; ///< of those of the whole record the decays show, too
+constexpr double sharper =
+    0.5; ///< deviations, over those of the whole: below 0.3 after trains, 0.8 to 1.1 of cars on a
+         ///< road; of forces at rest 0.06 to 0.4 of noise, 0.7 and more of measured hammers
+constexpr double shared_modes = 0.5; ///< of those of the whole that the part shows, too
 
 // Records without a force that are no repeats.
 constexpr double one_shape = 0.8;       ///< of the power at a mode: two close modes mix otherwise in each record

@@ -127,6 +127,22 @@ def test_a_rate_given_by_hand_needs_no_time(tmp_path: Path) -> None:
     assert record.fs_hz == 250.0 and record.names == ["time", "a"] and record.samples.shape == (6, 2)
 
 
+@pytest.mark.parametrize(
+    ("text", "fs", "words"),
+    [
+        ("Header\ntime [s],a\n0.00,1\n0.01,2\n0.02,3\n0.03,4\n0.04,4\n", 250.0, "column 'time [s]' says 100 Hz"),
+        ("Header\ntime [s],a\n0.00,1\n0.01,2\n0.02,3\n0.03,4\n0.04,4\n", 100.2, ""),
+        ("Sample rate: 512 Hz\na,b\n0,1\n4,2\n8,3\n12,4\n16,4\n20,1\n", 250.0, "a line above the data says 512 Hz"),
+    ],
+)
+def test_another_rate_by_hand_is_said(text: str, fs: float, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(text)
+    record = read_record(path, fs=fs)
+    said = [remark for remark in record.remarks if "every frequency scales" in remark]
+    assert record.fs_hz == fs and len(said) == bool(words) and all(words in remark for remark in said)
+
+
 def test_okids_own_form_stays_as_strict_as_the_program(tmp_path: Path) -> None:
     """Two rates contradict each other, a row is short, text stands among numbers: no second reading makes it right."""
     for text in ("# fs_hz: 5\n# fs_hz: 6\na,b\n1,2\n3,4\n", "a,b\n1,2\n3\n4,5\n", "a,b\n1,2\n3,x\n4,5\n5,6\n6,7\n"):

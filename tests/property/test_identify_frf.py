@@ -215,6 +215,69 @@ def test_units_of_a_universal_file(tmp_path: Path, unit: str) -> None:
     assert "the file says acceleration" in next(w.text for w in wrong.warnings if w.code == "drive_point_polarity")
 
 
+@pytest.mark.parametrize("power", [-1, -2])
+def test_quantity_of_a_universal_file(tmp_path: Path, power: int) -> None:
+    """Velocities and displacements are what the file says; an option says otherwise."""
+    quantity = {-1: "velocity", -2: "displacement"}[power]
+    M, R, K = _chain(3, 60.0)
+    line = np.arange(0.25, 1.5 * _truth(M, R, K)[0][-1], 0.25)
+    h = _responses(M, R, K, line, [0, 1, 2], [0])
+    own = Frf.of(line, h * (2j * np.pi * line[:, None, None]) ** power, ["1z"], ["1z", "2z", "3z"])
+    path = tmp_path / "h.uff"
+    okid.write_frf(path, own)
+    text = path.read_bytes().split(b"\n")
+    kind = f"{12:10d}".encode()
+    other = f"{ {-1: 11, -2: 8}[power]:10d}".encode()
+    said = [row.replace(kind, other, 1) if row.startswith(kind) else row for row in text]
+    path.write_bytes(b"\n".join(said))
+    whole = okid.identify_frf(Frf.of(line, h, ["1z"], ["1z", "2z", "3z"]))
+    expected = [mode.modal_mass for mode in whole.modes]
+    program("identify", path, "--frf", "--json", tmp_path / "r.json", status=0)
+    done = okid.Result.from_dict(json.loads((tmp_path / "r.json").read_text(encoding="utf-8")))
+    for result in (done, okid.identify_frf(path), okid.identify_frf(own, sensing=quantity)):
+        assert [mode.modal_mass for mode in result.modes] == pytest.approx(expected, rel=1e-3)
+        assert "drive_point_polarity" not in [w.code for w in result.warnings]
+    assert all(mode.modal_mass is None for mode in okid.identify_frf(path, sensing="acceleration").modes)
+
+
+@pytest.mark.parametrize(
+    ("head", "factor"),
+    [
+        ("frequency_hz,{o}:re,{o}:im", 1.0),
+        ("Frequency [Hz],3z [g]/3z [N]:re,3z [g]/3z [N]:im", 9.80665),
+        ("Freq (Hz),3z (g)/3z (N):Real,3z (g)/3z (N):Imag", 9.80665),
+        ("frequency_hz,{o}:re [g/N],{o}:im [g/N]", 9.80665),
+        ("frequency_hz,3z/3z [lbf]:re,3z/3z [lbf]:im", 1 / 4.4482216152605),
+        ("Frequency,Real,Imaginary", 1.0),
+    ],
+)
+def test_heads_of_tables_as_analysers_write_them(tmp_path: Path, head: str, factor: float) -> None:
+    M, R, K = _chain(3, 60.0)
+    line = np.arange(0.25, 1.5 * _truth(M, R, K)[0][-1], 0.25)
+    h = _responses(M, R, K, line, [0], [0])[:, 0, 0] / factor
+    path = tmp_path / "h.csv"
+    rows = "\n".join(f"{f:.6g},{x.real:.12g},{x.imag:.12g}" for f, x in zip(line, h, strict=True))
+    path.write_text(head.format(o="3z/3z") + "\n" + rows + "\n")
+    result = okid.identify_frf(path)
+    whole = okid.identify_frf(Frf.of(line, h[:, None, None] * factor, ["3z"], ["3z"]))
+    assert [m.frequency_hz for m in result.modes] == pytest.approx([m.frequency_hz for m in whole.modes], rel=1e-6)
+    if "3z" in head.format(o="3z/3z"):
+        assert [m.modal_mass for m in result.modes] == pytest.approx([m.modal_mass for m in whole.modes], rel=1e-4)
+    assert ("unit_converted" in [w.code for w in result.warnings]) == (factor != 1)
+
+
+def test_phases_of_tables_in_radians(tmp_path: Path) -> None:
+    M, R, K = _chain(3, 60.0)
+    line = np.arange(0.25, 1.5 * _truth(M, R, K)[0][-1], 0.25)
+    h = _noisy(_responses(M, R, K, line, [0], [0]), 0.001, 1)[:, 0, 0]
+    for unit, factor in (("rad", 1.0), ("deg", 180 / np.pi)):
+        rows = [f"{f:.6g},{abs(x):.17g},{factor * np.angle(x):.17g}" for f, x in zip(line, h, strict=True)]
+        (tmp_path / f"{unit}.csv").write_text(f"Frequency [Hz],Magnitude,Phase [{unit}]\n" + "\n".join(rows) + "\n")
+    in_rad, in_deg = (okid.identify_frf(tmp_path / f"{unit}.csv") for unit in ("rad", "deg"))
+    assert [m.frequency_hz for m in in_rad.modes] == pytest.approx([m.frequency_hz for m in in_deg.modes], rel=1e-9)
+    assert len(in_rad.confident_modes) == 3
+
+
 def test_many_modes_in_a_small_part_of_the_lines() -> None:
     """Below a quarter of the last line, one force: a fraction of 64 degrees over all lines loses three of them."""
     n = 20

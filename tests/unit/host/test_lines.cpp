@@ -284,6 +284,31 @@ static void what_a_tone_is_a_multiple_of_is_no_mode() {
     TEST_ASSERT_EQUAL_STRING("harmonic", codes[0].c_str());
 }
 
+/// A hammer beside a machine of 8 Hz. What answers a hit at 8 Hz and at a mode of four times that has the phase of the hit to the
+/// first and to the fourth power: no sign of the machine.
+static void what_answers_hits_is_no_multiple() {
+    std::mt19937 random(15);
+    std::normal_distribution<double> normal;
+    record_level level = one_record();
+    const std::complex<double> of_mode = pole_of(32, 0.004), below = pole_of(8.2, 0.03);
+    std::complex<double> mode = 0, other = 0;
+    std::size_t next = 40;
+    for (std::size_t i = 0; i < count; ++i) {
+        const double force = i == next ? 1 : 0;
+        if (i == next) next += 430 + static_cast<std::size_t>(100 * std::abs(normal(random)));
+        mode = of_mode * mode + force;
+        other = below * other + force;
+        const double machine = 0.01 * std::sin(2 * M_PI * 8 / fs * static_cast<double>(i));
+        level.records.front().insert(level.records.front().end(),
+                                     {force, other.imag() + mode.imag() + machine + 1e-3 * normal(random),
+                                      other.imag() - 0.6 * mode.imag() + machine + 1e-3 * normal(random)});
+    }
+    std::vector<consensus_mode> modes{pole(8, 1e-4, 1), pole(32, 0.004, -0.6)};
+    modes[0].why = {"tone"};
+    mark_lines({level}, 1, 2, false, modes);
+    TEST_ASSERT_EQUAL_UINT64(0, modes[1].why.size());
+}
+
 int main() {
     UNITY_BEGIN();
     RUN_TEST(a_decay_is_no_line_however_short_the_record);
@@ -298,5 +323,6 @@ int main() {
     RUN_TEST(a_mode_stays_one_wherever_it_lies);
     RUN_TEST(where_the_force_ends_is_no_mode);
     RUN_TEST(what_a_tone_is_a_multiple_of_is_no_mode);
+    RUN_TEST(what_answers_hits_is_no_multiple);
     return UNITY_END();
 }

@@ -26,6 +26,7 @@ Real = NDArray[np.float64]
 LOGGER_EXTENSIONS = (".txt", ".dat", ".tsv", ".lvm")
 _HEAD_BYTES = 1 << 18  # the data begin within them
 _ROWS_ALIKE = 5  # so many lines of one shape are data
+_OTHER_RATE = 5e-3  # of a rate: from here on two are not the same one
 _SEPARATORS = ("\t", ";", ",", None)  # None: blanks
 _MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "#NV", "null", "-", "--", "1.#QNAN", "-1.#IND", "1.#IND")
 _SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6,
@@ -343,12 +344,27 @@ def _times(layout: _Layout, columns: list[Any], found: dict[int, Real]) -> tuple
     return None
 
 
+def _contradiction(layout: _Layout, columns: list[Any], found: dict[int, Real], fs: float) -> list[str]:
+    """That the time of the file, or a line above its data, is not of the rate that is used instead."""
+    said = len(layout.remarks)
+    try:
+        time = _times(layout, columns, found)
+        rate = _stated_rate(layout.lines[: layout.first]) if time is None else _grid(layout, time[1])[0]
+    except InputError:  # the reason for which a rate is given
+        rate = None
+    del layout.remarks[said:]
+    if rate is None or abs(rate / fs - 1.0) <= _OTHER_RATE:
+        return []
+    where = f"column {layout.names[time[0]]!r}" if time is not None else "a line above the data"
+    return [f"{fs:.9g} Hz is used, {where} says {rate:.9g} Hz: every frequency scales with it"]
+
+
 def read_logger(path: str | Path, fs: float | None = None) -> Record:
     """Read a text file of a logger or spreadsheet: samples (N, m), NaN = missing, with rate, names and units found.
 
     The rate comes from the time column (t, time, Zeit, timestamp .. in s, ms, us, or clock times), else from a line
     above the data (sample rate, Delta_X, dt ..), else it is not known. Rows that the time shows to be missing become
-    NaN. `fs` in Hz: the time is not looked at. What was taken for what is in `remarks`, the lines above the data in
+    NaN. `fs` in Hz replaces all these. What was taken for what is in `remarks`, the lines above the data in
     the note "header". About 1 s for 10^6 rows of 4 channels. InputError names line and column of the first fault.
     """
     file = Path(path)
@@ -367,9 +383,11 @@ def read_logger(path: str | Path, fs: float | None = None) -> Record:
             if missing:
                 first = layout.first + int(np.argmax(np.diff(rows) > 1)) + 2
                 layout.remarks.append(f"{missing} samples are missing by the time, first before line {first}: NaN")
-            if stated is not None and abs(stated / rate - 1.0) > 5e-3:
+            if stated is not None and abs(stated / rate - 1.0) > _OTHER_RATE:
                 layout.remarks.append(f"a line above the data states {stated:.9g} Hz, the time says {rate:.9g} Hz")
-        elif stated is not None and fs is None:
+        elif fs is not None:
+            layout.remarks += _contradiction(layout, columns, found, fs)
+        elif stated is not None:
             layout.remarks.append(f"{stated:.9g} Hz by a line above the data")
         others = {k: array for k, array in arrays.items() if time is None or k != time[0]}
         kept = [k for k, array in others.items() if array is not None and not np.all(np.isnan(array))]

@@ -19,7 +19,7 @@ def identify_frf(
     responses: Frf | str | Path | Sequence[str | Path],
     *,
     band: tuple[float, float] | None = None,
-    sensing: str | Sequence[str] = "acceleration",
+    sensing: str | Sequence[str] | None = None,
     input_dofs: Sequence[int] | None = None,
     output_dofs: Sequence[int] | None = None,
     modes: Sequence[int] | None = None,
@@ -30,10 +30,10 @@ def identify_frf(
     """Identify a structure from measured frequency responses: pLSCF over many orders, residues by LSFD.
 
     `responses`: an okid.frf.Frf (of okid.read_frf(), okid.frf.h1() or Frf.of(frequency_hz, response)), or files, read
-    by okid.read_frf(). Several set-ups of one structure are one set of responses. `band` (low, high) in Hz; `sensing`,
-    `input_dofs`, `output_dofs`, `modes`: as in okid.identify(). `exponential`: time constant in s of an exponential
-    window in the responses; its damping is taken out of the modes. `stabilization`: keep the poles of all orders, for
-    result.stabilization().
+    by okid.read_frf(). Several set-ups of one structure are one set of responses. `band` (low, high) in Hz; `sensing`:
+    by default what the files say, else acceleration; `input_dofs`, `output_dofs`, `modes`: as in okid.identify().
+    `exponential`: time constant in s of an exponential window in the responses; its damping is taken out of the modes.
+    `stabilization`: keep the poles of all orders, for result.stabilization().
 
     The result is one as of okid.identify(): method "plscf", mode.confident, .found_in and .why by the agreement of six
     fits, deviations by what the fit leaves, emac NaN. With more inputs than outputs (a roving hammer) both are

@@ -12,8 +12,8 @@ from okid.report.material import Material
 
 # Nothing is to be done about these (docs/reference/result.md). Any other code, a newer one too, asks for a look.
 HARMLESS = frozenset({
-    "channel_skew", "decimated", "free_decays", "pdc_undetermined", "qr_factor", "reciprocity", "refine_failed",
-    "resampled", "restarted", "unit_converted", "window_shortened",
+    "channel_skew", "decimated", "force_window", "free_decays", "pdc_undetermined", "qr_factor", "reciprocity",
+    "refine_failed", "resampled", "restarted", "unit_converted", "window_shortened",
 })  # fmt: skip
 MILD = ' class="mild"'
 

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""A force that rests between its hits, behind a channel with noise: what the channel says there is no input. One whose
+amplifier has no reach to zero frequency says there how it comes back to rest, and that is one."""
+
+from __future__ import annotations
+
+import numpy as np
+import okid
+import scipy.signal
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+
+FS, OVER, SECONDS = 1000.0, 8, 12
+TRUE = np.array([(38.0, 0.004), (91.0, 0.003), (143.0, 0.006), (212.0, 0.0035), (317.0, 0.005)])
+SHAPES = np.array([[1.0, 0.7, -0.4], [0.8, -1.0, 0.6], [-0.5, 1.0, 0.9], [1.0, 0.3, 0.8], [0.6, -0.7, 1.0]])
+
+
+def struck(seed: int, noise: float, hits: int = 4, coupled: bool = False) -> tuple[Real, Real]:
+    """Force in N and three accelerations; `noise` of the channel in N; `coupled`: all behind a capacitor of 0.5 Hz."""
+    rng = np.random.default_rng(seed)
+    rate, count = FS * OVER, int(SECONDS * FS) * OVER
+    force = np.zeros(count)
+    for k in range(hits):
+        first, length = int((0.4 + k * SECONDS / hits + rng.uniform(0, 0.2)) * rate), int(0.0012 * rate)
+        force[first : first + length] += rng.uniform(80, 160) * np.sin(np.pi * (np.arange(length) + 0.5) / length)
+    y = np.zeros((count, 3))
+    for (hz, zeta), shape in zip(TRUE, SHAPES, strict=True):
+        own = scipy.signal.cont2discrete(([0.5, 0, 0], [1, 4 * np.pi * zeta * hz, (2 * np.pi * hz) ** 2]), 1 / rate)
+        y += np.outer(shape[0] * scipy.signal.lfilter(np.ravel(own[0]), own[1], force), shape)
+    rows = np.column_stack([force, y])
+    if coupled:
+        rows = scipy.signal.sosfilt(scipy.signal.butter(1, 0.5, "high", fs=rate, output="sos"), rows, axis=0)
+    rows = scipy.signal.resample_poly(rows, 1, OVER, axis=0)
+    rows += rng.standard_normal(rows.shape) * np.array([noise, 0.02, 0.02, 0.02])
+    return rows[:, :1], rows[:, 1:]
+
+
+def codes(result: okid.Result) -> list[str]:
+    return [one.code for one in result.warnings]
+
+
+def test_noise_of_a_resting_force_moves_no_mode() -> None:
+    z, shares = [], []
+    for seed in range(4):
+        u, y = struck(seed, 0.5)
+        result = okid.identify(u, y, fs=FS)
+        assert "force_window" in codes(result)
+        assert len(result.confident_modes) == len(TRUE), result.table()
+        for mode, (hz, zeta) in zip(result.confident_modes, TRUE, strict=True):
+            z += [
+                (mode.frequency_hz - hz) / mode.frequency_std_hz,
+                (mode.damping_ratio - zeta) / mode.damping_ratio_std,
+            ]
+            shares.append(mode.frequency_hz / hz - 1)
+    assert np.sqrt(np.mean(np.square(z))) < 1.8
+    assert np.sqrt(np.mean(np.square(shares))) < 3e-5
+
+
+def test_what_a_channel_says_of_its_way_back_is_kept() -> None:
+    u, y = struck(7, 0.02, coupled=True)
+    result = okid.identify(u, y, fs=FS)
+    assert "force_window" not in codes(result) and len(result.confident_modes) == len(TRUE)
+    u, y = struck(8, 0.0)
+    assert "force_window" not in codes(okid.identify(u, y, fs=FS))
