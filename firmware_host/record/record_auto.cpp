@@ -380,9 +380,9 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
 }
 
 /// Of records, and of a part of them that stands for them where it knows the modes far better.
-/// @param seen  the look at the part. @param said  code and words of why it was taken
-std::vector<listed_mode> find_in_part(one_look seen, const record_options& options, const char* code,
-                                      const std::string& said, record_work& work) {
+/// @param seen  the look at the part. @param said  code and words of what the part is
+std::vector<listed_mode> find_in_part(one_look seen, const record_options& options, const remarks::value_type& said,
+                                      record_work& work) {
     one_look whole = look_once(work.set, work.at_rest, unpicked(options), work, nullptr);
     std::vector<std::string> alone;
     const double ratio = deviations_over(seen, whole, alone);
@@ -391,29 +391,37 @@ std::vector<listed_mode> find_in_part(one_look seen, const record_options& optio
     if (best.listed.empty()) std::rethrow_exception(best.fault);
     if (&best == &seen)
         best.work.context.warnings.emplace_back(
-            code, fmt::format("{} knows the modes {:.1f} times as well: modes and fits are of that alone{}{}", said,
-                              1 / ratio, alone.empty() ? "" : ". Seen otherwise only: ", fmt::join(alone, ", ")));
+            said.first,
+            fmt::format("{} knows the modes {:.1f} times as well: modes and fits are of that alone{}{}", said.second,
+                        1 / ratio, alone.empty() ? "" : ". Seen otherwise only: ", fmt::join(alone, ", ")));
     work = std::move(best.work);
     work.struck = nullptr;
     return best.listed;
 }
 
+remarks::value_type remark_events(const record_set& pieces, const record_set& all, double fs_hz) {
+    return {"free_decays", fmt::format("{} times the power falls by 20 dB and more, as after a train or a hit. What "
+                                       "follows, {:.0f} of {:.0f} s,",
+                                       pieces.records.size(), static_cast<double>(pieces.count()) / fs_hz,
+                                       static_cast<double>(all.count()) / fs_hz)};
+}
+
+remarks::value_type remark_rest(const record_set& all, double fs_hz) {
+    return {"force_window", fmt::format("between its hits the force rests. The record of {:.0f} s without what its "
+                                        "channel says there",
+                                        static_cast<double>(all.count()) / fs_hz)};
+}
+
 /// Without a force: where the power rises and falls by far, a train that passes drives the structure at frequencies of its own,
 /// and what follows it is a free decay. With one that rests between its hits: its channel may say noise there.
 std::vector<listed_mode> find_modes(const record_options& options, record_work& work) {
-    const record_set pieces = after_events(work.set);
-    if (!pieces.records.empty())
-        return find_in_part(look_once(pieces, false, unpicked(options), work, &work.set), options, "free_decays",
-                            fmt::format("{} times the power falls by 20 dB and more, as after a train or a hit. What "
-                                        "follows, {:.0f} of {:.0f} s,",
-                                        pieces.records.size(), static_cast<double>(pieces.count()) / options.fs_hz,
-                                        static_cast<double>(work.set.count()) / options.fs_hz),
-                            work);
+    if (const record_set pieces = after_events(work.set); !pieces.records.empty())
+        return find_in_part(look_once(pieces, false, unpicked(options), work, &work.set), options,
+                            remark_events(pieces, work.set, options.fs_hz), work);
     record_set quiet = work.set.n_u > 0 && !work.before ? work.set : record_set();
     if (rest_between_hits(quiet))
         return find_in_part(look_once(std::move(quiet), work.at_rest, unpicked(options), work, nullptr), options,
-                            "force_window",
-                            "between its hits the force rests. The record without what its channel says there", work);
+                            remark_rest(work.set, options.fs_hz), work);
     return find_modes_agreed(options, work);
 }
 
