@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  which of two looks at the same records is believed
+// PURPOSE  which of two looks at the same records is believed: the one that knows its modes better, or explains the outputs better
 #include "looks.hpp"
 
+#include "record_fit.hpp"
 #include "result/judgement.hpp"
 
 #include <algorithm>
@@ -45,6 +46,18 @@ double deviations_over(const one_look& part, const one_look& whole, std::vector<
         if (ratio > 0) logs += std::log(ratio), ++count; // of NaN nothing is known
     }
     return count > 0 && count >= judgement::shared_modes * all ? std::exp(logs / 2 / count) : 1;
+}
+
+double power_left(const std::vector<listed_mode>& listed, record_set set, const record_options& options) {
+    record_work trial;
+    trial.set = std::move(set);
+    if (options.detrend != "none") remove_means(trial.set);
+    make_modal_model(listed, options.fs_hz, trial);
+    fit_records(trial.set, trial.model, trial.context, &trial.states);
+    double sum = 0, count = 0;
+    for (const double percent : trial.context.simulation_percent.value_or(std::vector<double>()))
+        if (percent == percent) sum += std::pow(1 - percent / 100, 2), ++count;
+    return sum / count;
 }
 
 } // namespace okid_host

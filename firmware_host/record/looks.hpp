@@ -25,4 +25,8 @@ struct one_look {
 /// @param alone  becomes the frequencies of the modes of the whole that the part does not have, with unit
 double deviations_over(const one_look& part, const one_look& whole, std::vector<std::string>& alone);
 
+/// Power that the likeliest simulation of records by these modes leaves of the outputs, over all of theirs (mean over the outputs);
+/// NaN without an input. B, D and initial states are fitted to these records: one output-error fit.
+double power_left(const std::vector<listed_mode>& listed, record_set set, const record_options& options);
+
 } // namespace okid_host

@@ -349,9 +349,8 @@ one_look picked_in(record_work seen, const record_options& options, const record
     return look_once(std::move(seen.set), seen.at_rest, options, about, seen.struck);
 }
 
-/// Of records struck at different places: poles and shapes from all together, B and D from those of each place. A force that rests
-/// is looked at twice. What follows it needs no input a place, so that many light modes and places do no harm; with it modes are
-/// seen that die away soon, and the silence before it shows that a mode is no tone: that look counts where it believes more modes.
+/// Of records struck at different places: poles and shapes from all together, B and D from those of each place. What follows hits
+/// needs no input a place; with it modes are seen that die away soon, and the silence before. Who believes more modes counts.
 std::vector<listed_mode> find_struck(const record_options& options, record_work& work) {
     record_options seen = options;
     seen.inputs = work.context.inputs = place_names(options.inputs.front(), options.hits);
@@ -379,50 +378,54 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
     return best.listed;
 }
 
-/// Of records, and of a part of them that stands for them where it knows the modes far better.
-/// @param seen  the look at the part. @param said  code and words of what the part is
-std::vector<listed_mode> find_in_part(one_look seen, const record_options& options, const remarks::value_type& said,
-                                      record_work& work) {
-    one_look whole = look_once(work.set, work.at_rest, unpicked(options), work, nullptr);
-    std::vector<std::string> alone;
-    const double ratio = deviations_over(seen, whole, alone);
-    one_look& best = ratio < judgement::sharper ? seen : whole;
+/// The look that is believed, as the result: what was picked by hand is looked at again.
+std::vector<listed_mode> take_look(one_look best, const record_options& options, record_work& work) {
     if (options.by_hand()) best = picked_in(std::move(best.work), options, work);
     if (best.listed.empty()) std::rethrow_exception(best.fault);
-    if (&best == &seen)
-        best.work.context.warnings.emplace_back(
-            said.first,
-            fmt::format("{} knows the modes {:.1f} times as well: modes and fits are of that alone{}{}", said.second,
-                        1 / ratio, alone.empty() ? "" : ". Seen otherwise only: ", fmt::join(alone, ", ")));
     work = std::move(best.work);
     work.struck = nullptr;
     return best.listed;
 }
 
-remarks::value_type remark_events(const record_set& pieces, const record_set& all, double fs_hz) {
-    return {"free_decays", fmt::format("{} times the power falls by 20 dB and more, as after a train or a hit. What "
-                                       "follows, {:.0f} of {:.0f} s,",
-                                       pieces.records.size(), static_cast<double>(pieces.count()) / fs_hz,
-                                       static_cast<double>(all.count()) / fs_hz)};
+/// Without a force: a train drives the structure at frequencies of its own, what follows it is a free decay.
+std::vector<listed_mode> find_after_events(const record_set& pieces, const record_options& options, record_work& work) {
+    one_look part = look_once(pieces, false, unpicked(options), work, &work.set),
+             whole = look_once(work.set, work.at_rest, unpicked(options), work, nullptr);
+    std::vector<std::string> alone;
+    const double ratio = deviations_over(part, whole, alone);
+    if (!(ratio < judgement::sharper)) return take_look(std::move(whole), options, work);
+    part.work.context.warnings.emplace_back(
+        "free_decays",
+        fmt::format(
+            "{} times the power falls by 20 dB or more, as after trains. What follows, {:.0f} of {:.0f} s, knows the "
+            "modes {:.1f} times as well: modes and fits are of that alone{}{}",
+            pieces.records.size(), static_cast<double>(pieces.count()) / options.fs_hz,
+            static_cast<double>(work.set.count()) / options.fs_hz, 1 / ratio,
+            alone.empty() ? "" : ". Seen otherwise only: ", fmt::join(alone, ", ")));
+    return take_look(std::move(part), options, work);
 }
 
-remarks::value_type remark_rest(const record_set& all, double fs_hz) {
-    return {"force_window", fmt::format("between its hits the force rests. The record of {:.0f} s without what its "
-                                        "channel says there",
-                                        static_cast<double>(all.count()) / fs_hz)};
-}
-
-/// Without a force: where the power rises and falls by far, a train that passes drives the structure at frequencies of its own,
-/// and what follows it is a free decay. With one that rests between its hits: its channel may say noise there.
-std::vector<listed_mode> find_modes(const record_options& options, record_work& work) {
-    if (const record_set pieces = after_events(work.set); !pieces.records.empty())
-        return find_in_part(look_once(pieces, false, unpicked(options), work, &work.set), options,
-                            remark_events(pieces, work.set, options.fs_hz), work);
+/// With a force that rests between its hits: what its channel says there is noise where the outputs do not follow it.
+std::vector<listed_mode> find_with_rest(const record_options& options, record_work& work) {
     record_set quiet = work.set.n_u > 0 && !work.before ? work.set : record_set();
-    if (rest_between_hits(quiet))
-        return find_in_part(look_once(std::move(quiet), work.at_rest, unpicked(options), work, nullptr), options,
-                            remark_rest(work.set, options.fs_hz), work);
-    return find_modes_agreed(options, work);
+    if (!rest_between_hits(quiet)) return find_modes_agreed(options, work);
+    one_look whole = look_once(work.set, work.at_rest, unpicked(options), work, nullptr);
+    const auto left = [&](const record_set& set) { return power_left(whole.listed, set, options); };
+    const double ratio = whole.listed.empty() ? 1 : left(quiet) / left(work.set);
+    if (!(ratio < judgement::explains_better)) return take_look(std::move(whole), options, work);
+    one_look part = look_once(std::move(quiet), work.at_rest, unpicked(options), work, nullptr);
+    if (part.believed() < whole.believed()) return take_look(std::move(whole), options, work);
+    part.work.context.warnings.emplace_back(
+        "force_window",
+        fmt::format("the force rests between its hits, and the result is of the record without the noise of "
+                    "its channel there: that leaves {:.2g} times as much of the outputs unexplained",
+                    ratio));
+    return take_look(std::move(part), options, work);
+}
+
+std::vector<listed_mode> find_modes(const record_options& options, record_work& work) {
+    const record_set pieces = after_events(work.set);
+    return pieces.records.empty() ? find_with_rest(options, work) : find_after_events(pieces, options, work);
 }
 
 /// Of records struck at different places: M, K and R where there is a mode for each, and shapes over the places.

@@ -14,11 +14,13 @@ namespace {
 constexpr double silence_share = 0.03; // of the spread after the hit
 constexpr double begun = 0.05;         // of the largest force
 constexpr std::size_t fewest_silent = 3;
-constexpr double struck_share = 0.1;      // of the largest force
-constexpr std::size_t resting_share = 20; // a force beyond that in more than one of so many samples does not rest
-constexpr double of_one_sign = 0.5;       // of a hit's sum of magnitudes, its sum; a burst of noise has none
-constexpr double audible = 5;             // of the usual distance from rest: above, a force acts
-constexpr std::size_t about_a_hit = 4;    // samples, or as many as the longest hit has
+constexpr double struck_share = 0.1;       // of the largest force
+constexpr std::size_t resting_share = 20;  // a force beyond that in more than one of so many samples does not rest
+constexpr double of_one_sign = 0.5;        // of a hit's sum of magnitudes, its sum; a burst of noise has none
+constexpr double audible = 5;              // of the usual distance from rest: above, a force acts
+constexpr std::size_t about_a_hit = 4;     // samples, or as many as the longest hit has
+constexpr std::size_t hits_of_a_mean = 16; // times as long: means at rest, of a channel that comes back slowly
+constexpr double heard_in_a_mean = 6;      // of the usual distance over the root of its samples: some four deviations
 
 /// Spread of a channel over samples first .. last-1 of a record.
 double spread_within(const record_set& set, const record_data& record, std::size_t channel, std::size_t first,
@@ -49,24 +51,53 @@ std::vector<std::pair<std::size_t, std::size_t>> stretches_beyond(const std::vec
     return out;
 }
 
-/// Where a force acts, if it acts in hits alone; else empty. @param force  less what it rests at, NaN: missing
-std::vector<bool> acting(const std::vector<double>& force) {
+/// A force that acts in hits alone; `acts` is empty: it does not.
+struct hit_force {
+    std::vector<bool> acts;
+    std::size_t longest = about_a_hit; ///< hit
+    double usual = 0;                  ///< distance from rest
+};
+
+/// @param force  less what it rests at, NaN: missing
+hit_force hits_of(const std::vector<double>& force) {
+    hit_force out;
     const force_level level = level_of(force.data(), 1, force.size());
     std::vector<double> known;
     std::copy_if(force.begin(), force.end(), std::back_inserter(known), [](double x) { return !std::isnan(x); });
-    const double least = audible * usual_distance(std::move(known), 0);
-    if (!level.rests || !(level.pulse > least)) return {};
-    std::size_t longest = about_a_hit;
+    out.usual = usual_distance(std::move(known), 0);
+    if (!level.rests || !(level.pulse > audible * out.usual)) return out;
     for (const auto& [first, end] : stretches_beyond(force, level.pulse)) {
         double sum = 0, all = 0;
         for (std::size_t i = first; i < end; ++i) sum += force[i], all += std::abs(force[i]);
-        if (std::abs(sum) < of_one_sign * all) return {};
-        longest = std::max(longest, end - first);
+        if (std::abs(sum) < of_one_sign * all) return out;
+        out.longest = std::max(out.longest, end - first);
     }
-    std::vector<bool> out(force.size());
-    for (const auto& [first, end] : stretches_beyond(force, least))
-        std::fill(out.begin() + static_cast<std::ptrdiff_t>(first - std::min(first, longest)),
-                  out.begin() + static_cast<std::ptrdiff_t>(std::min(force.size(), end + longest)), true);
+    out.acts.resize(force.size());
+    for (const auto& [first, end] : stretches_beyond(force, audible * out.usual))
+        std::fill(out.acts.begin() + static_cast<std::ptrdiff_t>(first - std::min(first, out.longest)),
+                  out.acts.begin() + static_cast<std::ptrdiff_t>(std::min(force.size(), end + out.longest)), true);
+    return out;
+}
+
+/// The force without its noise at rest: means over many samples that stand out of it, as behind a channel that has no reach to zero
+/// frequency and comes back slowly; else nothing.
+std::vector<double> without_noise(const std::vector<double>& force, const hit_force& hits) {
+    std::vector<double> out = force, sum(force.size() + 1), count(force.size() + 1);
+    for (std::size_t i = 0; i < force.size(); ++i) {
+        const bool known = !std::isnan(force[i]);
+        sum[i + 1] = sum[i] + (known ? force[i] : 0);
+        count[i + 1] = count[i] + (known ? 1 : 0);
+    }
+    const std::size_t reach = hits_of_a_mean * hits.longest / 2;
+    for (std::size_t first = 0, end = 0; first < force.size(); first = end + 1) {
+        for (end = first; end < force.size() && !hits.acts[end];) ++end;
+        for (std::size_t i = first; i < end; ++i) {
+            if (std::isnan(force[i])) continue;
+            const std::size_t from = i < first + reach ? first : i - reach, to = std::min(end, i + reach + 1);
+            const double samples = count[to] - count[from], mean = (sum[to] - sum[from]) / samples;
+            out[i] = std::abs(mean) > heard_in_a_mean * hits.usual / std::sqrt(samples) ? mean : 0;
+        }
+    }
     return out;
 }
 
@@ -115,10 +146,11 @@ bool rest_between_hits(record_set& set) {
             const double rest = middle_of(set, record, k);
             std::vector<double> force(record.count);
             for (std::size_t i = 0; i < record.count; ++i) force[i] = column[i * set.channels()] - rest;
-            const std::vector<bool> acts = acting(force);
-            for (std::size_t i = 0; i < acts.size(); ++i)
-                if (!acts[i] && !std::isnan(force[i]) && force[i] != 0)
-                    column[i * set.channels()] = rest, changed = true;
+            const hit_force hits = hits_of(force);
+            if (hits.acts.empty()) continue;
+            const std::vector<double> still = without_noise(force, hits);
+            for (std::size_t i = 0; i < force.size(); ++i)
+                if (std::abs(force[i] - still[i]) > 0) column[i * set.channels()] = rest + still[i], changed = true;
         }
     return changed;
 }

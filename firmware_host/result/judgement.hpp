@@ -120,8 +120,9 @@ constexpr double in_a_noisy_output = 0.8;    ///< of the power of a shape; of mo
 constexpr double fall_of_power = 100; ///< from the greatest of an event; cars on a road have it too, `sharper` decides
 constexpr double still_driven = 10;   ///< of the greatest power a tenth and more is of what acts
 constexpr double sharper =
-    0.5; ///< deviations, over those of the whole: below 0.3 after trains, 0.8 to 1.1 of cars on a
-         ///< road; of forces at rest 0.06 to 0.4 of noise, 0.7 and more of measured hammers
+    0.5; ///< deviations, over those of the whole: below 0.3 after trains, 0.8 to 1.1 of cars on a road
+constexpr double explains_better =
+    0.8; ///< power left of the outputs, over that with what the channel of a resting force says
 constexpr double shared_modes = 0.5; ///< of those of the whole that the part shows, too
 
 // Records without a force that are no repeats.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Averages under a Hann window whose lines are half as wide as the resonances: what leaks from line to line moves all outputs
-alike, and far more near a resonance than elsewhere. Time histories and averages by scipy; no noise but one in a thousand."""
+"""Averages under a Hann window whose lines are half as wide as the resonances: what leaks from line to line moves all
+outputs alike, and far more near a resonance than elsewhere. Time histories and averages by scipy, hardly any noise."""
 
 from __future__ import annotations
 

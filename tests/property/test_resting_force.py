@@ -57,9 +57,27 @@ def test_noise_of_a_resting_force_moves_no_mode() -> None:
     assert np.sqrt(np.mean(np.square(shares))) < 3e-5
 
 
+def errors(seeds: range, noise: float, hits: int, coupled: bool = False) -> tuple[float, float]:
+    """Of frequencies: relative, and over their deviations; rms."""
+    shares, z = [], []
+    for seed in seeds:
+        result = okid.identify(*struck(seed, noise, hits, coupled), fs=FS)
+        assert len(result.confident_modes) == len(TRUE), result.table()
+        for mode, (hz, _) in zip(result.confident_modes, TRUE, strict=True):
+            shares.append(mode.frequency_hz / hz - 1)
+            z.append((mode.frequency_hz - hz) / mode.frequency_std_hz)
+    return float(np.sqrt(np.mean(np.square(shares)))), float(np.sqrt(np.mean(np.square(z))))
+
+
+def test_one_hit_is_known_as_well_as_without_noise() -> None:
+    """Blocks of one record cannot say how far the noise of its force moves a mode; the outputs say that it is noise."""
+    for noise in (0.02, 0.1):
+        share, z = errors(range(7, 12), noise, 1)
+        assert share < 3e-6 and z < 2, (noise, share, z)
+
+
 def test_what_a_channel_says_of_its_way_back_is_kept() -> None:
-    u, y = struck(7, 0.02, coupled=True)
-    result = okid.identify(u, y, fs=FS)
-    assert "force_window" not in codes(result) and len(result.confident_modes) == len(TRUE)
+    share, _ = errors(range(7, 13), 0.02, 4, coupled=True)
+    assert share < 1.1e-5  # 1.3e-5 with all that the channel says, 1.8e-5 with nothing of it
     u, y = struck(8, 0.0)
     assert "force_window" not in codes(okid.identify(u, y, fs=FS))

@@ -87,9 +87,22 @@ static void what_is_no_hit_is_left_alone() {
     }
 }
 
+/// Behind a channel without a reach to zero frequency the force comes back slowly, below its noise: that stays, the noise goes.
+static void a_slow_way_back_stays() {
+    column force = noisy(), after;
+    strike(force, 500, 10);
+    const auto back = [](std::size_t i) { return -0.03 * std::exp(-static_cast<double>(i - 508) / 150); };
+    for (std::size_t i = 508; i < samples; ++i) force[i] += back(i);
+    (void)left_alone(force, &after);
+    for (std::size_t i = 580; i < 620; ++i) TEST_ASSERT_DOUBLE_WITHIN(0.006, offset + back(i), after[i]);
+    for (const std::size_t i : {0U, 480U, 1500U, 3999U})
+        TEST_ASSERT_TRUE(after[i] == after[100] && std::abs(after[i] - offset) < noise / 10);
+}
+
 int main() {
     UNITY_BEGIN();
     RUN_TEST(noise_between_hits_goes);
     RUN_TEST(what_is_no_hit_is_left_alone);
+    RUN_TEST(a_slow_way_back_stays);
     return UNITY_END();
 }
