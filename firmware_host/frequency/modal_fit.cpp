@@ -243,7 +243,7 @@ double repeated_along(const VectorXd& row, const std::vector<complex>& repeats) 
 
 /// How much more than white noise of its mean level moves a pole, and its residues: what is left along its residues, of the lines
 /// that rule them, and how much lines repeat each other. @param repeats  of all lines
-std::pair<double, double> local_noise(const problem& all, complex pole, const VectorXd& weight, Index k,
+std::pair<double, double> local_noise(const problem& all, const VectorXd& weight, Index k,
                                       const std::vector<complex>& repeats) {
     const Index lines = all.s.size();
     Eigen::VectorXcd along(weight.size());
@@ -321,7 +321,7 @@ void meet_places(const std::vector<complex>& poles, const problem& all, const Ve
             of_place.col(place) += moves.col(c);
             share[place] += weight[c] * (rows * own).trace() / 2;
         }
-        const auto [of_pole, of_residues] = local_noise(all, poles[m], weight, k, repeats);
+        const auto [of_pole, of_residues] = local_noise(all, weight, k, repeats);
         out.more_noise[k] = of_residues;
         Eigen::Matrix2d covariance = of_pole * inverse.block<2, 2>(2 * k, 2 * k);
         const double re = meet(of_place.row(0), share, covariance(0, 0)),

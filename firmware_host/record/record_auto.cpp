@@ -397,7 +397,7 @@ std::vector<listed_mode> find_after_events(const record_set& pieces, const recor
     part.work.context.warnings.emplace_back(
         "free_decays",
         fmt::format(
-            "{} times the power falls by 20 dB or more, as after trains. What follows, {:.0f} of {:.0f} s, knows the "
+            "{} times the power falls by 20 dB and more, as after trains. What follows, {:.0f} of {:.0f} s, knows the "
             "modes {:.1f} times as well: modes and fits are of that alone{}{}",
             pieces.records.size(), static_cast<double>(pieces.count()) / options.fs_hz,
             static_cast<double>(work.set.count()) / options.fs_hz, 1 / ratio,
