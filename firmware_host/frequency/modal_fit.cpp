@@ -241,9 +241,9 @@ double repeated_along(const VectorXd& row, const std::vector<complex>& repeats) 
     return std::max(out, few);
 }
 
-/// How much more than white noise of its mean level moves a pole, and its residues: what is left along its residues, of the lines
-/// that rule them, and how much lines repeat each other. @param repeats  of all lines
-std::pair<double, double> local_noise(const problem& all, const VectorXd& weight, Index k,
+/// How much more than white noise of its mean level moves a pole, and its residues: what is left near it, along its residues, and
+/// how much lines repeat each other. @param repeats  of all lines
+std::pair<double, double> local_noise(const problem& all, complex pole, const VectorXd& weight, Index k,
                                       const std::vector<complex>& repeats) {
     const Index lines = all.s.size();
     Eigen::VectorXcd along(weight.size());
@@ -254,22 +254,21 @@ std::pair<double, double> local_noise(const problem& all, const VectorXd& weight
     const MatrixXd own = all.slopes.middleCols(2 * k, 2);
     const MatrixXd inverse = all.gram.block<2, 2>(2 * k, 2 * k).inverse();
     const VectorXd self = (own * inverse).cwiseProduct(own).rowwise().sum(), bound = taken(all.Q);
+    double found = 0, expected = 0;
+    Eigen::Array<double, local_lags + 1, 1> products = Eigen::Array<double, local_lags + 1, 1>::Zero();
+    for (Index l = 0; l < lines; ++l) {
+        const double share = std::norm(all.root[l] / (all.s[l] - pole));
+        found += share * (re[l] * re[l] + im[l] * im[l]);
+        for (Index lag = 0; lag <= std::min(local_lags, lines - 1 - l); ++lag)
+            products[lag] += share * (re[l] * re[l + lag] + im[l] * im[l + lag]);
+        expected += share * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
+    }
     const double power = 2 * along.cwiseAbs2().cwiseQuotient(weight).sum();
-    const auto more = [&](const VectorXd& row) {
-        double found = 0, expected = 0;
-        Eigen::Array<double, local_lags + 1, 1> products = Eigen::Array<double, local_lags + 1, 1>::Zero();
-        for (Index l = 0; l < lines; ++l) {
-            const double share = row[l] * row[l] + row[l + lines] * row[l + lines];
-            found += share * (re[l] * re[l] + im[l] * im[l]);
-            for (Index lag = 0; lag <= std::min(local_lags, lines - 1 - l); ++lag)
-                products[lag] += share * (re[l] * re[l + lag] + im[l] * im[l + lag]);
-            expected += share * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
-        }
-        const double alike = 2 * (products / std::max(products[0], 1e-300)).max(0.0).sum() - 1;
-        const double near = std::max(1.0, found / std::max(expected * power, 1e-300));
-        return std::max(repeated_along(row, repeats), alike) * near;
-    };
-    return {more(own * inverse.col(0)), more(all.Q * all.inverse.row(2 * k).transpose())};
+    const double alike = 2 * (products / std::max(products[0], 1e-300)).max(0.0).sum() - 1;
+    const double near = std::max(1.0, found / std::max(expected * power, 1e-300));
+    const VectorXd of_pole = own * inverse.col(0), of_residue = all.Q * all.inverse.row(2 * k).transpose();
+    return {std::max(repeated_along(of_pole, repeats), alike) * near,
+            std::max(repeated_along(of_residue, repeats), alike) * near};
 }
 
 /// One part of a pole as the mean over places that may differ by more than their noise. @param moves  by which each moves the mean
@@ -321,7 +320,7 @@ void meet_places(const std::vector<complex>& poles, const problem& all, const Ve
             of_place.col(place) += moves.col(c);
             share[place] += weight[c] * (rows * own).trace() / 2;
         }
-        const auto [of_pole, of_residues] = local_noise(all, weight, k, repeats);
+        const auto [of_pole, of_residues] = local_noise(all, poles[m], weight, k, repeats);
         out.more_noise[k] = of_residues;
         Eigen::Matrix2d covariance = of_pole * inverse.block<2, 2>(2 * k, 2 * k);
         const double re = meet(of_place.row(0), share, covariance(0, 0)),
