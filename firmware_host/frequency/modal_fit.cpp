@@ -241,34 +241,47 @@ double repeated_along(const VectorXd& row, const std::vector<complex>& repeats) 
     return std::max(out, few);
 }
 
+/// What lines leave along the residues of a pole, over what white noise of the mean level would; each with its share.
+struct line_noise {
+    double found = 0, expected = 0;
+    Eigen::Array<double, local_lags + 1, 1> products = Eigen::Array<double, local_lags + 1, 1>::Zero();
+
+    double more() const { return std::max(1.0, found / std::max(expected, 1e-300)); }
+    double alike() const { return 2 * (products / std::max(products[0], 1e-300)).max(0.0).sum() - 1; }
+};
+
 /// How much more than white noise of its mean level moves a pole, and its residues: what is left near it, along its residues, and
-/// how much lines repeat each other. @param repeats  of all lines
+/// how much lines repeat each other; or what is left of the lines that rule them. @param repeats  of all lines
 std::pair<double, double> local_noise(const problem& all, complex pole, const VectorXd& weight, Index k,
                                       const std::vector<complex>& repeats) {
     const Index lines = all.s.size();
     Eigen::VectorXcd along(weight.size());
     for (Index c = 0; c < weight.size(); ++c)
         along[c] = weight[c] * complex(all.coefficients(2 * k, c), -all.coefficients(2 * k + 1, c));
-    const VectorXd re = all.left.topRows(lines) * along.real() - all.left.bottomRows(lines) * along.imag(),
-                   im = all.left.topRows(lines) * along.imag() + all.left.bottomRows(lines) * along.real();
+    Eigen::VectorXcd left(lines);
+    left.real() = all.left.topRows(lines) * along.real() - all.left.bottomRows(lines) * along.imag();
+    left.imag() = all.left.topRows(lines) * along.imag() + all.left.bottomRows(lines) * along.real();
     const MatrixXd own = all.slopes.middleCols(2 * k, 2);
     const MatrixXd inverse = all.gram.block<2, 2>(2 * k, 2 * k).inverse();
-    const VectorXd self = (own * inverse).cwiseProduct(own).rowwise().sum(), bound = taken(all.Q);
-    double found = 0, expected = 0;
-    Eigen::Array<double, local_lags + 1, 1> products = Eigen::Array<double, local_lags + 1, 1>::Zero();
-    for (Index l = 0; l < lines; ++l) {
-        const double share = std::norm(all.root[l] / (all.s[l] - pole));
-        found += share * (re[l] * re[l] + im[l] * im[l]);
-        for (Index lag = 0; lag <= std::min(local_lags, lines - 1 - l); ++lag)
-            products[lag] += share * (re[l] * re[l + lag] + im[l] * im[l + lag]);
-        expected += share * std::max(0.0, 1 - bound[l] - (self[l] + self[l + lines]) / 2);
-    }
+    const VectorXd self = (own * inverse).cwiseProduct(own).rowwise().sum();
+    const VectorXd free = (1 - taken(all.Q).array() - (self.head(lines) + self.tail(lines)).array() / 2).cwiseMax(0.0);
     const double power = 2 * along.cwiseAbs2().cwiseQuotient(weight).sum();
-    const double alike = 2 * (products / std::max(products[0], 1e-300)).max(0.0).sum() - 1;
-    const double near = std::max(1.0, found / std::max(expected * power, 1e-300));
-    const VectorXd of_pole = own * inverse.col(0), of_residue = all.Q * all.inverse.row(2 * k).transpose();
-    return {std::max(repeated_along(of_pole, repeats), alike) * near,
-            std::max(repeated_along(of_residue, repeats), alike) * near};
+    const auto noise = [&](const auto& share) {
+        line_noise out;
+        for (Index l = 0; l < lines; ++l) {
+            out.found += share(l) * std::norm(left[l]);
+            out.expected += share(l) * free[l] * power;
+            for (Index lag = 0; lag <= std::min(local_lags, lines - 1 - l); ++lag)
+                out.products[lag] += share(l) * (left[l] * std::conj(left[l + lag])).real();
+        }
+        return out;
+    };
+    const line_noise near = noise([&](Index l) { return std::norm(all.root[l] / (all.s[l] - pole)); });
+    const auto more = [&](const VectorXd& row) {
+        const line_noise ruling = noise([&](Index l) { return row[l] * row[l] + row[l + lines] * row[l + lines]; });
+        return std::max(std::max(repeated_along(row, repeats), near.alike()) * near.more(), ruling.more());
+    };
+    return {more(own * inverse.col(0)), more(all.Q * all.inverse.row(2 * k).transpose())};
 }
 
 /// One part of a pole as the mean over places that may differ by more than their noise. @param moves  by which each moves the mean

@@ -62,8 +62,21 @@ bool is_held(const record_options& options, const record_set& set) {
 
 } // namespace
 
+bool decay_freely(const std::vector<listed_mode>& modes, record_set set, const record_options& options) {
+    record_work trial;
+    trial.set = std::move(set);
+    if (options.detrend != "none") remove_means(trial.set);
+    make_modal_model(modes, options.fs_hz, trial);
+    return trial.model.n_z > 0 &&
+           whiteness_nearby(options.detrend != "none", trial, noise_colour::white) <= 2 * nearly_white;
+}
+
 bool refine_agreed(const record_options& options, std::vector<listed_mode>& listed, record_work& work) {
-    if (options.refine == "no" || work.set.n_u == 0 || work.model.n_z == 0) return false;
+    if (options.refine == "no" || work.model.n_z == 0) return false;
+    const bool forced = work.set.n_u > 0;
+    const noise_colour colour =
+        forced ? noise_colour::any : noise_colour::white; // else vibration is noise of its colour
+    if (!forced && work.before) return false;
     const auto reject = [&](const std::string& fault) {
         if (options.refine == "yes")
             work.context.warnings.emplace_back(
@@ -72,12 +85,12 @@ bool refine_agreed(const record_options& options, std::vector<listed_mode>& list
         return false;
     };
     if (work.force_is_older) return reject("the newest samples have too little of the force");
-    if (const std::size_t samples = refinable_samples(work); !is_enough(samples, work))
+    if (const std::size_t samples = refinable_samples(work); forced && !is_enough(samples, work))
         return reject(fmt::format("it could use {} of {} samples alone", samples, work.context.samples));
-    if (options.refine == "auto" && !is_held(options, work.set)) return false;
+    if (options.refine == "auto" && forced && !is_held(options, work.set)) return false;
     if (options.stage) options.stage("refining the modes");
     const bool constants = options.detrend != "none";
-    if (options.refine == "auto" && whiteness_nearby(constants, work) > 2 * nearly_white) return false;
+    if (options.refine == "auto" && whiteness_nearby(constants, work, colour) > 2 * nearly_white) return false;
     std::vector<mode_shift> wanted;
     std::vector<const listed_mode*> before;
     for (const listed_mode& mode : listed) {
@@ -85,7 +98,7 @@ bool refine_agreed(const record_options& options, std::vector<listed_mode>& list
         wanted.push_back({mode.frequency_hz, mode.damping_ratio, mode.shape});
         before.push_back(&mode);
     }
-    const likeliest_model one = likeliest(constants, work);
+    const likeliest_model one = likeliest(constants, work, colour);
     std::string fault = one.status < 0 ? okid_status_text(one.status) : "";
     if (fault.empty() && !one.found.converged) fault = "it did not converge";
     if (fault.empty() && options.refine == "auto" && one.found.whiteness > nearly_white)

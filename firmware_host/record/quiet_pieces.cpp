@@ -8,12 +8,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 
 namespace okid_host {
 namespace {
 
 constexpr double periods_of_block = 3; // of the frequency at which the outputs move on the whole
-constexpr std::size_t samples_of_block = 16, blocks_of_piece = 4, fewest_pieces = 2;
+constexpr std::size_t samples_of_block = 16, blocks_of_piece = 4;
 
 /// Three periods in samples, of the one frequency whose steps from sample to sample have this size; 0: nothing moves.
 std::size_t block_of(const record_set& set, const std::vector<output_spread>& about) {
@@ -58,6 +59,12 @@ struct power_fall {
     std::size_t peak, trough;
 };
 
+/// Does the power rise to a block at once: from so many before it?
+bool rises_at_once(const std::vector<double>& power, std::size_t to, std::size_t before) {
+    return to >= before && power[to - before] * judgement::fall_of_power < power[to];
+}
+
+/// The last one may last beyond the end, if it rose at once.
 std::vector<power_fall> falls_of(const std::vector<double>& power) {
     std::vector<power_fall> out;
     std::size_t peak = 0, trough = 0;
@@ -75,8 +82,19 @@ std::vector<power_fall> falls_of(const std::vector<double>& power) {
             peak = b;
         }
     }
-    if (falls) out.push_back({peak, power.size()});
+    if (!power.empty() && (falls || rises_at_once(power, peak, 1) || rises_at_once(power, peak, 2)))
+        out.push_back({peak, power.size()});
     return out;
+}
+
+/// The first block in which nothing acts any more: of a power that rose at once the next, else where it is a tenth.
+std::size_t left_alone(const std::vector<double>& power, const power_fall& event) {
+    if (rises_at_once(power, event.peak, 1)) return event.peak + 1;
+    if (rises_at_once(power, event.peak, 2)) return event.peak; // in the block before
+    std::size_t first = event.peak;
+    for (std::size_t b = event.peak; b < event.trough; ++b)
+        if (power[b] * judgement::still_driven >= power[event.peak]) first = b + 1;
+    return first;
 }
 
 } // namespace
@@ -91,15 +109,26 @@ record_set after_events(const record_set& set) {
     for (const record_data& record : set.records) {
         const std::vector<double> power = block_powers(set, record, about, block);
         for (const power_fall& one : falls_of(power)) {
-            std::size_t first = one.peak, last = one.trough;
-            for (std::size_t b = one.peak; b < last; ++b)
-                if (power[b] * judgement::still_driven >= power[one.peak]) first = b + 1;
+            const std::size_t first = left_alone(power, one), last = one.trough;
             if (last < first + blocks_of_piece) continue;
             const std::size_t end = last == power.size() ? record.count : last * block;
             out.add(record.path, set.rows(record) + first * block * set.n_y, end - first * block);
         }
     }
-    return out.records.size() < fewest_pieces ? record_set{0, set.n_y, {}, {}, false} : out;
+    return out;
+}
+
+std::pair<std::string, std::string> remark_pieces(const record_set& pieces, const record_set& all, double fs_hz,
+                                                  double ratio, const std::vector<std::string>& alone) {
+    const bool once = pieces.records.size() == 1;
+    return {
+        "free_decays",
+        fmt::format("{} the power falls by 20 dB and more, as after {}. What follows, {:.0f} of {:.0f} s, {}: modes "
+                    "and fits are of that alone{}{}",
+                    once ? "once" : fmt::format("{} times", pieces.records.size()), once ? "a release" : "trains",
+                    static_cast<double>(pieces.count()) / fs_hz, static_cast<double>(all.count()) / fs_hz,
+                    once ? "is a free decay" : fmt::format("knows the modes {:.1f} times as well", 1 / ratio),
+                    alone.empty() ? "" : ". Seen otherwise only: ", fmt::join(alone, ", "))};
 }
 
 } // namespace okid_host

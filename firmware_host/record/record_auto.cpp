@@ -387,21 +387,16 @@ std::vector<listed_mode> take_look(one_look best, const record_options& options,
     return best.listed;
 }
 
-/// Without a force: a train drives the structure at frequencies of its own, what follows it is a free decay.
+/// Without a force: a train drives the structure at frequencies of its own, what follows it is a free decay, as after a release.
 std::vector<listed_mode> find_after_events(const record_set& pieces, const record_options& options, record_work& work) {
-    one_look part = look_once(pieces, false, unpicked(options), work, &work.set),
-             whole = look_once(work.set, work.at_rest, unpicked(options), work, nullptr);
+    one_look whole = look_once(work.set, work.at_rest, unpicked(options), work, nullptr);
+    if (decay_freely(whole.listed, work.set, options)) return take_look(std::move(whole), options, work);
+    one_look part = look_once(pieces, false, unpicked(options), work, &work.set);
     std::vector<std::string> alone;
     const double ratio = deviations_over(part, whole, alone);
-    if (!(ratio < judgement::sharper)) return take_look(std::move(whole), options, work);
-    part.work.context.warnings.emplace_back(
-        "free_decays",
-        fmt::format(
-            "{} times the power falls by 20 dB and more, as after trains. What follows, {:.0f} of {:.0f} s, knows the "
-            "modes {:.1f} times as well: modes and fits are of that alone{}{}",
-            pieces.records.size(), static_cast<double>(pieces.count()) / options.fs_hz,
-            static_cast<double>(work.set.count()) / options.fs_hz, 1 / ratio,
-            alone.empty() ? "" : ". Seen otherwise only: ", fmt::join(alone, ", ")));
+    if (pieces.records.size() == 1 ? !decay_freely(part.listed, pieces, options) : !(ratio < judgement::sharper))
+        return take_look(std::move(whole), options, work);
+    part.work.context.warnings.push_back(remark_pieces(pieces, work.set, options.fs_hz, ratio, alone));
     return take_look(std::move(part), options, work);
 }
 

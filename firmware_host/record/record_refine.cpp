@@ -18,7 +18,7 @@
 namespace okid_host {
 namespace {
 
-constexpr int blocks = 20, draws = 64; ///< of a record; from sums
+constexpr int blocks = 20, draws = 64; ///< of a record; from sums, and of free decays
 constexpr std::size_t most_runs = 32;
 constexpr double same_percent = 0.01; ///< fits closer than this are the same
 constexpr double lost_percent = 0.5;  ///< a loss of prediction worth a remark
@@ -69,7 +69,10 @@ class refiner {
   public:
     /// @param iterations  at most, 0 = as many as it takes; others leave no replicates
     refiner(const sample_runs& runs, const okid_identified_t& start, bool constants, int iterations = 0)
-        : blocks_(iterations > 0 ? 0 : blocks), n_u_(start.n_u), n_y_(start.n_y), n_z_(start.n_z) {
+        : blocks_(iterations > 0  ? 0
+                  : start.n_u > 0 ? blocks
+                                  : draws),
+          n_u_(start.n_u), n_y_(start.n_y), n_z_(start.n_z) {
         open(static_cast<std::int32_t>(runs.counts.size()), iterations, constants);
         const okid_model_t model = model_view(start);
         if (status >= 0) status = okid_refine_run(refine_, &model, runs.counts.data(), runs.samples.data(), &found);
@@ -272,11 +275,11 @@ std::size_t refinable_samples(const record_work& work) {
     return out;
 }
 
-double whiteness_nearby(bool constants, const record_work& work) {
+double whiteness_nearby(bool constants, const record_work& work, noise_colour colour) {
     constexpr std::size_t glance = 20000;
     driven_runs runs(work, glance);
     std::vector<double> filter;
-    const auto one = refine_runs(runs, work.model, constants, 2, noise_colour::any, filter);
+    const auto one = refine_runs(runs, work.model, constants, 2, colour, filter);
     return one->status < 0 ? INFINITY : one->found.whiteness;
 }
 

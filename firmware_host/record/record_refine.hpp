@@ -20,14 +20,14 @@ struct likeliest_model {
     std::vector<double> filter{1}; ///< that the samples went through (whitening.hpp)
 };
 
-/// How white the residuals of a likelier model are, their colour taken out where they have one, from two steps over 20,000
-/// samples; infinite where there is none.
-double whiteness_nearby(bool constants, const record_work& work);
-
 /// Samples that a refinement has: of the 32 longest stretches in which no force is missing.
 std::size_t refinable_samples(const record_work& work);
 
 enum class noise_colour { white, any };
+
+/// How white the residuals of a likelier model are, their colour taken out where they may have one, from two steps over 20,000
+/// samples; infinite where there is none.
+double whiteness_nearby(bool constants, const record_work& work, noise_colour colour = noise_colour::any);
 
 /// @param constants  as for refine_model(). @param colour  any: noise that is not white is made so first (whitening.hpp)
 likeliest_model likeliest(bool constants, const record_work& work, noise_colour colour = noise_colour::any);

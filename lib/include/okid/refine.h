@@ -19,11 +19,11 @@ extern "C" {
 
 /// Sizes of the model and of the record; n_z (n_u + runs + 1) + n_u + runs <= 16384.
 typedef struct okid_refine_config_t {
-    int32_t n_u; ///< inputs, >= 1: without a measured input there is nothing to simulate
+    int32_t n_u; ///< inputs; 0: free decays, of the initial states of the runs
     int32_t n_y; ///< outputs, >= 1
     int32_t n_z; ///< states of the model, >= 1
     int32_t
-        runs; ///< stretches of samples without a missing input, each with an initial state of its own; 0: refine from sums
+        runs; ///< stretches of samples without a missing input, each with an initial state of its own; 0: refine from sums (n_u > 0)
     int32_t blocks;     ///< 2..64: room for that many delete-one-block replicates; 0: none
     int32_t iterations; ///< at most; 0 = 30
     int32_t offset;     ///< 1: every run has an unknown constant in every output (records less their mean); 0: none
@@ -92,9 +92,10 @@ OKID_NODISCARD OKID_API okid_status_t okid_refine_from_correlation(okid_refine_t
 /// The model that block `index` of `blocks` (equal numbers of used samples) left out would give, to first order: one step
 /// from the result with the scores of the block. Over all blocks they scatter as jackknife replicates do:
 /// variance = (blocks - 1)/blocks sum of (replicate - mean)^2. White residuals are not assumed. After
-/// okid_refine_from_correlation(), which knows no blocks, they are draws with the covariance of the Cramér-Rao bound at the
-/// noise found, for the same formula (the same ones in every run; 64 of them give a deviation to 9 %).
-/// @param index  0..blocks-1; @param A, B, C, D  out, sizes of the model
+/// okid_refine_from_correlation(), which knows no blocks, and without inputs, where a fast mode lives in one block, they are draws
+/// with the covariance of the Cramér-Rao bound at the noise found, for the same formula (the same ones in every run; 64 of them give
+/// a deviation to 9 %).
+/// @param index  0..blocks-1; @param A, B, C, D  out, sizes of the model; without inputs B and D may be NULL, in a start, too
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MISMATCH (no run before, or no blocks)
 OKID_NODISCARD OKID_API okid_status_t okid_refine_replicate(okid_refine_t* self, int32_t index, okid_real_t* A,
                                                             okid_real_t* B, okid_real_t* C, okid_real_t* D);

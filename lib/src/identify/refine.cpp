@@ -46,9 +46,9 @@ constexpr int tries = 12;             // of the damping, and of halving the step
 
 bool valid(const okid_refine_config_t& c) {
     constexpr int most = 1 << 14;
-    return c.n_u >= 1 && c.n_y >= 1 && c.n_z >= 1 && c.runs >= 0 && c.n_u <= most && c.n_y <= most && c.n_z <= most &&
-           c.runs <= most && (c.blocks == 0 || (c.blocks >= 2 && c.blocks <= 64)) && c.iterations >= 0 &&
-           (c.offset == 0 || c.offset == 1) &&
+    return c.n_u >= (c.runs > 0 ? 0 : 1) && c.n_y >= 1 && c.n_z >= 1 && c.runs >= 0 && c.n_u <= most && c.n_y <= most &&
+           c.n_z <= most && c.runs <= most && (c.blocks == 0 || (c.blocks >= 2 && c.blocks <= 64)) &&
+           c.iterations >= 0 && (c.offset == 0 || c.offset == 1) &&
            static_cast<long long>(c.n_z) * (c.n_u + c.runs + 1) + c.n_u + c.runs <= most;
 }
 
@@ -178,7 +178,7 @@ okid_status_t decompose(okid_refine& s, const okid_model_t& start) {
     if (!invert_basis(s)) return OKID_ERR_NUMERIC;
     std::copy(start.B, start.B + area(n, n_u), s.spare);
     multiply(false, false, n, n_u, n, 1, s.inverse, n, s.spare, n, 0, s.best.input, n);
-    turn_modes(s);
+    if (n_u > 0) turn_modes(s);
     std::copy(start.C, start.C + area(n_y, n), s.spare);
     multiply(false, false, n_y, n, n, 1, s.spare, n_y, s.basis, n, 0, s.best.shows + area(n_y, n_u), n_y);
     std::copy(start.D, start.D + area(n_y, n_u), s.best.shows);
@@ -311,7 +311,7 @@ void centre_scores(const okid_refine& s) {
 /// Scores of blocks as white noise of the size found would give them: draws whose covariance is the Fisher matrix over the blocks.
 void draw_scores(okid_refine& s) {
     const int t = s.layout.total(), n_y = s.layout.n_y;
-    double *factor = s.at_trial.gram, *draw = s.moments.one;
+    double *factor = s.at_trial.gram, *draw = s.equations.residual;
     const auto scale = [&](int i) { return std::sqrt(std::max(s.at_best.gram[at(i, i, t)], 0.0)); };
     constexpr double floor = 1e-12;
     for (int c = 0; c < t; ++c)
@@ -416,6 +416,7 @@ okid_status_t refine(okid_refine& s, const okid_model_t& start, const okid::refi
         s.equations.step(s.at_best.with_e, s.change);
         attempt(s, records);
     }
+    if (s.layout.n_u == 0) okid::hold_starts(s.layout, s.best);
     out = okid_refined_t{};
     const double before = s.at_best.likelihood;
     improve(s, records, out);
@@ -430,7 +431,8 @@ bool fits(const okid_refine& s, const okid_model_t& start) {
 }
 
 bool complete(const okid_model_t* start) {
-    return start != nullptr && start->A != nullptr && start->B != nullptr && start->C != nullptr && start->D != nullptr;
+    return start != nullptr && start->A != nullptr && start->C != nullptr &&
+           (start->n_u == 0 || (start->B != nullptr && start->D != nullptr));
 }
 
 } // namespace
@@ -448,6 +450,8 @@ okid_status_t okid_refine_run(okid_refine_t* self, const okid_model_t* start, co
     const okid_status_t status = refine(s, *start, records, *out);
     if (status != OKID_OK) return status;
     out->whiteness = s.pass.score(s.best, records, s.at_best, s.config.blocks, s.scores);
+    if (s.layout.n_u == 0)
+        draw_scores(s); // a fast mode lives in one block: the scores of the others know nothing of it
     centre_scores(s);
     publish(s, *out);
     return out->converged != 0 ? OKID_OK : OKID_WARN_MODEL;
@@ -473,8 +477,9 @@ okid_status_t okid_refine_from_correlation(okid_refine_t* self, const okid_model
 
 okid_status_t okid_refine_replicate(okid_refine_t* self, int32_t index, okid_real_t* A, okid_real_t* B, okid_real_t* C,
                                     okid_real_t* D) {
-    if (self == nullptr || A == nullptr || B == nullptr || C == nullptr || D == nullptr) return OKID_ERR_NULL;
+    if (self == nullptr || A == nullptr || C == nullptr) return OKID_ERR_NULL;
     const okid_refine& s = *self;
+    if (s.layout.n_u > 0 && (B == nullptr || D == nullptr)) return OKID_ERR_NULL;
     const int blocks = s.config.blocks;
     if (blocks == 0 || !s.ready) return OKID_ERR_MISMATCH;
     if (index < 0 || index >= blocks) return OKID_ERR_DIM;

@@ -2,7 +2,7 @@
 // PURPOSE    the parameters of a model in modal coordinates, and the signals all derivatives of its outputs are made of
 // METHOD     with s(t+1) = w s(t) + b u(t): dy/db_c = c phi_c, phi_c(t+1) = w phi_c(t) + u_c(t); dy/dw = c s',
 //            s'(t+1) = w s'(t) + s(t); dy/ds(0) = c w^t; dy/dc = s; dy/dD = u. One gain into each mode is held (a mode's
-//            scale may stand in c or in b), so that its phi is not needed
+//            scale may stand in c or in b), so that its phi is not needed; without inputs its largest initial state
 // REFERENCE  docs/numerics.md, refinement
 // NUMERICS   stable poles only: nothing grows
 // WORKSPACE  (64 + 1) (n_z (n_u + 2) + n_u + 1) + 64 n_y numbers
@@ -13,6 +13,17 @@
 namespace okid {
 
 using linalg::multiply;
+
+void hold_starts(const refine_layout& l, const refine_parameters& p) {
+    for (int k = 0; k < l.n_z; k += l.size(k)) {
+        double largest = -1;
+        for (int r = 0; r < l.runs; ++r) {
+            const double* x = p.start + at(k, r, l.n_z);
+            const double power = x[0] * x[0] + (l.pair[k] ? x[1] * x[1] : 0);
+            if (power > largest) std::fill(l.fixed + k, l.fixed + k + l.size(k), r), largest = power;
+        }
+    }
+}
 
 void refine_signals::lay_out(const refine_layout& l, arena& memory) {
     layout = &l;
@@ -62,7 +73,7 @@ bool refine_signals::sample(const refine_parameters& p, const double* v) {
     for (int k = 0; k < l.n_z; k += l.size(k)) {
         const std::complex<double> w = p.w(l, k);
         double* s = now + l.states() + k;
-        for (int i = 0; i < l.n_u - 1; ++i) {
+        for (int i = 0; i < l.gains(); ++i) {
             double* phi = now + l.phi() + i * l.n_z + k;
             advance(w, l.pair[k], phi, nullptr);
             phi[0] += v[l.input(k, i)];

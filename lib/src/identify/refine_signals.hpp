@@ -13,28 +13,31 @@ struct refine_layout {
     int n_u, n_y, n_z, runs;
     bool constants; ///< every run has a constant in every output
     bool* pair;     ///< n_z: a pair begins here
-    int* fixed;     ///< n_z: the input whose gain into the mode is held, which fixes the scale of the mode
-    bool* held;     ///< n_z: the pole stays where it is
-    double radius;  ///< poles stay inside it
+    int*
+        fixed; ///< n_z: the input whose gain into the mode is held, which fixes the scale of the mode; without inputs the run
+               ///< whose initial state is
+    bool* held;    ///< n_z: the pole stays where it is
+    double radius; ///< poles stay inside it
 
     int size(int k) const { return pair[k] ? 2 : 1; }
+    int gains() const { return n_u > 0 ? n_u - 1 : 0; } ///< of a mode, that are free
     /// Of one run: [u; s (states); phi of the inputs that are not fixed; s' = ds/dw; 1; w^t].
     int states() const { return n_u; }
     int phi() const { return n_u + n_z; }
-    int slope() const { return phi() + (n_u - 1) * n_z; }
+    int slope() const { return phi() + gains() * n_z; }
     int one() const { return slope() + n_z; }
     int decay() const { return one() + 1; }
     int of_run() const { return decay() + n_z; }
     /// Of all runs: [u; s; 1 of each run | phi; s'; w^t of each run]; the first part is linear in the outputs' own
     /// parameters, the second acts through the shapes.
     int linear() const { return n_u + n_z + runs; }
-    int shaped() const { return n_z * (n_u + runs); }
+    int shaped() const { return n_z * (gains() + 1 + runs); }
     int total() const { return linear() + shaped(); }
     /// Place of signal i of run r among all.
     int place(int i, int r) const {
         if (i < phi()) return i;
         if (i < one()) return linear() + i - phi();
-        return i == one() ? n_u + n_z + r : linear() + n_u * n_z + r * n_z + i - decay();
+        return i == one() ? n_u + n_z + r : linear() + (gains() + 1 + r) * n_z + i - decay();
     }
     /// The input behind slot i of phi.
     int input(int k, int i) const { return i < fixed[k] ? i : i + 1; }
@@ -63,6 +66,9 @@ struct refine_parameters {
         return std::norm(w(l, k)) < l.radius * l.radius && (!l.pair[k] || pole[k + 1] > 0);
     }
 };
+
+/// Without inputs: hold the initial state of each mode in the run that it moves most.
+void hold_starts(const refine_layout& l, const refine_parameters& p);
 
 /// The signals of one run, a batch of samples at a time.
 struct refine_signals {

@@ -42,9 +42,10 @@ void refine_change::add_to(const refine_layout& l, const refine_parameters& p, d
         for (int i = 0; i < l.n_u + l.n_z; ++i) out.shows[at(o, i, l.n_y)] += alpha * linear[at(i, o, l.linear())];
     for (int k = 0; k < l.n_z; k += l.size(k))
         for (int j = k; j < k + l.size(k); ++j) {
-            for (int i = 0; i < l.n_u - 1; ++i) out.input[at(j, l.input(k, i), l.n_z)] += alpha * shaped[i * l.n_z + j];
-            out.pole[j] += alpha * shaped[(l.n_u - 1) * l.n_z + j];
-            for (int r = 0; r < l.runs; ++r) out.start[at(j, r, l.n_z)] += alpha * shaped[(l.n_u + r) * l.n_z + j];
+            for (int i = 0; i < l.gains(); ++i) out.input[at(j, l.input(k, i), l.n_z)] += alpha * shaped[i * l.n_z + j];
+            out.pole[j] += alpha * shaped[l.gains() * l.n_z + j];
+            for (int r = 0; r < l.runs; ++r)
+                out.start[at(j, r, l.n_z)] += alpha * shaped[(l.gains() + 1 + r) * l.n_z + j];
         }
 }
 
@@ -142,8 +143,9 @@ bool refine_equations::prepare(const refine_parameters& p, const refine_sums& su
 /// Is this one of the shaped parameters that are not free?
 bool refine_equations::stays(int k) const {
     const refine_layout& l = *layout;
-    const int slope = (l.n_u - 1) * l.n_z;
-    return (starts_only && k < slope + l.n_z) || (k >= slope && k < slope + l.n_z && l.held[k - slope]);
+    const int slope = l.gains() * l.n_z, starts = slope + l.n_z;
+    if (k < starts) return starts_only || (k >= slope && l.held[k - slope]);
+    return l.n_u == 0 && !starts_only && (k - starts) / l.n_z == l.fixed[(k - starts) % l.n_z];
 }
 
 void refine_equations::hold(int k) const {

@@ -205,7 +205,7 @@ static void wrong_use_is_refused(void) {
     okid_model_t other = start;
     other.n_z = 4;
     TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_refine_run(self, &other, &count, v, &found));
-    const okid_refine_config_t bad[] = {{0, 1, 1, 1, 0, 0, 0},  {1, 0, 1, 1, 0, 0, 0}, {1, 1, 0, 1, 0, 0, 0},
+    const okid_refine_config_t bad[] = {{0, 1, 1, 0, 0, 0, 0},  {1, 0, 1, 1, 0, 0, 0}, {1, 1, 0, 1, 0, 0, 0},
                                         {1, 1, 1, -1, 0, 0, 0}, {1, 1, 1, 1, 1, 0, 0}, {1, 1, 1, 1, 65, 0, 0},
                                         {1, 1, 1, 1, 0, -1, 0}, {1, 1, 1, 1, 0, 0, 2}, {99, 9, 999, 9, 0, 0, 0}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
