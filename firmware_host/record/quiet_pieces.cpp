@@ -57,6 +57,7 @@ std::vector<double> block_powers(const record_set& set, const record_data& recor
 /// Where an event was greatest, and where it is over: blocks.
 struct power_fall {
     std::size_t peak, trough;
+    bool is_over; ///< the power fell
 };
 
 /// Does the power rise to a block at once: from so many before it?
@@ -77,20 +78,20 @@ std::vector<power_fall> falls_of(const std::vector<double>& power) {
         } else if (power[b] < power[trough]) {
             trough = b;
         } else if (power[b] > power[trough] * judgement::fall_of_power) {
-            out.push_back({peak, trough});
+            out.push_back({peak, trough, true});
             falls = false;
             peak = b;
         }
     }
     if (!power.empty() && (falls || rises_at_once(power, peak, 1) || rises_at_once(power, peak, 2)))
-        out.push_back({peak, power.size()});
+        out.push_back({peak, power.size(), falls});
     return out;
 }
 
-/// The first block in which nothing acts any more: of a power that rose at once the next, else where it is a tenth.
-std::size_t left_alone(const std::vector<double>& power, const power_fall& event) {
-    if (rises_at_once(power, event.peak, 1)) return event.peak + 1;
-    if (rises_at_once(power, event.peak, 2)) return event.peak; // in the block before
+/// The first block in which nothing acts any more: where the power is a tenth; of a release that is all there is, at once.
+std::size_t left_alone(const std::vector<double>& power, const power_fall& event, bool alone) {
+    if (alone && rises_at_once(power, event.peak, 1)) return event.peak + 1;
+    if (alone && rises_at_once(power, event.peak, 2)) return event.peak; // in the block before
     std::size_t first = event.peak;
     for (std::size_t b = event.peak; b < event.trough; ++b)
         if (power[b] * judgement::still_driven >= power[event.peak]) first = b + 1;
@@ -106,12 +107,18 @@ record_set after_events(const record_set& set) {
     const std::vector<output_spread> about = spreads_of(set);
     const std::size_t block = block_of(set, about);
     if (block == 0) return out;
+    std::vector<std::vector<double>> powers;
+    std::size_t events = 0;
     for (const record_data& record : set.records) {
-        const std::vector<double> power = block_powers(set, record, about, block);
-        for (const power_fall& one : falls_of(power)) {
-            const std::size_t first = left_alone(power, one), last = one.trough;
-            if (last < first + blocks_of_piece) continue;
-            const std::size_t end = last == power.size() ? record.count : last * block;
+        powers.push_back(block_powers(set, record, about, block));
+        events += falls_of(powers.back()).size();
+    }
+    for (std::size_t r = 0; r < powers.size(); ++r) {
+        const record_data& record = set.records[r];
+        for (const power_fall& one : falls_of(powers[r])) {
+            const std::size_t first = left_alone(powers[r], one, events == 1), last = one.trough;
+            if (last < first + blocks_of_piece || (!one.is_over && events > 1)) continue;
+            const std::size_t end = last == powers[r].size() ? record.count : last * block;
             out.add(record.path, set.rows(record) + first * block * set.n_y, end - first * block);
         }
     }
