@@ -112,7 +112,7 @@ void read_method(const config_place& place, const toml::table& t, const live_con
         if (out.refine == "yes")
             refuse_key(place, t.get("refine"), "refine",
                        "\"yes\" needs a [[channel]] with the role force: without one there is nothing to simulate");
-        out.refine = "no";
+        if (!agreed) out.refine = "no";
     }
     out.p = static_cast<int>(t["p"].value_or(std::int64_t{out.p}));
     out.rows = static_cast<int>(t["rows"].value_or(std::int64_t{0}));

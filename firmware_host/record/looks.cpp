@@ -49,10 +49,7 @@ double deviations_over(const one_look& part, const one_look& whole, std::vector<
 }
 
 double power_left(const std::vector<listed_mode>& listed, record_set set, const record_options& options) {
-    record_work trial;
-    trial.set = std::move(set);
-    if (options.detrend != "none") remove_means(trial.set);
-    make_modal_model(listed, options.fs_hz, trial);
+    record_work trial = modal_trial(listed, std::move(set), options);
     fit_records(trial.set, trial.model, trial.context, &trial.states);
     double sum = 0, count = 0;
     for (const double percent : trial.context.simulation_percent.value_or(std::vector<double>()))

@@ -124,6 +124,14 @@ void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, recor
     model.markov = arrays.markov.data();
 }
 
+record_work modal_trial(const std::vector<listed_mode>& modes, record_set set, const record_options& options) {
+    record_work out;
+    out.set = std::move(set);
+    if (options.detrend != "none") remove_means(out.set);
+    make_modal_model(modes, options.fs_hz, out);
+    return out;
+}
+
 void put_back_outputs(const std::vector<bool>& kept, record_work& work) {
     refined_arrays& arrays = *work.refined;
     okid_identified_t& model = work.model;

@@ -28,6 +28,9 @@ std::complex<double> discrete_pole(const listed_mode& mode, double dt);
 /// work.model: the modes of `modes` (ascending), the states of those in the model, B and D from the records, K 0.
 void make_modal_model(const std::vector<listed_mode>& modes, double fs_hz, record_work& work);
 
+/// Records less their means, if they are to be, and the model of these modes fitted to them.
+record_work modal_trial(const std::vector<listed_mode>& modes, record_set set, const record_options& options);
+
 /// The model and what is known of it with all outputs again: what belongs to one that was left out is NaN.
 void put_back_outputs(const std::vector<bool>& kept, record_work& work);
 

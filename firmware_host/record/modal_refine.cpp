@@ -63,10 +63,7 @@ bool is_held(const record_options& options, const record_set& set) {
 } // namespace
 
 bool decay_freely(const std::vector<listed_mode>& modes, record_set set, const record_options& options) {
-    record_work trial;
-    trial.set = std::move(set);
-    if (options.detrend != "none") remove_means(trial.set);
-    make_modal_model(modes, options.fs_hz, trial);
+    const record_work trial = modal_trial(modes, std::move(set), options);
     return trial.model.n_z > 0 &&
            whiteness_nearby(options.detrend != "none", trial, noise_colour::white) <= 2 * nearly_white;
 }

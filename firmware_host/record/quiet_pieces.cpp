@@ -60,7 +60,7 @@ struct power_fall {
     bool is_over; ///< the power fell
 };
 
-/// Does the power rise to a block at once: from so many before it?
+/// Is the power of a block far above that of the one so many before it?
 bool rises_at_once(const std::vector<double>& power, std::size_t to, std::size_t before) {
     return to >= before && power[to - before] * judgement::fall_of_power < power[to];
 }
@@ -108,14 +108,16 @@ record_set after_events(const record_set& set) {
     const std::size_t block = block_of(set, about);
     if (block == 0) return out;
     std::vector<std::vector<double>> powers;
+    std::vector<std::vector<power_fall>> falls;
     std::size_t events = 0;
     for (const record_data& record : set.records) {
         powers.push_back(block_powers(set, record, about, block));
-        events += falls_of(powers.back()).size();
+        falls.push_back(falls_of(powers.back()));
+        events += falls.back().size();
     }
     for (std::size_t r = 0; r < powers.size(); ++r) {
         const record_data& record = set.records[r];
-        for (const power_fall& one : falls_of(powers[r])) {
+        for (const power_fall& one : falls[r]) {
             const std::size_t first = left_alone(powers[r], one, events == 1), last = one.trough;
             if (last < first + blocks_of_piece || (!one.is_over && events > 1)) continue;
             const std::size_t end = last == powers[r].size() ? record.count : last * block;
@@ -127,15 +129,16 @@ record_set after_events(const record_set& set) {
 
 std::pair<std::string, std::string> remark_pieces(const record_set& pieces, const record_set& all, double fs_hz,
                                                   double ratio, const std::vector<std::string>& alone) {
-    const bool once = pieces.records.size() == 1;
-    return {
-        "free_decays",
-        fmt::format("{} the power falls by 20 dB and more, as after {}. What follows, {:.0f} of {:.0f} s, {}: modes "
-                    "and fits are of that alone{}{}",
-                    once ? "once" : fmt::format("{} times", pieces.records.size()), once ? "a release" : "trains",
-                    static_cast<double>(pieces.count()) / fs_hz, static_cast<double>(all.count()) / fs_hz,
-                    once ? "is a free decay" : fmt::format("knows the modes {:.1f} times as well", 1 / ratio),
-                    alone.empty() ? "" : ". Seen otherwise only: ", fmt::join(alone, ", "))};
+    const std::size_t n = pieces.records.size();
+    const double seconds = static_cast<double>(pieces.count()) / fs_hz;
+    const double of = static_cast<double>(all.count()) / fs_hz;
+    const std::string times = n == 1 ? "once" : fmt::format("{} times", n);
+    const std::string what =
+        n == 1 ? "is a free decay" : fmt::format("knows the modes {:.1f} times as well", 1 / ratio);
+    const std::string others = alone.empty() ? "" : fmt::format(". Seen otherwise only: {}", fmt::join(alone, ", "));
+    return {"free_decays", fmt::format("{} the power falls by 20 dB and more, as after {}. What follows, {:.0f} of "
+                                       "{:.0f} s, {}: modes and fits are of that alone{}",
+                                       times, n == 1 ? "a release" : "trains", seconds, of, what, others)};
 }
 
 } // namespace okid_host

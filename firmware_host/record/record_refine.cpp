@@ -95,8 +95,9 @@ class refiner {
             one.B.resize(size_of(n_z_) * size_of(n_u_));
             one.C.resize(size_of(n_y_) * size_of(n_z_));
             one.D.resize(size_of(n_y_) * size_of(n_u_));
-            if (okid_refine_replicate(refine_, b, one.A.data(), one.B.data(), one.C.data(), one.D.data()) >= 0)
-                one.n_z = n_z_;
+            double* const B = n_u_ > 0 ? one.B.data() : one.A.data(); // of no inputs no number is written
+            double* const D = n_u_ > 0 ? one.D.data() : one.C.data();
+            if (okid_refine_replicate(refine_, b, one.A.data(), B, one.C.data(), D) >= 0) one.n_z = n_z_;
             out.push_back(std::move(one));
         }
         return out;

@@ -20,7 +20,7 @@ constexpr double of_one_sign = 0.5;        // of a hit's sum of magnitudes, its 
 constexpr double audible = 5;              // of the usual distance from rest: above, a force acts
 constexpr std::size_t about_a_hit = 4;     // samples, or as many as the longest hit has
 constexpr std::size_t hits_of_a_mean = 16; // times as long: means at rest, of a channel that comes back slowly
-constexpr double heard_in_a_mean = 6;      // of the usual distance over the root of its samples: some four deviations
+constexpr double heard_in_a_mean = 6;      // deviations of such a mean
 
 /// Spread of a channel over samples first .. last-1 of a record.
 double spread_within(const record_set& set, const record_data& record, std::size_t channel, std::size_t first,

@@ -4,6 +4,8 @@ small part. Sums of damped cosines at nodes of a cantilever; noise of the sensor
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import okid
 import pytest
@@ -65,3 +67,18 @@ def test_wind_beside_a_release_is_no_free_decay() -> None:
             if mode.frequency_std_hz is not None:
                 z.append((mode.frequency_hz - F[k]) / mode.frequency_std_hz)
     assert np.sqrt(np.mean(np.square(z))) < 2
+
+
+def test_a_stream_ends_with_what_a_file_gives(tmp_path: Path) -> None:
+    rows = released(0, 20.0, 3.0, 0.01)
+    whole = okid.identify(None, rows, fs=FS)
+    config = tmp_path / "c.toml"
+    channel = '[[channel]]\nname = "y{0}"\nrole = "acceleration"\ncan_id = {1}\nstart_bit = 0\nlength = 16\n'
+    config.write_text(
+        '[acquisition]\nrate_hz = 100.0\n[[bus]]\nname = "can0"\ninterface = "vcan0"\n'
+        + "".join(channel.format(k, 256 + k) for k in range(SENSORS))
+    )
+    for session in (okid.Session(0, SENSORS, fs=FS), okid.Session.from_config(config)):
+        session.feed(rows)
+        for mode, other in zip(session.identify().confident_modes, whole.confident_modes, strict=True):
+            assert (mode.frequency_hz, mode.damping_ratio_std) == (other.frequency_hz, other.damping_ratio_std)

@@ -95,7 +95,7 @@ OKID_NODISCARD OKID_API okid_status_t okid_refine_from_correlation(okid_refine_t
 /// okid_refine_from_correlation(), which knows no blocks, and without inputs, where a fast mode lives in one block, they are draws
 /// with the covariance of the Cramér-Rao bound at the noise found, for the same formula (the same ones in every run; 64 of them give
 /// a deviation to 9 %).
-/// @param index  0..blocks-1; @param A, B, C, D  out, sizes of the model; without inputs B and D may be NULL, in a start, too
+/// @param index  0..blocks-1; @param A, B, C, D  out, sizes of the model
 /// @return OKID_OK, OKID_ERR_NULL, OKID_ERR_DIM, OKID_ERR_MISMATCH (no run before, or no blocks)
 OKID_NODISCARD OKID_API okid_status_t okid_refine_replicate(okid_refine_t* self, int32_t index, okid_real_t* A,
                                                             okid_real_t* B, okid_real_t* C, okid_real_t* D);

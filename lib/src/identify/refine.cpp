@@ -477,9 +477,8 @@ okid_status_t okid_refine_from_correlation(okid_refine_t* self, const okid_model
 
 okid_status_t okid_refine_replicate(okid_refine_t* self, int32_t index, okid_real_t* A, okid_real_t* B, okid_real_t* C,
                                     okid_real_t* D) {
-    if (self == nullptr || A == nullptr || C == nullptr) return OKID_ERR_NULL;
+    if (self == nullptr || A == nullptr || B == nullptr || C == nullptr || D == nullptr) return OKID_ERR_NULL;
     const okid_refine& s = *self;
-    if (s.layout.n_u > 0 && (B == nullptr || D == nullptr)) return OKID_ERR_NULL;
     const int blocks = s.config.blocks;
     if (blocks == 0 || !s.ready) return OKID_ERR_MISMATCH;
     if (index < 0 || index >= blocks) return OKID_ERR_DIM;

@@ -192,7 +192,7 @@ static const struct {
     {"jackknife: n_u, n_y, p, rows", jackknife, 4, {0, 1, 1, 0}, {2, 2, 4, 8}},
     {"replicates: n_u, n_y, n_z", replicates, 3, {0, 1, 1}, {2, 2, 2}},
     {"replicates: n_u, n_y, n_z, n_x", replicates_of_masses, 4, {1, 1, 1, 1}, {2, 2, 4, 2}},
-    {"refine: n_u, n_y, n_z, runs", refine, 4, {1, 1, 1, 0}, {2, 2, 2, 2}},
+    {"refine: n_u, n_y, n_z, runs", refine, 4, {0, 1, 1, 0}, {2, 2, 2, 2}},
     {"era: n_u, n_y, rows, cols", era, 4, {1, 1, 1, 1}, {2, 2, 2, 2}},
     {"subspace: n_u, n_y, rows, max_order", subspace, 4, {0, 1, 2, 0}, {2, 2, 4, 4}},
     {"subspace_output_error: n_u, n_y, n_z, records", output_error, 4, {0, 1, 1, 1}, {2, 2, 2, 2}},

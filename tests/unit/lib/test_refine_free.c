@@ -106,7 +106,7 @@ static void without_noise_the_decays_are_exact(void) {
 static void replicates_scatter_as_the_errors_do(void) {
     double share[MODES] = {0};
     for (int record_at = 0; record_at < RECORDS; ++record_at) {
-        static okid_real_t a[NZ * NZ], c[NY * NZ];
+        static okid_real_t a[NZ * NZ], c[NY * NZ], none[1];
         double of_turn[MODES], of_decay[MODES], t[MODES], d[MODES], sum_turn[MODES] = {0}, sum_decay[MODES] = {0};
         record(0.02);
         TEST_ASSERT_EQUAL(OKID_OK, refine(DRAWS));
@@ -115,7 +115,7 @@ static void replicates_scatter_as_the_errors_do(void) {
         for (int o = 0; o < NY; ++o) TEST_ASSERT_TRUE(fabs((double)found.noise_std[o] / 0.02 - 1) < 0.1);
         (void)errors(found.A, of_turn, of_decay);
         for (int j = 0; j < DRAWS; ++j) {
-            TEST_ASSERT_EQUAL(OKID_OK, okid_refine_replicate(self, j, a, NULL, c, NULL));
+            TEST_ASSERT_EQUAL(OKID_OK, okid_refine_replicate(self, j, a, none, c, none));
             (void)errors(a, t, d);
             for (int k = 0; k < MODES; ++k) {
                 sum_turn[k] += pow(t[k] - of_turn[k], 2) * (DRAWS - 1) / DRAWS;
