@@ -132,11 +132,11 @@ std::pair<std::string, std::string> remark_pieces(const record_set& pieces, cons
     const std::size_t n = pieces.records.size();
     const double seconds = static_cast<double>(pieces.count()) / fs_hz;
     const double of = static_cast<double>(all.count()) / fs_hz;
-    const std::string times = n == 1 ? "once" : fmt::format("{} times", n);
+    const std::string times = n == 1 ? "once the power rises or falls" : fmt::format("{} times the power falls", n);
     const std::string what =
         n == 1 ? "is a free decay" : fmt::format("knows the modes {:.1f} times as well", 1 / ratio);
     const std::string others = alone.empty() ? "" : fmt::format(". Seen otherwise only: {}", fmt::join(alone, ", "));
-    return {"free_decays", fmt::format("{} the power falls by 20 dB and more, as after {}. What follows, {:.0f} of "
+    return {"free_decays", fmt::format("{} by 20 dB and more, as after {}. What follows, {:.0f} of "
                                        "{:.0f} s, {}: modes and fits are of that alone{}",
                                        times, n == 1 ? "a release" : "trains", seconds, of, what, others)};
 }
