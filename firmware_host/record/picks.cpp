@@ -129,6 +129,14 @@ void mark_track(const run_track& track, int mode, std::vector<pole_table::pole>&
     }
 }
 
+/// Of `each` values a mode those of these modes are left; of none nothing.
+template <class T> void keep_values(const std::vector<std::size_t>& kept, std::size_t each, std::vector<T>& values) {
+    std::vector<T> out;
+    for (std::size_t at = 0; at < kept.size() * each && !values.empty(); ++at)
+        out.push_back(std::move(values[kept[at / each] * each + at % each]));
+    values = std::move(out);
+}
+
 } // namespace
 
 std::vector<picked_pole> read_picks(const std::string& given) {
@@ -164,6 +172,38 @@ std::vector<consensus_mode> picked_modes(const std::vector<picked_pole>& picks, 
     std::sort(out.begin(), out.end(),
               [](const consensus_mode& a, const consensus_mode& b) { return a.frequency_hz < b.frequency_hz; });
     return out;
+}
+
+bool keep_numbers(const std::vector<int>& numbers, std::vector<listed_mode>& listed, record_work& work) {
+    if (numbers.empty()) return false;
+    check_picked(numbers, listed.size());
+    result_context& context = work.context;
+    std::vector<int> renumbered(listed.size() + 1);
+    std::vector<std::size_t> kept;
+    for (std::size_t k = 0; k < listed.size(); ++k) {
+        if (std::find(numbers.begin(), numbers.end(), static_cast<int>(k) + 1) == numbers.end()) continue;
+        kept.push_back(k);
+        renumbered[k + 1] = static_cast<int>(kept.size());
+        listed[k].in_model = true;
+        context.verdicts[k] = {true, context.verdicts[k].found_in, {}, true};
+    }
+    const std::size_t n_y = work.set.n_y;
+    keep_values(kept, 1, listed);
+    keep_values(kept, 1, context.verdicts);
+    keep_values(kept, 1, work.carriers);
+    keep_values(kept, 1, work.apart);
+    keep_values(kept, 1, work.wider);
+    keep_values(kept, 1, work.shifts);
+    keep_values(kept, 1, work.inputs.residues);
+    if (context.sigma) {
+        keep_values(kept, 1, context.sigma->frequency_hz);
+        keep_values(kept, 1, context.sigma->damping_ratio);
+        keep_values(kept, n_y, context.sigma->shape_re);
+        keep_values(kept, n_y, context.sigma->shape_im);
+    }
+    if (context.poles)
+        for (pole_table::pole& pole : context.poles->poles) pole.mode = renumbered[static_cast<std::size_t>(pole.mode)];
+    return true;
 }
 
 pole_table poles_of(const std::vector<consensus_run>& runs, const std::vector<consensus_mode>& modes) {

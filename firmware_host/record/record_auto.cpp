@@ -123,16 +123,14 @@ void keep_wanted(const record_options& options, std::vector<consensus_mode>& mod
                 modes.end());
 }
 
-void keep_picked(const std::vector<int>& numbers, std::vector<listed_pair>& found) {
-    if (numbers.empty()) return;
-    std::vector<listed_pair> picked;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-        if (std::find(numbers.begin(), numbers.end(), static_cast<int>(i) + 1) == numbers.end()) continue;
-        picked.push_back(std::move(found[i]));
-        picked.back().first.picked = true;
+/// Modes of these numbers are believed; the others stay until all are refined, see keep_numbers().
+void believe(const std::vector<int>& numbers, std::vector<listed_pair>& found) {
+    for (const int number : numbers) {
+        if (number > static_cast<int>(found.size())) continue;
+        consensus_mode& mode = found[static_cast<std::size_t>(number) - 1].first;
+        mode.picked = true;
+        mode.why.clear();
     }
-    check_picked(numbers, found.size());
-    found = std::move(picked);
 }
 
 /// At the ends of what a record shows: a vibration that it holds only a few times, and one whose half-power band reaches
@@ -238,9 +236,7 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
                                   : picked_modes(options.picks, runs, modes);
     tell("leaving out one block after the other");
     auto found = carry_all(levels, runs, modes, options, work.at_rest);
-    keep_picked(options.modes, found);
-    for (auto& [mode, carried] : found)
-        if (mode.picked) mode.why.clear();
+    believe(options.modes, found);
     if (options.stabilization) {
         std::vector<consensus_mode> seen;
         for (const listed_pair& one : found) seen.push_back(one.first);
@@ -260,7 +256,8 @@ std::vector<listed_mode> find_modes_agreed(const record_options& options, record
 }
 
 /// M, K, R from the model of the modes that are confident; then the model of all listed, its gain and fits.
-void make_models(std::vector<listed_mode> listed, const record_options& options, record_work& work) {
+void make_models(std::vector<listed_mode> listed, const record_options& options, const record_set& decays,
+                 record_work& work) {
     std::vector<double> means(work.set.channels(), 0.0);
     if (options.detrend != "none") {
         means = means_of(work.set);
@@ -271,11 +268,13 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
         if (work.set.n_u > 0) find_states(work.set, work.model, work.context, &work.states);
     };
     make_model();
-    if (!options.by_hand() && mark_combinations(listed, options.fs_hz, work)) make_model();
-    if (!options.by_hand() && work.set.n_u > 0 && !work.force_is_older &&
+    if (options.picks.empty() && mark_combinations(listed, options.fs_hz, work)) make_model();
+    if (options.picks.empty() && work.set.n_u > 0 && !work.force_is_older &&
         mark_of_noisy_outputs(listed, options.fs_hz, work))
         make_model();
-    if (refine_agreed(options, listed, work)) make_model();
+    if (!decays.records.empty()) deviations_by_fit(listed, work); // with which a refinement by a part is compared
+    if (refine_agreed(options, decays, listed, work)) make_model();
+    if (keep_numbers(options.modes, listed, work)) make_model();
     deviations_by_fit(listed, work);
     remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);
@@ -339,7 +338,6 @@ one_look look_once(record_set set, bool at_rest, record_options options, const r
 
 /// The options by which two sets of records are compared: nothing is picked by hand.
 record_options unpicked(record_options options) {
-    options.modes.clear();
     options.picks.clear();
     return options;
 }
@@ -351,7 +349,7 @@ one_look picked_in(record_work seen, const record_options& options, const record
 
 /// Of records struck at different places: poles and shapes from all together, B and D from those of each place. What follows hits
 /// needs no input a place; with it modes are seen that die away soon, and the silence before. Who believes more modes counts.
-std::vector<listed_mode> find_struck(const record_options& options, record_work& work) {
+std::vector<listed_mode> find_struck(const record_options& options, const record_set& decays, record_work& work) {
     record_options seen = options;
     seen.inputs = work.context.inputs = place_names(options.inputs.front(), options.hits);
     record_set struck = std::exchange(work.set, one_column_a_place(work.set, options.hits));
@@ -359,11 +357,13 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
     one_look best = look_once(free_decays(struck), false, unpicked(seen), work, &work.set),
              forced = look_once(work.set, true, unpicked(seen), work, nullptr); // nothing moved before
     if (forced.believed() > best.believed()) best = std::move(forced);
-    if (options.by_hand()) best = picked_in(std::move(best.work), seen, work);
+    if (!options.picks.empty()) best = picked_in(std::move(best.work), seen, work);
     if (best.listed.empty()) std::rethrow_exception(best.fault);
     const bool at_rest = work.at_rest;
     work = std::move(best.work);
     work.struck = nullptr;
+    refine_decays(decays, options, best.listed, work);
+    keep_numbers(options.modes, best.listed, work);
     work.set = {};
     work.set.n_y = struck.n_y;
     make_modal_model(best.listed, options.fs_hz, work);
@@ -380,7 +380,7 @@ std::vector<listed_mode> find_struck(const record_options& options, record_work&
 
 /// The look that is believed, as the result: what was picked by hand is looked at again.
 std::vector<listed_mode> take_look(one_look best, const record_options& options, record_work& work) {
-    if (options.by_hand()) best = picked_in(std::move(best.work), options, work);
+    if (!options.picks.empty()) best = picked_in(std::move(best.work), options, work);
     if (best.listed.empty()) std::rethrow_exception(best.fault);
     work = std::move(best.work);
     work.struck = nullptr;
@@ -470,14 +470,15 @@ record_result identify_auto(record_set records, const record_options& given, con
     if (work.at_rest) work.context.start = "rest";
     if (options.detrend == "linear") detrend_linear(work.set, options);
     const bool roving = !options.hits.empty();
-    const std::vector<listed_mode> listed = roving ? find_struck(options, work) : find_modes(options, work);
+    const record_set decays = after_hits(work.set);
+    const std::vector<listed_mode> listed = roving ? find_struck(options, decays, work) : find_modes(options, work);
     if (work.set.n_u == 0 && work.context.sigma)
         keep_to_ambient_bound(
             work.set, options.fs_hz * static_cast<double>(work.set.count()) / static_cast<double>(work.context.samples),
             listed, work.wider, *work.context.sigma);
     if (options.stage) options.stage("simulating the model");
     const bool placed = work.model.n_u > 0; // by find_struck
-    if (!placed) make_models(listed, options, work);
+    if (!placed) make_models(listed, options, decays, work);
     remark_contradiction(listed, options.hits, options.fs_hz, work);
     if (placed) find_placed(listed, options, work);
     if (!all) put_back_outputs(screened.kept, work);

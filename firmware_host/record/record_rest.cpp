@@ -40,6 +40,14 @@ double middle_of(const record_set& set, const record_data& record, std::size_t c
     return values.empty() ? 0 : upper_median(values);
 }
 
+/// A channel less what it rests at.
+std::vector<double> from_rest(const record_set& set, const record_data& record, std::size_t channel) {
+    const double rest = middle_of(set, record, channel);
+    std::vector<double> out(record.count);
+    for (std::size_t i = 0; i < record.count; ++i) out[i] = set.rows(record)[i * set.channels() + channel] - rest;
+    return out;
+}
+
 /// Samples of a force that differ from rest by more than `least`, in stretches.
 std::vector<std::pair<std::size_t, std::size_t>> stretches_beyond(const std::vector<double>& force, double least) {
     std::vector<std::pair<std::size_t, std::size_t>> out;
@@ -48,6 +56,15 @@ std::vector<std::pair<std::size_t, std::size_t>> stretches_beyond(const std::vec
         if (out.empty() || out.back().second < i) out.emplace_back(i, i);
         out.back().second = i + 1;
     }
+    return out;
+}
+
+/// Is a sample in such a stretch, or as near as `reach` to one?
+std::vector<bool> around_stretches(const std::vector<double>& force, double least, std::size_t reach) {
+    std::vector<bool> out(force.size());
+    for (const auto& [first, end] : stretches_beyond(force, least))
+        std::fill(out.begin() + static_cast<std::ptrdiff_t>(first - std::min(first, reach)),
+                  out.begin() + static_cast<std::ptrdiff_t>(std::min(force.size(), end + reach)), true);
     return out;
 }
 
@@ -72,11 +89,18 @@ hit_force hits_of(const std::vector<double>& force) {
         if (std::abs(sum) < of_one_sign * all) return out;
         out.longest = std::max(out.longest, end - first);
     }
-    out.acts.resize(force.size());
-    for (const auto& [first, end] : stretches_beyond(force, audible * out.usual))
-        std::fill(out.acts.begin() + static_cast<std::ptrdiff_t>(first - std::min(first, out.longest)),
-                  out.acts.begin() + static_cast<std::ptrdiff_t>(std::min(force.size(), end + out.longest)), true);
+    out.acts = around_stretches(force, audible * out.usual, out.longest);
     return out;
+}
+
+/// Where a force that acts in hits alone changes; a channel that comes back slowly says nothing of the force. Empty: it acts otherwise.
+std::vector<bool> struck_within(const std::vector<double>& force) {
+    const hit_force hits = hits_of(force);
+    if (hits.acts.empty()) return {};
+    std::vector<double> steps(force.size()), known;
+    for (std::size_t i = 1; i < force.size(); ++i) steps[i] = force[i] - force[i - 1];
+    std::copy_if(steps.begin(), steps.end(), std::back_inserter(known), [](double x) { return !std::isnan(x); });
+    return around_stretches(steps, audible * usual_distance(std::move(known), 0), hits.longest);
 }
 
 /// The force without its noise at rest: means over many samples that stand out of it, as behind a channel that has no reach to zero
@@ -144,8 +168,7 @@ bool rest_between_hits(record_set& set) {
         for (std::size_t k = 0; k < set.n_u; ++k) {
             double* const column = set.rows(record) + k;
             const double rest = middle_of(set, record, k);
-            std::vector<double> force(record.count);
-            for (std::size_t i = 0; i < record.count; ++i) force[i] = column[i * set.channels()] - rest;
+            const std::vector<double> force = from_rest(set, record, k);
             const hit_force hits = hits_of(force);
             if (hits.acts.empty()) continue;
             const std::vector<double> still = without_noise(force, hits);
@@ -153,6 +176,30 @@ bool rest_between_hits(record_set& set) {
                 if (std::abs(force[i] - still[i]) > 0) column[i * set.channels()] = rest + still[i], changed = true;
         }
     return changed;
+}
+
+record_set after_hits(const record_set& set) {
+    record_set out;
+    out.n_y = set.n_y;
+    for (const record_data& record : set.records) {
+        std::vector<bool> acts(record.count);
+        for (std::size_t k = 0; k < set.n_u; ++k) {
+            const std::vector<bool> own = struck_within(from_rest(set, record, k));
+            if (own.empty()) return {};
+            for (std::size_t i = 0; i < record.count; ++i) acts[i] = acts[i] || own[i];
+        }
+        for (auto end = acts.begin(); end != acts.end();) {
+            const auto first = std::find(std::find(end, acts.end(), true), acts.end(), false);
+            end = std::find(first, acts.end(), true);
+            std::vector<double> rows;
+            for (auto i = first - acts.begin(); i < end - acts.begin(); ++i) {
+                const double* y = set.rows(record) + static_cast<std::size_t>(i) * set.channels() + set.n_u;
+                rows.insert(rows.end(), y, y + set.n_y);
+            }
+            if (!rows.empty()) out.add(record.path, rows.data(), rows.size() / set.n_y);
+        }
+    }
+    return out;
 }
 
 bool begin_at_rest(const record_set& set, const record_options& options) {

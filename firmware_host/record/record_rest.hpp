@@ -22,4 +22,7 @@ bool begin_at_rest(const record_set& set, const record_options& options);
 /// channel has no reach to zero frequency: then it says there how it comes back to rest. @return was there any to be put to rest?
 bool rest_between_hits(record_set& set);
 
+/// What follows each hit until the next one, outputs alone. Empty where a force acts otherwise than in hits.
+record_set after_hits(const record_set& set);
+
 } // namespace okid_host
