@@ -26,7 +26,7 @@ bool same_mode(const listed_mode& before, const carried_mode& after) {
            shape_mac(before.shape, after.shape) > same_shape;
 }
 
-/// Of a part of the records: is this mode known far less by it than by all, because it soon dies away?
+/// Of a part of the records: is this mode known far less by it than by all, because it soon decays?
 bool lives_elsewhere(const carried_mode& of_part, double damping_std) {
     return of_part.damping_std > known_less * damping_std;
 }
@@ -105,7 +105,7 @@ bool refine_by(const record_work& by, const record_options& options, std::vector
             fault = fmt::format("the mode at {:.4g} Hz would be another one", before[i]->frequency_hz);
         else if (&by != &work && work.context.sigma &&
                  lives_elsewhere(*found[i], work.context.sigma->damping_ratio[before[i] - listed.data()]))
-            fault = fmt::format("the mode at {:.4g} Hz has died away by then", before[i]->frequency_hz);
+            fault = fmt::format("the mode at {:.4g} Hz decays before what is used", before[i]->frequency_hz);
     if (!fault.empty()) return reject(fault);
     take_refined(found, listed, work);
     work.context.refined = one.found;

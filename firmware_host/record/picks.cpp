@@ -4,6 +4,7 @@
 #include "error.hpp"
 #include "files/input_file.hpp"
 #include "files/nearest_name.hpp"
+#include "request.hpp"
 #include "result/method.hpp"
 
 #include <algorithm>
