@@ -199,20 +199,26 @@ bool at_one_rate(const std::vector<consensus_run>& runs, const cluster& c) {
     return false;
 }
 
-/// Of each cluster, how far the nearest other vibration is that one rate at least supports; infinite: there is none.
-std::vector<double> spacings(const std::vector<consensus_run>& runs, const std::vector<cluster>& clusters) {
-    std::vector<double> out(clusters.size(), INFINITY);
+/// To the nearest other vibration that one rate at least supports.
+struct neighbour {
+    double apart_hz = INFINITY; ///< there is none
+    double alike = 1;           ///< MAC of the shapes
+
+    /// As two of one shape would be that are told apart as easily.
+    double told_apart_hz() const { return apart_hz / std::max(judgement::least_alike, alike); }
+};
+
+std::vector<neighbour> neighbours(const std::vector<consensus_run>& runs, const std::vector<cluster>& clusters) {
+    std::vector<neighbour> out(clusters.size());
     for (const cluster& other : clusters) {
         if (!at_one_rate(runs, other)) continue;
         for (std::size_t i = 0; i < clusters.size(); ++i) {
             const cluster& c = clusters[i];
             const double apart = std::abs(c.frequency_hz - other.frequency_hz);
+            if (&c == &other || !(apart < out[i].apart_hz)) continue;
             const double one = within(c.frequency_hz, c.damping_ratio, other.frequency_hz, other.damping_ratio);
-            if (&c == &other ||
-                (apart < one && shape_mac(c.members.front().found->shape, other.members.front().found->shape) >
-                                    judgement::same_shape_of_a_run))
-                continue;
-            out[i] = std::min(out[i], apart);
+            const double alike = shape_mac(c.members.front().found->shape, other.members.front().found->shape);
+            if (apart >= one || alike <= judgement::same_shape_of_a_run) out[i] = {apart, alike};
         }
     }
     return out;
@@ -293,18 +299,18 @@ std::vector<member> lasting(const std::vector<consensus_run>& runs, const std::v
     return out.size() < judgement::fewest_runs ? seen : out;
 }
 
-consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c, double spacing_hz,
+consensus_mode mode_of(const std::vector<consensus_run>& runs, const cluster& c, const neighbour& nearest,
                        const std::vector<bool>& turned) {
     consensus_mode mode;
     mode.frequency_hz = c.frequency_hz;
     const std::size_t n_y = c.members.front().found->shape.size();
-    const std::vector<bool> votes = voters(runs, mode.frequency_hz, spacing_hz, n_y);
+    const std::vector<bool> votes = voters(runs, mode.frequency_hz, nearest.told_apart_hz(), n_y);
     mode.could = static_cast<int>(std::count(votes.begin(), votes.end(), true));
-    mode.spacing_hz = spacing_hz;
+    mode.spacing_hz = nearest.apart_hz;
     std::vector<double> horizons;
     for (const consensus_run& run : runs) {
         if (!can_see(run, mode.frequency_hz)) continue;
-        mode.parted += can_part(run, spacing_hz, n_y);
+        mode.parted += can_part(run, nearest.apart_hz, n_y);
         horizons.push_back(run.horizon_s());
     }
     std::sort(horizons.rbegin(), horizons.rend());
@@ -440,9 +446,9 @@ bool can_see(const consensus_run& run, double frequency_hz) {
 std::vector<consensus_mode> find_agreement(std::vector<consensus_run>& runs, std::vector<bool>* turned) {
     std::vector<consensus_mode> modes;
     const std::vector<cluster> clusters = gather(runs);
-    const std::vector<double> apart = spacings(runs, clusters);
+    const std::vector<neighbour> nearest = neighbours(runs, clusters);
     std::vector<bool> quarter = turned ? *turned : std::vector<bool>();
-    for (std::size_t i = 0; i < clusters.size(); ++i) modes.push_back(mode_of(runs, clusters[i], apart[i], quarter));
+    for (std::size_t i = 0; i < clusters.size(); ++i) modes.push_back(mode_of(runs, clusters[i], nearest[i], quarter));
     if (turned && quarter.empty()) {
         std::vector<mode_shape> shapes; // of what would be believed but for its phases
         for (const consensus_mode& mode : modes)
@@ -452,7 +458,7 @@ std::vector<consensus_mode> find_agreement(std::vector<consensus_run>& runs, std
         quarter = turned_outputs(shapes);
         *turned = quarter;
         for (std::size_t i = 0; i < clusters.size() && !quarter.empty(); ++i)
-            modes[i] = mode_of(runs, clusters[i], apart[i], quarter);
+            modes[i] = mode_of(runs, clusters[i], nearest[i], quarter);
     }
     mark_full(clusters, modes, runs);
     std::sort(modes.begin(), modes.end(),

@@ -180,6 +180,13 @@ bool follows(const record_level& level, std::size_t m, std::size_t n_u, const co
            explained(level, m, n_u, false, mode, modes, block) < judgement::explained;
 }
 
+/// Samples of the longest record.
+std::size_t longest_of(const record_level& level, std::size_t m) {
+    std::size_t out = 0;
+    for (const sample_rows& rows : level.records) out = std::max(out, rows.size() / m);
+    return out;
+}
+
 const record_level& seen_by(const std::vector<record_level>& levels, double frequency_hz) {
     std::size_t k = 0; // the lowest rate that shows it: fewest samples
     while (k + 1 < levels.size() && !levels[k + 1].zoomed && frequency_hz < levels[k + 1].top * levels[k + 1].fs_hz)
@@ -193,7 +200,9 @@ bool of_machine(const std::vector<record_level>& levels, std::size_t m, std::siz
                 const consensus_mode& over, int n) {
     if (!near_multiple(over.frequency_hz, n * base.frequency_hz, judgement::mains_tolerance)) return false;
     const record_level& level = seen_by(levels, over.frequency_hz);
-    const auto block = static_cast<std::size_t>(judgement::machine_periods * level.fs_hz / base.frequency_hz) + 1;
+    const double period = level.fs_hz / base.frequency_hz, most = judgement::machine_periods * period,
+                 every = static_cast<double>(longest_of(level, m)) / (2 * judgement::fewest_blocks);
+    const auto block = static_cast<std::size_t>(std::clamp(every, judgement::line_periods * period, most)) + 1;
     const auto along = [&](const consensus_mode& one, double frequency_hz) {
         return amplitudes(level, m, n_u, weights_along(one.shape), frequency_hz, block);
     };
@@ -294,8 +303,7 @@ double spread_of_force(const record_level& level, std::size_t m, std::size_t n_u
 
 bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_rest, const consensus_mode& mode,
              const std::vector<consensus_mode>& modes) {
-    std::size_t longest = 0;
-    for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
+    const std::size_t longest = longest_of(level, m);
     const double seconds = static_cast<double>(longest) / level.fs_hz;
     const double rate = 2 * M_PI * mode.damping_ratio * mode.frequency_hz;
     const bool endless = rate * seconds < judgement::unresolved_decays;
@@ -316,6 +324,7 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
         return keeps_up &&
                track_beside(level, m, n_u, weights, mode.frequency_hz, block).away < judgement::off_its_frequency &&
                explained(level, m, n_u, false, mode, modes, block) < judgement::explained;
+    if (n_u == 0 && a.size() >= judgement::fewest_blocks && !keeps_up) return false; // neither stays nor falls
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= judgement::fewest_blocks * level.records.size()
@@ -414,8 +423,8 @@ enum class of_force { nothing, peak, edge };
 
 of_force shown_by_force(level_spectra& spectra, const record_level& level, std::size_t m, std::size_t n_u,
                         const consensus_mode& mode) {
-    std::size_t longest = 0, size = shortest;
-    for (const sample_rows& rows : level.records) longest = std::max(longest, rows.size() / m);
+    const std::size_t longest = longest_of(level, m);
+    std::size_t size = shortest;
     const double f = mode.frequency_hz / level.fs_hz;
     while (2 * averaged * size <= longest && mode.damping_ratio * f * static_cast<double>(size) < 2) size *= 2;
     const double width = std::max(mode.damping_ratio * f, 2 / static_cast<double>(size));

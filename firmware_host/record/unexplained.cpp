@@ -67,7 +67,7 @@ bool accounted_for(double f, double line_hz, const std::vector<listed_mode>& lis
         const auto is_any = [&](std::initializer_list<const char*> codes) {
             return std::any_of(codes.begin(), codes.end(), [&](const char* code) { return has_code(why, code); });
         };
-        const bool known = is_any({"tone", "pickup", "harmonic"}) || !is_any({"few_runs", "noise_shape"});
+        const bool known = is_any({"tone", "pickup", "harmonic"}) || !is_any({"few_runs", "noise_shape", "wide_sigma"});
         const double width = 3 * std::max(line_hz, listed[k].damping_ratio * listed[k].frequency_hz);
         if (known && std::abs(listed[k].frequency_hz - f) < width) return true;
     }
