@@ -186,6 +186,11 @@ static void models_that_cannot_be_watched(void) {
     other = model;
     other.K = NULL;
     TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_watch_set_model(watch, &other));
+    for (int k = 0; k < 2; ++k) { // a single input needs both of its matrices
+        other = model;
+        *(k ? &other.B : &other.D) = NULL;
+        TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_watch_set_model(watch, &other));
+    }
     okid_real_t singular[RIG_NY * RIG_NY] = {0};
     other = model;
     other.innovation = singular;
