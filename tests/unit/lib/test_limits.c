@@ -131,6 +131,8 @@ static void unknowns_of_a_refinement(void) {
     TEST_ASSERT_FALSE(TAKEN(refine, .n_u = 1, .n_y = 1, .n_z = 1, .runs = 8191));
     TEST_ASSERT_TRUE(TAKEN(refine, .n_u = 8191, .n_y = 1, .n_z = 1));
     TEST_ASSERT_FALSE(TAKEN(refine, .n_u = 8192, .n_y = 1, .n_z = 1));
+    const okid_refine_config_t of_outputs = {.n_u = 1, .n_y = 1, .n_z = 1}; // outputs have no part in it
+    LIMITS(refine, of_outputs, n_y, 1, 16384);
 }
 
 static void of_an_identification(void) {

@@ -171,6 +171,11 @@ static void inputs_can_be_replaced(void) {
         TEST_ASSERT_EQUAL_MEMORY(D, model.markov, sizeof D);
         TEST_ASSERT_TRUE(markov_mismatch() < TOLERANCE(1e-12, 1e-5));
         TEST_ASSERT_EQUAL(OKID_ERR_NULL, okid_identify_set_inputs(identifier, NULL, D, &model));
+        const int32_t states[] = {1, RIG_NZ, 0, -1, okid_identify_max_order(&config) + 1}; // one is enough
+        for (int n = 0; n < 5; ++n) {
+            model.n_z = states[n];
+            TEST_ASSERT_EQUAL(n < 2 ? OKID_OK : OKID_ERR_MISMATCH, okid_identify_set_inputs(identifier, B, D, &model));
+        }
     }
     free(v);
 }

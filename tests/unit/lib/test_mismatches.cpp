@@ -277,6 +277,67 @@ void factors_of_another_kind() {
     TEST_ASSERT_EQUAL(OKID_ERR_MISMATCH, okid_square_root_merge(one.self, one.self));
 }
 
+using counts = okid_accumulator_stats_t;
+
+void assert_counts(const counts& expected, const counts& found) {
+    TEST_ASSERT_EQUAL_INT64(expected.samples, found.samples);
+    TEST_ASSERT_EQUAL_INT64(expected.missing, found.missing);
+    TEST_ASSERT_EQUAL_INT64(expected.gaps, found.gaps);
+    TEST_ASSERT_EQUAL_INT64(expected.saturated, found.saturated);
+    TEST_ASSERT_EQUAL_INT64(expected.rows, found.rows);
+}
+
+/// The counts of both parts differ, so that none stands for another.
+template <class Object, class Config, class Add, class Merge>
+void parts_are_counted(const Config& config, Add add, Merge merge) {
+    int16_t codes[4 * 30];
+    for (int i = 0; i < 4 * 30; ++i) codes[i] = static_cast<int16_t>(i * i % 97 - 40);
+    codes[17] = 32767, codes[18] = -32768; // in what both parts hold
+    const Object one(config), other(config), none(config);
+    const auto feed = [&](const Object& to, int samples, int64_t missing, int again) {
+        TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, add(to.self, codes, samples));
+        to.gap(missing);
+        TEST_ASSERT_EQUAL(OKID_OK, add(to.self, codes + 40, again));
+    };
+    feed(one, 9, 5, 7);
+    feed(other, 13, 11, 17);
+    const counts part{30, 11, 1, 2, 30 - 2 * 3, 0}, all{46, 16, 2, 4, 46 - 4 * 3, 0}; // three lags
+    assert_counts({16, 5, 1, 2, 16 - 2 * 3, 0}, one.stats());
+    assert_counts(part, other.stats());
+    TEST_ASSERT_EQUAL(OKID_OK, merge(one.self, other.self));
+    TEST_ASSERT_EQUAL(OKID_OK, merge(one.self, none.self));
+    TEST_ASSERT_EQUAL(OKID_OK, merge(none.self, one.self));
+    assert_counts(part, other.stats());
+    for (const Object* each : {&one, &none}) assert_counts(all, each->stats());
+}
+
+void counts_of_parts_add_up() {
+    const accumulator_config c = with(growing(), &accumulator_config::sample, OKID_SAMPLE_INT16);
+    parts_are_counted<sums>(c, okid_accumulator_add_i16, okid_accumulator_merge);
+    correlation_config d = okid_correlation_defaults(2, 2, 3);
+    d.sample = OKID_SAMPLE_INT16;
+    d.slots = 9;
+    parts_are_counted<correlations>(d, okid_correlation_add_i16, okid_correlation_merge);
+    parts_are_counted<factors>(okid_square_root_defaults(2, 2, 3), okid_square_root_add_i16, okid_square_root_merge);
+}
+
+/// What is taken out again is no longer counted.
+void counts_of_a_part_go_with_it() {
+    const accumulator_config config = with(growing(), &accumulator_config::sample, OKID_SAMPLE_INT16);
+    const sums whole(config), part(config);
+    int16_t codes[4 * 20];
+    for (int i = 0; i < 4 * 20; ++i) codes[i] = static_cast<int16_t>(i * i % 97 - 40);
+    codes[17] = 32767;
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add_i16(whole.self, codes + 20, 15));
+    whole.gap(4);
+    const counts before = whole.stats();
+    TEST_ASSERT_EQUAL(OKID_WARN_SATURATED, okid_accumulator_add_i16(part.self, codes, 8));
+    part.gap(3);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_merge(whole.self, part.self));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_remove(whole.self, part.self, 1));
+    assert_counts(before, whole.stats());
+}
+
 /// A file that is shorter or longer than it says is none, wherever it ends.
 void files_of_another_length() {
     const double samples[4 * 6] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3, 4, 5, 6};
@@ -317,6 +378,8 @@ int main() {
     RUN_TEST(copies_and_files);
     RUN_TEST(correlations_of_another_kind);
     RUN_TEST(factors_of_another_kind);
+    RUN_TEST(counts_of_parts_add_up);
+    RUN_TEST(counts_of_a_part_go_with_it);
     RUN_TEST(files_of_another_length);
     return UNITY_END();
 }
