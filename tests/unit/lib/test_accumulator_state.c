@@ -82,6 +82,31 @@ static void bytes_go_on_bit_for_bit(void) {
         }
 }
 
+/// Sums are kept as they come: a unit of all channels scales them by its square, as it does the means.
+static void one_unit_of_all_channels_scales_the_sums(void) {
+    const okid_sample_t kinds[] = {OKID_SAMPLE_DOUBLE, OKID_SAMPLE_INT16, OKID_SAMPLE_INT24, OKID_SAMPLE_INT32};
+    const double units[] = {2, 0.5, -1, 3};
+    static double plain[W * W], scaled[W * W];
+    for (int kind = 0; kind < 4; ++kind)
+        for (int mean = 0; mean < 2; ++mean)
+            for (int k = 0; k < 4; ++k) {
+                const okid_detrend_t detrend = mean ? OKID_DETREND_MEAN : OKID_DETREND_NONE;
+                void* block;
+                okid_accumulator_t* a = make(config_of(kinds[kind]), &block);
+                TEST_ASSERT_EQUAL(OKID_OK, feed(a, kinds[kind], 0, 60));
+                double scale[M], of_ones[M], of_units[M];
+                TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, detrend, plain, of_ones));
+                for (int c = 0; c < M; ++c) scale[c] = units[k];
+                okid_accumulator_set_units(a, scale, NULL);
+                TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(a, detrend, scaled, of_units));
+                for (int i = 0; i < W * W; ++i)
+                    TEST_ASSERT_DOUBLE_WITHIN(1e-14 * fabs(plain[i]), plain[i] * units[k] * units[k], scaled[i]);
+                for (int c = 0; c < M; ++c)
+                    TEST_ASSERT_DOUBLE_WITHIN(1e-14 * fabs(of_ones[c]), of_ones[c] * units[k], of_units[c]);
+                free(block);
+            }
+}
+
 static void damaged_bytes_change_nothing(void) {
     void *block, *other;
     okid_accumulator_t* a = make(config_of(OKID_SAMPLE_INT16), &block);
@@ -405,6 +430,7 @@ int main(void) {
     RUN_TEST(sums_that_overflow_and_a_base_of_a_window);
     RUN_TEST(absurd_content_is_refused);
     RUN_TEST(bytes_go_on_bit_for_bit);
+    RUN_TEST(one_unit_of_all_channels_scales_the_sums);
     RUN_TEST(damaged_bytes_change_nothing);
     RUN_TEST(constants_bound_the_memory);
     RUN_TEST(the_state_is_small);

@@ -180,6 +180,23 @@ static void inputs_can_be_replaced(void) {
     free(v);
 }
 
+/// Sensors that show the force itself, but for the last digits: what is left has poles and no dynamics.
+static void a_loop_of_cable_has_no_modes(void) {
+    uint64_t seed = 31;
+    double* v = rig_record(&rig, N, 0, NULL, 11);
+    for (int n = 0; n < N; ++n)
+        for (int o = 0; o < RIG_NY; ++o)
+            v[n * RIG_M + RIG_NU + o] = (o - 3) * v[n * RIG_M] + TOLERANCE(1e-11, 1e-6) * rig_normal(&seed);
+    for (int k = 0; k < METHODS; ++k) {
+        const okid_identify_config_t config = config_of(methods[k], RIG_NU, RIG_NZ);
+        create(&config);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
+        TEST_ASSERT_EQUAL_MESSAGE(OKID_ERR_NO_MODES, okid_identify_run(identifier, accumulator, &model),
+                                  name_of(k, "cable"));
+    }
+    free(v);
+}
+
 static void what_does_not_fit_is_refused(void) {
     double* v = rig_record(&rig, N, 0.01, NULL, 11);
     okid_identify_config_t config = config_of(OKID_METHOD_N4SID_CVA, RIG_NU, 0), other = config;
@@ -302,6 +319,7 @@ int main(void) {
     RUN_TEST(other_orders_than_the_one_asked_for);
     RUN_TEST(ambient_records_have_modes_and_a_predictor);
     RUN_TEST(inputs_can_be_replaced);
+    RUN_TEST(a_loop_of_cable_has_no_modes);
     RUN_TEST(what_does_not_fit_is_refused);
     RUN_TEST(a_constant_channel_is_named);
     RUN_TEST(correlations_are_those_of_the_definition);

@@ -140,6 +140,35 @@ static void constant_and_dead_channels_are_named(void) {
     free(v);
 }
 
+/// A response that is too young to have been seen so long ago: its oldest lags are zero in every row, those of one output
+/// or of all. They take no part, and all others fit as well as they can.
+static void lags_that_were_never_seen_take_no_part(void) {
+    enum { ROWS = 300 };
+    for (int zeros = 1; zeros <= RIG_NY; ++zeros) {
+        uint64_t seed = 21;
+        memset(gram, 0, sizeof gram);
+        for (int n = 0; n < ROWS; ++n) {
+            double row[W];
+            for (int k = 0; k < W; ++k) row[k] = k < W - zeros ? rig_normal(&seed) : 0;
+            for (int o = 0; o < RIG_NY; ++o) row[RIG_NU + o] += row[RIG_M + o] + 2 * row[0];
+            for (int j = 0; j < W; ++j)
+                for (int i = 0; i < W; ++i) gram[j * W + i] += row[i] * row[j];
+        }
+        okid_observer_config_t leave = plain;
+        leave.unstable = 1;
+        TEST_ASSERT_EQUAL(OKID_OK, solve(&leave, ROWS));
+        for (int o = 0; o < RIG_NY; ++o)
+            for (int i = 0; i < Q; ++i) { // the normal equations
+                const int row = i < RIG_NU ? i : i + RIG_NY;
+                double left = gram[(RIG_NU + o) * W + row];
+                for (int k = 0; k < Q; ++k)
+                    left -= (double)theta[k * RIG_NY + o] * gram[(k < RIG_NU ? k : k + RIG_NY) * W + row];
+                TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-9, 1e-3), 0, left);
+                TEST_ASSERT_TRUE(i < Q - zeros || theta[i * RIG_NY + o] == 0);
+            }
+    }
+}
+
 static void one_sine_does_not_excite(void) {
     double* v = rig_record(&rig, 2000, 0, NULL, 2);
     for (int n = 0; n < 2000; ++n) v[n * RIG_M] = sin(0.3 * n);
@@ -169,6 +198,7 @@ int main(void) {
     RUN_TEST(innovation_is_the_noise);
     RUN_TEST(trap_22_unstable_arx_is_stabilised);
     RUN_TEST(constant_and_dead_channels_are_named);
+    RUN_TEST(lags_that_were_never_seen_take_no_part);
     RUN_TEST(one_sine_does_not_excite);
     RUN_TEST(wrong_use_is_refused);
     return UNITY_END();
