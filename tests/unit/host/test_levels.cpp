@@ -149,6 +149,15 @@ static void records_are_centred_and_channels_scaled() {
     TEST_ASSERT_EQUAL_INT64(4, level.samples);
 }
 
+/// A row that lacks any of its channels is none, wherever it stands.
+static void complete_rows_are_counted() {
+    for (std::size_t at = 0; at < 12; ++at) {
+        sample_rows rows = {1, 4, 2, 3, 1, 5, 7, 0, 3, 2, 6, 8};
+        rows[at] = NAN;
+        TEST_ASSERT_EQUAL_INT64(3, levels_of(rows, 3).front().samples);
+    }
+}
+
 /// The band ends where a thousandth of the usual power is left, from 0.42 on where a tenth is: the filter of the record.
 static void the_band_ends_where_the_power_does() {
     const struct {
@@ -225,6 +234,7 @@ int main() {
     RUN_TEST(a_rate_needs_700_samples);
     RUN_TEST(what_meets_a_missing_sample_is_missing);
     RUN_TEST(records_are_centred_and_channels_scaled);
+    RUN_TEST(complete_rows_are_counted);
     RUN_TEST(the_band_ends_where_the_power_does);
     RUN_TEST(a_narrow_band_stands_alone);
     RUN_TEST(a_narrow_band_has_edges);

@@ -182,6 +182,27 @@ static void eight_blocks_show_a_spread() {
                                  why({sine(1, count, constant)}, {found_at(1, 0.0099)}).c_str());
 }
 
+/// At the lowest rate that shows it, no narrow band: 0.42 of 128 and of 64 a second are 53.76 and 26.88 Hz.
+static void a_vibration_is_looked_at_where_it_takes_the_fewest_samples() {
+    constexpr std::size_t count = 4, length = 64 * 256; // of rates, the last one a narrow band
+    for (const auto& [hz, expected] : {std::pair{60.3, 0}, {53.9, 0}, {53.5, 1}, {27.1, 1}, {26.7, 2}, {11.0, 2}})
+        for (std::size_t steady = 0; steady < count; ++steady) { // the rate at which it is a line
+            std::vector<record_level> levels;
+            for (std::size_t k = 0; k < count; ++k) {
+                const double factor = std::pow(2, k); // so many times as fast for the rate
+                series chance = white(length, 1e-3, 1);
+                add(chance, 1, turning_at(hz * factor, chance_amplitude(length, hz * factor, 0.005, 2)));
+                levels.push_back(level_of({k == steady ? sine(hz * factor, length, constant) : chance}));
+                levels[k].fs_hz = sample_rate / factor;
+                levels[k].top = k > 0 ? 0.42 : 0.48;
+                levels[k].zoomed = k + 1 == count;
+            }
+            std::vector<consensus_mode> modes = {found_at(hz, 0.005)};
+            mark_lines(levels, 0, 1, false, modes);
+            TEST_ASSERT_EQUAL_UINT64(static_cast<int>(steady) == expected ? 1 : 0, modes[0].why.size());
+        }
+}
+
 /// Within 0.003 of 50 or 60 Hz of a multiple of theirs.
 static void lines_of_the_mains_are_pickup() {
     for (const auto& [hz, code] : {std::pair{50.14, "pickup"},
@@ -333,6 +354,7 @@ int main() {
     RUN_TEST(the_ends_of_a_tones_way_are_no_modes);
     RUN_TEST(a_mode_beside_a_tone_stays);
     RUN_TEST(eight_blocks_show_a_spread);
+    RUN_TEST(a_vibration_is_looked_at_where_it_takes_the_fewest_samples);
     RUN_TEST(lines_of_the_mains_are_pickup);
     RUN_TEST(simple_parts_of_the_rate_are_pickup);
     RUN_TEST(multiples_of_a_vibration_are_harmonics);

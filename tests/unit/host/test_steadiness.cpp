@@ -112,6 +112,30 @@ static void a_frequency_drifts() {
     }
 }
 
+/// Of four samples a period: that of an output belongs to the samples of that output at that instant, the quiet one included.
+static void outputs_are_seen_at_one_instant() {
+    const listed_mode mode = mode_at(64, 0.01, {1.0, {0.0, 0.5}});
+    const series force = white(usual, 1, 5);
+    series one = white(usual, 0.05, 6), other = white(usual, 0.002, 7);
+    std::complex<double> state = 0;
+    for (std::size_t t = 0; t < usual; ++t) {
+        one[t] += state.real();
+        other[t] -= 0.5 * state.imag();
+        const double drift = 0.1 * width * (static_cast<double>(t) / usual - 0.5);
+        state = discrete_pole(mode_at(64 * (1 + drift), 0.01), 1 / sample_rate) * state +
+                std::complex<double>(0.04, 0.05) * force[t];
+    }
+    judged found;
+    found.work.set = record_of({force, one, other}, 1);
+    found.work.context.outputs = {"a", "b"};
+    make_modal_model({mode}, sample_rate, found.work);
+    fit_records(found.work.set, found.work.model, found.work.context);
+    remark_unsteady({mode}, sample_rate, found.work);
+    const std::string text = warning(found.work, "time_varying");
+    TEST_ASSERT_FALSE(text.empty());
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.2, std::stod(text.substr(text.find(": ") + 2)));
+}
+
 /// A fiftieth of the bandwidth is not worth a word, however sure it is.
 static void a_small_change_is_not_worth_a_word() {
     TEST_ASSERT_FALSE(of_force(with_time(0.016 * width), 1e-5).drift());
@@ -164,6 +188,7 @@ int main() {
     RUN_TEST(a_steady_mode_is_steady);
     RUN_TEST(a_frequency_moves_with_the_level);
     RUN_TEST(a_frequency_drifts);
+    RUN_TEST(outputs_are_seen_at_one_instant);
     RUN_TEST(a_small_change_is_not_worth_a_word);
     RUN_TEST(what_cannot_be_judged_is_not);
     RUN_TEST(a_tone_beside_a_mode_is_no_law_of_its_level);

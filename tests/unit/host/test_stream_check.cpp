@@ -62,6 +62,19 @@ void test_nothing_to_say(void) {
     TEST_ASSERT_EQUAL_STRING("", codes_of(make_config(bits_at(0, 8), right_signal), false).c_str());
 }
 
+/// As wide as a frame has room for, and past its end: it goes on at zero.
+void test_a_counter_of_64_bits(void) {
+    const drv_signal_t wide = bits_at(0, 64);
+    stream_check check(make_config(wide, right_signal));
+    for (std::int64_t n = 0; n < frames; ++n) {
+        drv_frame_t frame = make_frame(0x101, 0, 0);
+        drv_signal_put(&wide, frame.data, 8, n - 500);
+        check.add(frame);
+    }
+    TEST_ASSERT_TRUE(check.judged());
+    TEST_ASSERT_EQUAL_INT(0, check.doubts().size());
+}
+
 void test_misread_sign(void) {
     const live_config config = make_config(right_counter, bits_at(16, 16));
     TEST_ASSERT_EQUAL_STRING("code_jumps ", codes_of(config, false).c_str());
@@ -179,6 +192,7 @@ void test_exact_before_alike(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_nothing_to_say);
+    RUN_TEST(test_a_counter_of_64_bits);
     RUN_TEST(test_misread_sign);
     RUN_TEST(test_misread_bits);
     RUN_TEST(test_losses_are_no_wrong_counter);

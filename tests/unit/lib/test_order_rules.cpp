@@ -58,6 +58,20 @@ static void gaps_in_rounding_do_not_count() {
     TEST_ASSERT_EQUAL(2, order_by_gap(values, 6, 4).order);
 }
 
+/// Units change no order: all values larger or smaller by the same.
+static void only_ratios_of_values_count() {
+    const okid_real_t values[] = {64, 32, 16, 8, okid_real_t(0.5), okid_real_t(0.25), okid_real_t(1e-20), 0};
+    const double scales[] = {1e-6, 1, 1e6};
+    for (const double scale : scales) {
+        okid_real_t scaled[8];
+        for (int k = 0; k < 8; ++k) scaled[k] = static_cast<okid_real_t>(scale) * values[k];
+        const okid::gap_choice found = order_by_gap(scaled, 7, 7), all = order_by_gap(scaled, 8, 8);
+        TEST_ASSERT_EQUAL(4, order_by_gap(scaled, 6, 6).order);
+        TEST_ASSERT_EQUAL(6, found.order); // nothing but rounding behind it
+        TEST_ASSERT_EQUAL(6, all.order);
+    }
+}
+
 static void one_state_is_all_there_is_room_for() {
     const okid_real_t values[] = {1, okid_real_t(0.5)};
     TEST_ASSERT_EQUAL(1, order_by_gap(values, 2, 1).order);
@@ -71,6 +85,7 @@ int main() {
     RUN_TEST(modes_are_worth_the_fourth_power_above_one_half);
     RUN_TEST(the_largest_gap_behind_an_even_order_is_taken);
     RUN_TEST(gaps_in_rounding_do_not_count);
+    RUN_TEST(only_ratios_of_values_count);
     RUN_TEST(one_state_is_all_there_is_room_for);
     return UNITY_END();
 }
