@@ -153,6 +153,28 @@ static void distortion_is_reported_without_a_mode() {
     TEST_ASSERT_TRUE(with_third(20, chance_amplitude(usual, 20, 0.01, 5), 0.1, false).nonlinear().empty());
 }
 
+/// What a machine does is in phase by itself: beside a multiple of a line nothing is told. Wherever the line stands in the list.
+static void multiples_of_a_line_are_no_distortion() {
+    series out = white(usual, 0.01, 9);
+    add(out, 1, turning_at(10, ten()));
+    add(out, 0.8, turning_at(13, thirteen()));
+    add(out, 0.1, turning_at(20, power_of(ten(), 2)));
+    for (const double line_hz : {5.0, 6.0, 20.0})
+        for (std::size_t place = 0; place < 3; ++place) {
+            judged found;
+            found.modes = {mode_at(10, 0.01), mode_at(13, 0.01)};
+            found.modes.insert(found.modes.begin() + static_cast<std::ptrdiff_t>(place), mode_at(line_hz, 1e-4));
+            found.work.set = record_of({out});
+            found.work.context.verdicts.assign(3, verdict());
+            found.work.context.verdicts[place] = verdict({"tone"});
+            found.modes[place].in_model = false;
+            found.taken_out = mark_combinations(found.modes, sample_rate, found.work);
+            const bool multiple = line_hz == 5 || line_hz == 20;
+            TEST_ASSERT_TRUE(!found.taken_out && multiple == found.nonlinear().empty());
+            TEST_ASSERT_TRUE(multiple || contains(found.nonlinear(), "20 Hz = 2 × 10"));
+        }
+}
+
 /// Sixteen blocks of six periods of 10 Hz, 154 samples each; of a vibration whose phase alone wanders.
 static void few_blocks_show_no_coherence() {
     for (const std::size_t count : {16 * 154, 16 * 154 - 1}) {
@@ -238,6 +260,7 @@ int main() {
     RUN_TEST(a_product_stands_at_the_sum_of_frequencies);
     RUN_TEST(one_product_makes_others_likely);
     RUN_TEST(distortion_is_reported_without_a_mode);
+    RUN_TEST(multiples_of_a_line_are_no_distortion);
     RUN_TEST(few_blocks_show_no_coherence);
     RUN_TEST(a_single_decay_proves_nothing);
     RUN_TEST(modes_are_looked_at_along_their_shape);

@@ -238,6 +238,31 @@ static void a_peak_of_a_lively_stretch_is_no_spike() {
         }
 }
 
+/// What is a fault is one in any unit, about any mean, and upside down.
+static void offset_unit_and_sign_change_no_fault() {
+    column clipped = moving(), spiky = moving(), hit = moving(), pulse = moving(), rest = held(0.33, 40);
+    put(clipped, 1, 10);
+    put(clipped, -1, 12, 17);
+    spiky[700] = 40, spiky[900] = -35, spiky[901] = -6;
+    hit[700] = 12, hit[701] = 2.5, hit[696] = 2.3, hit[705] = 3;
+    pulse[700] = 12, pulse[699] = 3, pulse[701] = -1;
+    for (std::size_t i = 440; i < 500; ++i) rest[i] *= 0.25;
+    std::size_t faults = 0;
+    for (const column& y : {clipped, spiky, hit, pulse, rest, held(0.33, 31), held(0.33, 32), held(0.33, 40)}) {
+        const outcome as_it_is = screened(y);
+        faults += as_it_is.missing.size();
+        for (const double unit : {1.0, -1.0, 0.125, -64.0})
+            for (const double offset : {0.0, 2.0, -2.0, 4096.0}) { // whatever rounding does, equal samples stay equal
+                column other = y;
+                for (double& x : other) x = unit * (x + offset);
+                const outcome one = screened(other);
+                TEST_ASSERT_TRUE(one.missing == as_it_is.missing && one.kept == as_it_is.kept);
+                TEST_ASSERT_EQUAL_STRING(as_it_is.said.c_str(), one.said.c_str());
+            }
+    }
+    TEST_ASSERT_EQUAL_UINT64(22 + 2 + 1 + 32 + 40, faults);
+}
+
 /// Each spike costs the 60 samples behind it too: of 1940 samples with clean lags nine cost 28 %, ten 31 %.
 static void an_output_that_loses_three_tenths_goes() {
     for (const std::size_t count : {9U, 10U}) {
@@ -335,6 +360,7 @@ int main() {
     RUN_TEST(a_spike_is_fifteen_spreads_out);
     RUN_TEST(a_hit_is_no_spike);
     RUN_TEST(a_peak_of_a_lively_stretch_is_no_spike);
+    RUN_TEST(offset_unit_and_sign_change_no_fault);
     RUN_TEST(an_output_that_loses_three_tenths_goes);
     RUN_TEST(an_output_that_costs_the_others_three_tenths_goes);
     RUN_TEST(an_output_that_never_moves_goes);
