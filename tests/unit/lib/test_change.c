@@ -127,6 +127,18 @@ static void a_shifted_mode_is_told_and_named(void) {
     }
 }
 
+/// Of two covariances that differ: no fewer than the smaller sample has, no more than both together.
+static void both_samples_give_degrees_of_freedom(void) {
+    feed(BLOCKS, 1, 0);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_change_learn(test));
+    for (int blocks = BLOCKS / 2; blocks <= BLOCKS; blocks += BLOCKS / 4) {
+        feed(blocks, 2, 0);
+        const okid_change_verdict_t found = verdict();
+        TEST_ASSERT_TRUE(found.freedom > blocks - 1 && found.freedom < BLOCKS + blocks - 2);
+        TEST_ASSERT_TRUE(found.p_value > 0 && found.p_value <= 1 && found.statistic >= 0);
+    }
+}
+
 static void one_block_tells_shifts_but_no_probability(void) {
     feed(BLOCKS, 1, 0);
     TEST_ASSERT_EQUAL(OKID_OK, okid_change_learn(test));
@@ -176,6 +188,7 @@ int main(void) {
     RUN_TEST(the_baseline_has_the_modes_of_the_structure);
     RUN_TEST(other_excitation_is_no_change);
     RUN_TEST(a_shifted_mode_is_told_and_named);
+    RUN_TEST(both_samples_give_degrees_of_freedom);
     RUN_TEST(one_block_tells_shifts_but_no_probability);
     RUN_TEST(refusals);
     return UNITY_END();

@@ -140,6 +140,35 @@ static void constant_and_dead_channels_are_named(void) {
     free(v);
 }
 
+/// The recursion written out: Y_n = own_n + sum over h of theta^y_h Y_(n-h); that of the gain begins at n = 1, with the sign
+/// of its own term turned over and no feedback of the instant itself.
+static void both_recursions_are_what_they_say(void) {
+    enum { U = 2, O = 3, LAGS = 3, M = U + O, COUNT = 8 };
+    okid_real_t given[O * (U + LAGS * M)], system[(COUNT + 1) * O * U], gains[COUNT * O * O],
+        alone[(COUNT + 1) * O * U];
+    for (int i = 0; i < O * (U + LAGS * M); ++i) given[i] = (okid_real_t)(sin(3.0 * i) / 4);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_markov_recursion(U, O, LAGS, given, COUNT, system, gains));
+    TEST_ASSERT_EQUAL(OKID_OK, okid_markov_recursion(U, O, LAGS, given, COUNT, alone, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(alone, system, sizeof alone);
+    for (int kind = 0; kind < 2; ++kind) { // Y, then the gain
+        const okid_real_t* found = kind ? gains : system;
+        const int width = kind ? O : U;
+        for (int n = kind; n <= COUNT; ++n)
+            for (int c = 0; c < width; ++c)
+                for (int o = 0; o < O; ++o) {
+                    double expected = n == 0 ? (double)given[c * O + o] : 0;
+                    const int own = U + (n - 1) * M + (kind ? U : 0);
+                    if (n > 0 && n <= LAGS) expected = (kind ? -1 : 1) * (double)given[(own + c) * O + o];
+                    for (int h = 1; h <= LAGS && h <= n - kind; ++h)
+                        for (int k = 0; k < O; ++k)
+                            expected += (double)given[(U + (h - 1) * M + U + k) * O + o] *
+                                        (double)found[((n - kind - h) * width + c) * O + k];
+                    TEST_ASSERT_DOUBLE_WITHIN(TOLERANCE(1e-14, 1e-6), expected,
+                                              (double)found[((n - kind) * width + c) * O + o]);
+                }
+    }
+}
+
 /// A response that is too young to have been seen so long ago: its oldest lags are zero in every row, those of one output
 /// or of all. They take no part, and all others fit as well as they can.
 static void lags_that_were_never_seen_take_no_part(void) {
@@ -198,6 +227,7 @@ int main(void) {
     RUN_TEST(innovation_is_the_noise);
     RUN_TEST(trap_22_unstable_arx_is_stabilised);
     RUN_TEST(constant_and_dead_channels_are_named);
+    RUN_TEST(both_recursions_are_what_they_say);
     RUN_TEST(lags_that_were_never_seen_take_no_part);
     RUN_TEST(one_sine_does_not_excite);
     RUN_TEST(wrong_use_is_refused);
