@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <unity.h>
 
@@ -120,12 +121,16 @@ static void rates_row_by_row_are_those_of_the_record() {
 static void blocks_hold_every_row() {
     for (const std::size_t gap_each : {std::size_t{0}, std::size_t{997}, std::size_t{30}}) {
         std::vector<double> rows = rows_of(30000, 6);
-        for (std::size_t n = gap_each; gap_each > 0 && n * m < rows.size(); n += gap_each) rows[n * m + 1] = NAN;
+        for (std::size_t n = gap_each; gap_each > 0 && n * m < rows.size(); n += gap_each)
+            rows[n * m + n / gap_each % m] = NAN;
         level_memory memory(n_u, n_y, lags + 4, 100);
         const owned_sums whole = sums_like(lags + 4), taken = sums_like(lags), direct = sums_like(lags);
         for (std::size_t n = 0; n < rows.size(); n += m) memory.add(rows.data() + n);
         TEST_ASSERT_TRUE(okid_accumulator_add(whole.sums, rows.data(), rows.size() / m) >= 0);
         TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_merge(direct.sums, whole.sums));
+        okid_accumulator_stats_t counts;
+        okid_accumulator_stats(whole.sums, &counts);
+        TEST_ASSERT_EQUAL_INT64(counts.samples, memory.samples());
         TEST_ASSERT_TRUE(memory.take(taken.sums));
         TEST_ASSERT_EQUAL_INT64(okid_accumulator_rows(whole.sums), okid_accumulator_rows(taken.sums));
         const std::vector<double> all = gram_of(direct.sums);
@@ -149,11 +154,128 @@ static void blocks_hold_every_row() {
         TEST_ASSERT_TRUE(taken_by(again, state.size()));
         const owned_sums twice = sums_like(lags);
         again.merge(memory);
+        TEST_ASSERT_EQUAL_INT64(2 * memory.samples(), again.samples());
         TEST_ASSERT_TRUE(again.take(twice.sums));
         std::vector<double> doubled = all;
         for (double& x : doubled) x *= 2;
         assert_same(doubled, gram_of(twice.sums), 1e-12);
     }
+}
+
+/// Without gaps neighbours become one when there are too many: blocks of one length, none of them with half of all in it.
+static void blocks_without_gaps_are_alike() {
+    level_memory memory(n_u, n_y, lags, 100);
+    const std::vector<double> rows = rows_of(20000, 9);
+    for (std::size_t n = 0; n < 20000; ++n) {
+        memory.add(rows.data() + n * m);
+        if (n % 1900 != 1899) continue;
+        std::vector<std::int64_t> lengths;
+        for (std::size_t k = 0; k < memory.blocks(); ++k) {
+            const owned_sums part = sums_like(lags);
+            TEST_ASSERT_TRUE(memory.take_block(k, part.sums));
+            lengths.push_back(okid_accumulator_rows(part.sums));
+        }
+        const std::int64_t all = static_cast<std::int64_t>(n) + 1 - lags;
+        TEST_ASSERT_EQUAL_INT64(all, std::accumulate(lengths.begin(), lengths.end(), std::int64_t{0}));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, static_cast<double>(all) / static_cast<double>(lengths.size()),
+                                  memory.rows_of_block());
+        lengths.pop_back(); // the newest one is not full
+        const auto [least, most] = std::minmax_element(lengths.begin(), lengths.end());
+        TEST_ASSERT_TRUE(lengths.size() >= 10 && *most - *least <= lags);
+    }
+}
+
+/// What begins in silence has a row from its first sample on, as if zeros stood before it.
+static void silence_stands_before_a_record() {
+    const std::vector<double> rows = rows_of(60, 10);
+    level_memory memory(n_u, n_y, lags, 100);
+    const owned_sums taken = sums_like(lags), direct = sums_like(lags);
+    std::vector<double> padded(lags * m);
+    padded.insert(padded.end(), rows.begin(), rows.end());
+    memory.silence();
+    for (std::size_t n = 0; n < rows.size(); n += m) memory.add(rows.data() + n);
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(direct.sums, padded.data(), padded.size() / m));
+    TEST_ASSERT_TRUE(memory.take(taken.sums));
+    TEST_ASSERT_EQUAL_INT64(60, okid_accumulator_rows(taken.sums));
+    TEST_ASSERT_EQUAL_INT64(60, memory.samples());
+    assert_same(gram_of(direct.sums), gram_of(taken.sums), 1e-12);
+}
+
+/// Whichever outputs go: what is left has the sums of a record that never had them, folded blocks included.
+static void outputs_go_out_of_the_sums() {
+    const std::vector<std::vector<bool>> flags = {{false, true}, {true, false}, {true, true}};
+    std::vector<double> rows = rows_of(9000, 11);
+    for (std::size_t n = 30; n < 9000; n += 30) rows[n * m] = NAN;
+    level_memory memory(n_u, n_y, lags, 100);
+    for (std::size_t n = 0; n < rows.size(); n += m) memory.add(rows.data() + n);
+    for (const std::vector<bool>& kept : flags) {
+        const int outputs = static_cast<int>(std::count(kept.begin(), kept.end(), true));
+        std::vector<double> fewer;
+        for (std::size_t i = 0; i < rows.size(); ++i)
+            if (i % m < n_u || kept[i % m - n_u]) fewer.push_back(rows[i]);
+        okid_accumulator_config_t config = okid_accumulator_defaults(n_u, outputs, lags);
+        config.edges = 1;
+        const owned_sums direct(config), taken(config);
+        const auto size = static_cast<std::size_t>((n_u + outputs) * (lags + 1));
+        TEST_ASSERT_TRUE(okid_accumulator_add(direct.sums, fewer.data(), 9000) >= 0);
+        const level_memory less = memory.without_outputs(kept);
+        TEST_ASSERT_EQUAL_INT64(memory.samples(), less.samples());
+        TEST_ASSERT_EQUAL_UINT64(memory.blocks(), less.blocks());
+        TEST_ASSERT_TRUE(less.take(taken.sums));
+        std::vector<double> expected(size * size), found(size * size);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(direct.sums, OKID_DETREND_NONE, expected.data(), nullptr));
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_gram(taken.sums, OKID_DETREND_NONE, found.data(), nullptr));
+        assert_same(expected, found, 1e-12);
+    }
+}
+
+/// A state whose sums are of another kind, in one number of their configuration, is none; and nothing has changed.
+static void sums_of_another_kind_are_not_taken_back() {
+    using config = okid_accumulator_config_t;
+    const std::vector<double> rows = rows_of(500, 8);
+    level_memory memory(n_u, n_y, lags, 100);
+    for (std::size_t n = 0; n < rows.size(); n += m) memory.add(rows.data() + n);
+    const std::vector<std::byte> state = memory.state();
+    config own[2]; // of the window, and of what it had no room for
+    byte_reader whole(state.data(), state.size());
+    whole.word();
+    for (config& each : own) {
+        const std::uint64_t bytes = whole.word();
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_peek(whole.bytes(bytes), bytes, &each));
+    }
+    const auto with = [&](const config& window, const config& base) {
+        std::vector<std::byte> other;
+        put_word(other, 500);
+        for (const config* each : {&window, &base}) {
+            const owned_sums sums(*each);
+            TEST_ASSERT_NOT_NULL(sums.sums);
+            std::vector<std::byte> bytes(okid_accumulator_serialised_size(sums.sums));
+            TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_serialise(sums.sums, bytes.data(), bytes.size()));
+            put_word(other, bytes.size());
+            other.insert(other.end(), bytes.begin(), bytes.end());
+        }
+        level_memory to(n_u, n_y, lags, 100);
+        byte_reader from(other.data(), other.size());
+        const bool taken = to.put_back(from);
+        TEST_ASSERT_EQUAL_INT64(taken ? 500 : 0, to.samples());
+        return taken;
+    };
+    TEST_ASSERT_TRUE(with(own[0], own[1]));
+    for (std::int32_t config::* number :
+         {&config::n_u, &config::n_y, &config::lags, &config::slots, &config::spare_slots, &config::edges}) {
+        config window = own[0], base = own[1];
+        window.*number += number == &config::edges && window.edges ? -1 : 1;
+        base.*number += number == &config::edges ? -1 : number == &config::slots ? 2 : 1;
+        if (number == &config::slots || number == &config::spare_slots) base.edges = 0, base.block = 50, base.slots = 2;
+        TEST_ASSERT_FALSE(with(window, own[1]));
+        TEST_ASSERT_FALSE(with(own[0], base));
+    }
+    config codes = own[0], fading = own[1];
+    codes.sample = OKID_SAMPLE_INT16;
+    fading.block = 50;
+    fading.forgetting = 0.9;
+    TEST_ASSERT_FALSE(with(codes, own[1]));
+    TEST_ASSERT_FALSE(with(own[0], fading));
 }
 
 /// Older and newest samples together have all rows but those at the seams, the filters' and the lags'.
@@ -235,6 +357,10 @@ int main() {
     UNITY_BEGIN();
     RUN_TEST(rates_row_by_row_are_those_of_the_record);
     RUN_TEST(blocks_hold_every_row);
+    RUN_TEST(blocks_without_gaps_are_alike);
+    RUN_TEST(silence_stands_before_a_record);
+    RUN_TEST(outputs_go_out_of_the_sums);
+    RUN_TEST(sums_of_another_kind_are_not_taken_back);
     RUN_TEST(nothing_is_lost_between_older_and_newest);
     RUN_TEST(records_go_as_a_whole_and_screened);
     RUN_TEST(hits_at_places_are_kept_as_samples);

@@ -180,6 +180,22 @@ static void inputs_can_be_replaced(void) {
     free(v);
 }
 
+/// Both say that it costs digits. That of a factor comes from its pivots, which tell the least it can be.
+static void both_ways_know_the_condition(void) {
+    double* v = rig_record(&rig, N, 0.05, NULL, 11);
+    for (int k = 0; k < METHODS; ++k) {
+        const okid_identify_config_t config = config_of(methods[k], RIG_NU, RIG_NZ);
+        create(&config);
+        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(square_root, v, N));
+        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run_factor(identifier, square_root, &model));
+        const double least = model.observer_info.condition;
+        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
+        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
+        TEST_ASSERT_TRUE(least > 100 && least < model.observer_info.condition);
+    }
+    free(v);
+}
+
 /// Sensors that show the force itself, but for the last digits: what is left has poles and no dynamics.
 static void a_loop_of_cable_has_no_modes(void) {
     uint64_t seed = 31;
@@ -319,6 +335,7 @@ int main(void) {
     RUN_TEST(other_orders_than_the_one_asked_for);
     RUN_TEST(ambient_records_have_modes_and_a_predictor);
     RUN_TEST(inputs_can_be_replaced);
+    RUN_TEST(both_ways_know_the_condition);
     RUN_TEST(a_loop_of_cable_has_no_modes);
     RUN_TEST(what_does_not_fit_is_refused);
     RUN_TEST(a_constant_channel_is_named);
