@@ -117,6 +117,36 @@ static void rates_row_by_row_are_those_of_the_record() {
         }
 }
 
+/// A state with a number that cannot be one, too short or too long, is none, and the chain goes on as it was.
+static void what_is_no_state_of_rates_is_not_taken() {
+    const std::vector<double> rows = rows_of(1000, 7);
+    rate_chain chain(m, 100, 2), other(m, 100, 2);
+    chain.begin_record(false);
+    other.begin_record(false);
+    const auto nothing = [](std::size_t, const double*) {};
+    for (std::size_t n = 0; n < rows.size(); n += m) chain.add(rows.data() + n, nothing);
+    const std::vector<double> state = chain.state(), fresh = other.state();
+    const auto refused = [&](const std::vector<double>& wrong) {
+        return !other.put_back(wrong) && other.state() == fresh;
+    };
+    for (std::size_t length = 0; length < state.size(); length += 7)
+        TEST_ASSERT_TRUE(refused({state.begin(), state.begin() + static_cast<std::ptrdiff_t>(length)}));
+    std::vector<double> wrong = state;
+    wrong.push_back(0);
+    TEST_ASSERT_TRUE(refused(wrong));
+    for (std::size_t place = 0; place < 2;
+         ++place) // samples that came, rows that wait: of the first rate a filter of 128
+        for (const double value : {-1.0, 0.5, 127.5, 1e16, 2000.0, static_cast<double>(NAN)}) {
+            wrong = state;
+            wrong[place] = value;
+            TEST_ASSERT_TRUE((place == 0 && value == 2000) || refused(wrong));
+        }
+    wrong = state;
+    wrong[0] = 127; // fewer than wait
+    TEST_ASSERT_TRUE(refused(wrong));
+    TEST_ASSERT_TRUE(other.put_back(state) && other.state() == state);
+}
+
 /// Every row, whether nothing is missing, a sample now and then, or every 30th: then blocks are folded.
 static void blocks_hold_every_row() {
     for (const std::size_t gap_each : {std::size_t{0}, std::size_t{997}, std::size_t{30}}) {
@@ -356,6 +386,7 @@ static void hits_at_places_are_kept_as_samples() {
 int main() {
     UNITY_BEGIN();
     RUN_TEST(rates_row_by_row_are_those_of_the_record);
+    RUN_TEST(what_is_no_state_of_rates_is_not_taken);
     RUN_TEST(blocks_hold_every_row);
     RUN_TEST(blocks_without_gaps_are_alike);
     RUN_TEST(silence_stands_before_a_record);
