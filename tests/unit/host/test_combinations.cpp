@@ -160,7 +160,7 @@ static void multiples_of_a_line_are_no_distortion() {
     add(out, 0.8, turning_at(13, thirteen()));
     add(out, 0.1, turning_at(20, power_of(ten(), 2)));
     for (const double line_hz : {5.0, 6.0, 20.0})
-        for (std::size_t place = 0; place < 3; ++place) {
+        for (const std::size_t place : {0, 2}) {
             judged found;
             found.modes = {mode_at(10, 0.01), mode_at(13, 0.01)};
             found.modes.insert(found.modes.begin() + static_cast<std::ptrdiff_t>(place), mode_at(line_hz, 1e-4));
