@@ -218,7 +218,8 @@ std::vector<neighbour> neighbours(const std::vector<consensus_run>& runs, const 
             if (&c == &other || !(apart < out[i].apart_hz)) continue;
             const double one = within(c.frequency_hz, c.damping_ratio, other.frequency_hz, other.damping_ratio);
             const double alike = shape_mac(c.members.front().found->shape, other.members.front().found->shape);
-            if (apart >= one || alike <= judgement::same_shape_of_a_run) out[i] = {apart, alike};
+            if (apart >= one || alike <= judgement::same_shape_of_a_run)
+                out[i] = {apart, runs.front().inputs == 0 ? alike : 1};
         }
     }
     return out;

@@ -202,7 +202,7 @@ bool of_machine(const std::vector<record_level>& levels, std::size_t m, std::siz
     const record_level& level = seen_by(levels, over.frequency_hz);
     const double period = level.fs_hz / base.frequency_hz, most = judgement::machine_periods * period,
                  every = static_cast<double>(longest_of(level, m)) / (2 * judgement::fewest_blocks);
-    const auto block = static_cast<std::size_t>(std::clamp(every, judgement::line_periods * period, most)) + 1;
+    const auto block = static_cast<std::size_t>(std::clamp(every, judgement::line_periods * period, most));
     const auto along = [&](const consensus_mode& one, double frequency_hz) {
         return amplitudes(level, m, n_u, weights_along(one.shape), frequency_hz, block);
     };
@@ -324,7 +324,6 @@ bool is_line(const record_level& level, std::size_t m, std::size_t n_u, bool at_
         return keeps_up &&
                track_beside(level, m, n_u, weights, mode.frequency_hz, block).away < judgement::off_its_frequency &&
                explained(level, m, n_u, false, mode, modes, block) < judgement::explained;
-    if (n_u == 0 && a.size() >= judgement::fewest_blocks && !keeps_up) return false; // neither stays nor falls
     // Few periods: shorter blocks show whether it falls.
     const std::size_t step =
         a.size() >= judgement::fewest_blocks * level.records.size()

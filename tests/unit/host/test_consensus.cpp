@@ -92,6 +92,20 @@ static void only_runs_that_can_part_two_modes_vote_on_them() {
         }
 }
 
+/// The same horizons, three outputs: a shape of its own is told from the other's where time alone does not part them.
+static void other_shapes_part_two_modes() {
+    for (const bool alike : {true, false}) {
+        auto runs = rate(6, 30, 3);
+        const auto lower = rate(6, 30, 3, 3, 12.5);
+        runs.insert(runs.end(), lower.begin(), lower.end());
+        give(runs, 0, 12, track(4.0, 0.004, bending));
+        give(runs, 0, 12, track(4.3, 0.004, alike ? bending : torsion));
+        const auto modes = find_agreement(runs);
+        TEST_ASSERT_EQUAL_UINT64(2, modes.size());
+        for (const consensus_mode& mode : modes) TEST_ASSERT_EQUAL_INT(alike ? 6 : 12, mode.could);
+    }
+}
+
 static void the_longest_horizons_vote_where_none_can_part() {
     auto runs = rate(6, 30, 1);
     give(runs, 0, 6, track(10, 0.001, {1.0}));
@@ -193,6 +207,7 @@ int main() {
     RUN_TEST(what_dies_away_is_judged_where_it_lasts);
     RUN_TEST(a_pole_that_higher_orders_resolve_is_none);
     RUN_TEST(only_runs_that_can_part_two_modes_vote_on_them);
+    RUN_TEST(other_shapes_part_two_modes);
     RUN_TEST(the_longest_horizons_vote_where_none_can_part);
     RUN_TEST(a_close_pair_is_split_only_by_its_shapes);
     RUN_TEST(a_shadow_of_a_mode_is_split);

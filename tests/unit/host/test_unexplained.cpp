@@ -70,7 +70,7 @@ static void a_mode_explains_what_is_near() {
 /// One that is believed, or named for what it is.
 static void chance_explains_nothing() {
     for (const char* code : {"tone", "pickup", "harmonic", "split"}) TEST_ASSERT_TRUE(explained_by(40, 0.01, {code}));
-    for (const char* code : {"few_runs", "noise_shape"}) {
+    for (const char* code : {"few_runs", "noise_shape", "wide_sigma"}) {
         TEST_ASSERT_FALSE(explained_by(40, 0.01, {code}));
         TEST_ASSERT_TRUE(explained_by(40, 0.01, {code, "tone"}));
     }
