@@ -369,9 +369,10 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
             s.strands[k].share_left > judgement::undriven)
             doubt("undriven", work.context.verdicts[k], modes[k]);
     work.context.warnings.emplace_back(
-        "nonlinear", fmt::format("the structure is not linear: what it does at {} moves in phase with the product of "
-                                 "these vibrations. The model holds for the level of this record",
-                                 fmt::join(products, ", ")));
+        "nonlinear",
+        fmt::format("the structure is not linear{}: what it does at {} moves in phase with the product of "
+                    "these vibrations. The model holds for the level of this record",
+                    driven ? "" : ", or what drives it has multiples, as steps have", fmt::join(products, ", ")));
     return std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; }) != before;
 }
 

@@ -6,6 +6,7 @@
 
 #include "ambient_bound.hpp"
 #include "carrier.hpp"
+#include "changed_output.hpp"
 #include "combinations.hpp"
 #include "consensus/lines.hpp"
 #include "consensus/quantity.hpp"
@@ -466,6 +467,7 @@ record_result identify_auto(record_set records, const record_options& given, con
     if (work.before)
         work.before->add_counts(asked_gaps > 0 ? missing : missing_count(), work.set.count(), work.context);
     work.context.warnings.insert(work.context.warnings.end(), screened.said.begin(), screened.said.end());
+    remark_changed_output(work.set, work.context);
     work.at_rest = begin_at_rest(work.set, options);
     if (work.at_rest) work.context.start = "rest";
     if (options.detrend == "linear") detrend_linear(work.set, options);

@@ -65,7 +65,8 @@ void test_nothing_to_say(void) {
 /// As wide as a frame has room for, and past its end: it goes on at zero.
 void test_a_counter_of_64_bits(void) {
     const drv_signal_t wide = bits_at(0, 64);
-    stream_check check(make_config(wide, right_signal));
+    const live_config config = make_config(wide, right_signal); // which outlives the check
+    stream_check check(config);
     for (std::int64_t n = 0; n < frames; ++n) {
         drv_frame_t frame = make_frame(0x101, 0, 0);
         drv_signal_put(&wide, frame.data, 8, n - 500);
