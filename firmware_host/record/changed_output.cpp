@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 #include <vector>
 
 namespace okid_host {
@@ -88,7 +89,8 @@ std::vector<Index> most_alike(const MatrixXd& correlation, Index output, Index w
     for (Index c = 0; c < n; ++c)
         if (c != output && c != without) out.push_back(c);
     const auto alike = [&](Index c) { return std::abs(correlation(n + c, n + output)); };
-    std::stable_sort(out.begin(), out.end(), [&](Index a, Index b) { return alike(a) > alike(b); });
+    std::sort(out.begin(), out.end(),
+              [&](Index a, Index b) { return std::pair(alike(b), a) < std::pair(alike(a), b); });
     out.resize(std::min(out.size(), static_cast<std::size_t>(predictors)));
     return out;
 }
@@ -164,9 +166,9 @@ std::optional<output_change> changed_output(const record_set& set) {
     const std::vector<slope_step> with_all = steps(-1);
     std::vector<Index> suspects; // the largest first
     for (Index c = 0; c < n; ++c) suspects.push_back(c);
-    std::stable_sort(suspects.begin(), suspects.end(), [&](Index a, Index b) {
-        return with_all[static_cast<std::size_t>(a)].size > with_all[static_cast<std::size_t>(b)].size;
-    });
+    const auto size = [&](Index c) { return with_all[static_cast<std::size_t>(c)].size; };
+    std::sort(suspects.begin(), suspects.end(),
+              [&](Index a, Index b) { return std::pair(size(b), a) < std::pair(size(a), b); });
     const auto output = static_cast<std::size_t>(suspects.front());
     if (!(with_all[output].size > judgement::changed_step)) return std::nullopt;
     suspects.resize(std::min(suspects.size(), named_at_most));
