@@ -7,6 +7,7 @@
 
 #include "files/order_statistics.hpp"
 #include "result/judgement.hpp"
+#include "stretch_means.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -23,11 +24,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index eighths = 8, predictors = 8, taps = 3; // regressors are `predictors` outputs at `taps` samples
-constexpr std::size_t rows_of_eighth = 500,
-                      mean_reach = 50; // of a block; samples before and after, whose mean is taken off
-constexpr std::size_t named_at_most = 8;
-constexpr double slight_ridge = 1e-6, no_slope = 0.05; // of the mean square of the regressors; a slope of nothing
-constexpr double slope_scatter = 0.02;                 // of slopes
+constexpr std::size_t rows_of_eighth = 500;            // at least
+constexpr std::size_t mean_reach = 50;                 // samples before and after, whose mean is taken off
+constexpr std::size_t most_suspects = 8;               // outputs that are left out in turn
+constexpr double slight_ridge = 1e-6;                  // of the mean square of the regressors
+constexpr double no_slope = 0.05;                      // the reciprocal of less is none
+constexpr double slope_scatter = 0.02;                 // of slopes, at least
 
 struct slope_step {
     double size = 0, at = 0, factor = 1; ///< over the scatter of the slopes
@@ -39,35 +41,30 @@ MatrixXd quick_part(const record_set& set, const record_data& record) {
     MatrixXd out(n, count);
     for (Index c = 0; c < n; ++c) {
         const double* y = set.rows(record) + set.n_u + static_cast<std::size_t>(c);
-        std::vector<double> sum(record.count + 1), known(record.count + 1);
-        for (std::size_t i = 0; i < record.count; ++i) {
-            const double x = y[i * set.channels()];
-            sum[i + 1] = sum[i] + (std::isnan(x) ? 0 : x);
-            known[i + 1] = known[i] + (std::isnan(x) ? 0 : 1);
-        }
+        const stretch_means means(y, set.channels(), record.count);
         for (std::size_t i = 0; i < record.count; ++i) {
             const std::size_t first = i - std::min(i, mean_reach), last = std::min(record.count, i + mean_reach + 1);
-            out(c, static_cast<Index>(i)) =
-                y[i * set.channels()] - (sum[last] - sum[first]) / (known[last] - known[first]);
+            out(c, static_cast<Index>(i)) = y[i * set.channels()] - means.of(first, last);
         }
     }
     return out;
 }
 
 /// Sums of products of all outputs at three samples, an eighth of the samples each; nothing where those are too short.
-std::vector<MatrixXd> block_sums(const record_set& set) {
+std::vector<MatrixXd> sums_of_eighths(const record_set& set) {
     const auto n = static_cast<Index>(set.n_y);
     std::vector<MatrixXd> sums(eighths, MatrixXd::Zero(taps * n, taps * n));
     std::vector<std::size_t> rows(eighths);
+    VectorXd row(taps * n);
     std::size_t at = 0;
     for (const record_data& record : set.records) {
         const MatrixXd y = quick_part(set, record);
         for (Index i = 1; i + 1 < y.cols(); ++i) {
-            const VectorXd row = y.middleCols(i - 1, taps).reshaped();
-            const std::size_t block = (at + static_cast<std::size_t>(i)) * eighths / set.count();
+            row = y.middleCols(i - 1, taps).reshaped();
+            const std::size_t eighth = (at + static_cast<std::size_t>(i)) * eighths / set.count();
             if (row.hasNaN()) continue;
-            sums[block].selfadjointView<Eigen::Lower>().rankUpdate(row);
-            ++rows[block];
+            sums[eighth].selfadjointView<Eigen::Lower>().rankUpdate(row);
+            ++rows[eighth];
         }
         at += record.count;
     }
@@ -117,6 +114,7 @@ MatrixXd slopes_between(const std::vector<MatrixXd>& sums, const MatrixXd& all, 
 /// The largest step of the slopes: between two eighths, or within one, which is left out then.
 slope_step largest_step(const MatrixXd& slopes) {
     slope_step out;
+    if (!slopes.allFinite()) return out;                       // of an eighth in which nothing moves nothing is known
     for (Index twice = 2; twice <= 2 * eighths - 2; ++twice) { // the place of the step in half eighths
         const auto side = [&](Index k) { return 2 * k + 1 < twice ? -1 : 2 * k + 1 > twice ? 1 : 0; };
         std::vector<double> across, within;
@@ -147,7 +145,7 @@ slope_step largest_step(const MatrixXd& slopes) {
 
 std::optional<output_change> changed_output(const record_set& set) {
     if (set.n_u > 0 || set.n_y < 3) return std::nullopt;
-    const std::vector<MatrixXd> sums = block_sums(set);
+    const std::vector<MatrixXd> sums = sums_of_eighths(set);
     if (sums.empty()) return std::nullopt;
     const auto n = static_cast<Index>(set.n_y);
     MatrixXd all = sums.front();
@@ -171,7 +169,7 @@ std::optional<output_change> changed_output(const record_set& set) {
               [&](Index a, Index b) { return std::pair(size(b), a) < std::pair(size(a), b); });
     const auto output = static_cast<std::size_t>(suspects.front());
     if (!(with_all[output].size > judgement::changed_step)) return std::nullopt;
-    suspects.resize(std::min(suspects.size(), named_at_most));
+    suspects.resize(std::min(suspects.size(), most_suspects));
     for (const Index c : suspects) // without the one that changed no step is left, without any other it is
         if ((size_of(steps(c)) < judgement::no_step) != (c == suspects.front())) return std::nullopt;
     return output_change{output, with_all[output].at, with_all[output].factor};

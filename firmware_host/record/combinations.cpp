@@ -372,7 +372,7 @@ bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_wor
         "nonlinear",
         fmt::format("the structure is not linear{}: what it does at {} moves in phase with the product of "
                     "these vibrations. The model holds for the level of this record",
-                    driven ? "" : ", or what drives it has multiples, as steps have", fmt::join(products, ", ")));
+                    driven ? "" : ", or an unmeasured force is periodic, as steps are", fmt::join(products, ", ")));
     return std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; }) != before;
 }
 

@@ -192,7 +192,7 @@ double of_shape(const listed_mode& mode, const VectorXd& noise, double of_entry,
 
 void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work) {
     result_context& context = work.context;
-    if (work.set.n_u == 0 || !context.sigma || !context.x0 || context.refined || work.before) return;
+    if (work.set.n_u == 0 || !context.sigma || !context.x0 || work.before) return;
     deviations& sigma = *context.sigma;
     fit_sums sums{work, {}, {}, {}, {}, {}};
     std::vector<std::size_t> place; // in the list, of a mode of the model

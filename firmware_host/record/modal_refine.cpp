@@ -16,19 +16,15 @@ namespace {
 constexpr double enough_of_all = 0.5; // of all samples, that a refinement has
 constexpr double same_frequency = 0.005, same_damping = 1.5,
                  same_shape = 0.95; // a mode that a refinement has not changed
-
-constexpr double known_less = 3; // times; deviations by agreement were up to 2.9 times too small (4 masses, one hit)
+constexpr double known_less =
+    3; // times, by a part of the samples: the mode decays before them. Deviations by agreement were up
+       // to 2.9 times too small (4 masses, one hit)
 
 /// Is this mode still the one it was?
 bool same_mode(const listed_mode& before, const carried_mode& after) {
     const double f = after.frequency_hz / before.frequency_hz, zeta = after.damping_ratio / before.damping_ratio;
     return std::abs(f - 1) < same_frequency && zeta > 1 / same_damping && zeta < same_damping &&
            shape_mac(before.shape, after.shape) > same_shape;
-}
-
-/// Of a part of the records: is this mode known far less by it than by all, because it soon decays?
-bool lives_elsewhere(const carried_mode& of_part, double damping_std) {
-    return of_part.damping_std > known_less * damping_std;
 }
 
 /// The refined modes in the place of those in the model, with their deviations.
@@ -67,8 +63,8 @@ bool is_held(const record_options& options, const record_set& set) {
     return options.hold == "auto" ? !falls_to_nyquist(set) : options.hold != "band";
 }
 
-/// @param by  the samples, with the model of the modes
-bool refine_by(const record_work& by, const record_options& options, std::vector<listed_mode>& listed,
+/// @param by  the samples, with the model of the modes; @param part  they are not all
+bool refine_by(const record_work& by, bool part, const record_options& options, std::vector<listed_mode>& listed,
                record_work& work) {
     const bool forced = by.set.n_u > 0;
     const noise_colour colour =
@@ -81,7 +77,7 @@ bool refine_by(const record_work& by, const record_options& options, std::vector
         return false;
     };
     if (work.force_is_older) return reject("the newest samples have too little of the force");
-    if (const std::size_t samples = refinable_samples(by); (forced || &by != &work) && !is_enough(samples, work))
+    if (const std::size_t samples = refinable_samples(by); (forced || part) && !is_enough(samples, work))
         return reject(fmt::format("it could use {} of {} samples alone", samples, work.context.samples));
     if (options.stage) options.stage("refining the modes");
     const bool constants = options.detrend != "none";
@@ -103,8 +99,10 @@ bool refine_by(const record_work& by, const record_options& options, std::vector
     for (std::size_t i = 0; i < found.size() && fault.empty(); ++i)
         if (!found[i] || !same_mode(*before[i], *found[i]))
             fault = fmt::format("the mode at {:.4g} Hz would be another one", before[i]->frequency_hz);
-        else if (&by != &work && work.context.sigma &&
-                 lives_elsewhere(*found[i], work.context.sigma->damping_ratio[before[i] - listed.data()]))
+        else if (part && work.context.sigma &&
+                 found[i]->damping_std >
+                     known_less *
+                         work.context.sigma->damping_ratio[static_cast<std::size_t>(before[i] - listed.data())])
             fault = fmt::format("the mode at {:.4g} Hz decays before what is used", before[i]->frequency_hz);
     if (!fault.empty()) return reject(fault);
     take_refined(found, listed, work);
@@ -124,14 +122,14 @@ bool refine_agreed(const record_options& options, const record_set& decays, std:
                    record_work& work) {
     if (options.refine == "no" || work.model.n_z == 0 || (work.set.n_u == 0 && work.before)) return false;
     const bool whole = options.refine == "yes" || work.set.n_u == 0 || is_held(options, work.set);
-    return (whole && refine_by(work, options, listed, work)) || refine_decays(decays, options, listed, work);
+    return (whole && refine_by(work, false, options, listed, work)) || refine_decays(decays, options, listed, work);
 }
 
 bool refine_decays(const record_set& decays, const record_options& options, std::vector<listed_mode>& listed,
                    record_work& work) {
     if (options.refine == "no" || decays.records.empty()) return false;
     const record_work trial = modal_trial(listed, decays, options);
-    return trial.model.n_z > 0 && refine_by(trial, options, listed, work);
+    return trial.model.n_z > 0 && refine_by(trial, true, options, listed, work);
 }
 
 } // namespace okid_host

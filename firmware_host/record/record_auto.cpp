@@ -273,10 +273,9 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
     if (options.picks.empty() && work.set.n_u > 0 && !work.force_is_older &&
         mark_of_noisy_outputs(listed, options.fs_hz, work))
         make_model();
-    if (!decays.records.empty()) deviations_by_fit(listed, work); // with which a refinement by a part is compared
+    deviations_by_fit(listed, work); // with which a refinement by a part is compared
     if (refine_agreed(options, decays, listed, work)) make_model();
     if (keep_numbers(options.modes, listed, work)) make_model();
-    deviations_by_fit(listed, work);
     remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);
     find_matrix_deviations(listed, options, work);
@@ -337,7 +336,7 @@ one_look look_once(record_set set, bool at_rest, record_options options, const r
     return out;
 }
 
-/// The options by which two sets of records are compared: nothing is picked by hand.
+/// The options by which two sets of records are compared: no frequencies are picked.
 record_options unpicked(record_options options) {
     options.picks.clear();
     return options;
@@ -379,7 +378,7 @@ std::vector<listed_mode> find_struck(const record_options& options, const record
     return best.listed;
 }
 
-/// The look that is believed, as the result: what was picked by hand is looked at again.
+/// The look that is believed, as the result: frequencies that were picked are looked for in it.
 std::vector<listed_mode> take_look(one_look best, const record_options& options, record_work& work) {
     if (!options.picks.empty()) best = picked_in(std::move(best.work), options, work);
     if (best.listed.empty()) std::rethrow_exception(best.fault);

@@ -2,6 +2,7 @@
 #include "record_rest.hpp"
 
 #include "files/order_statistics.hpp"
+#include "stretch_means.hpp"
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -106,20 +107,16 @@ std::vector<bool> struck_within(const std::vector<double>& force) {
 /// The force without its noise at rest: means over many samples that stand out of it, as behind a channel that has no reach to zero
 /// frequency and comes back slowly; else nothing.
 std::vector<double> without_noise(const std::vector<double>& force, const hit_force& hits) {
-    std::vector<double> out = force, sum(force.size() + 1), count(force.size() + 1);
-    for (std::size_t i = 0; i < force.size(); ++i) {
-        const bool known = !std::isnan(force[i]);
-        sum[i + 1] = sum[i] + (known ? force[i] : 0);
-        count[i + 1] = count[i] + (known ? 1 : 0);
-    }
+    std::vector<double> out = force;
+    const stretch_means means(force.data(), 1, force.size());
     const std::size_t reach = hits_of_a_mean * hits.longest / 2;
     for (std::size_t first = 0, end = 0; first < force.size(); first = end + 1) {
         for (end = first; end < force.size() && !hits.acts[end];) ++end;
         for (std::size_t i = first; i < end; ++i) {
             if (std::isnan(force[i])) continue;
             const std::size_t from = i < first + reach ? first : i - reach, to = std::min(end, i + reach + 1);
-            const double samples = count[to] - count[from], mean = (sum[to] - sum[from]) / samples;
-            out[i] = std::abs(mean) > heard_in_a_mean * hits.usual / std::sqrt(samples) ? mean : 0;
+            const double mean = means.of(from, to);
+            out[i] = std::abs(mean) > heard_in_a_mean * hits.usual / std::sqrt(means.known(from, to)) ? mean : 0;
         }
     }
     return out;
@@ -191,12 +188,9 @@ record_set after_hits(const record_set& set) {
         for (auto end = acts.begin(); end != acts.end();) {
             const auto first = std::find(std::find(end, acts.end(), true), acts.end(), false);
             end = std::find(first, acts.end(), true);
-            std::vector<double> rows;
-            for (auto i = first - acts.begin(); i < end - acts.begin(); ++i) {
-                const double* y = set.rows(record) + static_cast<std::size_t>(i) * set.channels() + set.n_u;
-                rows.insert(rows.end(), y, y + set.n_y);
-            }
-            if (!rows.empty()) out.add(record.path, rows.data(), rows.size() / set.n_y);
+            const auto begin = static_cast<std::size_t>(first - acts.begin()),
+                       last = static_cast<std::size_t>(end - acts.begin());
+            if (begin < last) out.add(record.path, set.outputs(record, begin, last).data(), last - begin);
         }
     }
     return out;

@@ -50,6 +50,16 @@ std::vector<std::vector<double>> record_set::rows_of_each() const {
     return out;
 }
 
+std::vector<double> record_set::outputs(const record_data& record, std::size_t begin, std::size_t end) const {
+    std::vector<double> out;
+    out.reserve((end - begin) * n_y);
+    for (std::size_t i = begin; i < end; ++i) {
+        const double* y = rows(record) + i * channels() + n_u;
+        out.insert(out.end(), y, y + n_y);
+    }
+    return out;
+}
+
 void record_set::add(std::string path, const double* from, std::size_t rows) {
     records.push_back({std::move(path), count(), rows});
     samples.insert(samples.end(), from, from + rows * channels());

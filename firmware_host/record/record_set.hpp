@@ -27,6 +27,8 @@ struct record_set {
     double* rows(const record_data& record) { return samples.data() + record.first * channels(); }
     const double* rows(const record_data& record) const { return samples.data() + record.first * channels(); }
     std::vector<std::vector<double>> rows_of_each() const; ///< record, copied
+    /// Outputs of samples begin .. end-1 of a record, copied.
+    std::vector<double> outputs(const record_data& record, std::size_t begin, std::size_t end) const;
     /// Another record of `rows` samples, copied.
     void add(std::string path, const double* from, std::size_t rows);
     /// Another record: samples begin .. end-1 of these rows.

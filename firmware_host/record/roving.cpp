@@ -160,12 +160,7 @@ record_set free_decays(const record_set& set) {
     out.n_y = set.n_y;
     for (const record_data& record : set.records) {
         const std::size_t first = span_of(set, record).end;
-        std::vector<double> rows;
-        for (std::size_t i = first; i < record.count; ++i) {
-            const double* y = set.rows(record) + i * set.channels() + set.n_u;
-            rows.insert(rows.end(), y, y + set.n_y);
-        }
-        out.add(record.path, rows.data(), record.count - first);
+        out.add(record.path, set.outputs(record, first, record.count).data(), record.count - first);
     }
     return out;
 }

@@ -47,19 +47,6 @@ bool is_peak(const std::vector<double>& power, std::size_t k) {
     return power[k] > above * upper_median(near);
 }
 
-/// Samples x n_y of one record, as rows.
-std::vector<std::vector<double>> outputs_of(const record_set& set) {
-    std::vector<std::vector<double>> out;
-    for (const record_data& record : set.records) {
-        std::vector<double> rows;
-        for (std::size_t i = 0; i < record.count; ++i)
-            rows.insert(rows.end(), set.rows(record) + i * set.channels() + set.n_u,
-                        set.rows(record) + (i + 1) * set.channels());
-        out.push_back(std::move(rows));
-    }
-    return out;
-}
-
 bool accounted_for(double f, double line_hz, const std::vector<listed_mode>& listed,
                    const std::vector<mode_verdict>& verdicts) {
     for (std::size_t k = 0; k < listed.size(); ++k) {
@@ -81,7 +68,8 @@ void remark_unexplained(const std::vector<listed_mode>& listed, double fs_hz, re
     std::size_t longest = 0, size = smallest;
     for (const record_data& record : set.records) longest = std::max(longest, record.count);
     while (2 * size <= largest && 2 * size * segments / 2 <= longest) size *= 2;
-    const auto all = outputs_of(set);
+    std::vector<std::vector<double>> all;
+    for (const record_data& record : set.records) all.push_back(set.outputs(record, 0, record.count));
     std::vector<std::vector<double>> left = all;
     if (set.n_u > 0 && work.context.x0) {
         std::vector<const listed_mode*> in_model;

@@ -21,8 +21,7 @@ constexpr double periods_least = 0.3; ///< where several outputs together have p
 constexpr double periods_sharp = 1.5; ///< where its damping is sharp
 constexpr double beats_seen =
     0.75; ///< of a mode and its neighbour within the horizon; with fewer a run sees one of both
-constexpr double least_alike =
-    0.1; ///< MAC with that neighbour: shapes that differ part two modes where time alone does not
+constexpr double least_alike = 0.1; ///< MAC with that neighbour: shapes part two modes where time alone does not
 constexpr double decays_left = 2; ///< in a horizon: what has fallen to a seventh at its end still tells something there
 constexpr double most_filled = 0.75;     ///< of a run's states, by two for each mode: above, weak ones find no room
 constexpr double surely_shared = 0.95;   ///< canonical correlation at that many states: there are more
@@ -96,12 +95,11 @@ constexpr double of_hits = 1;      ///< spread over mean of a force that mostly 
 constexpr double ring_periods = 3; ///< in a block, to see a vibration ring down between hits
 constexpr double falling = 0.1; ///< steps down less steps up of an amplitude, of all; hits 0.2 and more, no hits 0.05
 constexpr double stronger = 10; ///< amplitude of the vibration over that of its multiple
-constexpr double product_periods = 6; ///< in a block, of the slowest factor
-constexpr double machine_periods =
-    32;                              ///< in a block, at most, to see a tone and its multiples above what surrounds them
-constexpr double force_line = 10;    ///< power of a line of the force over that beside it
-constexpr double force_ends = 100;   ///< power of a force over that beyond the edge of its band
-constexpr double resonance_peak = 2; ///< power of the responses, over that of the force, at a mode over beside it
+constexpr double product_periods = 6;  ///< in a block, of the slowest factor
+constexpr double machine_periods = 32; ///< in a block at most, to see a tone and its multiples
+constexpr double force_line = 10;      ///< power of a line of the force over that beside it
+constexpr double force_ends = 100;     ///< power of a force over that beyond the edge of its band
+constexpr double resonance_peak = 2;   ///< power of the responses, over that of the force, at a mode over beside it
 
 // Distortion: products of stronger vibrations.
 constexpr std::size_t product_blocks = 16;    ///< to speak of a coherence
@@ -134,8 +132,8 @@ constexpr double moved_shape = 0.5;     ///< MAC of two records: below, sensors 
 constexpr std::size_t fewest_moved = 2; ///< modes; of one a change of the wind may be the reason
 constexpr double surely_apart = 4;      ///< deviations between the frequencies of two modes
 
-// An output that changes: a step of what the others say of it, over its scatter. In 29 simulated records without a change 2.3 at
-// most; a gain of 1.3 makes 4 to 9, of 2 at least 12, a turned sensor 68.
+// An output that changes: a step of what the others say of it, over its scatter. In 87 simulated ambient records without a change 4.6
+// at most; a gain of 1.3 makes 5 to 10, of 2 at least 18, a turned sensor 35 and more.
 constexpr double changed_step = 8;
 constexpr double no_step = 2; ///< is left without the output that changed
 

@@ -69,9 +69,10 @@ def test_of_hits_at_several_places() -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.4 and np.max(np.abs(z)) < 4
 
 
-def test_picked_modes_are_those_of_the_table() -> None:
+@pytest.mark.parametrize("refine", [None, False])
+def test_picked_modes_are_those_of_the_table(refine: bool | None) -> None:
     u, y = struck(0, 1)
-    every, picked = okid.identify(u, y, fs=FS), okid.identify(u, y, fs=FS, modes=[1, 3])
+    every, picked = (okid.identify(u, y, fs=FS, refine=refine, modes=modes) for modes in (None, [1, 3]))
     values = [[(m.frequency_hz, m.damping_ratio_std, m.found_in) for m in one.modes] for one in (every, picked)]
     assert values[1] == [values[0][0], values[0][2]]
 

@@ -83,6 +83,13 @@ static void what_changes_all_of_them_is_no_matter_of_one() {
     }
 }
 
+/// Nothing moves for a quarter of the record, as where a logger fills a gap with the last value.
+static void of_silence_nothing_is_known() {
+    record_set set = beam(6, {-1.0});
+    for (std::size_t i = 3000 * outputs; i < 6000 * outputs; ++i) set.samples[i] = 0;
+    TEST_ASSERT_FALSE(changed_output(set).has_value());
+}
+
 static void two_outputs_a_force_or_a_short_record_say_nothing() {
     record_set set = beam(5, {-1.0});
     set.records.front().count = 3900;
@@ -107,6 +114,7 @@ int main() {
     RUN_TEST(a_gain_and_a_sign_are_named);
     RUN_TEST(missing_samples_change_nothing);
     RUN_TEST(what_changes_all_of_them_is_no_matter_of_one);
+    RUN_TEST(of_silence_nothing_is_known);
     RUN_TEST(two_outputs_a_force_or_a_short_record_say_nothing);
     return UNITY_END();
 }

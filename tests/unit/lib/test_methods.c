@@ -36,16 +36,24 @@ static const char* name_of(int k, const char* form) {
     return text;
 }
 
+static void run_by_factor(const double* v) {
+    TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(square_root, v, N));
+    TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run_factor(identifier, square_root, &model));
+}
+
+static void run_by_sums(const double* v) {
+    TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
+    TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
+}
+
 static void every_method_finds_the_modes_without_noise(void) {
     double* v = rig_record(&rig, N, 0, NULL, 1);
     for (int k = 0; k < METHODS; ++k) {
         const okid_identify_config_t config = config_of(methods[k], RIG_NU, RIG_NZ);
         create(&config);
-        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(square_root, v, N));
-        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run_factor(identifier, square_root, &model));
+        run_by_factor(v);
         expect_modes(frequency_limit, damping_limit, 0.9, name_of(k, "factor"));
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
-        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
+        run_by_sums(v);
         expect_modes(frequency_limit, TOLERANCE(1e-7, 2e-2), 0.9, name_of(k, "gram"));
         TEST_ASSERT_TRUE(model.warnings & OKID_NOTE_ILL_CONDITIONED);
     }
@@ -186,11 +194,9 @@ static void both_ways_know_the_condition(void) {
     for (int k = 0; k < METHODS; ++k) {
         const okid_identify_config_t config = config_of(methods[k], RIG_NU, RIG_NZ);
         create(&config);
-        TEST_ASSERT_EQUAL(OKID_OK, okid_square_root_add(square_root, v, N));
-        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run_factor(identifier, square_root, &model));
+        run_by_factor(v);
         const double least = model.observer_info.condition;
-        TEST_ASSERT_EQUAL(OKID_OK, okid_accumulator_add(accumulator, v, N));
-        TEST_ASSERT_GREATER_OR_EQUAL(0, okid_identify_run(identifier, accumulator, &model));
+        run_by_sums(v);
         TEST_ASSERT_TRUE(least > 100 && least < model.observer_info.condition);
     }
     free(v);
