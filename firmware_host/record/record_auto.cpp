@@ -491,6 +491,7 @@ record_result identify_auto(record_set records, const record_options& given, con
     result.carriers = std::move(work.carriers);
     result.scale = std::move(work.scale);
     shapes_in_one_quantity(given.sensing, result.model, result.context);
+    shapes_without_delays(result.model, result.context);
     return result;
 }
 
