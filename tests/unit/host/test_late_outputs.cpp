@@ -25,7 +25,7 @@ std::vector<seen_shape> beam(int modes, const std::vector<double>& late, double 
                 std::sin(M_PI * k * (0.13 + static_cast<double>(i)) / static_cast<double>(late.size()));
             const double angle = turned - 2 * M_PI * one.frequency_hz * late[i] + complexity * normal(random);
             const std::complex<double> noise(normal(random), normal(random));
-            one.shape.push_back(std::polar(place, angle) + scatter * noise);
+            one.shape.push_back(place * std::polar(1.0, angle) + scatter * noise);
             one.variance.push_back(2 * scatter * scatter);
         }
         out.push_back(one);
