@@ -36,6 +36,13 @@ double relative_spread(const std::vector<double>& values, double about) {
 
 using chain = std::vector<const run_pole*>;
 
+/// Relative distance in frequency that weighs as much as a fifth of the shape: by a hundredth alone, each of a doublet is as near
+/// as the other.
+double one_apart(double damping_ratio) {
+    return std::clamp(judgement::same_widths * damping_ratio, judgement::least_same_frequency,
+                      judgement::same_frequency);
+}
+
 /// Distance of a pole from the end of a chain; infinite when they are not the same.
 double link_cost(const run_pole& pole, const run_pole& last, double most_hz) {
     if (last.order < pole.order - judgement::order_reach) return INFINITY;
@@ -46,7 +53,7 @@ double link_cost(const run_pole& pole, const run_pole& last, double most_hz) {
     const double dz = std::abs(pole.damping_ratio - last.damping_ratio);
     if (dz >= std::max(judgement::same_damping * wide, 1e-3)) return INFINITY;
     const double mac = shape_mac(pole.shape, last.shape);
-    return mac > judgement::same_shape_of_a_run ? e / judgement::same_frequency + 5 * (1 - mac) + dz / wide : INFINITY;
+    return mac > judgement::same_shape_of_a_run ? e / one_apart(narrow) + 5 * (1 - mac) + dz / wide : INFINITY;
 }
 
 /// Continue the chains with the poles of the next order, each by at most one, the nearest first.
@@ -143,6 +150,17 @@ struct cluster {
     bool holds(int run) const {
         return std::any_of(members.begin(), members.end(), [&](const member& m) { return m.run == run; });
     }
+    /// Has the run of a track another one of this shape and damping that is much nearer, and the track beyond its half-width?
+    bool nearer_in(const consensus_run& run, const run_track& than) const {
+        const double apart = std::abs(than.frequency_hz - frequency_hz);
+        if (apart < judgement::same_widths * std::min(than.damping_ratio, damping_ratio) * frequency_hz) return false;
+        return std::any_of(run.tracks.begin(), run.tracks.end(), [&](const run_track& t) {
+            const double wider = t.damping_ratio / damping_ratio;
+            return std::abs(t.frequency_hz - frequency_hz) < judgement::much_nearer * apart &&
+                   std::max(wider, 1 / wider) < judgement::as_lightly_damped &&
+                   shape_mac(t.shape, members.front().found->shape) >= judgement::same_shape;
+        });
+    }
     double cost(const member& m) const {
         const run_track& t = *m.found;
         const double e = std::abs(t.frequency_hz / frequency_hz - 1);
@@ -150,7 +168,7 @@ struct cluster {
             return INFINITY;
         const double mac = shape_mac(t.shape, members.front().found->shape);
         if (mac < judgement::same_shape) return INFINITY;
-        return e / judgement::same_frequency + 3 * (1 - mac) +
+        return e / one_apart(std::min(t.damping_ratio, damping_ratio)) + 3 * (1 - mac) +
                0.3 * std::abs(std::log(t.damping_ratio / damping_ratio));
     }
     void add(const member& m) {
@@ -166,7 +184,9 @@ std::vector<cluster> gather(const std::vector<consensus_run>& runs) {
         cluster* best = nullptr;
         double least = INFINITY;
         for (cluster& c : clusters)
-            if (const double cost = c.cost(m); cost < least) least = cost, best = &c;
+            if (const double cost = c.cost(m);
+                cost < least && !c.nearer_in(runs[static_cast<std::size_t>(m.run)], *m.found))
+                least = cost, best = &c;
         if (!best) best = &clusters.emplace_back();
         best->add(m);
     }

@@ -7,13 +7,16 @@
 namespace okid_host::judgement {
 
 // A track: the poles of one run that are the same vibration from one order to the next.
-constexpr double most_damping = 0.25;       ///< a pole above is no vibration to an engineer
-constexpr double same_frequency = 0.01;     ///< relative, within a run and between runs
-constexpr double same_damping = 0.3;        ///< relative, from one order to the next
-constexpr double same_shape_of_a_run = 0.9; ///< MAC, from one order to the next
-constexpr int fewest_orders = 4;            ///< a shorter track is chance
-constexpr double share_of_orders = 0.4;     ///< of the orders from its first on
-constexpr int order_reach = 8;              ///< states for which a pole may be missing
+constexpr double most_damping = 0.25;   ///< a pole above is no vibration to an engineer
+constexpr double same_frequency = 0.01; ///< relative, within a run and between runs
+constexpr double same_widths =
+    2; ///< times the damping ratio, if that is less: two of a doublet are hundredths of a percent apart
+constexpr double least_same_frequency = 1e-5; ///< relative: what a run knows at best
+constexpr double same_damping = 0.3;          ///< relative, from one order to the next
+constexpr double same_shape_of_a_run = 0.9;   ///< MAC, from one order to the next
+constexpr int fewest_orders = 4;              ///< a shorter track is chance
+constexpr double share_of_orders = 0.4;       ///< of the orders from its first on
+constexpr int order_reach = 8;                ///< states for which a pole may be missing
 
 // What a run can see.
 constexpr double periods_seen = 0.75; ///< of a mode within the horizon; with fewer its pole is a trend
@@ -28,7 +31,10 @@ constexpr double surely_shared = 0.95;   ///< canonical correlation at that many
 constexpr std::size_t fewest_voters = 6; ///< runs with the longest horizons, which vote in any case
 
 // Agreement: found_in x EMAC x (1 + MPC)/2 / (1 + (scatter of damping / scatter_scale)^2).
-constexpr double same_shape = 0.8;      ///< MAC, between runs
+constexpr double same_shape = 0.8; ///< MAC, between runs
+constexpr double much_nearer =
+    0.5; ///< of the distance of a track: if its run has another one so near, that is the mode
+constexpr double as_lightly_damped = 3; ///< … factor in damping of that other one
 constexpr int fewest_runs = 3;          ///< of MOESP and CVA, which share their projections, two may err alike
 constexpr double least_found_in = 0.5;  ///< of the runs that vote
 constexpr double least_agreement = 0.5; ///< below: short-lived, complex or scattering

@@ -136,6 +136,50 @@ static void a_close_pair_is_split_only_by_its_shapes() {
     for (const consensus_mode& mode : find_agreement(runs)) TEST_ASSERT_TRUE(mode.confident());
 }
 
+/// Two of a bell, 0.05 % apart at a damping ratio of 2e-5 and much alike: noise exchanges their shapes, not their frequencies,
+/// between runs and from order to order. One run of three has a pole between them.
+static void doublets_keep_their_frequencies() {
+    const double f = 800, split = 0.4, zeta = 2e-5;
+    const shape one = {1.0, 0.9, 0.2}, near = {1.0, 0.8, 0.4}, other = {1.0, 0.5, 0.5};
+    auto runs = rate(9, 4000, 3, 0, 2000);
+    give(runs, 0, 4, track(f, zeta, one));
+    give(runs, 0, 4, track(f + split, zeta, other));
+    give(runs, 4, 6, track(f, zeta, other));
+    give(runs, 4, 6, track(f + split, zeta, one));
+    give(runs, 6, 9, track(f + 0.3 * split, 2 * zeta, one, 0.9));
+    std::vector<double> found;
+    for (const consensus_mode& mode : find_agreement(runs))
+        if (mode.confident()) found.push_back(mode.frequency_hz);
+    TEST_ASSERT_EQUAL_UINT64(2, found.size());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, f, std::min(found[0], found[1]));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, f + split, std::max(found[0], found[1]));
+    consensus_run run = rate(1, 4000, 3, 0, 2000)[0];
+    run.orders = consensus_orders(24);
+    for (const int order : run.orders) {
+        const bool exchanged = order % 4 == 0;
+        run.poles.push_back({order, f, zeta, 1, 1, exchanged ? near : one});
+        run.poles.push_back({order, f + split, zeta, 1, 1, exchanged ? one : near});
+    }
+    link_tracks(run);
+    TEST_ASSERT_EQUAL_UINT64(2, run.tracks.size());
+    for (const run_track& t : run.tracks) TEST_ASSERT_TRUE(t.frequency_spread < 1e-9);
+}
+
+/// Five runs see both of two, the upper one first; the steadiest sees the lower alone. That one is the mode of all six.
+static void a_track_is_no_member_where_its_run_has_a_nearer_one() {
+    auto runs = rate(6, 4000, 3, 0, 2000);
+    run_track lower = track(800, 2e-5), upper = track(800.4, 2e-5);
+    lower.length = 20;
+    give(runs, 0, 1, lower);
+    upper.length = 15;
+    give(runs, 1, 6, upper);
+    lower.length = 10;
+    give(runs, 1, 6, lower);
+    const auto modes = find_agreement(runs);
+    TEST_ASSERT_EQUAL_UINT64(2, modes.size());
+    for (const consensus_mode& mode : modes) TEST_ASSERT_EQUAL_INT(mode.frequency_hz < 800.2 ? 6 : 5, mode.hits);
+}
+
 /// Beside a stronger mode of the same shape, further off than its bandwidth, but no run can tell one from the other.
 static void a_shadow_of_a_mode_is_split() {
     auto runs = rate(6, 30, 3); // 0.3 s x 3 outputs x 0.5 Hz = 0.45 beats
@@ -210,6 +254,8 @@ int main() {
     RUN_TEST(other_shapes_part_two_modes);
     RUN_TEST(the_longest_horizons_vote_where_none_can_part);
     RUN_TEST(a_close_pair_is_split_only_by_its_shapes);
+    RUN_TEST(doublets_keep_their_frequencies);
+    RUN_TEST(a_track_is_no_member_where_its_run_has_a_nearer_one);
     RUN_TEST(a_shadow_of_a_mode_is_split);
     RUN_TEST(the_horizon_holds_a_mode);
     RUN_TEST(velocities_beside_accelerations_are_no_noise);
