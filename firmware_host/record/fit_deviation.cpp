@@ -9,6 +9,7 @@
 
 #include "modal_answer.hpp"
 #include "record_uncertainty.hpp"
+#include "result/judgement.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -230,6 +231,21 @@ void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work
         for (std::size_t o = 0; o < n_y; ++o)
             sigma.shape_re[i * n_y + o] = sigma.shape_im[i * n_y + o] = of_shape(listed[i], noise, of_entry, o);
     }
+}
+
+bool doubt_wide(std::vector<listed_mode>& listed, record_work& work) {
+    if (work.set.n_u == 0 || work.set.n_y > 1 || !work.context.sigma) return false;
+    bool any = false;
+    for (std::size_t k = 0; k < listed.size(); ++k) {
+        listed_mode& mode = listed[k];
+        if (!mode.in_model || !(work.context.sigma->damping_ratio[k] > judgement::wide_damping * mode.damping_ratio ||
+                                work.context.sigma->frequency_hz[k] > judgement::widest_frequency * mode.frequency_hz))
+            continue;
+        work.context.verdicts[k].why.emplace_back("wide_sigma");
+        work.context.verdicts[k].confident = mode.in_model = false;
+        any = true;
+    }
+    return any;
 }
 
 } // namespace okid_host

@@ -10,4 +10,8 @@ namespace okid_host {
 /// @param listed  modes of work.context.sigma, in its order
 void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work);
 
+/// Of one output under a force: a mode is doubtful (`wide_sigma`) whose deviation is as large as its damping, or 5 % of its frequency.
+/// No shape says that it is one. @return whether there is one
+bool doubt_wide(std::vector<listed_mode>& listed, record_work& work);
+
 } // namespace okid_host

@@ -275,6 +275,7 @@ void make_models(std::vector<listed_mode> listed, const record_options& options,
         make_model();
     deviations_by_fit(listed, work); // with which a refinement by a part is compared
     if (refine_agreed(options, decays, listed, work)) make_model();
+    if (options.picks.empty() && doubt_wide(listed, work)) make_model();
     if (keep_numbers(options.modes, listed, work)) make_model();
     remark_unsteady(listed, options.fs_hz, work);
     find_matrices_agreed(options, work);

@@ -48,7 +48,9 @@ constexpr double worth_listing = 0.25;  ///< of agreement or of the runs: below,
 constexpr double doubtful_share = 0.5;  ///< of the runs: fewer, and a doubtful mode is not listed by itself
 constexpr double widest_damping =
     0.5; ///< sigma of damping over damping: of one output without a force, and of responses
-constexpr double widest_frequency = 0.05; ///< sigma of a frequency over it, of responses
+constexpr double wide_damping =
+    1; ///< … from where on a mode has a warning, and of one output under a force is not believed
+constexpr double widest_frequency = 0.05; ///< sigma of a frequency over it
 constexpr double fewest_periods = 8;      ///< of a mode in the record: fewer are a trend
 
 // Two that may be one.

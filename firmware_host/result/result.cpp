@@ -150,8 +150,7 @@ std::string fit_text(const result_context& context) {
 /// An indicator with four digits; "-" where it is not known.
 std::string indicator(double value) { return std::isfinite(value) ? fmt::format("{:.4f}", value) : "-"; }
 
-constexpr double widest_damping = 1, widest_frequency = 0.05; // sigma over value, beyond which it is reported
-constexpr int most_shape_columns = 6;                         // more would not stand side by side on a screen
+constexpr int most_shape_columns = 6; // more would not stand side by side on a screen
 
 std::string mode_rows(const okid_identified_t& model, const result_context& context) {
     const bool agreed = !context.verdicts.empty();
@@ -381,13 +380,13 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
                                                     : "If a channel drifts, --detrend linear; else record longer, or "
                                                       "ask for another --order"));
     const std::string wide = confident_modes(model, context, [](double f, double f_std, double zeta, double zeta_std) {
-        return f_std > widest_frequency * f || zeta_std > widest_damping * zeta;
+        return f_std > judgement::widest_frequency * f || zeta_std > judgement::wide_damping * zeta;
     });
     if (!wide.empty() && judged_by_agreement(context) && !said("wide_sigma"))
         out.emplace_back("wide_sigma", fmt::format("one standard deviation is as large as the damping, or {:.0f} % of "
                                                    "the frequency, at {}: with some block of the record left out, the "
                                                    "model has it elsewhere",
-                                                   100 * widest_frequency, wide));
+                                                   100 * judgement::widest_frequency, wide));
     return out;
 }
 

@@ -70,6 +70,34 @@ void many_give_one() {
     }
 }
 
+/// One output under a force: no shape tells such a mode from noise. Of two outputs, and without a force, other rules hold.
+void a_wide_mode_of_one_output_is_doubtful() {
+    for (const std::size_t n_u : {0U, 1U})
+        for (const std::size_t n_y : {1U, 2U}) {
+            std::vector<listed_mode> modes(4, {10, 0.01, 1, 1, std::vector<std::complex<double>>(n_y, 1), true});
+            modes[3].in_model = false;
+            record_work work;
+            work.set.n_u = n_u;
+            work.set.n_y = n_y;
+            work.context.sigma = deviations();
+            work.context.sigma->frequency_hz = {0.49, 0.51, 0.49, 0.51};
+            work.context.sigma->damping_ratio = {0.0099, 0.0099, 0.0101, 0.0101};
+            work.context.verdicts.assign(4, {true, 1, {}, false});
+            const bool judged = n_u == 1 && n_y == 1;
+            TEST_ASSERT_EQUAL(judged, doubt_wide(modes, work));
+            for (std::size_t k = 0; k < 4; ++k) {
+                const bool wide = judged && (k == 1 || k == 2);
+                TEST_ASSERT_EQUAL(wide, has_code(work.context.verdicts[k].why, "wide_sigma"));
+                TEST_ASSERT_EQUAL(!wide, work.context.verdicts[k].confident);
+                TEST_ASSERT_EQUAL(!wide && k < 3, modes[k].in_model);
+            }
+        }
+    std::vector<listed_mode> modes(1, {10, 0.01, 1, 1, {1.0}, true});
+    record_work without;
+    without.set.n_u = without.set.n_y = 1;
+    TEST_ASSERT_FALSE(doubt_wide(modes, without));
+}
+
 } // namespace
 
 int main() {
@@ -77,5 +105,6 @@ int main() {
     RUN_TEST(what_a_few_samples_leave_open_is_no_deviation);
     RUN_TEST(a_deviation_that_is_known_stays);
     RUN_TEST(many_give_one);
+    RUN_TEST(a_wide_mode_of_one_output_is_doubtful);
     return UNITY_END();
 }

@@ -116,6 +116,17 @@ static void ten_samples_at_an_extreme_are_clipped() {
         }
 }
 
+/// Six on each side: no gap is left that could be bridged. Where that would be more than a hundredth of the record, none.
+static void a_few_clipped_samples_take_their_neighbours_along() {
+    for (const std::size_t count : {2199U, 2200U}) {
+        const outcome one = screened(held(1, 10, 1000, moving(count)));
+        TEST_ASSERT_TRUE(says(one, "clipped (10 samples, the first is number 1000)"));
+        TEST_ASSERT_EQUAL_UINT64(count == 2200 ? 22 : 10, one.missing.size());
+        TEST_ASSERT_EQUAL_UINT64(count == 2200 ? 994 : 1000, one.missing.front());
+        TEST_ASSERT_EQUAL_UINT64(count == 2200 ? 1015 : 1009, one.missing.back());
+    }
+}
+
 /// A flat top has three times the samples of the hundredth of the range below it, and of the next value.
 static void clipped_is_three_times_what_is_just_below() {
     for (const std::size_t count : {29U, 30U}) {
@@ -354,6 +365,7 @@ int main() {
     UNITY_BEGIN();
     RUN_TEST(a_sound_output_is_left_alone);
     RUN_TEST(ten_samples_at_an_extreme_are_clipped);
+    RUN_TEST(a_few_clipped_samples_take_their_neighbours_along);
     RUN_TEST(clipped_is_three_times_what_is_just_below);
     RUN_TEST(a_flat_top_below_a_spike_is_one);
     RUN_TEST(a_flat_top_of_a_part_is_one);
