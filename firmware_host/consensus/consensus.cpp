@@ -150,7 +150,7 @@ struct cluster {
     bool holds(int run) const {
         return std::any_of(members.begin(), members.end(), [&](const member& m) { return m.run == run; });
     }
-    /// Has the run of a track another one of this shape and damping that is much nearer, and the track beyond its half-width?
+    /// Has the run of a track another one, of this shape and damping, that is much nearer, where the track is a bandwidth off or more?
     bool nearer_in(const consensus_run& run, const run_track& than) const {
         const double apart = std::abs(than.frequency_hz - frequency_hz);
         if (apart < judgement::same_widths * std::min(than.damping_ratio, damping_ratio) * frequency_hz) return false;

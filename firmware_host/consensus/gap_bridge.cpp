@@ -18,10 +18,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t longest_window = 40, shortest_window = 4, most_of_window = 400; // rows, rows, numbers
 constexpr std::size_t rows_of_gap = 4; // of a window, to each row of the longest gap
-constexpr double most_missing = 0.1;   // of the rows, in short gaps
-constexpr double least_power = 1e-9;   // of the power of a channel, added to it
+constexpr std::size_t longest_window = rows_of_gap * longest_bridged, shortest_window = 4; // rows
+constexpr std::size_t most_of_window = 400;                                                // numbers
+constexpr double most_missing = 0.1;                                                       // of the rows, in short gaps
+constexpr double least_power = 1e-9; // of the power of a channel, added to it
 
 bool is_missing(const double* row, std::size_t m) {
     return std::any_of(row, row + m, [](double x) { return std::isnan(x); });

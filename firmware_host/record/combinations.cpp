@@ -325,11 +325,6 @@ void fill(const record_work& work, product_search& s) {
     }
 }
 
-void doubt(const char* code, mode_verdict& verdict, listed_mode& mode) {
-    verdict.why.emplace_back(code);
-    verdict.confident = mode.in_model = false;
-}
-
 } // namespace
 
 bool mark_combinations(std::vector<listed_mode>& modes, double fs_hz, record_work& work) {

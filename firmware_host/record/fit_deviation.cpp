@@ -241,8 +241,7 @@ bool doubt_wide(std::vector<listed_mode>& listed, record_work& work) {
         if (!mode.in_model || !(work.context.sigma->damping_ratio[k] > judgement::wide_damping * mode.damping_ratio ||
                                 work.context.sigma->frequency_hz[k] > judgement::widest_frequency * mode.frequency_hz))
             continue;
-        work.context.verdicts[k].why.emplace_back("wide_sigma");
-        work.context.verdicts[k].confident = mode.in_model = false;
+        doubt("wide_sigma", work.context.verdicts[k], mode);
         any = true;
     }
     return any;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// PURPOSE  delays of outputs from complex shapes, of records whose forces are not known
+// PURPOSE  delays of outputs beside each other from shapes alone; okid/steps/skew.h has those beside the forces
 // METHOD   an entry of a real shape is a real number times e^(j (a_k - w_k tau_i)); by turns the angle a_k of each mode (in
 //          closed form) and the delay tau_i of each output (on a grid, then a parabola), least squares of what is off the line
 // NUMERICS angles are taken mod pi, so polarities do not matter; entries below three deviations say nothing
@@ -117,23 +117,23 @@ std::vector<late_output> late_outputs(const std::vector<seen_shape>& modes) {
         std::pow(with / without, left / 2) > judgement::delays_by_chance)
         return {};
     double earliest = INFINITY, least = 0;
-    std::vector<double> std(found.outputs);
+    std::vector<double> deviation(found.outputs);
     for (std::size_t i = 0; i < found.outputs; ++i) {
-        std[i] = found.spoken(i) ? found.deviation(i) * std::sqrt(std::max(1.0, with / left)) : INFINITY;
-        if (found.spoken(i) && found.tau[i] < earliest) earliest = found.tau[i], least = std[i];
+        deviation[i] = found.spoken(i) ? found.deviation(i) * std::sqrt(std::max(1.0, with / left)) : INFINITY;
+        if (found.spoken(i) && found.tau[i] < earliest) earliest = found.tau[i], least = deviation[i];
     }
     const auto is_late = [&](std::size_t i) {
-        return found.tau[i] - earliest > surely_late * std::hypot(std[i], least);
+        return found.tau[i] - earliest > surely_late * std::hypot(deviation[i], least);
     };
     double sum = 0, weight = 0; // of those that are not
     for (std::size_t i = 0; i < found.outputs; ++i) {
         if (is_late(i)) continue;
-        sum += found.tau[i] / (std[i] * std[i]);
-        weight += 1 / (std[i] * std[i]);
+        sum += found.tau[i] / (deviation[i] * deviation[i]);
+        weight += 1 / (deviation[i] * deviation[i]);
     }
     std::vector<late_output> late;
     for (std::size_t i = 0; i < found.outputs; ++i)
-        if (is_late(i)) late.push_back({i, found.tau[i] - sum / weight, std[i]});
+        if (is_late(i)) late.push_back({i, found.tau[i] - sum / weight, deviation[i]});
     return late;
 }
 

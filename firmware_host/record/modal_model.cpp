@@ -90,6 +90,11 @@ bool put_inputs(const std::vector<listed_mode>& modes, const mode_inputs& inputs
 
 mode_verdict verdict_of(const consensus_mode& mode) { return {mode.confident(), mode.found_in, mode.why, mode.picked}; }
 
+void doubt(const char* code, mode_verdict& verdict, listed_mode& mode) {
+    verdict.why.emplace_back(code);
+    verdict.confident = mode.in_model = false;
+}
+
 std::complex<double> discrete_pole(const listed_mode& mode, double dt) {
     return std::exp(continuous_pole(mode.frequency_hz, mode.damping_ratio) * dt);
 }

@@ -20,6 +20,9 @@ struct listed_mode {
     bool in_model;
 };
 
+/// Not believed, for the reason of this code: listed, and in no model.
+void doubt(const char* code, mode_verdict& verdict, listed_mode& mode);
+
 constexpr int markov_blocks = 61; // as 30 block rows give
 
 /// exp(lambda dt)

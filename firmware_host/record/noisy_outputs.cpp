@@ -75,10 +75,7 @@ bool mark_of_noisy_outputs(std::vector<listed_mode>& modes, double fs_hz, record
     const auto believed =
         std::count_if(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; });
     if (alone.size() == static_cast<std::size_t>(believed)) return true; // there is nothing to compare with
-    for (const auto& [k, output] : alone) {
-        work.context.verdicts[k].why.emplace_back("noisy_output");
-        work.context.verdicts[k].confident = modes[k].in_model = false;
-    }
+    for (const auto& [k, output] : alone) doubt("noisy_output", work.context.verdicts[k], modes[k]);
     return true;
 }
 

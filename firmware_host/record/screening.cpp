@@ -5,6 +5,7 @@
 //          beyond all neighbours; two or three beyond what the record does about them, too
 #include "screening.hpp"
 
+#include "consensus/gap_bridge.hpp"
 #include "files/order_statistics.hpp"
 #include "record_rest.hpp"
 
@@ -12,6 +13,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <map>
+#include <set>
 #include <string_view>
 
 namespace okid_host {
@@ -24,10 +26,10 @@ constexpr double extreme_ratio = 3;    // at the extreme over just below it; 2.4
 constexpr std::size_t fewest_extreme = 10;
 constexpr std::size_t parts = 16, shortest_part = 500; // samples; of a record, each may have a range of its own
 constexpr std::size_t frozen_run = 32, zero_run = 6;
-constexpr std::size_t beside_clipped = 6; // samples on each side: such a gap is too long to be bridged
-constexpr double few_clipped = 0.01;      // of the samples, with those
-constexpr double usual_runs = 8;          // times the longest of all but the rarest thousandth of runs
-constexpr double moving_share = 0.3;      // of the usual spread, before and after a frozen stretch
+constexpr std::size_t beside_clipped = longest_bridged / 2 + 1; // samples on each side
+constexpr double few_clipped = 0.01;                            // of the samples, with those
+constexpr double usual_runs = 8;     // times the longest of all but the rarest thousandth of runs
+constexpr double moving_share = 0.3; // of the usual spread, before and after a frozen stretch
 constexpr double spike_spreads = 15, spike_ratio = 5;
 constexpr double spreads_around = 8; // of one of two or three samples: a pulse that runs along a beam is as narrow
 constexpr std::size_t spike_reach = 6, beside_spike = about_a_spike;
@@ -254,11 +256,13 @@ std::string fault_text(const std::string& output, const std::vector<fault>& foun
 /// What was lost because it was large is not to be guessed from what was not: its error would come with every hit. Where samples
 /// are clipped in few places, those beside them become missing too, so that no gap there is short enough to be bridged.
 void widen_clipped(const output_view& y, const std::vector<std::size_t>& clipped) {
-    std::vector<std::size_t> wide;
+    const double most = few_clipped * static_cast<double>(y.size());
+    if (static_cast<double>(clipped.size()) > most) return;
+    std::set<std::size_t> wide;
     for (const std::size_t i : clipped)
-        for (std::size_t k = i - std::min(i, beside_clipped); k <= std::min(i + beside_clipped, y.size() - 1); ++k)
-            if (wide.empty() || k > wide.back()) wide.push_back(k);
-    if (static_cast<double>(wide.size()) > few_clipped * static_cast<double>(y.size())) return;
+        for (std::size_t k = i - std::min(i, beside_clipped); k <= i + beside_clipped && k < y.size(); ++k)
+            wide.insert(k);
+    if (static_cast<double>(wide.size()) > most) return;
     for (const std::size_t i : wide) y.drop(i);
 }
 
@@ -279,13 +283,13 @@ std::vector<fault> screen(const output_view& y, const force_times& forces) {
     const double usual = spread_of(y, 0, y.size());
     find_clipped(y, runs, usual, clipped);
     find_frozen(y, runs, forces.resting, usual, low, high, frozen, zeros);
+    widen_clipped(y, clipped.samples);
     std::vector<fault> out;
     for (fault* found : {&clipped, &frozen, &zeros, &spikes}) {
         if (found->samples.empty()) continue;
         std::sort(found->samples.begin(), found->samples.end());
         found->samples.erase(std::unique(found->samples.begin(), found->samples.end()), found->samples.end());
         for (const std::size_t i : found->samples) y.drop(i);
-        if (found == &clipped) widen_clipped(y, found->samples);
         found->record = &y.record;
         out.push_back(std::move(*found));
     }

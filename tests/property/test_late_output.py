@@ -23,11 +23,18 @@ def record(forces: bool, late: list[int]) -> laboratory.Laboratory:
     return made
 
 
+def identified(made: laboratory.Laboratory) -> okid.Result:
+    u = made.samples[:, : made.n_u] if made.n_u else None
+    return okid.identify(u, made.samples[:, made.n_u :], fs=made.fs)
+
+
+def confident(made: laboratory.Laboratory) -> list[okid.Mode]:
+    return [mode for mode in identified(made).modes if mode.confident]
+
+
 def warned(made: laboratory.Laboratory) -> str:
     """The text of `late_output`, or nothing."""
-    u = made.samples[:, : made.n_u] if made.n_u else None
-    found = okid.identify(u, made.samples[:, made.n_u :], fs=made.fs)
-    return "".join(one.text for one in found.warnings if one.code == "late_output")
+    return "".join(one.text for one in identified(made).warnings if one.code == "late_output")
 
 
 @pytest.mark.parametrize("forces", [False, True])
@@ -35,6 +42,17 @@ def test_late_outputs_are_named(forces: bool) -> None:
     told = re.findall(r"(\w+) ([0-9.]+) ms", warned(record(forces, [1, 4])))
     assert [name for name, _ in told] == ["y2", "y5"]
     assert all(abs(float(ms) / (1e3 * LATE_S) - 1) < 0.05 for _, ms in told)
+
+
+@pytest.mark.parametrize("forces", [False, True])
+def test_shapes_are_without_the_delays(forces: bool) -> None:
+    """One mode beside the other: those of the same record with no output late."""
+    late, sound = (confident(record(forces, outputs)) for outputs in ([1, 4], []))
+    assert len(late) == len(sound) >= 5
+    for one, other in zip(late, sound, strict=True):
+        a, b = np.asarray(one.shape), np.asarray(other.shape)
+        assert np.abs(np.vdot(a, b)) ** 2 > 0.99 * np.vdot(a, a).real * np.vdot(b, b).real
+        assert one.mpc == pytest.approx(other.mpc, abs=0.02)
 
 
 @pytest.mark.parametrize("forces", [False, True])
